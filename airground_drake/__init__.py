@@ -1,0 +1,1 @@
+"""Event-triggered UAV-to-UGV intervention on Drake, with verification reports."""

@@ -1,0 +1,73 @@
+"""Decision time, error rate and Bayes-optimal threshold of the drift-diffusion model, eqs (16)-(19).
+
+Formulas after Bogacz et al., Psychological Review 113(4), 2006, in physical units: threshold zeta and initial
+deviation in m, drift in m/s, noise intensity in m/sqrt(s). The paper's (17)-(18) are these with the initial
+deviation divided by the drift, that is in seconds; its (19) has the right-hand side upside down.
+"""
+
+from __future__ import annotations
+
+import math
+
+from scipy.optimize import brentq
+
+
+def decision_time(zeta: float, drift: float, noise: float, deviation: float = 0.0) -> float:
+    """Mean time to reach +-zeta from `deviation`, (17), s.
+
+    Raises:
+        ValueError: if zeta, drift or noise is not positive, or |deviation| >= zeta.
+    """
+    _check(zeta, drift, noise, deviation)
+    time = zeta / drift * math.tanh(zeta * drift / noise**2)
+    return time + 2.0 * zeta / drift * _bias(zeta, drift, noise, deviation) - deviation / drift
+
+
+def error_rate(zeta: float, drift: float, noise: float, deviation: float = 0.0) -> float:
+    """Probability to reach -zeta first from `deviation`, (18).
+
+    Raises:
+        ValueError: if zeta, drift or noise is not positive, or |deviation| >= zeta.
+    """
+    _check(zeta, drift, noise, deviation)
+    unbiased = 0.5 * (1.0 - math.tanh(zeta * drift / noise**2))
+    return unbiased - _bias(zeta, drift, noise, deviation)
+
+
+def bayes_risk(zeta: float, drift: float, noise: float, c1: float, c2: float, deviation: float = 0.0) -> float:
+    """B = c1 T + c2 E, (16); c1 in 1/s, c2 without unit. Raises ValueError as its parts do."""
+    return c1 * decision_time(zeta, drift, noise, deviation) + c2 * error_rate(zeta, drift, noise, deviation)
+
+
+def optimal_threshold(drift: float, noise: float, c1: float, c2: float) -> float:
+    """Threshold, m, that minimises the Bayes risk without initial deviation: (19) with c2/c1 on the right.
+
+    Raises:
+        ValueError: if an argument is not positive and finite.
+    """
+    for name, value in {"drift": drift, "noise": noise, "c1": c1, "c2": c2}.items():
+        if not (math.isfinite(value) and value > 0.0):
+            raise ValueError(f"{name} must be positive and finite, got {value!r}")
+    scale = 2.0 * drift / noise**2
+    ratio = c2 / c1
+
+    def residual(u: float) -> float:  # u = 2 zeta drift / noise^2, so that nothing overflows
+        return noise**2 / drift**2 * (math.sinh(u) + u) - ratio
+
+    upper = math.asinh(ratio * drift**2 / noise**2)  # sinh(upper) alone already reaches the right-hand side
+    return float(brentq(residual, 0.0, upper, xtol=1e-15 * max(upper, 1e-300), rtol=8.9e-16)) / scale
+
+
+def _bias(zeta: float, drift: float, noise: float, deviation: float) -> float:
+    """(1 - exp(-2 y0 a / s^2)) / (2 sinh(2 zeta a / s^2)), written so that it cannot overflow."""
+    u = 2.0 * zeta * drift / noise**2
+    w = 2.0 * deviation * drift / noise**2
+    return (math.exp(-u) - math.exp(-u - w)) / -math.expm1(-2.0 * u)
+
+
+def _check(zeta: float, drift: float, noise: float, deviation: float) -> None:
+    for name, value in {"zeta": zeta, "drift": drift, "noise": noise}.items():
+        if not (math.isfinite(value) and value > 0.0):
+            raise ValueError(f"{name} must be positive and finite, got {value!r}")
+    if not abs(deviation) < zeta:
+        raise ValueError(f"the initial deviation {deviation!r} m must lie inside the thresholds +-{zeta!r} m")

@@ -1,0 +1,45 @@
+"""Exceptions of the package; messages say what, where and what is allowed."""
+
+from __future__ import annotations
+
+VALUE_WIDTH = 120
+"""Longer values are cut in messages, characters."""
+
+
+class AirgroundError(Exception):
+    """Base class of the package's own exceptions."""
+
+
+class Fault(str):
+    """What is wrong, in words, where there is no single offending value to show."""
+
+
+class ScenarioError(AirgroundError):
+    """A scenario file that cannot be used. The message is one printable line.
+
+    Attributes:
+        source: file (with line where known) or command-line option.
+        key: dotted path of the offending key, or ''.
+        value: the offending value, or a `Fault`.
+        allowed: what is allowed there.
+    """
+
+    def __init__(self, source: str, key: str, value: object, allowed: str) -> None:
+        """Build the one-line message from its parts."""
+        self.source, self.key, self.value, self.allowed = source, key, value, allowed
+        where = f"{source}: {key}: " if key else f"{source}: "
+        fault = str(value) if isinstance(value, Fault) else f"{_short(repr(value))} is not allowed"
+        super().__init__(_one_line(f"{where}{fault}; {allowed}"))
+
+
+class TraceError(AirgroundError):
+    """A trace that is missing, truncated, tampered with or not finite."""
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= VALUE_WIDTH else f"{text[: VALUE_WIDTH - 3]}..."
+
+
+def _one_line(text: str) -> str:
+    """Escape what would break the line or upset a terminal."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)

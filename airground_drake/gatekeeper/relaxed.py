@@ -1,0 +1,169 @@
+"""The paper's route: relaxation (27) as a convex quadratic program, then sum-up rounding (28)-(29)."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+from pydrake.solvers import ClarabelSolver, MathematicalProgram
+
+from airground_drake.gatekeeper.problem import Decision, Problem
+from airground_drake.gatekeeper.rounding import rounding_deviation, sum_up_rounding
+from airground_drake.nsbc.task import Array
+
+_AXES = 2  # UGVs move in their plane
+
+
+class RelaxedRoute:
+    """Relax, solve, round; every decision carries its optimality gap.
+
+    The obstacle constraint (26d) is replaced by supporting half-planes n_k.(p_k - o) >= d - u_k with unit n_k.
+    As ||p_k - o|| >= n_k.(p_k - o), they imply (26d) for any n_k: conservative, never optimistic. The n_k are
+    taken along the better of the two constant plans. The plan returned is the cheapest, by the exact cost
+    (25), of the rounded one and the two constant ones.
+
+    The program is built once for a number of stages and points, then only its coefficients change. Rows that
+    no plan can reach are left unbounded, which the solver's interface drops.
+    """
+
+    def __init__(self) -> None:
+        """Start without any program."""
+        self._programs: dict[tuple[int, int], _Program] = {}
+        self._solver = ClarabelSolver()
+
+    def decide(self, problem: Problem) -> Decision:
+        """Accept or refuse: never raises for a hard or broken problem, but refuses and says why."""
+        stages = problem.stages
+        ones, zeros = np.ones(stages), np.zeros(stages)
+        accept, refuse = problem.evaluate(ones), problem.evaluate(zeros)
+        if not np.isfinite([accept.objective, refuse.objective]).all():
+            return Decision(False, "refused_not_finite")
+        guide = accept if accept.objective < refuse.objective else refuse
+        normals = _normals(problem, guide.positions)
+        relaxed, bound = self._solve(problem, normals)
+        if relaxed is None:
+            return Decision(
+                False,
+                "refused_solver_failed",
+                objective_accept=accept.objective,
+                objective_refuse=refuse.objective,
+            )
+        rounded = sum_up_rounding(relaxed)
+        plans = (problem.evaluate(rounded), accept, refuse)
+        best = min(plans, key=lambda plan: plan.objective)
+        convexified = min(_convexified_cost(problem, normals, plan.positions) for plan in plans)
+        return Decision(
+            accept=bool(best.omega[0] == 1.0),
+            status="optimal",
+            objective=best.objective,
+            lower_bound=bound,
+            gap=(convexified - bound) / max(convexified, 1e-12),
+            relaxed_first_stage=float(relaxed[0]),
+            rounding_deviation=rounding_deviation(relaxed, rounded, problem.dt),
+            clearance=min(best.clearance, 1e9),
+            objective_accept=min(plan.objective for plan in plans if plan.omega[0] == 1.0),
+            objective_refuse=min(plan.objective for plan in plans if plan.omega[0] == 0.0),
+        )
+
+    def _solve(self, problem: Problem, normals: Array) -> tuple[Array | None, float]:
+        size = (problem.stages, len(problem.distances))
+        if size not in self._programs:
+            self._programs[size] = _Program(*size, problem.slack_weight * problem.dt)
+        program = self._programs[size]
+        program.update(problem, normals)
+        result = self._solver.Solve(program.program)
+        omega = result.GetSolution(program.omega)
+        cost = result.get_optimal_cost()
+        if not result.is_success() or not np.isfinite(omega).all() or not np.isfinite(cost):
+            del self._programs[size]  # a fresh workspace after a failure
+            return None, -1.0
+        return np.clip(omega, 0.0, 1.0), float(cost)
+
+
+class _Program:
+    """MathematicalProgram of the relaxation; variables p (2N), omega (N), u (N). Coefficients change, not shape."""
+
+    def __init__(self, stages: int, points: int, slack_cost: float) -> None:
+        size = _AXES * stages
+        self.program = MathematicalProgram()
+        p = self.program.NewContinuousVariables(size, "p")
+        self.omega = self.program.NewContinuousVariables(stages, "omega")
+        u = self.program.NewContinuousVariables(stages, "u")
+        self._eye = np.eye(size)
+        self._dynamics_matrix = np.hstack([self._eye - np.eye(size, k=-_AXES), np.zeros((size, stages))])
+        self._avoidance_matrix = np.zeros((stages * points, size + stages))
+        self._row = np.arange(stages * points).reshape(stages, points)
+        self._stage = np.arange(stages)
+        self._avoidance_matrix[self._row, size + self._stage[:, None]] = 1.0
+        unbounded = np.full(stages * points, np.inf)
+
+        self._tracking = self.program.AddQuadraticCost(self._eye, np.zeros(size), p, is_convex=True)
+        slack = self.program.AddQuadraticCost(2.0 * slack_cost * np.eye(stages), np.zeros(stages), u, is_convex=True)
+        box = self.program.AddBoundingBoxConstraint(0.0, 1.0, self.omega)
+        sign = self.program.AddBoundingBoxConstraint(0.0, np.inf, u)
+        self._dynamics = self.program.AddLinearEqualityConstraint(
+            self._dynamics_matrix, np.zeros(size), np.concatenate([p, self.omega])
+        )
+        names = {"(25) task error": self._tracking, "(25) slack": slack, "(27c) relaxed": box, "(27e)": sign}
+        names["(23), (27b)"] = self._dynamics
+        if points:
+            self._avoidance = self.program.AddLinearConstraint(
+                self._avoidance_matrix, -unbounded, unbounded, np.concatenate([p, u])
+            )
+            names["(27d) as half-planes"] = self._avoidance
+        for name, binding in names.items():
+            binding.evaluator().set_description(name)
+
+    def update(self, problem: Problem, normals: Array) -> None:
+        """Put in the data of a problem of this size."""
+        weight = 2.0 * problem.error_weight * problem.dt
+        reference = problem.reference[:, :_AXES].ravel()
+        self._tracking.evaluator().UpdateCoefficients(
+            weight * self._eye, -weight * reference, 0.5 * weight * float(reference @ reference), is_convex=True
+        )
+        size = len(reference)
+        drift = problem.dt * problem.refuse[:, :_AXES]
+        drift[0] += problem.initial[:_AXES]
+        for axis in range(_AXES):
+            change = problem.dt * (problem.accept - problem.refuse)[:, axis]
+            self._dynamics_matrix[_AXES * self._stage + axis, size + self._stage] = -change
+            self._avoidance_matrix[self._row, _AXES * self._stage[:, None] + axis] = normals[:, :, axis]
+        self._dynamics.evaluator().UpdateCoefficients(self._dynamics_matrix, drift.ravel())
+        if self._row.size:
+            lower = np.where(_reachable(problem), _offsets(problem, normals), -np.inf).ravel()
+            self._avoidance.evaluator().UpdateCoefficients(self._avoidance_matrix, lower, np.full(len(lower), np.inf))
+
+
+def _offsets(problem: Problem, normals: Array) -> Array:
+    """d + n.(o - height): right-hand sides (N, m) of the half-planes in the plane of motion, m."""
+    planar = np.einsum("kmi,kmi->km", normals[:, :, :_AXES], problem.centres[:, :, :_AXES])
+    height = normals[:, :, 2] * (problem.initial[2] - problem.centres[:, :, 2])
+    return problem.distances + planar - height
+
+
+def _reachable(problem: Problem) -> npt.NDArray[np.bool_]:
+    """(N, m): False where no relaxed plan can come within the safe distance, so that the row cannot bind.
+
+    Any plan stays, per axis, between the running sums of the smaller and of the larger mode velocity.
+    """
+    both = np.stack([problem.accept, problem.refuse])
+    low = problem.initial + problem.dt * np.cumsum(both.min(axis=0), axis=0)
+    high = problem.initial + problem.dt * np.cumsum(both.max(axis=0), axis=0)
+    outside = np.maximum(low[:, None] - problem.centres, problem.centres - high[:, None])
+    gap = np.maximum(outside, 0.0)
+    within: npt.NDArray[np.bool_] = np.einsum("kmi,kmi->km", gap, gap) < problem.distances**2
+    return within
+
+
+def _normals(problem: Problem, positions: Array) -> Array:
+    """Unit vectors (N, m, 3) from the points to a guiding trajectory (N, 3)."""
+    offset = positions[:, None, :] - problem.centres
+    norm = np.linalg.norm(offset, axis=2, keepdims=True)
+    fallback = np.broadcast_to([1.0, 0.0, 0.0], offset.shape)
+    return np.where(norm > 1e-9, offset / np.maximum(norm, 1e-9), fallback)
+
+
+def _convexified_cost(problem: Problem, normals: Array, positions: Array) -> float:
+    """Cost of a plan through positions (N, 3) when its slack is measured to the half-planes, not to the discs."""
+    reach = np.einsum("kmi,kmi->km", normals, positions[:, None, :] - problem.centres)
+    slack = np.maximum(0.0, (problem.distances - reach).max(axis=1, initial=0.0))
+    return problem.cost(positions, slack)

@@ -1,0 +1,81 @@
+"""The detour policy: shortest path round the obstacles that the UAV knows, back to the preset trajectory."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from airground_drake.intervention.paths import NoPath, shortest_path
+from airground_drake.intervention.policy import Observation, Policy
+from airground_drake.nsbc.motion import Motion
+from airground_drake.nsbc.task import Array
+
+SAMPLE_S = 0.05
+"""Spacing of the vertices of the motion, s."""
+
+RENDEZVOUS_TOLERANCE_S = 1e-3
+
+
+class Detour(Policy):
+    """Meet the preset trajectory again as early as possible, by the shortest safe path at a set speed.
+
+    Attributes:
+        speed: along the path, m/s.
+        clearance: kept beyond the safe distance, m.
+        follow: how long the proposal goes on along the preset trajectory after the rendezvous, s.
+    """
+
+    def __init__(self, *, speed_m_s: float, clearance_m: float = 0.05, follow_s: float = 5.0) -> None:
+        """Set the parameters.
+
+        Raises:
+            ValueError: if the speed is not positive or another parameter negative.
+        """
+        if not (speed_m_s > 0.0 and clearance_m >= 0.0 and follow_s >= 0.0):
+            raise ValueError(
+                f"detour needs speed_m_s > 0, clearance_m >= 0 and follow_s >= 0, "
+                f"got {speed_m_s!r}, {clearance_m!r}, {follow_s!r}"
+            )
+        self.speed = speed_m_s
+        self.clearance = clearance_m
+        self.follow = follow_s
+
+    def propose(self, seen: Observation) -> Motion | None:
+        """Shortest path to the earliest rendezvous with the preset trajectory, then along it.
+
+        None where no free path to the preset trajectory exists up to its end.
+        """
+        height = seen.position[2]
+        reach = seen.safe_distance + self.clearance
+        squared = reach**2 - (seen.obstacles[:, 2] - height) ** 2
+        centres = seen.obstacles[squared > 0.0, :2]
+        radii = np.sqrt(squared[squared > 0.0])
+        start = seen.position[:2]
+
+        duration = 0.0
+        while True:  # the duration only grows: by a sample where the preset is blocked, else to the travel time
+            goal = seen.preset.at(seen.start + duration)[0][:2]
+            try:
+                path = shortest_path(start, goal, centres, radii)
+                needed = path.length_m / self.speed
+            except NoPath:
+                if seen.start + duration > seen.preset.end:
+                    return None
+                needed = duration + SAMPLE_S
+            else:
+                if needed <= duration + RENDEZVOUS_TOLERANCE_S:
+                    break
+            duration = needed
+
+        count = max(1, math.ceil(duration / SAMPLE_S))
+        legs = np.array([path.at(path.length_m * k / count)[0] for k in range(count + 1)])
+        times = seen.start + np.linspace(0.0, max(duration, RENDEZVOUS_TOLERANCE_S), count + 1)
+        return _then_follow(times, legs, seen.preset, self.follow, height)
+
+
+def _then_follow(times: Array, legs: Array, preset: Motion, follow: float, height: float) -> Motion:
+    """Append the preset trajectory, from its next vertex or sample on, to planar legs (k, 2) at times (k,)."""
+    after = times[-1] + np.arange(1, max(1, round(follow / SAMPLE_S)) + 1) * SAMPLE_S
+    points = np.concatenate([legs, preset.sample(after)[:, :2]])
+    return Motion(np.concatenate([times, after]), np.column_stack([points, np.full(len(points), height)]))

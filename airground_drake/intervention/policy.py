@@ -1,0 +1,78 @@
+"""What an intervention policy sees and what it proposes: the plug-in interface of the behaviour database."""
+
+from __future__ import annotations
+
+import abc
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, Self
+
+import numpy as np
+
+from airground_drake.nsbc.motion import Motion
+from airground_drake.nsbc.task import Array, pseudoinverse
+
+
+@dataclass(frozen=True)
+class Observation:
+    """What the UAV knows when it plans for one UGV.
+
+    Attributes:
+        t: time, s.
+        start: earliest time at which a proposal made now can act, s (messages take a period each way).
+        robot: name of the UGV.
+        position: its position, (3,), m, world frame.
+        target: its target, (3,), m.
+        preset: its preset trajectory.
+        obstacles: centres of the obstacles on the UAV's own map, (m, 3), m.
+        safe_distance: distance d to keep from them, m.
+        refusals: number of proposals that the UGV has refused since the trigger.
+    """
+
+    t: float
+    start: float
+    robot: str
+    position: Array
+    target: Array
+    preset: Motion
+    obstacles: Array
+    safe_distance: float
+    refusals: int
+
+
+@dataclass(frozen=True, eq=False)
+class Proposal:
+    """The UAV's intervention task for one UGV, eqs (12)-(14), as data: the message that is sent.
+
+    Attributes:
+        policy: name of the policy that made it.
+        issued: time of sending, s; identifies the proposal in the UGV's answer.
+        motion: desired value of the task over time: where the UGV is to be.
+        selection: J_int, (m, 3), directions in which the UAV intervenes (default: all).
+    """
+
+    policy: str
+    issued: float
+    motion: Motion
+    selection: Array = field(default_factory=lambda: np.eye(3))
+
+    @cached_property
+    def chosen(self) -> Array:
+        """J_int^+ J_int, the projector onto the directions in which the UAV intervenes, (3, 3)."""
+        return pseudoinverse(self.selection) @ self.selection
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        """Immutable: the copy is the object itself."""
+        return self
+
+
+class Policy(abc.ABC):
+    """An intervention behaviour of the UAV. Subclasses take their parameters as keyword numbers.
+
+    A policy may fail: an exception, or anything but a Motion of finite numbers or None, counts as no
+    intervention and is reported (see `database.py`). No policy's code runs in a UGV's control loop.
+    """
+
+    @abc.abstractmethod
+    def propose(self, seen: Observation) -> Motion | None:
+        """The motion that the UGV is asked to make from `seen.start` on, or None for no intervention."""

@@ -1,0 +1,1 @@
+"""Null-space-based behavioural control: tasks, composition, set-based avoidance (pure maths)."""

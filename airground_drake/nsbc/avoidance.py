@@ -1,0 +1,103 @@
+"""Set-based avoidance: inequality tasks that keep every sampled step at the safe distance.
+
+For a robot at distance D from a point that it must keep away from by d, with n the unit vector away from
+that point, the velocity v of one control period h must satisfy
+
+    n.v >= share * A (d - D)     if D <= d    (recover, at the rate of task (8)),
+    n.v >= -share * (D - d) / h  otherwise    (do not arrive closer than d),
+
+with share = 1 for an obstacle and 1/2 for each robot of a pair. As ||x + s v|| >= ||x|| + s (x.v)/||x||, the
+distance is then at least d during the whole period, whatever velocity the lower priorities ask for: v = 0
+satisfies all of them, so a safe choice always exists.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+
+from airground_drake.nsbc import kernels
+from airground_drake.nsbc.task import Array
+
+Composition = Literal["augmented", "recursion_nearest", "recursion_listed"]
+COMPOSITIONS: tuple[Composition, ...] = get_args(Composition)
+_CODES = {"augmented": kernels.AUGMENTED, "recursion_nearest": kernels.RECURSION_NEAREST,
+          "recursion_listed": kernels.RECURSION_LISTED}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class HalfSpaces:
+    """K velocity constraints for each of n robots: normal . v >= bound.
+
+    Attributes:
+        normal: (n, K, 3); unit vectors away from what is avoided, with 0 in directions in which the robot
+            cannot move.
+        bound: (n, K), m/s; -inf where out of sensing range.
+    """
+
+    normal: Array
+    bound: Array
+
+    def slack(self, velocity: Array) -> Array:
+        """normal . v - bound for velocities (n, 3) m/s: (n, K) m/s, negative where violated."""
+        return np.matmul(self.normal, velocity[..., None])[..., 0] - self.bound
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What each of n robots must keep away from, K points each.
+
+    Attributes:
+        centre: (n, K, 3), m, world frame.
+        distance: safe distances d, (n, K), m.
+        share: fraction of the constraint that this robot takes, (n, K): 1 (obstacle) or 1/2 (robot).
+    """
+
+    centre: Array
+    distance: Array
+    share: Array
+
+
+@dataclass(frozen=True)
+class Avoidance:
+    """The avoidance layer of a team: parameters of the inequalities and of their composition.
+
+    Attributes:
+        gain: A of (8), 1/s.
+        period: control period h, s; gain * period <= 1 keeps the recovery from overshooting.
+        sensing_range: farther points are not seen, m.
+        composition: 'augmented' is the KKT point of min ||v - lower||^2 under all constraints, that is the
+            augmented null-space projection over the active set, shortened to be exact in floating point.
+            'recursion_nearest' and 'recursion_listed' apply (5) as printed to the same constraints, with the
+            nearest or the first listed obstacle as highest priority; they are not safe, and here to show it.
+    """
+
+    gain: float
+    period: float
+    sensing_range: float = np.inf
+    composition: Composition = "augmented"
+
+    @property
+    def code(self) -> int:
+        """The composition as the kernels take it."""
+        return _CODES[self.composition]
+
+    def half_spaces(self, position: Array, mobility: Array, around: Surroundings) -> HalfSpaces:
+        """Constraints at positions (n, 3) m; mobility (n, 3) is 1 where a robot can move, else 0."""
+        return HalfSpaces(
+            *kernels.team_half_spaces(
+                position, around.centre, around.distance, around.share,
+                self.gain, self.period, mobility, self.sensing_range,
+            )
+        )  # fmt: skip
+
+    def apply(self, lower: Array, spaces: HalfSpaces) -> Array:
+        """Put the avoidance tasks above lower-priority velocities: (n, 3) m/s to (n, 3) m/s."""
+        return kernels.team_avoid(lower, spaces.normal, spaces.bound, self.code)
+
+
+def limit_speed(velocity: Array, max_speed: Array) -> Array:
+    """Scale velocities (n, 3) down to at most max_speed (n,), m/s, keeping their direction."""
+    return kernels.limit_speed(velocity, max_speed)

@@ -1,0 +1,239 @@
+"""Compiled inner loops of set-based avoidance (numba); `avoidance.py` explains and wraps them.
+
+Scalar code without temporaries, because the gatekeeper rolls the closed loop out hundreds of thousands of
+times. No fast-math: results are those of IEEE arithmetic in the order written.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from airground_drake.nsbc.task import Array
+
+MARGIN_M_S = 1e-12
+"""Added to every bound in the projection, so that rounding leaves the bound itself satisfied, m/s."""
+
+AUGMENTED, RECURSION_NEAREST, RECURSION_LISTED = 0, 1, 2
+
+
+@njit(cache=True)
+def fill_half_spaces(
+    position: Array,
+    centre: Array,
+    distance: Array,
+    share: Array,
+    gain: float,
+    period: float,
+    mobility: Array,
+    sensing_range: float,
+    normal: Array,
+    bound: Array,
+) -> None:
+    """Write the velocity constraints of one robot: normal (K, 3), bound (K,); see `half_spaces`."""
+    for k in range(len(bound)):
+        squared = 0.0
+        for a in range(3):
+            normal[k, a] = position[a] - centre[k, a]
+            squared += normal[k, a] ** 2
+        reach = np.sqrt(squared)
+        for a in range(3):
+            normal[k, a] = mobility[a] * normal[k, a] / reach if reach > 0.0 else 0.0
+        excess = reach - distance[k]
+        if reach > sensing_range:
+            bound[k] = -np.inf
+        elif excess <= 0.0:
+            bound[k] = -share[k] * gain * excess
+        else:
+            bound[k] = -share[k] * excess / period
+
+
+@njit(cache=True)
+def avoid_one(lower: Array, normal: Array, bound: Array, composition: int) -> Array:
+    """Velocity of one robot, (3,) m/s: the avoidance tasks above `lower`; see `avoid`."""
+    for k in range(len(bound)):
+        if _dot(normal[k], lower) < bound[k]:
+            break
+    else:
+        return lower.copy()
+    if composition == AUGMENTED:
+        return _scale_back(_closest_feasible(lower, normal, bound), normal, bound)
+    return _recursion(lower, normal, bound, composition == RECURSION_NEAREST)
+
+
+@njit(cache=True)
+def _recursion(lower: Array, normal: Array, bound: Array, nearest_first: bool) -> Array:
+    """(5) as printed, from the lowest priority to the highest: each task sees only the level below it."""
+    count = len(bound)
+    done = np.zeros(count, dtype=np.bool_)
+    velocity = lower.copy()
+    for level in range(count):
+        k = count - 1 - level
+        if nearest_first:  # the lowest priority left is the one with the least demanding bound
+            k = -1
+            for j in range(count):
+                if not done[j] and (k < 0 or bound[j] <= bound[k]):
+                    k = j
+        done[k] = True
+        shortfall = bound[k] - _dot(normal[k], velocity)
+        squared = _dot(normal[k], normal[k])
+        if shortfall > 0.0 and squared > 0.0:
+            for a in range(3):
+                velocity[a] += normal[k, a] * (shortfall / squared)
+    return velocity
+
+
+@njit(cache=True)
+def team_half_spaces(
+    position: Array,
+    centre: Array,
+    distance: Array,
+    share: Array,
+    gain: float,
+    period: float,
+    mobility: Array,
+    sensing_range: float,
+) -> tuple[Array, Array]:
+    """Constraints of n robots: normal (n, K, 3), bound (n, K)."""
+    normal, bound = np.empty(centre.shape), np.empty(distance.shape)
+    for i in range(len(position)):
+        fill_half_spaces(
+            position[i], centre[i], distance[i], share[i], gain, period, mobility[i], sensing_range, normal[i], bound[i]
+        )
+    return normal, bound
+
+
+@njit(cache=True)
+def team_avoid(lower: Array, normal: Array, bound: Array, composition: int) -> Array:
+    """Velocities of n robots, (n, 3) m/s."""
+    velocity = np.empty(lower.shape)
+    for i in range(len(lower)):
+        velocity[i] = avoid_one(lower[i], normal[i], bound[i], composition)
+    return velocity
+
+
+@njit(cache=True)
+def gather(positions: Array, obstacles: Array, others: npt.NDArray[np.intp]) -> Array:
+    """Points around k robots: (k, m + n, 3) from obstacles (m, 3) and positions of the others (k, n)."""
+    m = len(obstacles)
+    centre = np.empty((others.shape[0], m + others.shape[1], 3))
+    for i in range(others.shape[0]):
+        for a in range(3):
+            for k in range(m):
+                centre[i, k, a] = obstacles[k, a]
+            for k in range(others.shape[1]):
+                centre[i, m + k, a] = positions[others[i, k], a]
+    return centre
+
+
+@njit(cache=True)
+def limit_speed(velocity: Array, max_speed: Array) -> Array:
+    """Velocities (n, 3) scaled down to at most max_speed (n,), m/s, keeping their direction."""
+    limited = velocity.copy()
+    for i in range(len(velocity)):
+        speed = np.sqrt(_dot(velocity[i], velocity[i]))
+        if speed > max_speed[i]:
+            for a in range(3):
+                limited[i, a] *= max_speed[i] / speed
+    return limited
+
+
+@njit(cache=True)
+def _dot(a: Array, b: Array) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@njit(cache=True)
+def _closest_feasible(lower: Array, normal: Array, bound: Array) -> Array:
+    """Closest velocity to `lower` under all constraints, by enumeration of active sets of at most three.
+
+    A projection in R^3 needs no larger active set (a planar robot: two), so this is exact. Each trial is
+    lower + J^+ (b - J lower), the augmented composition over that active set. Where no velocity is feasible
+    (a robot inside several safe distances at once) the trial of least violation is taken.
+    """
+    worst = 0.0
+    for k in range(len(bound)):
+        worst = max(worst, bound[k])
+    reach = np.sqrt(_dot(lower, lower)) + 2.0 * worst + 1e-9  # |v| never exceeds it: lesser bounds cannot bind
+    row, gap = np.empty((len(bound), 3)), np.empty(len(bound))
+    count = 0
+    planar = True
+    for k in range(len(bound)):
+        if bound[k] > -reach:
+            for a in range(3):
+                row[count, a] = normal[k, a]
+            gap[count] = bound[k] + MARGIN_M_S - _dot(normal[k], lower)
+            planar = planar and normal[k, 2] == 0.0
+            count += 1
+    tolerance = 1e-13 + 1e-14 * reach
+    best_cost, best_shortfall = np.inf, np.inf
+    best, step = np.zeros(3), np.zeros(3)
+    for i in range(count):
+        for j in range(i, count):
+            for m in range(j, j + 1 if planar or j == i else count):
+                if not _active_step(row, gap, i, j, m, step):
+                    continue
+                shortfall = tolerance
+                for k in range(count):
+                    shortfall = max(shortfall, gap[k] - _dot(row[k], step))
+                cost = _dot(step, step)
+                if shortfall < best_shortfall or (shortfall == best_shortfall and cost < best_cost):
+                    best_shortfall, best_cost = shortfall, cost
+                    for a in range(3):
+                        best[a] = step[a]
+    for a in range(3):
+        best[a] += lower[a]
+    return best
+
+
+@njit(cache=True)
+def _active_step(row: Array, gap: Array, i: int, j: int, m: int, step: Array) -> bool:
+    """Minimum-norm step that closes the gaps of constraints i <= j <= m (a repeated index counts once).
+
+    Written into `step`; False where the rows are (nearly) dependent, so that a smaller set says the same.
+    """
+    ii, jj, ij = _dot(row[i], row[i]), _dot(row[j], row[j]), _dot(row[i], row[j])
+    if ii < 1e-18 or jj < 1e-18:
+        return False
+    if i == j:
+        for a in range(3):
+            step[a] = row[i, a] * gap[i] / ii
+        return True
+    if m == j:
+        det = ii * jj - ij**2
+        if det <= 1e-12 * ii * jj:
+            return False
+        first, second = (jj * gap[i] - ij * gap[j]) / det, (ii * gap[j] - ij * gap[i]) / det
+        for a in range(3):
+            step[a] = row[i, a] * first + row[j, a] * second
+        return True
+    volume = 0.0
+    for a in range(3):
+        b, c = (a + 1) % 3, (a + 2) % 3
+        jm = row[j, b] * row[m, c] - row[j, c] * row[m, b]
+        mi = row[m, b] * row[i, c] - row[m, c] * row[i, b]
+        across = row[i, b] * row[j, c] - row[i, c] * row[j, b]
+        step[a] = gap[i] * jm + gap[j] * mi + gap[m] * across
+        volume += across * row[m, a]
+    if volume**2 <= 1e-12 * ii * jj * _dot(row[m], row[m]):
+        return False
+    for a in range(3):
+        step[a] /= volume
+    return True
+
+
+@njit(cache=True)
+def _scale_back(velocity: Array, normal: Array, bound: Array) -> Array:
+    """Shorten a velocity, in place, until every constraint that v = 0 satisfies holds in floating point."""
+    while True:
+        scale = 1.0
+        for k in range(len(bound)):
+            rate = _dot(normal[k], velocity)
+            if rate < bound[k] <= 0.0:
+                scale = min(scale, bound[k] / rate)
+        if scale == 1.0:
+            return velocity
+        scale = np.nextafter(scale, 0.0) if scale > 1e-300 else 0.0
+        for a in range(3):
+            velocity[a] *= scale

@@ -1,0 +1,84 @@
+"""Timed polylines: the preset trajectory of a UGV, and the motion that an intervention asks for."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+
+from airground_drake.nsbc.task import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Piecewise-linear motion through positions at given times; at rest before the first and after the last.
+
+    Immutable, and therefore shared rather than copied when a Context is.
+
+    Attributes:
+        times: (M,), s, strictly increasing.
+        positions: (M, 3), m, world frame.
+    """
+
+    times: Array
+    positions: Array
+
+    def __post_init__(self) -> None:
+        """Check and freeze the arrays.
+
+        Raises:
+            ValueError: if shapes disagree, times do not increase, or a number is not finite.
+        """
+        times = np.array(self.times, dtype=np.float64)
+        positions = np.array(self.positions, dtype=np.float64)
+        if times.ndim != 1 or len(times) == 0 or positions.shape != (len(times), 3):
+            raise ValueError(f"a motion needs times (M,) and positions (M, 3), got {times.shape}, {positions.shape}")
+        if not (np.isfinite(times).all() and np.isfinite(positions).all()):
+            raise ValueError("a motion needs finite times and positions")
+        if not (np.diff(times) > 0.0).all():
+            raise ValueError("the times of a motion must increase strictly")
+        times.setflags(write=False)
+        positions.setflags(write=False)
+        object.__setattr__(self, "times", times)
+        object.__setattr__(self, "positions", positions)
+        object.__setattr__(self, "_times", times.tolist())
+        with np.errstate(all="raise"):
+            slopes = np.diff(positions, axis=0) / np.diff(times)[:, None]
+        object.__setattr__(self, "_slopes", slopes)
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        """Immutable: the copy is the object itself."""
+        return self
+
+    @classmethod
+    def at_speed(cls, waypoints: Array, speed: float, start: float = 0.0) -> Motion:
+        """Travel waypoints (M, 3) m at constant speed, m/s, from time `start`, s.
+
+        Raises:
+            ValueError: if consecutive waypoints coincide or the speed is not positive.
+        """
+        if not speed > 0.0:
+            raise ValueError(f"the speed must be positive, got {speed!r} m/s")
+        points = np.asarray(waypoints, dtype=np.float64)
+        lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
+        return cls(start + np.concatenate([[0.0], np.cumsum(lengths)]) / speed, points)
+
+    @property
+    def end(self) -> float:
+        """Time of the last vertex, s."""
+        return float(self.times[-1])
+
+    def at(self, t: float) -> tuple[Array, Array]:
+        """Position (3,) m and velocity (3,) m/s at time t (at a vertex: the velocity after it)."""
+        times: list[float] = self._times  # type: ignore[attr-defined]
+        k = bisect_right(times, t) - 1
+        if k < 0 or k >= len(times) - 1:
+            return self.positions[max(k, 0)], np.zeros(3)
+        slope: Array = self._slopes[k]  # type: ignore[attr-defined]
+        return self.positions[k] + (t - times[k]) * slope, slope
+
+    def sample(self, t: Array) -> Array:
+        """Positions at times (k,): (k, 3) m."""
+        return np.column_stack([np.interp(t, self.times, self.positions[:, axis]) for axis in range(3)])

@@ -1,0 +1,111 @@
+"""The tasks of the paper: move to target or track, keep a distance, stay over the centroid, intervene."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from airground_drake.nsbc.task import Array, Task
+
+
+class PositionTask(Task):
+    """Move-to-target and preset-trajectory tracking, eq (6): sigma = rho, J = I (gain B).
+
+    Attributes:
+        target: desired positions, (n, 3), m.
+        rate: desired velocities, (n, 3), m/s.
+    """
+
+    def __init__(self, target: Array, rate: Array, gain: float) -> None:
+        """Track `target` (n, 3) m moving at `rate` (n, 3) m/s; raises ValueError on a bad gain."""
+        super().__init__(gain)
+        self.target = target
+        self.rate = rate
+
+    def value(self, position: Array) -> Array:
+        """The position itself, (n, 3), m."""
+        return position
+
+    def jacobian(self, position: Array) -> Array:
+        """The identity, (n, 3, 3)."""
+        return np.broadcast_to(np.eye(3), (*position.shape, 3))
+
+    def desired(self) -> tuple[Array, Array]:
+        """Target (n, 3) m and its velocity (n, 3) m/s."""
+        return self.target, self.rate
+
+    def velocity(self, position: Array) -> Array:
+        """Eq (6), (n, 3) m/s; the pseudoinverse of the identity is the identity."""
+        return self.rate + self.gain * (self.target - position)
+
+
+class DistanceTask(Task):
+    """Obstacle avoidance as an equality, eqs (7)-(8): sigma = ||rho - rho_o||, sigma_d = d (gain A).
+
+    Attributes:
+        obstacle: centre of the obstacle, (3,) or (n, 3), m.
+        distance: safe distance d, m.
+    """
+
+    def __init__(self, obstacle: Array, distance: float, gain: float) -> None:
+        """Keep `distance` m from `obstacle`; raises ValueError on a bad gain."""
+        super().__init__(gain)
+        self.obstacle = obstacle
+        self.distance = distance
+
+    def value(self, position: Array) -> Array:
+        """Distance D to the obstacle, (n, 1), m."""
+        return np.linalg.norm(position - self.obstacle, axis=-1, keepdims=True)
+
+    def jacobian(self, position: Array) -> Array:
+        """Unit row vector away from the obstacle, (n, 1, 3); zero at the centre, where it is undefined."""
+        offset = position - self.obstacle
+        norm = np.linalg.norm(offset, axis=-1, keepdims=True)
+        unit = np.divide(offset, norm, out=np.zeros_like(offset), where=norm > 0.0)
+        return unit[..., None, :]
+
+    def desired(self) -> tuple[Array, Array]:
+        """Safe distance and zero rate, each (1,), m and m/s."""
+        return np.array([self.distance]), np.zeros(1)
+
+
+class FormationTask(PositionTask):
+    """Stay over the centroid of the UGVs, eqs (9)-(10), at a set altitude (gain C).
+
+    Equation (9) makes the centroid of the UGVs the task value, which the UAV cannot move; what it can do,
+    and what we build, is hold its own position at that centroid, raised by the altitude.
+    """
+
+    def __init__(self, ugv_positions: Array, ugv_velocities: Array, altitude: float, gain: float) -> None:
+        """Fly `altitude` m over the centroid of UGVs at (n, 3) m moving at (n, 3) m/s."""
+        share = np.full((1, len(ugv_positions)), 1.0 / len(ugv_positions))
+        super().__init__(share @ ugv_positions + np.array([0.0, 0.0, altitude]), share @ ugv_velocities, gain)
+
+
+class InterventionTask(Task):
+    """The UAV's intervention on UGVs, eqs (12)-(14): sigma_int = S rho (gain Lambda).
+
+    Attributes:
+        target: intervened positions, (n, 3), m.
+        rate: their velocities, (n, 3), m/s.
+        selection: constant task Jacobian J_int = S, (m, 3): the directions in which the UAV intervenes
+            (the identity: all of them, so that nothing is left for the UGV's own tasks).
+    """
+
+    def __init__(self, target: Array, rate: Array, gain: float, selection: Array) -> None:
+        """Steer `selection @ rho` to `selection @ target`; raises ValueError on a bad gain."""
+        super().__init__(gain)
+        self.target = target
+        self.rate = rate
+        self.selection = selection
+
+    def value(self, position: Array) -> Array:
+        """S rho, (n, m), m."""
+        return position @ self.selection.T
+
+    def jacobian(self, position: Array) -> Array:
+        """S for every robot, (n, m, 3)."""
+        return np.broadcast_to(self.selection, (len(position), *self.selection.shape))
+
+    def desired(self) -> tuple[Array, Array]:
+        """S target in m and S rate in m/s, each (n, m)."""
+        return self.target @ self.selection.T, self.rate @ self.selection.T

@@ -1,0 +1,174 @@
+"""Common ground of the figures: looks that do not rely on colour, labels beside the data, SVG of fixed bytes."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any, NamedTuple
+
+import matplotlib
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from airground_drake.nsbc.task import Array
+
+MAX_POINTS = 2000
+"""Points of a line at most."""
+
+WIDE_IN = 4.7
+"""Width of a panel of full width; smaller ones print the same type larger on a page."""
+
+INK, MUTED, ALARM = "#1a1a1a", "#5a5a5a", "#b00020"
+_POINTS_PER_INCH = 72.0
+_FONT_PT = 9.0
+_STEPS = [1, 2, 5, 10]
+
+# Text stays text (fonttype 'none'): it can be selected, searched and enlarged, it is a tenth of the size of
+# outlines, and the bytes do not depend on the glyphs of the matplotlib release. The price is that a reader
+# without the first font sees another one, so labels get room. Names are the user's: no mathtext in them.
+_RC: Any = {
+    "svg.fonttype": "none",
+    "svg.hashsalt": "airground_drake",
+    "text.parse_math": False,
+    "font.family": "sans-serif",
+    "font.sans-serif": ["DejaVu Sans", "Verdana", "sans-serif"],
+    "font.size": _FONT_PT,
+    "axes.titlesize": _FONT_PT,
+    "axes.titlelocation": "left",
+    "axes.titley": 1.0,  # fixed: finding a place for it costs a sixth of the drawing time
+    "axes.edgecolor": MUTED,
+    "axes.labelcolor": INK,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.unicode_minus": True,
+    "grid.color": "#dddddd",
+    "grid.linewidth": 0.6,
+    "hatch.linewidth": 0.6,
+    "lines.linewidth": 1.6,
+    "text.color": INK,
+    "xtick.color": MUTED,
+    "ytick.color": MUTED,
+    "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK,
+}
+
+
+class Look(NamedTuple):
+    """How a line is told apart: colour, dash pattern and marker, each different."""
+
+    color: str
+    dash: Any
+    marker: str
+
+
+LOOKS = (
+    Look("#0060a8", "-", "o"),
+    Look("#b34700", (0, (6, 2)), "s"),
+    Look("#00705a", (0, (5, 1.5, 1, 1.5)), "^"),
+    Look("#8b3a8b", (0, (1.2, 1.2)), "D"),
+    Look("#6b5900", (0, (9, 2, 1, 2, 1, 2)), "v"),
+    Look("#303030", (0, (3, 3)), "P"),
+)
+"""Six looks, distinct for colour-blind readers and in greyscale through dash and marker; reused in turn."""
+UAV_LOOK = Look("#666666", (0, (3, 2)), "d")
+
+
+def look(position: int) -> Look:
+    """The look of the line at a position."""
+    return LOOKS[position % len(LOOKS)]
+
+
+def short(name: str, limit: int = 18) -> str:
+    """A name cut to what fits beside a line."""
+    return name if len(name) <= limit else f"{name[: limit - 1]}…"
+
+
+@contextmanager
+def style() -> Iterator[None]:
+    """The settings of all figures, whatever the user's own, for as long as the context lasts."""
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        matplotlib.rcParams.update(_RC)
+        yield
+
+
+def svg(figure: Figure) -> str:
+    """The SVG document of a figure, without date or version; call it inside `style`."""
+    buffer = io.StringIO()
+    figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
+    return buffer.getvalue()
+
+
+def thin(values: Array, limit: int = MAX_POINTS) -> npt.NDArray[np.intp]:
+    """Indices of at most `limit` rows of (T,) or (T, m) that keep the ends and each bucket's extremes."""
+    rows = len(values)
+    if rows <= limit:
+        return np.arange(rows)
+    columns = values.reshape(rows, -1).T
+    buckets = np.array_split(np.arange(1, rows - 1), max(1, (limit - 2) // (2 * len(columns))))
+    kept = {0, rows - 1}
+    for bucket in buckets:
+        for column in columns:
+            kept.update((int(bucket[column[bucket].argmin()]), int(bucket[column[bucket].argmax()])))
+    return np.array(sorted(kept), dtype=np.intp)
+
+
+def time_line(axes: Axes, t: Array, values: Array, appearance: Look, **options: Any) -> None:
+    """A line over time with sparse markers."""
+    rows = thin(values)
+    axes.plot(
+        t[rows], values[rows], color=appearance.color, linestyle=appearance.dash, marker=appearance.marker,
+        markevery=max(1, len(rows) // 8), markersize=4.5, **options,
+    )  # fmt: skip
+
+
+def level(axes: Axes, value: float, dash: Any) -> None:
+    """A horizontal reference line."""
+    axes.axhline(value, color=INK, linestyle=dash, linewidth=1.0)
+
+
+def label_right(axes: Axes, labels: Sequence[tuple[float, str, str]]) -> None:
+    """Labels (value, text, colour) in the margin right of the axes, at their values as far as there is room."""
+    bottom, top = axes.get_ylim()
+    gap = 1.25 * _FONT_PT / _POINTS_PER_INCH / size_in(axes)[1]
+    order = sorted(range(len(labels)), key=lambda k: labels[k][0])
+    places = spread([(labels[k][0] - bottom) / (top - bottom) for k in order], gap)
+    for k, place in zip(order, places, strict=True):
+        _, text, color = labels[k]
+        axes.text(1.015, place, text, color=color, transform=axes.transAxes, va="center", ha="left", clip_on=False)
+
+
+def spread(places: Sequence[float], gap: float) -> list[float]:
+    """Ascending places moved as little as needed to be `gap` apart and, while there is room, inside [0, 1]."""
+    result: list[float] = []
+    for place in places:
+        result.append(max(place, result[-1] + gap) if result else max(place, 0.0))
+    ceiling = 1.0
+    for k in range(len(result) - 1, -1, -1):
+        result[k] = min(result[k], ceiling)
+        ceiling = result[k] - gap
+    return result
+
+
+def label_axes(axes: Axes, x: str, y: str) -> None:
+    """Axis labels at fixed places (searching for one costs drawing time), and few ticks."""
+    width_in, height_in = size_in(axes)
+    axes.set_xlabel(x)
+    axes.set_ylabel(y)
+    axes.xaxis.set_label_coords(0.5, -0.28 / height_in)
+    axes.yaxis.set_label_coords(-0.38 / width_in, 0.5)
+    axes.xaxis.set_major_locator(MaxNLocator(6, steps=_STEPS))
+    axes.yaxis.set_major_locator(MaxNLocator(max(2, min(7, round(2.5 * height_in))), steps=_STEPS))
+
+
+def size_in(axes: Axes) -> tuple[float, float]:
+    """Width and height of the axes, inches."""
+    figure, box = axes.get_figure(root=True), axes.get_position(original=True)
+    width_in, height_in = figure.get_size_inches() if isinstance(figure, Figure) else (1.0, 1.0)
+    return box.width * width_in, box.height * height_in

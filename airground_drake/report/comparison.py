@@ -1,0 +1,74 @@
+"""The figure that compares recursion (5) as printed with the augmented projector."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from airground_drake.nsbc.task import Array
+from airground_drake.report import canvas, maps, svg, timelines
+from airground_drake.report.metrics import closest_obstacle, place
+from airground_drake.report.panels import Figure, Panel, series
+from airground_drake.scenarios.schema import Scenario
+from airground_drake.trace import Trace
+
+MAX_RUNS = 6
+
+
+def draw(scenario: Scenario, traces: Mapping[str, Trace]) -> Figure | None:
+    """Recursion (5) against the augmented projector, None if the runs do not have both."""
+    printed = [name for name in traces if scenario.runs[name].composition.startswith("recursion")]
+    methods = {scenario.runs[name].method for name in printed}
+    augmented = [name for name in traces if name not in printed and scenario.runs[name].method in methods]
+    if not printed or not augmented or not scenario.obstacles:
+        return None
+    runs = {name: traces[name] for name in [*augmented, *printed][:MAX_RUNS]}
+    first = runs[augmented[0]]
+    minima = {(name, ugv): closest_obstacle(trace, ugv) for name, trace in runs.items() for ugv in first.ugvs}
+    (_, robot), _ = min(minima.items(), key=lambda item: item[1].value if item[1] else np.inf)
+    gaps = {name: timelines.nearest_distance(trace, robot) for name, trace in runs.items()}
+    d = scenario.safe_distance.obstacle_m
+    frame = _frame(runs, robot, gaps)
+    worst = {name: minima[name, robot] for name in runs}
+    listed = "; ".join(f"{_how(scenario, name)}: {at.value:.3f} m" for name, at in worst.items() if at)
+    text = f"{robot}, smallest distance to an obstacle: {listed}; safe distance {d:g} m."
+    drawings = (
+        ("paths", "Paths near the obstacles", maps.compared_paths(runs, robot, frame)),
+        ("gaps", "Distance to the nearest obstacle", timelines.compared_distances(runs, robot)),
+    )
+    tables = (
+        {
+            f"run {name} {axis}": np.interp(first.t, trace.t, trace.position(robot)[:, k])
+            for name, trace in runs.items()
+            for k, axis in enumerate("xy")
+        },
+        {f"run {name}": np.interp(first.t, runs[name].t, gap) for name, gap in gaps.items()},
+    )
+    panels = tuple(
+        Panel(
+            heading,
+            svg.inline(canvas.svg(drawing), f"recursion-{key}", f"{heading} of {robot}, {' and '.join(runs)}", text),
+            series(first, f"{heading} of {robot}, m", columns),
+        )
+        for (key, heading, drawing), columns in zip(drawings, tables, strict=True)
+    )
+    return Figure(
+        "recursion", "Recursion (5) against the augmented projector", f"{text} Audit item 1 says why.", panels
+    )
+
+
+def _how(scenario: Scenario, run: str) -> str:
+    return f"run {run} ({scenario.runs[run].composition.replace('_', ', ')})"
+
+
+def _frame(runs: Mapping[str, Trace], robot: str, gaps: Mapping[str, Array]) -> maps.Frame:
+    """Around the closest approaches of the runs and the two obstacles nearest to them."""
+    closest = np.array([trace.position(robot)[int(gaps[name].argmin()), :2] for name, trace in runs.items()])
+    first = next(iter(runs.values()))
+    centres = np.array([place(first, name)[:2] for name in first.scenario["obstacles"]])
+    reach = np.linalg.norm(centres - closest.mean(axis=0), axis=1)
+    points = np.concatenate([closest, centres[np.argsort(reach, kind="stable")[:2]]])
+    pad = 0.4 * float(first.scenario["safe_distance"]["obstacle_m"])
+    (left, bottom), (right, top) = points.min(axis=0) - pad, points.max(axis=0) + pad
+    return maps.Frame(left, right, bottom, top)

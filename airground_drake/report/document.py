@@ -1,0 +1,178 @@
+"""report.json: everything that a report says, as strict JSON; HTML and JUnit only render it."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from airground_drake.report import audit as runs_audit
+from airground_drake.report import metrics, reproduction
+from airground_drake.scenarios.schema import Scenario
+from airground_drake.trace import Trace
+from airground_drake.verify.verdict import STATUSES, Verdict
+
+SCHEMA = "airground_drake.report/1"
+
+METHODS = {
+    "a": "no intervention",
+    "b": "direct intervention, no gatekeeper",
+    "c": "the paper's MPC gatekeeper",
+    "d": "certified gatekeeper",
+}
+UNDECIDED = ("inconclusive", "error", "not_run")
+"""Statuses that say nothing about the claim: unexpected, they leave the report inconclusive."""
+EXIT_CODES = {"as_expected": 0, "not_as_expected": 1, "inconclusive": 3}
+
+
+def build(
+    scenario: Scenario,
+    sha256: str,
+    traces: Mapping[str, Trace],
+    verdicts: Iterable[Verdict],
+    provenance: Mapping[str, Any],
+    *,
+    audit: Sequence[Mapping[str, Any]] = (),
+) -> dict[str, Any]:
+    """The document.
+
+    Args:
+        scenario: as resolved (after command-line settings).
+        sha256: digest of the scenario file.
+        traces: by run, in the order of the scenario; a run without a trace makes the report inconclusive.
+        verdicts: all of them; a claim that the scenario expects and that is missing makes it inconclusive.
+        provenance: versions, seed, time, `command` and the like.
+        audit: findings about the paper from elsewhere, added to those that the runs show.
+
+    Returns:
+        Strict JSON; numbers that are not finite have become None.
+    """
+    claims = [verdict.to_json() for verdict in verdicts]
+    resolved = asdict(scenario)
+    document = {
+        "schema": SCHEMA,
+        "scenario": {
+            "name": scenario.name,
+            "title": scenario.title,
+            "description": scenario.description,
+            "sha256": sha256,
+            "resolved": resolved,
+        },
+        "provenance": dict(provenance),
+        "overall": overall(claims, missing(scenario, traces, claims)),
+        "runs": {name: _run(scenario, trace) for name, trace in traces.items()},
+        "claims": claims,
+        "reproduction": reproduction.rows(scenario, traces),
+        "choices": [{**asdict(choice), "ours": _lookup(resolved, choice.key)} for choice in scenario.choices],
+        "audit": sorted([*runs_audit.findings(scenario, traces), *map(dict, audit)], key=lambda item: item["id"]),
+    }
+    strict: dict[str, Any] = _strict(document)
+    return strict
+
+
+def overall(claims: Sequence[Mapping[str, Any]], absent: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """The verdict over all claims: `status`, `exit_code`, `why`, counts, and what differs, is open or missing."""
+    unexpected = [{key: c[key] for key in ("id", "run", "status", "expected")} for c in claims if not c["as_expected"]]
+    differs = [c for c in unexpected if c["status"] not in UNDECIDED]
+    undecided = [c for c in unexpected if c["status"] in UNDECIDED]
+    counts = Counter(c["status"] for c in claims)
+    if differs:
+        status = "not_as_expected"
+        why = f"{_checks(len(differs))} of {len(claims)} differ from what the scenario declares: {_list(differs)}."
+    elif undecided or absent or not claims:
+        status = "inconclusive"
+        open_items = [*undecided, *absent]
+        why = f"{_checks(len(open_items))} could not be decided: {_list(open_items)}." if open_items else "No checks."
+    else:
+        status = "as_expected"
+        why = f"All {_checks(len(claims))} gave the verdict that the scenario declares for them."
+    return {
+        "status": status,
+        "exit_code": EXIT_CODES[status],
+        "why": why,
+        "checks": len(claims),
+        "as_expected": len(claims) - len(unexpected),
+        "counts": {name: counts[name] for name in STATUSES if counts[name]},
+        "differs": differs,
+        "undecided": undecided,
+        "missing": list(absent),
+    }
+
+
+def exit_code(document: Mapping[str, Any]) -> int:
+    """0 if all claims are as expected, 1 if one differs, 3 if one is undecided or missing and none differs."""
+    return int(document["overall"]["exit_code"])
+
+
+def missing(
+    scenario: Scenario, traces: Mapping[str, Trace], claims: Sequence[Mapping[str, Any]]
+) -> list[dict[str, str]]:
+    """Runs without a trace or any verdict, and claims that a run's expectations name but nobody checked."""
+    checked = {(claim["run"], claim["id"]) for claim in claims}
+    found = []
+    for name, run in scenario.runs.items():
+        if name not in traces:
+            found.append({"run": name, "id": "", "why": "the run has no trace"})
+        elif name not in {of_run for of_run, _ in checked}:
+            found.append({"run": name, "id": "", "why": "no claim was checked on the run"})
+        else:
+            unchecked = [claim for claim in run.expected if (name, claim) not in checked]
+            found += [{"run": name, "id": claim, "why": "expected, but not checked"} for claim in unchecked]
+    return found
+
+
+def _run(scenario: Scenario, trace: Trace) -> dict[str, Any]:
+    run = scenario.runs[trace.run]
+    return {
+        "method": run.method,
+        "method_name": METHODS.get(run.method, ""),
+        "composition": run.composition,
+        "seed": trace.meta.get("seed"),
+        "zeta_m": trace.meta["zeta_m"],
+        "events": trace.events,
+        "faults": list(trace.meta.get("faults", [])),
+        "metrics": metrics.of_run(trace),
+    }
+
+
+def _lookup(resolved: Any, key: str) -> Any:
+    """Value at a dotted path of the resolved scenario, None if there is none."""
+    for part in key.split("."):
+        if not isinstance(resolved, dict) or part not in resolved:
+            return None
+        resolved = resolved[part]
+    return resolved
+
+
+def _checks(count: int) -> str:
+    return f"{count} check" if count == 1 else f"{count} checks"
+
+
+def _list(items: Sequence[Mapping[str, Any]], limit: int = 4) -> str:
+    """The first few items in words."""
+    words = [
+        f"{item['id'] or 'run'} on run {item['run']} ({item['status']}, expected {item['expected']})"
+        if "status" in item
+        else f"{item['id'] or 'run'} {item['run']} ({item['why']})"
+        for item in items[:limit]
+    ]
+    return ", ".join(words) + (f" and {len(items) - limit} more" if len(items) > limit else "")
+
+
+def _strict(value: Any) -> Any:
+    """Plain JSON types: numpy scalars and arrays unwrapped, tuples as lists, numbers that are not finite as None."""
+    if isinstance(value, Mapping):
+        return {str(key): _strict(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple, set, frozenset)):
+        return [_strict(item) for item in value]
+    if isinstance(value, (np.ndarray, np.generic)):
+        return _strict(value.tolist())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if value is None or isinstance(value, (str, int)):
+        return value
+    return str(value)

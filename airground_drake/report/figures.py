@@ -1,0 +1,224 @@
+"""The figures of a report: the paper's Figures 3-6 (case B: 7-10) redrawn, and recursion (5) against augmented.
+
+Each figure is a row of panels, one per run: separate drawings, so that a page can stack them on a phone. Each
+panel comes with a table of its data.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from airground_drake.nsbc.task import Array
+from airground_drake.report import canvas, comparison, maps, timelines
+from airground_drake.report.metrics import closest_obstacle, events_of, place
+from airground_drake.report.panels import MAX_TABLE_ROWS, Figure, Table, per_run, series
+from airground_drake.report.reproduction import MEASURES
+from airground_drake.scenarios.schema import Scenario
+from airground_drake.trace import Trace
+
+MAX_RUNS, MAX_UGVS, MAX_OBSTACLES = 6, 4, 6
+"""What a figure shows at most; the rest is in the trace, and the caption says so."""
+
+_PAPER = {"case_a": (3, 4, 5, 6), "case_b": (7, 8, 9, 10)}
+"""Numbers of the paper's figures, by the beginning of a scenario's name."""
+_HAPPENINGS = ("trigger", "release", "proposal", "accept", "refuse", "collision")
+
+
+@dataclass(frozen=True)
+class _Selection:
+    """What the figures show."""
+
+    runs: dict[str, Trace]
+    ugvs: list[str]
+    obstacles: list[str]
+
+
+def draw(scenario: Scenario, traces: Mapping[str, Trace]) -> list[Figure]:
+    """All figures of a report; none without traces.
+
+    Args:
+        scenario: names the runs.
+        traces: by run.
+
+    Raises:
+        TraceError: if a trace lacks a column or holds numbers that are not finite.
+    """
+    if not traces:
+        return []
+    with canvas.style():
+        chosen = _select(scenario, traces)
+        drawn = [_trajectories(chosen), _decision(chosen)]
+        drawn += [_distances(chosen)] if chosen.obstacles else []
+        drawn += [_events(chosen)]
+        compared = comparison.draw(scenario, traces)
+    numbers = next((paper for name, paper in _PAPER.items() if scenario.name.startswith(name)), ())
+    order = {"trajectories": 0, "decision": 1, "distances": 2, "events": 3}
+    numbered = [
+        Figure(
+            f.id, f"{f.title} (the paper's Figure {numbers[order[f.id]]})" if numbers else f.title, f.caption, f.panels
+        )
+        for f in drawn
+    ]
+    return numbered + ([compared] if compared else [])
+
+
+def _select(scenario: Scenario, traces: Mapping[str, Trace]) -> _Selection:
+    plain = {name: trace for name, trace in traces.items() if scenario.runs[name].composition == "augmented"}
+    runs = dict(list((plain or dict(traces)).items())[:MAX_RUNS])
+    first = next(iter(runs.values()))
+    busy = [name for name in first.ugvs if any(events_of(trace, name, *_HAPPENINGS) for trace in runs.values())]
+    ugvs = [*busy, *(name for name in first.ugvs if name not in busy)][:MAX_UGVS]
+    gap = {
+        name: min(
+            np.linalg.norm(trace.position(ugv) - place(trace, name), axis=1).min()
+            for trace in runs.values()
+            for ugv in ugvs
+        )
+        for name in first.scenario["obstacles"]
+    }
+    near = sorted(gap, key=gap.__getitem__)[:MAX_OBSTACLES]
+    return _Selection(
+        runs,
+        [name for name in first.ugvs if name in ugvs],
+        [name for name in first.scenario["obstacles"] if name in near],
+    )
+
+
+def _trajectories(chosen: _Selection) -> Figure:
+    first = next(iter(chosen.runs.values()))
+    frame = maps.frame_of(list(chosen.runs.values()), [*chosen.ugvs, first.robots[-1]])
+    stalls = [
+        f"in run {name} {ugv} stands still at ({at[0]:.2f}, {at[1]:.2f}) m"
+        for name, trace in chosen.runs.items()
+        for ugv in chosen.ugvs
+        if (at := MEASURES["stall_position"](trace, ugv))
+    ]
+    reach = first.scenario["safe_distance"]["obstacle_m"]
+    caption = (
+        f"{_sentence('; '.join(stalls)) if stalls else 'Every robot shown keeps moving or arrives. '}"
+        f"○ start, × target, ▲ trigger, □ stands still, ✖ collision; hexagons are obstacles in their safe circles of "
+        f"{reach:g} m; the thin dashed line is the UAV's path, projected onto the ground. Equal scales, in m."
+        f"{_left_out(chosen)}"
+    )
+    robots = [*chosen.ugvs, first.robots[-1]]
+    panels = per_run(
+        "trajectories",
+        chosen.runs,
+        lambda trace: maps.plane(trace, chosen.ugvs, frame),
+        lambda trace: f"Paths of {', '.join(robots)} in the ground plane; final positions: {_finals(trace, robots)}.",
+        lambda trace: series(
+            trace, "Positions, m", {f"{r} {a}": trace.position(r)[:, k] for r in robots for k, a in enumerate("xy")}
+        ),
+    )
+    return Figure("trajectories", "Trajectories", caption, panels)
+
+
+def _decision(chosen: _Selection) -> Figure:
+    columns = {
+        name: {ugv: trace.column(f"{ugv}.decision_variable_m") for ugv in chosen.ugvs}
+        for name, trace in chosen.runs.items()
+    }
+    first = next(iter(chosen.runs.values()))
+    highest = max(float(x.max()) for each in columns.values() for x in each.values())
+    top = 1.08 * max(highest, float(first.meta["zeta_m"]) * 1.1)
+    caption = (
+        "A UGV that stands still falls behind its moving reference, so its decision variable grows; ▲ marks where it "
+        "reaches the threshold (solid line) and an intervention is triggered. A helped UGV falls below it again, and "
+        "the intervention ends at the release level (dotted)." + _left_out(chosen)
+    )
+    panels = per_run(
+        "decision",
+        chosen.runs,
+        lambda trace: timelines.decision(trace, chosen.ugvs, top),
+        lambda trace: (
+            "Decision variable over time; largest values: "
+            + ", ".join(f"{ugv} {x.max():.2f} m" for ugv, x in columns[trace.run].items())
+            + f"; threshold {float(trace.meta['zeta_m']):.3g} m."
+        ),
+        lambda trace: series(trace, "Decision variables, m", columns[trace.run]),
+    )
+    return Figure("decision", "Decision variables", caption, panels)
+
+
+def _distances(chosen: _Selection) -> Figure:
+    gaps: dict[str, dict[str, Array]] = {
+        run: {
+            f"{ugv} to {name}": np.linalg.norm(trace.position(ugv) - place(trace, name), axis=1)
+            for ugv in chosen.ugvs
+            for name in chosen.obstacles
+        }
+        for run, trace in chosen.runs.items()
+    }
+    top = 1.05 * max(float(gap.max()) for each in gaps.values() for gap in each.values())
+    caption = (
+        "No line may enter the hatched band below the safe distance d. The circle marks the smallest distance, which "
+        "is exact in continuous time: robots move on straight lines between samples." + _left_out(chosen)
+    )
+
+    def describe(trace: Trace) -> str:
+        minima = [(ugv, closest_obstacle(trace, ugv)) for ugv in chosen.ugvs]
+        return "Distance to each obstacle over time; smallest: " + ", ".join(
+            f"{ugv} {at.value:.3f} m to {at.other} at {at.t_s:.2f} s" for ugv, at in minima if at
+        )
+
+    panels = per_run(
+        "distances",
+        chosen.runs,
+        lambda trace: timelines.distances(trace, chosen.ugvs, chosen.obstacles, top),
+        describe,
+        lambda trace: series(trace, "Distances, m", gaps[trace.run]),
+    )
+    return Figure("distances", "Distances to the obstacles", caption, panels)
+
+
+def _events(chosen: _Selection) -> Figure:
+    def busy(trace: Trace) -> list[str]:
+        return [ugv for ugv in chosen.ugvs if events_of(trace, ugv, *_HAPPENINGS)]
+
+    def table(trace: Trace) -> Table:
+        listed = [event for event in trace.events if event["robot"] in chosen.ugvs]
+        cells = tuple(
+            (f"{e['t_s']:.3f}", e["robot"], e["kind"], ", ".join(f"{x:.3f}" for x in e["position_m"]))
+            for e in listed[:MAX_TABLE_ROWS]
+        )
+        shown = "" if len(listed) <= MAX_TABLE_ROWS else f", the first {MAX_TABLE_ROWS} of {len(listed)}"
+        return Table(f"Run {trace.run}: events{shown}", ("t, s", "robot", "event", "position x, y, z, m"), cells)
+
+    def describe(trace: Trace) -> str:
+        listed = [
+            f"{e['kind']} of {e['robot']} at {e['t_s']:.2f} s"
+            for u in busy(trace)
+            for e in events_of(trace, u, *_HAPPENINGS)
+        ]
+        return "Events over time: " + ("; ".join(listed[:12]) or "none") + "."
+
+    caption = (
+        "▲ trigger and ▼ release: the grey bar is the time in which the UAV intervenes. ◆ proposal of the UAV. "
+        "● accepted and ✖ refused by the UGV's gatekeeper (run by method (b): carried out unasked); the hatched bar is "
+        "the time in which the UGV carries out an intervention." + _left_out(chosen)
+    )
+    panels = per_run(
+        "events",
+        chosen.runs,
+        lambda trace: timelines.events(trace, busy(trace)) if busy(trace) else timelines.nothing_happened(trace),
+        describe,
+        table,
+    )
+    return Figure("events", "Triggers, proposals and decisions", caption, panels)
+
+
+def _finals(trace: Trace, robots: Iterable[str]) -> str:
+    return ", ".join(f"{robot} ({x:.2f}, {y:.2f}) m" for robot in robots for x, y, _ in [trace.position(robot)[-1]])
+
+
+def _sentence(text: str) -> str:
+    return f"{text[0].upper()}{text[1:]}. "
+
+
+def _left_out(chosen: _Selection) -> str:
+    first = next(iter(chosen.runs.values()))
+    hidden: Sequence[str] = [name for name in first.ugvs if name not in chosen.ugvs]
+    return f" {len(hidden)} more UGVs are not drawn; their data are in the trace." if hidden else ""

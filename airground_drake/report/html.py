@@ -1,0 +1,133 @@
+"""report.html: one self-contained page that renders report.json, the figures and the diagram; no JavaScript."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from airground_drake.report import svg
+from airground_drake.report.panels import Figure
+from airground_drake.report.reproduction import YES_NO
+
+MAX_DIAGRAM_CHARS = 500_000
+MAX_JSON_CHARS = 4_000
+MAX_DISTANCE_ROWS = 60
+
+CHIPS = {
+    "as_expected": ("✓", "as expected", "good"),
+    "not_as_expected": ("✗", "not as expected", "bad"),
+    "proved": ("✓", "proved", "good"),
+    "holds": ("✓", "holds", "good"),
+    "supported": ("✓", "supported", "good"),
+    "refuted": ("✗", "refuted", "bad"),
+    "inconclusive": ("?", "inconclusive", "open"),
+    "error": ("!", "error", "open"),
+    "not_run": ("○", "not run", "open"),
+    "reproduced": ("✓", "reproduced", "good"),
+    "calibrated": ("≈", "calibrated", "tuned"),
+    "not_reproduced": ("✗", "not reproduced", "bad"),
+}
+"""How a status is shown: icon, word, class (which sets the colour): never by colour alone."""
+
+
+def render(document: Mapping[str, Any], figures: Sequence[Figure], diagram_svg: str | None = None) -> str:
+    """The page.
+
+    Args:
+        document: report.json, as built by `document.build`.
+        figures: as drawn by `figures.draw`, in the order of the page.
+        diagram_svg: the exported block diagram; left out if it is not an SVG or too large to inline.
+    """
+    return _environment().get_template("report.html.j2").render(
+        report=document,
+        figures=[figure for figure in figures if figure.id != "recursion"],
+        comparison=next((figure for figure in figures if figure.id == "recursion"), None),
+        diagram=_diagram(diagram_svg, str(document["scenario"]["name"])),
+        groups=_by_claim(document["claims"]),
+        attention=[claim for claim in document["claims"] if not claim["as_expected"]],
+        distances=_distances(document["runs"]),
+        max_distance_rows=MAX_DISTANCE_ROWS,
+    )  # fmt: skip
+
+
+def _environment() -> Environment:
+    environment = Environment(
+        loader=PackageLoader("airground_drake.report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters.update(num=number, value=value, pretty=pretty, inline=Markup)
+    environment.globals.update(chips=CHIPS)
+    return environment
+
+
+def number(x: Any, digits: int = 4) -> str:
+    """A number for reading, a dash for none."""
+    if x is None:
+        return "–"
+    if isinstance(x, bool) or not isinstance(x, (int, float)):
+        return str(x)
+    if isinstance(x, int) or x == int(x) and abs(x) < 1e6:
+        return str(int(x))
+    return f"{x:.{digits}g}".replace("-", "−")
+
+
+def value(x: Any, unit: str = "") -> str:
+    """A quantity of the reproduction table: a number, a vector or yes/no, with its unit."""
+    if x is None:
+        return "no value"
+    if unit == YES_NO:
+        return "yes" if x else "no"
+    text = f"({', '.join(number(each) for each in x)})" if isinstance(x, list) else number(x)
+    return f"{text} {unit}".strip()
+
+
+def pretty(x: Any) -> str:
+    """JSON for reading, cut where it gets long."""
+    text = json.dumps(x, indent=1, ensure_ascii=False, allow_nan=False)
+    if len(text) <= MAX_JSON_CHARS:
+        return text
+    return f"{text[:MAX_JSON_CHARS]}\n… cut here; report.json has all of it"
+
+
+def _diagram(source: str | None, name: str) -> str | None:
+    if source is None or len(source) > MAX_DIAGRAM_CHARS:
+        return None
+    try:
+        return svg.inline(
+            source, "diagram", f"Block diagram of {name}", "The systems of the simulation and the signals between them."
+        )
+    except ValueError:
+        return None
+
+
+def _by_claim(claims: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Claims of the same identifier together, those with a deviation first."""
+    groups: dict[str, list[Mapping[str, Any]]] = {}
+    for claim in claims:
+        groups.setdefault(claim["id"], []).append(claim)
+    grouped = [
+        {"id": name, "claims": members, "fine": all(claim["as_expected"] for claim in members)}
+        for name, members in groups.items()
+    ]
+    return sorted(grouped, key=lambda group: bool(group["fine"]))
+
+
+def _distances(runs: Mapping[str, Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """The smallest distances of all runs; of many, those of least margin."""
+    rows = [
+        {"run": run, "robot": robot, "other": other, "margin": found["value"] - found["safe_distance_m"], **found}
+        for run, entry in runs.items()
+        for kind in ("min_distance_m", "min_robot_distance_m")
+        for robot, others in entry["metrics"][kind].items()
+        for other, found in others.items()
+    ]
+    if len(rows) <= MAX_DISTANCE_ROWS:
+        return rows
+    return sorted(rows, key=lambda row: float(row["margin"]))[:MAX_DISTANCE_ROWS]

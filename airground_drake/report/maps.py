@@ -1,0 +1,173 @@
+"""Drawings in the ground plane, each a matplotlib Figure; call them inside `canvas.style`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+
+from airground_drake.nsbc.task import Array
+from airground_drake.report.canvas import (
+    ALARM,
+    INK,
+    MUTED,
+    UAV_LOOK,
+    WIDE_IN,
+    Look,
+    label_axes,
+    look,
+    short,
+    size_in,
+    thin,
+)
+from airground_drake.report.metrics import events_of
+from airground_drake.report.reproduction import MEASURES
+from airground_drake.trace import Trace
+
+_BOX = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 1.0}
+
+
+class Frame(NamedTuple):
+    """A rectangle of the ground plane, m."""
+
+    left: float
+    right: float
+    bottom: float
+    top: float
+
+
+def frame_of(traces: Sequence[Trace], robots: Sequence[str]) -> Frame:
+    """What has to be in the picture: robots, targets, obstacles with their safe circles."""
+    points = [trace.position(robot)[:, :2] for trace in traces for robot in robots]
+    scenario = traces[0].scenario
+    points += [np.array([scenario["ugvs"][robot]["target_m"][:2] for robot in robots if robot in scenario["ugvs"]])]
+    reach = scenario["safe_distance"]["obstacle_m"]
+    centres = np.array([obstacle["position_m"][:2] for obstacle in scenario["obstacles"].values()])
+    points += [centres - reach, centres + reach] if len(centres) else []
+    every = np.concatenate(points)
+    (left, bottom), (right, top) = every.min(axis=0) - 0.4, every.max(axis=0) + 0.4
+    return Frame(left, right, bottom - 0.6, top + 0.8)
+
+
+def plane(trace: Trace, ugvs: Sequence[str], frame: Frame) -> Figure:
+    """Trajectories of a run in the plane: starts o, targets x, obstacles with safe circles, the UAV dashed."""
+    figure, axes = _map(trace, frame, width_in=3.3)
+    uav = trace.robots[-1]
+    targets = {**{name: ugv["target_m"] for name, ugv in trace.scenario["ugvs"].items()}, uav: None}
+    for position, robot in enumerate([*ugvs, uav]):
+        appearance = UAV_LOOK if robot == uav else look(position)
+        _path(axes, trace.position(robot), appearance, linewidth=1.1 if robot == uav else 1.9)
+        start, end = trace.position(robot)[0], trace.position(robot)[-1]
+        axes.plot(*start[:2], marker="o", markersize=6, color=appearance.color, markerfacecolor="white", zorder=4)
+        target = targets[robot] or end
+        if robot != uav:
+            axes.plot(*target[:2], marker="x", markersize=7, markeredgewidth=2, color=appearance.color, zorder=4)
+            _name(axes, robot, start, appearance, -11)
+        _name(axes, robot, target, appearance, 6)
+    centres = np.array([obstacle["position_m"][:2] for obstacle in trace.scenario["obstacles"].values()])
+    written = [np.repeat(centres + (right, -0.5), 30, axis=0) for right in (-0.8, 0.0, 0.8)] if len(centres) else []
+    paths = [*(trace.position(robot)[:, :2] for robot in [*ugvs, uav]), *written]
+    for ugv in ugvs:
+        for at, lines in _happenings(axes, trace, ugv):
+            _note(axes, frame, at, lines, paths)
+    return figure
+
+
+def compared_paths(runs: Mapping[str, Trace], robot: str, frame: Frame) -> Figure:
+    """Trajectories of one robot in several runs, near the obstacles."""
+    figure, axes = _map(next(iter(runs.values())), frame, WIDE_IN, above_in=0.22 * len(runs))
+    for position, (name, trace) in enumerate(runs.items()):
+        path, appearance = trace.position(robot), look(position)
+        _path(axes, path, appearance, linewidth=2.0, label=f"run {short(name, 24)}")
+        inside = (path[:, 0] > frame.left) & (path[:, 0] < frame.right)
+        inside &= (path[:, 1] > frame.bottom) & (path[:, 1] < frame.top)
+        marked = np.flatnonzero(inside)[:: max(1, int(inside.sum()) // 7)]
+        axes.plot(*path[marked, :2].T, linestyle="none", marker=appearance.marker, markersize=5, color=appearance.color)
+        if MEASURES["stall_position"](trace, robot):
+            axes.plot(*path[-1, :2], marker="s", markersize=11, markerfacecolor="none", color=INK, markeredgewidth=1.6)
+            _note(
+                axes, frame, path[-1, :2], ["stands still"], [other.position(robot)[:, :2] for other in runs.values()]
+            )
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False, handlelength=4.0, borderaxespad=0.0)
+    return figure
+
+
+def _map(trace: Trace, frame: Frame, width_in: float, above_in: float = 0.1) -> tuple[Figure, Axes]:
+    """Axes over a part of the ground plane, at equal scales, with the obstacles drawn."""
+    left_in, rest_in = 0.5, 0.15
+    inner_in = width_in - left_in - rest_in
+    inner_height_in = inner_in * (frame.top - frame.bottom) / (frame.right - frame.left)
+    height_in = inner_height_in + 0.42 + above_in
+    figure = Figure(figsize=(width_in, height_in))
+    axes = figure.add_axes((left_in / width_in, 0.42 / height_in, inner_in / width_in, inner_height_in / height_in))
+    axes.set_xlim(frame.left, frame.right)
+    axes.set_ylim(frame.bottom, frame.top)
+    axes.set_aspect("equal")
+    label_axes(axes, "x, m", "y, m")
+    reach = float(trace.scenario["safe_distance"]["obstacle_m"])
+    for name, obstacle in trace.scenario["obstacles"].items():
+        x, y = obstacle["position_m"][:2]
+        axes.add_patch(Circle((x, y), reach, facecolor="#f3f3f3", edgecolor=MUTED, linestyle=(0, (2, 2)), zorder=1.0))
+        if frame.left < x < frame.right and frame.bottom < y < frame.top:
+            axes.plot(x, y, marker="h", markersize=6, color=INK, zorder=3)
+            seen = "" if obstacle["known_to_uav"] else "\n(unseen by the UAV)"
+            text = f"{short(name, 12)}{seen}"
+            axes.annotate(text, (x, y), (0, -6), textcoords="offset points", ha="center", va="top", fontsize=7.5)
+    return figure, axes
+
+
+def _path(axes: Axes, path: Array, appearance: Look, **options: Any) -> None:
+    rows = thin(path[:, :2])
+    axes.plot(*path[rows, :2].T, color=appearance.color, linestyle=appearance.dash, **options)
+
+
+def _name(axes: Axes, robot: str, at: Array, appearance: Look, offset_pt: float) -> None:
+    axes.annotate(
+        short(robot, 9), (float(at[0]), float(at[1])), (0, offset_pt), textcoords="offset points",
+        ha="center", va="bottom", color=appearance.color, fontweight="bold", fontsize=8,
+    )  # fmt: skip
+
+
+def _happenings(axes: Axes, trace: Trace, ugv: str) -> list[tuple[Array, list[str]]]:
+    """Mark where a UGV triggered, collided or stands still; the places with what to write beside them."""
+    found: list[tuple[Array, list[str]]] = []
+
+    def mark(at: Array, text: str, **options: Any) -> None:
+        axes.plot(*at, markersize=10, zorder=6, **options)
+        near = next((lines for known, lines in found if np.linalg.norm(known - at) < 0.3), None)
+        if near is None:
+            found.append((at, [text]))
+        else:
+            near.append(text)
+
+    for event in [*events_of(trace, ugv, "trigger")[:2], *events_of(trace, ugv, "collision")[:1]]:
+        options = {"marker": "^", "color": INK} if event["kind"] == "trigger" else {"marker": "X", "color": ALARM}
+        at = np.asarray(event["position_m"][:2], dtype=np.float64)
+        mark(at, f"{event['kind']} {event['t_s']:.2f} s", markeredgecolor="white", **options)
+    if MEASURES["stall_position"](trace, ugv):
+        at = trace.position(ugv)[-1, :2]
+        mark(at, "stands still", marker="s", markerfacecolor="none", color=INK, markeredgewidth=1.4)
+    return found
+
+
+def _note(axes: Axes, frame: Frame, at: Array, lines: Sequence[str], paths: Sequence[Array]) -> None:
+    """Write beside a point, on the side where the text covers the least of the paths."""
+    scale_pt = 72.0 * size_in(axes)[0] / (frame.right - frame.left)
+    size = np.array([0.6 * 8.0 * max(map(len, lines)), 11.0 * len(lines)]) / scale_pt
+    points = np.concatenate([path[thin(path, 400)] for path in paths])
+    corner = np.array([[frame.left, frame.bottom], [frame.right, frame.top]])
+
+    def covered(side: tuple[int, int]) -> float:
+        centre = at + np.array(side) * (size / 2 + 10.0 / scale_pt)
+        outside = (centre - size / 2 < corner[0]).any() or (centre + size / 2 > corner[1]).any()
+        return float((np.abs(points - centre) < size / 2).all(axis=1).sum() + 10_000 * outside)
+
+    right, up = min(((1, 0), (-1, 0), (1, -1), (-1, 1), (1, 1), (-1, -1), (0, 1), (0, -1)), key=covered)
+    axes.annotate(
+        "\n".join(lines), (float(at[0]), float(at[1])), (10 * right, 10 * up), textcoords="offset points", fontsize=8,
+        ha=("center", "left", "right")[right], va=("center", "bottom", "top")[up], bbox=_BOX, zorder=5,
+    )  # fmt: skip

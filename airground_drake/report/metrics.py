@@ -1,0 +1,133 @@
+"""Numbers of one run that every reader asks for: distances, events, decisions, times; strict JSON."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from airground_drake.nsbc.task import Array
+from airground_drake.trace import Trace
+from airground_drake.verify.geometry import closest_approach
+
+
+class Closest(NamedTuple):
+    """Smallest distance over continuous time: its value in m, when (s), and to what."""
+
+    value: float
+    t_s: float
+    other: str
+
+
+def of_run(trace: Trace) -> dict[str, Any]:
+    """Metrics of one run.
+
+    Returns:
+        `min_distance_m` (robot -> obstacle -> value, t_s, safe_distance_m; exact in continuous time) and
+        `min_robot_distance_m` (the same, for the other robot of least margin only), `final_position_m`,
+        `duration_s`, `wall_s` and `realtime_factor` (None if not measured), `event_counts` (robot -> kind ->
+        count), `gatekeeper` (see `gatekeeper`).
+    """
+    wall_s = trace.timings.get("wall_s")
+    duration_s = float(trace.t[-1] - trace.t[0])
+    counts = {robot: Counter(e["kind"] for e in trace.events if e["robot"] == robot) for robot in trace.robots}
+    return {
+        "min_distance_m": {robot: _distances(trace, robot, trace.scenario["obstacles"]) for robot in trace.robots},
+        "min_robot_distance_m": {robot: _tightest(trace, robot) for robot in trace.robots},
+        "final_position_m": {robot: trace.position(robot)[-1].tolist() for robot in trace.robots},
+        "duration_s": duration_s,
+        "wall_s": wall_s,
+        "realtime_factor": duration_s / wall_s if wall_s else None,
+        "event_counts": {robot: dict(sorted(count.items())) for robot, count in counts.items()},
+        "gatekeeper": gatekeeper(trace),
+    }
+
+
+def gatekeeper(trace: Trace) -> dict[str, Any] | None:
+    """Summary of the gatekeeper's decisions, None if it made none.
+
+    Returns:
+        `calls`, `decisions` (decision -> count), `max_gap` (largest optimality gap), `time_s` (p50, p99, max
+        of the wall-clock times) and `closest_call`: where the costs of accepting and refusing were closest,
+        relative to the smaller one, so that nobody has to trust a knife edge. None where not recorded.
+    """
+    table = trace.decisions
+    if not len(table):
+        return None
+    gaps = table["gap"][table["gap"] >= 0.0]
+    times = np.asarray(trace.timings.get("decision_times_s", []), dtype=np.float64)
+    time_s = {"p50": np.quantile(times, 0.5), "p99": np.quantile(times, 0.99), "max": times.max()} if times.size else {}
+    return {
+        "calls": len(table),
+        "decisions": {str(name): int(count) for name, count in table["decision"].value_counts().sort_index().items()},
+        "max_gap": float(gaps.max()) if len(gaps) else None,
+        "time_s": {name: float(value) for name, value in time_s.items()} or None,
+        "closest_call": _closest_call(trace),
+    }
+
+
+def _closest_call(trace: Trace) -> dict[str, Any] | None:
+    both = trace.decisions[(trace.decisions["objective_accept"] >= 0.0) & (trace.decisions["objective_refuse"] >= 0.0)]
+    if not len(both):
+        return None
+    smaller = both[["objective_accept", "objective_refuse"]].min(axis=1).clip(lower=1e-12)
+    margin = ((both["objective_accept"] - both["objective_refuse"]).abs() / smaller).to_numpy()
+    k = int(np.argmin(margin))
+    row = both.iloc[k]
+    return {
+        "relative_cost_margin": float(margin[k]),
+        "t_s": float(row["t_s"]),
+        "robot": str(row["robot"]),
+        "policy": str(row["policy"]),
+        "decision": str(row["decision"]),
+        "objective_accept": float(row["objective_accept"]),
+        "objective_refuse": float(row["objective_refuse"]),
+    }
+
+
+def closest_obstacle(trace: Trace, robot: str) -> Closest | None:
+    """Smallest distance of a robot to any obstacle over continuous time, None without obstacles."""
+    return min((closest(trace, robot, name) for name in trace.scenario["obstacles"]), default=None)
+
+
+def closest(trace: Trace, robot: str, other: str) -> Closest:
+    """Smallest distance of a robot to an obstacle or another robot over continuous time, exact."""
+    found = closest_approach(trace.t, trace.position(robot), place(trace, other))
+    return Closest(found.distance_m, found.t_s, other)
+
+
+def place(trace: Trace, name: str) -> Array:
+    """Position of an obstacle, (3,), or of a robot, (T, 3), m."""
+    if name in trace.scenario["obstacles"]:
+        return np.asarray(trace.scenario["obstacles"][name]["position_m"], dtype=np.float64)
+    return trace.position(name)
+
+
+def safe_distance_m(trace: Trace, robot: str, other: str) -> float:
+    """The safe distance d that the scenario sets for a robot and an obstacle or another robot, m."""
+    if other in trace.scenario["obstacles"]:
+        kind = "obstacle_m"
+    else:
+        kind = "ugv_m" if {robot, other} <= set(trace.ugvs) else "air_ground_m"
+    return float(trace.scenario["safe_distance"][kind])
+
+
+def events_of(trace: Trace, robot: str, *kinds: str) -> list[dict[str, Any]]:
+    """Events of a robot, by time, of the given kinds."""
+    return [event for event in trace.events if event["robot"] == robot and event["kind"] in kinds]
+
+
+def _distances(trace: Trace, robot: str, others: Iterable[str]) -> dict[str, dict[str, float]]:
+    found = [closest(trace, robot, name) for name in others]
+    return {
+        at.other: {"value": at.value, "t_s": at.t_s, "safe_distance_m": safe_distance_m(trace, robot, at.other)}
+        for at in found
+    }
+
+
+def _tightest(trace: Trace, robot: str) -> dict[str, dict[str, float]]:
+    pairs = _distances(trace, robot, (name for name in trace.robots if name != robot))
+    other = min(pairs, key=lambda name: pairs[name]["value"] - pairs[name]["safe_distance_m"], default=None)
+    return {} if other is None else {other: pairs[other]}

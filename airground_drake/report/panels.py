@@ -1,0 +1,70 @@
+"""A figure of a report: panels of inline SVG, each with a table of its data."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.figure import Figure as Drawing
+
+from airground_drake.nsbc.task import Array
+from airground_drake.report import canvas, svg
+from airground_drake.report.document import METHODS
+from airground_drake.trace import Trace
+
+MAX_TABLE_ROWS = 31
+"""Rows of a data table at most; all of them are in the trace."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """Data of a panel: cells are text, the first column heads its row."""
+
+    caption: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One drawing: inline SVG with an accessible name and description, and its data."""
+
+    heading: str
+    svg: str
+    table: Table
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A figure: `id` is unique in the page, `caption` says what to see."""
+
+    id: str
+    title: str
+    caption: str
+    panels: tuple[Panel, ...]
+
+
+def per_run(
+    kind: str,
+    runs: Mapping[str, Trace],
+    drawing: Callable[[Trace], Drawing],
+    describe: Callable[[Trace], str],
+    table: Callable[[Trace], Table],
+) -> tuple[Panel, ...]:
+    """One panel per run."""
+    panels = []
+    for position, (name, trace) in enumerate(runs.items()):
+        method = str(trace.meta["method"])
+        heading = f"Run {name}: method ({method}), {METHODS.get(method, 'of the user')}"
+        title = f"{kind} of run {name}"
+        text = canvas.svg(drawing(trace))
+        panels.append(Panel(heading, svg.inline(text, f"{kind}-{position}", title, describe(trace)), table(trace)))
+    return tuple(panels)
+
+
+def series(trace: Trace, caption: str, columns: Mapping[str, Array]) -> Table:
+    """A few dozen rows of columns (T,), evenly spread over the run."""
+    rows = np.unique(np.linspace(0, len(trace.t) - 1, MAX_TABLE_ROWS).round().astype(int))
+    cells = tuple((f"{trace.t[k]:.2f}", *(f"{values[k]:.3f}" for values in columns.values())) for k in rows)
+    return Table(f"Run {trace.run}: {caption}", ("t, s", *columns), cells)

@@ -1,0 +1,229 @@
+"""The paper's reported results against ours: a registry of measures, and the reproduction table.
+
+A measure is a pure function of a trace and a robot. It returns its components in the order of the scenario's
+`paper` values, 1 or 0 for a yes/no quantity, and an empty list where the run has no such value: a row without
+a value is never reproduced.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from airground_drake.errors import TraceError
+from airground_drake.nsbc.task import Array
+from airground_drake.report.metrics import closest_obstacle, events_of
+from airground_drake.scenarios.schema import Reproduction, Scenario
+from airground_drake.trace import Trace
+
+Measure = Callable[[Trace, str], list[float]]
+
+STILL_M = 1e-3
+"""A robot that moved less than this during the last STILL_S of a run stands still."""
+STILL_S = 1.0
+TRIGGER_TOLERANCE_M = 1e-5
+"""A trigger is at the threshold if the decision variable is not below it by more than this: event isolation."""
+YES_NO = "yes/no"
+"""Unit of a row that is compared exactly."""
+
+MEASURES: dict[str, Measure] = {}
+"""Measures by name; `@measure` adds one."""
+
+
+def measure(function: Measure) -> Measure:
+    """Register a measure under its function's name (a decorator)."""
+    MEASURES[function.__name__] = function
+    return function
+
+
+@measure
+def stall_position(trace: Trace, robot: str) -> list[float]:
+    """Final [x, y] in m of a robot that stands still short of its target."""
+    if trace.t[-1] - trace.t[0] < STILL_S or _arrived(trace, robot):
+        return []
+    first = max(int(np.searchsorted(trace.t, trace.t[-1] - STILL_S, side="right")) - 1, 0)
+    last_second = trace.position(robot)[first:]
+    if np.linalg.norm(last_second - last_second[-1], axis=1).max() >= STILL_M:
+        return []
+    return _planar(last_second[-1])
+
+
+@measure
+def distances_while_stalled(trace: Trace, robot: str) -> list[float]:
+    """Final distances in m of a stalled robot to its two nearest obstacles, in the order of their names."""
+    if not stall_position(trace, robot):
+        return []
+    final = trace.position(robot)[-1]
+    distance = {
+        name: float(np.linalg.norm(final - np.asarray(obstacle["position_m"])))
+        for name, obstacle in trace.scenario["obstacles"].items()
+    }
+    return [distance[name] for name in sorted(sorted(distance, key=distance.__getitem__)[:2])]
+
+
+@measure
+def grows_past_threshold(trace: Trace, robot: str) -> list[float]:
+    """1 if the decision variable ends above the threshold and grew from its crossing to the reference's end.
+
+    A run in which the robot's intervention was released does not count: there it came back by itself.
+    """
+    x, zeta = _decision_variable(trace, robot)
+    above = np.flatnonzero(x >= zeta)
+    if not above.size or _times(trace, robot, "release"):
+        return [0.0]
+    moving = np.flatnonzero((np.diff(trace.reference(robot), axis=0) != 0.0).any(axis=1))
+    reference_end = int(moving[-1]) + 1 if moving.size else len(x) - 1
+    return [float(x[-1] > zeta and x[reference_end] > x[above[0]])]
+
+
+@measure
+def arrives(trace: Trace, robot: str) -> list[float]:
+    """1 if the robot ends within the arrival tolerance of its target."""
+    return [float(_arrived(trace, robot))]
+
+
+@measure
+def trigger_time(trace: Trace, robot: str) -> list[float]:
+    """Time of the first trigger, s."""
+    return _times(trace, robot, "trigger")[:1]
+
+
+@measure
+def recovery_duration(trace: Trace, robot: str) -> list[float]:
+    """Time from the first trigger until the decision variable first falls below the threshold, s.
+
+    The row of the trigger may be below the threshold by the accuracy of event isolation, so a fall needs a row
+    at or above the threshold before it. Linear interpolation between rows.
+    """
+    triggers = _times(trace, robot, "trigger")
+    if not triggers:
+        return []
+    t, (x, zeta) = trace.t, _decision_variable(trace, robot)
+    start = int(np.searchsorted(t, triggers[0]))
+    falls = np.flatnonzero((x[start:-1] >= zeta) & (x[start + 1 :] < zeta)) + start
+    if not falls.size:
+        return []
+    k = falls[0]
+    return [float(t[k] + (t[k + 1] - t[k]) * (x[k] - zeta) / (x[k] - x[k + 1]) - triggers[0])]
+
+
+@measure
+def intervention_succeeds(trace: Trace, robot: str) -> list[float]:
+    """1 if the robot arrives, triggered only at the threshold, and the gatekeeper accepted and never refused."""
+    triggers = _times(trace, robot, "trigger")
+    x, zeta = _decision_variable(trace, robot)
+    at_threshold = np.interp(triggers, trace.t, x) >= zeta - TRIGGER_TOLERANCE_M
+    accepted, refused = (bool(_times(trace, robot, kind)) for kind in ("accept", "refuse"))
+    return [float(bool(triggers) and bool(at_threshold.all()) and accepted and not refused and _arrived(trace, robot))]
+
+
+@measure
+def minimum_distance(trace: Trace, robot: str) -> list[float]:
+    """Smallest distance to any obstacle over continuous time, m."""
+    nearest = closest_obstacle(trace, robot)
+    return [] if nearest is None else [nearest.value]
+
+
+@measure
+def acceptance_time(trace: Trace, robot: str) -> list[float]:
+    """Time of the first acceptance by the gatekeeper, s."""
+    return _times(trace, robot, "accept")[:1]
+
+
+@measure
+def refusal_time(trace: Trace, robot: str) -> list[float]:
+    """Time of the first refusal by the gatekeeper, s."""
+    return _times(trace, robot, "refuse")[:1]
+
+
+@measure
+def collision_position(trace: Trace, robot: str) -> list[float]:
+    """Position [x, y] in m of the robot's first collision."""
+    hits = events_of(trace, robot, "collision")
+    return _planar(hits[0]["position_m"]) if hits else []
+
+
+def rows(scenario: Scenario, traces: Mapping[str, Trace]) -> list[dict[str, Any]]:
+    """The reproduction table, in the scenario's order: one JSON object per row.
+
+    Args:
+        scenario: its `reproduction` rows are evaluated.
+        traces: by run.
+
+    Returns:
+        For each row `id`, `quantity`, `measure`, `run`, `robot`, `paper`, `ours` (scalars if of one component,
+        `ours` is None without a value), `difference` (largest over the components), `unit`, `tolerance`,
+        `status` (reproduced, calibrated or not_reproduced) and `why`.
+    """
+    return [_row(row, traces) for row in scenario.reproduction]
+
+
+def _row(row: Reproduction, traces: Mapping[str, Trace]) -> dict[str, Any]:
+    ours, reason = _evaluate(row, traces)
+    tolerance = 0.0 if row.unit == YES_NO else row.tolerance
+    difference = max(abs(a - b) for a, b in zip(ours, row.paper, strict=True)) if ours else None
+    within = difference is not None and difference <= tolerance * (1.0 + 1e-9) + 1e-12
+    if difference is not None and not within and row.unit != YES_NO:
+        reason = f"differs by {difference:.4g} {row.unit}, {tolerance:.4g} {row.unit} are allowed"
+    elif difference is not None and not within:
+        reason = "the answer differs"
+    return {
+        "id": row.id,
+        "quantity": row.quantity,
+        "measure": row.measure,
+        "run": row.run,
+        "robot": row.robot,
+        "paper": _scalar(row.paper),
+        "ours": _scalar(ours),
+        "difference": difference,
+        "unit": row.unit,
+        "tolerance": tolerance,
+        "status": ("calibrated" if row.calibrated else "reproduced") if within else "not_reproduced",
+        "why": row.why if within else "; ".join(filter(None, (reason, row.why))),
+    }
+
+
+def _evaluate(row: Reproduction, traces: Mapping[str, Trace]) -> tuple[list[float], str]:
+    """Our value and, where there is none to compare, the reason."""
+    if row.measure not in MEASURES:
+        return [], f"there is no measure {row.measure!r}; there are {', '.join(sorted(MEASURES))}"
+    if row.run not in traces:
+        return [], f"run {row.run!r} has no trace"
+    try:
+        ours = MEASURES[row.measure](traces[row.run], row.robot)
+    except TraceError as error:
+        return [], f"could not be measured: {error}"
+    if not ours:
+        return [], f"no value: run {row.run} shows nothing of the kind for {row.robot}"
+    if len(ours) != len(row.paper):
+        return [], f"{len(ours)} components measured, the paper's value has {len(row.paper)}"
+    if not np.isfinite(ours).all():
+        return [], "the measured value is not finite"
+    return ours, ""
+
+
+def _scalar(values: list[float]) -> float | list[float] | None:
+    """One component as a number, several as a list, none as None."""
+    return (values[0] if len(values) == 1 else list(values)) if values else None
+
+
+def _decision_variable(trace: Trace, ugv: str) -> tuple[Array, float]:
+    return trace.column(f"{ugv}.decision_variable_m"), float(trace.meta["zeta_m"])
+
+
+def _times(trace: Trace, robot: str, kind: str) -> list[float]:
+    return [float(event["t_s"]) for event in events_of(trace, robot, kind)]
+
+
+def _planar(position: Any) -> list[float]:
+    return [float(position[0]), float(position[1])]
+
+
+def _arrived(trace: Trace, robot: str) -> bool:
+    scenario = trace.scenario
+    if robot not in trace.robots:
+        raise TraceError(f"run {trace.run}: there is no robot {robot!r}; there are {', '.join(trace.robots)}")
+    target = (scenario["ugvs"][robot] if robot in scenario["ugvs"] else scenario["uav"])["target_m"]
+    return bool(np.linalg.norm(trace.position(robot)[-1] - np.asarray(target)) <= scenario["arrival_tolerance_m"])

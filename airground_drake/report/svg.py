@@ -1,0 +1,88 @@
+"""SVG made fit for inlining in an HTML page: named for screen readers, with unique ids, small, and inert."""
+
+from __future__ import annotations
+
+import re
+import xml.etree.ElementTree as ET
+
+NAMESPACE = "http://www.w3.org/2000/svg"
+_TAG = f"{{{NAMESPACE}}}"
+_XLINK = "{http://www.w3.org/1999/xlink}"
+_DROPPED = {
+    f"{_TAG}{name}"
+    for name in ("script", "style", "metadata", "foreignObject", "image", "animate", "set", "title", "desc")
+}
+_REFERENCE = re.compile(r"url\(\s*['\"]?#([^'\")\s]+)['\"]?\s*\)")
+_LONG_NUMBER = re.compile(r"-?\d+\.\d{3,}")
+_ROUNDED = {"d", "points", "transform", "x", "y", "width", "height", "cx", "cy", "rx", "ry", "r"}
+
+
+def inline(svg: str, prefix: str, title: str, description: str) -> str:
+    """An SVG document as an element to be placed in HTML.
+
+    Scripts, style sheets, handlers and references to anything outside the document are removed (style sheets
+    would apply to the whole page), ids get a prefix, and unused ones are removed, so that several drawings can
+    share a page; coordinates are rounded to 0.01 units. The size is left to the page.
+
+    Args:
+        svg: the document; `viewBox` must be set.
+        prefix: unique in the page; letters, digits, '-' and '_'.
+        title: the accessible name.
+        description: what it shows.
+
+    Raises:
+        ValueError: if it is not an SVG document.
+    """
+    try:
+        root = ET.fromstring(svg)
+    except ET.ParseError as error:
+        raise ValueError(f"not well-formed XML: {error}") from error
+    if root.tag != f"{_TAG}svg":
+        raise ValueError(f"the root element is {root.tag!r}, not an SVG")
+    _drop(root)
+    used = {name for element in root.iter() for value in element.attrib.values() for name in _references(value)}
+    for element in root.iter():
+        _clean(element, prefix, used)
+    for name in ("width", "height", "version"):
+        root.attrib.pop(name, None)
+    root.set("role", "img")
+    root.set("aria-labelledby", f"{prefix}-title {prefix}-desc")
+    for position, (name, text) in enumerate((("title", title), ("desc", description))):
+        child = ET.Element(f"{_TAG}{name}", {"id": f"{prefix}-{name}"})
+        child.text = text
+        root.insert(position, child)
+    ET.register_namespace("", NAMESPACE)
+    return ET.tostring(root, encoding="unicode")
+
+
+def _drop(element: ET.Element) -> None:
+    for child in list(element):
+        if not isinstance(child.tag, str) or child.tag in _DROPPED:
+            element.remove(child)
+        else:
+            _drop(child)
+
+
+def _references(value: str) -> list[str]:
+    """Ids of this document that an attribute's value refers to."""
+    return [value[1:]] if value.startswith("#") else _REFERENCE.findall(value)
+
+
+def _clean(element: ET.Element, prefix: str, used: set[str]) -> None:
+    for name in ("href", f"{_XLINK}href"):
+        target = element.attrib.pop(name, "")
+        if target.startswith("#"):
+            element.set("href", f"#{prefix}-{target[1:]}")
+    for name, value in list(element.attrib.items()):
+        if name == "id" and value in used:
+            element.set(name, f"{prefix}-{value}")
+        elif name == "id" or name.lower().startswith(("on", _XLINK)) or _leads_outside(value):
+            del element.attrib[name]
+        elif "url(" in value:
+            element.set(name, _REFERENCE.sub(rf"url(#{prefix}-\1)", value))
+        elif name in _ROUNDED and "scale" not in value and "matrix" not in value:
+            element.set(name, _LONG_NUMBER.sub(lambda match: f"{float(match.group()):.2f}", value))
+
+
+def _leads_outside(value: str) -> bool:
+    return "url(" in value and "url(" in _REFERENCE.sub("", value)

@@ -1,0 +1,1 @@
+"""The scenario file: schema, loading, validation, and the shipped scenarios."""

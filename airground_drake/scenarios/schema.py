@@ -1,0 +1,190 @@
+"""The scenario file as dataclasses: every key, its unit (in the key's name) and its meaning.
+
+pydrake's YAML reader fills them (`load.py`), which is why they are mutable and use lists: after loading and
+validation (`validate.py`) nothing changes them. Positions are in the world frame, z up, the ground at z = 0.
+"""
+
+from dataclasses import dataclass, field
+
+Vector = list[float]
+
+
+@dataclass
+class Preset:
+    """Preset trajectory rho_rd of a UGV: a polyline travelled at constant speed from t = 0, then held."""
+
+    waypoints_m: list[Vector] = field(default_factory=list)
+    speed_m_s: float = 1.0
+
+
+@dataclass
+class Ugv:
+    """One UGV: a planar first-order robot."""
+
+    start_m: Vector = field(default_factory=list)
+    target_m: Vector = field(default_factory=list)
+    preset: Preset = field(default_factory=Preset)
+    max_speed_m_s: float = 6.0
+
+
+@dataclass
+class Uav:
+    """The UAV: a spatial first-order robot that flies over the centroid of the UGVs, eqs (9)-(10)."""
+
+    name: str = "uav"
+    start_m: Vector = field(default_factory=list)
+    target_m: Vector = field(default_factory=list)
+    altitude_m: float = 2.0
+    max_speed_m_s: float = 10.0
+
+
+@dataclass
+class Obstacle:
+    """A point to keep away from by the safe distance of (7)-(8)."""
+
+    position_m: Vector = field(default_factory=list)
+    known_to_uav: bool = True
+
+
+@dataclass
+class SafeDistance:
+    """Safe distances d of (7)-(8), for each kind of pair, and the distance that counts as a collision."""
+
+    obstacle_m: float = 2.0
+    ugv_m: float = 2.0
+    air_ground_m: float = 1.0
+    collision_m: float = 0.05
+
+
+@dataclass
+class Control:
+    """NSBC controllers of all robots: sampled with zero-order hold."""
+
+    period_s: float = 0.025
+    avoidance_gain_1_s: float = 3.0
+    motion_gain_1_s: float = 2.0
+    formation_gain_1_s: float = 5.0
+    intervention_gain_1_s: float = 1.5
+    sensing_range_m: float = 4.0
+
+
+@dataclass
+class Threshold:
+    """Decision threshold zeta: rule 'fixed' takes zeta_m; 'bayes' minimises the Bayes risk (16)-(19)."""
+
+    rule: str = "fixed"
+    zeta_m: float = 3.0
+    c1_1_s: float = 0.5
+    c2: float = 1.0
+    drift_m_s: float = 6.05
+    noise_m_sqrt_s: float = 10.0
+
+
+@dataclass
+class Decision:
+    """DDM (15) and event trigger: 'automaton' (hysteresis, minimum inter-event time) or 'bare' (the paper's)."""
+
+    threshold: Threshold = field(default_factory=Threshold)
+    trigger: str = "automaton"
+    release_m: float = 1.5
+    min_inter_event_s: float = 0.5
+    noise_m_sqrt_s: float = 0.0
+    leak_1_s: float = 0.0
+    noise_period_s: float = 0.025
+
+
+@dataclass
+class Policy:
+    """One entry of the UAV's behaviour database: a policy's name and its numbers."""
+
+    name: str = "detour"
+    parameters: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass
+class Intervention:
+    """The UAV's intervention behaviours, tried in this order; how often it plans, and rests after a refusal."""
+
+    period_s: float = 0.05
+    retry_s: float = 1.0
+    policies: list[Policy] = field(default_factory=list)
+
+
+@dataclass
+class Gatekeeper:
+    """The accept/refuse decision, eqs (21)-(29).
+
+    A decision on a proposal is reversed only for a plan that is cheaper by the (relative) switching margin.
+    """
+
+    route: str = "relaxed"
+    period_s: float = 0.05
+    horizon_s: float = 3.0
+    stages: int = 60
+    error_weight_1_m2_s: float = 1.0
+    slack_weight_1_m2_s: float = 1000.0
+    switching_margin: float = 0.05
+
+
+@dataclass
+class Run:
+    """One simulation: a method of SPEC section 1 and what is expected of it.
+
+    `stalls_m` names the UGVs that must end (to within `stall_tolerance_m`) at that point short of their
+    target. `expected` maps claim identifiers to the expected verdict; a claim not named must hold.
+    """
+
+    method: str = "d"
+    composition: str = "augmented"
+    stalls_m: dict[str, Vector] = field(default_factory=dict)
+    expected: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass
+class Reproduction:
+    """One row of the reproduction table: a measure of a run against the paper's value."""
+
+    id: str = ""
+    quantity: str = ""
+    measure: str = ""
+    run: str = ""
+    robot: str = ""
+    paper: list[float] = field(default_factory=list)
+    unit: str = ""
+    tolerance: float = 0.0
+    calibrated: bool = False
+    why: str = ""
+
+
+@dataclass
+class Choice:
+    """Where a value that is not the paper's comes from: `source` is 'calibrated' or 'ours'."""
+
+    key: str = ""
+    source: str = "ours"
+    paper: str = ""
+    reason: str = ""
+
+
+@dataclass
+class Scenario:
+    """A scenario file. The order of `ugvs` and `obstacles` is the order of all arrays."""
+
+    name: str = ""
+    title: str = ""
+    description: str = ""
+    seed: int = 0
+    duration_s: float = 30.0
+    arrival_tolerance_m: float = 0.1
+    stall_tolerance_m: float = 0.1
+    ugvs: dict[str, Ugv] = field(default_factory=dict)
+    uav: Uav = field(default_factory=Uav)
+    obstacles: dict[str, Obstacle] = field(default_factory=dict)
+    safe_distance: SafeDistance = field(default_factory=SafeDistance)
+    control: Control = field(default_factory=Control)
+    decision: Decision = field(default_factory=Decision)
+    intervention: Intervention = field(default_factory=Intervention)
+    gatekeeper: Gatekeeper = field(default_factory=Gatekeeper)
+    runs: dict[str, Run] = field(default_factory=dict)
+    reproduction: list[Reproduction] = field(default_factory=list)
+    choices: list[Choice] = field(default_factory=list)

@@ -1,0 +1,305 @@
+"""What a well-formed scenario must satisfy to make sense: one small function per rule, all in `CHECKS`.
+
+A check yields its problems as (key, value, allowed); `check` raises the first. Constants that later stages
+share (methods, routes, claim identifiers) stand here, because nothing may be imported from right to left.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections import Counter
+from collections.abc import Callable, Collection, Iterable, Iterator
+from dataclasses import fields, is_dataclass
+from itertools import combinations, pairwise
+
+from airground_drake.errors import Fault, ScenarioError
+from airground_drake.nsbc.avoidance import COMPOSITIONS
+from airground_drake.scenarios import schema
+from airground_drake.scenarios.schema import Scenario, Vector
+
+METHODS: tuple[str, ...] = ("a", "b", "c", "d")
+ROUTES: tuple[str, ...] = ("relaxed",)
+TRIGGERS: tuple[str, ...] = ("automaton", "bare")
+THRESHOLD_RULES: tuple[str, ...] = ("fixed", "bayes")
+POLICIES: tuple[str, ...] = ("detour",)
+SOURCES: tuple[str, ...] = ("calibrated", "ours")
+CLAIMS: tuple[str, ...] = ("SAFE-TRACE", "SAFE-HYP", "ZENO-TRACE", "THR-TRIG", "LIVE-GOAL", "COMM", "GATE-TIME")
+STATUSES: tuple[str, ...] = ("proved", "holds", "supported", "refuted", "inconclusive", "error", "not_run")
+
+MAX_UGVS = 100
+MAX_STAGES = 1000
+MAX_SEED = 2**31 - 1
+LARGEST, SMALLEST = 1e9, 1e-9
+"""Largest size of any number and smallest positive one: products and quotients of two stay finite."""
+TOLERANCE_M = 1e-9
+TOLERANCE_RATIO = 1e-9
+
+NON_NEGATIVE: dict[type, tuple[str, ...]] = {
+    schema.Control: ("avoidance_gain_1_s", "motion_gain_1_s", "formation_gain_1_s", "intervention_gain_1_s"),
+    schema.Decision: ("release_m", "min_inter_event_s", "noise_m_sqrt_s", "leak_1_s"),
+    schema.Gatekeeper: ("slack_weight_1_m2_s",),
+    schema.Reproduction: ("tolerance",),
+}
+"""Numbers that may be 0; every other number of the schema must be positive."""
+_UNITS = {"m_sqrt_s": "m/sqrt(s)", "1_m2_s": "1/(m^2 s)", "m_s": "m/s", "1_s": "1/s", "m": "m", "s": "s"}
+"""Unit by the suffix of a key, the longest suffix first."""
+
+Problem = tuple[str, object, str]
+Problems = Iterator[Problem]
+
+
+def check(scenario: Scenario, source: str, known_policies: Collection[str] | None = None) -> None:
+    """Check a scenario whose values have the types of the schema.
+
+    Args:
+        scenario: the scenario.
+        source: where it comes from, for the message.
+        known_policies: names of the behaviour database (default: `POLICIES`).
+
+    Raises:
+        ScenarioError: for the first problem; names the key, its value and what is allowed.
+    """
+    known = tuple(POLICIES if known_policies is None else known_policies)
+    for problems in (*(rule(scenario) for rule in CHECKS), _policies(scenario, known)):
+        for key, value, allowed in problems:
+            raise ScenarioError(source, key, value, allowed)
+
+
+def unit_of(name: str) -> str:
+    """Unit that the suffix of a key says, or ''."""
+    return next((unit for suffix, unit in _UNITS.items() if name.endswith(f"_{suffix}")), "")
+
+
+def in_unit(name: str) -> str:
+    """' in m/s' and the like, or '' for a key without unit."""
+    return f" in {unit_of(name)}" if unit_of(name) else ""
+
+
+def _join(key: str, part: str) -> str:
+    return f"{key}.{part}" if key else part
+
+
+def _one_of(key: str, value: str, allowed: Iterable[str], what: str = "one of") -> Problems:
+    options = tuple(allowed)
+    if value not in options:
+        yield key, value, f"{what} {', '.join(options) or '(none)'}"
+
+
+def _nodes(value: object, key: str = "", name: str = "") -> Iterator[tuple[str, str, object]]:
+    """(dotted key, name of the field or parameter, value) of a value and of everything in it."""
+    yield key, name, value
+    children: Iterable[tuple[str, str, object]] = ()
+    if is_dataclass(value):
+        children = ((f.name, f.name, getattr(value, f.name)) for f in fields(value))
+    elif isinstance(value, dict):
+        children = ((entry, name if unit_of(name) else entry, child) for entry, child in value.items())
+    elif isinstance(value, list):
+        children = ((str(index), name, child) for index, child in enumerate(value))
+    for part, child_name, child in children:
+        yield from _nodes(child, _join(key, part), child_name)
+
+
+def _finite(scenario: Scenario) -> Problems:
+    for key, name, value in _nodes(scenario):
+        if isinstance(value, float) and not abs(value) <= LARGEST:
+            yield key, value, f"a finite number{in_unit(name)}, at most {LARGEST:g} in size"
+
+
+def _bounds(scenario: Scenario) -> Problems:
+    for key, _, value in _nodes(scenario):
+        for field in fields(value) if is_dataclass(value) else ():
+            if isinstance(field.default, float):
+                least = 0.0 if field.name in NON_NEGATIVE.get(type(value), ()) else SMALLEST
+                if getattr(value, field.name) < least:
+                    allowed = f"a number{in_unit(field.name)}, not below {least:g}"
+                    yield _join(key, field.name), getattr(value, field.name), allowed
+
+
+def _names(scenario: Scenario) -> Problems:
+    bodies = [(f"ugvs.{name}", name) for name in scenario.ugvs]
+    bodies += [("uav.name", scenario.uav.name), *((f"obstacles.{name}", name) for name in scenario.obstacles)]
+    others = [("name", scenario.name), *((f"runs.{name}", name) for name in scenario.runs)]
+    for index, policy in enumerate(scenario.intervention.policies):
+        others += [(f"intervention.policies.{index}.parameters.{name}", name) for name in policy.parameters]
+    count = Counter(name for _, name in bodies)
+    for key, name in (*bodies, *others):
+        if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", name):
+            yield key, name, "a name of letters, digits and underscores that does not begin with a digit"
+        if count[name] > 1:
+            yield key, name, "a name that no other UGV, obstacle or UAV has"
+
+
+def _counts(scenario: Scenario) -> Problems:
+    if not 0 <= scenario.seed <= MAX_SEED:
+        yield "seed", scenario.seed, f"a whole number from 0 to {MAX_SEED}"
+    if not 1 <= scenario.gatekeeper.stages <= MAX_STAGES:
+        yield "gatekeeper.stages", scenario.gatekeeper.stages, f"a whole number from 1 to {MAX_STAGES}"
+    if not 1 <= len(scenario.ugvs) <= MAX_UGVS:
+        yield "ugvs", Fault(f"{len(scenario.ugvs)} UGVs"), f"1 to {MAX_UGVS} are allowed"
+    if not scenario.runs:
+        yield "runs", Fault("no run"), "at least one is needed, such as d: {method: d}"
+
+
+def _options(scenario: Scenario) -> Problems:
+    yield from _one_of("gatekeeper.route", scenario.gatekeeper.route, ROUTES)
+    yield from _one_of("decision.trigger", scenario.decision.trigger, TRIGGERS)
+    yield from _one_of("decision.threshold.rule", scenario.decision.threshold.rule, THRESHOLD_RULES)
+
+
+def _runs(scenario: Scenario) -> Problems:
+    for name, run in scenario.runs.items():
+        yield from _one_of(f"runs.{name}.method", run.method, METHODS)
+        yield from _one_of(f"runs.{name}.composition", run.composition, COMPOSITIONS)
+        for robot in run.stalls_m:
+            yield from _one_of(f"runs.{name}.stalls_m.{robot}", robot, scenario.ugvs, "one of the UGVs")
+        for claim, status in run.expected.items():
+            yield from _one_of(f"runs.{name}.expected.{claim}", claim, CLAIMS, "one of the claims")
+            yield from _one_of(f"runs.{name}.expected.{claim}", status, STATUSES)
+
+
+def _ugv_points(scenario: Scenario) -> Iterator[tuple[str, Vector]]:
+    for name, ugv in scenario.ugvs.items():
+        yield f"ugvs.{name}.start_m", ugv.start_m
+        yield f"ugvs.{name}.target_m", ugv.target_m
+        for index, point in enumerate(ugv.preset.waypoints_m):
+            yield f"ugvs.{name}.preset.waypoints_m.{index}", point
+    for run_name, run in scenario.runs.items():
+        for name, point in run.stalls_m.items():
+            yield f"runs.{run_name}.stalls_m.{name}", point
+
+
+def _points(scenario: Scenario) -> Problems:
+    others = [("uav.start_m", scenario.uav.start_m), ("uav.target_m", scenario.uav.target_m)]
+    others += [(f"obstacles.{name}.position_m", each.position_m) for name, each in scenario.obstacles.items()]
+    for key, point in (*_ugv_points(scenario), *others):
+        if len(point) != 3:
+            yield key, point, "3 numbers in m: [x, y, z]"
+    for key, point in _ugv_points(scenario):
+        if point[2] != 0.0:
+            yield key, point, "z must be 0 m: a UGV moves on the ground"
+
+
+def _presets(scenario: Scenario) -> Problems:
+    for name, ugv in scenario.ugvs.items():
+        key = f"ugvs.{name}.preset.waypoints_m"
+        if len(ugv.preset.waypoints_m) < 2:
+            yield key, ugv.preset.waypoints_m, "at least 2 waypoints"
+        for index, (before, after) in enumerate(pairwise(ugv.preset.waypoints_m), start=1):
+            if math.dist(before, after) <= TOLERANCE_M:
+                yield f"{key}.{index}", after, "a waypoint other than the one before it"
+
+
+def _gains(scenario: Scenario) -> Problems:
+    period = scenario.control.period_s
+    for name in NON_NEGATIVE[schema.Control]:
+        gain = getattr(scenario.control, name)
+        if gain * period > 1.0:
+            yield f"control.{name}", gain, f"at most {1.0 / period:.9g} 1/s: gain * control.period_s must not exceed 1"
+
+
+def _periods(scenario: Scenario) -> Problems:
+    control, gatekeeper, noise = scenario.control.period_s, scenario.gatekeeper, scenario.decision.noise_period_s
+    rule = f"must be a whole multiple of control.period_s = {control:.9g} s"
+    for key, period in (("gatekeeper", gatekeeper.period_s), ("intervention", scenario.intervention.period_s)):
+        if not _multiple(period, control):
+            yield f"{key}.period_s", period, rule
+    stage = gatekeeper.horizon_s / gatekeeper.stages
+    if not _multiple(stage, control):
+        yield "gatekeeper.horizon_s", gatekeeper.horizon_s, f"a stage, horizon_s / stages = {stage:.9g} s, {rule}"
+    if not (_multiple(noise, control) or _multiple(control, noise)):
+        yield "decision.noise_period_s", noise, f"{rule}, or go into it a whole number of times"
+
+
+def _multiple(of: float, unit: float) -> bool:
+    ratio = of / unit
+    return round(ratio) >= 1 and abs(ratio - round(ratio)) <= TOLERANCE_RATIO * ratio
+
+
+def _release(scenario: Scenario) -> Problems:
+    decision, zeta = scenario.decision, scenario.decision.threshold.zeta_m
+    fixed = decision.trigger == "automaton" and decision.threshold.rule == "fixed"
+    if fixed and not decision.release_m < zeta:
+        yield "decision.release_m", decision.release_m, f"less than decision.threshold.zeta_m = {zeta:.9g} m"
+
+
+def _distances(scenario: Scenario) -> Problems:
+    safe, altitude = scenario.safe_distance, scenario.uav.altitude_m
+    for name in ("obstacle_m", "ugv_m", "air_ground_m"):
+        if not safe.collision_m < getattr(safe, name):
+            allowed = f"less than safe_distance.{name} = {getattr(safe, name):.9g} m"
+            yield "safe_distance.collision_m", safe.collision_m, allowed
+    if not altitude > safe.air_ground_m:
+        allowed = f"more than safe_distance.air_ground_m = {safe.air_ground_m:.9g} m, for the UAV to fly over a UGV"
+        yield "uav.altitude_m", altitude, allowed
+
+
+def _sensing(scenario: Scenario) -> Problems:
+    """What is farther than the sensing range must not come within the safe distance in one control period."""
+    safe, period = scenario.safe_distance, scenario.control.period_s
+    ugvs = sorted(((ugv.max_speed_m_s, name) for name, ugv in scenario.ugvs.items()), reverse=True)
+    uav = (scenario.uav.max_speed_m_s, scenario.uav.name)
+    pairs = [(safe.air_ground_m, "air_ground_m", uav, ugvs[0])]
+    if len(ugvs) > 1:
+        pairs.append((safe.ugv_m, "ugv_m", ugvs[0], ugvs[1]))
+    if scenario.obstacles:
+        pairs.append((safe.obstacle_m, "obstacle_m", max(uav, ugvs[0]), (0.0, "an obstacle")))
+    needed, distance, closing, kind, one, other = max(
+        (d + (v + w) * period, d, v + w, kind, one, other) for d, kind, (v, one), (w, other) in pairs
+    )
+    if scenario.control.sensing_range_m < needed - TOLERANCE_M:
+        sum_of = (
+            f"safe_distance.{kind} {distance:.9g} m + closing speed {closing:.9g} m/s * control.period_s {period:.9g} s"
+        )
+        allowed = f"at least {needed:.9g} m for {one} and {other}: {sum_of}"
+        yield "control.sensing_range_m", scenario.control.sensing_range_m, allowed
+
+
+def _clearances(scenario: Scenario) -> Problems:
+    """Robots that start, or are to end, within the safe distance of an obstacle or of each other."""
+    for attribute, verb in (("start_m", "starts"), ("target_m", "would end")):
+        ugvs = [(f"ugvs.{name}", name, getattr(ugv, attribute)) for name, ugv in scenario.ugvs.items()]
+        uav = ("uav", scenario.uav.name, getattr(scenario.uav, attribute))
+        obstacles = [(name, obstacle.position_m) for name, obstacle in scenario.obstacles.items()]
+        pairs = [
+            *((robot, obstacle, "obstacle_m") for robot in (*ugvs, uav) for obstacle in obstacles),
+            *((robot, other[1:], "ugv_m") for other, robot in combinations(ugvs, 2)),
+            *((uav, ugv[1:], "air_ground_m") for ugv in ugvs),
+        ]
+        for (key, name, point), (other_name, other_point), kind in pairs:
+            distance, least = math.dist(point, other_point), getattr(scenario.safe_distance, kind)
+            if distance < least - TOLERANCE_M:
+                allowed = f"at least safe_distance.{kind} = {least:.9g} m is"
+                yield f"{key}.{attribute}", point, f"{name} {verb} {distance:.9g} m from {other_name}, {allowed}"
+
+
+def _reproduction(scenario: Scenario) -> Problems:
+    count = Counter(row.id for row in scenario.reproduction)
+    for index, row in enumerate(scenario.reproduction):
+        key = f"reproduction.{index}"
+        if not row.id or count[row.id] > 1:
+            yield f"{key}.id", row.id, "an identifier that no other row has"
+        if not row.paper:
+            yield f"{key}.paper", row.paper, "at least one number"
+        yield from _one_of(f"{key}.run", row.run, scenario.runs, "one of the runs")
+        yield from _one_of(f"{key}.robot", row.robot, (*scenario.ugvs, scenario.uav.name), "one of the robots")
+
+
+def _choices(scenario: Scenario) -> Problems:
+    keys = {key for key, _, _ in _nodes(scenario) if key}
+    for index, choice in enumerate(scenario.choices):
+        if choice.key not in keys:
+            yield f"choices.{index}.key", choice.key, "a key of this scenario, such as control.period_s"
+        yield from _one_of(f"choices.{index}.source", choice.source, SOURCES)
+
+
+def _policies(scenario: Scenario, known: Collection[str]) -> Problems:
+    for index, policy in enumerate(scenario.intervention.policies):
+        yield from _one_of(f"intervention.policies.{index}.name", policy.name, known, "one of the policies")
+
+
+CHECKS: tuple[Callable[[Scenario], Problems], ...] = (
+    _finite, _bounds, _counts, _names, _options, _runs, _points, _presets, _gains, _periods, _release,
+    _distances, _sensing, _clearances, _reproduction, _choices,
+)  # fmt: skip
+"""Every rule but that of the policies; later ones rely on earlier ones (finite numbers, three coordinates)."""

@@ -1,0 +1,225 @@
+"""Run a model with Drake's Simulator and turn what was logged into a Trace."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from pydrake.common import RandomGenerator
+from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
+from pydrake.systems.framework import Context, DiagramBuilder
+from pydrake.systems.primitives import LogVectorOutput, VectorLogSink
+
+from airground_drake.diagram import RECORDED, Model, build_model
+from airground_drake.gatekeeper.prediction import Scene, UgvLaw, mode_velocities
+from airground_drake.intervention.policy import Proposal
+from airground_drake.nsbc.avoidance import Avoidance, Composition, Surroundings, limit_speed
+from airground_drake.nsbc.motion import Motion
+from airground_drake.nsbc.task import Array
+from airground_drake.nsbc.team import Team
+from airground_drake.scenarios.load import resolved
+from airground_drake.scenarios.schema import Run, Scenario
+from airground_drake.systems.decision import FIELDS
+from airground_drake.trace import DECISION_COLUMNS, SCHEMA, Trace
+
+EVENT_ACCURACY = 1e-6
+"""Accuracy of the Context: witness functions are isolated to it (relative to the time scale of 1 s)."""
+
+MERGE_S = 1e-9
+"""Rows closer than this are one: periods that are not binary fractions give steps of about 1e-17 s."""
+
+
+class Recorder:
+    """A model inside a diagram that logs its exported outputs at every step; reused for several seeds.
+
+    A Diagram with Python systems is never garbage-collected, so that one is built per method and process.
+    """
+
+    def __init__(self, scenario: Scenario, name: str, run: Run) -> None:
+        """Build the model of a run of the scenario and its loggers."""
+        composition: Composition = run.composition  # type: ignore[assignment]
+        self._scenario, self._name, self._run = scenario, name, run
+        self._model: Model = build_model(scenario, run.method, composition)  # type: ignore[arg-type]
+        builder = DiagramBuilder()
+        builder.AddSystem(self._model.diagram)
+        self._sinks: dict[str, VectorLogSink] = {}
+        for port in RECORDED:
+            self._sinks[port] = LogVectorOutput(self._model.diagram.GetOutputPort(port), builder)
+            self._sinks[port].set_name(f"log_{port}")
+        self._root = builder.Build()
+        self._root.set_name("recorded")
+        warm_up()
+
+    def simulate(self, seed: int | None = None, duration: float | None = None) -> Trace:
+        """One run from the initial state.
+
+        Args:
+            seed: of the decision noise; default: the scenario's.
+            duration: s; default: the scenario's.
+        """
+        seed = self._scenario.seed if seed is None else seed
+        context = self._root.CreateDefaultContext()
+        self._root.SetRandomContext(context, RandomGenerator(seed))
+        self._model.set_starts(context)
+        context.SetAccuracy(EVENT_ACCURACY)
+        simulator = Simulator(self._root, context)
+        period = self._scenario.control.period_s
+        config = SimulatorConfig(integration_scheme="explicit_euler", max_step_size=period, use_error_control=False)
+        ApplySimulatorConfig(config, simulator)  # velocities are held between samples: Euler's method is exact
+        if self._model.gatekeeper is not None:
+            self._model.gatekeeper.reset_timing()
+        started = time.perf_counter()
+        simulator.Initialize()
+        simulator.AdvanceTo(self._scenario.duration_s if duration is None else duration)
+        wall = time.perf_counter() - started
+        return self._trace(context, seed, wall)
+
+    def _trace(self, context: Context, seed: int, wall: float) -> Trace:
+        model, ugvs, robots = self._model, self._model.team.ugvs, self._model.team.robots
+        logs = {port: self._sinks[port].FindLog(context) for port in RECORDED}
+        t = logs["team_position"].sample_times()
+        keep = np.append(np.diff(t) > MERGE_S, True)
+        data = {port: log.data()[:, keep] for port, log in logs.items()}
+        signals = _signals(t[keep], data, ugvs, robots)
+        gatekeeper = model.gatekeeper
+        rulings = gatekeeper.rulings(gatekeeper.GetMyContextFromRoot(context)) if gatekeeper is not None else ()
+        memory = model.planner.memory(model.planner.GetMyContextFromRoot(context))
+        decisions = pd.DataFrame(
+            [
+                {
+                    "t_s": r.t,
+                    "robot": ugvs[r.robot],
+                    "policy": r.proposal.policy,
+                    "issued_s": r.proposal.issued,
+                    "decision": "accept" if r.accepted else "refuse",
+                    "status": r.decision.status,
+                    "route": self._scenario.gatekeeper.route,
+                    "first_stage": "accept" if r.decision.accept else "refuse",
+                    "relaxed_first_stage": r.decision.relaxed_first_stage,
+                    "objective": r.decision.objective,
+                    "lower_bound": r.decision.lower_bound,
+                    "gap": r.decision.gap,
+                    "objective_accept": r.decision.objective_accept,
+                    "objective_refuse": r.decision.objective_refuse,
+                    "rounding_deviation_s": r.decision.rounding_deviation,
+                    "predicted_min_distance_m": r.decision.clearance,
+                }
+                for r in rulings
+            ],
+            columns=list(DECISION_COLUMNS),
+        ).astype(DECISION_COLUMNS)
+        sent = [(ugvs[i], proposal.issued, proposal.policy) for i, proposal in memory.sent]
+        meta: dict[str, Any] = {
+            "schema": SCHEMA,
+            "run": self._name,
+            "method": self._run.method,
+            "composition": self._run.composition,
+            "seed": seed,
+            "robots": list(robots),
+            "ugvs": list(ugvs),
+            "zeta_m": model.zeta,
+            "scenario": resolved(self._scenario),
+            "events": [],
+            "faults": [{"t_s": f.t, "robot": f.robot, "policy": f.policy, "what": f.what} for f in memory.faults],
+        }
+        times = list(gatekeeper.decision_times_s) if gatekeeper is not None else []
+        trace = Trace(meta, signals, decisions, {"wall_s": wall, "decision_times_s": times})
+        meta["events"] = events(trace, sent)
+        return trace
+
+
+@cache
+def warm_up() -> None:
+    """Load the compiled kernels, once per process, so that no run's wall time includes it."""
+    one, motion = np.ones((1, 3)), Motion(np.array([0.0, 1.0]), np.zeros((2, 3)))
+    avoidance = Avoidance(gain=1.0, period=0.1)
+    spaces = avoidance.half_spaces(one, one, Surroundings(np.zeros((1, 1, 3)), np.ones((1, 1)), np.ones((1, 1))))
+    limit_speed(avoidance.apply(-one, spaces), np.ones(1))
+    team = Team(("a",), "b", np.zeros((1, 3)), 1.0, 1.0, 1.0, np.ones(2))
+    team.neighbourhood(slice(0, 1)).around(np.ones((2, 3)))
+    scene = Scene(0.0, one[0], motion, one, one, np.ones(1), np.ones(1), 1.0)
+    mode_velocities(scene, UgvLaw(avoidance, 1.0, 1.0, False), Proposal("", 0.0, motion), stages=1, substeps=1)
+
+
+def simulate(scenario: Scenario, run: str, seed: int | None = None) -> Trace:
+    """Simulate one run of a scenario.
+
+    Raises:
+        KeyError: if the scenario has no such run.
+    """
+    return Recorder(scenario, run, scenario.runs[run]).simulate(seed)
+
+
+def _signals(t: Array, data: dict[str, Array], ugvs: tuple[str, ...], robots: tuple[str, ...]) -> pd.DataFrame:
+    columns: dict[str, Array] = {"t_s": t}
+    for i, robot in enumerate(robots):
+        for a, axis in enumerate("xyz"):
+            columns[f"{robot}.{axis}_m"] = data["team_position"][3 * i + a]
+        for a, axis in enumerate("xyz"):
+            columns[f"{robot}.v{axis}_m_s"] = data["team_command"][3 * i + a]
+    for i, ugv in enumerate(ugvs):
+        for a, axis in enumerate("xyz"):
+            columns[f"{ugv}.ref_{axis}_m"] = data["reference"][3 * i + a]
+        columns[f"{ugv}.noise_m"] = data["noise"][i]
+        columns[f"{ugv}.decision_variable_m"] = data["decision_variable"][i]
+        for k, name in enumerate(("mode", "triggers", "triggered_at_s", "released_at_s")):
+            columns[f"{ugv}.{name}"] = data["status"][FIELDS * i + k]
+        columns[f"{ugv}.accepted"] = data["accepted"][i]
+    return pd.DataFrame(columns)
+
+
+def events(trace: Trace, sent: Iterable[tuple[str, float, str]]) -> list[dict[str, Any]]:
+    """All events of a run by time, from its signals and decisions.
+
+    Args:
+        trace: the run.
+        sent: proposals as (robot, time of issue in s, policy).
+    """
+    t = trace.t
+    found: list[dict[str, Any]] = []
+
+    def add(time_s: float, robot: str, kind: str, **more: Any) -> None:
+        where = [float(np.interp(time_s, t, trace.column(f"{robot}.{axis}_m"))) for axis in "xyz"]
+        found.append({"t_s": float(time_s), "robot": robot, "kind": kind, "position_m": where, **more})
+
+    for ugv in trace.ugvs:
+        for kind, name in (("trigger", "triggered_at_s"), ("release", "released_at_s")):
+            for when in np.unique(trace.column(f"{ugv}.{name}")):
+                if when >= 0.0:
+                    add(when, ugv, kind)
+    for ugv, issued, policy in sent:
+        add(issued, ugv, "proposal", policy=policy)
+    previous: dict[tuple[str, float], str] = {}
+    for row in trace.decisions.to_dict("records"):
+        key = (row["robot"], row["issued_s"])
+        if previous.get(key) != row["decision"]:
+            previous[key] = row["decision"]
+            add(row["t_s"], row["robot"], row["decision"], policy=row["policy"], status=row["status"])
+    for robot in trace.robots:
+        _add_arrival(trace, robot, add)
+        _add_collisions(trace, robot, add)
+    return sorted(found, key=lambda event: (event["t_s"], trace.robots.index(event["robot"])))
+
+
+def _add_arrival(trace: Trace, robot: str, add: Any) -> None:
+    """The time from which on the robot stays within the arrival tolerance of its target."""
+    scenario = trace.scenario
+    spec = scenario["ugvs"].get(robot, scenario["uav"])
+    away = np.linalg.norm(trace.position(robot) - np.array(spec["target_m"]), axis=1)
+    outside = np.flatnonzero(away > scenario["arrival_tolerance_m"])
+    first = int(outside[-1]) + 1 if len(outside) else 0
+    if first < len(away):
+        add(trace.t[first], robot, "arrival")
+
+
+def _add_collisions(trace: Trace, robot: str, add: Any) -> None:
+    """The first row of each visit within collision distance of an obstacle."""
+    for name, obstacle in trace.scenario["obstacles"].items():
+        distance = np.linalg.norm(trace.position(robot) - np.array(obstacle["position_m"]), axis=1)
+        hit = distance < trace.scenario["safe_distance"]["collision_m"]
+        for k in np.flatnonzero(hit & ~np.append(False, hit[:-1])):
+            add(trace.t[k], robot, "collision", obstacle=name)

@@ -1,0 +1,16 @@
+"""LeafSystems: thin shells that give the pure maths named ports, rates and state."""
+
+from airground_drake.systems.controllers import UavController, UgvController
+from airground_drake.systems.decision import DecisionVariable, EventTrigger
+from airground_drake.systems.gatekeeper import DirectAcceptance, Gatekeeper
+from airground_drake.systems.intervention import InterventionPlanner
+
+__all__ = [
+    "DecisionVariable",
+    "DirectAcceptance",
+    "EventTrigger",
+    "Gatekeeper",
+    "InterventionPlanner",
+    "UavController",
+    "UgvController",
+]

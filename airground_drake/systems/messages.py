@@ -1,0 +1,29 @@
+"""The bidirectional channel: proposals from the UAV, answers from the UGVs.
+
+An answer is two numbers per UGV: ACCEPT, REFUSE or SILENT, and the time of issue of the proposal that it
+answers. An answer to another proposal than the one in force means nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from airground_drake.intervention.policy import Proposal
+from airground_drake.nsbc.task import Array
+
+ACCEPT, SILENT, REFUSE = 1.0, 0.0, -1.0
+
+Proposals = tuple[Proposal | None, ...]
+"""One entry per UGV."""
+
+
+def answer_to(proposal: Proposal | None, answers: Sequence[float] | Array, robot: int) -> float:
+    """The UGV's answer to this very proposal: ACCEPT, REFUSE or SILENT; answers (2n,) flattened."""
+    if proposal is None or answers[2 * robot + 1] != proposal.issued:
+        return SILENT
+    return float(answers[2 * robot])
+
+
+def accepted_proposals(proposals: Sequence[Proposal | None], answers: Array) -> list[Proposal | None]:
+    """Per UGV, the proposal in force if the UGV has accepted it, else None."""
+    return [p if answer_to(p, answers, i) == ACCEPT else None for i, p in enumerate(proposals)]

@@ -1,0 +1,179 @@
+"""What a run leaves behind: every signal once, every event, every gatekeeper decision; saved and loaded.
+
+Rows of `signals` are the ends of the simulator's steps: all control periods, and the isolated event times in
+between. A row's command is the velocity that was applied *up to* this row since the one before, so that
+position[k] = position[k-1] + (t[k] - t[k-1]) * command[k]: between rows every robot moves on a straight line.
+The other held signals (mode, accepted, ...) are likewise those in force just before the row's time.
+
+Columns (units in the names; one set per robot or UGV):
+    t_s
+    <robot>.x_m .y_m .z_m                     position, world frame
+    <robot>.vx_m_s .vy_m_s .vz_m_s            command in force up to this row
+    <ugv>.ref_x_m .ref_y_m .ref_z_m           preset trajectory rho_rd(t)
+    <ugv>.noise_m                             integrated noise of (15)
+    <ugv>.decision_variable_m                 x = ||rho_rd - rho|| + noise
+    <ugv>.mode                                0 supervising, 1 intervening, 2 refractory
+    <ugv>.triggers                            number of triggers so far
+    <ugv>.triggered_at_s .released_at_s       time of the last one, -1 before the first
+    <ugv>.accepted                            1 while an intervention is accepted
+"""
+
+from __future__ import annotations
+
+import io
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from airground_drake import files
+from airground_drake.errors import TraceError
+from airground_drake.nsbc.task import Array
+
+SCHEMA = "airground_drake.trace/1"
+
+DECISION_COLUMNS = {
+    "t_s": "float64",
+    "robot": "str",
+    "policy": "str",
+    "issued_s": "float64",
+    "decision": "str",
+    "status": "str",
+    "route": "str",
+    "first_stage": "str",
+    "relaxed_first_stage": "float64",
+    "objective": "float64",
+    "lower_bound": "float64",
+    "gap": "float64",
+    "objective_accept": "float64",
+    "objective_refuse": "float64",
+    "rounding_deviation_s": "float64",
+    "predicted_min_distance_m": "float64",
+}
+"""Columns of `Trace.decisions`, one row per robot and gatekeeper call; -1 where a number does not apply."""
+
+
+@dataclass(frozen=True)
+class Trace:
+    """One run.
+
+    Attributes:
+        meta: strict JSON: `schema`, `run` (identifier), `method`, `composition`, `seed`, `robots`, `ugvs`
+            (names, array order; the UAV is the last robot), `zeta_m` (threshold in force), `scenario` (the
+            resolved scenario as nested dicts), `events` (list, by time), `faults` (list of what went wrong
+            in a policy or solver).
+        signals: see the module's docstring.
+        decisions: see DECISION_COLUMNS.
+        timings: wall-clock measurements, kept apart because they differ between identical runs:
+            `wall_s`, `decision_times_s`.
+    """
+
+    meta: dict[str, Any]
+    signals: pd.DataFrame
+    decisions: pd.DataFrame
+    timings: dict[str, Any] = field(default_factory=dict, compare=False)
+
+    @property
+    def run(self) -> str:
+        """Identifier of the run in its scenario."""
+        return str(self.meta["run"])
+
+    @property
+    def robots(self) -> list[str]:
+        """Names of all robots: the UGVs, then the UAV."""
+        return list(self.meta["robots"])
+
+    @property
+    def ugvs(self) -> list[str]:
+        """Names of the UGVs."""
+        return list(self.meta["ugvs"])
+
+    @property
+    def scenario(self) -> dict[str, Any]:
+        """The resolved scenario, as nested dicts with the keys of the scenario file."""
+        resolved: dict[str, Any] = self.meta["scenario"]
+        return resolved
+
+    @property
+    def events(self) -> list[dict[str, Any]]:
+        """Events by time: `t_s`, `robot`, `kind`, `position_m`, and what else belongs to the kind."""
+        return list(self.meta["events"])
+
+    @property
+    def t(self) -> Array:
+        """Times of the rows, (T,), s."""
+        return self.column("t_s")
+
+    def column(self, name: str) -> Array:
+        """One column as float64, (T,).
+
+        Raises:
+            TraceError: if it is missing or not finite.
+        """
+        if name not in self.signals:
+            raise TraceError(f"run {self.meta.get('run')}: the trace has no column {name!r}")
+        values = self.signals[name].to_numpy(dtype=np.float64)
+        if not np.isfinite(values).all():
+            raise TraceError(f"run {self.meta.get('run')}: column {name!r} has values that are not finite")
+        return values
+
+    def vector(self, robot: str, stem: str = "", unit: str = "m") -> Array:
+        """Three columns as (T, 3): positions by default; stem 'v' and unit 'm_s' for commands, 'ref_' for presets."""
+        return np.column_stack([self.column(f"{robot}.{stem}{axis}_{unit}") for axis in "xyz"])
+
+    def position(self, robot: str) -> Array:
+        """Positions, (T, 3), m, world frame."""
+        return self.vector(robot)
+
+    def command(self, robot: str) -> Array:
+        """Commands in force up to each row, (T, 3), m/s."""
+        return self.vector(robot, "v", "m_s")
+
+    def reference(self, ugv: str) -> Array:
+        """Preset trajectory, (T, 3), m."""
+        return self.vector(ugv, "ref_")
+
+
+def save(trace: Trace, folder: Path) -> None:
+    """Write `signals.parquet`, `decisions.parquet`, `timings.json`, then `meta.json` with their digests.
+
+    Each file is written atomically and `meta.json` last, so that an interrupted save is recognised by `load`.
+
+    Raises:
+        OSError: if the folder cannot be written.
+        ValueError: if `meta` holds a number that is not finite.
+    """
+    tables = {"signals.parquet": trace.signals, "decisions.parquet": trace.decisions}
+    digests = {}
+    for name, table in tables.items():
+        buffer = io.BytesIO()
+        table.to_parquet(buffer, index=False)
+        digests[name] = files.sha256(buffer.getvalue())
+        files.write_bytes(folder / name, buffer.getvalue())
+    files.write_json(folder / "timings.json", trace.timings)
+    files.write_json(folder / "meta.json", {**trace.meta, "files": digests})
+
+
+def load(folder: Path) -> Trace:
+    """Read a saved trace back.
+
+    Raises:
+        TraceError: if a file is missing, unreadable, or differs from the digest in `meta.json`.
+    """
+    try:
+        meta = json.loads((folder / "meta.json").read_text(encoding="utf-8"))
+        timings = json.loads((folder / "timings.json").read_text(encoding="utf-8"))
+        tables = {}
+        for name, digest in meta.pop("files").items():
+            data = (folder / name).read_bytes()
+            if files.sha256(data) != digest:
+                raise TraceError(f"{folder / name}: its SHA-256 is not the one recorded in meta.json")
+            tables[name] = pd.read_parquet(io.BytesIO(data))
+        if meta.get("schema") != SCHEMA:
+            raise TraceError(f"{folder}: schema {meta.get('schema')!r}, this version reads {SCHEMA!r}")
+        return Trace(meta, tables["signals.parquet"], tables["decisions.parquet"], timings)
+    except (OSError, KeyError, ValueError, AttributeError) as error:
+        raise TraceError(f"{folder}: not a readable trace: {error}") from error

@@ -1,0 +1,150 @@
+"""The shape of a claim and of a verdict, and what any trace must be before a claim may pass on it."""
+
+from __future__ import annotations
+
+import abc
+import json
+from dataclasses import asdict, dataclass, field
+from typing import Any, Literal, get_args
+
+import numpy as np
+
+from airground_drake.errors import TraceError
+from airground_drake.trace import Trace
+
+Status = Literal["proved", "holds", "supported", "refuted", "inconclusive", "error", "not_run"]
+STATUSES: tuple[Status, ...] = get_args(Status)
+PASSING: tuple[Status, ...] = ("proved", "holds", "supported")
+
+MOTION_TOLERANCE_M = 1e-9
+"""A row may differ by this from the position that its command leads to, m: floating-point integration of one
+step errs by 1e-15 m, and a lie this small moves no robot more than it in any step."""
+TIME_TOLERANCE_S = 1e-9
+"""Two instants that differ by less are the same, s: rounding of multiples of a period errs by 1e-14 s."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What a check found.
+
+    Attributes:
+        status: the verdict class.
+        margin: signed distance from refutation (negative: refuted), in `unit`; None where there is none.
+        unit: unit of the margin.
+        where: where the margin is attained: robot, obstacle, time and the like.
+        counterexample: for `refuted`: enough to reproduce it by hand.
+        evidence: numbers behind the verdict, strict JSON.
+    """
+
+    status: Status
+    margin: float | None = None
+    unit: str = ""
+    where: dict[str, Any] = field(default_factory=dict)
+    counterexample: dict[str, Any] | None = None
+    evidence: dict[str, Any] = field(default_factory=dict)
+
+
+class TraceClaim(abc.ABC):
+    """A claim about one run, decided from its trace alone.
+
+    Attributes (all of the class):
+        id: stable identifier.
+        statement: the claim in words.
+        formula: the claim as a formula (plain text).
+        method: how it is decided.
+        equations: equation numbers of the paper that it is about.
+        assumptions: what is taken for granted.
+        does_not_establish: what a reader must not conclude from it.
+    """
+
+    id: str
+    statement: str
+    formula: str
+    method: str
+    equations: str
+    assumptions: tuple[str, ...]
+    does_not_establish: str
+
+    @abc.abstractmethod
+    def check(self, trace: Trace) -> Finding:
+        """Decide the claim on this trace; missing data is `error` or `not_run`, never a pass.
+
+        Called through `judge`, which turns an exception into `error`.
+        """
+
+    def applies(self, trace: Trace) -> bool:
+        """Whether the claim says anything about a run of this method; if not it is left out, not passed."""
+        return True
+
+    def judge(self, trace: Trace) -> Finding:
+        """`check` under guard: a malformed trace or a failing checker is `error`, and so is a pass on half a run."""
+        try:
+            require_motion(trace)
+            finding = self.check(trace)
+            if finding.status in PASSING:
+                require_whole_run(trace)
+            json.dumps(asdict(finding), allow_nan=False)  # a margin that is not a number must not pass
+        except Exception as error:  # noqa: BLE001 (whatever went wrong, the claim was not decided)
+            return Finding("error", evidence={"error": f"{type(error).__name__}: {error}"})
+        return finding
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """A claim, its finding on a run, and the status that the scenario expects."""
+
+    claim: TraceClaim
+    run: str
+    finding: Finding
+    expected: Status
+
+    @property
+    def as_expected(self) -> bool:
+        """Whether the status is the expected one."""
+        return self.finding.status == self.expected
+
+    def to_json(self) -> dict[str, Any]:
+        """The entry of `claims` in report.json."""
+        described = ("id", "statement", "formula", "method", "equations", "does_not_establish")
+        return {
+            **{name: getattr(self.claim, name) for name in described},
+            "assumptions": list(self.claim.assumptions),
+            "run": self.run,
+            "expected": self.expected,
+            "as_expected": self.as_expected,
+            **asdict(self.finding),
+        }
+
+
+def require_motion(trace: Trace) -> None:
+    """Check that the trace is of the shape that its docstring states: position[k] = position[k-1] + dt command[k].
+
+    Raises:
+        TraceError: if time runs backwards, the robots are not those of the scenario, or a step does not agree
+            with its command to within `MOTION_TOLERANCE_M`.
+    """
+    scenario, t = trace.scenario, trace.t
+    if trace.ugvs != list(scenario["ugvs"]) or trace.robots != [*trace.ugvs, scenario["uav"]["name"]]:
+        raise TraceError(f"the trace is of the robots {trace.robots}, which are not those of its scenario")
+    if len(t) < 2 or (np.diff(t) < 0.0).any():
+        raise TraceError("the trace has fewer than two rows, or its time runs backwards")
+    for robot in trace.robots:
+        predicted = np.diff(t)[:, None] * trace.command(robot)[1:]
+        off = np.abs(np.diff(trace.position(robot), axis=0) - predicted).max(axis=1)
+        k = int(np.argmax(off))
+        if off[k] > MOTION_TOLERANCE_M:
+            raise TraceError(f"{robot} at t = {t[k + 1]} s is {off[k]:.3g} m from where its command leads to")
+
+
+def require_whole_run(trace: Trace) -> None:
+    """Check that the rows cover the run, t = 0 to its duration, with no control period left out.
+
+    Raises:
+        TraceError: if they do not.
+    """
+    t, duration, period = trace.t, trace.scenario["duration_s"], trace.scenario["control"]["period_s"]
+    if abs(t[0]) > TIME_TOLERANCE_S or abs(t[-1] - duration) > TIME_TOLERANCE_S:
+        raise TraceError(f"the trace covers {t[0]} to {t[-1]} s of a run from 0 to {duration} s")
+    gap = np.diff(t)
+    if gap.max() > period + TIME_TOLERANCE_S:
+        raise TraceError(f"the trace has no row in the {gap.max()} s before t = {t[1:][np.argmax(gap)]} s")

@@ -1,0 +1,260 @@
+"""Valid traces without the simulator: a small numpy simulation of case A, of scripted motions, and edits of both.
+
+Nothing here is shared with the checkers; of the package only the avoidance inequalities are used.
+"""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import asdict, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from scipy.optimize import brentq
+
+from airground_drake.nsbc.avoidance import Avoidance, Surroundings
+from airground_drake.nsbc.task import Array
+from airground_drake.scenarios.schema import Decision, Obstacle, Preset, Run, Scenario, Uav, Ugv
+from airground_drake.trace import DECISION_COLUMNS, SCHEMA, Trace
+
+Drive = Callable[[float], list[list[float]]]
+"""Scripted velocities of all robots, m/s, at a control sample, s."""
+
+DETOUR = np.array([[6.3, 4.8, 0.0], [6.3, 7.5, 0.0]])
+AWAY = Uav(start_m=[50.0, 50.0, 2.0], target_m=[50.0, 50.0, 2.0])
+
+
+def case_a(changes: dict[str, Any] | None = None) -> dict[str, Any]:
+    """Geometry of case A with the printed reference speed, resolved; `changes` maps dotted keys to values."""
+    scenario = Scenario(
+        name="synthetic",
+        duration_s=18.0,
+        ugvs={
+            "ugv1": Ugv([1.0, 0.5, 0.0], [3.3, 13.0, 0.0], Preset([[3.3, 0.0, 0.0], [3.3, 13.0, 0.0]], 1.0)),
+            "ugv2": Ugv([-1.0, 0.5, 0.0], [-1.3, 13.0, 0.0], Preset([[-1.3, 0.0, 0.0], [-1.3, 13.0, 0.0]], 1.0)),
+        },
+        uav=Uav(start_m=[0.2, 1.0, 2.0], target_m=[1.0, 13.0, 2.0]),
+        obstacles={
+            "obstacle_1": Obstacle([1.7, 4.0, 0.0]),
+            "obstacle_2": Obstacle([4.0, 7.0, 0.0]),
+            "obstacle_3": Obstacle([-0.5, 5.0, 0.0]),
+        },
+        decision=Decision(noise_m_sqrt_s=0.004),
+        runs={m: Run(method=m) for m in "bcd"} | {"a": Run(method="a", stalls_m={"ugv1": [3.37, 5.10, 0.0]})},
+    )
+    return changed(asdict(scenario), changes or {})
+
+
+def lone(start: list[float], target: list[float], preset: Preset, duration_s: float, **more: Any) -> dict[str, Any]:
+    """One scripted UGV far from everything else."""
+    scenario = Scenario(
+        duration_s=duration_s, ugvs={"ugv1": Ugv(start, target, preset)}, uav=AWAY, runs={"d": Run()}, **more
+    )
+    return asdict(scenario)
+
+
+def changed(tree: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
+    """A copy of nested dicts with some dotted keys set."""
+    tree = copy.deepcopy(tree)
+    for key, value in changes.items():
+        *path, last = key.split(".")
+        node = tree
+        for part in path:
+            node = node[part]
+        assert last in node, key
+        node[last] = value
+    return tree
+
+
+def simulate(scenario: dict[str, Any], run: str = "d", drive: Drive | None = None, seed: int = 0) -> Trace:
+    """Simulate a run: NSBC with avoidance on top and a fixed detour, or scripted velocities as they are."""
+    return _Simulation(scenario, run, drive, seed).trace()
+
+
+class _Simulation:
+    def __init__(self, scenario: dict[str, Any], run: str, drive: Drive | None, seed: int) -> None:
+        self.scenario, self.run, self.drive, self.rng = scenario, run, drive, np.random.default_rng(seed)
+        self.method = scenario["runs"][run]["method"]
+        self.specs = list(scenario["ugvs"].values())
+        self.robots = [*scenario["ugvs"], scenario["uav"]["name"]]
+        self.n = len(self.specs)
+        self.position = np.array([*(ugv["start_m"] for ugv in self.specs), scenario["uav"]["start_m"]])
+        self.command = np.zeros((self.n + 1, 3))
+        self.noise = np.zeros(self.n)
+        decision = scenario["decision"]
+        self.zeta, bare = decision["threshold"]["zeta_m"], decision["trigger"] == "bare"
+        self.release, self.dwell = (self.zeta, 0.0) if bare else (decision["release_m"], decision["min_inter_event_s"])
+        self.status = np.tile([0.0, 0.0, -1.0, -1.0], (self.n, 1))  # mode, triggers, triggered at, released at
+        self.leg = np.zeros(self.n, dtype=int)
+        self.issued = np.full(self.n, -1.0)
+        self.accepted = np.zeros(self.n)
+        self.rows: list[list[float]] = []
+        self.events: list[dict[str, Any]] = []
+        self.decisions: list[dict[str, Any]] = []
+
+    def reference(self, i: int, t: float) -> list[float]:
+        preset = self.specs[i]["preset"]
+        left = preset["speed_m_s"] * t
+        for a, b in pairwise(preset["waypoints_m"]):
+            length = math.dist(a, b)
+            if left <= length:
+                return [p + (q - p) * left / length for p, q in zip(a, b, strict=True)]
+            left -= length
+        return list(preset["waypoints_m"][-1])
+
+    def x(self, i: int, position: Iterable[float], noise: float, t: float) -> float:
+        return math.dist(self.reference(i, t), position) + noise
+
+    def trace(self) -> Trace:
+        h, duration = self.scenario["control"]["period_s"], self.scenario["duration_s"]
+        for i in range(self.n):
+            if self.x(i, self.position[i], 0.0, 0.0) >= self.zeta:
+                self.transit(i, 1, 0.0)
+        self.record(0.0)
+        for k in range(round(duration / h)):
+            t = k * h
+            self.converse(k, t)
+            self.command = self.velocities(t) if self.drive is None else np.array(self.drive(t), dtype=float)
+            self.advance(t, (k + 1) * h)
+        return self.finish()
+
+    def transit(self, i: int, mode: int, t: float) -> None:
+        before, self.status[i, 0] = self.status[i, 0], mode
+        for kind, happens, column in (("trigger", mode == 1, 2), ("release", before == 1, 3)):
+            if happens:
+                self.status[i, column] = t
+                self.status[i, 1] += kind == "trigger"
+                where = self.position[i].tolist()
+                self.events.append({"t_s": t, "robot": self.robots[i], "kind": kind, "position_m": where})
+
+    def advance(self, begin: float, end: float) -> None:
+        rate = self.scenario["decision"]["noise_m_sqrt_s"] * self.rng.standard_normal(self.n) / math.sqrt(end - begin)
+        while begin < end:
+            found = [event for i in range(self.n) if (event := self.next_event(i, begin, end, rate[i]))]
+            until, i, mode = min(found, default=(end, -1, 0))
+            self.position = self.position + (until - begin) * self.command
+            self.noise = self.noise + (until - begin) * rate
+            self.record(until)
+            if i >= 0:
+                self.transit(i, mode, until)
+            begin = until
+
+    def next_event(self, i: int, begin: float, end: float, rate: float) -> tuple[float, int, int] | None:
+        """(time, UGV, next mode) of the first transition in (begin, end), by search on a fine grid."""
+
+        motion = list(zip(self.position[i].tolist(), self.command[i].tolist(), strict=True))
+        noise = float(self.noise[i])
+
+        def x(t: float) -> float:
+            return self.x(i, [p + (t - begin) * v for p, v in motion], noise + (t - begin) * rate, t)
+
+        mode, over = self.status[i, 0], self.status[i, 2] + self.dwell
+        if mode == 2:
+            return (over, i, 1 if x(over) >= self.zeta else 0) if begin < over <= end else None
+        level, sign = (self.zeta, 1.0) if mode == 0 else (self.release, -1.0)
+        grid = [begin + 1e-12 + (end - begin - 1e-12) * j / 8 for j in range(9)]
+        values = [(t, sign * (x(t) - level)) for t in grid]
+        for (a, left), (b, right) in pairwise(values):
+            if left < 0.0 <= right:
+                t = float(brentq(lambda s: x(s) - level, a, b, xtol=1e-13))
+                return t, i, 1 if mode == 0 else 0 if t >= over else 2
+        return None
+
+    def converse(self, k: int, t: float) -> None:
+        """Every other sample: propose once per intervention, and decide (accept) from the next sample on."""
+        intervening = (self.status[:, 0] == 1) & (self.method != "a")
+        self.accepted = intervening & (self.issued >= 0.0) & ((self.accepted > 0) | (self.method == "b") | (k % 2 == 0))
+        if k % 2:
+            return
+        for i in np.flatnonzero(intervening & (self.issued >= 0.0) & (self.method not in ("b",))):
+            row = dict.fromkeys(DECISION_COLUMNS, -1.0) | {"t_s": t, "robot": self.robots[i], "policy": "detour"}
+            self.decisions.append(row | {"issued_s": self.issued[i], "decision": "accept", "status": "", "route": ""})
+        for i in np.flatnonzero(intervening & (self.issued < 0.0)):
+            self.issued[i], self.leg[i] = t, 0
+            self.events.append({"t_s": t, "robot": self.robots[i], "kind": "proposal", "position_m": [0.0, 0.0, 0.0]})
+        self.issued[~intervening] = -1.0
+
+    def velocities(self, t: float) -> Array:
+        """NSBC with the avoidance inequalities on top; an accepted detour replaces the tracking task."""
+        control, safe = self.scenario["control"], self.scenario["safe_distance"]
+        lower = np.zeros((self.n + 1, 3))
+        for i in range(self.n):
+            reference = np.array(self.reference(i, t))
+            rate = (np.array(self.reference(i, t + 1e-6)) - reference) / 1e-6
+            lower[i] = rate + control["motion_gain_1_s"] * (reference - self.position[i])
+            if self.accepted[i] and self.leg[i] < len(DETOUR):
+                offset = DETOUR[self.leg[i]] - self.position[i]
+                self.leg[i] += np.linalg.norm(offset) < 0.3
+                lower[i] = 2.6 * offset / np.linalg.norm(offset)
+        centroid = self.position[: self.n].mean(axis=0) + [0.0, 0.0, self.scenario["uav"]["altitude_m"]]
+        lower[self.n] = control["formation_gain_1_s"] * (centroid - self.position[self.n])
+        speed = np.linalg.norm(lower, axis=1)
+        lower *= np.minimum(1.0, 5.9 / np.maximum(speed, 1e-9))[:, None]
+        obstacles = np.array([o["position_m"] for o in self.scenario["obstacles"].values()]).reshape(-1, 3)
+        m = len(obstacles)
+        centre, distance = np.empty((self.n + 1, m + self.n, 3)), np.full((self.n + 1, m + self.n), safe["obstacle_m"])
+        share, mobility = np.ones(distance.shape), np.ones((self.n + 1, 3))
+        centre[:, :m], share[:, m:], mobility[: self.n, 2] = obstacles, 0.5, 0.0
+        for i in range(self.n + 1):
+            centre[i, m:] = np.delete(self.position, i, axis=0)
+            distance[i, m:] = safe["air_ground_m"] if i == self.n else safe["ugv_m"]
+        distance[: self.n, -1] = safe["air_ground_m"]
+        avoidance = Avoidance(control["avoidance_gain_1_s"], control["period_s"], control["sensing_range_m"])
+        spaces = avoidance.half_spaces(self.position, mobility, Surroundings(centre, distance, share))
+        return avoidance.apply(lower, spaces)
+
+    def record(self, t: float) -> None:
+        row = [t, *self.position.ravel(), *self.command.ravel()]
+        for i in range(self.n):
+            x = self.x(i, self.position[i], self.noise[i], t)
+            row += [*self.reference(i, t), self.noise[i], x, *self.status[i], float(self.accepted[i])]
+        self.rows.append(row)
+
+    def finish(self) -> Trace:
+        names = ["t_s", *(f"{r}.{a}_m" for r in self.robots for a in "xyz")]
+        names += [f"{r}.v{a}_m_s" for r in self.robots for a in "xyz"]
+        held = ["noise_m", "decision_variable_m", "mode", "triggers", "triggered_at_s", "released_at_s", "accepted"]
+        for ugv in self.robots[:-1]:
+            names += [f"{ugv}.{name}" for name in [*(f"ref_{a}_m" for a in "xyz"), *held]]
+        meta = {"schema": SCHEMA, "run": self.run, "method": self.method, "composition": "augmented", "seed": 0}
+        meta |= {"robots": self.robots, "ugvs": self.robots[:-1], "zeta_m": self.zeta, "faults": []}
+        meta |= {"scenario": self.scenario, "events": sorted(self.events, key=lambda event: event["t_s"])}
+        decisions = pd.DataFrame(self.decisions, columns=list(DECISION_COLUMNS)).astype(DECISION_COLUMNS)
+        times = [] if decisions.empty else (0.002 + 0.001 * self.rng.random(len(decisions))).tolist()
+        return Trace(meta, pd.DataFrame(self.rows, columns=names), decisions, {"decision_times_s": times})
+
+
+def with_signals(trace: Trace, edit: Callable[[pd.DataFrame], pd.DataFrame | None]) -> Trace:
+    """A copy whose signals were edited, in place or by returning new ones."""
+    signals = trace.signals.copy()
+    edited = edit(signals)
+    return replace(trace, signals=signals if edited is None else edited)
+
+
+def with_meta(trace: Trace, **changes: Any) -> Trace:
+    """A copy with entries of `meta` replaced."""
+    return replace(trace, meta=copy.deepcopy(trace.meta) | changes)
+
+
+def with_scenario(trace: Trace, **changes: Any) -> Trace:
+    """A copy that claims to be of another scenario: dotted keys, with __ for the dots."""
+    dotted = {key.replace("__", "."): value for key, value in changes.items()}
+    return with_meta(trace, scenario=changed(trace.scenario, dotted))
+
+
+def moved(trace: Trace, robot: str, row: int, offset: list[float]) -> Trace:
+    """A copy in which a robot is elsewhere at one row, with commands that lead there and back."""
+
+    def edit(signals: pd.DataFrame) -> None:
+        dt = np.diff(signals["t_s"].to_numpy())
+        for axis, delta in zip("xyz", offset, strict=True):
+            signals.loc[row, f"{robot}.{axis}_m"] += delta
+            for k, sign in ((row, 1.0), (row + 1, -1.0)):
+                if k < len(signals):
+                    signals.loc[k, f"{robot}.v{axis}_m_s"] += sign * delta / dt[k - 1]
+
+    return with_signals(trace, edit)
