@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import os
 import re
 import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import pygraphviz
@@ -16,28 +18,68 @@ from airground_drake import files
 from airground_drake.diagram import build_diagram
 from airground_drake.scenarios.load import load, shipped
 
-_NODE = re.compile(r"\b(cluster|clusters|s|_)(\d+)(?=diagram\b|in\b|out\b|\b)")
+_NODE = re.compile(r"\b(cluster|clusters|s|_)(\d+)(?=[a-z]*\b)")
 
 
 def dot(diagram: Diagram) -> str:
     """Graphviz text of a diagram: its systems and wires, one level deep.
 
-    Drake numbers systems in the order in which the process made them; here they are numbered from 1, so that
-    the same diagram always gives the same text.
+    Drake numbers systems in the order in which the process made them, and lists wires in the order of memory
+    addresses; here systems are numbered from 1 and wires sorted, so that a diagram always gives the same text.
     """
     text = str(diagram.GetGraphvizString(max_depth=1))
     numbers = sorted({int(found) for _, found in _NODE.findall(text)})
     rank = {str(number): str(i) for i, number in enumerate(numbers, start=1)}
-    return _NODE.sub(lambda match: match[1] + rank[match[2]], text)
+    lines = _NODE.sub(lambda match: match[1] + rank[match[2]], text).splitlines(keepends=True)
+    wires = [i for i, line in enumerate(lines) if " -> " in line]
+    for i, line in zip(wires, sorted((lines[i] for i in wires), key=_natural), strict=True):
+        lines[i] = line
+    return "".join(lines)
+
+
+def _natural(line: str) -> list[tuple[int, str]]:
+    """Sort key by which s2 comes before s10."""
+    return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", line)]
 
 
 def svg(dot_text: str) -> str:
-    """Lay out Graphviz text as SVG; the same text gives the same bytes with the same Graphviz."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # Graphviz remarks on fonts
-        graph = pygraphviz.AGraph(string=dot_text)
-        drawn = graph.draw(format="svg", prog="dot").decode()
-    return re.sub(r"<!--.*?-->\n?", "", drawn, flags=re.DOTALL)
+    """Lay out Graphviz text as SVG.
+
+    The same text gives the same bytes on the same machine; box sizes depend on its fonts. The digest of the text
+    is in the picture, so that it can be told whether a picture is current.
+    """
+    with _silent_stderr(), warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # Graphviz and fontconfig remark on fonts; errors still raise
+        drawn = pygraphviz.AGraph(string=dot_text).draw(format="svg", prog="dot").decode()
+    drawn = re.sub(r"<!--.*?-->\n?", "", drawn, flags=re.DOTALL)
+    return drawn.replace("<svg ", f"<!-- {_digest(dot_text)} -->\n<svg ", 1)
+
+
+def is_current(name: str, content: str, found: str) -> bool:
+    """Whether a file's text is that of the present code: `.dot` to the letter, `.svg` by the digest inside."""
+    if name.endswith(".svg"):
+        mark = re.search(r"<!-- (dot sha256 \w+) -->", content)
+        return mark is not None and mark[1] in found
+    return content == found
+
+
+def _digest(dot_text: str) -> str:
+    return f"dot sha256 {files.sha256(dot_text.encode())}"
+
+
+@contextmanager
+def _silent_stderr() -> Iterator[None]:
+    """Point file descriptor 2 at nothing: the C libraries below write there."""
+    sys.stderr.flush()
+    saved = os.dup(2)
+    nothing = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nothing, 2)
+        yield
+    finally:
+        os.dup2(saved, 2)
+        os.close(saved)
+        os.close(nothing)
 
 
 def pictures() -> dict[str, str]:
@@ -59,7 +101,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     stale = []
     for name, content in pictures().items():
         path = options.output / name
-        if path.exists() and path.read_text(encoding="utf-8") == content:
+        if path.exists() and is_current(name, content, path.read_text(encoding="utf-8")):
             continue
         stale.append(str(path))
         if not options.check:

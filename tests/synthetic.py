@@ -87,7 +87,8 @@ class _Simulation:
         self.noise = np.zeros(self.n)
         decision = scenario["decision"]
         self.zeta, bare = decision["threshold"]["zeta_m"], decision["trigger"] == "bare"
-        self.release, self.dwell = (self.zeta, 0.0) if bare else (decision["release_m"], decision["min_inter_event_s"])
+        self.release: float = self.zeta if bare else decision["release_m"]
+        self.dwell: float = 0.0 if bare else decision["min_inter_event_s"]
         self.status = np.tile([0.0, 0.0, -1.0, -1.0], (self.n, 1))  # mode, triggers, triggered at, released at
         self.leg = np.zeros(self.n, dtype=int)
         self.issued = np.full(self.n, -1.0)
@@ -145,7 +146,6 @@ class _Simulation:
 
     def next_event(self, i: int, begin: float, end: float, rate: float) -> tuple[float, int, int] | None:
         """(time, UGV, next mode) of the first transition in (begin, end), by search on a fine grid."""
-
         motion = list(zip(self.position[i].tolist(), self.command[i].tolist(), strict=True))
         noise = float(self.noise[i])
 
@@ -190,7 +190,7 @@ class _Simulation:
                 offset = DETOUR[self.leg[i]] - self.position[i]
                 self.leg[i] += np.linalg.norm(offset) < 0.3
                 lower[i] = 2.6 * offset / np.linalg.norm(offset)
-        centroid = self.position[: self.n].mean(axis=0) + [0.0, 0.0, self.scenario["uav"]["altitude_m"]]
+        centroid = self.position[: self.n].mean(axis=0) + np.array([0.0, 0.0, self.scenario["uav"]["altitude_m"]])
         lower[self.n] = control["formation_gain_1_s"] * (centroid - self.position[self.n])
         speed = np.linalg.norm(lower, axis=1)
         lower *= np.minimum(1.0, 5.9 / np.maximum(speed, 1e-9))[:, None]
@@ -252,9 +252,14 @@ def moved(trace: Trace, robot: str, row: int, offset: list[float]) -> Trace:
     def edit(signals: pd.DataFrame) -> None:
         dt = np.diff(signals["t_s"].to_numpy())
         for axis, delta in zip("xyz", offset, strict=True):
-            signals.loc[row, f"{robot}.{axis}_m"] += delta
-            for k, sign in ((row, 1.0), (row + 1, -1.0)):
-                if k < len(signals):
-                    signals.loc[k, f"{robot}.v{axis}_m_s"] += sign * delta / dt[k - 1]
+            place, velocity = (
+                signals[f"{robot}.{axis}_m"].to_numpy(copy=True),
+                signals[f"{robot}.v{axis}_m_s"].to_numpy(copy=True),
+            )
+            place[row] += delta
+            velocity[row] += delta / dt[row - 1]
+            if row + 1 < len(signals):
+                velocity[row + 1] -= delta / dt[row]
+            signals[f"{robot}.{axis}_m"], signals[f"{robot}.v{axis}_m_s"] = place, velocity
 
     return with_signals(trace, edit)

@@ -19,8 +19,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse import csr_array  # type: ignore[import-untyped]
-from scipy.sparse.csgraph import dijkstra  # type: ignore[import-untyped]
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
 
 Array = NDArray[np.float64]
 Points = NDArray[np.complex128]
@@ -33,7 +33,7 @@ up to about 1e4 m, where double rounding (2e-12 m) stays well below."""
 _EPS = TOL / 10
 
 
-class NoPath(ValueError):
+class NoPath(ValueError):  # noqa: N818
     """No free path exists; the message says which point is at fault and why."""
 
 

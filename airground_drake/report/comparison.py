@@ -59,7 +59,10 @@ def draw(scenario: Scenario, traces: Mapping[str, Trace]) -> Figure | None:
 
 
 def _how(scenario: Scenario, run: str) -> str:
-    return f"run {run} ({scenario.runs[run].composition.replace('_', ', ')})"
+    """A run and its composition, in words."""
+    composition = scenario.runs[run].composition
+    printed = f"recursion (5), {composition.removeprefix('recursion_')} first"
+    return f"run {run} ({printed if composition.startswith('recursion_') else composition})"
 
 
 def _frame(runs: Mapping[str, Trace], robot: str, gaps: Mapping[str, Array]) -> maps.Frame:

@@ -82,7 +82,8 @@ def overall(claims: Sequence[Mapping[str, Any]], absent: Sequence[Mapping[str, A
     counts = Counter(c["status"] for c in claims)
     if differs:
         status = "not_as_expected"
-        why = f"{_checks(len(differs))} of {len(claims)} differ from what the scenario declares: {_list(differs)}."
+        differ = "differs" if len(differs) == 1 else "differ"
+        why = f"{len(differs)} of {_checks(len(claims))} {differ} from what the scenario declares: {_list(differs)}."
     elif undecided or absent or not claims:
         status = "inconclusive"
         open_items = [*undecided, *absent]

@@ -98,10 +98,10 @@ def _trajectories(chosen: _Selection) -> Figure:
     ]
     reach = first.scenario["safe_distance"]["obstacle_m"]
     caption = (
-        f"{_sentence('; '.join(stalls)) if stalls else 'Every robot shown keeps moving or arrives. '}"
-        f"○ start, × target, ▲ trigger, □ stands still, ✖ collision; hexagons are obstacles in their safe circles of "
-        f"{reach:g} m; the thin dashed line is the UAV's path, projected onto the ground. Equal scales, in m."
-        f"{_left_out(chosen)}"
+        f"{_sentence('; '.join(stalls)) if stalls else 'No UGV shown stands still short of its target. '}"
+        "○ start, \N{MULTIPLICATION SIGN} target, ▲ trigger, □ stands still, ✖ collision. Hexagons are obstacles in "
+        f"their safe circles of {reach:g} m. The thin dashed line is the UAV's path, projected onto the ground. Equal "
+        f"scales, in m.{_left_out(chosen)}"
     )
     robots = [*chosen.ugvs, first.robots[-1]]
     panels = per_run(
@@ -196,9 +196,9 @@ def _events(chosen: _Selection) -> Figure:
         return "Events over time: " + ("; ".join(listed[:12]) or "none") + "."
 
     caption = (
-        "▲ trigger and ▼ release: the grey bar is the time in which the UAV intervenes. ◆ proposal of the UAV. "
-        "● accepted and ✖ refused by the UGV's gatekeeper (run by method (b): carried out unasked); the hatched bar is "
-        "the time in which the UGV carries out an intervention." + _left_out(chosen)
+        "▲ trigger and ▼ release, with the grey bar between them: the UAV is called upon (under method (a) it does not "
+        "come). ◆ proposal of the UAV. ● accepted and ✖ refused by the UGV's gatekeeper (method (b) has none). The "
+        "hatched bar: the UGV carries out an intervention." + _left_out(chosen)
     )
     panels = per_run(
         "events",

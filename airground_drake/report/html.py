@@ -15,7 +15,8 @@ from airground_drake.report.reproduction import YES_NO
 
 MAX_DIAGRAM_CHARS = 500_000
 MAX_JSON_CHARS = 4_000
-MAX_DISTANCE_ROWS = 60
+LINE_CHARS = 110
+MAX_DISTANCE_ROWS = 120
 
 CHIPS = {
     "as_expected": ("✓", "as expected", "good"),
@@ -42,15 +43,20 @@ def render(document: Mapping[str, Any], figures: Sequence[Figure], diagram_svg: 
         figures: as drawn by `figures.draw`, in the order of the page.
         diagram_svg: the exported block diagram; left out if it is not an SVG or too large to inline.
     """
+    distances = _distances(document["runs"])
     return _environment().get_template("report.html.j2").render(
         report=document,
         figures=[figure for figure in figures if figure.id != "recursion"],
         comparison=next((figure for figure in figures if figure.id == "recursion"), None),
         diagram=_diagram(diagram_svg, str(document["scenario"]["name"])),
         groups=_by_claim(document["claims"]),
-        attention=[claim for claim in document["claims"] if not claim["as_expected"]],
-        distances=_distances(document["runs"]),
-        max_distance_rows=MAX_DISTANCE_ROWS,
+        attention=sorted(
+            (claim for claim in document["claims"] if not claim["as_expected"]),
+            key=lambda claim: CHIPS[claim["status"]][2] == "open",
+        ),
+        tightest=_tightest(distances),
+        distances=sorted(distances, key=_margin)[:MAX_DISTANCE_ROWS],
+        left_out=max(0, len(distances) - MAX_DISTANCE_ROWS),
     )  # fmt: skip
 
 
@@ -70,12 +76,12 @@ def _environment() -> Environment:
 def number(x: Any, digits: int = 4) -> str:
     """A number for reading, a dash for none."""
     if x is None:
-        return "–"
+        return "\N{EN DASH}"
     if isinstance(x, bool) or not isinstance(x, (int, float)):
         return str(x)
-    if isinstance(x, int) or x == int(x) and abs(x) < 1e6:
+    if isinstance(x, int) or (x == int(x) and abs(x) < 1e6):
         return str(int(x))
-    return f"{x:.{digits}g}".replace("-", "−")
+    return f"{x:.{digits}g}".replace("-", "\N{MINUS SIGN}")
 
 
 def value(x: Any, unit: str = "") -> str:
@@ -88,12 +94,23 @@ def value(x: Any, unit: str = "") -> str:
     return f"{text} {unit}".strip()
 
 
-def pretty(x: Any) -> str:
-    """JSON for reading, cut where it gets long."""
-    text = json.dumps(x, indent=1, ensure_ascii=False, allow_nan=False)
-    if len(text) <= MAX_JSON_CHARS:
-        return text
-    return f"{text[:MAX_JSON_CHARS]}\n… cut here; report.json has all of it"
+def pretty(x: Any, limit: int = MAX_JSON_CHARS) -> str:
+    """JSON for reading: what fits on a line is on a line; cut where it gets long."""
+    text = _lay_out(x, "")
+    return text if len(text) <= limit else f"{text[:limit]}\n… cut here; report.json has all of it"
+
+
+def _lay_out(x: Any, indent: str) -> str:
+    flat = json.dumps(x, ensure_ascii=False, allow_nan=False)
+    if len(indent) + len(flat) <= LINE_CHARS or not isinstance(x, (Mapping, list)):
+        return flat
+    deeper = f"{indent} "
+    if isinstance(x, Mapping):
+        items = [f"{json.dumps(key, ensure_ascii=False)}: {_lay_out(item, deeper)}" for key, item in x.items()]
+    else:
+        items = [_lay_out(item, deeper) for item in x]
+    opening, closing = "{}" if isinstance(x, Mapping) else "[]"
+    return f"{opening}\n{deeper}{f',{chr(10)}{deeper}'.join(items)}\n{indent}{closing}"
 
 
 def _diagram(source: str | None, name: str) -> str | None:
@@ -101,8 +118,9 @@ def _diagram(source: str | None, name: str) -> str | None:
         return None
     try:
         return svg.inline(
-            source, "diagram", f"Block diagram of {name}", "The systems of the simulation and the signals between them."
-        )
+            source, "diagram", f"Block diagram of {name}", "The systems of the simulation and their connections.",
+            natural_size=True,
+        )  # fmt: skip
     except ValueError:
         return None
 
@@ -120,14 +138,25 @@ def _by_claim(claims: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
 
 
 def _distances(runs: Mapping[str, Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """The smallest distances of all runs; of many, those of least margin."""
-    rows = [
+    """All smallest distances, a row each with its margin."""
+    return [
         {"run": run, "robot": robot, "other": other, "margin": found["value"] - found["safe_distance_m"], **found}
         for run, entry in runs.items()
         for kind in ("min_distance_m", "min_robot_distance_m")
         for robot, others in entry["metrics"][kind].items()
         for other, found in others.items()
     ]
-    if len(rows) <= MAX_DISTANCE_ROWS:
-        return rows
-    return sorted(rows, key=lambda row: float(row["margin"]))[:MAX_DISTANCE_ROWS]
+
+
+def _tightest(distances: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The row of least margin of each robot in each run."""
+    rows: dict[tuple[str, str], dict[str, Any]] = {}
+    for row in distances:
+        known = rows.setdefault((row["run"], row["robot"]), row)
+        if row["margin"] < known["margin"]:
+            rows[row["run"], row["robot"]] = row
+    return list(rows.values())[:MAX_DISTANCE_ROWS]
+
+
+def _margin(row: Mapping[str, Any]) -> float:
+    return float(row["margin"])

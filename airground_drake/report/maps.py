@@ -18,8 +18,8 @@ from airground_drake.report.canvas import (
     UAV_LOOK,
     WIDE_IN,
     Look,
-    label_axes,
     look,
+    rule,
     short,
     size_in,
     thin,
@@ -69,8 +69,9 @@ def plane(trace: Trace, ugvs: Sequence[str], frame: Frame) -> Figure:
             _name(axes, robot, start, appearance, -11)
         _name(axes, robot, target, appearance, 6)
     centres = np.array([obstacle["position_m"][:2] for obstacle in trace.scenario["obstacles"].values()])
-    written = [np.repeat(centres + (right, -0.5), 30, axis=0) for right in (-0.8, 0.0, 0.8)] if len(centres) else []
-    paths = [*(trace.position(robot)[:, :2] for robot in [*ugvs, uav]), *written]
+    labels = [np.array([right, -down]) for right in (-1.0, -0.5, 0.0, 0.5, 1.0) for down in (0.0, 0.35, 0.7)]
+    written = [np.repeat(centres + label, 10, axis=0) for label in labels if len(centres)]
+    paths = [*(trace.position(ugv)[:, :2] for ugv in ugvs), *written]
     for ugv in ugvs:
         for at, lines in _happenings(axes, trace, ugv):
             _note(axes, frame, at, lines, paths)
@@ -107,7 +108,7 @@ def _map(trace: Trace, frame: Frame, width_in: float, above_in: float = 0.1) -> 
     axes.set_xlim(frame.left, frame.right)
     axes.set_ylim(frame.bottom, frame.top)
     axes.set_aspect("equal")
-    label_axes(axes, "x, m", "y, m")
+    rule(axes, "x, m", "y, m")
     reach = float(trace.scenario["safe_distance"]["obstacle_m"])
     for name, obstacle in trace.scenario["obstacles"].items():
         x, y = obstacle["position_m"][:2]
@@ -157,7 +158,7 @@ def _happenings(axes: Axes, trace: Trace, ugv: str) -> list[tuple[Array, list[st
 def _note(axes: Axes, frame: Frame, at: Array, lines: Sequence[str], paths: Sequence[Array]) -> None:
     """Write beside a point, on the side where the text covers the least of the paths."""
     scale_pt = 72.0 * size_in(axes)[0] / (frame.right - frame.left)
-    size = np.array([0.6 * 8.0 * max(map(len, lines)), 11.0 * len(lines)]) / scale_pt
+    size = np.array([0.55 * 8.0 * max(map(len, lines)), 11.0 * len(lines)]) / scale_pt
     points = np.concatenate([path[thin(path, 400)] for path in paths])
     corner = np.array([[frame.left, frame.bottom], [frame.right, frame.top]])
 

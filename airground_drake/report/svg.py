@@ -17,18 +17,19 @@ _LONG_NUMBER = re.compile(r"-?\d+\.\d{3,}")
 _ROUNDED = {"d", "points", "transform", "x", "y", "width", "height", "cx", "cy", "rx", "ry", "r"}
 
 
-def inline(svg: str, prefix: str, title: str, description: str) -> str:
+def inline(svg: str, prefix: str, title: str, description: str, *, natural_size: bool = False) -> str:
     """An SVG document as an element to be placed in HTML.
 
     Scripts, style sheets, handlers and references to anything outside the document are removed (style sheets
     would apply to the whole page), ids get a prefix, and unused ones are removed, so that several drawings can
-    share a page; coordinates are rounded to 0.01 units. The size is left to the page.
+    share a page; coordinates are rounded to 0.01 units.
 
     Args:
         svg: the document; `viewBox` must be set.
         prefix: unique in the page; letters, digits, '-' and '_'.
         title: the accessible name.
         description: what it shows.
+        natural_size: whether to keep the size of the document; otherwise it is left to the page.
 
     Raises:
         ValueError: if it is not an SVG document.
@@ -43,7 +44,7 @@ def inline(svg: str, prefix: str, title: str, description: str) -> str:
     used = {name for element in root.iter() for value in element.attrib.values() for name in _references(value)}
     for element in root.iter():
         _clean(element, prefix, used)
-    for name in ("width", "height", "version"):
+    for name in ("version",) if natural_size else ("version", "width", "height"):
         root.attrib.pop(name, None)
     root.set("role", "img")
     root.set("aria-labelledby", f"{prefix}-title {prefix}-desc")

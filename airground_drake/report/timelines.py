@@ -16,10 +16,10 @@ from airground_drake.report.canvas import (
     INK,
     MUTED,
     WIDE_IN,
-    label_axes,
     label_right,
     level,
     look,
+    rule,
     short,
     time_line,
 )
@@ -35,7 +35,7 @@ _FORBIDDEN: dict[str, Any] = {
 
 def decision(trace: Trace, ugvs: Sequence[str], top: float) -> Figure:
     """Decision variables of a run with the threshold and the release level."""
-    figure, (axes,) = _time_axes(1, 2.5, trace, "decision variable, m", above_in=0.08)
+    figure, (axes,) = _time_axes(1, 2.5, trace, above_in=0.08)
     zeta, release = float(trace.meta["zeta_m"]), float(trace.scenario["decision"]["release_m"])
     labels = [(zeta, f"threshold {zeta:.3g}", INK)]
     level(axes, zeta, "-")
@@ -50,6 +50,7 @@ def decision(trace: Trace, ugvs: Sequence[str], top: float) -> Figure:
             at = float(np.interp(event["t_s"], trace.t, x))
             axes.plot(event["t_s"], at, marker="^", markersize=8, color=look(position).color, markeredgecolor="white")
     axes.set_ylim(0.0, top)
+    rule(axes, "time, s", "decision variable, m")
     label_right(axes, labels)
     return figure
 
@@ -57,7 +58,7 @@ def decision(trace: Trace, ugvs: Sequence[str], top: float) -> Figure:
 def distances(trace: Trace, ugvs: Sequence[str], obstacles: Sequence[str], top: float) -> Figure:
     """Distances of each UGV to the obstacles, the safe distance d, and the exact minimum."""
     d = float(trace.scenario["safe_distance"]["obstacle_m"])
-    figure, every = _time_axes(len(ugvs), 0.5 + 1.75 * len(ugvs), trace, "distance, m")
+    figure, every = _time_axes(len(ugvs), 0.5 + 1.75 * len(ugvs), trace)
     for axes, ugv in zip(every, ugvs, strict=True):
         level(axes, d, "-")
         axes.axhspan(0.0, d, **_FORBIDDEN)
@@ -67,6 +68,7 @@ def distances(trace: Trace, ugvs: Sequence[str], obstacles: Sequence[str], top: 
             time_line(axes, trace.t, gap, look(position))
             labels.append((float(gap[-1]), short(name, 12), look(position).color))
         axes.set_ylim(0.0, top)
+        rule(axes, "time, s" if axes is every[-1] else "", "distance, m")
         label_right(axes, labels)
         nearest = closest_obstacle(trace, ugv)
         if nearest is None:
@@ -85,12 +87,12 @@ def distances(trace: Trace, ugvs: Sequence[str], obstacles: Sequence[str], top: 
 def events(trace: Trace, ugvs: Sequence[str]) -> Figure:
     """Triggers, proposals and decisions over time, a row each per UGV."""
     rows = [(ugv, row) for ugv in ugvs for row in ("trigger", "proposal", "decision")]
-    figure, (axes,) = _time_axes(1, 0.55 + 0.33 * len(rows), trace, "", left_in=1.25, right_in=0.15, above_in=0.05)
-    names = [f"{short(ugv, 9)} {row}" for ugv, row in rows]
-    axes.set_yticks(range(len(rows)), names)
+    figure, (axes,) = _time_axes(1, 0.55 + 0.33 * len(rows), trace, left_in=1.25, right_in=0.15, above_in=0.05)
     axes.set_ylim(len(rows) - 0.4, -0.6)
-    axes.grid(axis="y", visible=False)
+    rule(axes, "time, s", "")
     for y, (ugv, row) in enumerate(rows):
+        name = f"{short(ugv, 9)} {row}"
+        axes.text(-0.02, y, name, transform=axes.get_yaxis_transform(), ha="right", va="center")
         if row == "trigger":
             _bars(axes, trace, trace.column(f"{ugv}.mode") == 1, y, facecolor="#dddddd")
         if row == "decision":
@@ -105,8 +107,8 @@ def events(trace: Trace, ugvs: Sequence[str]) -> Figure:
 
 def nothing_happened(trace: Trace) -> Figure:
     """The event panel of a run without events."""
-    figure, (axes,) = _time_axes(1, 0.9, trace, "", left_in=1.25, right_in=0.15, above_in=0.05)
-    axes.set_yticks([])
+    figure, (axes,) = _time_axes(1, 0.9, trace, left_in=1.25, right_in=0.15, above_in=0.05)
+    rule(axes, "time, s", "")
     axes.text(0.5, 0.5, "no trigger, no proposal, no decision", transform=axes.transAxes, ha="center", va="center")
     return figure
 
@@ -119,7 +121,6 @@ def compared_distances(runs: Mapping[str, Trace], robot: str) -> Figure:
         1,
         3.0 + 0.22 * len(runs),
         first,
-        "distance to the nearest obstacle, m",
         right_in=0.65,
         above_in=0.22 * len(runs),
     )
@@ -128,6 +129,7 @@ def compared_distances(runs: Mapping[str, Trace], robot: str) -> Figure:
     axes.set_ylim(max(0.0, low - 0.15 * d), 1.6 * d)
     axes.axhspan(0.0, d, **_FORBIDDEN)
     level(axes, d, "-")
+    rule(axes, "time, s", "distance to the nearest obstacle, m")
     label_right(axes, [(d, f"d = {d:g}", INK)])
     for position, (name, trace) in enumerate(runs.items()):
         appearance = look(position)
@@ -150,14 +152,7 @@ def nearest_distance(trace: Trace, robot: str) -> Array:
 
 
 def _time_axes(
-    count: int,
-    height_in: float,
-    trace: Trace,
-    y_label: str,
-    *,
-    left_in: float = 0.55,
-    right_in: float = 1.05,
-    above_in: float = 0.24,
+    count: int, height_in: float, trace: Trace, *, left_in: float = 0.55, right_in: float = 1.05, above_in: float = 0.24
 ) -> tuple[Figure, list[Axes]]:
     """Axes over time, one above the other, with room for labels on the right."""
     figure = Figure(figsize=(WIDE_IN, height_in))
@@ -170,8 +165,6 @@ def _time_axes(
         box = (left_in / WIDE_IN, bottom_in / height_in, width_in / WIDE_IN, inner_in / height_in)
         axes = figure.add_axes(box)
         axes.set_xlim(float(trace.t[0]), float(trace.t[-1]) if len(trace.t) > 1 else float(trace.t[0]) + 1.0)
-        label_axes(axes, "time, s" if row == count - 1 else "", y_label)
-        axes.tick_params(labelbottom=row == count - 1)
         every.append(axes)
     return figure, every
 

@@ -13,6 +13,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import fields, is_dataclass
 from itertools import combinations, pairwise
 
+from airground_drake.decision.bayes import optimal_threshold
 from airground_drake.errors import Fault, ScenarioError
 from airground_drake.nsbc.avoidance import COMPOSITIONS
 from airground_drake.scenarios import schema
@@ -27,26 +28,23 @@ SOURCES: tuple[str, ...] = ("calibrated", "ours")
 CLAIMS: tuple[str, ...] = ("SAFE-TRACE", "SAFE-HYP", "ZENO-TRACE", "THR-TRIG", "LIVE-GOAL", "COMM", "GATE-TIME")
 STATUSES: tuple[str, ...] = ("proved", "holds", "supported", "refuted", "inconclusive", "error", "not_run")
 
-MAX_UGVS = 100
-MAX_STAGES = 1000
-MAX_SEED = 2**31 - 1
-LARGEST, SMALLEST = 1e9, 1e-9
-"""Largest size of any number and smallest positive one: products and quotients of two stay finite."""
-TOLERANCE_M = 1e-9
-TOLERANCE_RATIO = 1e-9
+MAX_UGVS, MAX_STAGES, MAX_SEED = 100, 1000, 2**31 - 1
+LARGEST, SMALLEST = 1e9, 1e-9  # of any number; of a positive number: products and quotients stay finite
+TOLERANCE = 1e-9  # m between points; relative between periods
 
 NON_NEGATIVE: dict[type, tuple[str, ...]] = {
     schema.Control: ("avoidance_gain_1_s", "motion_gain_1_s", "formation_gain_1_s", "intervention_gain_1_s"),
     schema.Decision: ("release_m", "min_inter_event_s", "noise_m_sqrt_s", "leak_1_s"),
-    schema.Gatekeeper: ("slack_weight_1_m2_s",),
+    schema.Gatekeeper: ("slack_weight_1_m2_s", "switching_margin"),
+    schema.Intervention: ("retry_s",),
     schema.Reproduction: ("tolerance",),
 }
 """Numbers that may be 0; every other number of the schema must be positive."""
-_UNITS = {"m_sqrt_s": "m/sqrt(s)", "1_m2_s": "1/(m^2 s)", "m_s": "m/s", "1_s": "1/s", "m": "m", "s": "s"}
-"""Unit by the suffix of a key, the longest suffix first."""
 
-Problem = tuple[str, object, str]
-Problems = Iterator[Problem]
+# Unit by the suffix of a key, the longest suffix first.
+_UNITS = {"m_sqrt_s": "m/sqrt(s)", "1_m2_s": "1/(m^2 s)", "m_s": "m/s", "1_s": "1/s", "m": "m", "s": "s"}
+
+Problems = Iterator[tuple[str, object, str]]
 
 
 def check(scenario: Scenario, source: str, known_policies: Collection[str] | None = None) -> None:
@@ -60,23 +58,19 @@ def check(scenario: Scenario, source: str, known_policies: Collection[str] | Non
     Raises:
         ScenarioError: for the first problem; names the key, its value and what is allowed.
     """
-    known = tuple(POLICIES if known_policies is None else known_policies)
+    known = (*sorted(POLICIES if known_policies is None else known_policies), "module:Class")
     for problems in (*(rule(scenario) for rule in CHECKS), _policies(scenario, known)):
         for key, value, allowed in problems:
             raise ScenarioError(source, key, value, allowed)
 
 
-def unit_of(name: str) -> str:
-    """Unit that the suffix of a key says, or ''."""
-    return next((unit for suffix, unit in _UNITS.items() if name.endswith(f"_{suffix}")), "")
+def unit_of(name: str, before: str = "") -> str:
+    """Unit that the suffix of a key says, with words before it; '' if it says none."""
+    return next((before + unit for suffix, unit in _UNITS.items() if name.endswith(f"_{suffix}")), "")
 
 
-def in_unit(name: str) -> str:
-    """' in m/s' and the like, or '' for a key without unit."""
-    return f" in {unit_of(name)}" if unit_of(name) else ""
-
-
-def _join(key: str, part: str) -> str:
+def dotted(key: str, part: str) -> str:
+    """Key of a part of what has this key ('' for the scenario itself)."""
     return f"{key}.{part}" if key else part
 
 
@@ -89,31 +83,29 @@ def _one_of(key: str, value: str, allowed: Iterable[str], what: str = "one of") 
 def _nodes(value: object, key: str = "", name: str = "") -> Iterator[tuple[str, str, object]]:
     """(dotted key, name of the field or parameter, value) of a value and of everything in it."""
     yield key, name, value
-    children: Iterable[tuple[str, str, object]] = ()
     if is_dataclass(value):
-        children = ((f.name, f.name, getattr(value, f.name)) for f in fields(value))
+        children = [(field.name, field.name, getattr(value, field.name)) for field in fields(value)]
     elif isinstance(value, dict):
-        children = ((entry, name if unit_of(name) else entry, child) for entry, child in value.items())
-    elif isinstance(value, list):
-        children = ((str(index), name, child) for index, child in enumerate(value))
+        children = [(entry, name if unit_of(name) else entry, child) for entry, child in value.items()]
+    else:
+        children = [(str(index), name, child) for index, child in enumerate(value if isinstance(value, list) else ())]
     for part, child_name, child in children:
-        yield from _nodes(child, _join(key, part), child_name)
+        yield from _nodes(child, dotted(key, part), child_name)
 
 
 def _finite(scenario: Scenario) -> Problems:
     for key, name, value in _nodes(scenario):
         if isinstance(value, float) and not abs(value) <= LARGEST:
-            yield key, value, f"a finite number{in_unit(name)}, at most {LARGEST:g} in size"
+            yield key, value, f"a finite number{unit_of(name, ' in ')}, at most {LARGEST:g} in size"
 
 
 def _bounds(scenario: Scenario) -> Problems:
     for key, _, value in _nodes(scenario):
         for field in fields(value) if is_dataclass(value) else ():
-            if isinstance(field.default, float):
-                least = 0.0 if field.name in NON_NEGATIVE.get(type(value), ()) else SMALLEST
-                if getattr(value, field.name) < least:
-                    allowed = f"a number{in_unit(field.name)}, not below {least:g}"
-                    yield _join(key, field.name), getattr(value, field.name), allowed
+            least = 0.0 if field.name in NON_NEGATIVE.get(type(value), ()) else SMALLEST
+            if isinstance(field.default, float) and getattr(value, field.name) < least:
+                allowed = f"a number{unit_of(field.name, ' in ')}, not below {least:g}"
+                yield dotted(key, field.name), getattr(value, field.name), allowed
 
 
 def _names(scenario: Scenario) -> Problems:
@@ -186,7 +178,7 @@ def _presets(scenario: Scenario) -> Problems:
         if len(ugv.preset.waypoints_m) < 2:
             yield key, ugv.preset.waypoints_m, "at least 2 waypoints"
         for index, (before, after) in enumerate(pairwise(ugv.preset.waypoints_m), start=1):
-            if math.dist(before, after) <= TOLERANCE_M:
+            if math.dist(before, after) <= TOLERANCE:
                 yield f"{key}.{index}", after, "a waypoint other than the one before it"
 
 
@@ -213,14 +205,19 @@ def _periods(scenario: Scenario) -> Problems:
 
 def _multiple(of: float, unit: float) -> bool:
     ratio = of / unit
-    return round(ratio) >= 1 and abs(ratio - round(ratio)) <= TOLERANCE_RATIO * ratio
+    return round(ratio) >= 1 and abs(ratio - round(ratio)) <= TOLERANCE * ratio
 
 
 def _release(scenario: Scenario) -> Problems:
-    decision, zeta = scenario.decision, scenario.decision.threshold.zeta_m
-    fixed = decision.trigger == "automaton" and decision.threshold.rule == "fixed"
-    if fixed and not decision.release_m < zeta:
-        yield "decision.release_m", decision.release_m, f"less than decision.threshold.zeta_m = {zeta:.9g} m"
+    decision, rule = scenario.decision, scenario.decision.threshold
+    zeta = rule.zeta_m
+    if rule.rule == "bayes":
+        try:
+            zeta = optimal_threshold(rule.drift_m_s, rule.noise_m_sqrt_s, rule.c1_1_s, rule.c2)
+        except ValueError:
+            yield "decision.threshold", Fault("no Bayes threshold found"), "numbers of comparable size are allowed"
+    if decision.trigger == "automaton" and not decision.release_m < zeta:
+        yield "decision.release_m", decision.release_m, f"less than the {rule.rule} threshold, {zeta:.9g} m"
 
 
 def _distances(scenario: Scenario) -> Problems:
@@ -240,18 +237,14 @@ def _sensing(scenario: Scenario) -> Problems:
     ugvs = sorted(((ugv.max_speed_m_s, name) for name, ugv in scenario.ugvs.items()), reverse=True)
     uav = (scenario.uav.max_speed_m_s, scenario.uav.name)
     pairs = [(safe.air_ground_m, "air_ground_m", uav, ugvs[0])]
-    if len(ugvs) > 1:
-        pairs.append((safe.ugv_m, "ugv_m", ugvs[0], ugvs[1]))
-    if scenario.obstacles:
-        pairs.append((safe.obstacle_m, "obstacle_m", max(uav, ugvs[0]), (0.0, "an obstacle")))
+    pairs += [(safe.ugv_m, "ugv_m", one, other) for one, other in pairwise(ugvs[:2])]
+    pairs += [(safe.obstacle_m, "obstacle_m", max(uav, ugvs[0]), (0.0, name)) for name in scenario.obstacles]
     needed, distance, closing, kind, one, other = max(
         (d + (v + w) * period, d, v + w, kind, one, other) for d, kind, (v, one), (w, other) in pairs
     )
-    if scenario.control.sensing_range_m < needed - TOLERANCE_M:
-        sum_of = (
-            f"safe_distance.{kind} {distance:.9g} m + closing speed {closing:.9g} m/s * control.period_s {period:.9g} s"
-        )
-        allowed = f"at least {needed:.9g} m for {one} and {other}: {sum_of}"
+    if scenario.control.sensing_range_m < needed - TOLERANCE:
+        total = f"safe_distance.{kind} {distance:.9g} m + closing {closing:.9g} m/s * control.period_s {period:.9g} s"
+        allowed = f"at least {needed:.9g} m for {one} and {other}: {total}"
         yield "control.sensing_range_m", scenario.control.sensing_range_m, allowed
 
 
@@ -260,16 +253,15 @@ def _clearances(scenario: Scenario) -> Problems:
     for attribute, verb in (("start_m", "starts"), ("target_m", "would end")):
         ugvs = [(f"ugvs.{name}", name, getattr(ugv, attribute)) for name, ugv in scenario.ugvs.items()]
         uav = ("uav", scenario.uav.name, getattr(scenario.uav, attribute))
-        obstacles = [(name, obstacle.position_m) for name, obstacle in scenario.obstacles.items()]
         pairs = [
-            *((robot, obstacle, "obstacle_m") for robot in (*ugvs, uav) for obstacle in obstacles),
+            *((r, (name, o.position_m), "obstacle_m") for r in (*ugvs, uav) for name, o in scenario.obstacles.items()),
             *((robot, other[1:], "ugv_m") for other, robot in combinations(ugvs, 2)),
             *((uav, ugv[1:], "air_ground_m") for ugv in ugvs),
         ]
         for (key, name, point), (other_name, other_point), kind in pairs:
             distance, least = math.dist(point, other_point), getattr(scenario.safe_distance, kind)
-            if distance < least - TOLERANCE_M:
-                allowed = f"at least safe_distance.{kind} = {least:.9g} m is"
+            if distance < least - TOLERANCE:
+                allowed = f"at least safe_distance.{kind} = {least:.9g} m is needed"
                 yield f"{key}.{attribute}", point, f"{name} {verb} {distance:.9g} m from {other_name}, {allowed}"
 
 
@@ -295,7 +287,8 @@ def _choices(scenario: Scenario) -> Problems:
 
 def _policies(scenario: Scenario, known: Collection[str]) -> Problems:
     for index, policy in enumerate(scenario.intervention.policies):
-        yield from _one_of(f"intervention.policies.{index}.name", policy.name, known, "one of the policies")
+        if not re.fullmatch(r"[\w.]+:\w+", policy.name):  # a plug-in, which the behaviour database looks up
+            yield from _one_of(f"intervention.policies.{index}.name", policy.name, known, "one of the policies")
 
 
 CHECKS: tuple[Callable[[Scenario], Problems], ...] = (

@@ -20,6 +20,10 @@ from airground_drake.nsbc.team import Team
 from airground_drake.systems.messages import ACCEPT, REFUSE, SILENT, answer_to
 
 
+USELESS = 1e-6
+"""Relative gain below which an intervention makes no difference: ten times the solver's tolerance."""
+
+
 class Route(Protocol):
     """A way to solve (26): any object with this method."""
 
@@ -154,10 +158,13 @@ def settle(decision: Decision, standing: float, margin: float) -> bool:
     """Whether the proposal is accepted, given the answer that stands.
 
     A standing answer is reversed only if the other choice is cheaper by the relative margin: two choices of
-    nearly equal cost must not alternate at every sample. Without an optimum the answer is to refuse.
+    nearly equal cost must not alternate at every sample. A new proposal that changes nothing (one that the
+    avoidance inequalities would block entirely) is refused, and so is every one without an optimum.
     """
-    if decision.status != "optimal" or standing == SILENT:
-        return decision.accept
+    if decision.status != "optimal":
+        return False
+    if standing == SILENT:
+        return decision.accept and decision.objective_accept < (1.0 - USELESS) * decision.objective_refuse
     kept, other = decision.objective_accept, decision.objective_refuse
     if standing == REFUSE:
         kept, other = other, kept

@@ -188,8 +188,7 @@ def _outside(times: Array, intervals: Array, allowance: float) -> npt.NDArray[np
     """Which of the times (M,) are in none of the intervals (K, 2) extended by the allowance: (M,) bool."""
     begins, ends = intervals[:, 0] - TIME_TOLERANCE_S, intervals[:, 1] + allowance + TIME_TOLERANCE_S
     inside = (times[:, None] >= begins) & (times[:, None] <= ends)
-    outside: npt.NDArray[np.bool_] = ~inside.any(axis=1)
-    return outside
+    return np.asarray(~inside.any(axis=1))
 
 
 class GateTime(TraceClaim):

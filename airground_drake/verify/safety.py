@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from airground_drake.nsbc.task import Array
 from airground_drake.trace import Trace
-from airground_drake.verify.geometry import Pair, closest_approach, distinct_rows, pairs_of, places_of, snapshot
+from airground_drake.verify.geometry import MERGE_S, Pair, closest_approach, pairs_of, places_of, snapshot
 from airground_drake.verify.verdict import TIME_TOLERANCE_S, Finding, TraceClaim
 
 DISTANCE_TOLERANCE_M = 1e-9
@@ -167,26 +167,24 @@ def _static(trace: Trace) -> Iterator[_Hypothesis]:
 
 def _sampled(trace: Trace) -> Iterator[_Hypothesis]:
     """Hypotheses at the control samples: their spacing, the hold between them, limits and inequalities."""
-    control, places, limits = trace.scenario["control"], places_of(trace), _speed_limits(trace)
-    period, kept = control["period_s"], distinct_rows(trace.t)
-    t = trace.t[kept]
-    ticks = np.flatnonzero(np.abs(t - np.round(t / period) * period) <= TIME_TOLERANCE_S)
-    begins = ticks[ticks < len(t) - 1]  # the velocity chosen at a sample is the command of the row after it
-    spacing = np.diff(np.append(t[begins], t[-1]))
-    yield _Hypothesis("sampling", "s", t[begins], period - spacing, TIME_TOLERANCE_S, {})
-    chosen_at = np.searchsorted(begins, np.arange(len(t) - 1), side="right") - 1
+    control, limits, t = trace.scenario["control"], _speed_limits(trace), trace.t
+    samples = _samples(t, control["period_s"])
+    chosen = np.searchsorted(t, t[samples] + MERGE_S)  # the velocity chosen at a sample is the next row's command
+    spacing = np.diff(np.append(t[samples], t[-1]))
+    yield _Hypothesis("sampling", "s", t[samples], control["period_s"] - spacing, TIME_TOLERANCE_S, {})
+    begins = np.flatnonzero(np.diff(t) >= MERGE_S)  # rows at which an interval begins
+    sample_of = np.searchsorted(t[samples], t[begins] + MERGE_S) - 1
     for robot in trace.robots:
         command, about = trace.command(robot), {"robot": robot}
-        held = command[kept][begins + 1]
-        drift = np.linalg.norm(command[kept][1:] - held[chosen_at], axis=1)
-        yield _Hypothesis("zero-order hold", "m/s", t[:-1], 0.0 - drift, VELOCITY_TOLERANCE_M_S, about)
+        drift = np.linalg.norm(command[begins + 1] - command[chosen][sample_of], axis=1)
+        yield _Hypothesis("zero-order hold", "m/s", t[begins], 0.0 - drift, VELOCITY_TOLERANCE_M_S, about)
         spare = limits[robot] - np.linalg.norm(command[1:], axis=1)
-        yield _Hypothesis("speed limit", "m/s", trace.t[:-1], spare, VELOCITY_TOLERANCE_M_S, about)
+        yield _Hypothesis("speed limit", "m/s", t[:-1], spare, VELOCITY_TOLERANCE_M_S, about)
         if robot in trace.ugvs:
             climb = 0.0 - np.abs(command[1:, 2])
-            yield _Hypothesis("planar motion", "m/s", trace.t[:-1], climb, VELOCITY_TOLERANCE_M_S, about)
-    velocities = {robot: trace.command(robot)[kept][begins + 1] for robot in trace.robots}
-    sampled = {name: place if place.ndim == 1 else place[kept][begins] for name, place in places.items()}
+            yield _Hypothesis("planar motion", "m/s", t[:-1], climb, VELOCITY_TOLERANCE_M_S, about)
+    velocities = {robot: trace.command(robot)[chosen] for robot in trace.robots}
+    sampled = {name: place if place.ndim == 1 else place[samples] for name, place in places_of(trace).items()}
     for pair in pairs_of(trace):
         for robot, other in ((pair.first, pair.second), (pair.second, pair.first)):
             if robot not in velocities:
@@ -195,7 +193,15 @@ def _sampled(trace: Trace) -> Iterator[_Hypothesis]:
                 sampled[robot] - sampled[other], velocities[robot], pair, control, planar=robot in trace.ugvs
             )
             about = {"robot": robot, "other": other}
-            yield _Hypothesis("avoidance", "m/s", t[begins], slack, VELOCITY_TOLERANCE_M_S, about)
+            yield _Hypothesis("avoidance", "m/s", t[samples], slack, VELOCITY_TOLERANCE_M_S, about)
+
+
+def _samples(t: Array, period: float) -> npt.NDArray[np.intp]:
+    """Rows of the control samples: the nearest to each multiple of the period before the last row, if it is there."""
+    instants = np.arange(int((t[-1] - MERGE_S) / period) + 1) * period
+    right = np.searchsorted(t, instants).clip(1, len(t) - 1)
+    nearest = right - (instants - t[right - 1] < t[right] - instants)
+    return np.asarray(nearest[np.abs(t[nearest] - instants) <= TIME_TOLERANCE_S])
 
 
 def _slack(offset: Array, velocity: Array, pair: Pair, control: dict[str, Any], *, planar: bool) -> Array:

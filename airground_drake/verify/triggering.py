@@ -91,8 +91,8 @@ class ZenoTrace(TraceClaim):
     statement = "In this run no UGV was triggered twice within the minimum inter-event time."
     formula = "t_(k+1) - t_k >= min_inter_event_s for consecutive triggers of each UGV, tolerance 1e-9 s"
     method = (
-        "Differences of the recorded trigger times; the events must agree with the columns triggers, triggered_at_s and "
-        "released_at_s at every row, otherwise the verdict is `error`. A bare trigger is held to the same bound."
+        "Differences of the recorded trigger times; the events must agree with the columns triggers, triggered_at_s "
+        "and released_at_s at every row, otherwise the verdict is `error`. A bare trigger is held to the same bound."
     )
     equations = "(20)"
     assumptions = ("The trace records every trigger (THR-TRIG recomputes them independently).",)
@@ -160,8 +160,8 @@ class ThrTrig(TraceClaim):
         "Events in the last 1e-5 s of the run may be on either side of its end.",
     )
     does_not_establish = (
-        "That the threshold is a good one (THR-ROOT, THR-OPT), that the noise has the stated distribution (THR-DDM), or "
-        "anything about a Wiener path between the noise samples. Where x only touches a level to within rounding, "
+        "That the threshold is a good one (THR-ROOT, THR-OPT), that the noise has the stated distribution (THR-DDM), "
+        "or anything about a Wiener path between the noise samples. Where x only touches a level to within rounding, "
         "1e-12 m, a trigger and none are equally right and the verdict follows the rounding."
     )
 
@@ -214,7 +214,7 @@ def _compare(expected: list[Transition], recorded: list[Transition], x: NormSign
             lag = max(lag, abs(ours[0] - theirs[0]))
             continue
         time, kind = min(event for event in (ours, theirs) if event)
-        if ours and theirs or time < end:
+        if (ours and theirs) or time < end:
             what = f"{'missing' if (time, kind) == ours else 'spurious'} {kind}"
             both = {"recomputed": ours, "recorded": theirs}
             return lag, {"t_s": time, "what": what, **both, "decision_variable_m": float(x.at(time))}

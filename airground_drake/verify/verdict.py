@@ -84,7 +84,7 @@ class TraceClaim(abc.ABC):
             if finding.status in PASSING:
                 require_whole_run(trace)
             json.dumps(asdict(finding), allow_nan=False)  # a margin that is not a number must not pass
-        except Exception as error:  # noqa: BLE001 (whatever went wrong, the claim was not decided)
+        except Exception as error:  # whatever went wrong, the claim was not decided
             return Finding("error", evidence={"error": f"{type(error).__name__}: {error}"})
         return finding
 
@@ -120,10 +120,12 @@ def require_motion(trace: Trace) -> None:
     """Check that the trace is of the shape that its docstring states: position[k] = position[k-1] + dt command[k].
 
     Raises:
-        TraceError: if time runs backwards, the robots are not those of the scenario, or a step does not agree
-            with its command to within `MOTION_TOLERANCE_M`.
+        TraceError: if time runs backwards, the run or the robots are not those of the scenario, or a step does
+            not agree with its command to within `MOTION_TOLERANCE_M`.
     """
     scenario, t = trace.scenario, trace.t
+    if scenario["runs"].get(trace.run, {}).get("method") != trace.meta["method"]:
+        raise TraceError(f"the scenario declares no run {trace.run!r} of method {trace.meta['method']!r}")
     if trace.ugvs != list(scenario["ugvs"]) or trace.robots != [*trace.ugvs, scenario["uav"]["name"]]:
         raise TraceError(f"the trace is of the robots {trace.robots}, which are not those of its scenario")
     if len(t) < 2 or (np.diff(t) < 0.0).any():

@@ -1,0 +1,196 @@
+"""`python -m airground_drake.report case_a`: simulate all runs of a scenario, check the claims, write the report."""
+
+from __future__ import annotations
+
+import argparse
+import platform
+import shlex
+import shutil
+import subprocess
+import sys
+import time
+import webbrowser
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from airground_drake import files, graphviz, trace
+from airground_drake.diagram import build_diagram
+from airground_drake.errors import AirgroundError, ScenarioError
+from airground_drake.intervention.database import PolicyError
+from airground_drake.report import document, figures, html, junit
+from airground_drake.scenarios.load import load, shipped
+from airground_drake.scenarios.schema import Scenario
+from airground_drake.simulation import Recorder
+from airground_drake.trace import Trace
+from airground_drake.verify import verify
+
+EXIT_USAGE, EXIT_TOOL = 2, 4
+FORMATS = ("html", "json", "junit")
+PACKAGES = ("airground_drake", "drake", "numpy", "scipy", "numba", "pandas", "matplotlib")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line.
+
+    Returns:
+        Exit code: 0 all claims as expected, 1 a claim differs, 2 usage or bad scenario, 3 inconclusive,
+        4 tool error.
+    """
+    parser = _parser()
+    options = parser.parse_args(arguments)
+    if options.scenario is None and not options.list:
+        parser.error("a scenario is needed (see --list)")
+    if options.list:
+        print("\n".join(shipped()))
+        return 0
+    command = ["python", "-m", "airground_drake.report", *(sys.argv[1:] if arguments is None else arguments)]
+    try:
+        overrides = [*options.set, *([] if options.seed is None else [f"seed={options.seed}"])]
+        scenario, digest = load(options.scenario, overrides)
+        folder = options.output or Path("reports") / scenario.name
+        report = write_report(scenario, digest, folder, options.format, shlex.join(command))
+    except (ScenarioError, PolicyError) as error:
+        print(f"error: {error}", file=sys.stderr)
+        return EXIT_USAGE
+    except (AirgroundError, OSError) as error:
+        print(f"error: {error}", file=sys.stderr)
+        return EXIT_TOOL
+    overall = report["overall"]
+    print(f"{scenario.name}: {overall['status'].replace('_', ' ')}. {overall['why']}\n{folder}")
+    if options.open and "html" in options.format:
+        webbrowser.open((folder / "report.html").resolve().as_uri())
+    return document.exit_code(report)
+
+
+def write_report(
+    scenario: Scenario, digest: str, folder: Path, formats: Sequence[str] = FORMATS, command: str = ""
+) -> dict[str, Any]:
+    """Simulate every run, judge it, and write everything to a folder.
+
+    Args:
+        scenario: validated scenario.
+        digest: SHA-256 of its file.
+        folder: created if need be; files of an earlier report are replaced, one by one and whole.
+        formats: which of html, json and junit to write; traces and diagram are always written.
+        command: how to make this report again.
+
+    Returns:
+        The document, as in report.json.
+
+    Raises:
+        PolicyError: if the scenario names a policy that cannot be made.
+        OSError: if the folder cannot be written.
+    """
+    started, clock = datetime.now(UTC), time.perf_counter()
+    traces: dict[str, Trace] = {}
+    for name, run in scenario.runs.items():
+        _progress(f"simulating {name}")
+        traces[name] = Recorder(scenario, name, run).simulate()
+    _progress("checking claims")
+    verdicts = [verdict for of_run in traces.values() for verdict in verify(of_run)]
+    dot = graphviz.dot(build_diagram(scenario))
+    drawn = graphviz.svg(dot)
+    provenance = _provenance(scenario, started, command)
+
+    _progress("writing")
+    _drop_stale(folder / "trace", set(traces))
+    for name, of_run in traces.items():
+        trace.save(of_run, folder / "trace" / name)
+    files.write_text(folder / "diagram.dot", dot)
+    files.write_text(folder / "diagram.svg", drawn)
+    provenance["wall_s"] = time.perf_counter() - clock
+    report = document.build(scenario, digest, traces, verdicts, provenance)
+    if "junit" in formats:
+        files.write_text(folder / "junit.xml", junit.render(report))
+    if "html" in formats:
+        files.write_text(folder / "report.html", html.render(report, figures.draw(scenario, traces), drawn))
+    if "json" in formats:
+        files.write_json(folder / "report.json", report)
+    _progress("")
+    return report
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m airground_drake.report",
+        description="Simulate all runs of a scenario, check the claims on them, and write the report.",
+        epilog="exit codes: 0 all as expected, 1 a claim differs, 2 usage or bad scenario, 3 inconclusive, 4 tool error",
+    )
+    parser.add_argument("scenario", nargs="?", help="name of a shipped scenario, or path to a YAML file")
+    parser.add_argument("-o", "--output", type=Path, metavar="DIR", help="default: reports/<scenario>")
+    parser.add_argument(
+        "--format", type=_formats, default=FORMATS, help="comma-separated: html,json,junit (default: all)"
+    )
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="KEY=VALUE", help="override a key of the scenario"
+    )
+    parser.add_argument("--seed", type=int, metavar="N", help="seed of the decision noise")
+    parser.add_argument("--open", action="store_true", help="open the report in a browser")
+    parser.add_argument("--list", action="store_true", help="list the shipped scenarios")
+    return parser
+
+
+def _formats(text: str) -> tuple[str, ...]:
+    chosen = tuple(text.split(","))
+    unknown = [name for name in chosen if name not in FORMATS]
+    if unknown:
+        raise argparse.ArgumentTypeError(f"{', '.join(unknown)!r} is not allowed; formats are {', '.join(FORMATS)}")
+    return chosen
+
+
+def _drop_stale(folder: Path, current: set[str]) -> None:
+    """Remove traces of an earlier report's runs that this report does not have."""
+    for meta in folder.glob("*/meta.json"):
+        if meta.parent.name not in current:
+            shutil.rmtree(meta.parent)
+
+
+def _provenance(scenario: Scenario, started: datetime, command: str) -> dict[str, Any]:
+    versions = {}
+    for name in PACKAGES:
+        try:
+            versions[name] = version(name)
+        except PackageNotFoundError:
+            versions[name] = "not installed"
+    return {
+        "package": versions.pop("airground_drake"),
+        "drake": versions.pop("drake"),
+        "python": platform.python_version(),
+        "packages": versions,
+        "platform": platform.platform(),
+        "git": _git(),
+        "seed": scenario.seed,
+        "started": started.isoformat(timespec="seconds"),
+        "command": command,
+    }
+
+
+def _git() -> str:
+    """Commit of the checkout that the package is imported from, with '+changes', or 'not a checkout'."""
+    here = ["git", "-C", str(Path(__file__).parent)]
+    try:
+        tracked = subprocess.run([*here, "ls-files", "--error-unmatch", __file__], capture_output=True, check=False)
+        if tracked.returncode != 0:
+            return "not a checkout"
+        commit = subprocess.run([*here, "rev-parse", "HEAD"], capture_output=True, text=True, check=True).stdout.strip()
+        changed = subprocess.run([*here, "status", "--porcelain"], capture_output=True, text=True, check=True).stdout
+    except (OSError, subprocess.CalledProcessError):
+        return "not a checkout"
+    return commit + ("+changes" if changed else "")
+
+
+def _progress(text: str) -> None:
+    if sys.stderr.isatty():
+        print(f"\r\033[K{text}", end="", file=sys.stderr, flush=True)
+
+
+def entry() -> None:
+    """Console script."""
+    sys.exit(main())
+
+
+if __name__ == "__main__":
+    entry()

@@ -1,0 +1,75 @@
+"""junit.xml: one test case per claim and run, for continuous integration servers."""
+
+from __future__ import annotations
+
+import json
+import re
+import xml.etree.ElementTree as ET
+from collections.abc import Mapping
+from typing import Any
+
+_NOT_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+"""Characters that XML 1.0 cannot hold, not even escaped."""
+
+
+def render(document: Mapping[str, Any]) -> str:
+    """JUnit XML of report.json: a suite per run.
+
+    A claim whose status is the expected one passes. Otherwise it fails; an `error` is an error and a `not_run`
+    is skipped. What is missing altogether (a run without a trace, a claim that nobody checked) is an error.
+
+    Args:
+        document: as built by `document.build`.
+    """
+    name = document["scenario"]["name"]
+    root = ET.Element("testsuites", {"name": _text(f"airground_drake.{name}")})
+    missing = document["overall"]["missing"]
+    runs = list(dict.fromkeys([*document["runs"], *(item["run"] for item in [*document["claims"], *missing])]))
+    for run in runs:
+        suite = ET.SubElement(root, "testsuite", {"name": _text(f"{name}.{run}")})
+        for claim in document["claims"]:
+            if claim["run"] == run:
+                _outcome(_case(suite, name, run, claim["id"]), claim)
+        for item in missing:
+            if item["run"] == run:
+                case = _case(suite, name, run, item["id"] or "run")
+                ET.SubElement(case, "error", {"message": _text(item["why"]), "type": "missing"})
+        seconds = (document["runs"].get(run) or {"metrics": {}})["metrics"].get("wall_s")
+        _count(suite, [suite], seconds or 0.0)
+    _count(root, list(root), sum(float(suite.get("time", 0.0)) for suite in root))
+    ET.indent(root)
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{ET.tostring(root, encoding="unicode")}\n'
+
+
+def _case(suite: ET.Element, scenario: str, run: str, claim: str) -> ET.Element:
+    attributes = {"classname": f"{scenario}.{run}", "name": claim, "time": "0"}
+    return ET.SubElement(suite, "testcase", {key: _text(value) for key, value in attributes.items()})
+
+
+def _outcome(case: ET.Element, claim: Mapping[str, Any]) -> None:
+    if claim["as_expected"]:
+        return
+    kind = {"error": "error", "not_run": "skipped"}.get(claim["status"], "failure")
+    margin = "" if claim["margin"] is None else f", margin {claim['margin']:.4g} {claim['unit']}"
+    message = f"{claim['status']}, expected {claim['expected']}{margin}: {claim['statement']}"
+    outcome = ET.SubElement(case, kind, {"message": _text(message)})
+    if kind != "skipped":
+        outcome.set("type", claim["status"])
+        details = {key: claim[key] for key in ("where", "counterexample", "evidence") if claim[key]}
+        outcome.text = _text(json.dumps(details, indent=1, ensure_ascii=False))
+
+
+def _count(element: ET.Element, suites: list[ET.Element], seconds: float) -> None:
+    """Set the totals of a suite, or of all suites."""
+    for total, path in (
+        ("tests", "testcase"),
+        ("failures", "*/failure"),
+        ("errors", "*/error"),
+        ("skipped", "*/skipped"),
+    ):
+        element.set(total, str(sum(len(suite.findall(path)) for suite in suites)))
+    element.set("time", f"{seconds:.3f}")
+
+
+def _text(text: str) -> str:
+    return _NOT_XML.sub("\ufffd", text)

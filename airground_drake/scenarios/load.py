@@ -1,0 +1,298 @@
+"""From the name or file of a scenario to a validated `Scenario`; every mistake becomes one line.
+
+The YAML text is composed to nodes, which know their line; `--set` replaces nodes; the nodes are checked against
+the type hints of the schema; pydrake's typed reader builds the dataclasses; `validate.py` checks the meaning.
+Scalars are read by the rules of YAML 1.2 (`1e-3` is a number, `yes` and `1:30` are text). Anchors, merge keys
+(`<<`) and templates under top-level keys that begin with an underscore work as in Drake's own files.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import math
+import re
+from collections.abc import Callable, Collection, Iterable, Sequence
+from importlib import resources
+from importlib.resources.abc import Traversable
+from pathlib import Path
+from typing import Any, NoReturn, get_args, get_origin
+
+import yaml
+from pydrake.common.yaml import yaml_load_typed
+
+from airground_drake import files
+from airground_drake.errors import Fault, ScenarioError
+from airground_drake.scenarios import schema, validate
+from airground_drake.scenarios.schema import Scenario
+
+MAX_BYTES = 2**20
+
+REQUIRED: dict[Any, tuple[str, ...]] = {
+    Scenario: ("name", "ugvs", "uav", "obstacles", "runs"),
+    schema.Ugv: ("start_m", "target_m", "preset"),
+    schema.Preset: ("waypoints_m",),
+    schema.Uav: ("start_m", "target_m"),
+    schema.Obstacle: ("position_m",),
+    schema.Policy: ("name",),
+    schema.Run: ("method",),
+    schema.Reproduction: ("id", "quantity", "measure", "run", "robot", "paper"),
+    schema.Choice: ("key", "source", "reason"),
+}
+"""Keys without a default; the dataclasses must be constructible without arguments for pydrake."""
+
+_TAG = "tag:yaml.org,2002:"
+_SCALARS: dict[str, tuple[str | None, Callable[[str], object]]] = {  # tag: its plain scalars, conversion
+    "null": (r"~|null|Null|NULL|", lambda _: None),
+    "bool": (r"true|True|TRUE|false|False|FALSE", lambda text: text.lower() == "true"),
+    "int": (r"[-+]?[0-9]+", int),
+    "float": (
+        r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)",
+        lambda text: float(text.lower().replace(".inf", "inf").replace(".nan", "nan")),
+    ),
+    "str": (None, lambda text: text.encode().decode()),  # refuses lone surrogates
+}
+_WANTED = {
+    str: "text (in quotes where it looks like a number)",
+    bool: "true or false",
+    int: "a whole number",
+    float: "a number",
+}
+
+Children = dict[str, tuple[yaml.Node, yaml.Node]]
+"""Key node (for its line) and value node of each entry."""
+
+
+class _Loader(yaml.BaseLoader):
+    """Composes nodes whose scalars are tagged by the rules of YAML 1.2."""
+
+
+for _name, (_pattern, _) in _SCALARS.items():
+    if _pattern is not None:
+        _Loader.add_implicit_resolver(_TAG + _name, re.compile(rf"(?:{_pattern})\Z"), None)
+
+
+def shipped() -> list[str]:
+    """Names of the scenarios that come with the package, sorted."""
+    return sorted(name.removesuffix(".yaml") for name in _shipped_files())
+
+
+def load(
+    name_or_path: str, overrides: Sequence[str] = (), *, known_policies: Collection[str] | None = None
+) -> tuple[Scenario, str]:
+    """Load and validate a scenario.
+
+    Args:
+        name_or_path: name of a shipped scenario, or path to a YAML file.
+        overrides: `dotted.key=value`, applied in order; the value is YAML, list items are addressed by index.
+            The key must be one of the schema, or an entry that exists in the file.
+        known_policies: names of the behaviour database, see `validate.check`.
+
+    Returns:
+        The scenario, and the SHA-256 of the file's bytes followed by a NUL byte and the text of each override.
+
+    Raises:
+        ScenarioError: if the file cannot be read or an override or the scenario is not valid.
+    """
+    source, data = _read_bytes(name_or_path)
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise ScenarioError(f"{source}:{line}", "", Fault("not UTF-8 text"), "wanted: a YAML file") from None
+    try:
+        root = _compose(text, source)
+        for override in overrides:
+            root = _override(root, override)
+        plain = _plain(root, Scenario, "", "")
+    except RecursionError:
+        raise ScenarioError(source, "", Fault("nested too deeply"), "wanted: a scenario") from None
+    scenario: Scenario = yaml_load_typed(schema=Scenario, data=yaml.safe_dump(plain, sort_keys=False))
+    try:
+        validate.check(scenario, source, known_policies)
+    except ScenarioError as error:
+        raise ScenarioError(_where(_nearest(root, error.key)), error.key, error.value, error.allowed) from None
+    digest = files.sha256(b"\0".join([data, *(override.encode() for override in overrides)]))
+    return scenario, digest
+
+
+def resolved(scenario: Scenario) -> dict[str, Any]:
+    """The scenario as nested dicts and lists, defaults filled in."""
+    return dataclasses.asdict(scenario)
+
+
+def _shipped_files() -> dict[str, Traversable]:
+    return {file.name: file for file in resources.files(__package__).iterdir() if file.name.endswith(".yaml")}
+
+
+def _read_bytes(name_or_path: str) -> tuple[str, bytes]:
+    """Path and content of a scenario; a shipped scenario's name has precedence."""
+    file: Traversable = _shipped_files().get(f"{name_or_path}.yaml", Path(name_or_path))
+    source = str(file)
+    try:
+        with file.open("rb") as stream:
+            data = stream.read(MAX_BYTES + 1)
+    except (FileNotFoundError, NotADirectoryError):
+        close = _suggestion(name_or_path, shipped())
+        wanted = f"{close}wanted: the path of a YAML file, or a shipped scenario: {', '.join(shipped())}"
+        raise ScenarioError(name_or_path, "", Fault("no such scenario or file"), wanted) from None
+    except (OSError, ValueError) as error:
+        fault = Fault(f"cannot be read ({getattr(error, 'strerror', None) or error})")
+        raise ScenarioError(source, "", fault, "wanted: a readable YAML file") from None
+    if len(data) > MAX_BYTES:
+        raise ScenarioError(source, "", Fault("too large"), f"at most {MAX_BYTES} bytes are allowed")
+    return source, data
+
+
+def _compose(text: str, source: str) -> yaml.Node:
+    """Nodes of a YAML document whose marks bear the source's name."""
+    try:
+        loader = _Loader(text)
+        loader.name = source
+        root: yaml.Node | None = loader.get_single_node()
+    except (yaml.YAMLError, ValueError, OverflowError) as error:  # the latter from escapes such as "\U99999999"
+        mark = getattr(error, "problem_mark", None)
+        line = mark.line + 1 if mark else text.count("\n", 0, getattr(error, "position", 0)) + 1
+        problem = getattr(error, "problem", None) or getattr(error, "reason", None) or error
+        raise ScenarioError(f"{source}:{line}", "", Fault(f"not YAML: {problem}"), "wanted: YAML text") from None
+    if root is None:
+        raise ScenarioError(source, "", Fault("empty"), "wanted: YAML text")
+    return root
+
+
+def _override(root: yaml.Node, override: str) -> yaml.Node:
+    """The document with one value replaced; the document itself is left as it is, as aliases may share nodes."""
+    source = f"--set {override}"
+    key, equals, value = override.partition("=")
+    if not equals or not key.strip():
+        raise ScenarioError(source, "", override, "wanted: dotted.key=value, such as control.period_s=0.05")
+    return _replace(root, Scenario, key.strip().split("."), "", _compose(value, source))
+
+
+def _replace(node: yaml.Node | None, hint: Any, parts: list[str], key: str, new: yaml.Node) -> yaml.Node:
+    if not parts:
+        return new
+    part, *rest = parts
+    children = {} if node is None or hint in _WANTED else _children(node, hint, key, key.rpartition(".")[2])
+    options = _hints(hint) if dataclasses.is_dataclass(hint) else {name: get_args(hint)[-1] for name in children}
+    if part not in options:
+        _unknown(new, key, part, options)
+    name, child = children.get(part, (None, None))
+    if name is None or not rest:
+        name = yaml.ScalarNode(f"{_TAG}str", part, new.start_mark, new.end_mark)
+    children[part] = (name, _replace(child, options[part], rest, validate.dotted(key, part), new))
+    marks = (node or new).start_mark, (node or new).end_mark
+    if get_origin(hint) is list:
+        return yaml.SequenceNode(f"{_TAG}seq", [child for _, child in children.values()], *marks)
+    return yaml.MappingNode(f"{_TAG}map", list(children.values()), *marks)
+
+
+def _plain(node: yaml.Node, hint: Any, key: str, name: str) -> Any:
+    """Data of a node, of the types that the hint says; `name` is the key whose suffix gives the unit."""
+    if hint in _WANTED:
+        value = _value(node)
+        if hint is float and type(value) is int:
+            return float(value) if abs(value) < 1e300 else math.inf
+        if type(value) is not hint:
+            raise ScenarioError(_where(node), key, value, _wanted(hint, name))
+        return value
+    children = _children(node, hint, key, name)
+    if not dataclasses.is_dataclass(hint):
+        item, named = get_args(hint)[-1], get_origin(hint) is dict and not validate.unit_of(name)
+        data = {
+            part: _plain(child, item, validate.dotted(key, part), part if named else name)
+            for part, (_, child) in children.items()
+        }
+        return data if get_origin(hint) is dict else list(data.values())
+    hints = _hints(hint)
+    for part, (name_node, _) in children.items():
+        if part not in hints and (key or not part.startswith("_")):
+            _unknown(name_node, key, part, hints)
+    for part in REQUIRED.get(hint, ()):
+        if part not in children:
+            wanted = _wanted(hints[part], part)
+            raise ScenarioError(_where(node), validate.dotted(key, part), Fault("missing"), wanted)
+    return {
+        part: _plain(child, hints[part], validate.dotted(key, part), part)
+        for part, (_, child) in children.items()
+        if part in hints
+    }
+
+
+def _hints(cls: Any) -> dict[str, Any]:
+    return {field.name: field.type for field in dataclasses.fields(cls)}
+
+
+def _value(node: yaml.Node) -> object:
+    """Value of a scalar node; a `Fault` that says what it is for any other."""
+    tag = node.tag.removeprefix(_TAG)
+    if not isinstance(node, yaml.ScalarNode) or tag not in _SCALARS:
+        return Fault({"map": "a mapping is given", "seq": "a list is given"}.get(tag, f"the tag {tag} is given"))
+    try:
+        value = _SCALARS[tag][1](node.value)
+    except ValueError:
+        return Fault("a value is given that cannot be read")
+    return Fault("no value is given") if value is None else value
+
+
+def _children(node: yaml.Node, hint: Any, key: str, name: str) -> Children:
+    """Entries of the mapping, or items of the list, that the hint asks for."""
+    kind, tag = (yaml.SequenceNode, "seq") if get_origin(hint) is list else (yaml.MappingNode, "map")
+    if isinstance(node, kind) and node.tag == _TAG + tag:
+        return _entries(node, key)
+    raise ScenarioError(_where(node), key, _value(node), _wanted(hint, name))
+
+
+def _entries(node: yaml.Node, key: str) -> Children:
+    if isinstance(node, yaml.SequenceNode):
+        return {str(index): (child, child) for index, child in enumerate(node.value)}
+    entries: Children = {}
+    for name, child in node.value if isinstance(node, yaml.MappingNode) else ():
+        if not isinstance(name, yaml.ScalarNode):
+            raise ScenarioError(_where(name), key, Fault("a list or mapping is given as a key"), "wanted: a name")
+        if name.value in entries:
+            first = _where(entries[name.value][0])
+            raise ScenarioError(_where(name), validate.dotted(key, name.value), Fault("given twice"), f"first: {first}")
+        entries[name.value] = (name, child)
+    if "<<" in entries:
+        _, template = entries.pop("<<")
+        for each in template.value if isinstance(template, yaml.SequenceNode) else [template]:
+            if not isinstance(each, yaml.MappingNode):
+                raise ScenarioError(_where(each), validate.dotted(key, "<<"), _value(each), "wanted: mappings to merge")
+            entries = {**_entries(each, key), **entries}
+    return entries
+
+
+def _nearest(node: yaml.Node, key: str) -> yaml.Node:
+    """Node where a dotted key, or else its nearest ancestor, is given."""
+    found = node
+    for part in key.split("."):
+        children = _entries(node, "")
+        if part not in children:
+            break
+        found, node = children[part]
+    return found
+
+
+def _where(node: yaml.Node) -> str:
+    """File and line, or command-line option, of a node."""
+    mark = node.start_mark
+    return str(mark.name) if mark.name.startswith("--set ") else f"{mark.name}:{mark.line + 1}"
+
+
+def _wanted(hint: Any, name: str) -> str:
+    if dataclasses.is_dataclass(hint):
+        return f"wanted: a mapping with the keys {', '.join(_hints(hint))}"
+    if hint in _WANTED:
+        return f"wanted: {_WANTED[hint]}{validate.unit_of(name, ' in ')}"
+    return f"wanted: {'a mapping' if get_origin(hint) is dict else 'a list'}{validate.unit_of(name, ' in ')}"
+
+
+def _suggestion(name: str, options: Iterable[str]) -> str:
+    close = difflib.get_close_matches(name, list(options), n=1)
+    return f"did you mean {close[0]}? " if close else ""
+
+
+def _unknown(node: yaml.Node, key: str, part: str, options: Iterable[str]) -> NoReturn:
+    wanted = f"{_suggestion(part, options)}allowed: {', '.join(options) or 'none'}"
+    raise ScenarioError(_where(node), validate.dotted(key, part), Fault("unknown key"), wanted)

@@ -1,0 +1,170 @@
+"""Set-based avoidance: exact projection, invariance under any lower-priority velocity, and what breaks it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import cvxpy
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from airground_drake.nsbc.avoidance import Avoidance, HalfSpaces, Surroundings, limit_speed
+from airground_drake.nsbc.composition import augmented
+from airground_drake.nsbc.team import Team
+
+D = 2.0
+SEEDS = st.integers(0, 2**31)
+
+
+def scene(seed: int, robots: int = 3, obstacles: int = 6, spread: float = 8.0) -> tuple[Team, np.ndarray]:
+    """A team at safe random positions, UAV included; many pairs at exactly the safe distance."""
+    rng = np.random.default_rng(seed)
+    centres = np.column_stack([rng.uniform(-spread, spread, (obstacles, 2)), rng.choice([0.0, 0.5], obstacles)])
+    positions: list[np.ndarray] = []
+    while len(positions) < robots:
+        trial = np.array([*rng.uniform(-spread, spread, 2), 0.0])
+        if rng.random() < 0.5:  # onto the safe circle of an obstacle
+            o = centres[rng.integers(obstacles)]
+            radius = np.sqrt(D**2 - o[2] ** 2)
+            angle = rng.uniform(0, 2 * np.pi)
+            trial = np.array([o[0] + radius * np.cos(angle), o[1] + radius * np.sin(angle), 0.0])
+        if all(np.linalg.norm(trial - q) >= D for q in [*centres, *positions]):
+            positions.append(trial)
+    positions.append(np.array([*rng.uniform(-spread, spread, 2), 3.0]))
+    team = Team(tuple(f"u{i}" for i in range(robots)), "uav", centres, D, D, 1.0, np.full(robots + 1, 6.0))
+    return team, np.array(positions)
+
+
+def closest(position: np.ndarray, velocity: np.ndarray, centre: np.ndarray, other: np.ndarray, h: float) -> float:
+    """Exact minimum distance between two points in uniform motion over one period."""
+    x, v = position - centre, (velocity - other) * h
+    s = 0.0 if v @ v == 0 else float(np.clip(-(x @ v) / (v @ v), 0, 1))
+    return float(np.linalg.norm(x + s * v))
+
+
+def worst_margin(team: Team, positions: np.ndarray, velocities: np.ndarray, h: float) -> float:
+    pairs = team.pair_distance()
+    margins = [
+        closest(p, v, o, np.zeros(3), h) - D
+        for p, v in zip(positions, velocities, strict=True)
+        for o in team.obstacles
+    ]
+    n = len(positions)
+    margins += [
+        closest(positions[i], velocities[i], positions[j], velocities[j], h) - pairs[i, j]
+        for i in range(n)
+        for j in range(i)
+    ]
+    return min(margins)
+
+
+def attack(seed: int, steps: int, avoidance: Avoidance, *, share: float | None = None) -> float:
+    """Drive a team by hostile velocities through the avoidance layer; the worst continuous-time margin, m."""
+    team, positions = scene(seed)
+    rng = np.random.default_rng(seed + 1)
+    neighbourhood = team.neighbourhood(slice(None))
+    if share is not None:
+        neighbourhood = replace(neighbourhood, share=np.where(neighbourhood.share < 1.0, share, 1.0))
+    worst = np.inf
+    for _ in range(steps):
+        around = neighbourhood.around(positions)
+        nearest = around.centre[np.arange(len(positions)), rng.integers(around.centre.shape[1], size=len(positions))]
+        towards = nearest - positions if rng.random() < 0.7 else rng.normal(size=positions.shape)
+        lower = limit_speed(100.0 * towards * team.mobility, team.max_speed)
+        spaces = avoidance.half_spaces(positions, team.mobility, around)
+        velocities = avoidance.apply(lower, spaces)
+        worst = min(worst, worst_margin(team, positions, velocities, avoidance.period))
+        positions = positions + avoidance.period * velocities
+    return worst
+
+
+@settings(max_examples=40)
+@given(SEEDS, st.sampled_from([0.01, 0.05, 0.2]))
+def test_no_velocity_breaks_the_safe_distance_in_continuous_time(seed: int, h: float) -> None:
+    assert attack(seed, 60, Avoidance(gain=3.0, period=h)) >= -1e-12
+
+
+@pytest.mark.parametrize("composition", ["recursion_nearest", "recursion_listed"])
+def test_recursion_as_printed_is_refuted(composition: str) -> None:
+    assert min(attack(seed, 60, Avoidance(3.0, 0.05, composition=composition)) for seed in range(20)) < -0.01  # type: ignore[arg-type]
+
+
+def test_robots_that_each_take_the_whole_share_are_refuted() -> None:
+    assert min(attack(seed, 60, Avoidance(3.0, 0.05), share=1.0) for seed in range(20)) < -0.01
+
+
+@given(SEEDS)
+def test_inequalities_hold_in_floating_point_from_any_safe_state(seed: int) -> None:
+    team, positions = scene(seed)
+    avoidance = Avoidance(3.0, 0.05)
+    spaces = avoidance.half_spaces(positions, team.mobility, team.neighbourhood(slice(None)).around(positions))
+    lower = np.random.default_rng(seed).normal(size=positions.shape) * 10 * team.mobility
+    slack = spaces.slack(avoidance.apply(lower, spaces))
+    assert (slack[spaces.bound <= 0.0] >= -1e-15).all()
+    assert (slack >= -1e-9).all()
+
+
+@settings(max_examples=60)
+@given(SEEDS, st.booleans())
+def test_projection_is_the_exact_minimiser(seed: int, planar: bool) -> None:
+    """Against an interior-point solver, which shares nothing with the enumeration of active sets."""
+    rng = np.random.default_rng(seed)
+    count = int(rng.integers(1, 6))
+    normal = rng.normal(size=(count, 3))
+    if planar:
+        normal[:, 2] = 0.0
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    bound = -rng.uniform(0, 2, count) * rng.choice([0.0, 1.0], count)
+    lower = rng.normal(size=3) * 3
+    ours = Avoidance(1.0, 1.0).apply(lower[None], HalfSpaces(normal[None], bound[None]))[0]
+    v = cvxpy.Variable(3)
+    cvxpy.Problem(cvxpy.Minimize(cvxpy.sum_squares(v - lower)), [normal @ v >= bound]).solve(solver="CLARABEL")
+    assert np.linalg.norm(ours - lower) <= np.linalg.norm(v.value - lower) + 1e-6
+    np.testing.assert_allclose(ours, v.value, atol=1e-4)
+
+
+@given(SEEDS)
+def test_projection_is_the_augmented_composition_over_its_active_set(seed: int) -> None:
+    """v = J^+ b + (I - J^+ J) v_lower with J the stacked rows of the constraints that end up active."""
+    team, positions = scene(seed, robots=2)
+    avoidance = Avoidance(3.0, 0.05)
+    spaces = avoidance.half_spaces(positions, team.mobility, team.neighbourhood(slice(None)).around(positions))
+    lower = np.random.default_rng(seed).normal(size=positions.shape) * 10 * team.mobility
+    velocity = avoidance.apply(lower, spaces)
+    for i in range(len(positions)):
+        active = np.abs(spaces.slack(velocity)[i]) < 1e-9
+        if not active.any() or np.linalg.matrix_rank(spaces.normal[i, active], tol=1e-6) < active.sum():
+            continue
+        rows = spaces.normal[i, active]
+        equality = (np.linalg.pinv(rows) @ spaces.bound[i, active])[None], rows[None]
+        expected = augmented([equality, (lower[i][None], np.eye(3)[None])])[0]
+        np.testing.assert_allclose(velocity[i], expected, atol=1e-6)
+
+
+def test_violated_distance_recovers_at_the_task_rate() -> None:
+    """Inside the safe distance the robot moves out at A (d - D), eq (8), even against its other task."""
+    avoidance = Avoidance(gain=3.0, period=0.05)
+    around = Surroundings(np.zeros((1, 1, 3)), np.full((1, 1), D), np.ones((1, 1)))
+    position = np.array([[1.5, 0.0, 0.0]])
+    spaces = avoidance.half_spaces(position, np.ones((1, 3)), around)
+    velocity = avoidance.apply(np.array([[-5.0, 1.0, 0.0]]), spaces)[0]
+    np.testing.assert_allclose(velocity, [3.0 * 0.5, 1.0, 0.0], atol=1e-9)
+
+
+def test_out_of_range_points_are_not_seen() -> None:
+    avoidance = Avoidance(3.0, 0.05, sensing_range=1.0)
+    around = Surroundings(np.zeros((1, 1, 3)), np.full((1, 1), D), np.ones((1, 1)))
+    spaces = avoidance.half_spaces(np.array([[1.5, 0.0, 0.0]]), np.ones((1, 3)), around)
+    assert spaces.bound[0, 0] == -np.inf
+
+
+def test_infeasible_start_gives_a_finite_least_violation() -> None:
+    """A robot squeezed between two points, inside both safe distances, still gets a finite velocity."""
+    avoidance = Avoidance(3.0, 0.05)
+    centre = np.array([[[-1.0, 0, 0], [1.0, 0, 0]]])
+    around = Surroundings(centre, np.full((1, 2), D), np.ones((1, 2)))
+    spaces = avoidance.half_spaces(np.zeros((1, 3)), np.array([[1.0, 1.0, 0.0]]), around)
+    velocity = avoidance.apply(np.array([[1.0, 1.0, 0.0]]), spaces)
+    assert np.isfinite(velocity).all()

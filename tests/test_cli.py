@@ -1,0 +1,88 @@
+"""The command line: exit codes, one-line errors, files."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from airground_drake import trace
+from airground_drake.report.__main__ import main
+from airground_drake.scenarios.load import load
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("report")
+    assert main(["case_a", "-o", str(folder)]) == 0
+    return folder
+
+
+def test_everything_is_written(report: Path) -> None:
+    names = {path.name for path in report.iterdir()}
+    assert names == {"report.html", "report.json", "junit.xml", "diagram.dot", "diagram.svg", "trace"}
+    scenario = load("case_a")[0]
+    for name in scenario.runs:
+        assert trace.load(report / "trace" / name).run == name
+
+
+def test_the_reproduction_table_meets_its_targets(report: Path) -> None:
+    document = json.loads((report / "report.json").read_text())
+    rows = {row["id"]: row for row in document["reproduction"]}
+    assert max(abs(a - b) for a, b in zip(rows["A1"]["ours"], (3.3, 5.1), strict=True)) < 0.1
+    assert all(abs(value - 2.0) < 0.01 for value in rows["A2"]["ours"])
+    assert abs(rows["A5"]["ours"] - 14.45) <= 0.05
+    assert abs(rows["A6"]["ours"] - 1.7) <= 0.1
+    assert {name: row["status"] for name, row in rows.items()} == {
+        **dict.fromkeys(("A1", "A2", "A3", "A4", "A7"), "reproduced"),
+        **dict.fromkeys(("A5", "A6"), "calibrated"),
+    }
+    assert document["runs"]["d"]["metrics"]["min_distance_m"]["ugv1"]["obstacle_1"]["value"] >= 2.0 - 1e-9
+
+
+def test_an_unexpected_verdict_is_exit_code_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    wrong = ["--set", "runs.a.expected={SAFE-TRACE: refuted}", "--format", "json"]
+    assert main(["case_a", "-o", str(tmp_path), *wrong]) == 1
+    assert "SAFE-TRACE" in capsys.readouterr().out
+    assert not (tmp_path / "report.html").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["no_such_scenario"], "case_a"),
+        (["case_a", "--set", "control.period_s=-1"], "control.period_s"),
+        (["case_a", "--set", "no.such=1"], "no"),
+        (["case_a", "--set", "nonsense"], "nonsense"),
+        (["case_a", "--seed", "-1"], "seed"),
+        (["case_a", "--set", "intervention.policies.0.name=teleport"], "teleport"),
+        (["case_a", "--set", "intervention.policies.0.parameters.warp=9"], "warp"),
+    ],
+)
+def test_a_users_mistake_is_one_line_and_exit_code_2(
+    arguments: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([*arguments, "-o", str(tmp_path / "out")]) == 2
+    error = capsys.readouterr().err
+    assert said in error
+    assert error.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("arguments", [[], ["case_a", "--format", "pdf"], ["case_a", "--seed", "x"], ["--what"]])
+def test_usage_errors_are_exit_code_2(arguments: list[str]) -> None:
+    with pytest.raises(SystemExit) as stopped:
+        main(arguments)
+    assert stopped.value.code == 2
+
+
+def test_a_folder_that_cannot_be_written_is_exit_code_4(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "file").write_text("in the way")
+    assert main(["case_a", "--set", "duration_s=1", "-o", str(tmp_path / "file")]) == 4
+    assert capsys.readouterr().err.startswith("error: ")
+
+
+def test_the_shipped_scenarios_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--list"]) == 0
+    assert capsys.readouterr().out.split() == ["case_a", "case_a_table1"]

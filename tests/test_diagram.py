@@ -1,0 +1,77 @@
+"""Structure: names, pictures, and which module may import which."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import pytest
+from pydrake.systems.framework import LeafSystem
+
+import airground_drake
+from airground_drake import graphviz
+from airground_drake.diagram import METHODS, RECORDED, build_diagram
+from airground_drake.scenarios.load import load
+
+PACKAGE = Path(airground_drake.__file__).parent
+LAYERS = (
+    ("errors", "files"),
+    ("nsbc",),
+    ("decision", "intervention"),
+    ("gatekeeper",),
+    ("scenarios",),
+    ("systems",),
+    ("diagram", "trace"),
+    ("simulation", "graphviz", "verify"),
+    ("report",),
+)
+"""From left to right: a module imports from its own layer or from those before it."""
+
+
+def test_every_system_and_port_has_a_name() -> None:
+    diagram = build_diagram(load("case_a")[0], "d")
+    names = [system.get_name() for system in diagram.GetSystems()]
+    assert len(names) == len(set(names))
+    assert {"ugv_controller", "uav_controller", "event_trigger", "intervention_planner", "gatekeeper"} <= set(names)
+    assert [diagram.get_output_port(i).get_name() for i in range(diagram.num_output_ports())] == list(RECORDED)
+    for system in diagram.GetSystems():
+        if isinstance(system, LeafSystem) and type(system).__module__.startswith("airground_drake"):
+            for i in range(system.num_input_ports()):
+                assert not system.get_input_port(i).get_name().startswith("u0")
+            assert type(system).__doc__
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_pictures_are_the_same_each_time(method: str) -> None:
+    scenario = load("case_a")[0]
+    one, two = (graphviz.dot(build_diagram(scenario, method)) for _ in range(2))
+    assert one == two
+    assert graphviz.svg(one) == graphviz.svg(two)
+
+
+@pytest.mark.skipif(not (PACKAGE.parent / "diagrams").exists(), reason="only in a checkout")
+def test_shipped_pictures_are_current() -> None:
+    folder = PACKAGE.parent / "diagrams"
+    pictures = graphviz.pictures()
+    assert {path.name for path in folder.glob("*.*") if path.suffix in (".dot", ".svg")} == set(pictures)
+    for name, content in pictures.items():
+        assert graphviz.is_current(name, content, (folder / name).read_text(encoding="utf-8")), name
+
+
+def test_an_outdated_picture_is_noticed() -> None:
+    pictures = graphviz.pictures()
+    assert not graphviz.is_current("case_a.dot", pictures["case_a.dot"], pictures["case_a_table1.dot"])
+    assert not graphviz.is_current("case_a.svg", pictures["case_a.svg"], pictures["case_a_table1.svg"])
+
+
+def test_data_flows_one_way() -> None:
+    rank = {name: i for i, layer in enumerate(LAYERS) for name in layer}
+    for path in PACKAGE.rglob("*.py"):
+        parts = path.relative_to(PACKAGE).with_suffix("").parts
+        if parts == ("__init__",):
+            continue
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("airground_drake"):
+                tail = (node.module or "").split(".")[1:]
+                for target in [tail[0]] if tail else [alias.name for alias in node.names]:
+                    assert rank[target] <= rank[parts[0]], f"{path.name} imports {target}"

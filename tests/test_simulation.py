@@ -1,0 +1,234 @@
+"""Whole runs: timeline, events, reproducibility, failures of policies."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pydrake.systems.analysis import Simulator
+
+from airground_drake import trace
+from airground_drake.diagram import build_diagram, build_model
+from airground_drake.errors import TraceError
+from airground_drake.intervention.database import POLICIES, PolicyError, make_policy
+from airground_drake.intervention.policy import Observation, Policy
+from airground_drake.nsbc.motion import Motion
+from airground_drake.scenarios.schema import Obstacle, Preset, Run, Scenario, Ugv
+from airground_drake.scenarios.schema import Policy as PolicyEntry
+from airground_drake.scenarios.validate import check
+from airground_drake.simulation import Recorder, simulate
+from airground_drake.trace import Trace
+from airground_drake.verify import verify
+
+Runs = Callable[[str, str], Trace]
+
+
+def kinds(of_run: Trace, robot: str) -> list[str]:
+    return [event["kind"] for event in of_run.events if event["robot"] == robot]
+
+
+def times(of_run: Trace, kind: str) -> list[float]:
+    return [event["t_s"] for event in of_run.events if event["kind"] == kind]
+
+
+def test_method_a_stalls_between_the_obstacles(run: Runs) -> None:
+    of_run = run("case_a", "a")
+    assert np.linalg.norm(of_run.position("ugv1")[-1, :2] - [3.3, 5.1]) < 0.1
+    assert kinds(of_run, "ugv1") == ["trigger"]
+    assert "arrival" in kinds(of_run, "ugv2")
+
+
+@pytest.mark.parametrize("method", ["b", "c", "d"])
+def test_the_intervention_frees_ugv1(run: Runs, method: str) -> None:
+    of_run = run("case_a", method)
+    answered = [] if method == "b" else ["accept"]
+    assert kinds(of_run, "ugv1") == ["trigger", "proposal", *answered, "release", "arrival"]
+    assert times(of_run, "trigger")[0] == pytest.approx(14.45, abs=0.05)
+
+
+def test_table_1_triggers_at_8_10(run: Runs) -> None:
+    assert times(run("case_a_table1", "b"), "trigger")[0] == pytest.approx(8.10, abs=0.05)
+
+
+def test_recursion_as_printed_is_unsafe_and_does_not_stall(run: Runs) -> None:
+    for name in ("a_recursion_nearest", "a_recursion_listed"):
+        of_run = run("case_a", name)
+        distance = [
+            np.linalg.norm(of_run.position("ugv1") - o["position_m"], axis=1).min()
+            for o in of_run.scenario["obstacles"].values()
+        ]
+        assert min(distance) < 1.95
+        assert "arrival" in kinds(of_run, "ugv1")
+
+
+@pytest.mark.parametrize("scenario", ["case_a", "case_a_table1"])
+def test_every_run_has_the_verdicts_that_its_scenario_declares(run: Runs, scenario: str, case_a: Scenario) -> None:
+    for name in case_a.runs:
+        for verdict in verify(run(scenario, name)):
+            assert verdict.as_expected, (name, verdict.claim.id, verdict.finding)
+
+
+def test_without_noise_the_decision_variable_is_the_norm_of_the_task_error(case_a: Scenario) -> None:
+    case_a.decision.noise_m_sqrt_s = 0.0
+    of_run = simulate(case_a, "b")
+    for ugv in of_run.ugvs:
+        error = np.linalg.norm(of_run.reference(ugv) - of_run.position(ugv), axis=1)
+        assert np.abs(of_run.column(f"{ugv}.decision_variable_m") - error).max() < 1e-6
+
+
+def test_same_seed_same_bytes_other_seed_other_trigger(case_a: Scenario, run: Runs, tmp_path: Path) -> None:
+    recorder = Recorder(case_a, "d", case_a.runs["d"])
+    trace.save(recorder.simulate(), tmp_path / "one")
+    trace.save(recorder.simulate(), tmp_path / "two")
+    trace.save(run("case_a", "d"), tmp_path / "three")  # another diagram of the same scenario
+    for name in ("signals.parquet", "decisions.parquet", "meta.json"):
+        first = (tmp_path / "one" / name).read_bytes()
+        assert first == (tmp_path / "two" / name).read_bytes() == (tmp_path / "three" / name).read_bytes()
+    other = recorder.simulate(seed=7)
+    assert times(other, "trigger")[0] != times(run("case_a", "d"), "trigger")[0]
+    assert all(verdict.as_expected for verdict in verify(other))
+
+
+def test_noise_has_the_intensity_of_the_scenario(case_a: Scenario) -> None:
+    """Independent increments of variance sigma^2 dt, eq (15)."""
+    case_a.decision.noise_m_sqrt_s = 0.1
+    case_a.decision.threshold.zeta_m = 50.0
+    recorder = Recorder(case_a, "a", Run(method="a"))
+    steps = [np.diff(recorder.simulate(seed, 3.0).column(f"{ugv}.noise_m")) for seed in range(3) for ugv in ("ugv1", "ugv2")]
+    assert np.std(steps) == pytest.approx(0.1 * np.sqrt(0.05), rel=0.15)  # 360 increments: 4 standard errors
+    assert abs(np.corrcoef(steps[0], steps[1])[0, 1]) < 0.5  # each UGV has its own noise
+
+
+def test_starting_above_the_threshold_triggers_at_once(case_a: Scenario) -> None:
+    case_a.decision.threshold.zeta_m = 2.0  # UGV1 starts 2.35 m from its preset trajectory
+    case_a.decision.release_m = 1.0
+    case_a.duration_s = 2.0
+    of_run = simulate(case_a, "a")
+    assert times(of_run, "trigger")[0] == 0.0
+    assert next(v for v in verify(of_run) if v.claim.id == "THR-TRIG").finding.status == "holds"
+
+
+def test_events_are_isolated_not_sampled(run: Runs) -> None:
+    of_run = run("case_a", "b")
+    x = of_run.column("ugv1.decision_variable_m")
+    when = times(of_run, "trigger")[0]
+    assert when % 0.05 > 1e-6
+    assert np.interp(when, of_run.t, x) == pytest.approx(3.0, abs=1e-5)
+
+
+def test_bare_trigger_chatters_where_the_automaton_does_not(case_a: Scenario) -> None:
+    """A task error that rests at the threshold, under noise: what the hysteresis and the dwell are for."""
+    case_a.ugvs["ugv1"].preset.waypoints_m = [[3.3, 0.0, 0.0], [3.3, 8.1, 0.0]]
+    case_a.decision.leak_1_s = 2.0
+    case_a.decision.noise_m_sqrt_s = 0.3
+    counts = {}
+    for kind in ("bare", "automaton"):
+        case_a.decision.trigger = kind
+        of_run = simulate(case_a, "a")
+        counts[kind] = len(times(of_run, "trigger"))
+        verdicts = {v.claim.id: v.finding.status for v in verify(of_run)}
+        assert verdicts["THR-TRIG"] == "holds"
+        assert verdicts["ZENO-TRACE"] == ("refuted" if kind == "bare" else "holds")
+    assert counts["bare"] > 2 * counts["automaton"]
+
+
+class Raises(Policy):
+    """A policy with a bug."""
+
+    def propose(self, seen: Observation) -> Motion | None:
+        raise RuntimeError("no plan")
+
+
+class Nonsense(Policy):
+    """A policy that returns something else than a motion."""
+
+    def propose(self, seen: Observation) -> Motion | None:
+        return "left"  # type: ignore[return-value]
+
+
+class NotFinite(Policy):
+    """A policy whose numbers are not finite."""
+
+    def propose(self, seen: Observation) -> Motion | None:
+        return Motion(np.array([seen.start]), np.full((1, 3), np.nan))
+
+
+@pytest.mark.parametrize("kind", [Raises, Nonsense, NotFinite])
+def test_a_broken_policy_counts_as_no_intervention_and_is_reported(
+    case_a: Scenario, kind: type[Policy], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(POLICIES, "broken", kind)
+    case_a.intervention.policies = [PolicyEntry("broken", {})]
+    case_a.duration_s = 16.0
+    of_run = simulate(case_a, "d")
+    assert kinds(of_run, "ugv1") == ["trigger"]
+    assert of_run.meta["faults"][0]["policy"] == "broken"
+    assert next(v for v in verify(of_run) if v.claim.id == "SAFE-TRACE").finding.status == "holds"
+
+
+def test_after_a_failure_the_next_policy_is_asked(case_a: Scenario, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(POLICIES, "broken", Raises)
+    case_a.intervention.policies.insert(0, PolicyEntry("broken", {}))
+    of_run = simulate(case_a, "d")
+    assert "arrival" in kinds(of_run, "ugv1")
+    assert of_run.meta["faults"][0]["what"] == "RuntimeError: no plan"
+
+
+@pytest.mark.parametrize(
+    ("name", "parameters", "said"),
+    [
+        ("nothing", {}, "allowed are detour"),
+        ("no_such_module:Thing", {}, "cannot be imported"),
+        ("math:pi", {}, "not a subclass"),
+        ("detour", {"speed": 3.0}, "speed"),
+        ("detour", {"speed_m_s": -1.0}, "speed_m_s > 0"),
+    ],
+)
+def test_policies_that_cannot_be_made(name: str, parameters: dict[str, float], said: str) -> None:
+    with pytest.raises(PolicyError, match=said):
+        make_policy(name, parameters)
+
+
+def test_a_team_of_six_among_many_obstacles_stays_safe(case_a: Scenario) -> None:
+    """More robots and obstacles than the paper has, presets crossing each other: safe under method (d)."""
+    rng = np.random.default_rng(4)
+    case_a.ugvs = {
+        f"r{i}": Ugv([4.0 * i, 0.0, 0.0], [4.0 * (5 - i), 20.0, 0.0],
+                     Preset([[4.0 * i, 0.0, 0.0], [4.0 * (5 - i), 20.0, 0.0]], 0.8), 3.0)
+        for i in range(6)
+    }  # fmt: skip
+    case_a.obstacles = {f"o{k}": Obstacle([*rng.uniform([0, 4], [20, 15]), 0.0]) for k in range(10)}
+    case_a.uav.start_m, case_a.uav.target_m = [10.0, 0.0, 2.0], [10.0, 20.0, 2.0]
+    case_a.reproduction, case_a.choices, case_a.runs = [], [], {"d": Run(method="d")}
+    check(case_a, "test")
+    statuses = {v.claim.id: v.finding.status for v in verify(simulate(case_a, "d"))}
+    assert statuses["SAFE-TRACE"] == statuses["SAFE-HYP"] == statuses["THR-TRIG"] == "holds"
+
+
+def test_a_trace_survives_saving_and_a_changed_file_does_not(run: Runs, tmp_path: Path) -> None:
+    of_run = run("case_a", "c")
+    trace.save(of_run, tmp_path)
+    back = trace.load(tmp_path)
+    assert back.signals.equals(of_run.signals)
+    assert back.decisions.equals(of_run.decisions)
+    assert back.meta == of_run.meta
+    (tmp_path / "signals.parquet").write_bytes((tmp_path / "signals.parquet").read_bytes()[:-1])
+    with pytest.raises(TraceError, match="SHA-256"):
+        trace.load(tmp_path)
+    (tmp_path / "decisions.parquet").unlink()
+    with pytest.raises(TraceError, match="not a readable trace"):
+        trace.load(tmp_path / "nowhere")
+
+
+def test_the_diagram_can_be_used_without_the_recorder(case_a: Scenario) -> None:
+    model = build_model(case_a, "d")
+    context = model.create_context()
+    context.SetAccuracy(1e-6)
+    simulator = Simulator(model.diagram, context)
+    simulator.AdvanceTo(1.0)
+    positions = model.diagram.GetOutputPort("team_position").Eval(context).reshape(-1, 3)
+    assert positions.shape == (3, 3)
+    assert np.linalg.norm(positions[0] - [1.0, 0.5, 0.0]) > 0.5
+    assert build_diagram(case_a).get_name() == "case_a_method_a"
