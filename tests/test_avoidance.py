@@ -47,9 +47,7 @@ def closest(position: np.ndarray, velocity: np.ndarray, centre: np.ndarray, othe
 def worst_margin(team: Team, positions: np.ndarray, velocities: np.ndarray, h: float) -> float:
     pairs = team.pair_distance()
     margins = [
-        closest(p, v, o, np.zeros(3), h) - D
-        for p, v in zip(positions, velocities, strict=True)
-        for o in team.obstacles
+        closest(p, v, o, np.zeros(3), h) - D for p, v in zip(positions, velocities, strict=True) for o in team.obstacles
     ]
     n = len(positions)
     margins += [

@@ -15,7 +15,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from synthetic import Drive, case_a, lone, moved, simulate, with_meta, with_scenario, with_signals
+from synthetic import Drive, case_a, changed, lone, moved, simulate, with_meta, with_scenario, with_signals
 
 from airground_drake.errors import TraceError
 from airground_drake.nsbc.avoidance import Avoidance, Surroundings
@@ -448,7 +448,11 @@ def test_a_corner_of_the_preset_inside_a_row_interval() -> None:
     assert samples.max() < 3.005
     assert [event["kind"] for event in trace.events if event["kind"] != "proposal"] == ["trigger", "release"]
     assert judge("THR-TRIG", trace).status == "holds"
-    assert counterexample("THR-TRIG", with_meta(trace, events=[]))["what"] == "missing trigger"
+    unseen = simulate(changed(trace.scenario, {"decision.threshold.zeta_m": 99.0}), drive=at_rest)  # no event rows
+    unseen = with_meta(with_scenario(unseen, decision__threshold__zeta_m=3.005), zeta_m=3.005)
+    seen = counterexample("THR-TRIG", unseen)
+    assert seen["what"] == "missing trigger"
+    assert seen["t_s"] == pytest.approx(3.005, abs=1e-9)
 
 
 @pytest.mark.parametrize("trigger", ["automaton", "bare"])

@@ -44,9 +44,7 @@ def case_a_proposal() -> tuple[Scene, UgvLaw, Proposal, Horizon]:
     seen = Observation(t, t + 0.05, "ugv1", STALL, np.array([3.3, 13.0, 0.0]), preset, team.obstacles, 2.0, 0)
     motion = Detour(speed_m_s=2.85).propose(seen)
     assert motion is not None
-    scene = Scene(
-        t + 0.05, STALL, preset, team.obstacles, np.zeros((3, 3)), np.full(3, 2.0), np.ones(3), 3.0
-    )
+    scene = Scene(t + 0.05, STALL, preset, team.obstacles, np.zeros((3, 3)), np.full(3, 2.0), np.ones(3), 3.0)
     law = UgvLaw(Avoidance(3.0, 0.05, 4.0), 2.0, 1.5, intervention_on_top=False)
     return scene, law, Proposal("detour", t, motion), Horizon(60, 1, 1.0, 1000.0)
 
@@ -157,7 +155,7 @@ def test_a_failing_solver_refuses(monkeypatch: pytest.MonkeyPatch) -> None:
             return float("inf")
 
     class Solver:
-        def Solve(self, program: object) -> Failed:
+        def Solve(self, *arguments: object) -> Failed:
             return Failed()
 
     route = RelaxedRoute()
@@ -193,13 +191,11 @@ def test_a_proposal_into_an_obstacle_is_refused() -> None:
 def test_prediction_is_the_running_controller(on_top: bool, selection: np.ndarray) -> None:
     """The rolled-out velocities are those of `UgvController`, step by step, under both choices."""
     scenario = load("case_a")[0]
-    scene, law, proposal, horizon = case_a_proposal()
+    scene, law, proposal, _ = case_a_proposal()
     law = replace(law, intervention_on_top=on_top)
     proposal = replace(proposal, selection=selection)
     team, presets = make_team(scenario), make_presets(scenario)
-    controller = UgvController(
-        team, law.avoidance, motion_gain=2.0, intervention_gain=1.5, intervention_on_top=on_top
-    )
+    controller = UgvController(team, law.avoidance, motion_gain=2.0, intervention_gain=1.5, intervention_on_top=on_top)
     h = law.avoidance.period
     for accepted, predicted in zip((True, False), mode_velocities(scene, law, proposal, 60, 1), strict=True):
         positions = np.array([STALL, [-30.0, 0.0, 0.0], [-30.0, 0.0, 2.0]])

@@ -17,8 +17,8 @@ import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from airground_drake import diagram
 from airground_drake.errors import ScenarioError
-from airground_drake.intervention import database
 from airground_drake.nsbc.avoidance import COMPOSITIONS
 from airground_drake.scenarios import schema, validate
 from airground_drake.scenarios.load import MAX_BYTES, REQUIRED, load, resolved, shipped
@@ -162,9 +162,8 @@ def test_multiples_tolerate_rounding(period: str, write: Callable[[str | bytes],
 def test_policies_of_the_registry_and_plug_ins(write: Callable[[str | bytes], str]) -> None:
     path = write(SMALL)
     load(path, ["intervention.policies.0.name=my.module:Policy"])
-    load(path, ["intervention.policies.0.name=hostile"], known_policies=("hostile",))
-    with pytest.raises(ScenarioError, match="one of the policies hostile"):
-        load(path, known_policies=("hostile",))
+    with pytest.raises(ScenarioError, match="one of the policies detour"):
+        load(path, ["intervention.policies.0.name=teleport"])
 
 
 # --- overrides ---------------------------------------------------------------------------------------------------
@@ -457,7 +456,8 @@ def test_tables_name_real_things() -> None:
     for cls, names in REQUIRED.items():
         assert set(names) <= {field.name for field in dataclasses.fields(cls)}
     assert validate.STATUSES == STATUSES
-    assert set(validate.POLICIES) <= set(database.POLICIES)
+    assert validate.METHODS == diagram.METHODS
+    assert tuple(diagram.ROUTES) == validate.ROUTES
 
 
 # --- nothing but ScenarioError, whatever the file --------------------------------------------------------------

@@ -96,7 +96,9 @@ def test_noise_has_the_intensity_of_the_scenario(case_a: Scenario) -> None:
     case_a.decision.noise_m_sqrt_s = 0.1
     case_a.decision.threshold.zeta_m = 50.0
     recorder = Recorder(case_a, "a", Run(method="a"))
-    steps = [np.diff(recorder.simulate(seed, 3.0).column(f"{ugv}.noise_m")) for seed in range(3) for ugv in ("ugv1", "ugv2")]
+    steps = [
+        np.diff(recorder.simulate(seed, 3.0).column(f"{ugv}.noise_m")) for seed in range(3) for ugv in ("ugv1", "ugv2")
+    ]
     assert np.std(steps) == pytest.approx(0.1 * np.sqrt(0.05), rel=0.15)  # 360 increments: 4 standard errors
     assert abs(np.corrcoef(steps[0], steps[1])[0, 1]) < 0.5  # each UGV has its own noise
 

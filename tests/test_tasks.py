@@ -68,9 +68,7 @@ def test_bad_gain_is_refused(gain: float) -> None:
 def test_compositions_follow_their_formulas(jacobians: np.ndarray, wishes: np.ndarray) -> None:
     layers = [(np.einsum("nij,nj->ni", pseudoinverse(j) @ j, v), j) for j, v in zip(jacobians, wishes, strict=True)]
     (v1, j1), (v2, j2), (v3, _) = layers
-    by_hand = v1 + np.einsum(
-        "nij,nj->ni", null_space(j1), v2 + np.einsum("nij,nj->ni", null_space(j2), v3)
-    )
+    by_hand = v1 + np.einsum("nij,nj->ni", null_space(j1), v2 + np.einsum("nij,nj->ni", null_space(j2), v3))
     np.testing.assert_allclose(recursion(layers), by_hand, atol=1e-8)
     stacked = np.concatenate([j1, j2], axis=1)
     by_hand = v1 + np.einsum("nij,nj->ni", null_space(j1), v2) + np.einsum("nij,nj->ni", null_space(stacked), v3)

@@ -54,7 +54,7 @@ def optimal_threshold(drift: float, noise: float, c1: float, c2: float) -> float
     def residual(u: float) -> float:  # u = 2 zeta drift / noise^2, so that nothing overflows
         return noise**2 / drift**2 * (math.sinh(u) + u) - ratio
 
-    upper = math.asinh(ratio * drift**2 / noise**2)  # sinh(upper) alone already reaches the right-hand side
+    upper = 1.0 + math.asinh(ratio * drift**2 / noise**2)  # sinh(upper) alone exceeds the right-hand side
     return float(brentq(residual, 0.0, upper, xtol=1e-15 * max(upper, 1e-300), rtol=8.9e-16)) / scale
 
 

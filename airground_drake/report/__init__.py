@@ -1,0 +1,1 @@
+"""Reports: report.json is the truth; HTML, JUnit and the figures render it."""

@@ -117,7 +117,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="python -m airground_drake.report",
         description="Simulate all runs of a scenario, check the claims on them, and write the report.",
-        epilog="exit codes: 0 all as expected, 1 a claim differs, 2 usage or bad scenario, 3 inconclusive, 4 tool error",
+        epilog="exit codes: 0 as expected, 1 a claim differs, 2 usage or bad scenario, 3 inconclusive, 4 tool error",
     )
     parser.add_argument("scenario", nargs="?", help="name of a shipped scenario, or path to a YAML file")
     parser.add_argument("-o", "--output", type=Path, metavar="DIR", help="default: reports/<scenario>")

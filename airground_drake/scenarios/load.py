@@ -12,7 +12,7 @@ import dataclasses
 import difflib
 import math
 import re
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
@@ -77,16 +77,13 @@ def shipped() -> list[str]:
     return sorted(name.removesuffix(".yaml") for name in _shipped_files())
 
 
-def load(
-    name_or_path: str, overrides: Sequence[str] = (), *, known_policies: Collection[str] | None = None
-) -> tuple[Scenario, str]:
+def load(name_or_path: str, overrides: Sequence[str] = ()) -> tuple[Scenario, str]:
     """Load and validate a scenario.
 
     Args:
         name_or_path: name of a shipped scenario, or path to a YAML file.
         overrides: `dotted.key=value`, applied in order; the value is YAML, list items are addressed by index.
             The key must be one of the schema, or an entry that exists in the file.
-        known_policies: names of the behaviour database, see `validate.check`.
 
     Returns:
         The scenario, and the SHA-256 of the file's bytes followed by a NUL byte and the text of each override.
@@ -109,7 +106,7 @@ def load(
         raise ScenarioError(source, "", Fault("nested too deeply"), "wanted: a scenario") from None
     scenario: Scenario = yaml_load_typed(schema=Scenario, data=yaml.safe_dump(plain, sort_keys=False))
     try:
-        validate.check(scenario, source, known_policies)
+        validate.check(scenario, source)
     except ScenarioError as error:
         raise ScenarioError(_where(_nearest(root, error.key)), error.key, error.value, error.allowed) from None
     digest = files.sha256(b"\0".join([data, *(override.encode() for override in overrides)]))

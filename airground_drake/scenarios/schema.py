@@ -4,6 +4,7 @@ pydrake's YAML reader fills them (`load.py`), which is why they are mutable and 
 validation (`validate.py`) nothing changes them. Positions are in the world frame, z up, the ground at z = 0.
 """
 
+# No `from __future__ import annotations` here: pydrake's reader needs the types themselves, not their names.
 from dataclasses import dataclass, field
 
 Vector = list[float]

@@ -9,12 +9,13 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import fields, is_dataclass
 from itertools import combinations, pairwise
 
 from airground_drake.decision.bayes import optimal_threshold
 from airground_drake.errors import Fault, ScenarioError
+from airground_drake.intervention.database import POLICIES
 from airground_drake.nsbc.avoidance import COMPOSITIONS
 from airground_drake.scenarios import schema
 from airground_drake.scenarios.schema import Scenario, Vector
@@ -23,7 +24,6 @@ METHODS: tuple[str, ...] = ("a", "b", "c", "d")
 ROUTES: tuple[str, ...] = ("relaxed",)
 TRIGGERS: tuple[str, ...] = ("automaton", "bare")
 THRESHOLD_RULES: tuple[str, ...] = ("fixed", "bayes")
-POLICIES: tuple[str, ...] = ("detour",)
 SOURCES: tuple[str, ...] = ("calibrated", "ours")
 CLAIMS: tuple[str, ...] = ("SAFE-TRACE", "SAFE-HYP", "ZENO-TRACE", "THR-TRIG", "LIVE-GOAL", "COMM", "GATE-TIME")
 STATUSES: tuple[str, ...] = ("proved", "holds", "supported", "refuted", "inconclusive", "error", "not_run")
@@ -47,20 +47,18 @@ _UNITS = {"m_sqrt_s": "m/sqrt(s)", "1_m2_s": "1/(m^2 s)", "m_s": "m/s", "1_s": "
 Problems = Iterator[tuple[str, object, str]]
 
 
-def check(scenario: Scenario, source: str, known_policies: Collection[str] | None = None) -> None:
+def check(scenario: Scenario, source: str) -> None:
     """Check a scenario whose values have the types of the schema.
 
     Args:
         scenario: the scenario.
         source: where it comes from, for the message.
-        known_policies: names of the behaviour database (default: `POLICIES`).
 
     Raises:
         ScenarioError: for the first problem; names the key, its value and what is allowed.
     """
-    known = (*sorted(POLICIES if known_policies is None else known_policies), "module:Class")
-    for problems in (*(rule(scenario) for rule in CHECKS), _policies(scenario, known)):
-        for key, value, allowed in problems:
+    for rule in CHECKS:
+        for key, value, allowed in rule(scenario):
             raise ScenarioError(source, key, value, allowed)
 
 
@@ -180,6 +178,9 @@ def _presets(scenario: Scenario) -> Problems:
         for index, (before, after) in enumerate(pairwise(ugv.preset.waypoints_m), start=1):
             if math.dist(before, after) <= TOLERANCE:
                 yield f"{key}.{index}", after, "a waypoint other than the one before it"
+        if ugv.preset.speed_m_s > ugv.max_speed_m_s:
+            allowed = f"at most the UGV's max_speed_m_s = {ugv.max_speed_m_s:.9g} m/s"
+            yield f"ugvs.{name}.preset.speed_m_s", ugv.preset.speed_m_s, allowed
 
 
 def _gains(scenario: Scenario) -> Problems:
@@ -285,7 +286,8 @@ def _choices(scenario: Scenario) -> Problems:
         yield from _one_of(f"choices.{index}.source", choice.source, SOURCES)
 
 
-def _policies(scenario: Scenario, known: Collection[str]) -> Problems:
+def _policies(scenario: Scenario) -> Problems:
+    known = (*sorted(POLICIES), "module:Class")
     for index, policy in enumerate(scenario.intervention.policies):
         if not re.fullmatch(r"[\w.]+:\w+", policy.name):  # a plug-in, which the behaviour database looks up
             yield from _one_of(f"intervention.policies.{index}.name", policy.name, known, "one of the policies")
@@ -293,6 +295,6 @@ def _policies(scenario: Scenario, known: Collection[str]) -> Problems:
 
 CHECKS: tuple[Callable[[Scenario], Problems], ...] = (
     _finite, _bounds, _counts, _names, _options, _runs, _points, _presets, _gains, _periods, _release,
-    _distances, _sensing, _clearances, _reproduction, _choices,
+    _distances, _sensing, _clearances, _reproduction, _choices, _policies,
 )  # fmt: skip
-"""Every rule but that of the policies; later ones rely on earlier ones (finite numbers, three coordinates)."""
+"""Every rule; later ones rely on earlier ones (finite numbers, three coordinates)."""

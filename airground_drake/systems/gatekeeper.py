@@ -19,7 +19,6 @@ from airground_drake.nsbc.task import Array
 from airground_drake.nsbc.team import Team
 from airground_drake.systems.messages import ACCEPT, REFUSE, SILENT, answer_to
 
-
 USELESS = 1e-6
 """Relative gain below which an intervention makes no difference: ten times the solver's tolerance."""
 

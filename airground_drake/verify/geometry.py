@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import brentq
 
 from airground_drake.nsbc.task import Array
@@ -67,11 +66,6 @@ def closest_approach(t: Array, first: Array, second: Array) -> Approach:
 def interpolate(t: Array, values: Array, at: float | Array) -> Array:
     """Values (T, m) that are linear between the rows, at other times: (m,), or (K, m) for K times."""
     return np.stack([np.interp(at, t, column) for column in values.T], axis=-1)
-
-
-def distinct_rows(t: Array) -> npt.NDArray[np.intp]:
-    """Indices of the first row of each instant: rows less than `MERGE_S` after the one before are left out."""
-    return np.flatnonzero(np.diff(t, prepend=-np.inf) >= MERGE_S)
 
 
 def travelled(waypoints: Array, speed: float, t: float | Array) -> Array:

@@ -14,7 +14,7 @@ import numpy as np
 
 from airground_drake.errors import TraceError
 from airground_drake.trace import Trace
-from airground_drake.verify.geometry import NormSignal, corner_times, distinct_rows, interpolate, travelled
+from airground_drake.verify.geometry import NormSignal, corner_times, interpolate, travelled
 from airground_drake.verify.verdict import TIME_TOLERANCE_S, Finding, TraceClaim
 
 EVENT_TOLERANCE_S = 1e-5
@@ -34,12 +34,11 @@ Conflict = dict[str, Any]
 
 def decision_variable(trace: Trace, ugv: str) -> NormSignal:
     """x(t) of (15) from positions and noise of the trace and the preset of its scenario, not the recorded one."""
-    kept = distinct_rows(trace.t)
-    rows, preset = trace.t[kept], trace.scenario["ugvs"][ugv]["preset"]
+    rows, preset = trace.t, trace.scenario["ugvs"][ugv]["preset"]
     waypoints, speed = np.asarray(preset["waypoints_m"], dtype=np.float64), preset["speed_m_s"]
     corners = corner_times(waypoints, speed)
     t = np.union1d(rows, corners[(corners > rows[0]) & (corners < rows[-1])])
-    parts = interpolate(rows, np.column_stack([trace.position(ugv), trace.column(f"{ugv}.noise_m")])[kept], t)
+    parts = interpolate(rows, np.column_stack([trace.position(ugv), trace.column(f"{ugv}.noise_m")]), t)
     parts[:, :3] = travelled(waypoints, speed, t) - parts[:, :3]
     return NormSignal.of(t, parts)
 
