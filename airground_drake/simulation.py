@@ -8,6 +8,7 @@ from functools import cache
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import pandas as pd
 from pydrake.common import RandomGenerator
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
@@ -15,7 +16,8 @@ from pydrake.systems.framework import Context, DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput, VectorLogSink
 
 from airground_drake.diagram import RECORDED, Model, build_model
-from airground_drake.gatekeeper.prediction import Scene, UgvLaw, mode_velocities
+from airground_drake.gatekeeper.prediction import Horizon, Scene, UgvLaw, predicted_problem
+from airground_drake.gatekeeper.relaxed import RelaxedRoute
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance, Composition, Surroundings, limit_speed
 from airground_drake.nsbc.motion import Motion
@@ -82,7 +84,7 @@ class Recorder:
         model, ugvs, robots = self._model, self._model.team.ugvs, self._model.team.robots
         logs = {port: self._sinks[port].FindLog(context) for port in RECORDED}
         t = logs["team_position"].sample_times()
-        keep = np.append(np.diff(t) > MERGE_S, True)
+        keep = _distinct(t, logs["team_command"].data())
         data = {port: log.data()[:, keep] for port, log in logs.items()}
         signals = _signals(t[keep], data, ugvs, robots)
         gatekeeper = model.gatekeeper
@@ -134,7 +136,7 @@ class Recorder:
 
 @cache
 def warm_up() -> None:
-    """Load the compiled kernels, once per process, so that no run's wall time includes it."""
+    """Load the compiled kernels and the solver, once per process, so that no run's time includes that."""
     one, motion = np.ones((1, 3)), Motion(np.array([0.0, 1.0]), np.zeros((2, 3)))
     avoidance = Avoidance(gain=1.0, period=0.1)
     spaces = avoidance.half_spaces(one, one, Surroundings(np.zeros((1, 1, 3)), np.ones((1, 1)), np.ones((1, 1))))
@@ -142,7 +144,8 @@ def warm_up() -> None:
     team = Team(("a",), "b", np.zeros((1, 3)), 1.0, 1.0, 1.0, np.ones(2))
     team.neighbourhood(slice(0, 1)).around(np.ones((2, 3)))
     scene = Scene(0.0, one[0], motion, one, one, np.ones(1), np.ones(1), 1.0)
-    mode_velocities(scene, UgvLaw(avoidance, 1.0, 1.0, False), Proposal("", 0.0, motion), stages=1, substeps=1)
+    law, horizon = UgvLaw(avoidance, 1.0, 1.0, False), Horizon(2, 1, 1.0, 1.0)
+    RelaxedRoute().decide(predicted_problem(scene, law, Proposal("", 0.0, motion), horizon))
 
 
 def simulate(scenario: Scenario, run: str, seed: int | None = None) -> Trace:
@@ -152,6 +155,18 @@ def simulate(scenario: Scenario, run: str, seed: int | None = None) -> Trace:
         KeyError: if the scenario has no such run.
     """
     return Recorder(scenario, run, scenario.runs[run]).simulate(seed)
+
+
+def _distinct(t: Array, command: Array) -> npt.NDArray[np.intp]:
+    """Indices of rows (T,) at distinct times, for commands (3 (n + 1), T).
+
+    Of rows within MERGE_S of each other the last one is kept that still has the command of the first: the
+    command that led there.
+    """
+    cluster = np.concatenate([[0], np.cumsum(np.diff(t) > MERGE_S)])
+    first = np.searchsorted(cluster, cluster)
+    led = (command == command[:, first]).all(axis=0)
+    return np.unique(np.maximum.accumulate(np.where(led, np.arange(len(t)), 0))[np.append(np.diff(cluster) > 0, True)])
 
 
 def _signals(t: Array, data: dict[str, Array], ugvs: tuple[str, ...], robots: tuple[str, ...]) -> pd.DataFrame:

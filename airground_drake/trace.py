@@ -3,7 +3,8 @@
 Rows of `signals` are the ends of the simulator's steps: all control periods, and the isolated event times in
 between. A row's command is the velocity that was applied *up to* this row since the one before, so that
 position[k] = position[k-1] + (t[k] - t[k-1]) * command[k]: between rows every robot moves on a straight line.
-The other held signals (mode, accepted, ...) are likewise those in force just before the row's time.
+The other held signals (mode, accepted, ...) are likewise those in force just before the row's time, so an event
+at the last row's time may be absent. Noise is linear between rows. Row 0's command means nothing.
 
 Columns (units in the names; one set per robot or UGV):
     t_s
@@ -16,6 +17,8 @@ Columns (units in the names; one set per robot or UGV):
     <ugv>.triggers                            number of triggers so far
     <ugv>.triggered_at_s .released_at_s       time of the last one, -1 before the first
     <ugv>.accepted                            1 while an intervention is accepted
+
+Rows closer than 1e-9 s are one.
 """
 
 from __future__ import annotations
@@ -68,7 +71,7 @@ class Trace:
         signals: see the module's docstring.
         decisions: see DECISION_COLUMNS.
         timings: wall-clock measurements, kept apart because they differ between identical runs:
-            `wall_s`, `decision_times_s`.
+            `wall_s`, and `decision_times_s`: CPU time of each row of `decisions`, in order.
     """
 
     meta: dict[str, Any]

@@ -470,6 +470,12 @@ class TestFigures:
         assert len(canvas.thin(values[:100])) == 100
 
     @staticmethod
+    def test_long_names_keep_both_ends() -> None:
+        assert canvas.short("obstacle_1", 12) == "obstacle_1"
+        assert canvas.short("vehicle_number_17", 12) == "vehic…ber_17"
+        assert len(canvas.short("vehicle_number_17", 9)) == 9
+
+    @staticmethod
     def test_labels_are_spread() -> None:
         assert canvas.spread([0.5, 0.51, 0.99], 0.1) == pytest.approx([0.5, 0.6, 0.99])
         assert canvas.spread([0.98, 0.99], 0.1) == pytest.approx([0.9, 1.0])
@@ -698,6 +704,18 @@ def test_metrics_of_robot_pairs_and_events(traces: dict[str, Trace]) -> None:
     assert nearest["safe_distance_m"] == 1.0
     assert found["gatekeeper"]["decisions"] == {"accept": 2}
     assert metrics.of_run(traces["a"])["gatekeeper"] is None
+
+
+def test_least_pair_margin_is_exact_between_rows() -> None:
+    scenario = make_scenario()
+    crossing = make_trace(scenario, "a", [(0, 3.3, 0.5), (15, -2.5, 7), (30, 3.3, 13)], step_s=15.0)
+    found = metrics.of_run(crossing)["min_robot_distance_m"]
+    fine = make_trace(scenario, "a", [(0, 3.3, 0.5), (15, -2.5, 7), (30, 3.3, 13)], step_s=0.001)
+    for column in ("ugv2.x_m", "ugv2.y_m"):
+        fine.signals[column] = np.interp(fine.t, crossing.t, crossing.column(column))
+    expected = np.linalg.norm(fine.position("ugv1") - fine.position("ugv2"), axis=1).min()
+    assert found["ugv1"]["ugv2"]["value"] == pytest.approx(expected, abs=1e-3)
+    assert found["ugv1"]["ugv2"] == found["ugv2"]["ugv1"]
 
 
 def test_readers_of_many_names_know_every_status() -> None:

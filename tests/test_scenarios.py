@@ -194,8 +194,8 @@ def test_override(override: str, value: object) -> None:
 def test_overrides_apply_in_order_and_leave_aliases_alone(write: Callable[[str | bytes], str]) -> None:
     first, second = "preset: {waypoints_m: [[0, 0, 0]", "preset: {waypoints_m: [[0, 5, 0], [9, 5, 0]]}"
     path = write(SMALL.replace(first, first.replace("preset:", "preset: &shared")).replace(second, "preset: *shared"))
-    scenario, _ = load(path, ["ugvs.one.preset.speed_m_s=2", "ugvs.one.preset.speed_m_s=3"])
-    assert [ugv.preset.speed_m_s for ugv in scenario.ugvs.values()] == [3.0, 1.0]
+    scenario, _ = load(path, ["ugvs.one.preset.speed_m_s=1.5", "ugvs.one.preset.speed_m_s=2"])
+    assert [ugv.preset.speed_m_s for ugv in scenario.ugvs.values()] == [2.0, 1.0]
 
 
 def test_the_digest_depends_on_how_overrides_are_split(write: Callable[[str | bytes], str]) -> None:

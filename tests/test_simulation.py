@@ -234,3 +234,12 @@ def test_the_diagram_can_be_used_without_the_recorder(case_a: Scenario) -> None:
     assert positions.shape == (3, 3)
     assert np.linalg.norm(positions[0] - [1.0, 0.5, 0.0]) > 0.5
     assert build_diagram(case_a).get_name() == "case_a_method_a"
+
+
+@pytest.mark.parametrize(("period", "noise_period"), [(0.01, 0.05), (0.05, 0.01), (0.025, 0.05)])
+def test_claims_do_not_depend_on_the_periods(case_a: Scenario, period: float, noise_period: float) -> None:
+    """Periods that are not binary fractions give steps of 1e-17 s; event times may coincide with samples."""
+    case_a.control.period_s, case_a.decision.noise_period_s = period, noise_period
+    of_run = simulate(case_a, "d")
+    assert {verdict.finding.status for verdict in verify(of_run)} == {"holds"}
+    assert times(of_run, "trigger")[0] == pytest.approx(14.45, abs=0.1)

@@ -16,8 +16,8 @@ from matplotlib.ticker import MaxNLocator
 
 from airground_drake.nsbc.task import Array
 
-MAX_POINTS = 2000
-"""Points of a line at most."""
+MAX_POINTS = 600
+"""Points of a line at most: two per pixel of a panel, the extremes of each stretch among them."""
 
 WIDE_IN = 4.4
 """Width of a panel of full width; smaller ones print the same type larger on a page."""
@@ -76,8 +76,9 @@ def look(position: int) -> Look:
 
 
 def short(name: str, limit: int = 18) -> str:
-    """A name cut to what fits beside a line."""
-    return name if len(name) <= limit else f"{name[: limit - 1]}…"
+    """A name cut to what fits beside a line; names of a team differ at their ends, so the middle goes."""
+    head = (limit - 1) // 2
+    return name if len(name) <= limit else f"{name[:head]}…{name[head + 1 - limit :]}"
 
 
 @contextmanager

@@ -19,7 +19,7 @@ from airground_drake.report.reproduction import MEASURES
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.trace import Trace
 
-MAX_RUNS, MAX_UGVS, MAX_OBSTACLES = 6, 4, 6
+MAX_RUNS, MAX_UGVS, MAX_OBSTACLES = 6, 3, 4
 """What a figure shows at most; the rest is in the trace, and the caption says so."""
 
 _PAPER = {"case_a": (3, 4, 5, 6), "case_b": (7, 8, 9, 10)}
@@ -99,9 +99,9 @@ def _trajectories(chosen: _Selection) -> Figure:
     reach = first.scenario["safe_distance"]["obstacle_m"]
     caption = (
         f"{_sentence('; '.join(stalls)) if stalls else 'No UGV shown stands still short of its target. '}"
-        "○ start, \N{MULTIPLICATION SIGN} target, ▲ trigger, □ stands still, ✖ collision. Hexagons are obstacles in "
-        f"their safe circles of {reach:g} m. The thin dashed line is the UAV's path, projected onto the ground. Equal "
-        f"scales, in m.{_left_out(chosen)}"
+        "○ start, \N{MULTIPLICATION SIGN} target, ▲ trigger, □ stands still, ✖ collision. Hexagons are obstacles "
+        f"(hollow: not on the UAV's map) in their safe circles of {reach:g} m. The thin dashed line is the UAV's path, "
+        f"projected onto the ground. Equal scales, in m.{_left_out(chosen)}"
     )
     robots = [*chosen.ugvs, first.robots[-1]]
     panels = per_run(

@@ -28,6 +28,7 @@ from airground_drake.report.metrics import events_of
 from airground_drake.report.reproduction import MEASURES
 from airground_drake.trace import Trace
 
+MAX_NAMED_OBSTACLES = 8
 _BOX = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 1.0}
 
 
@@ -113,10 +114,12 @@ def _map(trace: Trace, frame: Frame, width_in: float, above_in: float = 0.1) -> 
     for name, obstacle in trace.scenario["obstacles"].items():
         x, y = obstacle["position_m"][:2]
         axes.add_patch(Circle((x, y), reach, facecolor="#f3f3f3", edgecolor=MUTED, linestyle=(0, (2, 2)), zorder=1.0))
-        if frame.left < x < frame.right and frame.bottom < y < frame.top:
-            axes.plot(x, y, marker="h", markersize=6, color=INK, zorder=3)
-            seen = "" if obstacle["known_to_uav"] else "\n(unseen by the UAV)"
-            text = f"{short(name, 12)}{seen}"
+        if not (frame.left < x < frame.right and frame.bottom < y < frame.top):
+            continue
+        known = obstacle["known_to_uav"]
+        axes.plot(x, y, marker="h", markersize=6, color=INK, markerfacecolor=INK if known else "white", zorder=3)
+        if len(trace.scenario["obstacles"]) <= MAX_NAMED_OBSTACLES:
+            text = short(name, 12) + ("" if known else "\n(unseen by the UAV)")
             axes.annotate(text, (x, y), (0, -6), textcoords="offset points", ha="center", va="top", fontsize=7.5)
     return figure, axes
 

@@ -35,7 +35,7 @@ def of_run(trace: Trace) -> dict[str, Any]:
     counts = {robot: Counter(e["kind"] for e in trace.events if e["robot"] == robot) for robot in trace.robots}
     return {
         "min_distance_m": {robot: _distances(trace, robot, trace.scenario["obstacles"]) for robot in trace.robots},
-        "min_robot_distance_m": {robot: _tightest(trace, robot) for robot in trace.robots},
+        "min_robot_distance_m": _tightest_pairs(trace),
         "final_position_m": {robot: trace.position(robot)[-1].tolist() for robot in trace.robots},
         "duration_s": duration_s,
         "wall_s": wall_s,
@@ -88,14 +88,9 @@ def _closest_call(trace: Trace) -> dict[str, Any] | None:
 
 
 def closest_obstacle(trace: Trace, robot: str) -> Closest | None:
-    """Smallest distance of a robot to any obstacle over continuous time, None without obstacles."""
-    return min((closest(trace, robot, name) for name in trace.scenario["obstacles"]), default=None)
-
-
-def closest(trace: Trace, robot: str, other: str) -> Closest:
-    """Smallest distance of a robot to an obstacle or another robot over continuous time, exact."""
-    found = closest_approach(trace.t, trace.position(robot), place(trace, other))
-    return Closest(found.distance_m, found.t_s, other)
+    """Smallest distance of a robot to any obstacle over continuous time, exact; None without obstacles."""
+    found = _distances(trace, robot, trace.scenario["obstacles"])
+    return min((Closest(at["value"], at["t_s"], name) for name, at in found.items()), default=None)
 
 
 def place(trace: Trace, name: str) -> Array:
@@ -120,14 +115,34 @@ def events_of(trace: Trace, robot: str, *kinds: str) -> list[dict[str, Any]]:
 
 
 def _distances(trace: Trace, robot: str, others: Iterable[str]) -> dict[str, dict[str, float]]:
-    found = [closest(trace, robot, name) for name in others]
-    return {
-        at.other: {"value": at.value, "t_s": at.t_s, "safe_distance_m": safe_distance_m(trace, robot, at.other)}
-        for at in found
-    }
+    t, position = trace.t, trace.position(robot)
+    found = {}
+    for name in others:
+        at = closest_approach(t, position, place(trace, name))
+        required = safe_distance_m(trace, robot, name)
+        found[name] = {"value": at.distance_m, "t_s": at.t_s, "safe_distance_m": required}
+    return found
 
 
-def _tightest(trace: Trace, robot: str) -> dict[str, dict[str, float]]:
-    pairs = _distances(trace, robot, (name for name in trace.robots if name != robot))
-    other = min(pairs, key=lambda name: pairs[name]["value"] - pairs[name]["safe_distance_m"], default=None)
-    return {} if other is None else {other: pairs[other]}
+def _tightest_pairs(trace: Trace) -> dict[str, dict[str, dict[str, float]]]:
+    """For each robot the other one of least margin.
+
+    The margin at the rows is at most half of both robots' longest steps above the exact one, so the exact one
+    is needed only where it can be the least: a large team has thousands of pairs.
+    """
+    robots = trace.robots
+    position = [trace.position(robot) for robot in robots]
+    half_step = [0.5 * float(np.linalg.norm(np.diff(p, axis=0), axis=1).max(initial=0.0)) for p in position]
+    at_rows = np.full((len(robots), len(robots)), np.inf)
+    for i in range(len(robots)):
+        for j in range(i):
+            gap = position[i] - position[j]
+            nearest = np.sqrt(np.einsum("ti,ti->t", gap, gap).min())
+            at_rows[i, j] = at_rows[j, i] = nearest - safe_distance_m(trace, robots[i], robots[j])
+    found = {}
+    for i, robot in enumerate(robots):
+        reach = at_rows[i].min() + half_step[i] + np.asarray(half_step)
+        pairs = _distances(trace, robot, (robots[j] for j in np.flatnonzero(at_rows[i] <= reach) if j != i))
+        other = min(pairs, key=lambda name: pairs[name]["value"] - pairs[name]["safe_distance_m"], default=None)
+        found[robot] = {} if other is None else {other: pairs[other]}
+    return found

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from pydrake.systems.framework import (
     BasicVector,
@@ -71,36 +73,46 @@ class EventTrigger(LeafSystem):
         status = self.DeclareDiscreteState(_pack([TriggerState()] * count))
         self.DeclareStateOutputPort("status", status)
         self.DeclareInitializationUnrestrictedUpdateEvent(self._start)
-        self._witnesses = [self._make_witnesses(j) for j in range(count)]
+        self._witnesses = self._make_witnesses()
 
-    def _make_witnesses(self, j: int) -> dict[Mode, WitnessFunction]:
-        def above_threshold(context: Context) -> float:
-            return float(self._x.Eval(context)[j]) - self._trigger.zeta
+    def _make_witnesses(self) -> dict[Mode, WitnessFunction]:
+        """One witness per mode, over all UGVs in it: the first of them to leave it."""
+
+        def below_threshold(context: Context) -> float:
+            return self._trigger.zeta - max(self._in_mode(context, Mode.SUPERVISING))
 
         def above_release(context: Context) -> float:
-            return float(self._x.Eval(context)[j]) - self._trigger.release
+            return min(self._in_mode(context, Mode.INTERVENING)) - self._trigger.release
 
-        def after_dwell(context: Context) -> float:
-            return context.get_time() - self._trigger.dwell_end(_unpack(context.get_discrete_state_vector().value(), j))
+        def before_dwell_end(context: Context) -> float:
+            values = context.get_discrete_state_vector().value()
+            states = [_unpack(values, j) for j in range(self._count)]
+            ends = [self._trigger.dwell_end(state) for state in states if state.mode is Mode.REFRACTORY]
+            return min(ends) - context.get_time()
 
-        def event(transition: Mode) -> UnrestrictedUpdateEvent:
+        def make(mode: Mode, calc: Callable[[Context], float]) -> WitnessFunction:
             def update(context: Context, _: UnrestrictedUpdateEvent, state: State) -> EventStatus:
-                self._move(context, state, j, transition)
+                self._leave(mode, context, state)
                 return EventStatus.Succeeded()
 
-            return UnrestrictedUpdateEvent(update)
+            direction = WitnessFunctionDirection.kPositiveThenNonPositive
+            return self.MakeWitnessFunction(f"leaves {mode.name}", direction, calc, UnrestrictedUpdateEvent(update))
 
-        up, down = WitnessFunctionDirection.kNegativeThenNonNegative, WitnessFunctionDirection.kPositiveThenNonPositive
         return {
-            Mode.SUPERVISING: self.MakeWitnessFunction(f"rise {j}", up, above_threshold, event(Mode.SUPERVISING)),
-            Mode.INTERVENING: self.MakeWitnessFunction(f"fall {j}", down, above_release, event(Mode.INTERVENING)),
-            Mode.REFRACTORY: self.MakeWitnessFunction(f"dwell {j}", up, after_dwell, event(Mode.REFRACTORY)),
+            Mode.SUPERVISING: make(Mode.SUPERVISING, below_threshold),
+            Mode.INTERVENING: make(Mode.INTERVENING, above_release),
+            Mode.REFRACTORY: make(Mode.REFRACTORY, before_dwell_end),
         }
 
+    def _in_mode(self, context: Context, mode: Mode) -> list[float]:
+        """Decision variables of the UGVs in a mode, m."""
+        modes = context.get_discrete_state_vector().value()[::FIELDS].tolist()
+        return [x for x, found in zip(self._x.Eval(context).tolist(), modes, strict=True) if found == mode]
+
     def DoGetWitnessFunctions(self, context: Context) -> list[WitnessFunction]:
-        """The one event that can end each UGV's present mode."""
-        modes = context.get_discrete_state_vector().value()[::FIELDS]
-        return [self._witnesses[j][Mode(int(mode))] for j, mode in enumerate(modes)]
+        """The witnesses of the modes that some UGV is in."""
+        modes = context.get_discrete_state_vector().value()[::FIELDS].tolist()
+        return [witness for mode, witness in self._witnesses.items() if mode in modes]
 
     def _start(self, context: Context, state: State) -> EventStatus:
         x = self._x.Eval(context)
@@ -109,17 +121,23 @@ class EventTrigger(LeafSystem):
         state.get_mutable_discrete_state().set_value(0, packed)
         return EventStatus.Succeeded()
 
-    def _move(self, context: Context, state: State, j: int, ended: Mode) -> None:
-        t = context.get_time()
+    def _leave(self, mode: Mode, context: Context, state: State) -> None:
+        """Move every UGV whose time in the mode is over at this event; its witness has just crossed zero."""
+        t, trigger = context.get_time(), self._trigger
+        x = self._x.Eval(context)
         values = state.get_mutable_discrete_state().get_mutable_value(0)
-        before = _unpack(values, j)
-        if ended is Mode.SUPERVISING:
-            after = self._trigger.rise(before, t)
-        elif ended is Mode.INTERVENING:
-            after = self._trigger.fall(before, t)
-        else:
-            after = self._trigger.recover(before, t, float(self._x.Eval(context)[j]))
-        values[FIELDS * j : FIELDS * (j + 1)] = _pack([after])
+        for j in range(self._count):
+            before = _unpack(values, j)
+            if before.mode is not mode:
+                continue
+            after = before
+            if mode is Mode.SUPERVISING and x[j] >= trigger.zeta:
+                after = trigger.rise(before, t)
+            elif mode is Mode.INTERVENING and x[j] <= trigger.release:
+                after = trigger.fall(before, t)
+            elif mode is Mode.REFRACTORY and t >= trigger.dwell_end(before):
+                after = trigger.recover(before, t, float(x[j]))
+            values[FIELDS * j : FIELDS * (j + 1)] = _pack([after])
 
 
 def _pack(states: list[TriggerState]) -> np.ndarray:

@@ -66,8 +66,9 @@ class Gatekeeper(LeafSystem):
     Rate: one update per gatekeeper period, from t = 0.
 
     Attributes:
-        decision_times_s: wall-clock time of every decision since construction or `reset_timing`. Kept outside
-            the Context because it differs between identical runs.
+        decision_times_s: CPU time of every decision since construction or `reset_timing` (what it costs, not
+            what else the machine did meanwhile). Kept outside the Context because it differs between
+            identical runs.
     """
 
     def __init__(
@@ -127,9 +128,9 @@ class Gatekeeper(LeafSystem):
             if proposal is None:
                 answers += [SILENT, -1.0]
                 continue
-            started = time.perf_counter()
+            started = time.thread_time()
             decision = self._route.decide(self._problem(context.get_time(), i, proposal, positions, velocities))
-            self.decision_times_s.append(time.perf_counter() - started)
+            self.decision_times_s.append(time.thread_time() - started)
             standing = answer_to(proposal, memory.answers, i)
             accepted = settle(decision, standing, self._switching_margin)
             rulings.append(Ruling(context.get_time(), i, proposal, decision, accepted))

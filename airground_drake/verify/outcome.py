@@ -196,15 +196,16 @@ class GateTime(TraceClaim):
 
     id = "GATE-TIME"
     statement = "The gatekeeper decided within its sampling period in at least 99 % of its decisions."
-    formula = "p99 of the wall-clock time per decision < gatekeeper period"
+    formula = "p99 of the CPU time per decision < gatekeeper period"
     method = "Order statistics (no interpolation, rounded up) of the times measured around every decision of the run."
     equations = "(26)-(29)"
     assumptions = (
-        "One time was measured per decision, on the machine that the report names, with whatever else ran on it.",
+        "One CPU time was measured per decision, on the machine that the report names; the solver runs in one thread.",
         "Decisions for several UGVs at one sample run on separate computers: times are per UGV, not summed.",
     )
     does_not_establish = (
-        "A worst-case execution time, or the times of other hardware: a measured maximum is no bound, and with fewer "
+        "A worst-case execution time, waiting behind other processes, or the times of other hardware: a measured "
+        "maximum is no bound, and with fewer "
         "than 100 decisions p99 is the maximum. Simulated time waits for the solver, so late decisions had no effect."
     )
 
