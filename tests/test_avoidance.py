@@ -115,7 +115,7 @@ def test_projection_is_the_exact_minimiser(seed: int, planar: bool) -> None:
         normal[:, 2] = 0.0
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     bound = -rng.uniform(0, 2, count) * rng.choice([0.0, 1.0], count)
-    lower = rng.normal(size=3) * 3
+    lower = rng.normal(size=3) * 3 * ([1, 1, 0] if planar else [1, 1, 1])
     ours = Avoidance(1.0, 1.0).apply(lower[None], HalfSpaces(normal[None], bound[None]))[0]
     v = cvxpy.Variable(3)
     cvxpy.Problem(cvxpy.Minimize(cvxpy.sum_squares(v - lower)), [normal @ v >= bound]).solve(solver="CLARABEL")

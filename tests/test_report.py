@@ -213,8 +213,11 @@ class TestMeasures:
 
     @staticmethod
     def test_distances_are_the_two_nearest_in_the_order_of_names() -> None:
-        near = [float(np.hypot(STALL[0] - x, STALL[1] - y)) for x, y in ((1.7, 4.0), (4.0, 7.0))]
-        assert TestMeasures.of("distances_while_stalled") == pytest.approx(near)
+        near = [float(np.hypot(3.9 - x, 5.3 - y)) for x, y in ((1.7, 4.0), (4.0, 7.0))]
+        assert near[0] > near[1]
+        assert TestMeasures.of(
+            "distances_while_stalled", [(0, 3.3, 0.5), (9, 3.9, 5.3), (30, 3.9, 5.3)]
+        ) == pytest.approx(near)
 
     @staticmethod
     @pytest.mark.parametrize(
@@ -247,7 +250,7 @@ class TestMeasures:
 
     @staticmethod
     def test_recovery_is_interpolated_and_skips_the_trigger_itself() -> None:
-        x = {0: 0.0, 9.9: 2.0, 10.0: 3.0 - 1e-9, 11.0: 4.0, 12.0: 3.04, 12.1: 2.94, 30.0: 0.0}
+        x = {0: 0.0, 9.9: 2.0, 10.0: 3.0 - 2e-9, 10.1: 3.0 - 1e-9, 11.0: 4.0, 12.0: 3.04, 12.1: 2.94, 30.0: 0.0}
         assert TestMeasures.of("recovery_duration", events=[event(10.0, "trigger")], x=x) == pytest.approx([2.04])
         assert TestMeasures.of("recovery_duration", events=[], x=x) == []
         assert TestMeasures.of("recovery_duration", events=[event(10.0, "trigger")], x={0: 0.0, 10: 3, 30: 9}) == []
@@ -426,7 +429,7 @@ class TestFigures:
     def test_bytes_do_not_depend_on_the_time_or_the_user(
         scenario: Scenario, traces: dict[str, Trace], drawn: list[Figure]
     ) -> None:
-        with matplotlib.rc_context({"font.size": 30.0, "lines.linewidth": 9.0, "svg.fonttype": "path"}):
+        with matplotlib.rc_context({"font.size": 30.0, "axes.linewidth": 9.0, "svg.fonttype": "path"}):
             assert figures.draw(scenario, traces) == drawn
 
     @staticmethod
@@ -494,7 +497,7 @@ class TestSvg:
         text = svg.inline(TestSvg.SOURCE, "n", "T & t", "D")
         assert not any(word in text for word in ("script", "style", "onload", "http://e", "image", "unused", "width"))
         assert 'id="n-p"' in text
-        assert 'href="#n-p"' in text
+        assert text.count("href=") == text.count('href="#n-p"') == 1
         assert "url(#n-p)" in text
         assert 'd="M 0.12 1"' in text
         assert '<title id="n-title">T &amp; t</title>' in text
@@ -706,16 +709,17 @@ def test_metrics_of_robot_pairs_and_events(traces: dict[str, Trace]) -> None:
     assert metrics.of_run(traces["a"])["gatekeeper"] is None
 
 
-def test_least_pair_margin_is_exact_between_rows() -> None:
-    scenario = make_scenario()
-    crossing = make_trace(scenario, "a", [(0, 3.3, 0.5), (15, -2.5, 7), (30, 3.3, 13)], step_s=15.0)
-    found = metrics.of_run(crossing)["min_robot_distance_m"]
-    fine = make_trace(scenario, "a", [(0, 3.3, 0.5), (15, -2.5, 7), (30, 3.3, 13)], step_s=0.001)
-    for column in ("ugv2.x_m", "ugv2.y_m"):
-        fine.signals[column] = np.interp(fine.t, crossing.t, crossing.column(column))
-    expected = np.linalg.norm(fine.position("ugv1") - fine.position("ugv2"), axis=1).min()
-    assert found["ugv1"]["ugv2"]["value"] == pytest.approx(expected, abs=1e-3)
-    assert found["ugv1"]["ugv2"] == found["ugv2"]["ugv1"]
+def test_least_pair_margin_is_the_exact_one_not_that_at_the_rows() -> None:
+    trace = make_trace(make_scenario(), "a", [(0, 1.5, 0.5), (30, -8.0, 3.0)], step_s=30.0)
+    found = metrics.of_run(trace)["min_robot_distance_m"]
+    fine = {}
+    for robot in trace.robots:
+        first, last = trace.position(robot)
+        fine[robot] = np.linspace(first, last, 30_001)
+    to_ugv2, to_uav = (np.linalg.norm(fine["ugv1"] - fine[other], axis=1) for other in ("ugv2", "uav"))
+    assert min(to_uav[0], to_uav[-1]) - 1.0 < min(to_ugv2[0], to_ugv2[-1]) - 2.0
+    assert to_uav.min() - 1.0 > to_ugv2.min() - 2.0
+    assert found["ugv1"]["ugv2"]["value"] == pytest.approx(to_ugv2.min(), abs=1e-6)
 
 
 def test_readers_of_many_names_know_every_status() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from pydrake.solvers import ClarabelSolver, MathematicalProgram, SolverOptions
+from pydrake.solvers import Binding, ClarabelSolver, MathematicalProgram, QuadraticCost, SolverOptions
 
 from airground_drake.gatekeeper.problem import Decision, Problem
 from airground_drake.gatekeeper.rounding import rounding_deviation, sum_up_rounding
@@ -21,13 +21,13 @@ class RelaxedRoute:
     taken along the better of the two constant plans. The plan returned is the cheapest, by the exact cost
     (25), of the rounded one and the two constant ones.
 
-    The program is built once for a number of stages and points, then only its coefficients change. Rows that
-    no plan can reach are left unbounded, which the solver's interface drops.
+    The program is built once for a number of stages, points and the weights, then only its coefficients change.
+    Rows that no plan can reach are left unbounded, which the solver's interface drops.
     """
 
     def __init__(self) -> None:
         """Start without any program."""
-        self._programs: dict[tuple[int, int], _Program] = {}
+        self._programs: dict[tuple[int, int, float, float, float], _Program] = {}
         self._solver = ClarabelSolver()
         self._options = SolverOptions()  # refinement costs a third of the time and changes the optimum by 1e-8
         self._options.SetOption(ClarabelSolver.id(), "iterative_refinement_enable", 0)
@@ -67,49 +67,57 @@ class RelaxedRoute:
         )
 
     def _solve(self, problem: Problem, normals: Array) -> tuple[Array | None, float]:
-        size = (problem.stages, len(problem.distances))
-        if size not in self._programs:
-            self._programs[size] = _Program(*size, problem.slack_weight * problem.dt)
-        program = self._programs[size]
+        key = (problem.stages, len(problem.distances), problem.dt, problem.error_weight, problem.slack_weight)
+        if key not in self._programs:
+            self._programs[key] = _Program(*key)
+        program = self._programs[key]
         program.update(problem, normals)
         result = self._solver.Solve(program.program, None, self._options)
         omega = result.GetSolution(program.omega)
         cost = result.get_optimal_cost()
         if not result.is_success() or not np.isfinite(omega).all() or not np.isfinite(cost):
-            del self._programs[size]  # a fresh workspace after a failure
+            del self._programs[key]  # a fresh workspace after a failure
             return None, -1.0
         return np.clip(omega, 0.0, 1.0), float(cost)
 
 
 class _Program:
-    """MathematicalProgram of the relaxation; variables p (2N), omega (N), u (N). Coefficients change, not shape."""
+    """MathematicalProgram of the relaxation; coefficients change, not shape.
 
-    def __init__(self, stages: int, points: int, slack_cost: float) -> None:
+    Variables: task errors e = p - reference (2N), omega (N), u (N). Written in the errors, the cost (25) is
+    constant.
+    """
+
+    def __init__(self, stages: int, points: int, dt: float, error_weight: float, slack_weight: float) -> None:
         size = _AXES * stages
         self.program = MathematicalProgram()
-        p = self.program.NewContinuousVariables(size, "p")
+        e = self.program.NewContinuousVariables(size, "e")
         self.omega = self.program.NewContinuousVariables(stages, "omega")
         u = self.program.NewContinuousVariables(stages, "u")
-        self._eye = np.eye(size)
-        self._dynamics_matrix = np.hstack([self._eye - np.eye(size, k=-_AXES), np.zeros((size, stages))])
+        self._dynamics_matrix = np.hstack([np.eye(size) - np.eye(size, k=-_AXES), np.zeros((size, stages))])
         self._avoidance_matrix = np.zeros((stages * points, size + stages))
         self._row = np.arange(stages * points).reshape(stages, points)
         self._stage = np.arange(stages)
         self._avoidance_matrix[self._row, size + self._stage[:, None]] = 1.0
-        unbounded = np.full(stages * points, np.inf)
+        self._unbounded = np.full(stages * points, np.inf)
 
-        self._tracking = self.program.AddQuadraticCost(self._eye, np.zeros(size), p, is_convex=True)
-        slack = self.program.AddQuadraticCost(2.0 * slack_cost * np.eye(stages), np.zeros(stages), u, is_convex=True)
-        box = self.program.AddBoundingBoxConstraint(0.0, 1.0, self.omega)
-        sign = self.program.AddBoundingBoxConstraint(0.0, np.inf, u)
+        def square(weight: float, variables: Array) -> Binding[QuadraticCost]:
+            hessian = 2.0 * weight * dt * np.eye(len(variables))
+            return self.program.AddQuadraticCost(hessian, np.zeros(len(variables)), variables, is_convex=True)
+
         self._dynamics = self.program.AddLinearEqualityConstraint(
-            self._dynamics_matrix, np.zeros(size), np.concatenate([p, self.omega])
+            self._dynamics_matrix, np.zeros(size), np.concatenate([e, self.omega])
         )
-        names = {"(25) task error": self._tracking, "(25) slack": slack, "(27c) relaxed": box, "(27e)": sign}
-        names["(23), (27b)"] = self._dynamics
+        names = {
+            "(25) task error": square(error_weight, e),
+            "(25) slack": square(slack_weight, u),
+            "(27c) relaxed": self.program.AddBoundingBoxConstraint(0.0, 1.0, self.omega),
+            "(27e)": self.program.AddBoundingBoxConstraint(0.0, np.inf, u),
+            "(23), (27b)": self._dynamics,
+        }
         if points:
             self._avoidance = self.program.AddLinearConstraint(
-                self._avoidance_matrix, -unbounded, unbounded, np.concatenate([p, u])
+                self._avoidance_matrix, -self._unbounded, self._unbounded, np.concatenate([e, u])
             )
             names["(27d) as half-planes"] = self._avoidance
         for name, binding in names.items():
@@ -117,29 +125,24 @@ class _Program:
 
     def update(self, problem: Problem, normals: Array) -> None:
         """Put in the data of a problem of this size."""
-        weight = 2.0 * problem.error_weight * problem.dt
-        reference = problem.reference[:, :_AXES].ravel()
-        self._tracking.evaluator().UpdateCoefficients(
-            weight * self._eye, -weight * reference, 0.5 * weight * float(reference @ reference), is_convex=True
-        )
-        size = len(reference)
-        drift = problem.dt * problem.refuse[:, :_AXES]
-        drift[0] += problem.initial[:_AXES]
+        size = _AXES * problem.stages
+        before = np.vstack([problem.initial, problem.reference[:-1]])
+        drift = problem.dt * problem.refuse + before - problem.reference
         for axis in range(_AXES):
             change = problem.dt * (problem.accept - problem.refuse)[:, axis]
             self._dynamics_matrix[_AXES * self._stage + axis, size + self._stage] = -change
             self._avoidance_matrix[self._row, _AXES * self._stage[:, None] + axis] = normals[:, :, axis]
-        self._dynamics.evaluator().UpdateCoefficients(self._dynamics_matrix, drift.ravel())
+        self._dynamics.evaluator().UpdateCoefficients(self._dynamics_matrix, drift[:, :_AXES].ravel())
         if self._row.size:
             lower = np.where(_reachable(problem), _offsets(problem, normals), -np.inf).ravel()
-            self._avoidance.evaluator().UpdateCoefficients(self._avoidance_matrix, lower, np.full(len(lower), np.inf))
+            self._avoidance.evaluator().UpdateCoefficients(self._avoidance_matrix, lower, self._unbounded)
 
 
 def _offsets(problem: Problem, normals: Array) -> Array:
-    """d + n.(o - height): right-hand sides (N, m) of the half-planes in the plane of motion, m."""
-    planar = np.einsum("kmi,kmi->km", normals[:, :, :_AXES], problem.centres[:, :, :_AXES])
-    height = normals[:, :, 2] * (problem.initial[2] - problem.centres[:, :, 2])
-    return problem.distances + planar - height
+    """d + n.(o - reference): right-hand sides (N, m) of the half-planes for the task error in the plane, m."""
+    at = problem.reference[:, None, :].copy()
+    at[:, :, 2] = problem.initial[2]
+    return problem.distances + np.einsum("kmi,kmi->km", normals, problem.centres - at)
 
 
 def _reachable(problem: Problem) -> npt.NDArray[np.bool_]:

@@ -53,7 +53,8 @@ class Detour(Policy):
         radii = np.sqrt(squared[squared > 0.0])
         start = seen.position[:2]
 
-        duration = 0.0
+        gap = np.linalg.norm(seen.preset.at(seen.start)[0][:2] - start)
+        duration = float(gap) / (self.speed + seen.preset.max_speed)  # no rendezvous can be earlier
         while True:  # the duration only grows: by a sample where the preset is blocked, else to the travel time
             goal = seen.preset.at(seen.start + duration)[0][:2]
             try:

@@ -70,6 +70,12 @@ class Motion:
         """Time of the last vertex, s."""
         return float(self.times[-1])
 
+    @property
+    def max_speed(self) -> float:
+        """Largest speed, m/s."""
+        slopes: Array = self._slopes  # type: ignore[attr-defined]
+        return float(np.linalg.norm(slopes, axis=1).max(initial=0.0))
+
     def at(self, t: float) -> tuple[Array, Array]:
         """Position (3,) m and velocity (3,) m/s at time t (at a vertex: the velocity after it)."""
         times: list[float] = self._times  # type: ignore[attr-defined]
