@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+import multiprocessing
+import os
+import sys
 import time
+import warnings
 from collections.abc import Iterable
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from functools import cache
 from typing import Any
 
@@ -16,6 +22,7 @@ from pydrake.systems.framework import Context, DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput, VectorLogSink
 
 from airground_drake.diagram import RECORDED, Model, build_model
+from airground_drake.errors import AirgroundError
 from airground_drake.gatekeeper.prediction import Horizon, Scene, UgvLaw, predicted_problem
 from airground_drake.gatekeeper.relaxed import RelaxedRoute
 from airground_drake.intervention.policy import Proposal
@@ -146,6 +153,34 @@ def warm_up() -> None:
     scene = Scene(0.0, one[0], motion, one, one, np.ones(1), np.ones(1), 1.0)
     law, horizon = UgvLaw(avoidance, 1.0, 1.0, False), Horizon(2, 1, 1.0, 1.0)
     RelaxedRoute().decide(predicted_problem(scene, law, Proposal("", 0.0, motion), horizon))
+
+
+def simulate_all(scenario: Scenario, jobs: int | None = None) -> dict[str, Trace]:
+    """Simulate every run of a scenario, in its order, on several processes where the system can fork.
+
+    Args:
+        scenario: validated scenario.
+        jobs: number of processes; default: one for each processor that this process may use.
+
+    Raises:
+        AirgroundError: if a process dies.
+    """
+    names = list(scenario.runs)
+    jobs = min(len(names), _processors() if jobs is None else jobs)
+    if jobs < 2 or "fork" not in multiprocessing.get_all_start_methods() or sys.platform == "darwin":
+        return {name: simulate(scenario, name) for name in names}
+    warm_up()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # idle threads of numerical libraries survive a fork
+        with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("fork")) as pool:
+            try:
+                return dict(zip(names, pool.map(simulate, [scenario] * len(names), names), strict=True))
+            except BrokenProcessPool as error:
+                raise AirgroundError(f"a simulation of {scenario.name} died: {error}") from error
+
+
+def _processors() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def simulate(scenario: Scenario, run: str, seed: int | None = None) -> Trace:

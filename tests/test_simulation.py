@@ -18,7 +18,7 @@ from airground_drake.nsbc.motion import Motion
 from airground_drake.scenarios.schema import Obstacle, Preset, Run, Scenario, Ugv
 from airground_drake.scenarios.schema import Policy as PolicyEntry
 from airground_drake.scenarios.validate import check
-from airground_drake.simulation import Recorder, simulate
+from airground_drake.simulation import Recorder, simulate, simulate_all
 from airground_drake.trace import Trace
 from airground_drake.verify import verify
 
@@ -89,6 +89,15 @@ def test_same_seed_same_bytes_other_seed_other_trigger(case_a: Scenario, run: Ru
     other = recorder.simulate(seed=7)
     assert times(other, "trigger")[0] != times(run("case_a", "d"), "trigger")[0]
     assert all(verdict.as_expected for verdict in verify(other))
+
+
+def test_runs_in_several_processes_are_those_in_one(case_a: Scenario, run: Runs) -> None:
+    case_a.runs = {name: case_a.runs[name] for name in ("a", "d")}
+    one, two = (simulate_all(case_a, jobs) for jobs in (1, 2))
+    for name in case_a.runs:
+        assert one[name].signals.equals(two[name].signals)
+        assert one[name].decisions.equals(two[name].decisions)
+        assert one[name].meta["events"] == two[name].meta["events"] == run("case_a", name).meta["events"]
 
 
 def test_noise_has_the_intensity_of_the_scenario(case_a: Scenario) -> None:

@@ -75,6 +75,21 @@ def test_compositions_follow_their_formulas(jacobians: np.ndarray, wishes: np.nd
     np.testing.assert_allclose(augmented(layers), by_hand, atol=1e-8)
 
 
+@given(POSITIONS, st.sampled_from([np.eye(3), np.array([[0.6, 0.8, 0.0]]), np.array([[1.0, 0, 0], [0, 1.0, 0]])]))
+def test_the_controllers_form_of_20_is_the_composition_of_tasks(position: np.ndarray, selection: np.ndarray) -> None:
+    """v + J^+ J (rate + gain * error - v) is the intervention task (14) above v, for a constant Jacobian."""
+    below = np.cos(position)
+    task = InterventionTask(np.full(position.shape, 2.0), np.full(position.shape, 0.3), 1.5, selection)
+    layers = [
+        (task.velocity(position), task.jacobian(position)),
+        (below, np.broadcast_to(np.eye(3), (len(below), 3, 3))),
+    ]
+    composed = augmented(layers)
+    chosen = pseudoinverse(selection) @ selection
+    asked = task.rate + 1.5 * (task.target - position)
+    np.testing.assert_allclose(below + (asked - below) @ chosen.T, composed, atol=1e-9)
+
+
 def test_only_the_augmented_projector_leaves_all_higher_tasks_alone() -> None:
     """Three planar tasks, pairwise oblique: (5) lets the third disturb the second."""
     rows = np.array([[1.0, 0.0, 0.0], [0.6, 0.8, 0.0], [0.0, 1.0, 0.0]])

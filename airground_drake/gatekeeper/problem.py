@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numba import njit
 
 from airground_drake.nsbc.task import Array
 
@@ -44,28 +45,69 @@ class Problem:
         """N."""
         return len(self.accept)
 
+    def is_finite(self) -> bool:
+        """Whether all data are finite numbers."""
+        data = (self.initial, self.accept, self.refuse, self.reference, self.centres, self.distances)
+        return all(np.isfinite(array).all() for array in data)
+
     def positions(self, omega: Array) -> Array:
         """Predicted positions at the ends of the stages, (23): omega (N,) in [0, 1] to (N, 3), m."""
         velocity = self.refuse + omega[:, None] * (self.accept - self.refuse)
         return self.initial + self.dt * np.cumsum(velocity, axis=0)
 
-    def clearance(self, positions: Array) -> Array:
-        """Distance to every point minus its safe distance, at positions (N, 3): (N, m), m."""
-        offset = positions[:, None, :] - self.centres
-        return np.sqrt(np.einsum("kmi,kmi->km", offset, offset)) - self.distances
-
     def evaluate(self, omega: Array) -> Evaluation:
-        """Cost (25) of a plan with the exact distances of (26d)."""
+        """Cost (25) of a plan with the exact distances of (26d), by the right-hand rectangle rule."""
         positions = self.positions(omega)
-        clearance = self.clearance(positions).min(axis=1, initial=np.inf)
-        slack = np.maximum(0.0, -clearance)
-        return Evaluation(omega, positions, self.cost(positions, slack), float(clearance.min(initial=np.inf)))
+        clearances = _clearances(positions, self.centres, self.distances)
+        objective = self.cost(positions, clearances)
+        return Evaluation(omega, positions, objective, float(clearances.min(initial=np.inf)))
 
-    def cost(self, positions: Array, slack: Array) -> float:
-        """(25) by the right-hand rectangle rule: positions (N, 3) m, slack u (N,) m."""
-        error = self.reference - positions
-        tracking = self.error_weight * np.einsum("ki,ki->", error, error)
-        return float(self.dt * (tracking + self.slack_weight * slack @ slack))
+    def evaluate_half_planes(self, positions: Array, normals: Array) -> float:
+        """Cost (25) through positions (N, 3) m when distances are measured along unit normals (N, m, 3)."""
+        return self.cost(positions, _reaches(positions, self.centres, self.distances, normals))
+
+    def cost(self, positions: Array, clearances: Array) -> float:
+        """(25) for positions (N, 3), m, and the least clearance of each stage (N,), m: slack is its negative part."""
+        return _cost(positions, self.reference, clearances, self.error_weight, self.slack_weight, self.dt)
+
+
+@njit(cache=True)
+def _clearances(positions: Array, centres: Array, distances: Array) -> Array:
+    """Least distance minus safe distance at each stage, (N,), m; inf without points."""
+    least = np.full(len(positions), np.inf)
+    for k in range(len(positions)):
+        for m in range(len(distances)):
+            squared = 0.0
+            for a in range(3):
+                squared += (positions[k, a] - centres[k, m, a]) ** 2
+            least[k] = min(least[k], np.sqrt(squared) - distances[m])
+    return least
+
+
+@njit(cache=True)
+def _reaches(positions: Array, centres: Array, distances: Array, normals: Array) -> Array:
+    """Least n.(p - o) - d at each stage, (N,), m: never more than the clearance."""
+    least = np.full(len(positions), np.inf)
+    for k in range(len(positions)):
+        for m in range(len(distances)):
+            reach = 0.0
+            for a in range(3):
+                reach += normals[k, m, a] * (positions[k, a] - centres[k, m, a])
+            least[k] = min(least[k], reach - distances[m])
+    return least
+
+
+@njit(cache=True)
+def _cost(
+    positions: Array, reference: Array, clearances: Array, error_weight: float, slack_weight: float, dt: float
+) -> float:
+    total = 0.0
+    for k in range(len(positions)):
+        slack = max(0.0, -clearances[k])
+        total += slack_weight * slack * slack
+        for a in range(3):
+            total += error_weight * (reference[k, a] - positions[k, a]) ** 2
+    return dt * total
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,8 +23,7 @@ from airground_drake.intervention.database import PolicyError
 from airground_drake.report import document, figures, html, junit
 from airground_drake.scenarios.load import load, shipped
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.simulation import Recorder
-from airground_drake.trace import Trace
+from airground_drake.simulation import simulate_all
 from airground_drake.verify import verify
 
 EXIT_USAGE, EXIT_TOOL = 2, 4
@@ -85,10 +84,8 @@ def write_report(
         OSError: if the folder cannot be written.
     """
     started, clock = datetime.now(UTC), time.perf_counter()
-    traces: dict[str, Trace] = {}
-    for name, run in scenario.runs.items():
-        _progress(f"simulating {name}")
-        traces[name] = Recorder(scenario, name, run).simulate()
+    _progress(f"simulating {', '.join(scenario.runs)}")
+    traces = simulate_all(scenario)
     _progress("checking claims")
     verdicts = [verdict for of_run in traces.values() for verdict in verify(of_run)]
     dot = graphviz.dot(build_diagram(scenario))

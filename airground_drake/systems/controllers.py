@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import numpy as np
 from pydrake.common.value import Value
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance, HalfSpaces, limit_speed
-from airground_drake.nsbc.composition import augmented
 from airground_drake.nsbc.task import Array
-from airground_drake.nsbc.tasks import FormationTask, InterventionTask, PositionTask
+from airground_drake.nsbc.tasks import FormationTask, PositionTask
 from airground_drake.nsbc.team import Team
 from airground_drake.systems.messages import accepted_proposals
 
@@ -95,13 +93,12 @@ class UgvController(LeafSystem):
     def _intervened(
         self, t: float, proposal: Proposal, i: int, own: Array, lower: Array, composite: Array, spaces: HalfSpaces
     ) -> Array:
-        row = slice(i, i + 1)
+        """Eq (20): v_int + (I - J_int^+ J_int) v, with v_int of (14), for one UGV; (3,), m/s."""
         wanted, rate = proposal.motion.at(t)
-        task = InterventionTask(wanted[None], rate[None], self._intervention_gain, proposal.selection)
-        top = (task.velocity(own[row]) * self._mobility[row], task.jacobian(own[row]))
+        asked = self._mobility[i] * (rate + self._intervention_gain * (wanted - own[i]))
         below = composite if self._on_top else lower
-        velocity = augmented([top, (below[None], np.eye(3)[None])])
-        velocity = limit_speed(velocity, self._max_speed[row])
+        row = slice(i, i + 1)
+        velocity = limit_speed((below + proposal.chosen @ (asked - below))[None], self._max_speed[row])
         if self._on_top:
             return velocity[0]
         return self._avoidance.apply(velocity, HalfSpaces(spaces.normal[row], spaces.bound[row]))[0]
