@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -98,6 +100,28 @@ def test_runs_in_several_processes_are_those_in_one(case_a: Scenario, run: Runs)
         assert one[name].signals.equals(two[name].signals)
         assert one[name].decisions.equals(two[name].decisions)
         assert one[name].meta["events"] == two[name].meta["events"] == run("case_a", name).meta["events"]
+
+
+WARM_UP = """
+from airground_drake import simulation
+from airground_drake.scenarios.load import load
+
+
+def compiled():
+    functions = [*vars(kernels).items(), *vars(prediction).items(), *vars(problem).items()]
+    return {name: list(map(str, f.signatures)) for name, f in functions if hasattr(f, "signatures")}
+
+
+simulation.warm_up()
+before = compiled()
+simulation.simulate(load("case_a")[0], "d")
+assert before and compiled() == before, (before, compiled())
+"""
+
+
+def test_warming_up_compiles_all_that_a_run_needs() -> None:
+    """Otherwise the first decision of a process would count the compiler's time as its own."""
+    subprocess.run([sys.executable, "-c", WARM_UP], check=True, timeout=300)
 
 
 def test_noise_has_the_intensity_of_the_scenario(case_a: Scenario) -> None:

@@ -103,7 +103,7 @@ def predicted_problem(scene: Scene, law: UgvLaw, proposal: Proposal, horizon: Ho
         accept=accept,
         refuse=refuse,
         reference=scene.preset.sample(scene.t + after),
-        centres=centres[:, near],
+        centres=np.ascontiguousarray(centres[:, near]),  # a layout that the kernels are compiled for
         distances=scene.distances[near],
         error_weight=horizon.error_weight,
         slack_weight=horizon.slack_weight,
