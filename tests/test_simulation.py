@@ -104,6 +104,8 @@ def test_runs_in_several_processes_are_those_in_one(case_a: Scenario, run: Runs)
 
 WARM_UP = """
 from airground_drake import simulation
+from airground_drake.gatekeeper import prediction, problem
+from airground_drake.nsbc import kernels
 from airground_drake.scenarios.load import load
 
 
