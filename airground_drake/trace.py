@@ -54,7 +54,7 @@ DECISION_COLUMNS = {
     "objective_accept": "float64",
     "objective_refuse": "float64",
     "rounding_deviation_s": "float64",
-    "predicted_min_distance_m": "float64",
+    "predicted_clearance_m": "float64",
 }
 """Columns of `Trace.decisions`, one row per robot and gatekeeper call; -1 where a number does not apply."""
 
@@ -78,7 +78,6 @@ class Trace:
     signals: pd.DataFrame
     decisions: pd.DataFrame
     timings: dict[str, Any] = field(default_factory=dict, compare=False)
-    _columns: dict[str, Array] = field(default_factory=dict, compare=False, repr=False)
 
     @property
     def run(self) -> str:
@@ -117,15 +116,11 @@ class Trace:
         Raises:
             TraceError: if it is missing or not finite.
         """
-        if name in self._columns:
-            return self._columns[name]
         if name not in self.signals:
             raise TraceError(f"run {self.meta.get('run')}: the trace has no column {name!r}")
         values = self.signals[name].to_numpy(dtype=np.float64)
         if not np.isfinite(values).all():
             raise TraceError(f"run {self.meta.get('run')}: column {name!r} has values that are not finite")
-        values.setflags(write=False)
-        self._columns[name] = values
         return values
 
     def vector(self, robot: str, stem: str = "", unit: str = "m") -> Array:
