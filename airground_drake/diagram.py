@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, TypeVar, get_args
 
@@ -20,6 +21,9 @@ from pydrake.trajectories import PiecewisePolynomial
 
 from airground_drake.decision.bayes import optimal_threshold
 from airground_drake.decision.trigger import Trigger
+from airground_drake.gatekeeper.branch import BranchAndBoundRoute
+from airground_drake.gatekeeper.enumeration import EnumerationRoute
+from airground_drake.gatekeeper.nonlinear import NonlinearRoute
 from airground_drake.gatekeeper.prediction import Horizon, UgvLaw
 from airground_drake.gatekeeper.relaxed import RelaxedRoute
 from airground_drake.intervention.database import BehaviourDatabase, make_policy
@@ -37,13 +41,19 @@ from airground_drake.systems import (
     UavController,
     UgvController,
 )
+from airground_drake.systems.gatekeeper import Route
 
 Method = Literal["a", "b", "c", "d"]
 """(a) no intervention, (b) no gatekeeper, (c) the paper's gatekeeper, (d) certified: avoidance always on top."""
 
 METHODS: tuple[Method, ...] = get_args(Method)
 
-ROUTES = {"relaxed": RelaxedRoute}
+ROUTES: dict[str, Callable[[], Route]] = {
+    "relaxed": RelaxedRoute,
+    "enumeration": EnumerationRoute,
+    "nonlinear": NonlinearRoute,
+    "branch_and_bound": BranchAndBoundRoute,
+}
 
 S = TypeVar("S", bound=System)
 
@@ -146,6 +156,8 @@ def build_model(scenario: Scenario, method: Method, composition: Composition = "
             BehaviourDatabase(
                 [(entry.name, make_policy(entry.name, entry.parameters)) for entry in policies],
                 retry=scenario.intervention.retry_s,
+                ranking=scenario.intervention.ranking,  # type: ignore[arg-type]
+                budget=scenario.intervention.budget_s,
             ),
             period=scenario.intervention.period_s,
             presets=presets,
@@ -208,6 +220,7 @@ def build_model(scenario: Scenario, method: Method, composition: Composition = "
     connect(planner, "proposals", gate, "proposals")
     connect(gate, "answers", ugv_controller, "answers")
     connect(gate, "answers", planner, "answers")
+    connect(gate, "reports", planner, "reports")
     connect(ugv_controller, "command", uav_controller, "ugv_command")
     if gatekeeper is not None:
         connect(ugv_controller, "command", gatekeeper, "ugv_command")

@@ -115,7 +115,7 @@ class Recorder:
                     "objective_accept": r.decision.objective_accept,
                     "objective_refuse": r.decision.objective_refuse,
                     "rounding_deviation_s": r.decision.rounding_deviation,
-                    "predicted_min_distance_m": r.decision.clearance,
+                    "predicted_clearance_m": r.decision.clearance,
                 }
                 for r in rulings
             ],

@@ -41,6 +41,19 @@ def test_the_reproduction_table_meets_its_targets(report: Path) -> None:
     assert document["runs"]["d"]["metrics"]["min_distance_m"]["ugv1"]["obstacle_1"]["value"] >= 2.0 - 1e-9
 
 
+def test_case_b_meets_its_targets_too(tmp_path: Path) -> None:
+    assert main(["case_b", "-o", str(tmp_path), "--format", "json"]) == 0
+    document = json.loads((tmp_path / "report.json").read_text())
+    statuses = {row["id"]: row["status"] for row in document["reproduction"]}
+    wanted = {"B1": "reproduced", "B2": "calibrated", "B3": "calibrated", "B4": "not_reproduced", "B5": "reproduced"}
+    assert statuses == wanted
+    collision = document["runs"]["b"]["metrics"]["min_distance_m"]["ugv1"]["sudden"]["value"]
+    assert collision < 0.05
+    obstacles = document["scenario"]["resolved"]["obstacles"]
+    for found in document["runs"]["d"]["metrics"]["min_distance_m"].values():
+        assert all(found[name]["value"] >= 2.0 - 1e-9 for name in obstacles)
+
+
 def test_an_unexpected_verdict_is_exit_code_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     wrong = ["--set", "runs.a.expected={SAFE-TRACE: refuted}", "--format", "json"]
     assert main(["case_a", "-o", str(tmp_path), *wrong]) == 1
@@ -85,4 +98,4 @@ def test_a_folder_that_cannot_be_written_is_exit_code_4(tmp_path: Path, capsys: 
 
 def test_the_shipped_scenarios_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--list"]) == 0
-    assert capsys.readouterr().out.split() == ["case_a", "case_a_table1"]
+    assert capsys.readouterr().out.split() == ["case_a", "case_a_table1", "case_b", "soft_gate"]

@@ -41,7 +41,10 @@ def case_a_proposal() -> tuple[Scene, UgvLaw, Proposal, Horizon]:
     scenario = load("case_a")[0]
     team, preset = make_team(scenario), make_presets(scenario)[0]
     t = 14.5
-    seen = Observation(t, t + 0.05, "ugv1", STALL, np.array([3.3, 13.0, 0.0]), preset, team.obstacles, 2.0, 0)
+    seen = Observation(
+        t=t, start=t + 0.05, robot="ugv1", position=STALL, target=np.array([3.3, 13.0, 0.0]), preset=preset,
+        obstacles=team.obstacles, mapped=team.obstacles, others=np.zeros((0, 3)), safe_distance=2.0, refusals=0,
+    )  # fmt: skip
     motion = Detour(speed_m_s=2.85).propose(seen)
     assert motion is not None
     scene = Scene(t + 0.05, STALL, preset, team.obstacles, np.zeros((3, 3)), np.full(3, 2.0), np.ones(3), 3.0)

@@ -245,7 +245,9 @@ class TestMeasures:
     def test_times_of_first_events() -> None:
         events = [event(3, "trigger", "ugv2"), event(5, "refuse"), event(6, "accept"), event(7, "trigger")]
         found = {name: TestMeasures.of(name, events=events) for name in MEASURES if name.endswith("_time")}
+        executed = found.pop("execution_time")
         assert found == {"trigger_time": [7], "acceptance_time": [6], "refusal_time": [5]}
+        assert executed == TestMeasures.of("execution_time")  # from the signal, not from events
         assert TestMeasures.of("trigger_time") == []
 
     @staticmethod

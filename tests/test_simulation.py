@@ -17,6 +17,7 @@ from airground_drake.errors import TraceError
 from airground_drake.intervention.database import POLICIES, PolicyError, make_policy
 from airground_drake.intervention.policy import Observation, Policy
 from airground_drake.nsbc.motion import Motion
+from airground_drake.scenarios.load import load, shipped
 from airground_drake.scenarios.schema import Obstacle, Preset, Run, Scenario, Ugv
 from airground_drake.scenarios.schema import Policy as PolicyEntry
 from airground_drake.scenarios.validate import check
@@ -65,9 +66,9 @@ def test_recursion_as_printed_is_unsafe_and_does_not_stall(run: Runs) -> None:
         assert "arrival" in kinds(of_run, "ugv1")
 
 
-@pytest.mark.parametrize("scenario", ["case_a", "case_a_table1"])
-def test_every_run_has_the_verdicts_that_its_scenario_declares(run: Runs, scenario: str, case_a: Scenario) -> None:
-    for name in case_a.runs:
+@pytest.mark.parametrize("scenario", shipped())
+def test_every_run_has_the_verdicts_that_its_scenario_declares(run: Runs, scenario: str) -> None:
+    for name in load(scenario)[0].runs:
         for verdict in verify(run(scenario, name)):
             assert verdict.as_expected, (name, verdict.claim.id, verdict.finding)
 
@@ -278,3 +279,85 @@ def test_claims_do_not_depend_on_the_periods(case_a: Scenario, period: float, no
     of_run = simulate(case_a, "d")
     assert {verdict.finding.status for verdict in verify(of_run)} == {"holds"}
     assert times(of_run, "trigger")[0] == pytest.approx(14.45, abs=0.1)
+
+
+def test_case_b_refuses_the_wrong_intervention_and_accepts_the_right_one(run: Runs) -> None:
+    """B1-B3, B5: the collision without a gatekeeper, and the timeline with one."""
+    collision = next(event for event in run("case_b", "b").events if event["kind"] == "collision")
+    assert np.linalg.norm(np.array(collision["position_m"][:2]) - [5.5, 5.8]) < 0.1
+    for method in ("c", "d"):
+        of_run = run("case_b", method)
+        assert kinds(of_run, "ugv1") == ["trigger", "proposal", "refuse", "proposal", "accept", "release", "arrival"]
+        assert times(of_run, "refuse")[0] == pytest.approx(10.6, abs=0.05)
+        assert times(of_run, "accept")[0] == pytest.approx(13.1, abs=0.1)
+        first = of_run.decisions.groupby("issued_s").first()
+        gap = (first["objective_refuse"] - first["objective_accept"]).abs()
+        assert (gap / first[["objective_accept", "objective_refuse"]].max(axis=1) > 0.05).all()  # no knife edge
+
+
+def test_what_a_refusal_teaches_is_on_the_uavs_map_afterwards(case_a: Scenario, run: Runs) -> None:
+    """The detour accepted in case B keeps clear of the obstacle that the UAV did not know at first."""
+    of_run = run("case_b", "c")
+    accepted = times(of_run, "accept")[0]
+    after = of_run.position("ugv1")[of_run.t > accepted]
+    assert np.linalg.norm(after - [5.5, 5.8, 0.0], axis=1).min() >= 2.0 - 1e-9
+
+
+def test_the_soft_gate_accepts_a_predicted_intrusion_and_the_certified_one_is_safe(run: Runs) -> None:
+    accepted = run("soft_gate", "c").decisions.iloc[0]
+    assert accepted["decision"] == "accept"
+    assert accepted["predicted_clearance_m"] < -1.0
+    safety = {name: verify(run("soft_gate", name))[0].finding for name in ("c", "d")}
+    assert safety["c"].status == "refuted"
+    assert safety["d"].status == "holds"
+
+
+class Hangs(Policy):
+    """A policy that never answers, and catches what it can."""
+
+    def propose(self, seen: Observation) -> Motion | None:
+        while True:
+            try:
+                sum(range(1000))
+            except Exception:
+                continue
+
+
+def test_a_policy_that_hangs_is_stopped_and_reported(case_a: Scenario, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(POLICIES, "hangs", Hangs)
+    case_a.intervention.policies.insert(0, PolicyEntry("hangs", {}))
+    case_a.intervention.budget_s = 0.05
+    of_run = simulate(case_a, "d")
+    assert "arrival" in kinds(of_run, "ugv1")
+    assert "OutOfTime" in of_run.meta["faults"][0]["what"]
+
+
+@pytest.mark.parametrize("ranking", ["listed", "predicted"])
+def test_the_ranking_decides_what_is_proposed_first(case_a: Scenario, ranking: str) -> None:
+    wrong = PolicyEntry("towards", {"x_m": 4.0, "y_m": 7.0, "speed_m_s": 2.0})
+    case_a.intervention.policies.insert(0, wrong)
+    case_a.intervention.ranking = ranking
+    of_run = simulate(case_a, "d")
+    first = next(event for event in of_run.events if event["kind"] == "proposal")
+    assert first["policy"] == ("towards" if ranking == "listed" else "detour")
+    assert "arrival" in kinds(of_run, "ugv1")
+
+
+@pytest.mark.parametrize(
+    ("name", "parameters"),
+    [
+        ("hostile", {"speed_m_s": 3.0}),
+        ("noisy", {"speed_m_s": 2.8, "noise_m": 1.0}),
+        ("stale_map", {"speed_m_s": 2.8}),
+        ("towards", {"x_m": 1.7, "y_m": 4.0, "speed_m_s": 3.0}),
+    ],
+)
+def test_no_wrong_policy_gets_past_method_d(case_a: Scenario, name: str, parameters: dict[str, float]) -> None:
+    case_a.intervention.policies = [PolicyEntry(name, parameters)]
+    case_a.obstacles["obstacle_2"].known_to_uav = False
+    case_a.gatekeeper.error_weight_1_m2_s = 500.0  # accepts nearly anything
+    case_a.duration_s = 20.0
+    of_run = simulate(case_a, "d")
+    assert "proposal" in kinds(of_run, "ugv1")
+    statuses = {v.claim.id: v.finding.status for v in verify(of_run)}
+    assert statuses["SAFE-TRACE"] == statuses["SAFE-HYP"] == "holds"

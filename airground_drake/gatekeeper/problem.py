@@ -131,8 +131,9 @@ class Decision:
         accept: the first stage of the plan.
         status: 'optimal', or why the proposal was refused without an optimum.
         objective: cost (25) of the plan returned.
-        lower_bound: optimum of the relaxation (for the same supporting half-planes).
-        gap: (objective - lower_bound) / objective, the objective being that of the same convexified problem.
+        lower_bound: of the problem that the route solves: relaxed or branched, for the same supporting
+            half-planes; enumerated, for the same dwell. A local optimum has none.
+        gap: (objective - lower_bound) / objective, the objective being that of the same problem.
         objective_accept: lowest cost found of a plan that starts by accepting.
         objective_refuse: lowest cost found of a plan that starts by refusing.
         relaxed_first_stage: omega_0 of the relaxation.

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 from pydrake.solvers import Binding, ClarabelSolver, MathematicalProgram, QuadraticCost, SolverOptions
 
+from airground_drake.gatekeeper.candidates import Constants, choose
+from airground_drake.gatekeeper.half_planes import normals_along as _normals
+from airground_drake.gatekeeper.half_planes import offsets, reachable
 from airground_drake.gatekeeper.problem import Decision, Problem
 from airground_drake.gatekeeper.rounding import rounding_deviation, sum_up_rounding
 from airground_drake.nsbc.task import Array
@@ -40,34 +42,19 @@ class RelaxedRoute:
         """Accept or refuse: never raises for a hard or broken problem, but refuses and says why."""
         if not problem.is_finite():
             return Decision(False, "refused_not_finite")
-        stages = problem.stages
-        ones, zeros = np.ones(stages), np.zeros(stages)
-        accept, refuse = problem.evaluate(ones), problem.evaluate(zeros)
-        guide = accept if accept.objective < refuse.objective else refuse
-        normals = _normals(problem, guide.positions)
+        constants = Constants.of(problem)
+        normals = _normals(problem, constants.better.positions)
         relaxed, bound = self._solve(problem, normals)
         if relaxed is None:
-            return Decision(
-                False,
-                "refused_solver_failed",
-                objective_accept=accept.objective,
-                objective_refuse=refuse.objective,
-            )
+            return constants.failed()
         rounded = sum_up_rounding(relaxed)
-        plans = (problem.evaluate(rounded), accept, refuse)
-        best = min(plans, key=lambda plan: plan.objective)
-        convexified = min(problem.evaluate_half_planes(plan.positions, normals) for plan in plans)
-        return Decision(
-            accept=bool(best.omega[0] == 1.0),
-            status="optimal",
-            objective=best.objective,
+        return choose(
+            problem,
+            (problem.evaluate(rounded), constants.accept, constants.refuse),
             lower_bound=bound,
-            gap=(convexified - bound) / max(convexified, 1e-12),
+            normals=normals,
             relaxed_first_stage=float(relaxed[0]),
-            rounding_deviation=rounding_deviation(relaxed, rounded, problem.dt),
-            clearance=min(best.clearance, 1e9),
-            objective_accept=min(plan.objective for plan in plans if plan.omega[0] == 1.0),
-            objective_refuse=min(plan.objective for plan in plans if plan.omega[0] == 0.0),
+            deviation=rounding_deviation(relaxed, rounded, problem.dt),
         )
 
     def _solve(self, problem: Problem, normals: Array) -> tuple[Array | None, float]:
@@ -138,34 +125,5 @@ class _Program:
             self._avoidance_matrix[self._row, _AXES * self._stage[:, None] + axis] = normals[:, :, axis]
         self._dynamics.evaluator().UpdateCoefficients(self._dynamics_matrix, drift[:, :_AXES].ravel())
         if self._row.size:
-            lower = np.where(_reachable(problem), _offsets(problem, normals), -np.inf).ravel()
+            lower = np.where(reachable(problem), offsets(problem, normals), -np.inf).ravel()
             self._avoidance.evaluator().UpdateCoefficients(self._avoidance_matrix, lower, self._unbounded)
-
-
-def _offsets(problem: Problem, normals: Array) -> Array:
-    """d + n.(o - reference): right-hand sides (N, m) of the half-planes for the task error in the plane, m."""
-    at = problem.reference[:, None, :].copy()
-    at[:, :, 2] = problem.initial[2]
-    return problem.distances + np.einsum("kmi,kmi->km", normals, problem.centres - at)
-
-
-def _reachable(problem: Problem) -> npt.NDArray[np.bool_]:
-    """(N, m): False where no relaxed plan can come within the safe distance, so that the row cannot bind.
-
-    Any plan stays, per axis, between the running sums of the smaller and of the larger mode velocity.
-    """
-    both = np.stack([problem.accept, problem.refuse])
-    low = problem.initial + problem.dt * np.cumsum(both.min(axis=0), axis=0)
-    high = problem.initial + problem.dt * np.cumsum(both.max(axis=0), axis=0)
-    outside = np.maximum(low[:, None] - problem.centres, problem.centres - high[:, None])
-    gap = np.maximum(outside, 0.0)
-    within: npt.NDArray[np.bool_] = np.einsum("kmi,kmi->km", gap, gap) < problem.distances**2
-    return within
-
-
-def _normals(problem: Problem, positions: Array) -> Array:
-    """Unit vectors (N, m, 3) from the points to a guiding trajectory (N, 3)."""
-    offset = positions[:, None, :] - problem.centres
-    norm = np.linalg.norm(offset, axis=2, keepdims=True)
-    fallback = np.broadcast_to([1.0, 0.0, 0.0], offset.shape)
-    return np.where(norm > 1e-9, offset / np.maximum(norm, 1e-9), fallback)

@@ -24,7 +24,10 @@ class Observation:
         position: its position, (3,), m, world frame.
         target: its target, (3,), m.
         preset: its preset trajectory.
-        obstacles: centres of the obstacles on the UAV's own map, (m, 3), m.
+        obstacles: centres of the obstacles that the UAV knows: its own map, and what refusals have taught it,
+            (m, 3), m.
+        mapped: those of its own map alone, (k, 3), m.
+        others: positions of the other robots, (n, 3), m.
         safe_distance: distance d to keep from them, m.
         refusals: number of proposals that the UGV has refused since the trigger.
     """
@@ -36,6 +39,8 @@ class Observation:
     target: Array
     preset: Motion
     obstacles: Array
+    mapped: Array
+    others: Array
     safe_distance: float
     refusals: int
 

@@ -1,4 +1,8 @@
-"""The tasks of the paper: move to target or track, keep a distance, stay over the centroid, intervene."""
+"""The tasks of the paper: move to target or track, keep a distance, stay over the centroid, intervene.
+
+The controllers run `DistanceTask` as inequalities (`avoidance.py`) and `InterventionTask` in the closed form that
+a constant Jacobian allows; tests hold those against the tasks as stated here.
+"""
 
 from __future__ import annotations
 

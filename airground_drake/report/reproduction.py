@@ -139,6 +139,13 @@ def refusal_time(trace: Trace, robot: str) -> list[float]:
 
 
 @measure
+def execution_time(trace: Trace, robot: str) -> list[float]:
+    """Time from which on an intervention is executed for the first time, s."""
+    rows = np.flatnonzero(trace.column(f"{robot}.accepted") > 0.0)
+    return [float(trace.t[max(rows[0] - 1, 0)])] if len(rows) else []
+
+
+@measure
 def collision_position(trace: Trace, robot: str) -> list[float]:
     """Position [x, y] in m of the robot's first collision."""
     hits = events_of(trace, robot, "collision")

@@ -104,10 +104,16 @@ class Policy:
 
 @dataclass
 class Intervention:
-    """The UAV's intervention behaviours, tried in this order; how often it plans, and rests after a refusal."""
+    """The UAV's intervention behaviours; how often it plans, and how long it rests after a refusal.
+
+    `ranking` is 'listed' (in the order of the list) or 'predicted' (best predicted outcome on the UAV's map
+    first). A policy that takes longer than `budget_s` for a proposal counts as proposing nothing.
+    """
 
     period_s: float = 0.05
     retry_s: float = 1.0
+    ranking: str = "predicted"
+    budget_s: float = 2.0
     policies: list[Policy] = field(default_factory=list)
 
 

@@ -15,13 +15,13 @@ from itertools import combinations, pairwise
 
 from airground_drake.decision.bayes import optimal_threshold
 from airground_drake.errors import Fault, ScenarioError
-from airground_drake.intervention.database import POLICIES
+from airground_drake.intervention.database import POLICIES, RANKINGS
 from airground_drake.nsbc.avoidance import COMPOSITIONS
 from airground_drake.scenarios import schema
 from airground_drake.scenarios.schema import Scenario, Vector
 
 METHODS: tuple[str, ...] = ("a", "b", "c", "d")
-ROUTES: tuple[str, ...] = ("relaxed",)
+ROUTES: tuple[str, ...] = ("relaxed", "enumeration", "nonlinear", "branch_and_bound")
 TRIGGERS: tuple[str, ...] = ("automaton", "bare")
 THRESHOLD_RULES: tuple[str, ...] = ("fixed", "bayes")
 SOURCES: tuple[str, ...] = ("calibrated", "ours")
@@ -132,6 +132,7 @@ def _counts(scenario: Scenario) -> Problems:
 
 
 def _options(scenario: Scenario) -> Problems:
+    yield from _one_of("intervention.ranking", scenario.intervention.ranking, RANKINGS)
     yield from _one_of("gatekeeper.route", scenario.gatekeeper.route, ROUTES)
     yield from _one_of("decision.trigger", scenario.decision.trigger, TRIGGERS)
     yield from _one_of("decision.threshold.rule", scenario.decision.threshold.rule, THRESHOLD_RULES)

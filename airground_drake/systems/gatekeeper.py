@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol, Self
 
 import numpy as np
-from pydrake.common.value import Value
+from pydrake.common.value import AbstractValue, Value
 from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSystem, State
 
 from airground_drake.gatekeeper.prediction import Horizon, Scene, UgvLaw, predicted_problem
@@ -17,7 +17,7 @@ from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.motion import Motion
 from airground_drake.nsbc.task import Array
 from airground_drake.nsbc.team import Team
-from airground_drake.systems.messages import ACCEPT, REFUSE, SILENT, answer_to
+from airground_drake.systems.messages import ACCEPT, REFUSE, SILENT, Point, Reports, answer_to
 
 USELESS = 1e-6
 """Relative gain below which an intervention makes no difference: ten times the solver's tolerance."""
@@ -43,9 +43,10 @@ class Ruling:
 
 @dataclass(frozen=True)
 class GatekeeperMemory:
-    """Abstract state: the answers in force, (2n,), and every ruling so far."""
+    """Abstract state: the answers in force, (2n,), what was sensed with them, and every ruling so far."""
 
     answers: tuple[float, ...]
+    reports: Reports
     rulings: tuple[Ruling, ...] = ()
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
@@ -62,7 +63,7 @@ class Gatekeeper(LeafSystem):
     Ports (n UGVs):
         in  `team_position` (3(n+1)) m; `ugv_command` (3n) and `uav_command` (3) m/s, for the predicted motion
             of the other robots; `proposals` abstract, n of Proposal or None.
-        out `answers` (2n), see `messages`; held.
+        out `answers` (2n) and `reports` (abstract), see `messages`; held.
     Rate: one update per gatekeeper period, from t = 0.
 
     Attributes:
@@ -96,9 +97,15 @@ class Gatekeeper(LeafSystem):
         self._ugv_command = self.DeclareVectorInputPort("ugv_command", 3 * n)
         self._uav_command = self.DeclareVectorInputPort("uav_command", 3)
         self._proposals = self.DeclareAbstractInputPort("proposals", Value(object()))
-        self._memory = self.DeclareAbstractState(Value(GatekeeperMemory((SILENT, -1.0) * n)))
+        self._memory = self.DeclareAbstractState(Value(GatekeeperMemory((SILENT, -1.0) * n, ((),) * n)))
         self.DeclareVectorOutputPort(
             "answers", 2 * n, self._calc_answers, prerequisites_of_calc={self.abstract_state_ticket(self._memory)}
+        )
+        self.DeclareAbstractOutputPort(
+            "reports",
+            lambda: Value(object()),
+            self._calc_reports,
+            prerequisites_of_calc={self.abstract_state_ticket(self._memory)},
         )
         self.DeclarePeriodicUnrestrictedUpdateEvent(period, 0.0, self._update)
         self.decision_times_s: list[float] = []
@@ -115,6 +122,9 @@ class Gatekeeper(LeafSystem):
     def _calc_answers(self, context: Context, output: BasicVector) -> None:
         output.SetFromVector(context.get_abstract_state(int(self._memory)).get_value().answers)
 
+    def _calc_reports(self, context: Context, output: AbstractValue) -> None:
+        output.set_value(context.get_abstract_state(int(self._memory)).get_value().reports)
+
     def _update(self, context: Context, state: State) -> EventStatus:
         proposals = self._proposals.Eval(context)
         memory: GatekeeperMemory = context.get_abstract_state(int(self._memory)).get_value()
@@ -123,10 +133,12 @@ class Gatekeeper(LeafSystem):
         positions = self._position.Eval(context).reshape(-1, 3)
         velocities = np.concatenate([self._ugv_command.Eval(context), self._uav_command.Eval(context)]).reshape(-1, 3)
         answers: list[float] = []
+        reports: list[tuple[Point, ...]] = []
         rulings = list(memory.rulings)
         for i, proposal in enumerate(proposals):
             if proposal is None:
                 answers += [SILENT, -1.0]
+                reports.append(())
                 continue
             started = time.thread_time()
             decision = self._route.decide(self._problem(context.get_time(), i, proposal, positions, velocities))
@@ -135,9 +147,16 @@ class Gatekeeper(LeafSystem):
             accepted = settle(decision, standing, self._switching_margin)
             rulings.append(Ruling(context.get_time(), i, proposal, decision, accepted))
             answers += [ACCEPT if accepted else REFUSE, proposal.issued]
-        new = GatekeeperMemory(tuple(answers), tuple(rulings))
+            reports.append(self._sensed(positions[i]))
+        new = GatekeeperMemory(tuple(answers), tuple(reports), tuple(rulings))
         state.get_mutable_abstract_state(int(self._memory)).set_value(new)
         return EventStatus.Succeeded()
+
+    def _sensed(self, position: Array) -> tuple[Point, ...]:
+        """Obstacles within sensing range."""
+        obstacles = self._neighbourhood.obstacles
+        near = np.linalg.norm(obstacles - position, axis=1) <= self._law.avoidance.sensing_range
+        return tuple((x, y, z) for x, y, z in obstacles[near].tolist())
 
     def _problem(self, t: float, i: int, proposal: Proposal, positions: Array, velocities: Array) -> Problem:
         around = self._neighbourhood
@@ -175,7 +194,8 @@ def settle(decision: Decision, standing: float, margin: float) -> bool:
 class DirectAcceptance(LeafSystem):
     """Method (b): every proposal is accepted at once.
 
-    Ports (n UGVs): in `proposals` abstract; out `answers` (2n), see `messages`.
+    Ports (n UGVs): in `proposals` abstract; out `answers` (2n) and `reports` (abstract, always empty), see
+    `messages`.
     """
 
     def __init__(self, count: int) -> None:
@@ -184,6 +204,12 @@ class DirectAcceptance(LeafSystem):
         self._proposals = self.DeclareAbstractInputPort("proposals", Value(object()))
         self.DeclareVectorOutputPort(
             "answers", 2 * count, self._calc_answers, prerequisites_of_calc={self._proposals.ticket()}
+        )
+        self.DeclareAbstractOutputPort(
+            "reports",
+            lambda: Value(object()),
+            lambda context, output: output.set_value(((),) * count),
+            prerequisites_of_calc={self.nothing_ticket()},
         )
 
     def _calc_answers(self, context: Context, output: BasicVector) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Self
 
+import numpy as np
 from pydrake.common.value import AbstractValue, Value
 from pydrake.systems.framework import Context, EventStatus, LeafSystem, State
 
@@ -15,14 +16,15 @@ from airground_drake.intervention.policy import Observation, Proposal
 from airground_drake.nsbc.motion import Motion
 from airground_drake.nsbc.task import Array
 from airground_drake.systems.decision import FIELDS
-from airground_drake.systems.messages import REFUSE, answer_to
+from airground_drake.systems.messages import REFUSE, Point, answer_to
 
 
 @dataclass(frozen=True)
 class PlannerMemory:
-    """Abstract state: per UGV what is on the desk, and everything sent and gone wrong so far."""
+    """Abstract state: per UGV what is on the desk, what refusals have taught, all sent and gone wrong so far."""
 
     desks: tuple[Desk, ...]
+    learnt: tuple[Point, ...] = ()
     sent: tuple[tuple[int, Proposal], ...] = ()
     faults: tuple[Fault, ...] = ()
 
@@ -35,10 +37,12 @@ class InterventionPlanner(LeafSystem):
     """Supervises every UGV; for those in mode INTERVENING it asks the behaviour database for proposals.
 
     It plans on the UAV's own map, which may miss obstacles. A refusal comes back through `answers` and moves
-    it to the next behaviour.
+    it to the next behaviour; the obstacles that the UGV senses come with it through `reports`, and the UAV
+    knows them from then on.
 
     Ports (n UGVs):
-        in  `team_position` (3(n+1)) m; `status` (4n) from EventTrigger; `answers` (2n), see `messages`.
+        in  `team_position` (3(n+1)) m; `status` (4n) from EventTrigger; `answers` (2n) and `reports`
+            (abstract), see `messages`.
         out `proposals` abstract, n of Proposal or None.
     Rate: one update per planning period, from t = 0. A proposal can act one period after it is made.
     """
@@ -77,6 +81,7 @@ class InterventionPlanner(LeafSystem):
         self._position = self.DeclareVectorInputPort("team_position", 3 * (n + 1))
         self._status = self.DeclareVectorInputPort("status", FIELDS * n)
         self._answers = self.DeclareVectorInputPort("answers", 2 * n)
+        self._reports = self.DeclareAbstractInputPort("reports", Value(object()))
         self._memory = self.DeclareAbstractState(Value(PlannerMemory((Desk(),) * n)))
         self.DeclareAbstractOutputPort(
             "proposals",
@@ -103,21 +108,26 @@ class InterventionPlanner(LeafSystem):
         answers = self._answers.Eval(context)
         t = context.get_time()
         desks, sent, faults = list(memory.desks), list(memory.sent), list(memory.faults)
+        refused = [answer_to(desk.proposal, answers, i) == REFUSE for i, desk in enumerate(desks)]
+        reported = {point for i, points in enumerate(self._reports.Eval(context)) if refused[i] for point in points}
+        fresh = tuple(sorted(reported - set(memory.learnt) - set(map(tuple, self._obstacles.tolist()))))
+        learnt = memory.learnt + fresh
+        obstacles = np.concatenate([self._obstacles, np.array(learnt).reshape(-1, 3)])
         for i, robot in enumerate(self._ugvs):
             if modes[i] != Mode.INTERVENING:
                 desks[i] = Desk()
                 continue
             seen = Observation(
                 t=t, start=t + self._period, robot=robot, position=positions[i].copy(), target=self._targets[i],
-                preset=self._presets[i], obstacles=self._obstacles, safe_distance=self._safe_distance,
+                preset=self._presets[i], obstacles=obstacles, mapped=self._obstacles,
+                others=np.delete(positions, i, axis=0), safe_distance=self._safe_distance,
                 refusals=desks[i].refusals,
             )  # fmt: skip
-            refused = answer_to(desks[i].proposal, answers, i) == REFUSE
-            desk, failed = self._database.plan(desks[i], seen, refused)
+            desk, failed = self._database.plan(desks[i], seen, refused=refused[i], learnt=bool(fresh))
             faults += failed
             if desk.proposal is not None and desk.proposal is not desks[i].proposal:
                 sent.append((i, desk.proposal))
             desks[i] = desk
-        new = PlannerMemory(tuple(desks), tuple(sent), tuple(faults))
+        new = PlannerMemory(tuple(desks), learnt, tuple(sent), tuple(faults))
         state.get_mutable_abstract_state(int(self._memory)).set_value(new)
         return EventStatus.Succeeded()

@@ -1,7 +1,8 @@
 """The bidirectional channel: proposals from the UAV, answers from the UGVs.
 
 An answer is two numbers per UGV: ACCEPT, REFUSE or SILENT, and the time of issue of the proposal that it
-answers. An answer to another proposal than the one in force means nothing.
+answers. An answer to another proposal than the one in force means nothing. With it comes a report: the obstacles
+that the UGV sensed when it decided.
 """
 
 from __future__ import annotations
@@ -12,6 +13,12 @@ from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.task import Array
 
 ACCEPT, SILENT, REFUSE = 1.0, 0.0, -1.0
+
+Point = tuple[float, float, float]
+"""Centre of an obstacle, m, world frame."""
+
+Reports = tuple[tuple[Point, ...], ...]
+"""Per UGV, the obstacles that it sensed at its last decision; empty if it has not decided."""
 
 Proposals = tuple[Proposal | None, ...]
 """One entry per UGV."""

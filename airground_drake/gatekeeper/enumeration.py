@@ -1,0 +1,148 @@
+"""All binary plans with a minimum dwell, by the exact cost (25)-(26d), in bounded time."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from airground_drake.gatekeeper.candidates import Constants, block_of_stage, choose
+from airground_drake.gatekeeper.problem import Decision, Problem
+from airground_drake.nsbc.task import Array
+
+
+class EnumerationRoute:
+    """Exact minimum of (26) over the plans that are constant on blocks of N / `blocks` stages.
+
+    Mode velocities are data, so that a plan's cost is a sum over its stages and two plans share the cost of
+    their common prefix. The tree of 2^blocks plans is searched depth first; a branch is cut where its cost so
+    far plus a lower bound of the rest is not below the best plan known. The rest is bounded by the task error
+    from the box that any plan stays in (see `_tail`). Distances are exact: no half-planes, no relaxation.
+
+    Both halves of the tree (plans that start by accepting, by refusing) are searched separately, so that both
+    `objective_accept` and `objective_refuse` are exact. `lower_bound` equals `objective` and the gap is 0:
+    among the plans with this dwell, not among all binary plans. Without any cut it visits 2^(blocks + 1)
+    blocks: that bounds its time.
+    """
+
+    def __init__(self, blocks: int = 10) -> None:
+        """Compile the search.
+
+        Raises:
+            ValueError: if `blocks` is not from 1 to 20.
+        """
+        if not 1 <= blocks <= 20:
+            raise ValueError(f"blocks: {blocks}, allowed: 1 to 20")
+        self._blocks = blocks
+        none = np.zeros((1, 0, 3))
+        row = np.zeros((1, 3))
+        self.decide(Problem(1.0, np.zeros(3), row, row, row, none, np.zeros(0), 1.0, 1.0))
+
+    def decide(self, problem: Problem) -> Decision:
+        """Accept or refuse; a tie accepts. Never raises for a broken problem, but refuses and says why."""
+        if not problem.is_finite():
+            return Decision(False, "refused_not_finite")
+        constants = Constants.of(problem)
+        if not constants.are_finite():
+            return Decision(False, "refused_not_finite")
+        block = block_of_stage(problem.stages, self._blocks)
+        starts = np.searchsorted(block, np.arange(block[-1] + 2)).astype(np.int64)
+        modes = np.stack([problem.refuse, problem.accept])
+        tail = _tail(problem)
+        halves = []
+        for first, plan in enumerate((constants.refuse, constants.accept)):
+            chosen = _search(
+                first, plan.objective, starts, problem.dt, problem.initial, modes, problem.reference,
+                problem.centres, problem.distances, problem.error_weight, problem.slack_weight, tail,
+            )  # fmt: skip
+            found = problem.evaluate(chosen[block])
+            halves.append(found if found.objective <= plan.objective else plan)
+        refuse, accept = halves
+        bound = min(accept.objective, refuse.objective)
+        return choose(problem, (accept, refuse), lower_bound=bound, gap=0.0)
+
+
+def _tail(problem: Problem) -> Array:
+    """Lower bound of (25) over the stages from k on, for k = 0..N, (N + 1,): task error from the reachable box."""
+    both = np.stack([problem.accept, problem.refuse])
+    low = problem.initial + problem.dt * np.cumsum(both.min(axis=0), axis=0)
+    high = problem.initial + problem.dt * np.cumsum(both.max(axis=0), axis=0)
+    outside = np.maximum(0.0, np.maximum(low - problem.reference, problem.reference - high))
+    stage = problem.dt * problem.error_weight * np.square(outside).sum(axis=1)
+    # the last digits of the running sums must not cut an optimum
+    return (1.0 - 1e-9) * np.concatenate([np.cumsum(stage[::-1])[::-1], [0.0]])
+
+
+@njit(cache=True)
+def _search(
+    first: int,
+    known: float,
+    starts: npt.NDArray[np.int64],
+    dt: float,
+    initial: Array,
+    modes: Array,
+    reference: Array,
+    centres: Array,
+    distances: Array,
+    error_weight: float,
+    slack_weight: float,
+    tail: Array,
+) -> Array:
+    """Modes (B,) of the cheapest plan whose first block has mode `first`; constant if none is below `known`.
+
+    Args:
+        first: 0 or 1.
+        known: cost of the constant plan.
+        starts: first stage of each block and N, (B + 1,).
+        dt: s.
+        initial: (3,), m.
+        modes: velocities of the modes, (2, N, 3), m/s.
+        reference: (N, 3), m.
+        centres: (N, m, 3), m.
+        distances: (m,), m.
+        error_weight: a of (25).
+        slack_weight: b of (25).
+        tail: lower bound of the cost from stage k on, (N + 1,).
+    """
+    depth = len(starts) - 1
+    best = np.full(depth, float(first))
+    at = np.empty((depth + 1, 3))
+    at[0] = initial
+    cost = np.zeros(depth + 1)
+    mode = np.zeros(depth, dtype=np.int64)
+    tried = np.zeros(depth, dtype=np.int64)
+    b = 0
+    while b >= 0:
+        if tried[b] == (1 if b == 0 else 2):
+            b -= 1
+            continue
+        # the mode of the block before comes first: constant continuations are good incumbents
+        before = first if b == 0 else mode[b - 1]
+        mode[b] = before if tried[b] == 0 else 1 - before
+        tried[b] += 1
+        total, limit = cost[b], known - tail[starts[b + 1]]
+        x, y, z = at[b, 0], at[b, 1], at[b, 2]
+        for k in range(starts[b], starts[b + 1]):
+            x += dt * modes[mode[b], k, 0]
+            y += dt * modes[mode[b], k, 1]
+            z += dt * modes[mode[b], k, 2]
+            slack = 0.0
+            for m in range(len(distances)):
+                squared = (x - centres[k, m, 0]) ** 2 + (y - centres[k, m, 1]) ** 2 + (z - centres[k, m, 2]) ** 2
+                slack = max(slack, distances[m] - np.sqrt(squared))
+            error = (reference[k, 0] - x) ** 2 + (reference[k, 1] - y) ** 2 + (reference[k, 2] - z) ** 2
+            total += dt * (error_weight * error + slack_weight * slack * slack)
+            if total >= limit:
+                break
+        if total >= limit:
+            continue
+        if b == depth - 1:
+            known = total
+            for i in range(depth):
+                best[i] = float(mode[i])
+            continue
+        b += 1
+        at[b, 0], at[b, 1], at[b, 2] = x, y, z
+        cost[b] = total
+        tried[b] = 0
+    return best

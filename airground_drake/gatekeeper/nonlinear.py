@@ -1,0 +1,163 @@
+"""(27) as the paper has it, with the exact distances of (26d): a nonlinear program, then sum-up rounding."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal, get_args
+
+import numpy as np
+from pydrake.solvers import IpoptSolver, MathematicalProgram, QuadraticConstraint, SnoptSolver, SolverOptions
+
+from airground_drake.gatekeeper.candidates import Constants, choose
+from airground_drake.gatekeeper.half_planes import reachable
+from airground_drake.gatekeeper.problem import Decision, Evaluation, Problem
+from airground_drake.gatekeeper.rounding import rounding_deviation, sum_up_rounding
+from airground_drake.nsbc.task import Array
+
+NlpSolver = Literal["snopt", "ipopt"]
+
+_AXES = 2  # UGVs move in their plane
+
+_SOLVERS = {"snopt": SnoptSolver, "ipopt": IpoptSolver}
+
+_OPTIONS: dict[str, dict[str, float | int]] = {
+    "snopt": {
+        "Major iterations limit": 200,
+        "Iterations limit": 20000,
+        "Major optimality tolerance": 1e-5,
+        "Major feasibility tolerance": 1e-6,
+    },
+    "ipopt": {"max_iter": 300, "tol": 1e-6},
+}
+"""Limits are iterations, not seconds: the same problem must give the same decision on every machine."""
+
+
+class NonlinearRoute:
+    """Relax, solve to a local optimum, round.
+
+    (26d), ||p - o|| >= d - u, is not ||p - o||^2 >= (d - u)^2: squared, a slack u > d would push the robot
+    away again, and u > d is needed where the points of a stage have different d. So each pair of stage and
+    point gets a radius r >= 0:
+
+        r >= d - u,    ||p - o||^2 >= r^2.
+
+    Such an r exists exactly if ||p - o|| >= max(0, d - u), which is (26d); all functions are smooth, also at
+    p = o. Only pairs that some plan can bring within d are in the program.
+
+    The start is the cheaper constant plan. The plan returned is the cheapest, by the exact cost (25), of the
+    rounded one and the two constant ones. A local optimum bounds nothing: `lower_bound` and `gap` are -1.
+    """
+
+    def __init__(self, solver: NlpSolver = "snopt") -> None:
+        """Choose the solver; both come with Drake and need no licence.
+
+        Raises:
+            ValueError: if the solver is unknown or not in this build of Drake.
+        """
+        if solver not in _SOLVERS:
+            raise ValueError(f"solver: {solver!r}, allowed: {', '.join(get_args(NlpSolver))}")
+        self._solver = _SOLVERS[solver]()
+        if not (self._solver.available() and self._solver.enabled()):
+            raise ValueError(f"solver: {solver!r} is not available in this build of Drake")
+        self._options = SolverOptions()
+        for name, value in _OPTIONS[solver].items():
+            self._options.SetOption(self._solver.solver_id(), name, value)
+
+    def decide(self, problem: Problem) -> Decision:
+        """Accept or refuse: never raises for a hard or broken problem, but refuses and says why."""
+        if not problem.is_finite():
+            return Decision(False, "refused_not_finite")
+        constants = Constants.of(problem)
+        if not constants.are_finite():
+            return Decision(False, "refused_not_finite")
+        relaxed = self._solve(problem, constants.better)
+        if relaxed is None:
+            return constants.failed()
+        rounded = sum_up_rounding(relaxed)
+        return choose(
+            problem,
+            (problem.evaluate(rounded), constants.accept, constants.refuse),
+            relaxed_first_stage=float(relaxed[0]),
+            deviation=rounding_deviation(relaxed, rounded, problem.dt),
+        )
+
+    def _solve(self, problem: Problem, start: Evaluation) -> Array | None:
+        nlp = relaxation(problem, start)
+        try:
+            result = self._solver.Solve(nlp.program, nlp.guess, self._options)
+        except RuntimeError:
+            return None
+        omega = result.GetSolution(nlp.omega)
+        if not result.is_success() or not np.isfinite(omega).all():
+            return None
+        clipped: Array = np.clip(omega, 0.0, 1.0)
+        return clipped
+
+
+@dataclass(frozen=True, eq=False)
+class Relaxation:
+    """(27) as a program: its variables omega (N,) and an initial guess for all of its variables."""
+
+    program: MathematicalProgram
+    omega: Any
+    guess: Array
+
+
+def relaxation(problem: Problem, start: Evaluation) -> Relaxation:
+    """Multiple shooting in the task errors e = p - reference, (2N,), omega (N,), u (N,) and one r per pair.
+
+    Args:
+        problem: data of (26).
+        start: the plan whose states are the initial guess.
+    """
+    stages, dt = problem.stages, problem.dt
+    size = _AXES * stages
+    stage, point = np.nonzero(reachable(problem))
+    program = MathematicalProgram()
+    e = program.NewContinuousVariables(size, "e")
+    omega = program.NewContinuousVariables(stages, "omega")
+    u = program.NewContinuousVariables(stages, "u")
+    r = program.NewContinuousVariables(len(stage), "r")
+
+    for name, weight, variables in (("error", problem.error_weight, e), ("slack", problem.slack_weight, u)):
+        hessian = 2.0 * weight * dt * np.eye(len(variables))
+        cost = program.AddQuadraticCost(hessian, np.zeros(len(variables)), variables, is_convex=True)
+        cost.evaluator().set_description(f"(25) {name}")
+    program.AddBoundingBoxConstraint(0.0, 1.0, omega).evaluator().set_description("(27c) relaxed")
+    program.AddBoundingBoxConstraint(0.0, np.inf, u).evaluator().set_description("(27e)")
+
+    before = np.vstack([problem.initial, problem.reference[:-1]])
+    drift = (dt * problem.refuse + before - problem.reference)[:, :_AXES]
+    change = np.zeros((size, stages))
+    for axis in range(_AXES):
+        change[_AXES * np.arange(stages) + axis, np.arange(stages)] = dt * (problem.accept - problem.refuse)[:, axis]
+    dynamics = np.hstack([np.eye(size) - np.eye(size, k=-_AXES), -change])
+    program.AddLinearEqualityConstraint(
+        dynamics, drift.ravel(), np.concatenate([e, omega])
+    ).evaluator().set_description("(23), (27b)")
+
+    distance = problem.distances[point]
+    offset = start.positions[stage] - problem.centres[stage, point]
+    if len(stage):
+        program.AddBoundingBoxConstraint(0.0, np.inf, r).evaluator().set_description("radius of (27d)")
+        picks = np.zeros((len(stage), stages))
+        picks[np.arange(len(stage)), stage] = 1.0
+        program.AddLinearConstraint(
+            np.hstack([np.eye(len(stage)), picks]), distance, np.full(len(stage), np.inf), np.concatenate([r, u])
+        ).evaluator().set_description("(27d) radius and slack")
+    away = problem.reference[stage] - problem.centres[stage, point]
+    away[:, 2] = offset[:, 2]  # the height does not change
+    hessian = np.diag([2.0, 2.0, -2.0])
+    for i, k in enumerate(stage.tolist()):
+        # ||e + away||^2 >= r^2
+        program.AddQuadraticConstraint(
+            hessian, np.array([2.0 * away[i, 0], 2.0 * away[i, 1], 0.0]), -float(away[i] @ away[i]), np.inf,
+            np.array([e[_AXES * k], e[_AXES * k + 1], r[i]]), QuadraticConstraint.HessianType.kIndefinite,
+        ).evaluator().set_description(f"(27d) stage {k} point {int(point[i])}")  # fmt: skip
+
+    lacking = np.maximum(0.0, distance - np.linalg.norm(offset, axis=1))
+    slack = np.zeros(stages)
+    np.maximum.at(slack, stage, lacking)
+    errors = (start.positions - problem.reference)[:, :_AXES].ravel()
+    guess = np.concatenate([errors, start.omega, slack, np.maximum(0.0, distance - slack[stage])])
+    return Relaxation(program, omega, guess)

@@ -1,0 +1,90 @@
+"""Wrong interventions: what a UAV may propose under occlusion, noise, a stale map or malice."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from airground_drake.intervention.detour import Detour
+from airground_drake.intervention.policy import Observation, Policy
+from airground_drake.nsbc.motion import Motion
+from airground_drake.nsbc.task import Array
+
+
+class Towards(Policy):
+    """Straight to a fixed point, and stay there: the paper's wrong intervention of case B."""
+
+    def __init__(self, *, x_m: float, y_m: float, speed_m_s: float) -> None:
+        """Set the point, m, and the speed, m/s; raises ValueError unless the speed is positive."""
+        self.point = np.array([x_m, y_m])
+        self.speed = _positive("towards", speed_m_s)
+
+    def propose(self, seen: Observation) -> Motion | None:
+        """The straight way from here, whatever stands there."""
+        return _straight(seen, np.append(self.point, seen.position[2]), self.speed)
+
+
+class StaleMap(Detour):
+    """The detour on the map as it was at the start: what refusals have taught is ignored."""
+
+    def propose(self, seen: Observation) -> Motion | None:
+        """The detour round the obstacles of the original map."""
+        return super().propose(replace(seen, obstacles=seen.mapped))
+
+
+class Noisy(Detour):
+    """The detour with errors of measurement: every vertex displaced by independent Gaussian noise in the plane."""
+
+    def __init__(
+        self, *, speed_m_s: float, noise_m: float, seed: float = 0.0, clearance_m: float = 0.05, follow_s: float = 5.0
+    ) -> None:
+        """As Detour, with the noise's standard deviation, m, and the seed of its sequence."""
+        super().__init__(speed_m_s=speed_m_s, clearance_m=clearance_m, follow_s=follow_s)
+        if not noise_m >= 0.0:
+            raise ValueError(f"noisy needs noise_m >= 0, got {noise_m!r}")
+        self.noise, self.seed = noise_m, int(seed)
+
+    def propose(self, seen: Observation) -> Motion | None:
+        """The displaced detour; the same at the same time for the same seed."""
+        motion = super().propose(seen)
+        if motion is None:
+            return None
+        random = np.random.default_rng([self.seed, round(1e6 * seen.t)])
+        shift = np.zeros(motion.positions.shape)
+        shift[:, :2] = random.normal(scale=self.noise, size=(len(shift), 2))
+        return Motion(motion.times, motion.positions + shift)
+
+
+class Hostile(Policy):
+    """As dangerous as a speed bound allows: straight into the nearest obstacle or robot, anew at each proposal."""
+
+    def __init__(self, *, speed_m_s: float) -> None:
+        """Set the speed, m/s; raises ValueError unless it is positive."""
+        self.speed = _positive("hostile", speed_m_s)
+
+    def propose(self, seen: Observation) -> Motion | None:
+        """The straight way to the centre of what is nearest."""
+        around = np.concatenate([seen.obstacles, seen.others])
+        if not len(around):
+            return None
+        nearest = around[np.linalg.norm(around - seen.position, axis=1).argmin()]
+        return _straight(seen, np.append(nearest[:2], seen.position[2]), self.speed)
+
+
+def _straight(seen: Observation, goal: Array, speed: float) -> Motion:
+    length = float(np.linalg.norm(goal - seen.position))
+    if length == 0.0:
+        return Motion(np.array([seen.start, seen.start + HOLD_S]), np.array([goal, goal]))
+    arrival = seen.start + length / speed
+    return Motion(np.array([seen.start, arrival, arrival + HOLD_S]), np.array([seen.position, goal, goal]))
+
+
+HOLD_S = 1e4
+"""How long a wrong intervention holds its goal, s: in effect, until it is refused."""
+
+
+def _positive(policy: str, speed: float) -> float:
+    if not speed > 0.0:
+        raise ValueError(f"{policy} needs speed_m_s > 0, got {speed!r}")
+    return speed

@@ -1,0 +1,275 @@
+"""Time and cost of every solution route of (26) on the same problems, side by side.
+
+    python benchmarks/gatekeeper.py [--quick] [--routes relaxed,enumeration] [-o table.csv]
+
+Problems are those that the gatekeeper of case A was given in a run, and closed loops rolled out among random
+discs (a detour or a straight line proposed), for one and two UGVs. A decision is one sample: with two UGVs, both
+problems. Times are CPU times of the process. `excess` is the cost (25) above the best known of
+all rows of the same problem, in per cent of the cheaper constant plan's cost (relative to the best cost it would
+mean nothing where that is almost 0); `other_choice` counts the problems where the first stage is not that of the
+best plan known. CasADi with IPOPT and cvxpy with SCIP take part if they are installed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import logging
+import time
+from collections.abc import Callable, Iterator
+from importlib.util import find_spec
+from typing import Any
+
+import cvxpy
+import numpy as np
+
+from airground_drake import diagram
+from airground_drake.gatekeeper.candidates import Constants, choose
+from airground_drake.gatekeeper.half_planes import normals_along
+from airground_drake.gatekeeper.nonlinear import NonlinearRoute
+from airground_drake.gatekeeper.prediction import Horizon, Scene, UgvLaw, predicted_problem
+from airground_drake.gatekeeper.problem import Decision, Problem
+from airground_drake.gatekeeper.relaxed import RelaxedRoute
+from airground_drake.gatekeeper.rounding import sum_up_rounding
+from airground_drake.intervention.paths import NoPath, shortest_path
+from airground_drake.intervention.policy import Proposal
+from airground_drake.nsbc.avoidance import Avoidance
+from airground_drake.nsbc.motion import Motion
+from airground_drake.scenarios.load import load
+from airground_drake.simulation import Recorder
+
+Sample = list[Problem]
+"""The problems of one decision, one per UGV."""
+
+COLUMNS = ("problems", "ugvs", "points", "stages", "route", "decisions", "p50_ms", "p99_ms", "max_ms",
+           "mean_excess_%", "max_excess_%", "accepted", "other_choice", "no_optimum")  # fmt: skip
+SLOW = {"nonlinear_ipopt": 60, "cvxpy+scip": 60}
+"""Most stages, and one in ten decisions, for what takes seconds."""
+SCIP_LIMIT_S = 10.0
+
+
+# --- problems ----------------------------------------------------------------------------------------------------
+
+
+def recorded(run: str, most: int) -> list[Sample]:
+    """Evenly spaced among the problems that the gatekeeper solved in a run of case A."""
+    seen: list[Sample] = []
+
+    class Listening(RelaxedRoute):
+        def decide(self, problem: Problem) -> Decision:
+            seen.append([problem])
+            return super().decide(problem)
+
+    scenario = load("case_a")[0]
+    diagram.ROUTES["listening"] = Listening
+    scenario.gatekeeper.route = "listening"
+    Recorder(scenario, run, scenario.runs[run]).simulate()
+    del diagram.ROUTES["listening"]
+    return seen[:: -(-len(seen) // most)]
+
+
+def rolled_out(rng: np.random.Generator, ugvs: int, discs: int, stages: int, safe: float) -> Sample:
+    """UGVs among the same discs, all within sensing range of the first; each senses the others, which move."""
+    law = UgvLaw(Avoidance(3.0, 0.05, 4.0), 2.0, 1.5, intervention_on_top=False)
+    angle, radius = rng.uniform(-np.pi, np.pi, discs), rng.uniform(safe + 0.1, 3.8, discs)
+    centres = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), np.zeros(discs)])
+    starts, speeds = np.zeros((ugvs, 3)), rng.uniform(-0.5, 0.5, (ugvs, 3)) * [1, 1, 0]
+    for i in range(1, ugvs):
+        while min(np.linalg.norm(centres - starts[i], axis=1).min(), np.linalg.norm(starts[i])) < safe:
+            starts[i] = rng.uniform(-3.5, 3.5, 3) * [1, 1, 0]
+    sample = []
+    for i in range(ugvs):
+        others = [j for j in range(ugvs) if j != i]
+        goal = starts[i] + rng.uniform(-6.0, 6.0, 3) * [1, 1, 0]
+        preset = Motion.at_speed(np.array([starts[i], goal]), 0.56, start=-rng.uniform(0.0, 4.0))
+        aim = goal if rng.random() < 0.7 else starts[i] + rng.uniform(-6.0, 6.0, 3) * [1, 1, 0]
+        scene = Scene(
+            t=0.0,
+            position=starts[i],
+            preset=preset,
+            centres=np.concatenate([centres, starts[others]]),
+            velocities=np.concatenate([np.zeros((discs, 3)), speeds[others]]),
+            distances=np.full(discs + ugvs - 1, safe),
+            shares=np.concatenate([np.ones(discs), np.full(ugvs - 1, 0.5)]),
+            max_speed=3.0,
+        )
+        motion = Motion.at_speed(way(starts[i], aim, centres, safe + 0.05), 2.85, start=0.0)
+        horizon = Horizon(stages, 1, 1.0, 1000.0)
+        sample.append(predicted_problem(scene, law, Proposal("proposed", 0.0, motion), horizon))
+    return sample
+
+
+def way(start: np.ndarray, goal: np.ndarray, centres: np.ndarray, radius: float) -> np.ndarray:
+    """Shortest way round the discs as points (k, 3), m; straight where there is none."""
+    try:
+        path = shortest_path(start[:2], goal[:2], centres[:, :2], np.full(len(centres), radius))
+    except NoPath:
+        return np.array([start, goal])
+    count = max(2, int(path.length_m / 0.1))
+    return np.array([[*path.at(path.length_m * k / count)[0], start[2]] for k in range(count + 1)])
+
+
+def groups(quick: bool) -> Iterator[tuple[str, int, int, int, list[Sample]]]:
+    """Name, UGVs, points, stages and samples of every group."""
+    many, few = (20, 5) if quick else (200, 30)
+    for run in ("c", "d"):
+        samples = recorded(run, many)
+        yield f"case A, run {run}", 1, max(len(s[0].distances) for s in samples), samples[0][0].stages, samples
+
+    def random(ugvs: int, discs: int, stages: int, safe: float, count: int) -> tuple[int, int, int, list[Sample]]:
+        rng = np.random.default_rng([ugvs, discs, stages])
+        samples = [rolled_out(rng, ugvs, discs, stages, safe) for _ in range(count)]
+        return ugvs, discs + ugvs - 1, stages, samples
+
+    for ugvs in (1, 2):
+        for discs in (1, 2, 3, 4):
+            yield "random", *random(ugvs, discs, 60, 2.0, many)
+    for stages in (30, 120) if quick else (30, 60, 120, 240):
+        yield "growth with N", *random(1, 2, stages, 2.0, few)
+    for discs in (1, 16) if quick else (1, 2, 4, 8, 16):
+        yield "growth with points", *random(1, discs, 60, 1.0, few)
+
+
+# --- references --------------------------------------------------------------------------------------------------
+
+
+class CasadiRoute:
+    """(27) with exact distances in CasADi, IPOPT with exact Hessians, sum-up rounding."""
+
+    def decide(self, problem: Problem) -> Decision:
+        """Build, solve, round."""
+        import casadi
+
+        stages, points = problem.centres.shape[:2]
+        constants = Constants.of(problem)
+        p, omega, u = casadi.SX.sym("p", 2, stages), casadi.SX.sym("w", stages), casadi.SX.sym("u", stages)
+        velocity = problem.refuse[:, :2].T + casadi.repmat(omega.T, 2, 1) * (problem.accept - problem.refuse)[:, :2].T
+        before = casadi.horzcat(problem.initial[:2], p[:, :-1])
+        rows, low = [casadi.vec(p - before - problem.dt * velocity)], [np.zeros(2 * stages)]
+        for m in range(points):
+            offset = p - problem.centres[:, m, :2].T
+            height = problem.initial[2] - problem.centres[:, m, 2]
+            rows.append(casadi.sqrt(casadi.sum1(offset**2).T + height**2 + 1e-12) + u)
+            low.append(np.full(stages, problem.distances[m]))
+        error = casadi.sumsqr(p - problem.reference[:, :2].T)
+        cost = problem.dt * (problem.error_weight * error + problem.slack_weight * casadi.sumsqr(u))
+        nlp = {"x": casadi.vertcat(casadi.vec(p), omega, u), "f": cost, "g": casadi.vertcat(*rows)}
+        silent = {"print_time": False, "ipopt.print_level": 0, "ipopt.sb": "yes"}
+        solver = casadi.nlpsol("nlp", "ipopt", nlp, silent)
+        lower = np.concatenate([np.full(2 * stages, -np.inf), np.zeros(2 * stages)])
+        upper = np.concatenate([np.full(2 * stages, np.inf), np.ones(stages), np.full(stages, np.inf)])
+        start = constants.better
+        guess = np.concatenate([start.positions[:, :2].ravel(), start.omega, np.zeros(stages)])
+        high = np.concatenate([np.zeros(2 * stages), np.full(stages * points, np.inf)])
+        solution = solver(x0=guess, lbx=lower, ubx=upper, lbg=np.concatenate(low), ubg=high)
+        if not solver.stats()["success"]:
+            return constants.failed()
+        relaxed = np.clip(np.asarray(solution["x"]).ravel()[2 * stages : 3 * stages], 0.0, 1.0)
+        return choose(problem, (problem.evaluate(sum_up_rounding(relaxed)), constants.accept, constants.refuse))
+
+
+class ScipRoute:
+    """The convexified problem with one binary per stage, SCIP through cvxpy."""
+
+    def decide(self, problem: Problem) -> Decision:
+        """Build and solve, up to the time limit."""
+        constants = Constants.of(problem)
+        normals = normals_along(problem, constants.better.positions)
+        omega, u = cvxpy.Variable((problem.stages, 1), boolean=True), cvxpy.Variable(problem.stages, nonneg=True)
+        velocity = problem.refuse + cvxpy.multiply(omega, problem.accept - problem.refuse)
+        p = problem.initial[None] + problem.dt * cvxpy.cumsum(velocity, axis=0)
+        rows: list[Any] = [
+            cvxpy.sum(cvxpy.multiply(normals[:, m], p - problem.centres[:, m]), axis=1) >= d - u
+            for m, d in enumerate(problem.distances)
+        ]
+        error = problem.error_weight * cvxpy.sum_squares(problem.reference - p)
+        cost = problem.dt * (error + problem.slack_weight * cvxpy.sum_squares(u))
+        model = cvxpy.Problem(cvxpy.Minimize(cost), rows)
+        try:
+            model.solve(solver="SCIP", scip_params={"limits/time": SCIP_LIMIT_S})
+        except cvxpy.SolverError:
+            return constants.failed()
+        if model.status != "optimal" or omega.value is None:
+            return constants.failed()
+        plan = problem.evaluate((omega.value[:, 0] > 0.5).astype(float))
+        return choose(problem, (plan, constants.accept, constants.refuse))
+
+
+def contestants() -> dict[str, Callable[[], Any]]:
+    """Every route, and the references that are installed."""
+    routes: dict[str, Callable[[], Any]] = dict(diagram.ROUTES)
+    routes["nonlinear_ipopt"] = lambda: NonlinearRoute("ipopt")
+    for name, module, make in (("casadi+ipopt", "casadi", CasadiRoute), ("cvxpy+scip", "pyscipopt", ScipRoute)):
+        if find_spec(module) is None:
+            print(f"{name}: {module} is not installed, left out")
+        else:
+            routes[name] = make
+    return routes
+
+
+# --- measurement -------------------------------------------------------------------------------------------------
+
+
+def measure(route: Any, samples: list[Sample]) -> tuple[np.ndarray, list[list[Decision]]]:
+    """CPU time of each decision, ms, and what was decided; the first problem is solved once before."""
+    route.decide(samples[0][0])
+    times, decisions = [], []
+    for sample in samples:
+        started = time.process_time()
+        decisions.append([route.decide(problem) for problem in sample])
+        times.append(1e3 * (time.process_time() - started))
+    return np.array(times), decisions
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="a tenth of the problems")
+    parser.add_argument("-o", "--output", metavar="CSV", help="write the table there, too")
+    parser.add_argument("--routes", metavar="NAMES", help="only these, separated by commas (default: all)")
+    arguments = parser.parse_args()
+    logging.getLogger("drake").setLevel(logging.ERROR)  # solvers that give up are counted below
+    makers = contestants()
+    chosen = arguments.routes.split(",") if arguments.routes else list(makers)
+    if unknown := set(chosen) - set(makers):
+        parser.error(f"--routes: unknown {', '.join(sorted(unknown))}; allowed: {', '.join(makers)}")
+    routes = {name: makers[name]() for name in chosen}
+    layout = "{:<19}{:>5}{:>7}{:>7}  {:<17}{:>9}{:>9}{:>9}{:>9}{:>14}{:>13}{:>9}{:>13}{:>11}"
+    print(layout.format(*COLUMNS))
+    table = []
+    for title, ugvs, points, stages, samples in groups(arguments.quick):
+        results = {}
+        for name, route in routes.items():
+            if stages <= SLOW.get(name, stages):
+                step = 10 if name in SLOW else 1
+                results[name] = (step, *measure(route, samples[::step]))
+        best = [[Decision(False, "optimal", objective=np.inf)] * ugvs for _ in samples]
+        for step, _, decided in results.values():
+            for i, decisions in enumerate(decided):
+                for j, decision in enumerate(decisions):
+                    if decision.status == "optimal" and decision.objective < best[i * step][j].objective:
+                        best[i * step][j] = decision
+        for name, (step, times, decided) in results.items():
+            flat = [(d, best[i * step][j]) for i, ds in enumerate(decided) for j, d in enumerate(ds)]
+            scales = [Constants.of(problem).better.objective for sample in samples[::step] for problem in sample]
+            pairs = zip(flat, scales, strict=True)
+            excess = [
+                100.0 * (d.objective - b.objective) / max(scale, 1e-12)
+                for (d, b), scale in pairs
+                if d.status == "optimal"
+            ] or [np.nan]
+            row = (
+                title, ugvs, points, stages, name, len(times),
+                *(f"{t:.2f}" for t in (*np.percentile(times, [50, 99]), times.max())),
+                f"{np.mean(excess):.2f}", f"{np.max(excess):.2f}",
+                sum(d.accept for d, _ in flat), sum(d.accept != b.accept for d, b in flat),
+                sum(d.status != "optimal" for d, _ in flat),
+            )  # fmt: skip
+            table.append(row)
+            print(layout.format(*row), flush=True)
+    if arguments.output:
+        with open(arguments.output, "w", newline="", encoding="utf-8") as file:
+            csv.writer(file).writerows([COLUMNS, *table])
+
+
+if __name__ == "__main__":
+    main()

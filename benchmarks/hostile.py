@@ -1,0 +1,160 @@
+"""Attack the gatekeeper: hostile proposals at decision level, and whole runs with a hostile UAV.
+
+    python benchmarks/hostile.py --proposals 10000 --runs 300
+
+Decision level: UGVs at random safe places among obstacles, many exactly at the safe distance, with proposals of
+random position, speed, direction and course, a third of them aimed at what is nearest. Under method (d) each one
+is executed whether accepted or not; under (c) only if its gatekeeper accepts. Whole runs: case A with the
+policies `hostile`, `towards` and `noisy` of random parameters, a gatekeeper that accepts nearly anything, and
+obstacles that the UAV does not know. Distances are exact in continuous time.
+"""
+
+from __future__ import annotations
+
+import argparse
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from airground_drake.diagram import make_presets, make_team
+from airground_drake.gatekeeper.prediction import Horizon, Scene, UgvLaw, predicted_problem
+from airground_drake.gatekeeper.relaxed import RelaxedRoute
+from airground_drake.intervention.policy import Proposal
+from airground_drake.nsbc.avoidance import Avoidance
+from airground_drake.nsbc.motion import Motion
+from airground_drake.nsbc.task import Array
+from airground_drake.scenarios.load import load
+from airground_drake.scenarios.schema import Policy, Run
+from airground_drake.simulation import Recorder
+from airground_drake.systems.controllers import UgvController
+from airground_drake.verify.safety import SafeTrace
+
+STEPS = 30
+"""Control periods for which a proposal is executed at decision level."""
+
+
+def attack(random: np.random.Generator, start: Array, centres: Array, t: float) -> Motion:
+    """A hostile motion: some corners, held or jumping, a third of them at the nearest obstacle."""
+    count = int(random.integers(1, 6))
+    corners = start + random.normal(scale=random.choice([0.5, 3.0, 30.0]), size=(count, 3)) * [1, 1, 0]
+    if random.random() < 1 / 3:
+        nearest = centres[np.linalg.norm(centres - start, axis=1).argmin()]
+        corners[-1] = start + (nearest - start) * random.choice([0.5, 1.0, 1.5]) * [1, 1, 0]
+    times = t + np.cumsum(random.choice([1e-3, 0.05, 0.5]) * random.uniform(0.1, 1.0, count + 1))
+    return Motion(times, np.vstack([start, corners]))
+
+
+def at_decision_level(seed: int, proposals: int) -> tuple[float, int, int]:
+    """Worst margin under (d), m; proposals that (c) accepted; those of them that then came below d."""
+    random = np.random.default_rng(seed)
+    scenario = load("case_a")[0]
+    base, presets = make_team(scenario), make_presets(scenario)
+    gate = scenario.gatekeeper
+    horizon = Horizon(gate.stages, 1, gate.error_weight_1_m2_s, gate.slack_weight_1_m2_s)
+    avoidance = Avoidance(scenario.control.avoidance_gain_1_s, scenario.control.period_s, 4.0)
+    route, h, d = RelaxedRoute(), avoidance.period, base.obstacle_distance
+    worst, accepted, below = np.inf, 0, 0
+    for _ in range(proposals):
+        centres = np.column_stack([random.uniform(-4.0, 4.0, (4, 2)), np.zeros(4)])
+        start = safe_start(random, centres, d)
+        team = replace(base, obstacles=centres)
+        t = float(random.uniform(0.0, 20.0))
+        proposal = Proposal("hostile", t, attack(random, start, centres, t))
+        for on_top in (False, True):
+            law = UgvLaw(avoidance, 2.0, 1.5, intervention_on_top=on_top)
+            if on_top:
+                scene = Scene(t, start, presets[0], centres, np.zeros((4, 3)), np.full(4, d), np.ones(4), 3.0)
+                if not route.decide(predicted_problem(scene, law, proposal, horizon)).accept:
+                    continue
+                accepted += 1
+            controller = UgvController(
+                team, avoidance, motion_gain=2.0, intervention_gain=1.5, intervention_on_top=on_top
+            )
+            margin = execute(controller, presets[0], proposal, start, t, h, centres) - d
+            if on_top:
+                below += margin < -1e-9
+            else:
+                worst = min(worst, margin)
+    return worst, accepted, below
+
+
+def safe_start(random: np.random.Generator, centres: Array, d: float) -> Array:
+    """A place at least d from all centres; half of the time exactly d from one."""
+    while True:
+        start = np.append(random.uniform(-5.0, 5.0, 2), 0.0)
+        if random.random() < 0.5:
+            angle = random.uniform(0.0, 2.0 * np.pi)
+            start = centres[random.integers(len(centres))] + d * np.array([np.cos(angle), np.sin(angle), 0.0])
+        if (np.linalg.norm(centres - start, axis=1) >= d).all():
+            return start
+
+
+def execute(
+    controller: UgvController, preset: Motion, proposal: Proposal, start: Array, t: float, h: float, centres: Array
+) -> float:
+    """Exact minimum distance of the UGV to the centres while it executes the proposal, m."""
+    positions = np.array([start, [-90.0, 0.0, 0.0], [-90.0, 0.0, 2.0]])
+    least = np.inf
+    for k in range(STEPS):
+        now = t + k * h
+        reference, rate = (np.array([value, np.zeros(3)]) for value in preset.at(now))
+        velocity = controller.velocity(now, positions, reference, rate, [proposal, None])
+        offset, step = positions[0] - centres, h * velocity[0]
+        length = step @ step
+        share = np.clip(-(offset @ step) / length, 0.0, 1.0) if length > 0.0 else np.zeros(len(centres))
+        least = min(least, float(np.linalg.norm(offset + share[:, None] * step, axis=1).min()))
+        positions[:2] += h * velocity
+    return least
+
+
+def whole_run(seed: int) -> tuple[float, int, float]:
+    """Margins, m, of one run under (d) and (c), and the number of proposals that (d) executed."""
+    random = np.random.default_rng(seed)
+    scenario = load("case_a", ["duration_s=20", f"seed={seed}"])[0]
+    x, y = random.uniform([-1.0, 3.0], [6.0, 10.0])
+    scenario.intervention.policies = [
+        [
+            Policy("hostile", {"speed_m_s": float(random.uniform(0.5, 30.0))}),
+            Policy("towards", {"x_m": x, "y_m": y, "speed_m_s": float(random.uniform(0.5, 10.0))}),
+            Policy("noisy", {"speed_m_s": 2.8, "noise_m": float(random.uniform(0.2, 3.0))}),
+        ][seed % 3]
+    ]
+    scenario.intervention.ranking, scenario.intervention.retry_s = "listed", 0.05
+    scenario.gatekeeper.error_weight_1_m2_s = float(random.choice([1.0, 30.0, 1000.0]))
+    scenario.obstacles["obstacle_2"].known_to_uav = bool(random.integers(2))
+    margins, executed = {}, 0
+    for method in ("d", "c"):
+        scenario.runs = {method: Run(method=method)}
+        trace = Recorder(scenario, method, scenario.runs[method]).simulate()
+        margin = SafeTrace().check(trace).margin
+        margins[method] = np.nan if margin is None else margin
+        if method == "d":
+            executed = sum(event["kind"] == "accept" for event in trace.events)
+    return margins["d"], executed, margins["c"]
+
+
+def main() -> None:
+    """Run both attacks and print what came of them."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--proposals", type=int, default=10_000)
+    parser.add_argument("--runs", type=int, default=300)
+    parser.add_argument("--jobs", type=int, default=2)
+    options = parser.parse_args()
+    with ProcessPoolExecutor(options.jobs) as pool:
+        share = options.proposals // 20
+        parts = list(pool.map(partial(at_decision_level, proposals=share), range(20)))
+        worst, accepted, below = min(p[0] for p in parts), sum(p[1] for p in parts), sum(p[2] for p in parts)
+        print(f"{20 * share} hostile proposals, each executed for {STEPS} control periods:")
+        print(f"  (d) worst margin to d: {worst:.3g} m")
+        print(f"  (c) accepted {accepted}, of which {below} then came below d")
+        if options.runs:
+            runs = np.array(list(pool.map(whole_run, range(options.runs), chunksize=5)))
+            print(f"{options.runs} whole runs with a hostile UAV:")
+            print(f"  (d) accepted {int(runs[:, 1].sum())} proposals; worst margin to d: {runs[:, 0].min():.3g} m")
+            print(f"  (c) runs below d: {int((runs[:, 2] < -1e-9).sum())}; worst margin: {runs[:, 2].min():.3g} m")
+
+
+if __name__ == "__main__":
+    main()
