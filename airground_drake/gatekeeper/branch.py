@@ -40,7 +40,7 @@ class BranchAndBoundRoute:
     the same half-planes and dwell. Its "binaries" are binary to a tolerance only, so that the plan is rounded
     and evaluated exactly, and the cheapest of it and the constant plans is returned.
 
-    Anything but a proven optimum refuses. Of roll-outs among random discs 2 to 3 % end so, because Clarabel
+    Anything but a proven optimum refuses. Of roll-outs among random discs 4 to 7 % end so, because Clarabel
     reports insufficient progress in a node; Drake hands no options on to it. At worst 2^(blocks + 1)
     relaxations are solved.
     """
