@@ -12,9 +12,10 @@ from airground_drake.nsbc.task import Array
 def normals_along(problem: Problem, positions: Array) -> Array:
     """Unit vectors (N, m, 3) from the points to a guiding trajectory (N, 3)."""
     offset = positions[:, None, :] - problem.centres
-    norm = np.linalg.norm(offset, axis=2, keepdims=True)
-    fallback = np.broadcast_to([1.0, 0.0, 0.0], offset.shape)
-    return np.where(norm > 1e-9, offset / np.maximum(norm, 1e-9), fallback)
+    norm = np.sqrt(np.einsum("kmi,kmi->km", offset, offset))[:, :, None]
+    if norm.min(initial=np.inf) > 1e-9:
+        return offset / norm
+    return np.where(norm > 1e-9, offset / np.maximum(norm, 1e-9), [1.0, 0.0, 0.0])
 
 
 def offsets(problem: Problem, normals: Array) -> Array:
