@@ -17,6 +17,7 @@ from airground_drake.errors import TraceError
 from airground_drake.intervention.database import POLICIES, PolicyError, make_policy
 from airground_drake.intervention.policy import Observation, Policy
 from airground_drake.nsbc.motion import Motion
+from airground_drake.report.reproduction import MEASURES
 from airground_drake.scenarios.load import load, shipped
 from airground_drake.scenarios.schema import Obstacle, Preset, Run, Scenario, Ugv
 from airground_drake.scenarios.schema import Policy as PolicyEntry
@@ -285,6 +286,7 @@ def test_case_b_refuses_the_wrong_intervention_and_accepts_the_right_one(run: Ru
     """B1-B3, B5: the collision without a gatekeeper, and the timeline with one."""
     collision = next(event for event in run("case_b", "b").events if event["kind"] == "collision")
     assert np.linalg.norm(np.array(collision["position_m"][:2]) - [5.5, 5.8]) < 0.1
+    assert MEASURES["execution_time"](run("case_b", "b"), "ugv1") == [pytest.approx(10.55)]
     for method in ("c", "d"):
         of_run = run("case_b", method)
         assert kinds(of_run, "ugv1") == ["trigger", "proposal", "refuse", "proposal", "accept", "release", "arrival"]

@@ -6,8 +6,7 @@ import numpy as np
 from pydrake.solvers import Binding, ClarabelSolver, MathematicalProgram, QuadraticCost, SolverOptions
 
 from airground_drake.gatekeeper.candidates import Constants, choose
-from airground_drake.gatekeeper.half_planes import normals_along as _normals
-from airground_drake.gatekeeper.half_planes import offsets, reachable
+from airground_drake.gatekeeper.half_planes import normals_along, offsets, reachable
 from airground_drake.gatekeeper.problem import Decision, Problem
 from airground_drake.gatekeeper.rounding import rounding_deviation, sum_up_rounding
 from airground_drake.nsbc.task import Array
@@ -43,7 +42,7 @@ class RelaxedRoute:
         if not problem.is_finite():
             return Decision(False, "refused_not_finite")
         constants = Constants.of(problem)
-        normals = _normals(problem, constants.better.positions)
+        normals = normals_along(problem, constants.better.positions)
         relaxed, bound = self._solve(problem, normals)
         if relaxed is None:
             return constants.failed()
