@@ -49,13 +49,18 @@ def optimal_threshold(drift: float, noise: float, c1: float, c2: float) -> float
         if not (math.isfinite(value) and value > 0.0):
             raise ValueError(f"{name} must be positive and finite, got {value!r}")
     scale = 2.0 * drift / noise**2
-    ratio = c2 / c1
+    level = c2 / c1 * drift**2 / noise**2
 
-    def residual(u: float) -> float:  # u = 2 zeta drift / noise^2, so that nothing overflows
-        return noise**2 / drift**2 * (math.sinh(u) + u) - ratio
+    def residual(u: float) -> float:  # u = 2 zeta drift / noise^2
+        return math.sinh(u) + u - level
 
-    upper = 1.0 + math.asinh(ratio * drift**2 / noise**2)  # sinh(upper) alone exceeds the right-hand side
-    return float(brentq(residual, 0.0, upper, xtol=1e-15 * max(upper, 1e-300), rtol=8.9e-16)) / scale
+    # u <= sinh u <= (sinh u + u), so that the root lies between these; in floating point it may be one of them
+    low, high = math.asinh(level / 2.0), min(level / 2.0, math.asinh(level))
+    if low >= high or residual(low) >= 0.0:
+        return low / scale
+    if residual(high) <= 0.0:
+        return high / scale
+    return float(brentq(residual, low, high, xtol=4e-16 * low, rtol=8.9e-16)) / scale
 
 
 def _bias(zeta: float, drift: float, noise: float, deviation: float) -> float:

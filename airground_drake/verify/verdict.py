@@ -9,7 +9,9 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
+from airground_drake import files
 from airground_drake.errors import TraceError
+from airground_drake.scenarios.schema import Scenario
 from airground_drake.trace import Trace
 
 Status = Literal["proved", "holds", "supported", "refuted", "inconclusive", "error", "not_run"]
@@ -34,6 +36,7 @@ class Finding:
         where: where the margin is attained: robot, obstacle, time and the like.
         counterexample: for `refuted`: enough to reproduce it by hand.
         evidence: numbers behind the verdict, strict JSON.
+        certificates: texts that others can check, by file name.
     """
 
     status: Status
@@ -42,10 +45,11 @@ class Finding:
     where: dict[str, Any] = field(default_factory=dict)
     counterexample: dict[str, Any] | None = None
     evidence: dict[str, Any] = field(default_factory=dict)
+    certificates: dict[str, str] = field(default_factory=dict)
 
 
-class TraceClaim(abc.ABC):
-    """A claim about one run, decided from its trace alone.
+class Claim(abc.ABC):
+    """What a claim says of itself.
 
     Attributes (all of the class):
         id: stable identifier.
@@ -55,6 +59,7 @@ class TraceClaim(abc.ABC):
         equations: equation numbers of the paper that it is about.
         assumptions: what is taken for granted.
         does_not_establish: what a reader must not conclude from it.
+        expected: the status that a scenario expects unless it says otherwise.
     """
 
     id: str
@@ -64,6 +69,43 @@ class TraceClaim(abc.ABC):
     equations: str
     assumptions: tuple[str, ...]
     does_not_establish: str
+    expected: Status
+
+
+class ModelClaim(Claim):
+    """A claim about the model and its constants, whatever the run: a proof, or an experiment of its own.
+
+    `check` sees nothing but `inputs`, so that equal inputs (and equal code) give equal findings: that is what the
+    cache of findings rests on.
+    """
+
+    expected: Status = "proved"
+
+    @abc.abstractmethod
+    def inputs(self, scenario: Scenario) -> dict[str, Any]:
+        """The constants of a scenario that the claim is about, strict JSON; {} if it is about none."""
+
+    @abc.abstractmethod
+    def check(self, inputs: dict[str, Any]) -> Finding:
+        """Decide the claim for these constants; whatever a solver leaves open is `inconclusive`, never a pass.
+
+        Called through `judge`, which turns an exception into `error`.
+        """
+
+    def judge(self, inputs: dict[str, Any]) -> Finding:
+        """`check` under guard."""
+        try:
+            finding = self.check(inputs)
+            json.dumps(asdict(finding), allow_nan=False)
+        except Exception as error:  # whatever went wrong, the claim was not decided
+            return Finding("error", evidence={"error": f"{type(error).__name__}: {error}"})
+        return finding
+
+
+class TraceClaim(Claim):
+    """A claim about one run, decided from its trace alone."""
+
+    expected: Status = "holds"
 
     @abc.abstractmethod
     def check(self, trace: Trace) -> Finding:
@@ -91,12 +133,21 @@ class TraceClaim(abc.ABC):
 
 @dataclass(frozen=True)
 class Verdict:
-    """A claim, its finding on a run, and the status that the scenario expects."""
+    """A claim and what was found.
 
-    claim: TraceClaim
+    Attributes:
+        claim: the claim.
+        run: on which run; '' for a claim about the model.
+        finding: what was found.
+        expected: the status that the scenario expects.
+        inputs: the constants that a claim about the model is about.
+    """
+
+    claim: Claim
     run: str
     finding: Finding
     expected: Status
+    inputs: dict[str, Any] = field(default_factory=dict)
 
     @property
     def as_expected(self) -> bool:
@@ -104,15 +155,18 @@ class Verdict:
         return self.finding.status == self.expected
 
     def to_json(self) -> dict[str, Any]:
-        """The entry of `claims` in report.json."""
+        """The entry of `claims` in report.json; of certificates, their names and SHA-256."""
         described = ("id", "statement", "formula", "method", "equations", "does_not_establish")
+        digests = {name: files.sha256(text.encode()) for name, text in self.finding.certificates.items()}
         return {
             **{name: getattr(self.claim, name) for name in described},
             "assumptions": list(self.claim.assumptions),
             "run": self.run,
             "expected": self.expected,
             "as_expected": self.as_expected,
+            "inputs": self.inputs,
             **asdict(self.finding),
+            "certificates": digests,
         }
 
 
