@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numba import njit
 
+from airground_drake.gatekeeper.closed_loop import ClosedLoop
 from airground_drake.nsbc.task import Array
 
 
@@ -28,6 +30,12 @@ class Problem:
         distances: safe distances d of (26d), (m,), m.
         error_weight: a_i of (25), 1/(m^2 s).
         slack_weight: b_i of (25), 1/(m^2 s).
+        loop: what the mode velocities were rolled out from; None for a problem that is given by them alone.
+        bend: how much the avoidance inequalities bend the intervention along the roll-out "accept throughout":
+            the integral of ||v - v_below|| dt over that of ||v_below|| dt, with v the velocity commanded and
+            v_below the one that the task below the inequalities wants, within the speed limit. 0 where nothing
+            is wanted, or nothing stands above the intervention (methods (b), (c)); 1 where all that is wanted is
+            blocked; more where the inequalities make the UGV retreat.
     """
 
     dt: float
@@ -39,6 +47,8 @@ class Problem:
     distances: Array
     error_weight: float
     slack_weight: float
+    loop: ClosedLoop | None = None
+    bend: float = 0.0
 
     @property
     def stages(self) -> int:
@@ -48,7 +58,8 @@ class Problem:
     def is_finite(self) -> bool:
         """Whether all data are finite numbers."""
         data = (self.initial, self.accept, self.refuse, self.reference, self.centres, self.distances)
-        return all(np.isfinite(array).all() for array in data)
+        looped = self.loop is None or self.loop.is_finite()
+        return looped and math.isfinite(self.bend) and all(np.isfinite(array).all() for array in data)
 
     def positions(self, omega: Array) -> Array:
         """Predicted positions at the ends of the stages, (23): omega (N,) in [0, 1] to (N, 3), m."""
@@ -120,16 +131,19 @@ class Evaluation:
     clearance: float
 
 
-Status = Literal["optimal", "refused_solver_failed", "refused_not_finite"]
+Status = Literal["optimal", "budget_spent", "refused_budget_spent", "refused_solver_failed", "refused_not_finite"]
+DECIDED: tuple[Status, ...] = ("optimal", "budget_spent")
+"""Statuses of a decision that rests on a plan; every other one is a refusal for want of one."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Decision:
-    """What a route decided, with its evidence. Numbers that do not apply are -1.
+    """What a route decided, with its evidence. Numbers that do not apply are -1, arrays None.
 
     Attributes:
         accept: the first stage of the plan.
-        status: 'optimal', or why the proposal was refused without an optimum.
+        status: 'optimal': the route did all that it does; 'budget_spent': the best plan known when the budget
+            was spent, with its gap; else why the proposal was refused without a plan.
         objective: cost (25) of the plan returned.
         lower_bound: of the problem that the route solves: relaxed or branched, for the same supporting
             half-planes; enumerated, for the same dwell. A local optimum has none.
@@ -139,6 +153,11 @@ class Decision:
         relaxed_first_stage: omega_0 of the relaxation.
         rounding_deviation: largest integrated difference of sum-up rounding, s.
         clearance: smallest predicted distance minus d of the plan, m.
+        plan: omega of the plan returned, (N,), 0 or 1.
+        positions: where that leads, (N, 3), m.
+        relaxed: omega of the relaxation, (N,), in [0, 1].
+        rounded: `relaxed` after sum-up rounding, (N,), 0 or 1.
+        normals: of the half-planes that `lower_bound` and `gap` are about, (N, m, 3).
     """
 
     accept: bool
@@ -151,3 +170,8 @@ class Decision:
     relaxed_first_stage: float = -1.0
     rounding_deviation: float = -1.0
     clearance: float = -1.0
+    plan: Array | None = None
+    positions: Array | None = None
+    relaxed: Array | None = None
+    rounded: Array | None = None
+    normals: Array | None = None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 from pydrake.common.value import Value
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
@@ -43,7 +44,7 @@ class UgvController(LeafSystem):
         self._avoidance = avoidance
         self._motion_gain = motion_gain
         self._intervention_gain = intervention_gain
-        self._on_top = intervention_on_top
+        self.intervention_on_top = intervention_on_top
         self._neighbourhood = team.neighbourhood(slice(0, n))
         self._mobility = team.mobility[:n]
         self._max_speed = team.max_speed[:n]
@@ -93,13 +94,19 @@ class UgvController(LeafSystem):
     def _intervened(
         self, t: float, proposal: Proposal, i: int, own: Array, lower: Array, composite: Array, spaces: HalfSpaces
     ) -> Array:
-        """Eq (20): v_int + (I - J_int^+ J_int) v, with v_int of (14), for one UGV; (3,), m/s."""
+        """Eq (20): v_int + (I - J_int^+ J_int) v, with v_int of (14), for one UGV; (3,), m/s.
+
+        Whatever the proposal selects, a UGV stays in its plane.
+        """
         wanted, rate = proposal.motion.at(t)
         asked = self._mobility[i] * (rate + self._intervention_gain * (wanted - own[i]))
-        below = composite if self._on_top else lower
+        below = composite if self.intervention_on_top else lower
+        task = self._mobility[i] * (below + proposal.chosen @ (asked - below))
+        if not np.isfinite(task).all():  # the planner sends no such thing; nothing to follow then
+            return composite
         row = slice(i, i + 1)
-        velocity = limit_speed((below + proposal.chosen @ (asked - below))[None], self._max_speed[row])
-        if self._on_top:
+        velocity = limit_speed(task[None], self._max_speed[row])
+        if self.intervention_on_top:
             return velocity[0]
         return self._avoidance.apply(velocity, HalfSpaces(spaces.normal[row], spaces.bound[row]))[0]
 

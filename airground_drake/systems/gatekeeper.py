@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any, Protocol, Self
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal, Protocol, Self
 
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
 from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSystem, State
 
+from airground_drake.gatekeeper.budget import Budget, Clock
 from airground_drake.gatekeeper.prediction import Horizon, Scene, UgvLaw, predicted_problem
-from airground_drake.gatekeeper.problem import Decision, Problem
+from airground_drake.gatekeeper.problem import DECIDED, Decision, Problem
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.motion import Motion
 from airground_drake.nsbc.task import Array
@@ -26,26 +27,71 @@ USELESS = 1e-6
 class Route(Protocol):
     """A way to solve (26): any object with this method."""
 
-    def decide(self, problem: Problem) -> Decision:
-        """Accept or refuse; never raises."""
+    def decide(self, problem: Problem, budget: Budget, /) -> Decision:
+        """Accept or refuse, within the budget; never raises."""
+
+
+@dataclass(frozen=True)
+class Rules:
+    """When a decision becomes an answer, and what it may cost.
+
+    Attributes:
+        switching_margin: relative gain that a reversal needs.
+        min_dwell: least time between opposite answers to a proposal, s.
+        max_bend: largest share of its motion by which a proposal may be bent by the avoidance inequalities.
+        budget: of one decision, in counts.
+        budget_share: of the sampling period that all decisions of a sample may take by the clock; None: no limit.
+        clock: what that is measured with.
+    """
+
+    switching_margin: float = 0.0
+    min_dwell: float = 0.0
+    max_bend: float = np.inf
+    budget: Budget = field(default_factory=Budget)
+    budget_share: float | None = None
+    clock: Clock = time.monotonic
+
+
+Reason = Literal["cheaper", "not_cheaper", "no_difference", "bent", "kept", "dwell", "reversed", "no_plan"]
+"""Why an answer is what it is: see `settle`."""
 
 
 @dataclass(frozen=True)
 class Ruling:
-    """One decision on one proposal: when (s), for which UGV, on what, the route's decision, and what came of it."""
+    """One decision on one proposal.
+
+    Attributes:
+        t: when, s.
+        robot: for which UGV.
+        proposal: on what.
+        problem: (26) as predicted.
+        decision: the route's.
+        accepted: the answer.
+        reason: why.
+    """
 
     t: float
     robot: int
     proposal: Proposal
+    problem: Problem
     decision: Decision
     accepted: bool
+    reason: Reason
 
 
 @dataclass(frozen=True)
 class GatekeeperMemory:
-    """Abstract state: the answers in force, (2n,), what was sensed with them, and every ruling so far."""
+    """Abstract state.
+
+    Attributes:
+        answers: in force, (2n,), see `messages`.
+        since: when each UGV's answer became what it is, (n,), s.
+        reports: what was sensed with them.
+        rulings: every one so far.
+    """
 
     answers: tuple[float, ...]
+    since: tuple[float, ...]
     reports: Reports
     rulings: tuple[Ruling, ...] = ()
 
@@ -81,23 +127,24 @@ class Gatekeeper(LeafSystem):
         horizon: Horizon,
         *,
         period: float,
-        switching_margin: float,
+        rules: Rules,
     ) -> None:
-        """Declare ports, state and the periodic update; period in s, margin relative (see `settle`)."""
+        """Declare ports, state and the periodic update; period in s."""
         super().__init__()
         n = len(team.ugvs)
         self._law = law
         self._presets = tuple(presets)
         self._route = route
         self._horizon = horizon
-        self._switching_margin = switching_margin
+        self._rules = rules
+        self._allowance = None if rules.budget_share is None else rules.budget_share * period
         self._neighbourhood = team.neighbourhood(slice(0, n))
         self._max_speed = team.max_speed
         self._position = self.DeclareVectorInputPort("team_position", 3 * (n + 1))
         self._ugv_command = self.DeclareVectorInputPort("ugv_command", 3 * n)
         self._uav_command = self.DeclareVectorInputPort("uav_command", 3)
         self._proposals = self.DeclareAbstractInputPort("proposals", Value(object()))
-        self._memory = self.DeclareAbstractState(Value(GatekeeperMemory((SILENT, -1.0) * n, ((),) * n)))
+        self._memory = self.DeclareAbstractState(Value(GatekeeperMemory((SILENT, -1.0) * n, (0.0,) * n, ((),) * n)))
         self.DeclareVectorOutputPort(
             "answers", 2 * n, self._calc_answers, prerequisites_of_calc={self.abstract_state_ticket(self._memory)}
         )
@@ -132,25 +179,42 @@ class Gatekeeper(LeafSystem):
             return EventStatus.DidNothing()
         positions = self._position.Eval(context).reshape(-1, 3)
         velocities = np.concatenate([self._ugv_command.Eval(context), self._uav_command.Eval(context)]).reshape(-1, 3)
+        t = context.get_time()
         answers: list[float] = []
+        since: list[float] = []
         reports: list[tuple[Point, ...]] = []
         rulings = list(memory.rulings)
+        deadlines = self._deadlines(sum(proposal is not None for proposal in proposals))
         for i, proposal in enumerate(proposals):
             if proposal is None:
                 answers += [SILENT, -1.0]
+                since.append(t)
                 reports.append(())
                 continue
             started = time.thread_time()
-            decision = self._route.decide(self._problem(context.get_time(), i, proposal, positions, velocities))
+            problem = self._problem(t, i, proposal, positions, velocities)
+            decision = _decide(self._route, problem, next(deadlines))  # TEMPORARY
             self.decision_times_s.append(time.thread_time() - started)
             standing = answer_to(proposal, memory.answers, i)
-            accepted = settle(decision, standing, self._switching_margin)
-            rulings.append(Ruling(context.get_time(), i, proposal, decision, accepted))
-            answers += [ACCEPT if accepted else REFUSE, proposal.issued]
+            accepted, reason = settle(decision, problem.bend, standing, t - memory.since[i], self._rules)
+            rulings.append(Ruling(t, i, proposal, problem, decision, accepted, reason))
+            answer = ACCEPT if accepted else REFUSE
+            answers += [answer, proposal.issued]
+            since.append(memory.since[i] if answer == standing else t)
             reports.append(self._sensed(positions[i]))
-        new = GatekeeperMemory(tuple(answers), tuple(reports), tuple(rulings))
+        new = GatekeeperMemory(tuple(answers), tuple(since), tuple(reports), tuple(rulings))
         state.get_mutable_abstract_state(int(self._memory)).set_value(new)
         return EventStatus.Succeeded()
+
+    def _deadlines(self, count: int) -> Iterator[Budget]:
+        """The budget of each of `count` decisions of this sample, which begins now."""
+        if self._allowance is None:
+            yield from [self._rules.budget] * count
+            return
+        begin, clock = self._rules.clock(), self._rules.clock
+        for i in range(count):
+            deadline = begin + self._allowance * (i + 1) / count
+            yield replace(self._rules.budget, deadline_s=deadline, clock=clock)
 
     def _sensed(self, position: Array) -> tuple[Point, ...]:
         """Obstacles within sensing range."""
@@ -173,22 +237,40 @@ class Gatekeeper(LeafSystem):
         return predicted_problem(scene, self._law, proposal, self._horizon)
 
 
-def settle(decision: Decision, standing: float, margin: float) -> bool:
-    """Whether the proposal is accepted, given the answer that stands.
+def settle(decision: Decision, bend: float, standing: float, stood: float, rules: Rules) -> tuple[bool, Reason]:
+    """Whether the proposal is accepted, and why.
 
-    A standing answer is reversed only if the other choice is cheaper by the relative margin: two choices of
-    nearly equal cost must not alternate at every sample. A new proposal that changes nothing (one that the
-    avoidance inequalities would block entirely) is refused, and so is every one without an optimum.
+    Without a plan it is refused, whatever stands. A new proposal is accepted if the best plan starts by accepting
+    it, unless it makes no difference (one that the avoidance inequalities block entirely) or they would bend it
+    too much. A standing answer is reversed only if the other choice is cheaper by the switching margin (two
+    choices of nearly equal cost must not alternate at every sample), or if an accepted proposal has come to be
+    bent too much; and not before the dwell is over.
+
+    Args:
+        decision: the route's.
+        bend: see `Problem.bend`.
+        standing: ACCEPT, REFUSE or SILENT.
+        stood: for how long that has been the answer, s.
+        rules: margins and limits.
     """
-    if decision.status != "optimal":
-        return False
+    if decision.status not in DECIDED:
+        return False, "no_plan"
+    bent = bend > rules.max_bend
     if standing == SILENT:
-        return decision.accept and decision.objective_accept < (1.0 - USELESS) * decision.objective_refuse
-    kept, other = decision.objective_accept, decision.objective_refuse
-    if standing == REFUSE:
-        kept, other = other, kept
-    reverse = other < (1.0 - margin) * kept
-    return (standing == ACCEPT) != reverse
+        if not decision.accept:
+            return False, "not_cheaper"
+        if not decision.objective_accept < (1.0 - USELESS) * decision.objective_refuse:
+            return False, "no_difference"
+        return (False, "bent") if bent else (True, "cheaper")
+    if standing == ACCEPT:
+        reverse = bent or decision.objective_refuse < (1.0 - rules.switching_margin) * decision.objective_accept
+    else:
+        reverse = not bent and decision.objective_accept < (1.0 - rules.switching_margin) * decision.objective_refuse
+    if not reverse:
+        return standing == ACCEPT, "kept"
+    if stood < rules.min_dwell - 1e-9:
+        return standing == ACCEPT, "dwell"
+    return standing != ACCEPT, "reversed"
 
 
 class DirectAcceptance(LeafSystem):
@@ -215,3 +297,10 @@ class DirectAcceptance(LeafSystem):
     def _calc_answers(self, context: Context, output: BasicVector) -> None:
         answers = [(SILENT, -1.0) if p is None else (ACCEPT, p.issued) for p in self._proposals.Eval(context)]
         output.SetFromVector(np.array(answers).ravel())
+
+
+def _decide(route, problem, budget):  # TEMPORARY until all routes take a budget
+    try:
+        return route.decide(problem, budget)
+    except TypeError:
+        return route.decide(problem)

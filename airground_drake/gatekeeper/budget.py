@@ -1,0 +1,51 @@
+"""What one decision may spend: counted work in simulation, a clock in real time."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+Clock = Callable[[], float]
+"""Gives a time in s that never runs backwards."""
+
+
+@dataclass(frozen=True)
+class Budget:
+    """Limits of one decision. Counts make a run reproducible; a deadline keeps a real robot's pace.
+
+    A route asks `spent()` between its steps and hands the counts, and `left_s()`, to the solvers that it calls.
+
+    Attributes:
+        iterations: of each call of a convex or nonlinear solver.
+        nodes: of each tree search.
+        deadline_s: time on `clock` at which the decision must stand, s; inf: counted work only.
+        clock: what `deadline_s` refers to.
+    """
+
+    iterations: int = 100
+    nodes: int = 20_000
+    deadline_s: float = math.inf
+    clock: Clock = field(default=time.monotonic, compare=False)
+
+    def __post_init__(self) -> None:
+        """Check the limits.
+
+        Raises:
+            ValueError: if a count is below 1 or the deadline is not a number.
+        """
+        if self.iterations < 1 or self.nodes < 1 or math.isnan(self.deadline_s):
+            raise ValueError(f"a budget needs iterations >= 1, nodes >= 1 and a deadline, got {self}")
+
+    def spent(self) -> bool:
+        """Whether the deadline has passed; counted work alone never makes it so."""
+        return self.deadline_s < math.inf and self.clock() >= self.deadline_s
+
+    def left_s(self) -> float:
+        """Time to the deadline, s, not below 0; inf without one."""
+        return math.inf if self.deadline_s == math.inf else max(0.0, self.deadline_s - self.clock())
+
+
+UNLIMITED = Budget(iterations=10_000, nodes=2**31)
+"""Bounded only in principle: for oracles, benchmarks and tests."""

@@ -1,0 +1,262 @@
+"""All binary plans with a minimum dwell on the nonlinear closed loop, by the exact cost (25)-(26d)."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from airground_drake.gatekeeper.budget import Budget
+from airground_drake.gatekeeper.candidates import block_of_stage
+from airground_drake.gatekeeper.closed_loop import ACCEPTED, REFUSED, ClosedLoop, velocity_of, workspace
+from airground_drake.gatekeeper.enumeration import EnumerationRoute
+from airground_drake.gatekeeper.problem import Decision, Evaluation, Problem
+from airground_drake.nsbc.task import Array
+
+_CHUNK = 64
+"""Blocks rolled out between two looks at the clock; it takes them about 0.1 ms if they have six stages."""
+
+
+class RolloutRoute:
+    """Exact minimum of (25) over the plans that are constant on blocks of N / `blocks` stages.
+
+    Not with the mode velocities of (23), which hold along the two constant plans only: every plan is rolled out on
+    the closed loop that the UGV runs (`Problem.loop`), so that waiting shifts the way that follows. Two plans
+    share the roll-out of their common prefix. The tree of 2^blocks plans is searched depth first; a branch is
+    cut where its cost so far is not below the best plan known. (The speed limit bounds the rest of the cost as
+    well, but that cuts one block in ten and takes as long.)
+
+    Both halves of the tree (plans that start by accepting, by refusing) are searched separately, in turns, so that
+    both `objective_accept` and `objective_refuse` are exact. `lower_bound` equals `objective` and the gap is 0:
+    among the plans with this dwell, not among all binary plans. Without any cut it rolls 2^(blocks + 1) - 2 blocks
+    out. Each of them counts as a node of the budget. When that ends before, the best plans found so far decide
+    (the constant ones are always among them), with the gap to the least bound of all branches left open; a
+    deadline may be overrun by `_CHUNK` blocks.
+
+    A problem without a closed loop is given by its mode velocities alone, and these are then what is searched: by
+    `EnumerationRoute` with the same blocks.
+    """
+
+    def __init__(self, blocks: int = 10) -> None:
+        """Compile the search.
+
+        Raises:
+            ValueError: if `blocks` is not from 1 to 20.
+        """
+        if not 1 <= blocks <= 20:
+            raise ValueError(f"blocks: {blocks}, allowed: 1 to 20")
+        self._blocks = blocks
+        self._by_velocities = EnumerationRoute(blocks)
+        self.decide(_smallest())
+
+    def decide(self, problem: Problem, budget: Budget = Budget()) -> Decision:  # noqa: B008 (immutable)
+        """Accept or refuse; a tie accepts. Never raises for a broken problem, but refuses and says why."""
+        if problem.loop is None:
+            return self._by_velocities.decide(problem, budget)
+        if not problem.is_finite():
+            return Decision(False, "refused_not_finite")
+        if budget.spent():
+            return Decision(False, "refused_budget_spent")
+        best = [evaluate(problem, np.full(problem.stages, float(mode))) for mode in (REFUSED, ACCEPTED)]
+        if not all(np.isfinite(plan.objective) for plan in best):  # finite data overflow in the cost
+            return Decision(False, "refused_not_finite")
+        block = block_of_stage(problem.stages, self._blocks)
+        halves = [_Half(problem, problem.loop, block, mode, best[mode].objective) for mode in (REFUSED, ACCEPTED)]
+        nodes = budget.nodes
+        while nodes > 0 and any(half.open for half in halves) and not budget.spent():
+            for half in halves:
+                nodes -= half.search(min(_CHUNK, nodes))
+        refuse, accept = (
+            min(plan, evaluate(problem, half.plan[block]), key=lambda found: found.objective)
+            for plan, half in zip(best, halves, strict=True)
+        )
+        chosen = accept if accept.objective <= refuse.objective else refuse
+        bound = min(chosen.objective, *(half.bound() for half in halves))
+        return Decision(
+            accept=chosen is accept,
+            status="budget_spent" if any(half.open for half in halves) else "optimal",
+            objective=chosen.objective,
+            lower_bound=bound,
+            gap=(chosen.objective - bound) / max(chosen.objective, 1e-12),
+            objective_accept=accept.objective,
+            objective_refuse=refuse.objective,
+            clearance=min(chosen.clearance, 1e9),
+            plan=chosen.omega,
+            positions=chosen.positions,
+        )
+
+
+def evaluate(problem: Problem, omega: Array) -> Evaluation:
+    """Cost (25) of a plan, (N,) of 0 and 1, with the exact distances of (26d), on the closed loop.
+
+    Raises:
+        ValueError: if the problem has no closed loop, or the plan is not one of its plans.
+    """
+    if problem.loop is None:
+        raise ValueError("a problem that is given by mode velocities has no closed loop")
+    positions = problem.loop.positions(omega)
+    objective, clearance = _evaluate(_Cost.of(problem), positions)
+    return Evaluation(omega, positions, objective, clearance)
+
+
+class _Cost(NamedTuple):
+    """What (25) is made of, see `Problem`."""
+
+    dt: float
+    reference: Array
+    centres: Array
+    distances: Array
+    error_weight: float
+    slack_weight: float
+
+    @classmethod
+    def of(cls, problem: Problem) -> _Cost:
+        weights = float(problem.error_weight), float(problem.slack_weight)
+        return cls(float(problem.dt), problem.reference, problem.centres, problem.distances, *weights)
+
+
+class _Tree(NamedTuple):
+    """State of a depth-first search over B blocks, written to.
+
+    Attributes:
+        starts: first stage of each block, and N, (B + 1,).
+        depth: of the block to visit next, (1,); -1 when there is none left.
+        known: cost of the best plan known, (1,).
+        best: its modes, (B,).
+        at: position before each block of the current plan, (B, 3), m.
+        cost: of the blocks before, (B,).
+        mode: of each block of the current plan, (B,).
+        tried: how many modes of each block have been visited, (B,).
+    """
+
+    starts: npt.NDArray[np.int64]
+    depth: npt.NDArray[np.int64]
+    known: Array
+    best: npt.NDArray[np.int64]
+    at: Array
+    cost: Array
+    mode: npt.NDArray[np.int64]
+    tried: npt.NDArray[np.int64]
+
+
+class _Half:
+    """The plans whose first block has one of the modes; `known` is the cost of the constant one."""
+
+    def __init__(
+        self, problem: Problem, loop: ClosedLoop, block: npt.NDArray[np.int64], first: int, known: float
+    ) -> None:
+        blocks = int(block[-1]) + 1
+        starts = np.searchsorted(block, np.arange(blocks + 1)).astype(np.int64)
+        self._loop, self._cost = loop, _Cost.of(problem)
+        mode, tried = np.full(blocks, first, dtype=np.int64), np.zeros(blocks, dtype=np.int64)
+        at, cost = np.tile(loop.start, (blocks, 1)), np.zeros(blocks)
+        self._tree = _Tree(starts, np.zeros(1, dtype=np.int64), np.array([known]), mode.copy(), at, cost, mode, tried)
+
+    @property
+    def open(self) -> bool:
+        """Whether plans are left that neither were visited nor cut."""
+        return bool(self._tree.depth[0] >= 0)
+
+    @property
+    def plan(self) -> Array:
+        """Modes of the blocks of the best plan known, (B,)."""
+        return self._tree.best.astype(np.float64)
+
+    def search(self, nodes: int) -> int:
+        """Visit that many blocks at most; how many it were."""
+        return int(_search(self._loop, self._cost, self._tree, nodes))
+
+    def bound(self) -> float:
+        """Lower bound of the cost of all plans of this half: the best known, and every branch left open."""
+        tree = self._tree
+        reached = range(tree.depth[0] + 1)
+        return float(min([tree.known[0], *(tree.cost[b] for b in reached if tree.tried[b] < _modes(b))]))
+
+
+@njit(cache=True)
+def _search(loop: ClosedLoop, cost: _Cost, tree: _Tree, nodes: int) -> int:
+    """Go on with the search for that many nodes (blocks rolled out) at most; how many it were."""
+    blocks = len(tree.mode)
+    position, work = np.empty(3), workspace(loop)
+    visited = 0
+    b = tree.depth[0]
+    while b >= 0 and visited < nodes:
+        # the mode of the block before comes first: constant continuations are good incumbents
+        if b > 0:
+            tree.mode[b] = tree.mode[b - 1] if tree.tried[b] == 0 else 1 - tree.mode[b - 1]
+        tree.tried[b] += 1
+        visited += 1
+        position[:] = tree.at[b]
+        total = tree.cost[b]
+        for stage in range(tree.starts[b], tree.starts[b + 1]):
+            for k in range(stage * loop.substeps, (stage + 1) * loop.substeps):
+                velocity = velocity_of(loop, tree.mode[b], k, position, work)
+                for a in range(3):
+                    position[a] += loop.period * velocity[a]
+            total += _stage_cost(cost, stage, position, _clearance(cost, stage, position))
+            if total >= tree.known[0]:
+                break
+        if total < tree.known[0]:
+            if b == blocks - 1:
+                tree.known[0] = total
+                tree.best[:] = tree.mode
+            else:
+                b += 1
+                tree.at[b] = position
+                tree.cost[b] = total
+                tree.tried[b] = 0
+        while b >= 0 and tree.tried[b] == _modes(b):
+            b -= 1
+    tree.depth[0] = b
+    return visited
+
+
+@njit(cache=True)
+def _modes(block: int) -> int:
+    """How many modes a block may have: the first one has that of its half."""
+    return 1 if block == 0 else 2
+
+
+@njit(cache=True)
+def _evaluate(cost: _Cost, positions: Array) -> tuple[float, float]:
+    """Cost (25) and least clearance, m, through positions (N, 3), m."""
+    total, least = 0.0, np.inf
+    for stage in range(len(positions)):
+        clearance = _clearance(cost, stage, positions[stage])
+        total += _stage_cost(cost, stage, positions[stage], clearance)
+        least = min(least, clearance)
+    return total, least
+
+
+@njit(cache=True)
+def _clearance(cost: _Cost, stage: int, position: Array) -> float:
+    """Least distance minus safe distance at the end of a stage, m; inf without points."""
+    least = np.inf
+    for m in range(len(cost.distances)):
+        squared = 0.0
+        for a in range(3):
+            squared += (position[a] - cost.centres[stage, m, a]) ** 2
+        least = min(least, np.sqrt(squared) - cost.distances[m])
+    return least
+
+
+@njit(cache=True)
+def _stage_cost(cost: _Cost, stage: int, position: Array, clearance: float) -> float:
+    """What a stage adds to (25); the slack is the negative part of the clearance."""
+    slack, error = max(0.0, -clearance), 0.0
+    for a in range(3):
+        error += (cost.reference[stage, a] - position[a]) ** 2
+    return cost.dt * (cost.error_weight * error + cost.slack_weight * slack * slack)
+
+
+def _smallest() -> Problem:
+    """One stage without points, to compile the search with."""
+    still, none, row = np.zeros((2, 3)), np.zeros((0, 3)), np.zeros((1, 3))
+    loop = ClosedLoop(
+        start=np.zeros(3), preset=still, wanted=still, chosen=np.eye(3), centres=none, velocities=none,
+        distances=np.zeros(0), shares=np.zeros(0), max_speed=1.0, motion_gain=1.0, intervention_gain=1.0,
+        avoidance_gain=1.0, period=1.0, sensing_range=1.0, composition=0, intervention_on_top=False, substeps=1,
+    )  # fmt: skip
+    return Problem(1.0, np.zeros(3), row, row, row, np.zeros((1, 0, 3)), np.zeros(0), 1.0, 1.0, loop)

@@ -1,0 +1,173 @@
+"""From a decision to an answer: margin, dwell, bend, budget by counts and by an injected clock."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from airground_drake import diagram
+from airground_drake.gatekeeper.budget import Budget
+from airground_drake.gatekeeper.candidates import Constants
+from airground_drake.gatekeeper.problem import Decision, Problem
+from airground_drake.scenarios.load import load
+from airground_drake.scenarios.schema import Scenario
+from airground_drake.simulation import Recorder, simulate
+from airground_drake.systems.gatekeeper import Rules, settle
+from airground_drake.systems.messages import ACCEPT, REFUSE, SILENT
+
+RULES = Rules(switching_margin=0.1, min_dwell=0.2, max_bend=0.5)
+
+
+def decision(accept: float, refuse: float, status: Any = "optimal") -> Decision:
+    return Decision(accept < refuse, status, objective_accept=accept, objective_refuse=refuse)
+
+
+def test_a_new_proposal_is_judged_by_the_plan_alone() -> None:
+    assert settle(decision(10.0, 10.5), 0.0, SILENT, 0.0, RULES) == (True, "cheaper")
+    assert settle(decision(10.5, 10.0), 0.0, SILENT, 0.0, RULES) == (False, "not_cheaper")
+    assert settle(decision(10.0 - 1e-9, 10.0), 0.0, SILENT, 0.0, RULES) == (False, "no_difference")
+    assert settle(decision(1.0, 10.0), 0.6, SILENT, 0.0, RULES) == (False, "bent")
+
+
+def test_a_standing_answer_is_reversed_only_for_a_clear_gain() -> None:
+    assert settle(decision(10.5, 10.0), 0.0, ACCEPT, 1.0, RULES) == (True, "kept")
+    assert settle(decision(10.0, 10.5), 0.0, REFUSE, 1.0, RULES) == (False, "kept")
+    assert settle(decision(20.0, 10.0), 0.0, ACCEPT, 1.0, RULES) == (False, "reversed")
+    assert settle(decision(10.0, 20.0), 0.0, REFUSE, 1.0, RULES) == (True, "reversed")
+
+
+def test_a_proposal_that_has_come_to_be_bent_is_handed_back() -> None:
+    assert settle(decision(10.0, 20.0), 0.6, ACCEPT, 1.0, RULES) == (False, "reversed")
+    assert settle(decision(10.0, 20.0), 0.6, REFUSE, 1.0, RULES) == (False, "kept")
+
+
+def test_no_reversal_before_the_dwell_is_over() -> None:
+    assert settle(decision(20.0, 10.0), 0.0, ACCEPT, 0.15, RULES) == (True, "dwell")
+    assert settle(decision(10.0, 20.0), 0.0, REFUSE, 0.15, RULES) == (False, "dwell")
+    assert settle(decision(20.0, 10.0), 0.0, ACCEPT, 0.2, RULES) == (False, "reversed")
+
+
+@given(st.sampled_from([SILENT, ACCEPT, REFUSE]), st.floats(0.0, 1.0), st.floats(0.0, 2.0))
+def test_without_a_plan_everything_is_refused_at_once(standing: float, stood: float, bend: float) -> None:
+    for status in ("refused_solver_failed", "refused_not_finite", "refused_budget_spent"):
+        assert settle(decision(1.0, 2.0, status), bend, standing, stood, RULES) == (False, "no_plan")
+
+
+@given(st.floats(0.1, 100.0), st.floats(0.1, 100.0), st.floats(0.0, 0.5), st.sampled_from([ACCEPT, REFUSE]))
+def test_opposite_answers_never_want_each_other(accept: float, refuse: float, margin: float, standing: float) -> None:
+    """Reversed once, the same costs do not reverse it back."""
+    rules = Rules(switching_margin=margin)
+    accepted, _ = settle(decision(accept, refuse), 0.0, standing, 1.0, rules)
+    assert settle(decision(accept, refuse), 0.0, ACCEPT if accepted else REFUSE, 1.0, rules)[1] == "kept"
+
+
+@dataclass
+class Alternating:
+    """A route whose preference changes at every decision, by a wide margin."""
+
+    calls: int = 0
+
+    def decide(self, problem: Problem, budget: Budget) -> Decision:
+        self.calls += 1
+        return decision(1.0, 9.0) if self.calls % 2 else decision(9.0, 1.0)
+
+
+@pytest.mark.parametrize("dwell", [0.0, 0.2, 1.0])
+def test_opposite_answers_of_a_run_are_a_dwell_apart(
+    case_a: Scenario, monkeypatch: pytest.MonkeyPatch, dwell: float
+) -> None:
+    monkeypatch.setitem(diagram.ROUTES, "relaxed", Alternating)
+    case_a.gatekeeper.min_dwell_s = dwell
+    decisions = simulate(case_a, "d").decisions
+    for _, of_one in decisions.groupby(["robot", "issued_s"]):
+        changes = of_one["t_s"][of_one["decision"] != of_one["decision"].shift()].to_numpy()
+        assert (changes[1:] - changes[:-1] >= dwell - 1e-9).all()
+    assert ("dwell" in set(decisions["reason"])) == (dwell > 0.05)
+
+
+def test_a_proposal_into_an_obstacle_is_refused_as_bent(case_a: Scenario) -> None:
+    """Method (d), with a gatekeeper that would accept anything that helps a little."""
+    scenario, _ = load("case_b", ["intervention.policies.0.name=towards", "gatekeeper.max_bend=0.0"])
+    refused = simulate(scenario, "d").decisions
+    assert refused["bend"].max() > 0.9
+    assert (refused.loc[refused["bend"] > 0.0, "decision"] == "refuse").all()
+
+
+@dataclass
+class Clock:
+    """Advances by `tick` s at each reading."""
+
+    tick: float
+    now: float = 0.0
+
+    def __call__(self) -> float:
+        self.now += self.tick
+        return self.now
+
+
+@dataclass
+class Watching:
+    """A route that keeps the budgets that it was given."""
+
+    given: list[Budget] = field(default_factory=list)
+
+    def decide(self, problem: Problem, budget: Budget) -> Decision:
+        self.given.append(budget)
+        return Constants.of(problem).failed()
+
+
+def recorded_budgets(scenario: Scenario, monkeypatch: pytest.MonkeyPatch, clock: Clock | None) -> list[Budget]:
+    route = Watching()
+    monkeypatch.setitem(diagram.ROUTES, "relaxed", lambda: route)
+    if clock is not None:
+        make = diagram.make_rules
+        monkeypatch.setattr(diagram, "make_rules", lambda s: Rules(**{**make(s).__dict__, "clock": clock}))
+    Recorder(scenario, "d", scenario.runs["d"]).simulate(duration=16.0)
+    return route.given
+
+
+def test_in_simulation_a_decision_has_counts_and_no_deadline(case_a: Scenario, monkeypatch: pytest.MonkeyPatch) -> None:
+    case_a.gatekeeper.budget_iterations, case_a.gatekeeper.budget_nodes = 7, 11
+    budgets = recorded_budgets(case_a, monkeypatch, None)
+    assert budgets
+    assert {(b.iterations, b.nodes, b.deadline_s) for b in budgets} == {(7, 11, math.inf)}
+    assert not any(b.spent() for b in budgets)
+
+
+def test_in_real_time_a_decision_has_half_the_sampling_period(
+    case_a: Scenario, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    case_a.gatekeeper.budget = "wall_clock"
+    clock = Clock(tick=0.001)
+    budgets = recorded_budgets(case_a, monkeypatch, clock)
+    begins = [0.001 * (k + 1) for k in range(len(budgets))]  # read once a sample: one proposal each
+    assert [b.deadline_s for b in budgets] == pytest.approx([begin + 0.025 for begin in begins])
+    assert budgets[0].left_s() < 0.025
+    clock.now = 10.0
+    assert all(b.spent() and b.left_s() == 0.0 for b in budgets)
+
+
+@pytest.mark.parametrize("route", sorted(diagram.ROUTES))
+def test_with_no_time_left_every_proposal_is_refused(
+    case_a: Scenario, monkeypatch: pytest.MonkeyPatch, route: str
+) -> None:
+    """A clock that jumps a whole sampling period at each reading: nothing is ever evaluated in time."""
+    case_a.gatekeeper.budget, case_a.gatekeeper.route = "wall_clock", route
+    make = diagram.make_rules
+    monkeypatch.setattr(diagram, "make_rules", lambda s: Rules(**{**make(s).__dict__, "clock": Clock(tick=0.05)}))
+    decisions = simulate(case_a, "d").decisions
+    assert len(decisions)
+    assert set(decisions["decision"]) == {"refuse"}
+    assert set(decisions["status"]) == {"refused_budget_spent"}
+    assert set(decisions["reason"]) == {"no_plan"}
+
+
+@pytest.mark.parametrize("wrong", [{"iterations": 0}, {"nodes": 0}, {"deadline_s": math.nan}])
+def test_budgets_that_mean_nothing(wrong: dict[str, Any]) -> None:
+    with pytest.raises(ValueError, match="budget"):
+        Budget(**wrong)
