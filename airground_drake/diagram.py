@@ -22,10 +22,12 @@ from pydrake.trajectories import PiecewisePolynomial
 from airground_drake.decision.bayes import optimal_threshold
 from airground_drake.decision.trigger import Trigger
 from airground_drake.gatekeeper.branch import BranchAndBoundRoute
+from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.enumeration import EnumerationRoute
 from airground_drake.gatekeeper.nonlinear import NonlinearRoute
 from airground_drake.gatekeeper.prediction import Horizon, UgvLaw
 from airground_drake.gatekeeper.relaxed import RelaxedRoute
+from airground_drake.gatekeeper.rollout import RolloutRoute
 from airground_drake.intervention.database import BehaviourDatabase, make_policy
 from airground_drake.nsbc.avoidance import Avoidance, Composition
 from airground_drake.nsbc.motion import Motion
@@ -41,7 +43,7 @@ from airground_drake.systems import (
     UavController,
     UgvController,
 )
-from airground_drake.systems.gatekeeper import Route
+from airground_drake.systems.gatekeeper import Route, Rules
 
 Method = Literal["a", "b", "c", "d"]
 """(a) no intervention, (b) no gatekeeper, (c) the paper's gatekeeper, (d) certified: avoidance always on top."""
@@ -53,6 +55,7 @@ ROUTES: dict[str, Callable[[], Route]] = {
     "enumeration": EnumerationRoute,
     "nonlinear": NonlinearRoute,
     "branch_and_bound": BranchAndBoundRoute,
+    "rollout": RolloutRoute,
 }
 
 S = TypeVar("S", bound=System)
@@ -141,10 +144,10 @@ def build_model(scenario: Scenario, method: Method, composition: Composition = "
     team_position = add("team_position", Multiplexer([3] * (n + 1)))
     team_command = add("team_command", Multiplexer([3 * n, 3]))
     ugv_commands = add("ugv_commands", Demultiplexer(3 * n, 3))
-    reference = add("reference", TrajectorySource(_stack(presets), output_derivative_order=1))
+    reference = add("reference", TrajectorySource(stack_presets(presets), output_derivative_order=1))
     noise_source = add("noise_source", RandomSource(RandomDistribution.kGaussian, n, decision.noise_period_s))
     noise = add(
-        "decision_noise", _integrated_noise(n, decision.noise_m_sqrt_s, decision.leak_1_s, decision.noise_period_s)
+        "decision_noise", integrated_noise(n, decision.noise_m_sqrt_s, decision.leak_1_s, decision.noise_period_s)
     )
     decision_variable = add("decision_variable", DecisionVariable(n))
     trigger = add("event_trigger", EventTrigger(n, make_trigger(scenario, zeta)))
@@ -189,7 +192,7 @@ def build_model(scenario: Scenario, method: Method, composition: Composition = "
             ROUTES[scenario.gatekeeper.route](),
             make_horizon(scenario),
             period=scenario.gatekeeper.period_s,
-            switching_margin=scenario.gatekeeper.switching_margin,
+            rules=make_rules(scenario),
         )
     gate = add("gatekeeper", gatekeeper if gatekeeper is not None else DirectAcceptance(n))
 
@@ -269,6 +272,18 @@ def make_horizon(scenario: Scenario) -> Horizon:
     return Horizon(gate.stages, substeps, gate.error_weight_1_m2_s, gate.slack_weight_1_m2_s)
 
 
+def make_rules(scenario: Scenario) -> Rules:
+    """When the gatekeeper's decisions become answers, and what they may cost."""
+    gate = scenario.gatekeeper
+    return Rules(
+        switching_margin=gate.switching_margin,
+        min_dwell=gate.min_dwell_s,
+        max_bend=gate.max_bend,
+        budget=Budget(gate.budget_iterations, gate.budget_nodes),
+        budget_share=gate.budget_share if gate.budget == "wall_clock" else None,
+    )
+
+
 def make_trigger(scenario: Scenario, zeta: float) -> Trigger:
     """The trigger automaton with threshold zeta, m."""
     if scenario.decision.trigger == "bare":
@@ -288,14 +303,14 @@ def _positions(rows: list[list[float]]) -> Array:
     return np.array(rows, dtype=np.float64).reshape(-1, 3)
 
 
-def _stack(presets: list[Motion]) -> PiecewisePolynomial:
+def stack_presets(presets: list[Motion]) -> PiecewisePolynomial:
     """All presets as one trajectory of 3n components over the union of their vertices."""
     times = np.unique(np.concatenate([preset.times for preset in presets]))
     samples = np.concatenate([preset.sample(times) for preset in presets], axis=1)
     return PiecewisePolynomial.FirstOrderHold(times, samples.T)
 
 
-def _integrated_noise(count: int, intensity: float, leak: float, period: float) -> AffineSystem:
+def integrated_noise(count: int, intensity: float, leak: float, period: float) -> AffineSystem:
     """dn = -leak n dt + intensity dW for noise samples held over `period`: Euler-Maruyama on that grid."""
     eye, zero = np.eye(count), np.zeros(count)
     return AffineSystem(

@@ -7,7 +7,7 @@ import os
 import sys
 import time
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from functools import cache
@@ -33,7 +33,8 @@ from airground_drake.nsbc.team import Team
 from airground_drake.scenarios.load import resolved
 from airground_drake.scenarios.schema import Run, Scenario
 from airground_drake.systems.decision import FIELDS
-from airground_drake.trace import DECISION_COLUMNS, SCHEMA, Trace
+from airground_drake.systems.gatekeeper import Ruling
+from airground_drake.trace import DECISION_COLUMNS, PROBLEM_ARRAYS, PROBLEM_SCALARS, SCHEMA, Trace
 
 EVENT_ACCURACY = 1e-6
 """Accuracy of the Context: witness functions are isolated to it (relative to the time scale of 1 s)."""
@@ -105,6 +106,7 @@ class Recorder:
                     "policy": r.proposal.policy,
                     "issued_s": r.proposal.issued,
                     "decision": "accept" if r.accepted else "refuse",
+                    "reason": r.reason,
                     "status": r.decision.status,
                     "route": self._scenario.gatekeeper.route,
                     "first_stage": "accept" if r.decision.accept else "refuse",
@@ -114,8 +116,11 @@ class Recorder:
                     "gap": r.decision.gap,
                     "objective_accept": r.decision.objective_accept,
                     "objective_refuse": r.decision.objective_refuse,
+                    "accept_throughout": r.throughout[0],
+                    "refuse_throughout": r.throughout[1],
                     "rounding_deviation_s": r.decision.rounding_deviation,
                     "predicted_clearance_m": r.decision.clearance,
+                    "bend": r.problem.bend,
                 }
                 for r in rulings
             ],
@@ -136,9 +141,30 @@ class Recorder:
             "faults": [{"t_s": f.t, "robot": f.robot, "policy": f.policy, "what": f.what} for f in memory.faults],
         }
         times = list(gatekeeper.decision_times_s) if gatekeeper is not None else []
-        trace = Trace(meta, signals, decisions, {"wall_s": wall, "decision_times_s": times})
+        timings = {"wall_s": wall, "decision_times_s": times}
+        trace = Trace(meta, signals, decisions, timings, _problems(rulings))
         meta["events"] = events(trace, sent)
         return trace
+
+
+def _problems(rulings: Sequence[Ruling]) -> pd.DataFrame:
+    """`Trace.problems` of the rulings."""
+
+    def flat(array: Array | None) -> list[float]:
+        return [] if array is None else array.ravel().tolist()
+
+    rows = [
+        (
+            r.problem.dt, r.problem.error_weight, r.problem.slack_weight,
+            *map(flat, (
+                r.problem.initial, r.problem.accept, r.problem.refuse, r.problem.reference, r.problem.centres,
+                r.problem.distances, r.decision.plan, r.decision.positions, r.decision.relaxed, r.decision.rounded,
+                r.decision.normals,
+            )),
+        )
+        for r in rulings
+    ]  # fmt: skip
+    return pd.DataFrame(rows, columns=[*PROBLEM_SCALARS, *PROBLEM_ARRAYS])
 
 
 @cache

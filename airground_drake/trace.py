@@ -36,7 +36,7 @@ from airground_drake import files
 from airground_drake.errors import TraceError
 from airground_drake.nsbc.task import Array
 
-SCHEMA = "airground_drake.trace/1"
+SCHEMA = "airground_drake.trace/2"
 
 DECISION_COLUMNS = {
     "t_s": "float64",
@@ -44,6 +44,7 @@ DECISION_COLUMNS = {
     "policy": "str",
     "issued_s": "float64",
     "decision": "str",
+    "reason": "str",
     "status": "str",
     "route": "str",
     "first_stage": "str",
@@ -53,10 +54,23 @@ DECISION_COLUMNS = {
     "gap": "float64",
     "objective_accept": "float64",
     "objective_refuse": "float64",
+    "accept_throughout": "float64",
+    "refuse_throughout": "float64",
     "rounding_deviation_s": "float64",
     "predicted_clearance_m": "float64",
+    "bend": "float64",
 }
 """Columns of `Trace.decisions`, one row per robot and gatekeeper call; -1 where a number does not apply."""
+
+PROBLEM_SCALARS = ("dt_s", "error_weight_1_m2_s", "slack_weight_1_m2_s")
+PROBLEM_ARRAYS = (
+    "initial_m", "accept_m_s", "refuse_m_s", "reference_m", "centres_m", "distances_m",
+    "plan", "positions_m", "relaxed", "rounded", "normals",
+)  # fmt: skip
+"""Columns of `Trace.problems`: the data of (26) as each decision saw it, and what the route found, row by row as in
+`decisions`. Arrays are flattened in C order: initial (3), accept, refuse and reference (N x 3), centres and normals
+(N x m x 3), distances (m), plan, relaxed and rounded omega (N), positions of the plan (N x 3); empty where the route
+has none. Normals are those of the half-planes that `lower_bound` is about."""
 
 
 @dataclass(frozen=True)
@@ -70,6 +84,7 @@ class Trace:
             in a policy or solver).
         signals: see the module's docstring.
         decisions: see DECISION_COLUMNS.
+        problems: see PROBLEM_ARRAYS.
         timings: wall-clock measurements, kept apart because they differ between identical runs:
             `wall_s`, and `decision_times_s`: CPU time of each row of `decisions`, in order.
     """
@@ -78,6 +93,7 @@ class Trace:
     signals: pd.DataFrame
     decisions: pd.DataFrame
     timings: dict[str, Any] = field(default_factory=dict, compare=False)
+    problems: pd.DataFrame = field(default_factory=lambda: pd.DataFrame(columns=[*PROBLEM_SCALARS, *PROBLEM_ARRAYS]))
 
     @property
     def run(self) -> str:
@@ -141,7 +157,7 @@ class Trace:
 
 
 def save(trace: Trace, folder: Path) -> None:
-    """Write `signals.parquet`, `decisions.parquet`, `timings.json`, then `meta.json` with their digests.
+    """Write `signals.parquet`, `decisions.parquet`, `problems.parquet`, `timings.json`, then `meta.json` with digests.
 
     Each file is written atomically and `meta.json` last, so that an interrupted save is recognised by `load`.
 
@@ -149,7 +165,11 @@ def save(trace: Trace, folder: Path) -> None:
         OSError: if the folder cannot be written.
         ValueError: if `meta` holds a number that is not finite.
     """
-    tables = {"signals.parquet": trace.signals, "decisions.parquet": trace.decisions}
+    tables = {
+        "signals.parquet": trace.signals,
+        "decisions.parquet": trace.decisions,
+        "problems.parquet": trace.problems,
+    }
     digests = {}
     for name, table in tables.items():
         buffer = io.BytesIO()
@@ -177,6 +197,6 @@ def load(folder: Path) -> Trace:
             tables[name] = pd.read_parquet(io.BytesIO(data))
         if meta.get("schema") != SCHEMA:
             raise TraceError(f"{folder}: schema {meta.get('schema')!r}, this version reads {SCHEMA!r}")
-        return Trace(meta, tables["signals.parquet"], tables["decisions.parquet"], timings)
+        return Trace(meta, tables["signals.parquet"], tables["decisions.parquet"], timings, tables["problems.parquet"])
     except (OSError, KeyError, ValueError, AttributeError) as error:
         raise TraceError(f"{folder}: not a readable trace: {error}") from error

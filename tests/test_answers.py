@@ -24,46 +24,59 @@ RULES = Rules(switching_margin=0.1, min_dwell=0.2, max_bend=0.5)
 
 
 def decision(accept: float, refuse: float, status: Any = "optimal") -> Decision:
-    return Decision(accept < refuse, status, objective_accept=accept, objective_refuse=refuse)
+    return Decision(accept < refuse, status, objective=min(accept, refuse))
+
+
+def answer(accept: float, refuse: float, bend: float, standing: float, stood: float) -> tuple[bool, str]:
+    """`settle` where keeping an answer throughout costs what the best plan costs that starts with it."""
+    return settle(decision(accept, refuse), (accept, refuse), bend, standing, stood, RULES)
 
 
 def test_a_new_proposal_is_judged_by_the_plan_alone() -> None:
-    assert settle(decision(10.0, 10.5), 0.0, SILENT, 0.0, RULES) == (True, "cheaper")
-    assert settle(decision(10.5, 10.0), 0.0, SILENT, 0.0, RULES) == (False, "not_cheaper")
-    assert settle(decision(10.0 - 1e-9, 10.0), 0.0, SILENT, 0.0, RULES) == (False, "no_difference")
-    assert settle(decision(1.0, 10.0), 0.6, SILENT, 0.0, RULES) == (False, "bent")
+    assert answer(10.0, 10.5, 0.0, SILENT, 0.0) == (True, "cheaper")
+    assert answer(10.5, 10.0, 0.0, SILENT, 0.0) == (False, "not_cheaper")
+    assert answer(10.0 - 1e-9, 10.0, 0.0, SILENT, 0.0) == (False, "no_difference")
+    assert answer(1.0, 10.0, 0.6, SILENT, 0.0) == (False, "bent")
 
 
 def test_a_standing_answer_is_reversed_only_for_a_clear_gain() -> None:
-    assert settle(decision(10.5, 10.0), 0.0, ACCEPT, 1.0, RULES) == (True, "kept")
-    assert settle(decision(10.0, 10.5), 0.0, REFUSE, 1.0, RULES) == (False, "kept")
-    assert settle(decision(20.0, 10.0), 0.0, ACCEPT, 1.0, RULES) == (False, "reversed")
-    assert settle(decision(10.0, 20.0), 0.0, REFUSE, 1.0, RULES) == (True, "reversed")
+    assert answer(10.5, 10.0, 0.0, ACCEPT, 1.0) == (True, "kept")
+    assert answer(10.0, 10.5, 0.0, REFUSE, 1.0) == (False, "kept")
+    assert answer(20.0, 10.0, 0.0, ACCEPT, 1.0) == (False, "reversed")
+    assert answer(10.0, 20.0, 0.0, REFUSE, 1.0) == (True, "reversed")
 
 
 def test_a_proposal_that_has_come_to_be_bent_is_handed_back() -> None:
-    assert settle(decision(10.0, 20.0), 0.6, ACCEPT, 1.0, RULES) == (False, "reversed")
-    assert settle(decision(10.0, 20.0), 0.6, REFUSE, 1.0, RULES) == (False, "kept")
+    assert answer(10.0, 20.0, 0.6, ACCEPT, 1.0) == (False, "reversed")
+    assert answer(10.0, 20.0, 0.6, REFUSE, 1.0) == (False, "kept")
 
 
 def test_no_reversal_before_the_dwell_is_over() -> None:
-    assert settle(decision(20.0, 10.0), 0.0, ACCEPT, 0.15, RULES) == (True, "dwell")
-    assert settle(decision(10.0, 20.0), 0.0, REFUSE, 0.15, RULES) == (False, "dwell")
-    assert settle(decision(20.0, 10.0), 0.0, ACCEPT, 0.2, RULES) == (False, "reversed")
+    assert answer(20.0, 10.0, 0.0, ACCEPT, 0.15) == (True, "dwell")
+    assert answer(10.0, 20.0, 0.0, REFUSE, 0.15) == (False, "dwell")
+    assert answer(20.0, 10.0, 0.0, ACCEPT, 0.2) == (False, "reversed")
 
 
 @given(st.sampled_from([SILENT, ACCEPT, REFUSE]), st.floats(0.0, 1.0), st.floats(0.0, 2.0))
 def test_without_a_plan_everything_is_refused_at_once(standing: float, stood: float, bend: float) -> None:
     for status in ("refused_solver_failed", "refused_not_finite", "refused_budget_spent"):
-        assert settle(decision(1.0, 2.0, status), bend, standing, stood, RULES) == (False, "no_plan")
+        assert settle(decision(1.0, 2.0, status), (1.0, 2.0), bend, standing, stood, RULES) == (False, "no_plan")
 
 
-@given(st.floats(0.1, 100.0), st.floats(0.1, 100.0), st.floats(0.0, 0.5), st.sampled_from([ACCEPT, REFUSE]))
-def test_opposite_answers_never_want_each_other(accept: float, refuse: float, margin: float, standing: float) -> None:
+@given(
+    st.floats(0.1, 100.0),
+    st.floats(0.1, 100.0),
+    st.tuples(st.floats(0.1, 100.0), st.floats(0.1, 100.0)),
+    st.floats(0.0, 0.5),
+    st.sampled_from([ACCEPT, REFUSE]),
+)
+def test_opposite_answers_never_want_each_other(
+    accept: float, refuse: float, kept: tuple[float, float], margin: float, standing: float
+) -> None:
     """Reversed once, the same costs do not reverse it back."""
     rules = Rules(switching_margin=margin)
-    accepted, _ = settle(decision(accept, refuse), 0.0, standing, 1.0, rules)
-    assert settle(decision(accept, refuse), 0.0, ACCEPT if accepted else REFUSE, 1.0, rules)[1] == "kept"
+    accepted, _ = settle(decision(accept, refuse), kept, 0.0, standing, 1.0, rules)
+    assert settle(decision(accept, refuse), kept, 0.0, ACCEPT if accepted else REFUSE, 1.0, rules)[1] == "kept"
 
 
 @dataclass
@@ -74,7 +87,9 @@ class Alternating:
 
     def decide(self, problem: Problem, budget: Budget) -> Decision:
         self.calls += 1
-        return decision(1.0, 9.0) if self.calls % 2 else decision(9.0, 1.0)
+        throughout = Constants.of(problem)
+        least = 0.1 * min(throughout.accept.objective, throughout.refuse.objective)
+        return Decision(bool(self.calls % 2), "optimal", objective=least)
 
 
 @pytest.mark.parametrize("dwell", [0.0, 0.2, 1.0])

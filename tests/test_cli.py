@@ -21,7 +21,7 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_everything_is_written(report: Path) -> None:
     names = {path.name for path in report.iterdir()}
-    assert names == {"report.html", "report.json", "junit.xml", "diagram.dot", "diagram.svg", "trace"}
+    assert names == {"report.html", "report.json", "junit.xml", "diagram.dot", "diagram.svg", "trace", "certificates"}
     scenario = load("case_a")[0]
     for name in scenario.runs:
         assert trace.load(report / "trace" / name).run == name
@@ -98,4 +98,4 @@ def test_a_folder_that_cannot_be_written_is_exit_code_4(tmp_path: Path, capsys: 
 
 def test_the_shipped_scenarios_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--list"]) == 0
-    assert capsys.readouterr().out.split() == ["case_a", "case_a_table1", "case_b", "soft_gate"]
+    assert capsys.readouterr().out.split() == ["case_a", "case_a_table1", "case_b", "soft_gate", "audit"]

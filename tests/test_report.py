@@ -120,7 +120,7 @@ def make_trace(
         "decision": "accept",
     }
     costs: list[dict[str, Any]] = [
-        {"t_s": 14.5, "objective_accept": 80.0, "objective_refuse": 100.0, "gap": 0.01},
+        {"t_s": 14.5, "accept_throughout": 80.0, "refuse_throughout": 100.0, "gap": 0.01},
         {"t_s": 15.0},
     ]
     meta = {
@@ -412,7 +412,7 @@ class TestDocument:
     def test_audit_leaves_out_what_the_runs_do_not_show(scenario: Scenario, traces: dict[str, Trace]) -> None:
         moving = {"a": make_trace(scenario, "a", GOING_ROUND), "c": traces["c"]}
         assert built(scenario, moving, FINE)["audit"] == []
-        extra = {"id": 2, "finding": "f", "paper": 1, "ours": 2, "evidence": {}}
+        extra = {"id": 2, "finding": "f", "paper": 1, "ours": 2, "evidence": {}, "demonstrated": True}
         report = document.build(scenario, "", moving, FINE, {}, audit=[extra])
         assert [item["id"] for item in report["audit"]] == [2]
 

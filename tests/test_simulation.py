@@ -293,8 +293,8 @@ def test_case_b_refuses_the_wrong_intervention_and_accepts_the_right_one(run: Ru
         assert times(of_run, "refuse")[0] == pytest.approx(10.6, abs=0.05)
         assert times(of_run, "accept")[0] == pytest.approx(13.1, abs=0.1)
         first = of_run.decisions.groupby("issued_s").first()
-        gap = (first["objective_refuse"] - first["objective_accept"]).abs()
-        assert (gap / first[["objective_accept", "objective_refuse"]].max(axis=1) > 0.05).all()  # no knife edge
+        gap = (first["refuse_throughout"] - first["accept_throughout"]).abs()
+        assert (gap / first[["accept_throughout", "refuse_throughout"]].max(axis=1) > 0.05).all()  # no knife edge
 
 
 def test_what_a_refusal_teaches_is_on_the_uavs_map_afterwards(case_a: Scenario, run: Runs) -> None:

@@ -20,14 +20,22 @@ from airground_drake import files, graphviz, trace
 from airground_drake.diagram import build_diagram
 from airground_drake.errors import AirgroundError, ScenarioError
 from airground_drake.intervention.database import PolicyError
-from airground_drake.report import document, figures, html, junit
+from airground_drake.report import audit, document, figures, html, junit, refinement
+from airground_drake.report.panels import Figure
 from airground_drake.scenarios.load import load, shipped
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.simulation import simulate_all
-from airground_drake.verify import verify
+from airground_drake.verify import MODEL_CLAIMS, Verdict, cache_folder, stl, verify, verify_model
 
 EXIT_USAGE, EXIT_TOOL = 2, 4
 FORMATS = ("html", "json", "junit")
+AUDIT, AUDITED = "audit", "case_a"
+"""`report audit` is the report of the scenario AUDITED with every finding about the paper."""
+AUDIT_TITLE = "The paper's formulas and numbers, audited"
+AUDIT_DESCRIPTION = (
+    "Case A with all its runs and proofs, and every finding about the paper: its formula, ours, and evidence made by a "
+    "run, a proof or a computation."
+)
 PACKAGES = ("airground_drake", "drake", "numpy", "scipy", "numba", "pandas", "matplotlib")
 
 
@@ -43,14 +51,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.scenario is None and not options.list:
         parser.error("a scenario is needed (see --list)")
     if options.list:
-        print("\n".join(shipped()))
+        print("\n".join([*shipped(), AUDIT]))
         return 0
     command = ["python", "-m", "airground_drake.report", *(sys.argv[1:] if arguments is None else arguments)]
     try:
         overrides = [*options.set, *([] if options.seed is None else [f"seed={options.seed}"])]
-        scenario, digest = load(options.scenario, overrides)
+        audited = options.scenario == AUDIT
+        scenario, digest = load(AUDITED if audited else options.scenario, overrides)
+        if audited:
+            scenario.name, scenario.title, scenario.description = AUDIT, AUDIT_TITLE, AUDIT_DESCRIPTION
+        kept = None if options.no_cache else cache_folder()
         folder = options.output or Path("reports") / scenario.name
-        report = write_report(scenario, digest, folder, options.format, shlex.join(command))
+        report = write_report(scenario, digest, folder, options.format, shlex.join(command), kept, audited)
     except (ScenarioError, PolicyError) as error:
         print(f"error: {error}", file=sys.stderr)
         return EXIT_USAGE
@@ -65,7 +77,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def write_report(
-    scenario: Scenario, digest: str, folder: Path, formats: Sequence[str] = FORMATS, command: str = ""
+    scenario: Scenario,
+    digest: str,
+    folder: Path,
+    formats: Sequence[str] = FORMATS,
+    command: str = "",
+    kept: Path | None = None,
+    audited: bool = False,
 ) -> dict[str, Any]:
     """Simulate every run, judge it, and write everything to a folder.
 
@@ -75,6 +93,8 @@ def write_report(
         folder: created if need be; files of an earlier report are replaced, one by one and whole.
         formats: which of html, json and junit to write; traces and diagram are always written.
         command: how to make this report again.
+        kept: folder of kept findings about the model, see `verify_model`; None: every proof anew.
+        audited: add all findings about the paper, also those that take other runs.
 
     Returns:
         The document, as in report.json.
@@ -87,23 +107,31 @@ def write_report(
     _progress(f"simulating {', '.join(scenario.runs)}")
     traces = simulate_all(scenario)
     _progress("checking claims")
-    verdicts = [verdict for of_run in traces.values() for verdict in verify(of_run)]
+    verdicts = [verdict for of_run in traces.values() for verdict in stl.merge(verify(of_run), stl.cross_check(of_run))]
+    _progress("proving")
+    verdicts += verify_model(scenario, kept=kept)
+    if audited:
+        _progress("auditing the paper")
+    findings = audit.whole(scenario, verdicts) if audited else ()
     dot = graphviz.dot(build_diagram(scenario))
     drawn = graphviz.svg(dot)
     provenance = _provenance(scenario, started, command)
 
     _progress("writing")
+    _save_certificates(folder / "certificates", verdicts)
     _drop_stale(folder / "trace", set(traces))
     for name, of_run in traces.items():
         trace.save(of_run, folder / "trace" / name)
     files.write_text(folder / "diagram.dot", dot)
     files.write_text(folder / "diagram.svg", drawn)
     provenance["wall_s"] = time.perf_counter() - clock
-    report = document.build(scenario, digest, traces, verdicts, provenance)
+    required = [claim.id for claim in MODEL_CLAIMS]
+    report = document.build(scenario, digest, traces, verdicts, provenance, audit=findings, required=required)
     if "junit" in formats:
         files.write_text(folder / "junit.xml", junit.render(report))
     if "html" in formats:
-        files.write_text(folder / "report.html", html.render(report, figures.draw(scenario, traces), drawn))
+        plates = [*figures.draw(scenario, traces), *_refinement(verdicts)]
+        files.write_text(folder / "report.html", html.render(report, plates, drawn))
     if "json" in formats:
         files.write_json(folder / "report.json", report)
     _progress("")
@@ -116,7 +144,7 @@ def _parser() -> argparse.ArgumentParser:
         description="Simulate all runs of a scenario, check the claims on them, and write the report.",
         epilog="exit codes: 0 as expected, 1 a claim differs, 2 usage or bad scenario, 3 inconclusive, 4 tool error",
     )
-    parser.add_argument("scenario", nargs="?", help="name of a shipped scenario, or path to a YAML file")
+    parser.add_argument("scenario", nargs="?", help="name of a shipped scenario, path to a YAML file, or audit")
     parser.add_argument("-o", "--output", type=Path, metavar="DIR", help="default: reports/<scenario>")
     parser.add_argument(
         "--format", type=_formats, default=FORMATS, help="comma-separated: html,json,junit (default: all)"
@@ -125,6 +153,9 @@ def _parser() -> argparse.ArgumentParser:
         "--set", action="append", default=[], metavar="KEY=VALUE", help="override a key of the scenario"
     )
     parser.add_argument("--seed", type=int, metavar="N", help="seed of the decision noise")
+    parser.add_argument(
+        "--no-cache", action="store_true", help="redo every proof instead of reusing one whose inputs are unchanged"
+    )
     parser.add_argument("--open", action="store_true", help="open the report in a browser")
     parser.add_argument("--list", action="store_true", help="list the shipped scenarios")
     return parser
@@ -143,6 +174,21 @@ def _drop_stale(folder: Path, current: set[str]) -> None:
     for meta in folder.glob("*/meta.json"):
         if meta.parent.name not in current:
             shutil.rmtree(meta.parent)
+
+
+def _refinement(verdicts: Sequence[Verdict]) -> list[Figure]:
+    """The figure of ZENO-REFINE, if there is such a verdict."""
+    drawn = [refinement.draw(verdict.finding.evidence) for verdict in verdicts if verdict.claim.id == "ZENO-REFINE"]
+    return [figure for figure in drawn if figure is not None]
+
+
+def _save_certificates(folder: Path, verdicts: Sequence[Verdict]) -> None:
+    """Write every certificate to <folder>/<claim>/; those of an earlier report are removed."""
+    for claim in MODEL_CLAIMS:
+        shutil.rmtree(folder / claim.id, ignore_errors=True)
+    for verdict in verdicts:
+        for name, text in verdict.finding.certificates.items():
+            files.write_text(folder / verdict.claim.id / name, text)
 
 
 def _provenance(scenario: Scenario, started: datetime, command: str) -> dict[str, Any]:

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from airground_drake.report import audit as runs_audit
 from airground_drake.report import metrics, reproduction
+from airground_drake.report.audit import of_runs
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.trace import Trace
 from airground_drake.verify.verdict import STATUSES, Verdict
@@ -37,6 +37,7 @@ def build(
     provenance: Mapping[str, Any],
     *,
     audit: Sequence[Mapping[str, Any]] = (),
+    required: Iterable[str] = (),
 ) -> dict[str, Any]:
     """The document.
 
@@ -46,12 +47,15 @@ def build(
         traces: by run, in the order of the scenario; a run without a trace makes the report inconclusive.
         verdicts: all of them; a claim that the scenario expects and that is missing makes it inconclusive.
         provenance: versions, seed, time, `command` and the like.
-        audit: findings about the paper from elsewhere, added to those that the runs show.
+        audit: findings about the paper from elsewhere, added to those that the runs show; with any, all must be
+            demonstrated.
+        required: claims about the model of which there must be a verdict.
 
     Returns:
         Strict JSON; numbers that are not finite have become None.
     """
     claims = [verdict.to_json() for verdict in verdicts]
+    items = sorted([*of_runs(scenario, traces), *map(dict, audit)], key=lambda item: item["id"])
     resolved = asdict(scenario)
     document = {
         "schema": SCHEMA,
@@ -63,19 +67,27 @@ def build(
             "resolved": resolved,
         },
         "provenance": dict(provenance),
-        "overall": overall(claims, missing(scenario, traces, claims)),
+        "overall": overall(claims, missing(scenario, traces, claims, required), items if audit else ()),
         "runs": {name: _run(scenario, trace) for name, trace in traces.items()},
         "claims": claims,
         "reproduction": reproduction.rows(scenario, traces),
         "choices": [{**asdict(choice), "ours": _lookup(resolved, choice.key)} for choice in scenario.choices],
-        "audit": sorted([*runs_audit.findings(scenario, traces), *map(dict, audit)], key=lambda item: item["id"]),
+        "audit": items,
     }
     strict: dict[str, Any] = _strict(document)
     return strict
 
 
-def overall(claims: Sequence[Mapping[str, Any]], absent: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """The verdict over all claims: `status`, `exit_code`, `why`, counts, and what differs, is open or missing."""
+def overall(
+    claims: Sequence[Mapping[str, Any]],
+    absent: Sequence[Mapping[str, Any]],
+    items: Sequence[Mapping[str, Any]] = (),
+) -> dict[str, Any]:
+    """The verdict over all claims: `status`, `exit_code`, `why`, counts, and what differs, is open or missing.
+
+    Of `items`, the findings about the paper, one that was not demonstrated differs, too.
+    """
+    undemonstrated = [item["id"] for item in items if not item["demonstrated"]]
     unexpected = [{key: c[key] for key in ("id", "run", "status", "expected")} for c in claims if not c["as_expected"]]
     differs = [c for c in unexpected if c["status"] not in UNDECIDED]
     undecided = [c for c in unexpected if c["status"] in UNDECIDED]
@@ -84,6 +96,9 @@ def overall(claims: Sequence[Mapping[str, Any]], absent: Sequence[Mapping[str, A
         status = "not_as_expected"
         differ = "differs" if len(differs) == 1 else "differ"
         why = f"{len(differs)} of {_checks(len(claims))} {differ} from what the scenario declares: {_list(differs)}."
+    elif undemonstrated:
+        status = "not_as_expected"
+        why = f"Findings about the paper that were not demonstrated: {', '.join(map(str, undemonstrated))}."
     elif undecided or absent or not claims:
         status = "inconclusive"
         open_items = [*undecided, *absent]
@@ -101,6 +116,7 @@ def overall(claims: Sequence[Mapping[str, Any]], absent: Sequence[Mapping[str, A
         "differs": differs,
         "undecided": undecided,
         "missing": list(absent),
+        "undemonstrated": undemonstrated,
     }
 
 
@@ -110,9 +126,12 @@ def exit_code(document: Mapping[str, Any]) -> int:
 
 
 def missing(
-    scenario: Scenario, traces: Mapping[str, Trace], claims: Sequence[Mapping[str, Any]]
+    scenario: Scenario,
+    traces: Mapping[str, Trace],
+    claims: Sequence[Mapping[str, Any]],
+    required: Iterable[str] = (),
 ) -> list[dict[str, str]]:
-    """Runs without a trace or any verdict, and claims that a run's expectations name but nobody checked."""
+    """Runs without a trace or any verdict, and claims that are expected or required but nobody checked."""
     checked = {(claim["run"], claim["id"]) for claim in claims}
     found = []
     for name, run in scenario.runs.items():
@@ -123,7 +142,8 @@ def missing(
         else:
             unchecked = [claim for claim in run.expected if (name, claim) not in checked]
             found += [{"run": name, "id": claim, "why": "expected, but not checked"} for claim in unchecked]
-    return found
+    unproved = [claim for claim in dict.fromkeys([*required, *scenario.expected]) if ("", claim) not in checked]
+    return found + [{"run": "", "id": claim, "why": "not checked"} for claim in unproved]
 
 
 def _run(scenario: Scenario, trace: Trace) -> dict[str, Any]:
@@ -156,12 +176,16 @@ def _checks(count: int) -> str:
 def _list(items: Sequence[Mapping[str, Any]], limit: int = 4) -> str:
     """The first few items in words."""
     words = [
-        f"{item['id'] or 'run'} on run {item['run']} ({item['status']}, expected {item['expected']})"
+        f"{item['id']}{_on(item['run'])} ({item['status']}, expected {item['expected']})"
         if "status" in item
         else f"{item['id'] or 'run'} {item['run']} ({item['why']})"
         for item in items[:limit]
     ]
     return ", ".join(words) + (f" and {len(items) - limit} more" if len(items) > limit else "")
+
+
+def _on(run: str) -> str:
+    return f" on run {run}" if run else ""
 
 
 def _strict(value: Any) -> Any:

@@ -32,6 +32,8 @@ CHIPS = {
     "reproduced": ("✓", "reproduced", "good"),
     "calibrated": ("≈", "calibrated", "tuned"),
     "not_reproduced": ("✗", "not reproduced", "bad"),
+    "demonstrated": ("✓", "demonstrated", "good"),
+    "not_demonstrated": ("✗", "not demonstrated", "bad"),
 }
 """How a status is shown: icon, word, class (which sets the colour): never by colour alone."""
 
@@ -47,14 +49,16 @@ def render(document: Mapping[str, Any], figures: Sequence[Figure], diagram_svg: 
     distances = _distances(document["runs"])
     return _environment().get_template("report.html.j2").render(
         report=document,
-        figures=[figure for figure in figures if figure.id != "recursion"],
+        figures=[figure for figure in figures if figure.id not in ("recursion", "refinement")],
         comparison=next((figure for figure in figures if figure.id == "recursion"), None),
+        refinement=next((figure for figure in figures if figure.id == "refinement"), None),
         diagram=_diagram(diagram_svg, str(document["scenario"]["name"])),
         groups=_by_claim(document["claims"]),
         attention=sorted(
             (claim for claim in document["claims"] if not claim["as_expected"]),
             key=lambda claim: CHIPS[claim["status"]][2] == "open",
         ),
+        assumptions=_assumptions(document["claims"]),
         tightest=_tightest(distances),
         distances=sorted(distances, key=_margin)[:MAX_DISTANCE_ROWS],
         left_out=max(0, len(distances) - MAX_DISTANCE_ROWS),
@@ -137,6 +141,17 @@ def _by_claim(claims: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
         for name, members in groups.items()
     ]
     return sorted(grouped, key=lambda group: bool(group["fine"]))
+
+
+def _assumptions(claims: Sequence[Mapping[str, Any]]) -> dict[str, list[str]]:
+    """What is taken for granted, and by which claims; what most claims rest on first."""
+    resting: dict[str, list[str]] = {}
+    for claim in claims:
+        for assumption in claim["assumptions"]:
+            names = resting.setdefault(assumption, [])
+            if claim["id"] not in names:
+                names.append(claim["id"])
+    return dict(sorted(resting.items(), key=lambda item: -len(item[1])))
 
 
 def _distances(runs: Mapping[str, Mapping[str, Any]]) -> list[dict[str, Any]]:

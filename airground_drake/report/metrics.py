@@ -69,11 +69,14 @@ def gatekeeper(trace: Trace) -> dict[str, Any] | None:
 
 
 def _closest_call(trace: Trace) -> dict[str, Any] | None:
-    both = trace.decisions[(trace.decisions["objective_accept"] >= 0.0) & (trace.decisions["objective_refuse"] >= 0.0)]
+    """The decision at which accepting and refusing throughout differ least in cost."""
+    both = trace.decisions[
+        (trace.decisions["accept_throughout"] >= 0.0) & (trace.decisions["refuse_throughout"] >= 0.0)
+    ]
     if not len(both):
         return None
-    smaller = both[["objective_accept", "objective_refuse"]].min(axis=1).clip(lower=1e-12)
-    margin = ((both["objective_accept"] - both["objective_refuse"]).abs() / smaller).to_numpy()
+    smaller = both[["accept_throughout", "refuse_throughout"]].min(axis=1).clip(lower=1e-12)
+    margin = ((both["accept_throughout"] - both["refuse_throughout"]).abs() / smaller).to_numpy()
     k = int(np.argmin(margin))
     row = both.iloc[k]
     return {
@@ -82,8 +85,8 @@ def _closest_call(trace: Trace) -> dict[str, Any] | None:
         "robot": str(row["robot"]),
         "policy": str(row["policy"]),
         "decision": str(row["decision"]),
-        "objective_accept": float(row["objective_accept"]),
-        "objective_refuse": float(row["objective_refuse"]),
+        "accept_throughout": float(row["accept_throughout"]),
+        "refuse_throughout": float(row["refuse_throughout"]),
     }
 
 

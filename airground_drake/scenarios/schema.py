@@ -121,7 +121,11 @@ class Intervention:
 class Gatekeeper:
     """The accept/refuse decision, eqs (21)-(29).
 
-    A decision on a proposal is reversed only for a plan that is cheaper by the (relative) switching margin.
+    A decision on a proposal is reversed only for a plan that is cheaper by the (relative) switching margin, and
+    not before `min_dwell_s` have passed. Under method (d) a proposal that the avoidance inequalities would bend
+    by more than the share `max_bend` of its own motion is refused. A decision may take `budget_iterations` of a
+    solver and `budget_nodes` of a search (budget 'counted': a run is the same on every machine), or besides the
+    share `budget_share` of the sampling period by the clock (budget 'wall_clock': for real time).
     """
 
     route: str = "relaxed"
@@ -131,6 +135,12 @@ class Gatekeeper:
     error_weight_1_m2_s: float = 1.0
     slack_weight_1_m2_s: float = 1000.0
     switching_margin: float = 0.05
+    min_dwell_s: float = 0.2
+    max_bend: float = 0.5
+    budget: str = "counted"
+    budget_iterations: int = 100
+    budget_nodes: int = 20000
+    budget_share: float = 0.5
 
 
 @dataclass
@@ -175,7 +185,11 @@ class Choice:
 
 @dataclass
 class Scenario:
-    """A scenario file. The order of `ugvs` and `obstacles` is the order of all arrays."""
+    """A scenario file. The order of `ugvs` and `obstacles` is the order of all arrays.
+
+    `expected` maps identifiers of claims about the model (proofs and experiments, whatever the run) to the
+    expected verdict; one that is not named must be proved, or supported if it is statistical.
+    """
 
     name: str = ""
     title: str = ""
@@ -193,5 +207,6 @@ class Scenario:
     intervention: Intervention = field(default_factory=Intervention)
     gatekeeper: Gatekeeper = field(default_factory=Gatekeeper)
     runs: dict[str, Run] = field(default_factory=dict)
+    expected: dict[str, str] = field(default_factory=dict)
     reproduction: list[Reproduction] = field(default_factory=list)
     choices: list[Choice] = field(default_factory=list)

@@ -21,11 +21,18 @@ from airground_drake.scenarios import schema
 from airground_drake.scenarios.schema import Scenario, Vector
 
 METHODS: tuple[str, ...] = ("a", "b", "c", "d")
-ROUTES: tuple[str, ...] = ("relaxed", "enumeration", "nonlinear", "branch_and_bound")
+ROUTES: tuple[str, ...] = ("relaxed", "enumeration", "nonlinear", "branch_and_bound", "rollout")
 TRIGGERS: tuple[str, ...] = ("automaton", "bare")
 THRESHOLD_RULES: tuple[str, ...] = ("fixed", "bayes")
 SOURCES: tuple[str, ...] = ("calibrated", "ours")
-CLAIMS: tuple[str, ...] = ("SAFE-TRACE", "SAFE-HYP", "ZENO-TRACE", "THR-TRIG", "LIVE-GOAL", "COMM", "GATE-TIME")
+BUDGETS: tuple[str, ...] = ("counted", "wall_clock")
+CLAIMS: tuple[str, ...] = (
+    "SAFE-TRACE", "SAFE-HYP", "ZENO-TRACE", "THR-TRIG", "GATE-OPT", "GATE-SUR", "GATE-FEAS", "GATE-TIME", "LIVE-GOAL",
+    "COMM",
+)  # fmt: skip
+MODEL_CLAIMS: tuple[str, ...] = (
+    "SAFE-LEMMA", "SAFE-INV", "SAFE-GATE", "SAFE-DIST", "ZENO-PROOF", "ZENO-REFINE", "THR-ROOT", "THR-OPT", "THR-DDM",
+)  # fmt: skip
 STATUSES: tuple[str, ...] = ("proved", "holds", "supported", "refuted", "inconclusive", "error", "not_run")
 
 MAX_UGVS, MAX_STAGES, MAX_SEED = 100, 1000, 2**31 - 1
@@ -35,7 +42,7 @@ TOLERANCE = 1e-9  # m between points; relative between periods
 NON_NEGATIVE: dict[type, tuple[str, ...]] = {
     schema.Control: ("avoidance_gain_1_s", "motion_gain_1_s", "formation_gain_1_s", "intervention_gain_1_s"),
     schema.Decision: ("release_m", "min_inter_event_s", "noise_m_sqrt_s", "leak_1_s"),
-    schema.Gatekeeper: ("slack_weight_1_m2_s", "switching_margin"),
+    schema.Gatekeeper: ("slack_weight_1_m2_s", "switching_margin", "min_dwell_s", "max_bend"),
     schema.Intervention: ("retry_s",),
     schema.Reproduction: ("tolerance",),
 }
@@ -125,6 +132,11 @@ def _counts(scenario: Scenario) -> Problems:
         yield "seed", scenario.seed, f"a whole number from 0 to {MAX_SEED}"
     if not 1 <= scenario.gatekeeper.stages <= MAX_STAGES:
         yield "gatekeeper.stages", scenario.gatekeeper.stages, f"a whole number from 1 to {MAX_STAGES}"
+    for name in ("budget_iterations", "budget_nodes"):
+        if not 1 <= getattr(scenario.gatekeeper, name) <= MAX_SEED:
+            yield f"gatekeeper.{name}", getattr(scenario.gatekeeper, name), f"a whole number from 1 to {MAX_SEED}"
+    if scenario.gatekeeper.budget_share > 1.0:
+        yield "gatekeeper.budget_share", scenario.gatekeeper.budget_share, "at most 1, the whole sampling period"
     if not 1 <= len(scenario.ugvs) <= MAX_UGVS:
         yield "ugvs", Fault(f"{len(scenario.ugvs)} UGVs"), f"1 to {MAX_UGVS} are allowed"
     if not scenario.runs:
@@ -134,6 +146,7 @@ def _counts(scenario: Scenario) -> Problems:
 def _options(scenario: Scenario) -> Problems:
     yield from _one_of("intervention.ranking", scenario.intervention.ranking, RANKINGS)
     yield from _one_of("gatekeeper.route", scenario.gatekeeper.route, ROUTES)
+    yield from _one_of("gatekeeper.budget", scenario.gatekeeper.budget, BUDGETS)
     yield from _one_of("decision.trigger", scenario.decision.trigger, TRIGGERS)
     yield from _one_of("decision.threshold.rule", scenario.decision.threshold.rule, THRESHOLD_RULES)
 
@@ -147,6 +160,9 @@ def _runs(scenario: Scenario) -> Problems:
         for claim, status in run.expected.items():
             yield from _one_of(f"runs.{name}.expected.{claim}", claim, CLAIMS, "one of the claims")
             yield from _one_of(f"runs.{name}.expected.{claim}", status, STATUSES)
+    for claim, status in scenario.expected.items():
+        yield from _one_of(f"expected.{claim}", claim, MODEL_CLAIMS, "one of the claims about the model")
+        yield from _one_of(f"expected.{claim}", status, STATUSES)
 
 
 def _ugv_points(scenario: Scenario) -> Iterator[tuple[str, Vector]]:

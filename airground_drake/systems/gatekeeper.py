@@ -12,6 +12,7 @@ from pydrake.common.value import AbstractValue, Value
 from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSystem, State
 
 from airground_drake.gatekeeper.budget import Budget, Clock
+from airground_drake.gatekeeper.candidates import Constants
 from airground_drake.gatekeeper.prediction import Horizon, Scene, UgvLaw, predicted_problem
 from airground_drake.gatekeeper.problem import DECIDED, Decision, Problem
 from airground_drake.intervention.policy import Proposal
@@ -36,7 +37,7 @@ class Rules:
     """When a decision becomes an answer, and what it may cost.
 
     Attributes:
-        switching_margin: relative gain that a reversal needs.
+        switching_margin: relative gain that a reversal needs over keeping the answer throughout.
         min_dwell: least time between opposite answers to a proposal, s.
         max_bend: largest share of its motion by which a proposal may be bent by the avoidance inequalities.
         budget: of one decision, in counts.
@@ -66,6 +67,7 @@ class Ruling:
         proposal: on what.
         problem: (26) as predicted.
         decision: the route's.
+        throughout: costs (25) of accepting and of refusing throughout; -1 without a plan.
         accepted: the answer.
         reason: why.
     """
@@ -75,6 +77,7 @@ class Ruling:
     proposal: Proposal
     problem: Problem
     decision: Decision
+    throughout: tuple[float, float]
     accepted: bool
     reason: Reason
 
@@ -193,11 +196,12 @@ class Gatekeeper(LeafSystem):
                 continue
             started = time.thread_time()
             problem = self._problem(t, i, proposal, positions, velocities)
-            decision = _decide(self._route, problem, next(deadlines))  # TEMPORARY
+            decision = self._route.decide(problem, next(deadlines))
             self.decision_times_s.append(time.thread_time() - started)
             standing = answer_to(proposal, memory.answers, i)
-            accepted, reason = settle(decision, problem.bend, standing, t - memory.since[i], self._rules)
-            rulings.append(Ruling(t, i, proposal, problem, decision, accepted, reason))
+            throughout = _throughout(problem, decision)
+            accepted, reason = settle(decision, throughout, problem.bend, standing, t - memory.since[i], self._rules)
+            rulings.append(Ruling(t, i, proposal, problem, decision, throughout, accepted, reason))
             answer = ACCEPT if accepted else REFUSE
             answers += [answer, proposal.issued]
             since.append(memory.since[i] if answer == standing else t)
@@ -237,17 +241,29 @@ class Gatekeeper(LeafSystem):
         return predicted_problem(scene, self._law, proposal, self._horizon)
 
 
-def settle(decision: Decision, bend: float, standing: float, stood: float, rules: Rules) -> tuple[bool, Reason]:
+def _throughout(problem: Problem, decision: Decision) -> tuple[float, float]:
+    """Costs (25) of the two constant plans; mode velocities are exact for them."""
+    if decision.status not in DECIDED:
+        return -1.0, -1.0
+    constants = Constants.of(problem)
+    return constants.accept.objective, constants.refuse.objective
+
+
+def settle(
+    decision: Decision, throughout: tuple[float, float], bend: float, standing: float, stood: float, rules: Rules
+) -> tuple[bool, Reason]:
     """Whether the proposal is accepted, and why.
 
     Without a plan it is refused, whatever stands. A new proposal is accepted if the best plan starts by accepting
     it, unless it makes no difference (one that the avoidance inequalities block entirely) or they would bend it
-    too much. A standing answer is reversed only if the other choice is cheaper by the switching margin (two
-    choices of nearly equal cost must not alternate at every sample), or if an accepted proposal has come to be
-    bent too much; and not before the dwell is over.
+    too much. A standing answer is reversed only if the best plan starts with the other choice and is cheaper, by
+    the switching margin, than to keep the answer throughout; or if an accepted proposal has come to be bent too
+    much; and not before the dwell is over. (The best plan that keeps the answer for one more stage and then
+    changes it costs nearly the same as the one that changes it now: that comparison would decide nothing.)
 
     Args:
         decision: the route's.
+        throughout: costs (25) of accepting and of refusing throughout the horizon.
         bend: see `Problem.bend`.
         standing: ACCEPT, REFUSE or SILENT.
         stood: for how long that has been the answer, s.
@@ -255,18 +271,17 @@ def settle(decision: Decision, bend: float, standing: float, stood: float, rules
     """
     if decision.status not in DECIDED:
         return False, "no_plan"
+    accept, refuse = throughout
     bent = bend > rules.max_bend
     if standing == SILENT:
         if not decision.accept:
             return False, "not_cheaper"
-        if not decision.objective_accept < (1.0 - USELESS) * decision.objective_refuse:
+        if not decision.objective < (1.0 - USELESS) * refuse:
             return False, "no_difference"
         return (False, "bent") if bent else (True, "cheaper")
-    if standing == ACCEPT:
-        reverse = bent or decision.objective_refuse < (1.0 - rules.switching_margin) * decision.objective_accept
-    else:
-        reverse = not bent and decision.objective_accept < (1.0 - rules.switching_margin) * decision.objective_refuse
-    if not reverse:
+    kept = accept if standing == ACCEPT else refuse
+    better = decision.accept != (standing == ACCEPT) and decision.objective < (1.0 - rules.switching_margin) * kept
+    if not ((better or bent) if standing == ACCEPT else (better and not bent)):
         return standing == ACCEPT, "kept"
     if stood < rules.min_dwell - 1e-9:
         return standing == ACCEPT, "dwell"
@@ -297,10 +312,3 @@ class DirectAcceptance(LeafSystem):
     def _calc_answers(self, context: Context, output: BasicVector) -> None:
         answers = [(SILENT, -1.0) if p is None else (ACCEPT, p.issued) for p in self._proposals.Eval(context)]
         output.SetFromVector(np.array(answers).ravel())
-
-
-def _decide(route, problem, budget):  # TEMPORARY until all routes take a budget
-    try:
-        return route.decide(problem, budget)
-    except TypeError:
-        return route.decide(problem)

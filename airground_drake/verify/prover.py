@@ -82,7 +82,7 @@ def discharge(obligations: Sequence[Obligation], limit_s: float = LIMIT_S) -> li
 def finding(proofs: Sequence[Proof], **evidence: Any) -> Finding:
     """The finding over all obligations of a claim, with its certificates; the worst status counts."""
     order: tuple[Status, ...] = ("error", "refuted", "inconclusive", "proved")
-    status = min((proof.status for proof in proofs), key=order.index, default="error")
+    status: Status = min((proof.status for proof in proofs), key=order.index, default=order[0])
     broken = next((found for proof in proofs if (found := proof.counterexample())), None)
     return Finding(
         status,

@@ -1,0 +1,29 @@
+"""The paper's audit: each finding with the paper's formula, ours, and evidence made by a run, a proof or a computation.
+
+`of_runs` needs nothing but the runs of a report. `whole` adds what takes runs of other scenarios and what follows
+from the formulas alone: `python -m airground_drake.report audit`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from airground_drake.report.audit.companions import companion_findings
+from airground_drake.report.audit.formulas import formula_findings
+from airground_drake.report.audit.runs import findings as of_runs
+from airground_drake.scenarios.schema import Scenario
+from airground_drake.verify import Verdict
+
+__all__ = ["of_runs", "whole"]
+
+
+def whole(scenario: Scenario, verdicts: Sequence[Verdict]) -> list[dict[str, Any]]:
+    """All findings but those of the scenario's own runs.
+
+    Args:
+        scenario: `case_a`, whose constants are the paper's.
+        verdicts: on its model; findings that rest on a proof quote them.
+    """
+    proofs = {verdict.claim.id: verdict.finding for verdict in verdicts if not verdict.run}
+    return [*formula_findings(scenario, proofs), *companion_findings()]

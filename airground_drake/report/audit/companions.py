@@ -1,0 +1,133 @@
+"""Findings that take runs of other scenarios than the report's own: simulated here, with what was changed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from pydrake.solvers import ClarabelSolver, MathematicalProgram
+
+from airground_drake.report.audit.formulas import Item
+from airground_drake.report.metrics import closest_obstacle
+from airground_drake.report.reproduction import MEASURES
+from airground_drake.scenarios.load import load
+from airground_drake.simulation import simulate
+from airground_drake.trace import Trace
+
+
+def companion_findings() -> list[Item]:
+    """Items 7, 10 and 11."""
+    return [_sign(), _soft_gate(), _no_dynamics()]
+
+
+def _run(name: str, run: str, changes: tuple[str, ...] = ()) -> Trace:
+    return simulate(load(name, changes)[0], run)
+
+
+def _sign() -> Item:
+    """Item 7: UGV2's preset x with the printed and with the opposite sign."""
+    evidence = {}
+    for sign, x in (("printed", 1.3), ("ours", -1.3)):
+        points = f"[[{x}, 0.0, 0.0], [{x}, 13.0, 0.0], [-1.0, 13.0, 0.0]]"
+        changes = (f"ugvs.ugv2.preset.waypoints_m={points}", "reproduction=[]")
+        trace = _run("case_a", "a", changes)
+        evidence[sign] = {
+            "preset_x_m": x,
+            "ends_at_m": trace.position("ugv2")[-1].tolist(),
+            "stalls_at_m": MEASURES["stall_position"](trace, "ugv2"),
+            "arrives": bool(MEASURES["arrives"](trace, "ugv2")[0]),
+            "command": f"case_a with --set {changes[0]}, run a",
+        }
+    shown = bool(evidence["printed"]["stalls_at_m"]) and bool(evidence["ours"]["arrives"])
+    return {
+        "id": 7,
+        "where": "Table 1",
+        "finding": "UGV2's preset trajectory prints x = 1.3 m; there UGV2 stalls, though the paper says that it "
+        "completes on its own. With x = -1.3 m it completes.",
+        "paper": {"x_m": 1.3, "arrives": evidence["printed"]["arrives"]},
+        "ours": {"x_m": -1.3, "arrives": evidence["ours"]["arrives"]},
+        "unit": "m",
+        "demonstrated": shown,
+        "evidence": evidence,
+    }
+
+
+def _soft_gate() -> Item:
+    """Item 10: an intervention that (c) accepts with a predicted distance below d, and (d) renders harmless."""
+    evidence: dict[str, Any] = {}
+    for run in ("c", "d"):
+        trace = _run("soft_gate", run)
+        nearest = closest_obstacle(trace, "ugv1")
+        accepted = trace.decisions[trace.decisions["decision"] == "accept"]
+        evidence[run] = {
+            "accepted": len(accepted),
+            "least_predicted_clearance_of_accepted_m": (
+                float(accepted["predicted_clearance_m"].min()) if len(accepted) else None
+            ),
+            "min_distance_m": nearest[0] if nearest else None,
+            "t_s": nearest[1] if nearest else None,
+        }
+    d = load("soft_gate")[0].safe_distance.obstacle_m
+    paper, ours = evidence["c"], evidence["d"]
+    predicted = paper["least_predicted_clearance_of_accepted_m"]
+    return {
+        "id": 10,
+        "where": "(26d)-(26e)",
+        "finding": "The soft constraint is no safety guarantee: a large enough gain in task error buys an intrusion, "
+        "and the gatekeeper accepts it knowingly. Under (d) the same proposals leave every distance at least d.",
+        "paper": {"min_distance_m": paper["min_distance_m"], "predicted_clearance_m": predicted},
+        "ours": {"min_distance_m": ours["min_distance_m"]},
+        "unit": "m",
+        "demonstrated": predicted is not None
+        and predicted < 0.0
+        and paper["min_distance_m"] < d
+        and ours["min_distance_m"] >= d - 1e-9,
+        "evidence": evidence | {"safe_distance_m": d, "command": "python -m airground_drake.report soft_gate"},
+    }
+
+
+def _no_dynamics() -> Item:
+    """Item 11: (26) and (27) as printed have no kinematics: their optimum does not depend on the decision."""
+    trace = _run("case_b", "c", ("duration_s=11.0", "reproduction=[]"))
+    first = trace.problems.iloc[0]
+    reference = np.asarray(first["reference_m"]).reshape(-1, 3)
+    stages, start = len(reference), np.asarray(first["initial_m"])
+    costs = {}
+    weight, dt = float(first["error_weight_1_m2_s"]), float(first["dt_s"])
+    for name in ("accept", "refuse"):
+        moves = np.reshape(first[f"{name}_m_s"], (stages, 3))
+        costs[name] = {
+            "printed": _printed_optimum(reference, start, weight, dt),
+            "with_23": float(weight * dt * np.sum((start + dt * np.cumsum(moves, axis=0) - reference) ** 2)),
+        }
+    omega = np.concatenate([np.asarray(row, dtype=float) for row in trace.problems["relaxed"]] or [np.zeros(0)])
+    fractional = int(np.sum((omega > 1e-3) & (omega < 1.0 - 1e-3)))
+    printed, ours = (abs(costs["accept"][kind] - costs["refuse"][kind]) for kind in ("printed", "with_23"))
+    return {
+        "id": 11,
+        "where": "(26), (27)",
+        "finding": "Neither (26) nor (27) lists the kinematics (23) among its constraints. As printed the states are "
+        "free, follow the reference exactly, and accepting costs as much as refusing: nothing is decided.",
+        "paper": {"cost_accept_minus_refuse": printed},
+        "ours": {"cost_accept_minus_refuse": ours},
+        "unit": "",
+        "demonstrated": printed < 1e-6 < ours,
+        "evidence": {
+            "problem": "the first decision of case_b, run c; task errors only",
+            "t_s": float(trace.decisions["t_s"].iloc[0]),
+            "cost": costs,
+            "relaxed_omega_strictly_between_0_and_1": {"count": fractional, "of": len(omega)},
+        },
+    }
+
+
+def _printed_optimum(reference: Any, start: Any, weight: float, dt: float) -> float:
+    """Least task error of (27) as printed: states tied to nothing but the initial one."""
+    program = MathematicalProgram()
+    states = program.NewContinuousVariables(len(reference) + 1, 3, "rho")
+    program.AddBoundingBoxConstraint(start, start, states[0]).evaluator().set_description("(27b)")
+    free = states[1:].ravel()
+    hessian = 2.0 * weight * dt * np.eye(len(free))
+    program.AddQuadraticErrorCost(hessian / 2.0, reference.ravel(), free).evaluator().set_description("(25) task error")
+    result = ClarabelSolver().Solve(program)
+    return max(0.0, float(result.get_optimal_cost())) if result.is_success() else float("nan")

@@ -1,0 +1,70 @@
+"""The paper's audit: every item is demonstrated by what it computes, and not if the evidence is not there."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from airground_drake.decision import bayes
+from airground_drake.report.audit import companions, formulas
+from airground_drake.scenarios.load import load
+from airground_drake.verify import Finding, verify_model
+
+FORMULAS = (2, 3, 4, 5, 8, 9, 12, 13, 14, 15)
+
+
+@pytest.fixture(scope="module")
+def proofs() -> dict[str, Finding]:
+    return {verdict.claim.id: verdict.finding for verdict in verify_model(load("case_a")[0])}
+
+
+@pytest.fixture(scope="module")
+def items(proofs: dict[str, Finding]) -> dict[int, dict[str, Any]]:
+    return {item["id"]: item for item in formulas.formula_findings(load("case_a")[0], proofs)}
+
+
+@pytest.fixture(scope="module")
+def companion_items() -> dict[int, dict[str, Any]]:
+    return {item["id"]: item for item in companions.companion_findings()}
+
+
+@pytest.mark.parametrize("number", FORMULAS)
+def test_what_follows_from_the_formulas_is_demonstrated(items: dict[int, dict[str, Any]], number: int) -> None:
+    assert set(items) == set(FORMULAS)
+    assert items[number]["demonstrated"] is True
+    assert {"id", "where", "finding", "paper", "ours", "unit", "evidence"} <= set(items[number])
+
+
+def test_what_takes_other_runs_is_demonstrated(companion_items: dict[int, dict[str, Any]]) -> None:
+    assert {number: item["demonstrated"] for number, item in companion_items.items()} == {7: True, 10: True, 11: True}
+
+
+def test_the_numbers_of_the_audit(items: dict[int, dict[str, Any]], companion_items: dict[int, dict[str, Any]]) -> None:
+    assert items[2]["evidence"]["minimiser_of_16_m"] == pytest.approx(0.46500451, abs=1e-6)
+    assert items[2]["paper"]["root_m"] == pytest.approx(0.12435, abs=1e-5)
+    assert items[4]["ours"]["drift_m_s"] == pytest.approx([6.0667, 99.015], abs=1e-3)
+    assert items[5]["ours"]["mean_first_passage_s"] == pytest.approx(0.09)
+    assert companion_items[7]["evidence"]["printed"]["stalls_at_m"] == pytest.approx([-0.06, 3.05], abs=0.01)
+    assert companion_items[10]["paper"]["min_distance_m"] < 2.0 - 0.5
+    assert companion_items[11]["paper"]["cost_accept_minus_refuse"] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_with_the_printed_equation_in_the_code_item_2_would_not_pass(
+    proofs: dict[str, Finding], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def printed(drift: float, noise: float, c1: float, c2: float) -> float:
+        return bayes.optimal_threshold(drift, noise, c2, c1)
+
+    monkeypatch.setattr(formulas, "optimal_threshold", printed)
+    (item,) = [each for each in formulas.formula_findings(load("case_a")[0], proofs) if each["id"] == 2]
+    assert item["demonstrated"] is False
+
+
+def test_without_proofs_the_items_that_rest_on_them_are_not_demonstrated(proofs: dict[str, Finding]) -> None:
+    open_ones = {**proofs, "THR-OPT": replace(proofs["THR-OPT"], status="inconclusive")}
+    found = {item["id"]: item["demonstrated"] for item in formulas.formula_findings(load("case_a")[0], open_ones)}
+    assert found == {number: number != 2 for number in FORMULAS}
+    found = {item["id"]: item["demonstrated"] for item in formulas.formula_findings(load("case_a")[0], {})}
+    assert found == {number: number not in (2, 9) for number in FORMULAS}
