@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from airground_drake.decision import bayes
+from airground_drake.report import document
 from airground_drake.report.audit import companions, formulas
 from airground_drake.scenarios.load import load
+from airground_drake.scenarios.validate import MODEL_CLAIMS
 from airground_drake.verify import Finding, verify_model
+from airground_drake.verify.mutants import refute_mutants
 
 FORMULAS = (2, 3, 4, 5, 8, 9, 12, 13, 14, 15)
 
@@ -68,3 +72,18 @@ def test_without_proofs_the_items_that_rest_on_them_are_not_demonstrated(proofs:
     assert found == {number: number != 2 for number in FORMULAS}
     found = {item["id"]: item["demonstrated"] for item in formulas.formula_findings(load("case_a")[0], {})}
     assert found == {number: number not in (2, 9) for number in FORMULAS}
+
+
+def test_every_mutant_of_the_proofs_is_refuted(tmp_path: Path) -> None:
+    found = refute_mutants(load("case_b")[0], kept=tmp_path)
+    assert len(found) >= 30
+    assert [mutant for mutant in found if not mutant["refuted"]] == []
+    assert {mutant["claim"] for mutant in found} == set(MODEL_CLAIMS)
+    assert refute_mutants(load("case_b")[0], kept=tmp_path) == found
+
+
+def test_a_mutant_that_survives_is_in_the_verdict() -> None:
+    surviving = [{"claim": "SAFE-INV", "mutant": "harmless", "refuted": False}]
+    overall = document.overall([{"as_expected": True, "status": "holds"}], [], (), surviving)
+    assert (overall["status"], overall["exit_code"]) == ("not_as_expected", 1)
+    assert "SAFE-INV: harmless" in overall["why"]

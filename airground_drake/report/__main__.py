@@ -26,6 +26,7 @@ from airground_drake.scenarios.load import load, shipped
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.simulation import simulate_all
 from airground_drake.verify import MODEL_CLAIMS, Verdict, cache_folder, stl, verify, verify_model
+from airground_drake.verify.mutants import refute_mutants
 
 EXIT_USAGE, EXIT_TOOL = 2, 4
 FORMATS = ("html", "json", "junit")
@@ -94,7 +95,7 @@ def write_report(
         formats: which of html, json and junit to write; traces and diagram are always written.
         command: how to make this report again.
         kept: folder of kept findings about the model, see `verify_model`; None: every proof anew.
-        audited: add all findings about the paper, also those that take other runs.
+        audited: add all findings about the paper, also those that take other runs, and the proofs' mutants.
 
     Returns:
         The document, as in report.json.
@@ -113,6 +114,7 @@ def write_report(
     if audited:
         _progress("auditing the paper")
     findings = audit.whole(scenario, verdicts) if audited else ()
+    mutants = refute_mutants(scenario, kept=kept) if audited else ()
     dot = graphviz.dot(build_diagram(scenario))
     drawn = graphviz.svg(dot)
     provenance = _provenance(scenario, started, command)
@@ -126,7 +128,9 @@ def write_report(
     files.write_text(folder / "diagram.svg", drawn)
     provenance["wall_s"] = time.perf_counter() - clock
     required = [claim.id for claim in MODEL_CLAIMS]
-    report = document.build(scenario, digest, traces, verdicts, provenance, audit=findings, required=required)
+    report = document.build(
+        scenario, digest, traces, verdicts, provenance, audit=findings, mutants=mutants, required=required
+    )
     if "junit" in formats:
         files.write_text(folder / "junit.xml", junit.render(report))
     if "html" in formats:
