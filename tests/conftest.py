@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 
 import pytest
@@ -14,6 +15,12 @@ from airground_drake.trace import Trace
 
 settings.register_profile("airground", deadline=None)  # the first call compiles; nothing here asserts on time
 settings.load_profile("airground")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _cache(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Findings are kept in a folder of the session, not in the user's."""
+    os.environ["AIRGROUND_DRAKE_CACHE"] = str(tmp_path_factory.mktemp("kept"))
 
 
 @pytest.fixture(scope="session")

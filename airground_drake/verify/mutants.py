@@ -1,4 +1,4 @@
-"""Broken variants of what the proofs are about: each must be refuted, or the claim that it belongs to proves nothing."""
+"""Broken variants of what the proofs are about: each must be refuted, or its claim proves nothing."""
 
 from __future__ import annotations
 
