@@ -201,7 +201,9 @@ def test_a_proposal_into_an_obstacle_is_refused() -> None:
         problem = predicted_problem(
             scene, replace(law, intervention_on_top=on_top), Proposal("bad", scene.t, motion), horizon
         )
-        assert not settle(RelaxedRoute().decide(problem), problem.bend, SILENT, 0.0, Rules(max_bend=0.5))[0]
+        throughout = tuple(problem.evaluate(np.full(problem.stages, answer)).objective for answer in (1.0, 0.0))
+        decision = RelaxedRoute().decide(problem)
+        assert not settle(decision, throughout, problem.bend, SILENT, 0.0, Rules(max_bend=0.5))[0]
         assert (problem.bend > 0.5) == (not on_top)
 
 

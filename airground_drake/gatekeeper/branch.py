@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from pydrake.solvers import (
     ClarabelSolver,
     GurobiSolver,
-    MathematicalProgram,
     MixedIntegerBranchAndBound,
     MosekSolver,
     SolutionResult,
+    SolverOptions,
 )
 
-from airground_drake.gatekeeper.candidates import Constants, block_of_stage, choose
-from airground_drake.gatekeeper.half_planes import normals_along, reachable
+from airground_drake.gatekeeper.budget import Budget
+from airground_drake.gatekeeper.candidates import Constants, choose, cut_short, remaining_cost
+from airground_drake.gatekeeper.half_planes import normals_along
 from airground_drake.gatekeeper.problem import Decision, Problem
+from airground_drake.gatekeeper.program import TeamProgram, team_program
 from airground_drake.nsbc.task import Array
 
 _SCALE = 10.0
@@ -26,12 +28,21 @@ _SCALE = 10.0
 
 At 1000 Clarabel fails twice as often."""
 
+_NODE_S = 1e-3
+"""Time that a node is taken to need, s."""
+
+_NAMES = {
+    GurobiSolver: ("NodeLimit", "TimeLimit"),
+    MosekSolver: ("MSK_IPAR_MIO_MAX_NUM_BRANCHES", "MSK_DPAR_MIO_MAX_TIME"),
+}
+"""Options of the licensed solvers that limit nodes and time, s."""
+
 _GAP = 0.01 + 1e-5
 """Drake's branch and bound stops at this gap, relative or absolute; both are fixed there. And Clarabel's own."""
 
 
 class BranchAndBoundRoute:
-    """Mixed-integer quadratic program with the half-planes of `RelaxedRoute`, no rounding.
+    """Mixed-integer quadratic program with the half-planes of `RelaxedRoute`, no rounding: see `team_program`.
 
     With Gurobi or Mosek licensed for Drake, one binary per stage (their default gap 1e-4; not tested here,
     for want of a licence). Else `MixedIntegerBranchAndBound` with one binary per block of N / `blocks` stages
@@ -40,9 +51,13 @@ class BranchAndBoundRoute:
     the same half-planes and dwell. Its "binaries" are binary to a tolerance only, so that the plan is rounded
     and evaluated exactly, and the cheapest of it and the constant plans is returned.
 
-    Anything but a proven optimum refuses. Of roll-outs among random discs 4 to 7 % end so, because Clarabel
-    reports insufficient progress in a node; Drake hands no options on to it. At worst 2^(blocks + 1)
-    relaxations are solved.
+    Anything but a proven optimum refuses. Of roll-outs among random discs some end so, because Clarabel
+    reports insufficient progress in a node; Drake hands no options on to it.
+
+    Budget: nodes go to Drake's search, which explores at most 2^(blocks + 1) anyway. It can be neither
+    interrupted nor given a time, and its relaxations no number of iterations; so with a deadline it gets
+    no more nodes than last for the time left at `_NODE_S` each, an estimate and no guarantee. A licensed solver
+    gets both limits under its own names.
     """
 
     def __init__(self, blocks: int = 10) -> None:
@@ -56,28 +71,35 @@ class BranchAndBoundRoute:
         self._blocks = blocks
         self._licensed = licensed_solver()
 
-    def decide(self, problem: Problem) -> Decision:
+    def decide(self, problem: Problem, budget: Budget = Budget()) -> Decision:  # noqa: B008 (immutable)
         """Accept or refuse: never raises for a hard or broken problem, but refuses and says why."""
         if not problem.is_finite():
             return Decision(False, "refused_not_finite")
+        if budget.spent():
+            return Decision(False, "refused_budget_spent")
         constants = Constants.of(problem)
         if not constants.are_finite():
             return Decision(False, "refused_not_finite")
+        plans = [constants.accept, constants.refuse]
+        if budget.spent():
+            return cut_short(problem, plans, remaining_cost(problem))
         normals = normals_along(problem, constants.better.positions)
-        blocks = self._blocks if self._licensed is None else problem.stages
-        block = block_of_stage(problem.stages, blocks)
         scale = max(problem.evaluate_half_planes(constants.better.positions, normals), 1e-9) / _SCALE
+        blocks = self._blocks if self._licensed is None else None
+        team = team_program([problem], [normals], relaxed=False, blocks=blocks, scale=scale)
         try:
-            integer = integer_program(problem, normals, block, scale)
-            values, bound = _branch(integer) if self._licensed is None else _delegate(self._licensed, integer)
+            found = _branch(team, budget) if self._licensed is None else _delegate(self._licensed, team, budget)
         except (RuntimeError, ValueError):  # Drake: "Unknown result", or a failing sub-solver
             return constants.failed()
-        if values is None or not np.isfinite(values).all() or not np.isfinite(bound):
+        if found is None:
             return constants.failed()
-        plan = problem.evaluate((values[block] > 0.5).astype(float))
-        return choose(
-            problem, (plan, constants.accept, constants.refuse), lower_bound=max(0.0, scale * bound), normals=normals
-        )
+        if found.binaries is not None:
+            if not np.isfinite(found.binaries).all() or not np.isfinite(found.bound):
+                return constants.failed()
+            plans.insert(0, problem.evaluate((team.ugvs[0].plan(found.binaries) > 0.5).astype(float)))
+        if not found.finished:
+            return cut_short(problem, plans, remaining_cost(problem))
+        return choose(problem, plans, lower_bound=max(0.0, scale * found.bound), normals=normals)
 
 
 def licensed_solver() -> Any:
@@ -89,73 +111,47 @@ def licensed_solver() -> Any:
 
 
 @dataclass(frozen=True, eq=False)
-class IntegerProgram:
-    """The program and its binaries, one per block."""
+class Found:
+    """What a search gave: binaries (B,) if it has a plan, a lower bound in the program's unit, if it finished."""
 
-    program: MathematicalProgram
-    binaries: Any
-
-
-def integer_program(problem: Problem, normals: Array, block: npt.NDArray[np.int64], scale: float) -> IntegerProgram:
-    """Condensed: positions are affine in the binaries z, p = start + M z, so that only z and u are variables.
-
-    Args:
-        problem: data of (26).
-        normals: of the half-planes, (N, m, 3).
-        block: of each stage, (N,).
-        scale: cost (25) that is 1 in the program.
-    """
-    stages, count = problem.stages, int(block[-1]) + 1
-    member = np.zeros((stages, count))
-    member[np.arange(stages), block] = 1.0
-    change = (problem.accept - problem.refuse)[:, :, None] * member[:, None, :]
-    sensitivity = problem.dt * np.cumsum(change, axis=0)  # M, (N, 3, B)
-    error = problem.positions(np.zeros(stages)) - problem.reference
-    program = MathematicalProgram()
-    z = program.NewBinaryVariables(count, "z")
-    weight = 2.0 * problem.dt / scale
-    flat = sensitivity.reshape(-1, count)
-    program.AddQuadraticCost(
-        weight * problem.error_weight * flat.T @ flat,
-        weight * problem.error_weight * flat.T @ error.ravel(),
-        0.5 * weight * problem.error_weight * float(np.sum(error**2)),
-        z,
-        is_convex=True,
-    ).evaluator().set_description("(25) task error")
-    stage, point = np.nonzero(reachable(problem))
-    if len(stage):
-        used, row = np.unique(stage, return_inverse=True)
-        u = program.NewContinuousVariables(len(used), "u")
-        hessian = weight * problem.slack_weight * np.eye(len(used))
-        program.AddQuadraticCost(hessian, np.zeros(len(used)), u, is_convex=True).evaluator().set_description(
-            "(25) slack"
-        )
-        program.AddBoundingBoxConstraint(0.0, np.inf, u).evaluator().set_description("(26e)")
-        normal = normals[stage, point]
-        slope = np.einsum("ri,rib->rb", normal, sensitivity[stage])
-        away = problem.reference[stage] + error[stage] - problem.centres[stage, point]
-        lower = problem.distances[point] - np.einsum("ri,ri->r", normal, away)
-        picks = np.zeros((len(stage), len(used)))
-        picks[np.arange(len(stage)), row] = 1.0
-        program.AddLinearConstraint(
-            np.hstack([slope, picks]), lower, np.full(len(lower), np.inf), np.concatenate([z, u])
-        ).evaluator().set_description("(26d) as half-planes")
-    return IntegerProgram(program, z)
+    binaries: Array | None
+    bound: float
+    finished: bool
 
 
-def _branch(integer: IntegerProgram) -> tuple[Array | None, float]:
-    """Binaries (B,) and a lower bound by Drake's branch and bound; None without a proven optimum."""
-    search = MixedIntegerBranchAndBound(integer.program, ClarabelSolver.id())
-    if search.Solve() != SolutionResult.kSolutionFound:
-        return None, -1.0
+def _branch(team: TeamProgram, budget: Budget) -> Found | None:
+    """Drake's branch and bound; None without a proven optimum, unless the nodes were spent."""
+    options = MixedIntegerBranchAndBound.Options()
+    options.max_explored_nodes = min(budget.nodes, 2**31 - 1)
+    if budget.left_s() < math.inf:
+        options.max_explored_nodes = max(1, min(budget.nodes, int(budget.left_s() / _NODE_S)))
+    search = MixedIntegerBranchAndBound(team.program, ClarabelSolver.id(), options)
+    status = search.Solve()
+    if status == SolutionResult.kIterationLimit:
+        return Found(None, -1.0, False)
+    if status != SolutionResult.kSolutionFound:
+        return None
     optimum = float(search.GetOptimalCost())
-    return np.asarray(search.GetSolution(integer.binaries), dtype=float), optimum - _GAP * max(1.0, abs(optimum))
+    binaries = np.asarray(search.GetSolution(team.ugvs[0].omega), dtype=float)
+    return Found(binaries, optimum - _GAP * max(1.0, abs(optimum)), True)
 
 
-def _delegate(solver: Any, integer: IntegerProgram) -> tuple[Array | None, float]:
+def _delegate(solver: Any, team: TeamProgram, budget: Budget) -> Found | None:
     """The same by a solver of mixed-integer programs, at its default relative gap of 1e-4."""
-    result = solver.Solve(integer.program)
+    result = solver.Solve(team.program, None, _limits(solver, budget))
     if not result.is_success():
-        return None, -1.0
+        stopped = budget.spent() or result.get_solution_result() == SolutionResult.kIterationLimit
+        return Found(None, -1.0, False) if stopped else None
     optimum = float(result.get_optimal_cost())
-    return np.asarray(result.GetSolution(integer.binaries), dtype=float), optimum - 1e-4 * abs(optimum)
+    return Found(np.asarray(result.GetSolution(team.ugvs[0].omega), dtype=float), optimum - 1e-4 * abs(optimum), True)
+
+
+def _limits(solver: Any, budget: Budget) -> SolverOptions:
+    """Nodes and time left, as Gurobi and Mosek call them."""
+    options = SolverOptions()
+    nodes, seconds = _NAMES.get(type(solver), ("", ""))
+    if nodes:
+        options.SetOption(solver.solver_id(), nodes, min(budget.nodes, 2**31 - 1))
+        if budget.left_s() < math.inf:
+            options.SetOption(solver.solver_id(), seconds, budget.left_s())
+    return options

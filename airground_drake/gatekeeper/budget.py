@@ -25,7 +25,7 @@ class Budget:
     """
 
     iterations: int = 100
-    nodes: int = 20_000
+    nodes: int = 15_000
     deadline_s: float = math.inf
     clock: Clock = field(default=time.monotonic, compare=False)
 

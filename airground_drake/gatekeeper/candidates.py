@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from numba import njit
 
 from airground_drake.gatekeeper.problem import Decision, Evaluation, Problem, Status
+from airground_drake.gatekeeper.rounding import rounding_deviation
 from airground_drake.nsbc.task import Array
 
 
@@ -42,24 +45,26 @@ class Constants:
 
 def choose(
     problem: Problem,
-    plans: tuple[Evaluation, ...],
+    plans: Sequence[Evaluation],
     *,
+    status: Status = "optimal",
     lower_bound: float = -1.0,
     gap: float = -1.0,
     normals: Array | None = None,
-    relaxed_first_stage: float = -1.0,
-    deviation: float = -1.0,
+    relaxed: Array | None = None,
+    rounded: Array | None = None,
 ) -> Decision:
     """The cheapest of some evaluated plans, among them both constant ones; the first on a tie.
 
     Args:
         problem: what they are plans of.
         plans: at least one that starts by accepting and one that starts by refusing.
+        status: 'optimal' or 'budget_spent'.
         lower_bound: of the cost (25), with distances measured along `normals` if there are any.
         gap: of the plans to that bound; with `normals` it is computed.
         normals: of half-planes, (N, m, 3).
-        relaxed_first_stage: see `Decision`.
-        deviation: see `Decision.rounding_deviation`, s.
+        relaxed: omega of the relaxation, (N,), if it was solved.
+        rounded: the same after sum-up rounding, (N,).
     """
     best = min(plans, key=lambda plan: plan.objective)
     if normals is not None:
@@ -67,16 +72,77 @@ def choose(
         gap = (convexified - lower_bound) / max(convexified, 1e-12)
     return Decision(
         accept=bool(best.omega[0] == 1.0),
-        status="optimal",
+        status=status,
         objective=best.objective,
         lower_bound=lower_bound,
         gap=gap,
-        relaxed_first_stage=relaxed_first_stage,
-        rounding_deviation=deviation,
+        relaxed_first_stage=-1.0 if relaxed is None else float(relaxed[0]),
+        rounding_deviation=(
+            -1.0 if relaxed is None or rounded is None else rounding_deviation(relaxed, rounded, problem.dt)
+        ),
         clearance=min(best.clearance, 1e9),
         objective_accept=min(plan.objective for plan in plans if plan.omega[0] == 1.0),
         objective_refuse=min(plan.objective for plan in plans if plan.omega[0] == 0.0),
+        plan=best.omega,
+        positions=best.positions,
+        relaxed=relaxed,
+        rounded=rounded,
+        normals=normals,
     )
+
+
+def cut_short(
+    problem: Problem,
+    plans: Sequence[Evaluation],
+    tail: Array,
+    *,
+    bound: float = 0.0,
+    relaxed: Array | None = None,
+    rounded: Array | None = None,
+) -> Decision:
+    """The decision when the budget is spent: the best plan so far, and a bound for which no solver is needed.
+
+    Args:
+        problem: what they are plans of.
+        plans: as for `choose`.
+        tail: `remaining_cost(problem)`; its first element bounds every plan.
+        bound: another lower bound of (25), if there is one.
+        relaxed: as for `choose`.
+        rounded: as for `choose`.
+    """
+    best = min(plan.objective for plan in plans)
+    bound = min(max(float(tail[0]), bound), best)
+    gap = (best - bound) / max(best, 1e-12)
+    return choose(problem, plans, status="budget_spent", lower_bound=bound, gap=gap, relaxed=relaxed, rounded=rounded)
+
+
+def remaining_cost(problem: Problem) -> Array:
+    """Lower bound of (25) over the stages from k on, for k = 0..N, (N + 1,): task error from the reachable box.
+
+    Any plan stays, per axis, between the running sums of the smaller and of the larger mode velocity.
+    """
+    return _remaining_cost(
+        problem.dt, problem.initial, problem.accept, problem.refuse, problem.reference, problem.error_weight
+    )
+
+
+@njit(cache=True)
+def _remaining_cost(
+    dt: float, initial: Array, accept: Array, refuse: Array, reference: Array, error_weight: float
+) -> Array:
+    stages = len(accept)
+    tail = np.zeros(stages + 1)
+    low, high = initial.copy(), initial.copy()
+    for k in range(stages):
+        squared = 0.0
+        for a in range(3):
+            low[a] += dt * min(accept[k, a], refuse[k, a])
+            high[a] += dt * max(accept[k, a], refuse[k, a])
+            squared += max(0.0, low[a] - reference[k, a], reference[k, a] - high[a]) ** 2
+        tail[k] = dt * error_weight * squared
+    for k in range(stages - 1, -1, -1):
+        tail[k] += tail[k + 1]
+    return (1.0 - 1e-9) * tail  # the last digits of the running sums must not cut an optimum
 
 
 def block_of_stage(stages: int, blocks: int) -> npt.NDArray[np.int64]:

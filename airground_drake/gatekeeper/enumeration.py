@@ -6,8 +6,10 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from airground_drake.gatekeeper.candidates import Constants, block_of_stage, choose
-from airground_drake.gatekeeper.problem import Decision, Problem
+from airground_drake.gatekeeper.budget import Budget
+from airground_drake.gatekeeper.candidates import Constants, block_of_stage, choose, cut_short, remaining_cost
+from airground_drake.gatekeeper.polish import stage_cost
+from airground_drake.gatekeeper.problem import Decision, Evaluation, Problem
 from airground_drake.nsbc.task import Array
 
 
@@ -17,12 +19,14 @@ class EnumerationRoute:
     Mode velocities are data, so that a plan's cost is a sum over its stages and two plans share the cost of
     their common prefix. The tree of 2^blocks plans is searched depth first; a branch is cut where its cost so
     far plus a lower bound of the rest is not below the best plan known. The rest is bounded by the task error
-    from the box that any plan stays in (see `_tail`). Distances are exact: no half-planes, no relaxation.
+    from the box that any plan stays in (see `remaining_cost`). Distances are exact: no half-planes, no relaxation.
 
     Both halves of the tree (plans that start by accepting, by refusing) are searched separately, so that both
     `objective_accept` and `objective_refuse` are exact. `lower_bound` equals `objective` and the gap is 0:
-    among the plans with this dwell, not among all binary plans. Without any cut it visits 2^(blocks + 1)
-    blocks: that bounds its time.
+    among the plans with this dwell, not among all binary plans.
+
+    Budget: each half visits at most `nodes` blocks, of at most 2^blocks that there are, and the clock is asked
+    before each. A half that is not finished is bounded by its open branches, or, not begun, by `remaining_cost`.
     """
 
     def __init__(self, blocks: int = 10) -> None:
@@ -38,45 +42,42 @@ class EnumerationRoute:
         row = np.zeros((1, 3))
         self.decide(Problem(1.0, np.zeros(3), row, row, row, none, np.zeros(0), 1.0, 1.0))
 
-    def decide(self, problem: Problem) -> Decision:
+    def decide(self, problem: Problem, budget: Budget = Budget()) -> Decision:  # noqa: B008 (immutable)
         """Accept or refuse; a tie accepts. Never raises for a broken problem, but refuses and says why."""
         if not problem.is_finite():
             return Decision(False, "refused_not_finite")
+        if budget.spent():
+            return Decision(False, "refused_budget_spent")
         constants = Constants.of(problem)
         if not constants.are_finite():
             return Decision(False, "refused_not_finite")
         block = block_of_stage(problem.stages, self._blocks)
         starts = np.searchsorted(block, np.arange(block[-1] + 2)).astype(np.int64)
         modes = np.stack([problem.refuse, problem.accept])
-        tail = _tail(problem)
-        halves = []
-        for first, plan in enumerate((constants.refuse, constants.accept)):
-            chosen = _search(
-                first, plan.objective, starts, problem.dt, problem.initial, modes, problem.reference,
+        tail = remaining_cost(problem)
+        plans: list[Evaluation] = [constants.refuse, constants.accept]
+        bounds, finished = [float(tail[0])] * 2, True
+        for first, plan in enumerate(tuple(plans)):
+            if budget.spent():
+                return cut_short(problem, plans[::-1], tail, bound=min(bounds))
+            chosen, bound = _search(
+                first, plan.objective, budget.nodes, starts, problem.dt, problem.initial, modes, problem.reference,
                 problem.centres, problem.distances, problem.error_weight, problem.slack_weight, tail,
             )  # fmt: skip
             found = problem.evaluate(chosen[block])
-            halves.append(found if found.objective <= plan.objective else plan)
-        refuse, accept = halves
-        bound = min(accept.objective, refuse.objective)
-        return choose(problem, (accept, refuse), lower_bound=bound, gap=0.0)
-
-
-def _tail(problem: Problem) -> Array:
-    """Lower bound of (25) over the stages from k on, for k = 0..N, (N + 1,): task error from the reachable box."""
-    both = np.stack([problem.accept, problem.refuse])
-    low = problem.initial + problem.dt * np.cumsum(both.min(axis=0), axis=0)
-    high = problem.initial + problem.dt * np.cumsum(both.max(axis=0), axis=0)
-    outside = np.maximum(0.0, np.maximum(low - problem.reference, problem.reference - high))
-    stage = problem.dt * problem.error_weight * np.square(outside).sum(axis=1)
-    # the last digits of the running sums must not cut an optimum
-    return (1.0 - 1e-9) * np.concatenate([np.cumsum(stage[::-1])[::-1], [0.0]])
+            plans[first] = found if found.objective <= plan.objective else plan
+            bounds[first] = min(bound, plans[first].objective)
+            finished = finished and bound == np.inf
+        if not finished:
+            return cut_short(problem, plans[::-1], tail, bound=min(bounds))
+        return choose(problem, plans[::-1], lower_bound=min(bounds), gap=0.0)
 
 
 @njit(cache=True)
 def _search(
     first: int,
     known: float,
+    nodes: int,
     starts: npt.NDArray[np.int64],
     dt: float,
     initial: Array,
@@ -87,12 +88,15 @@ def _search(
     error_weight: float,
     slack_weight: float,
     tail: Array,
-) -> Array:
+) -> tuple[Array, float]:
     """Modes (B,) of the cheapest plan whose first block has mode `first`; constant if none is below `known`.
+
+    With them a lower bound of all plans that were not visited; inf if the search finished.
 
     Args:
         first: 0 or 1.
         known: cost of the constant plan.
+        nodes: most blocks to visit.
         starts: first stage of each block and N, (B + 1,).
         dt: s.
         initial: (3,), m.
@@ -116,6 +120,14 @@ def _search(
         if tried[b] == (1 if b == 0 else 2):
             b -= 1
             continue
+        if nodes == 0:
+            # what is open: the continuations of every prefix that has a mode untried
+            bound = np.inf
+            for i in range(b + 1):
+                if tried[i] < (1 if i == 0 else 2):
+                    bound = min(bound, cost[i] + tail[starts[i]])
+            return best, bound
+        nodes -= 1
         # the mode of the block before comes first: constant continuations are good incumbents
         before = first if b == 0 else mode[b - 1]
         mode[b] = before if tried[b] == 0 else 1 - before
@@ -126,12 +138,7 @@ def _search(
             x += dt * modes[mode[b], k, 0]
             y += dt * modes[mode[b], k, 1]
             z += dt * modes[mode[b], k, 2]
-            slack = 0.0
-            for m in range(len(distances)):
-                squared = (x - centres[k, m, 0]) ** 2 + (y - centres[k, m, 1]) ** 2 + (z - centres[k, m, 2]) ** 2
-                slack = max(slack, distances[m] - np.sqrt(squared))
-            error = (reference[k, 0] - x) ** 2 + (reference[k, 1] - y) ** 2 + (reference[k, 2] - z) ** 2
-            total += dt * (error_weight * error + slack_weight * slack * slack)
+            total += dt * stage_cost(x, y, z, k, reference, centres, distances, error_weight, slack_weight)
             if total >= limit:
                 break
         if total >= limit:
@@ -145,4 +152,4 @@ def _search(
         at[b, 0], at[b, 1], at[b, 2] = x, y, z
         cost[b] = total
         tried[b] = 0
-    return best
+    return best, np.inf

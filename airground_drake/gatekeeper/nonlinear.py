@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
 import numpy as np
-from pydrake.solvers import IpoptSolver, MathematicalProgram, QuadraticConstraint, SnoptSolver, SolverOptions
+from pydrake.solvers import (
+    IpoptSolver,
+    MathematicalProgram,
+    QuadraticConstraint,
+    SnoptSolver,
+    SolutionResult,
+    SolverOptions,
+)
 
-from airground_drake.gatekeeper.candidates import Constants, choose
+from airground_drake.gatekeeper.budget import Budget
+from airground_drake.gatekeeper.candidates import Constants, choose, cut_short, remaining_cost
 from airground_drake.gatekeeper.half_planes import reachable
 from airground_drake.gatekeeper.problem import Decision, Evaluation, Problem
-from airground_drake.gatekeeper.rounding import rounding_deviation, sum_up_rounding
+from airground_drake.gatekeeper.rounding import sum_up_rounding
 from airground_drake.nsbc.task import Array
 
 NlpSolver = Literal["snopt", "ipopt"]
@@ -22,14 +31,17 @@ _SOLVERS = {"snopt": SnoptSolver, "ipopt": IpoptSolver}
 
 _OPTIONS: dict[str, dict[str, float | int]] = {
     "snopt": {
-        "Major iterations limit": 200,
-        "Iterations limit": 20000,
         "Major optimality tolerance": 1e-5,
         "Major feasibility tolerance": 1e-6,
     },
-    "ipopt": {"max_iter": 300, "tol": 1e-6},
+    "ipopt": {"tol": 1e-6},
 }
-"""Limits are iterations, not seconds: the same problem must give the same decision on every machine."""
+
+_LIMITS: dict[str, tuple[dict[str, int], str]] = {
+    "snopt": ({"Major iterations limit": 1, "Iterations limit": 100}, "Time limit"),
+    "ipopt": ({"max_iter": 1}, "max_wall_time"),
+}
+"""Per solver: options that are this multiple of the budget's iterations, and the one that is its time left, s."""
 
 
 class NonlinearRoute:
@@ -46,6 +58,9 @@ class NonlinearRoute:
 
     The start is the cheaper constant plan. The plan returned is the cheapest, by the exact cost (25), of the
     rounded one and the two constant ones. A local optimum bounds nothing: `lower_bound` and `gap` are -1.
+
+    Budget: iterations (SNOPT: major ones) and the time left go to the solver. An iterate that it stops at is
+    rounded like an optimum; the status is 'budget_spent' and the bound then that of `remaining_cost`.
     """
 
     def __init__(self, solver: NlpSolver = "snopt") -> None:
@@ -59,39 +74,54 @@ class NonlinearRoute:
         self._solver = _SOLVERS[solver]()
         if not (self._solver.available() and self._solver.enabled()):
             raise ValueError(f"solver: {solver!r} is not available in this build of Drake")
-        self._options = SolverOptions()
-        for name, value in _OPTIONS[solver].items():
-            self._options.SetOption(self._solver.solver_id(), name, value)
+        self._name = solver
+        self._id = self._solver.solver_id()
 
-    def decide(self, problem: Problem) -> Decision:
+    def decide(self, problem: Problem, budget: Budget = Budget()) -> Decision:  # noqa: B008 (immutable)
         """Accept or refuse: never raises for a hard or broken problem, but refuses and says why."""
         if not problem.is_finite():
             return Decision(False, "refused_not_finite")
+        if budget.spent():
+            return Decision(False, "refused_budget_spent")
         constants = Constants.of(problem)
         if not constants.are_finite():
             return Decision(False, "refused_not_finite")
-        relaxed = self._solve(problem, constants.better)
+        plans = [constants.accept, constants.refuse]
+        if budget.spent():
+            return cut_short(problem, plans, remaining_cost(problem))
+        relaxed, finished = self._solve(problem, constants.better, budget)
         if relaxed is None:
-            return constants.failed()
+            return cut_short(problem, plans, remaining_cost(problem)) if budget.spent() else constants.failed()
         rounded = sum_up_rounding(relaxed)
-        return choose(
-            problem,
-            (problem.evaluate(rounded), constants.accept, constants.refuse),
-            relaxed_first_stage=float(relaxed[0]),
-            deviation=rounding_deviation(relaxed, rounded, problem.dt),
-        )
+        plans.insert(0, problem.evaluate(rounded))
+        if not finished:
+            return cut_short(problem, plans, remaining_cost(problem), relaxed=relaxed, rounded=rounded)
+        return choose(problem, plans, relaxed=relaxed, rounded=rounded)
 
-    def _solve(self, problem: Problem, start: Evaluation) -> Array | None:
+    def _solve(self, problem: Problem, start: Evaluation, budget: Budget) -> tuple[Array | None, bool]:
+        """Omega (N,), None where the solver failed, and whether it is a local optimum."""
         nlp = relaxation(problem, start)
         try:
-            result = self._solver.Solve(nlp.program, nlp.guess, self._options)
+            result = self._solver.Solve(nlp.program, nlp.guess, self._options(budget))
         except RuntimeError:
-            return None
-        omega = result.GetSolution(nlp.omega)
-        if not result.is_success() or not np.isfinite(omega).all():
-            return None
-        clipped: Array = np.clip(omega, 0.0, 1.0)
-        return clipped
+            return None, False
+        omega = np.clip(result.GetSolution(nlp.omega), 0.0, 1.0)
+        finished = bool(result.is_success())
+        if not np.isfinite(omega).all():
+            return None, False
+        if not finished and not budget.spent() and result.get_solution_result() != SolutionResult.kIterationLimit:
+            return None, False
+        return omega, finished
+
+    def _options(self, budget: Budget) -> SolverOptions:
+        options = SolverOptions()
+        limits, seconds = _LIMITS[self._name]
+        values = _OPTIONS[self._name] | {name: factor * budget.iterations for name, factor in limits.items()}
+        if budget.left_s() < math.inf:
+            values[seconds] = max(budget.left_s(), 1e-3)
+        for name, value in values.items():
+            options.SetOption(self._id, name, value)
+        return options
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,128 +1,179 @@
-"""The paper's route: relaxation (27) as a convex quadratic program, then sum-up rounding (28)-(29)."""
+"""The paper's route: relaxation (27) as a convex quadratic program, sum-up rounding (28)-(29), then a search."""
 
 from __future__ import annotations
 
-import numpy as np
-from pydrake.solvers import Binding, ClarabelSolver, MathematicalProgram, QuadraticCost, SolverOptions
+import math
 
-from airground_drake.gatekeeper.candidates import Constants, choose
-from airground_drake.gatekeeper.half_planes import normals_along, offsets, reachable
+import numpy as np
+from pydrake.solvers import ClarabelSolver, MathematicalProgramResult, SolutionResult, SolverOptions
+
+from airground_drake.gatekeeper.budget import Budget
+from airground_drake.gatekeeper.candidates import Constants, choose, cut_short, remaining_cost
+from airground_drake.gatekeeper.half_planes import Outlook, multipliers_at, normals_along, outlook
+from airground_drake.gatekeeper.polish import EVERYWHERE, Polish
 from airground_drake.gatekeeper.problem import Decision, Problem
-from airground_drake.gatekeeper.rounding import rounding_deviation, sum_up_rounding
+from airground_drake.gatekeeper.program import Shape, TeamProgram, empty_program
+from airground_drake.gatekeeper.rounding import sum_up_rounding
 from airground_drake.nsbc.task import Array
 
-_AXES = 2  # UGVs move in their plane
+_TOLERANCE = 1e-6
 
-_OPTIONS = {"tol_gap_abs": 1e-6, "tol_gap_rel": 1e-6, "tol_feas": 1e-6, "iterative_refinement_enable": 0}
+_OPTIONS = {
+    "tol_gap_abs": 1e-9,
+    "tol_gap_rel": _TOLERANCE,
+    "tol_feas": _TOLERANCE,
+    "iterative_refinement_enable": 0,
+    "equilibrate_enable": 0,
+    "presolve_enable": 0,
+}
 """Of Clarabel: optima to 1e-6 in two thirds of the time that its defaults take."""
+
+_SETTLED = 0.01
+"""Gap below which the wide searches are not worth their time."""
+
+_NEAR = 0.005
+"""Relative difference of accepting and refusing below which they are, whatever the gap."""
+
+_GUIDED = ((128, EVERYWHERE, 0.02),)
+_BLIND = ((128, EVERYWHERE, math.inf),)
+_WIDE = ((2048, EVERYWHERE, 0.0), (512, 0.3, math.inf), (512, 0.1, 0.02))
+"""Searches, see `Polish.labels`: labels per stage, radius of the tube (m), relative slackness.
+
+Those of infinite slackness do without the outlook, for the sides of obstacles that the half-planes hide. All
+were chosen on recorded and random problems: see `benchmarks/gatekeeper.py` for how near the plans come to the best
+known.
+"""
 
 
 class RelaxedRoute:
-    """Relax, solve, round; every decision carries its optimality gap.
+    """Relax, solve, round, improve; every decision carries its optimality gap.
 
     The obstacle constraint (26d) is replaced by supporting half-planes n_k.(p_k - o) >= d - u_k with unit n_k.
     As ||p_k - o|| >= n_k.(p_k - o), they imply (26d) for any n_k: conservative, never optimistic. The n_k are
-    taken along the better of the two constant plans. The plan returned is the cheapest, by the exact cost
-    (25), of the rounded one and the two constant ones.
+    taken along the better of the two constant plans. Taking them along the best plan found and solving again
+    was tried: it costs half as much again and brought the plans no nearer to the best known.
 
-    The program is built once for a number of stages, points and the weights, then only its coefficients change.
-    Rows that no plan can reach are left unbounded, which the solver's interface drops.
+    The rounded plan is the start of a search with the exact distances (`Polish`), which the multipliers of the
+    relaxation guide: for the best plan that accepts first and for the best that refuses first. Wider searches
+    follow where the gap is open or the two cost nearly the same. The cheaper plan is returned.
+
+    `lower_bound` is computed from the multipliers by weak duality (`outlook`), so that it is a bound whatever
+    the solver's tolerances, and also when its iterations ran out.
+
+    Budget: iterations and the time left go to the solver, nodes to each search; the clock is asked in between, so
+    that a deadline is overrun by one search at most. Few nodes make the searches over labels coarser; the status
+    is 'budget_spent' where they do not last for two labels a stage, or for the exchanges.
+
+    The program is built once for a number of stages and the weights, then only its coefficients change.
     """
 
     def __init__(self) -> None:
         """Start without any program."""
-        self._programs: dict[tuple[int, int, float, float, float], _Program] = {}
+        self._programs: dict[Shape, TeamProgram] = {}
         self._solver = ClarabelSolver()
-        self._options = SolverOptions()
-        for name, value in _OPTIONS.items():
-            self._options.SetOption(ClarabelSolver.id(), name, value)
 
-    def decide(self, problem: Problem) -> Decision:
+    def decide(self, problem: Problem, budget: Budget = Budget()) -> Decision:  # noqa: B008 (immutable)
         """Accept or refuse: never raises for a hard or broken problem, but refuses and says why."""
         if not problem.is_finite():
             return Decision(False, "refused_not_finite")
+        if budget.spent():
+            return Decision(False, "refused_budget_spent")
         constants = Constants.of(problem)
+        if not constants.are_finite():
+            return Decision(False, "refused_not_finite")
+        tail = remaining_cost(problem)
+        if budget.spent():
+            return cut_short(problem, (constants.accept, constants.refuse), tail)
         normals = normals_along(problem, constants.better.positions)
-        relaxed, bound = self._solve(problem, normals)
-        if relaxed is None:
-            return constants.failed()
+        relaxed, ahead, finished = self._solve(problem, normals, constants.better.objective, budget)
+        if relaxed is None or ahead is None:
+            plans = (constants.accept, constants.refuse)
+            return cut_short(problem, plans, tail) if budget.spent() else constants.failed()
         rounded = sum_up_rounding(relaxed)
+        polish = Polish(problem, constants, tail, budget, ahead)
+        polish.offer_both(rounded)
+        finished = _improve(polish, ahead, budget) and finished
+        refuse, accept = polish.plans
         return choose(
             problem,
-            (problem.evaluate(rounded), constants.accept, constants.refuse),
-            lower_bound=bound,
+            (accept, refuse),
+            status="optimal" if finished else "budget_spent",
+            lower_bound=max(ahead.bound, float(tail[0])),
             normals=normals,
-            relaxed_first_stage=float(relaxed[0]),
-            deviation=rounding_deviation(relaxed, rounded, problem.dt),
+            relaxed=relaxed,
+            rounded=rounded,
         )
 
-    def _solve(self, problem: Problem, normals: Array) -> tuple[Array | None, float]:
-        key = (problem.stages, len(problem.distances), problem.dt, problem.error_weight, problem.slack_weight)
-        if key not in self._programs:
-            self._programs[key] = _Program(*key)
-        program = self._programs[key]
-        program.update(problem, normals)
-        result = self._solver.Solve(program.program, None, self._options)
-        omega = result.GetSolution(program.omega)
-        cost = result.get_optimal_cost()
-        if not result.is_success() or not np.isfinite(omega).all() or not np.isfinite(cost):
-            del self._programs[key]  # a fresh workspace after a failure
-            return None, -1.0
-        return np.clip(omega, 0.0, 1.0), float(cost)
+    def _solve(
+        self, problem: Problem, normals: Array, cost: float, budget: Budget
+    ) -> tuple[Array | None, Outlook | None, bool]:
+        """Omega (N,), the bounds that follow, and whether it is an optimum; None where the solver failed."""
+        scale = _scale(cost)
+        shape = Shape.of(problem, scale=scale)
+        if shape not in self._programs:
+            self._programs[shape] = empty_program([shape], relaxed=True)
+        team = self._programs[shape]
+        (ugv,) = team.ugvs
+        rows = ugv.update(problem, normals)
+        result = self._solver.Solve(team.program, None, _options(budget))
+        omega = np.clip(result.GetSolution(ugv.omega), 0.0, 1.0)
+        finished = bool(result.is_success())
+        usable = np.isfinite(omega).all()
+        if not usable or not (finished or _stopped(result, budget)):
+            del self._programs[shape]  # a fresh workspace after a failure
+            return None, None, False
+        ahead = outlook(problem, normals, omega, multipliers_at(problem, normals, problem.positions(omega)))
+        if ahead.bound < (1.0 - 2.0 * _TOLERANCE) * scale * result.get_optimal_cost() and rows.any():
+            multipliers = np.zeros(rows.shape)
+            multipliers[rows] = scale * result.GetDualSolution(ugv.avoidance)
+            with_ties = outlook(problem, normals, omega, multipliers)
+            if with_ties.bound > ahead.bound:
+                ahead = with_ties
+        return omega, ahead, finished
 
 
-class _Program:
-    """MathematicalProgram of the relaxation; coefficients change, not shape.
+def _stopped(result: MathematicalProgramResult, budget: Budget) -> bool:
+    """Whether the solver gave up for want of budget."""
+    return budget.spent() or result.get_solution_result() == SolutionResult.kIterationLimit
 
-    Variables: task errors e = p - reference (2N), omega (N), u (N). Written in the errors, the cost (25) is
-    constant.
+
+def _improve(polish: Polish, ahead: Outlook, budget: Budget) -> bool:
+    """Search for cheaper plans until the gap is closed; whether the budget lasted for that.
+
+    Where a half-plane has a multiplier, the bound is one of the half-planes' problem only, and a plan on the other
+    side of an obstacle may be below it: then the search that does without half-planes is due in any case.
     """
+    for searches, reach, trusts_half_planes in ((_GUIDED, 1, False), (_BLIND, 0, True), (_WIDE, 8, True)):
+        for width, radius, slackness in searches:
+            if budget.spent():
+                return False
+            polish.labels(width, radius, slackness)
+        if budget.spent():
+            return False
+        if reach:
+            polish.exchanges(reach)
+        best = polish.best.objective
+        apart = abs(polish.plans[0].objective - polish.plans[1].objective)
+        closed = (1.0 - _SETTLED) * best <= ahead.bound <= (1.0 + 1e-9) * best
+        if closed and apart >= _NEAR * best and (trusts_half_planes or not ahead.pressed):
+            break
+    return polish.complete
 
-    def __init__(self, stages: int, points: int, dt: float, error_weight: float, slack_weight: float) -> None:
-        size = _AXES * stages
-        self.program = MathematicalProgram()
-        e = self.program.NewContinuousVariables(size, "e")
-        self.omega = self.program.NewContinuousVariables(stages, "omega")
-        u = self.program.NewContinuousVariables(stages, "u")
-        self._dynamics_matrix = np.hstack([np.eye(size) - np.eye(size, k=-_AXES), np.zeros((size, stages))])
-        self._avoidance_matrix = np.zeros((stages * points, size + stages))
-        self._row = np.arange(stages * points).reshape(stages, points)
-        self._stage = np.arange(stages)
-        self._avoidance_matrix[self._row, size + self._stage[:, None]] = 1.0
-        self._unbounded = np.full(stages * points, np.inf)
 
-        def square(weight: float, variables: Array) -> Binding[QuadraticCost]:
-            hessian = 2.0 * weight * dt * np.eye(len(variables))
-            return self.program.AddQuadraticCost(hessian, np.zeros(len(variables)), variables, is_convex=True)
+def _scale(cost: float) -> float:
+    """Cost that is 1 in the program: `cost` to a power of ten, so that few programs are kept.
 
-        self._dynamics = self.program.AddLinearEqualityConstraint(
-            self._dynamics_matrix, np.zeros(size), np.concatenate([e, self.omega])
-        )
-        names = {
-            "(25) task error": square(error_weight, e),
-            "(25) slack": square(slack_weight, u),
-            "(27c) relaxed": self.program.AddBoundingBoxConstraint(0.0, 1.0, self.omega),
-            "(27e)": self.program.AddBoundingBoxConstraint(0.0, np.inf, u),
-            "(23), (27b)": self._dynamics,
-        }
-        if points:
-            self._avoidance = self.program.AddLinearConstraint(
-                self._avoidance_matrix, -self._unbounded, self._unbounded, np.concatenate([e, u])
-            )
-            names["(27d) as half-planes"] = self._avoidance
-        for name, binding in names.items():
-            binding.evaluator().set_description(name)
+    Clarabel's relative gap is absolute below 1: unscaled, it would mean nothing where there is little to pay.
+    """
+    return float(10.0 ** min(12, max(-12, math.floor(math.log10(max(cost, 1e-300))))))
 
-    def update(self, problem: Problem, normals: Array) -> None:
-        """Put in the data of a problem of this size."""
-        size = _AXES * problem.stages
-        before = np.vstack([problem.initial, problem.reference[:-1]])
-        drift = problem.dt * problem.refuse + before - problem.reference
-        for axis in range(_AXES):
-            change = problem.dt * (problem.accept - problem.refuse)[:, axis]
-            self._dynamics_matrix[_AXES * self._stage + axis, size + self._stage] = -change
-            self._avoidance_matrix[self._row, _AXES * self._stage[:, None] + axis] = normals[:, :, axis]
-        self._dynamics.evaluator().UpdateCoefficients(self._dynamics_matrix, drift[:, :_AXES].ravel())
-        if self._row.size:
-            lower = np.where(reachable(problem), offsets(problem, normals), -np.inf).ravel()
-            self._avoidance.evaluator().UpdateCoefficients(self._avoidance_matrix, lower, self._unbounded)
+
+def _options(budget: Budget) -> SolverOptions:
+    options = SolverOptions()
+    solver = ClarabelSolver.id()
+    for name, value in _OPTIONS.items():
+        options.SetOption(solver, name, value)
+    options.SetOption(solver, "max_iter", min(budget.iterations, 10_000))
+    if budget.left_s() < math.inf:
+        options.SetOption(solver, "time_limit", max(budget.left_s(), 1e-6))
+    return options

@@ -139,7 +139,7 @@ class Gatekeeper:
     max_bend: float = 0.5
     budget: str = "counted"
     budget_iterations: int = 100
-    budget_nodes: int = 20000
+    budget_nodes: int = 15000
     budget_share: float = 0.5
 
 
