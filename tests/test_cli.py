@@ -10,6 +10,7 @@ import pytest
 from airground_drake import trace
 from airground_drake.report.__main__ import main
 from airground_drake.scenarios.load import load
+from airground_drake.verify import __main__ as judge
 
 
 @pytest.fixture(scope="module")
@@ -99,3 +100,33 @@ def test_a_folder_that_cannot_be_written_is_exit_code_4(tmp_path: Path, capsys: 
 def test_the_shipped_scenarios_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--list"]) == 0
     assert capsys.readouterr().out.split() == ["case_a", "case_a_table1", "case_b", "soft_gate", "audit"]
+
+
+def test_claims_are_judged_again_from_a_saved_run(report: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    document = json.loads((report / "report.json").read_text())
+    of_d = {claim["id"]: claim for claim in document["claims"] if claim["run"] in ("d", "")}
+    assert judge.main([str(report / "trace" / "d"), "--json"]) == 0
+    again = {claim["id"]: claim for claim in json.loads(capsys.readouterr().out)}
+    assert {name: claim["status"] for name, claim in again.items()} == {n: c["status"] for n, c in of_d.items()}
+    assert again["SAFE-TRACE"]["margin"] == of_d["SAFE-TRACE"]["margin"]
+    assert of_d["SAFE-INV"]["rerun"].endswith("SAFE-INV")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["case_a", "SAFE-TRACE"], "SAFE-TRACE says nothing about case_a"),
+        (["nowhere"], "no such scenario"),
+    ],
+)
+def test_what_cannot_be_judged_is_exit_code_2(
+    arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert judge.main(arguments) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_a_refuted_claim_that_is_not_expected_is_exit_code_1(tmp_path: Path) -> None:
+    changes = ["--set", "decision.trigger=bare", "--format", "json"]
+    assert main(["case_a", "-o", str(tmp_path), *changes]) == 1
+    assert judge.main([str(tmp_path / "trace" / "a"), "ZENO-PROOF"]) == 1

@@ -56,7 +56,14 @@ def build(
     Returns:
         Strict JSON; numbers that are not finite have become None.
     """
-    claims = [verdict.to_json() for verdict in verdicts]
+    some_run = next(iter(traces), "")
+    claims = [
+        {
+            **verdict.to_json(),
+            "rerun": f"python -m airground_drake.verify trace/{verdict.run or some_run} {verdict.claim.id}",
+        }
+        for verdict in verdicts
+    ]
     items = sorted([*of_runs(scenario, traces), *map(dict, audit)], key=lambda item: item["id"])
     resolved = asdict(scenario)
     document = {

@@ -7,6 +7,7 @@ optimiser whose work they judge; proofs take their constants from the objects th
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from pathlib import Path
 from typing import cast
 
@@ -89,21 +90,25 @@ def verify(trace: Trace) -> list[Verdict]:
     ]
 
 
-def verify_model(scenario: Scenario, *, kept: Path | None = None) -> list[Verdict]:
+def verify_model(
+    scenario: Scenario, *, kept: Path | None = None, only: Collection[str] | None = None
+) -> list[Verdict]:
     """Judge every claim about the model of a scenario.
 
     Args:
         scenario: its constants.
         kept: folder of findings that are reused if nothing that they depend on has changed (`cache_folder()`);
             None: everything anew.
+        only: identifiers of the claims to judge; default: all.
 
     Returns:
         One verdict per claim, run '', with the status that the scenario expects ('proved' or 'supported' unless
         it says otherwise).
     """
-    inputs = [claim.inputs(scenario) for claim in MODEL_CLAIMS]
-    findings = find(MODEL_CLAIMS, inputs, folder=kept)
+    claims = [claim for claim in MODEL_CLAIMS if only is None or claim.id in only]
+    inputs = [claim.inputs(scenario) for claim in claims]
+    findings = find(claims, inputs, folder=kept)
     return [
-        Verdict(claim, "", finding, cast(Status, scenario.expected.get(claim.id, claim.expected)), given)
-        for claim, given, finding in zip(MODEL_CLAIMS, inputs, findings, strict=True)
+        Verdict(claim, "", finding, cast("Status", scenario.expected.get(claim.id, claim.expected)), given)
+        for claim, given, finding in zip(claims, inputs, findings, strict=True)
     ]
