@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.optimize import linprog
 
 from airground_drake.nsbc.avoidance import Avoidance, HalfSpaces, Surroundings, limit_speed
 from airground_drake.nsbc.composition import augmented
@@ -166,3 +167,34 @@ def test_infeasible_start_gives_a_finite_least_violation() -> None:
     spaces = avoidance.half_spaces(np.zeros((1, 3)), np.array([[1.0, 1.0, 0.0]]), around)
     velocity = avoidance.apply(np.array([[1.0, 1.0, 0.0]]), spaces)
     assert np.isfinite(velocity).all()
+
+
+@given(SEEDS)
+def test_where_inequalities_contradict_each_other_the_largest_violation_is_least(seed: int) -> None:
+    """Inside several safe distances at once; against a linear program. What is asked for has no say."""
+    rng = np.random.default_rng(seed)
+    angle = rng.uniform(-np.pi, np.pi)
+    angles = np.array([angle, angle + np.pi, *rng.uniform(-np.pi, np.pi, rng.integers(0, 3))])
+    normal = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(len(angles))])
+    bound = rng.uniform(0.1, 2.0, len(angles))  # the first two cannot both be met
+    avoidance = Avoidance(1.0, 1.0)
+    found = [
+        avoidance.apply(lower[None], HalfSpaces(normal[None], bound[None]))[0]
+        for lower in rng.normal(size=(2, 3)) * [1e3, 1e3, 0.0]
+    ]
+    np.testing.assert_array_equal(found[0], found[1])
+    rows = np.column_stack([-normal[:, :2], -np.ones(len(bound))])
+    least = linprog([0.0, 0.0, 1.0], A_ub=rows, b_ub=-bound, bounds=[(None, None)] * 2 + [(0.0, None)]).fun
+    assert (bound - normal @ found[0]).max() <= least + 1e-6
+
+
+def test_a_robot_between_two_obstacles_is_not_driven_into_either() -> None:
+    """Inside both safe distances, with a hostile velocity: it is held where it violates both alike."""
+    avoidance = Avoidance(3.0, 0.05)
+    position, obstacles = np.array([[0.1, 0.0, 0.0]]), np.array([[[-1.5, 0.0, 0.0], [1.5, 0.0, 0.0]]])
+    around = Surroundings(obstacles, np.full((1, 2), 2.0), np.ones((1, 2)))
+    for _ in range(200):
+        spaces = avoidance.half_spaces(position, np.array([[1.0, 1.0, 0.0]]), around)
+        position = position + 0.05 * avoidance.apply(np.array([[10.0, 0.0, 0.0]]), spaces)
+        assert np.linalg.norm(position - obstacles[0], axis=1).min() >= 1.4 - 1e-9
+    assert abs(position[0, 0]) < 1e-3

@@ -14,6 +14,8 @@ from airground_drake.nsbc.task import Array
 
 MARGIN_M_S = 1e-12
 """Added to every bound in the projection, so that rounding leaves the bound itself satisfied, m/s."""
+CONTRADICTION_M_S = 1e-9
+"""Constraints that every trial misses by more contradict each other; by less, it is rounding, m/s."""
 
 AUGMENTED, RECURSION_NEAREST, RECURSION_LISTED = 0, 1, 2
 
@@ -51,7 +53,12 @@ def fill_half_spaces(
 
 @njit(cache=True)
 def avoid_one(lower: Array, normal: Array, bound: Array, composition: int) -> Array:
-    """Velocity of one robot, (3,) m/s: the avoidance tasks above `lower`; see `avoid`."""
+    """Velocity of one robot, (3,) m/s: the avoidance tasks above `lower`; see `avoid`.
+
+    A `lower` that is not finite asks for nothing.
+    """
+    if not np.isfinite(lower).all():
+        lower = np.zeros(3)
     for k in range(len(bound)):
         if _dot(normal[k], lower) < bound[k]:
             break
@@ -146,27 +153,59 @@ def _dot(a: Array, b: Array) -> float:
 
 @njit(cache=True)
 def _closest_feasible(lower: Array, normal: Array, bound: Array) -> Array:
-    """Closest velocity to `lower` under all constraints, by enumeration of active sets of at most three.
+    """Closest velocity to `lower` under all constraints; where none meets them, see `_least_violation`."""
+    velocity, shortfall = _closest(lower, normal, bound, False)
+    return velocity if shortfall <= CONTRADICTION_M_S else _least_violation(normal, bound)
 
-    A projection in R^3 needs no larger active set (a planar robot: two), so this is exact. Each trial is
-    lower + J^+ (b - J lower), the augmented composition over that active set. Where no velocity is feasible
-    (a robot inside several safe distances at once) the trial of least violation is taken.
+
+@njit(cache=True)
+def _least_violation(normal: Array, bound: Array) -> Array:
+    """Slowest velocity among those whose largest violation is least, to 1e-9 of what standing still violates.
+
+    Constraints contradict each other only where a robot is inside several safe distances at once. What the
+    lower priorities ask for then has no say: they might be hostile.
+    """
+    low, high = 0.0, 0.0
+    for k in range(len(bound)):
+        high = max(high, bound[k] + MARGIN_M_S)  # standing still violates nothing by more
+    still, best = np.zeros(3), np.zeros(3)
+    while high - low > 1e-9 * high:
+        middle = 0.5 * (low + high)
+        if middle <= low or middle >= high:
+            break
+        velocity, shortfall = _closest(still, normal, bound - middle, True)
+        if shortfall <= CONTRADICTION_M_S:
+            high, best = middle, velocity
+        else:
+            low = middle
+    return best
+
+
+@njit(cache=True)
+def _closest(lower: Array, normal: Array, bound: Array, every: bool) -> tuple[Array, float]:
+    """Closest velocity to `lower` under all constraints, and by how much it misses one, m/s.
+
+    By enumeration of active sets of at most three: a projection in R^3 needs no larger one (a planar robot:
+    two), so this is exact. Each trial is lower + J^+ (b - J lower), the augmented composition over that active
+    set; the one that misses least is taken. Where standing still meets all constraints, no projection is longer
+    than `lower`, and those that nothing of its size can reach are left out, unless `every` one is asked for.
     """
     worst = 0.0
     for k in range(len(bound)):
         worst = max(worst, bound[k])
-    reach = np.sqrt(_dot(lower, lower)) + 2.0 * worst + 1e-9  # |v| never exceeds it: lesser bounds cannot bind
+    every = every or worst > CONTRADICTION_M_S
+    reach = np.sqrt(_dot(lower, lower)) + 2.0 * worst + 1e-9
     row, gap = np.empty((len(bound), 3)), np.empty(len(bound))
     count = 0
     planar = True
     for k in range(len(bound)):
-        if bound[k] > -reach:
+        if every or bound[k] > -reach:
             for a in range(3):
                 row[count, a] = normal[k, a]
             gap[count] = bound[k] + MARGIN_M_S - _dot(normal[k], lower)
             planar = planar and normal[k, 2] == 0.0
             count += 1
-    tolerance = 1e-13 + 1e-14 * reach
+    tolerance = 0.5 * MARGIN_M_S + 1e-14 * reach
     best_cost, best_shortfall = np.inf, np.inf
     best, step = np.zeros(3), np.zeros(3)
     for i in range(count):
@@ -184,7 +223,7 @@ def _closest_feasible(lower: Array, normal: Array, bound: Array) -> Array:
                         best[a] = step[a]
     for a in range(3):
         best[a] += lower[a]
-    return best
+    return best, best_shortfall
 
 
 @njit(cache=True)
@@ -201,6 +240,14 @@ def _active_step(row: Array, gap: Array, i: int, j: int, m: int, step: Array) ->
             step[a] = row[i, a] * gap[i] / ii
         return True
     if m == j:
+        if row[i, 2] == 0.0 and row[j, 2] == 0.0:  # the corner itself: exact where the normal equations are not
+            cross = row[i, 0] * row[j, 1] - row[i, 1] * row[j, 0]
+            if cross**2 <= 1e-12 * ii * jj:
+                return False
+            step[0] = (gap[i] * row[j, 1] - gap[j] * row[i, 1]) / cross
+            step[1] = (gap[j] * row[i, 0] - gap[i] * row[j, 0]) / cross
+            step[2] = 0.0
+            return True
         det = ii * jj - ij**2
         if det <= 1e-12 * ii * jj:
             return False
