@@ -24,8 +24,10 @@ from airground_drake.systems.gatekeeper import Rules, settle
 from airground_drake.systems.messages import ACCEPT, REFUSE, SILENT
 from airground_drake.trace import DECISION_COLUMNS, PROBLEM_ARRAYS, PROBLEM_SCALARS, Trace, save
 from airground_drake.trace import load as load_trace
-from airground_drake.verify import gatekeeping
-from airground_drake.verify.gatekeeping import GateFeas, GateOpt, GateSur, Row, enclose, rows_of
+from airground_drake.verify import gatekeeping, optimality
+from airground_drake.verify.decisions import Off, Row, rows_of
+from airground_drake.verify.gatekeeping import GateFeas
+from airground_drake.verify.optimality import GateOpt, GateSur, enclose
 from airground_drake.verify.verdict import TraceClaim
 
 N, DT = 8, 0.05
@@ -420,14 +422,14 @@ def test_a_mutant_is_refuted(relaxed: Trace, claim: TraceClaim, edit: Edit, what
     assert any(what in text for text in found), found
 
 
-def _compared(claim: TraceClaim, trace: Trace) -> list[gatekeeping.Off]:
+def _compared(claim: TraceClaim, trace: Trace) -> list[Off]:
     rows = rows_of(trace)
     if claim is SUR:
-        return [one for row in rows for one in gatekeeping._rounding(row)]
+        return [one for row in rows for one in optimality._rounding(row)]
     if claim is OPT:
         pairs = zip(rows, enclose(rows), strict=True)
-        return [one for row in rows for one in gatekeeping._no_worse(row)] + [
-            one for row, found in pairs for one in gatekeeping._bounds(row, found, row["normals"])
+        return [one for row in rows for one in optimality._no_worse(row)] + [
+            one for row, found in pairs for one in optimality._bounds(row, found, row["normals"])
         ]
     described = [one for row in rows for one in (*gatekeeping._situation(trace, row), *gatekeeping._plan(trace, row))]
     return [*described, *gatekeeping._answers(trace, rows)]
@@ -658,7 +660,7 @@ def test_the_bound_holds_whatever_the_solver_returns(data: Data, seed: int) -> N
     row = row_of(data, np.zeros(N))
     rubbish = [rng.uniform(0.0, 1.0, N)], [rng.exponential(1.0, (N, len(data.distances)))]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(gatekeeping, "_solve", lambda rows: rubbish)
+        patch.setattr(optimality, "_solve", lambda rows: rubbish)
         (found,) = enclose([row])
     costs = row.cost(row.positions(PLANS), data.normals)
     assert found.lower <= costs.min() + 1e-12
@@ -670,7 +672,7 @@ def test_a_bad_solution_decides_nothing(relaxed: Trace, monkeypatch: pytest.Monk
     def nothing(rows: list[Row]) -> tuple[list[Array], list[Array]]:
         return [np.full(N, 0.5) for _ in rows], [np.zeros((N, 2)) for _ in rows]
 
-    monkeypatch.setattr(gatekeeping, "_solve", nothing)
+    monkeypatch.setattr(optimality, "_solve", nothing)
     assert OPT.judge(relaxed).status != "holds"
 
 
@@ -679,7 +681,7 @@ def test_blocks_are_enumerated_exactly() -> None:
     for row in rows_of(trace):
         data = problem_at(trace, row.given["t_s"])
         best = min(data.plan_cost(plan) for plan in PLANS)
-        assert gatekeeping._cheapest(row, None).lower == pytest.approx(best, rel=1e-12)
+        assert optimality._cheapest(row, None).lower == pytest.approx(best, rel=1e-12)
 
     def second_best(row: dict[str, Any], problem: dict[str, Any]) -> None:
         row["lower_bound"] *= 1.01

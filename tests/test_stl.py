@@ -20,8 +20,8 @@ from synthetic import case_a, lone, simulate, with_meta, with_scenario, with_sig
 from airground_drake.scenarios.schema import Decision, Obstacle, Preset, Threshold
 from airground_drake.trace import Trace
 from airground_drake.verify import verify
-from airground_drake.verify.stl import FORMULAS, Signals, StlFormula, cross_check, merge
-from airground_drake.verify.stl import _square as square
+from airground_drake.verify.stl import FORMULAS, StlFormula, cross_check, merge
+from airground_drake.verify.stl_signals import Signals, square
 from airground_drake.verify.verdict import Finding, Verdict
 
 pytest.importorskip("rtamt")

@@ -24,8 +24,9 @@ from airground_drake.decision.bayes import bayes_risk, decision_time, error_rate
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.smt import Result
-from airground_drake.verify import ddm, threshold
-from airground_drake.verify.ddm import Experiment, ThrDdm
+from airground_drake.verify import ddm, passages, threshold
+from airground_drake.verify.ddm import ThrDdm
+from airground_drake.verify.passages import Experiment
 from airground_drake.verify.statements import Sign, conclude, enclose, evaluate
 from airground_drake.verify.threshold import Constants, ThrOpt, ThrRoot
 from airground_drake.verify.verdict import Finding
@@ -389,14 +390,14 @@ def sampled(each: Experiment, nodes: int = 160) -> tuple[float, float]:
 def test_what_the_barrier_correction_leaves_is_within_the_allowances(drift: float, deviation: float) -> None:
     each = Experiment("", drift, 1.0, 1.0, deviation, 1, 0)
     periods, wrong = sampled(each)
-    time, rate = ddm.running(each)
+    time, rate = passages.running(each)
     assert abs(periods - 0.25 - time / each.period) < ddm.TIME_ALLOWANCE
     assert abs(wrong - rate) < ddm.ERROR_ALLOWANCE
 
 
 def test_the_experiments_are_within_the_range_of_that_test() -> None:
     for inputs in INPUTS.values():
-        for each in ddm.experiments(inputs):
+        for each in passages.experiments(inputs):
             assert 0.0 < each.zeta * each.drift / each.noise**2 <= 10.0
             assert abs(each.deviation) <= 0.4 * each.zeta * (1.0 + 1e-12)
 
@@ -404,21 +405,21 @@ def test_the_experiments_are_within_the_range_of_that_test() -> None:
 @pytest.mark.parametrize("zeta", [1.0, 1e-3])  # noise periods of 4 ms and 4 ns
 def test_increments_are_those_of_the_process(zeta: float) -> None:
     each = Experiment("", 2.0, 3.0, zeta, 0.0, 1, 5)
-    steps = np.array(ddm._increments(each, 1000))
-    assert steps.shape == (1000 * ddm.CHANNELS,)
+    steps = np.array(passages.increments(each, 1000))
+    assert steps.shape == (1000 * passages.CHANNELS,)
     deviation = each.noise * math.sqrt(each.period)
     assert abs(steps.mean() - each.drift * each.period) < 4.0 * deviation / math.sqrt(len(steps))
     assert steps.std() == pytest.approx(deviation, rel=4.0 / math.sqrt(2.0 * len(steps)))
     assert abs(np.corrcoef(steps[:-1], steps[1:])[0, 1]) < 4.0 / math.sqrt(len(steps))
-    assert ddm._increments(each, 20) == ddm._increments(each, 20)
-    assert ddm._increments(each, 20) != ddm._increments(replace(each, seed=6), 20)
+    assert passages.increments(each, 20) == passages.increments(each, 20)
+    assert passages.increments(each, 20) != passages.increments(replace(each, seed=6), 20)
 
 
 def test_passages() -> None:
-    assert ddm._passage(iter([0.5, -0.2, 0.9]), 0.0, 1.0) == (3, pytest.approx(1.2))
-    assert ddm._passage(iter([-2.0, 5.0]), 0.5, 1.0) == (1, -1.5)
+    assert passages.passage(iter([0.5, -0.2, 0.9]), 0.0, 1.0) == (3, pytest.approx(1.2))
+    assert passages.passage(iter([-2.0, 5.0]), 0.5, 1.0) == (1, -1.5)
     with pytest.raises(ArithmeticError, match="within a path"):
-        ddm._passage(iter([0.1]), 0.0, 1.0)
+        passages.passage(iter([0.1]), 0.0, 1.0)
 
 
 @given(st.floats(0.2, 5.0), st.floats(0.5, 5.0), st.floats(0.2, 3.0), st.floats(-0.9, 0.9))

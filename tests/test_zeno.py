@@ -31,10 +31,12 @@ from airground_drake.diagram import integrated_noise
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.smt import solve
 from airground_drake.systems.decision import FIELDS, DecisionVariable, EventTrigger
-from airground_drake.verify import refinement, zeno
+from airground_drake.verify import automaton, counting, induction, refinement, zeno
+from airground_drake.verify.counting import experiment
 from airground_drake.verify.geometry import NormSignal
 from airground_drake.verify.prover import discharge
-from airground_drake.verify.refinement import ZenoRefine, experiment
+from airground_drake.verify.refinement import ZenoRefine
+from airground_drake.verify.symbolic import Path
 from airground_drake.verify.triggering import transitions
 from airground_drake.verify.verdict import Finding
 from airground_drake.verify.zeno import ZenoProof
@@ -133,7 +135,7 @@ def test_a_dwell_that_is_too_short_is_refuted() -> None:
     assert finding.status == "refuted"
     assert finding.counterexample is not None
     assert 0.3 <= finding.counterexample["gap_s"] < 0.4
-    broken = [each for each in zeno.remarks(Trigger(3.0, 2.0, 0.3), 0.4) if not each.certified()]
+    broken = [each for each in induction.remarks(Trigger(3.0, 2.0, 0.3), 0.4) if not each.certified()]
     assert [each.name for each in broken] == ["dwell_is_the_bound"]
 
 
@@ -147,7 +149,7 @@ def test_mutants_are_refuted_by_a_run(name: str) -> None:
     t, x = [row["t_s"] for row in run], [row["x_m"] for row in run]
     mutant = KINDS[name](3.0, 2.0, 0.3) if name in KINDS else Trigger.bare(3.0)
     for trigger, broken in ((mutant, True), (Trigger(3.0, 2.0, 0.3), False)):
-        times = [row["t_s"] for row in zeno.replay(trigger, list(zip(t, x, strict=True))) if row["trigger"]]
+        times = [row["t_s"] for row in automaton.replay(trigger, list(zip(t, x, strict=True))) if row["trigger"]]
         assert (min((b - a for a, b in pairwise(times)), default=math.inf) < 0.3) == broken
     if name in ("no dwell", "no refractory mode", "no hysteresis, no dwell"):
         source = TrajectorySource(PiecewisePolynomial.FirstOrderHold([*t, t[-1] + 1.0], [[*x, x[-1]]]))
@@ -158,16 +160,16 @@ def test_mutants_are_refuted_by_a_run(name: str) -> None:
 
 @pytest.mark.parametrize("name", KINDS)
 def test_mutants_have_no_symbolic_proof_either(name: str) -> None:
-    broken = zeno.relation(lambda path: KINDS[name](*map(path.symbol, ("zeta", "release", "dwell"))))
-    failing = [each for each in zeno.obligations(broken) if not each.certified()]
+    broken = automaton.relation(lambda path: KINDS[name](*map(path.symbol, ("zeta", "release", "dwell"))))
+    failing = [each for each in induction.obligations(broken) if not each.certified()]
     assert failing
     assert "refuted" in {proof.status for proof in discharge(failing)}
 
 
 @pytest.mark.parametrize("name", KINDS)
 def test_conformance_notices_another_trigger(name: str) -> None:
-    relation = zeno.relation(lambda _: KINDS[name](3.0, 2.0, 0.3))
-    found = zeno.conformance(Trigger(3.0, 2.0, 0.3), relation, 30.0)
+    relation = automaton.relation(lambda _: KINDS[name](3.0, 2.0, 0.3))
+    found = automaton.conformance(Trigger(3.0, 2.0, 0.3), relation, 30.0)
     assert found["disagreements"] > 0
     assert found["first"] is not None
 
@@ -177,7 +179,7 @@ def test_conformance_meets_every_transition_and_the_rounding() -> None:
     assert found["states"] >= 2000
     assert found["disagreements"] == 0
     assert found["within_rounding"] > 0  # 0.3 is no binary fraction: it matters, and the bound on it covers it
-    relation = zeno.relation(lambda _: Trigger(3.0, 2.0, 0.3))
+    relation = automaton.relation(lambda _: Trigger(3.0, 2.0, 0.3))
     events = {each.name for each in relation if each.source is not None and not each.name.endswith("waits")}
     assert events - set(found["transitions"]) == {"intervening_refractory_untriggered"}  # only at s < 0
 
@@ -188,7 +190,7 @@ def test_rounding_bounds_the_end_of_the_dwell(triggered_at: float, dwell: float)
     trigger = Trigger(3.0, 2.0, dwell)
     end = trigger.dwell_end(trigger.rise(trigger.start(0.0, 0.0), triggered_at))
     exact = Fraction(triggered_at) + Fraction(repr(dwell))
-    assert abs(Fraction(end) - exact) <= Fraction(zeno.rounding(trigger, 30.0))
+    assert abs(Fraction(end) - exact) <= Fraction(automaton.rounding(trigger, 30.0))
 
 
 def test_certificates_are_answered_alike_from_their_text() -> None:
@@ -201,14 +203,14 @@ def test_certificates_are_answered_alike_from_their_text() -> None:
 
 
 def test_symbols_refuse_what_they_cannot_decide() -> None:
-    symbol = zeno.Path([]).symbol("a")
+    symbol = Path([]).symbol("a")
     for question in (lambda: bool(symbol), lambda: symbol == 1.0):
         with pytest.raises(TypeError):
             question()
 
 
 def test_symbols_explore_every_outcome() -> None:
-    relation = zeno.relation(lambda path: Trigger(*map(path.symbol, ("zeta", "release", "dwell"))))
+    relation = automaton.relation(lambda path: Trigger(*map(path.symbol, ("zeta", "release", "dwell"))))
     assert {(str(f), strict) for f, strict in relation[0].guards} >= {("zeta", True), ("zeta - release", False)}
     assert len([each for each in relation if each.source is None]) == 2
     assert {each.name for each in relation if each.triggers and not each.name.endswith("untriggered")} == {
@@ -226,17 +228,17 @@ def test_the_shipped_trigger_is_supported(case_a: Scenario) -> None:
     finding = refined()
     assert finding.status == "supported", finding.counterexample
     evidence = finding.evidence
-    assert evidence == refinement.series(REFINE)
+    assert evidence == refinement.series(experiment(REFINE), counting.counts(experiment(REFINE)))
     dt = evidence["dt_s"]
     assert dt[0] / dt[-1] >= 256
-    for name in refinement.SERIES:
+    for name in counting.SERIES:
         assert {len(values) for values in evidence[name].values()} == {len(dt)}
     low, high = evidence["fit"]["bare"]["interval"]
     assert low < -0.49 < high < -0.4
     assert max(evidence["automaton"]["largest"]) <= evidence["most_triggers"] == 61
     assert evidence["bare"]["mean"][-1] > 10.0 * evidence["bare"]["mean"][0]
     rows = finding.certificates["counts.csv"].splitlines()
-    assert len(rows) == 1 + refinement.PATHS * len(dt)
+    assert len(rows) == 1 + counting.PATHS * len(dt)
     last = [float(row.split(",")[2]) for row in rows[1:] if float(row.split(",")[1]) == dt[-1]]
     assert math.fsum(last) / len(last) == pytest.approx(evidence["bare"]["mean"][-1])
 
@@ -255,8 +257,8 @@ def test_more_triggers_than_the_dwell_admits_are_noticed() -> None:
     assert finding.status == "refuted"
     assert finding.counterexample is not None
     i, dt = finding.counterexample["path"], finding.counterexample["dt_s"]
-    unit = refinement.path(setting, i)[setting.dt_s.index(dt)]
-    times = refinement.triggers(kind, 3.0 + setting.noise_m_sqrt_s * unit, dt)
+    unit = counting.path(setting, i)[setting.dt_s.index(dt)]
+    times = counting.triggers(kind, 3.0 + setting.noise_m_sqrt_s * unit, dt)
     assert len(times) == finding.counterexample["triggers"] > 61
     assert min(b - a for a, b in pairwise(times)) < 0.5
 
@@ -273,7 +275,7 @@ def test_expected_bare_count_against_random_walks(leak: float) -> None:
         count += (x < 0.0) & (after >= 0.0)
         x = after
     error = count.std() / math.sqrt(walks)
-    assert abs(count.mean() - refinement.expected_bare(setting, dt)) < 4.0 * error
+    assert abs(count.mean() - counting.expected_bare(setting, dt)) < 4.0 * error
 
 
 def test_expected_bare_count_grows_as_stated() -> None:
@@ -282,7 +284,7 @@ def test_expected_bare_count_grows_as_stated() -> None:
         steps = round(setting.duration_s / dt)
         first = round(setting.dt_s[0] / dt)
         exact = 0.5 + sum(math.atan(1.0 / math.sqrt(first + k)) for k in range(steps)) / (2.0 * math.pi)
-        assert refinement.expected_bare(setting, dt) == pytest.approx(exact, rel=1e-9)
+        assert counting.expected_bare(setting, dt) == pytest.approx(exact, rel=1e-9)
         assert abs(exact - (math.sqrt(first + steps) - math.sqrt(first)) / math.pi) < 1.0
 
 
@@ -298,7 +300,7 @@ def test_fast_triggers_are_those_of_the_independent_checker(values: list[float],
     expected = [
         time for time, kind in transitions(signal, trigger.zeta, trigger.release, trigger.dwell) if kind == "trigger"
     ]
-    assert refinement.triggers(trigger, x, dt) == pytest.approx(expected, abs=1e-9)
+    assert counting.triggers(trigger, x, dt) == pytest.approx(expected, abs=1e-9)
 
 
 @pytest.mark.parametrize("kind", ["automaton", "bare"])
@@ -307,14 +309,14 @@ def test_fast_triggers_are_those_of_the_running_systems(kind: str) -> None:
     trigger = Trigger(3.0, 2.0, 0.5) if kind == "automaton" else Trigger.bare(3.0)
     setting = experiment(REFINE | {"duration_s": 8.0})
     dt = setting.dt_s[1]
-    noise = np.array([setting.noise_m_sqrt_s * refinement.path(setting, i)[1] for i in range(6)])
+    noise = np.array([setting.noise_m_sqrt_s * counting.path(setting, i)[1] for i in range(6)])
     source = TrajectorySource(PiecewisePolynomial.FirstOrderHold(dt * np.arange(noise.shape[1]), noise))
     systems = [(DecisionVariable(6), "noise"), (EventTrigger(6, trigger), "decision_variable")]
     # every UGV's reference is 3 m away: only its noise moves x
     status = simulate(systems, source, dt * (noise.shape[1] - 1), dt)
     total = 0
     for j in range(6):
-        expected = refinement.triggers(trigger, 3.0 + noise[j], dt)
+        expected = counting.triggers(trigger, 3.0 + noise[j], dt)
         assert trigger_times(status, j) == pytest.approx(expected, abs=1e-5)
         total += len(expected)
     assert total > 6
@@ -323,7 +325,7 @@ def test_fast_triggers_are_those_of_the_running_systems(kind: str) -> None:
 def test_paths_are_those_of_the_diagrams_noise() -> None:
     """The same normal samples through the diagram's AffineSystem, held over each noise step."""
     setting = experiment(REFINE | {"leak_1_s": 0.7, "noise_period_s": 1.0 / 32.0, "duration_s": 2.0})
-    dt, n = setting.dt_s[2], refinement.path(setting, 0)[2]
+    dt, n = setting.dt_s[2], counting.path(setting, 0)[2]
     samples = (np.diff(n) + setting.leak_1_s * dt * n[:-1]) / math.sqrt(dt)
     builder = DiagramBuilder()
     held = PiecewisePolynomial.ZeroOrderHold(dt * np.arange(len(n)), [[*samples, 0.0]])

@@ -199,7 +199,7 @@ def _closest(lower: Array, normal: Array, bound: Array, every: bool) -> tuple[Ar
     count = 0
     planar = True
     for k in range(len(bound)):
-        if every or bound[k] > -reach:
+        if bound[k] > -reach or (every and bound[k] > -np.inf):
             for a in range(3):
                 row[count, a] = normal[k, a]
             gap[count] = bound[k] + MARGIN_M_S - _dot(normal[k], lower)

@@ -16,8 +16,9 @@ from airground_drake.trace import Trace
 from airground_drake.verify.ddm import ThrDdm
 from airground_drake.verify.disturbance import SafeDist
 from airground_drake.verify.findings import cache_folder, find
-from airground_drake.verify.gatekeeping import GateFeas, GateOpt, GateSur
+from airground_drake.verify.gatekeeping import GateFeas
 from airground_drake.verify.invariance import SafeGate, SafeInv, SafeLemma
+from airground_drake.verify.optimality import GateOpt, GateSur
 from airground_drake.verify.outcome import Comm, GateTime, LiveGoal
 from airground_drake.verify.refinement import ZenoRefine
 from airground_drake.verify.safety import SafeHyp, SafeTrace
