@@ -89,6 +89,13 @@ class Data:
         return float((np.linalg.norm(positions[:, None] - self.centres, axis=2) - self.distances).min())
 
 
+@pytest.fixture(autouse=True)
+def _scripted(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The UGVs of scripted traces do not follow their own task; those of real runs do."""
+    if "real" not in request.node.name and "hides" not in request.node.name:
+        monkeypatch.setattr(gatekeeping, "_own_task", lambda trace, rows: iter(()))
+
+
 def rounding(relaxed: Array) -> Array:
     rounded: list[float] = []
     for k in range(N):
@@ -759,3 +766,13 @@ def test_a_real_run_saved_and_broken(tmp_path: Any) -> None:
         (OPT, understate_gap), (OPT, long_normals), (OPT, inflate_loser),
     ):  # fmt: skip
         assert claim.judge(edited(trace, edit)).status == "refuted", edit
+
+
+def test_a_run_that_hides_an_intervention_is_refuted() -> None:
+    """What was executed is not the UGV's own task, whatever the `accepted` column says."""
+    trace = record_of("case_b", "d")
+    assert FEAS.judge(trace).status == "holds"
+    hidden = replace(trace, signals=trace.signals.assign(**{"ugv1.accepted": 0.0}))
+    finding = FEAS.judge(hidden)
+    assert finding.status == "refuted"
+    assert "own task" in str(finding.counterexample)

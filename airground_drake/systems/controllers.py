@@ -41,7 +41,7 @@ class UgvController(LeafSystem):
         super().__init__()
         n = len(team.ugvs)
         self._count = n
-        self._avoidance = avoidance
+        self.avoidance = avoidance
         self._motion_gain = motion_gain
         self._intervention_gain = intervention_gain
         self.intervention_on_top = intervention_on_top
@@ -82,10 +82,10 @@ class UgvController(LeafSystem):
             Commands, (n, 3), m/s.
         """
         own = positions[: self._count]
-        spaces = self._avoidance.half_spaces(own, self._mobility, self._neighbourhood.around(positions))
+        spaces = self.avoidance.half_spaces(own, self._mobility, self._neighbourhood.around(positions))
         tracking = PositionTask(reference, rate, self._motion_gain).velocity(own) * self._mobility
         lower = limit_speed(tracking, self._max_speed)
-        velocity = self._avoidance.apply(lower, spaces)
+        velocity = self.avoidance.apply(lower, spaces)
         for i, proposal in enumerate(accepted):
             if proposal is not None:
                 velocity[i] = self._intervened(t, proposal, i, own, lower[i], velocity[i], spaces)
@@ -108,7 +108,7 @@ class UgvController(LeafSystem):
         velocity = limit_speed(task[None], self._max_speed[row])
         if self.intervention_on_top:
             return velocity[0]
-        return self._avoidance.apply(velocity, HalfSpaces(spaces.normal[row], spaces.bound[row]))[0]
+        return self.avoidance.apply(velocity, HalfSpaces(spaces.normal[row], spaces.bound[row]))[0]
 
 
 class UavController(LeafSystem):
@@ -124,7 +124,7 @@ class UavController(LeafSystem):
         """Declare ports, state and the periodic update; altitude in m over the centroid."""
         super().__init__()
         n = len(team.ugvs)
-        self._avoidance = avoidance
+        self.avoidance = avoidance
         self._gain = formation_gain
         self._altitude = altitude
         self._neighbourhood = team.neighbourhood(slice(n, n + 1))
@@ -141,5 +141,5 @@ class UavController(LeafSystem):
         commands = self._ugv_command.Eval(context).reshape(-1, 3)
         task = FormationTask(positions[:-1], commands, self._altitude, self._gain)
         lower = limit_speed(task.velocity(positions[-1:]), self._max_speed)
-        spaces = self._avoidance.half_spaces(positions[-1:], self._mobility, self._neighbourhood.around(positions))
-        discrete.set_value(0, self._avoidance.apply(lower, spaces)[0])
+        spaces = self.avoidance.half_spaces(positions[-1:], self._mobility, self._neighbourhood.around(positions))
+        discrete.set_value(0, self.avoidance.apply(lower, spaces)[0])

@@ -91,9 +91,7 @@ def verify(trace: Trace) -> list[Verdict]:
     ]
 
 
-def verify_model(
-    scenario: Scenario, *, kept: Path | None = None, only: Collection[str] | None = None
-) -> list[Verdict]:
+def verify_model(scenario: Scenario, *, kept: Path | None = None, only: Collection[str] | None = None) -> list[Verdict]:
     """Judge every claim about the model of a scenario.
 
     Args:
@@ -107,7 +105,7 @@ def verify_model(
         it says otherwise).
     """
     claims = [claim for claim in MODEL_CLAIMS if only is None or claim.id in only]
-    inputs = [claim.inputs(scenario) for claim in claims]
+    inputs = [claim.judge_inputs(scenario) for claim in claims]
     findings = find(claims, inputs, folder=kept)
     return [
         Verdict(claim, "", finding, cast("Status", scenario.expected.get(claim.id, claim.expected)), given)

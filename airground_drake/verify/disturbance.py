@@ -182,12 +182,17 @@ class SafeDist(ModelClaim):
             discharge([*disturbed(), *with_scenario(inputs)], LIMIT_S),
             disturbance_m_s=inputs["disturbance_m_s"], least_distances_m=bounds, runs=rows, conformance=compared,
         )  # fmt: skip
-        covered = [row for row in rows if not row["unmet"]] or rows
+        covered = [row for row in rows if not row["unmet"]]
+        if not covered:
+            reason = "no disturbed run met the inequalities, so that none says anything"
+            return replace(found, status="inconclusive", evidence={**found.evidence, "reason": reason})
         worst = min(covered, key=lambda row: float(row["worst_margin_m"]))
         where: dict[str, Any] = {name: worst["where"][name] for name in ("scene", "attack", "robot", "t_s")}
         found = replace(found, margin=worst["worst_margin_m"], unit="m", where=where)
         if found.status == "proved" and any(row["broken"] for row in rows):
             return replace(found, status="refuted", counterexample=next(row for row in rows if row["broken"]))
+        if found.status == "proved" and worst["worst_margin_m"] < -1e-9:
+            return replace(found, status="refuted", counterexample=worst)
         if found.status == "proved" and not compared["agrees"]:
             return replace(found, status="refuted", counterexample=compared["first_difference"] or compared)
         return found

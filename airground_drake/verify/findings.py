@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import platform
@@ -41,7 +42,8 @@ def find(
     for i, found in enumerate(known):
         finding = found if found is not None else made[i]
         if found is None and folder is not None and finding.status in (*PASSING, "refuted"):
-            files.write_json(folder / f"{key(claims[i], inputs[i])}.json", asdict(finding))
+            with contextlib.suppress(OSError):  # a folder that cannot be written keeps nothing
+                files.write_json(folder / f"{key(claims[i], inputs[i])}.json", asdict(finding))
         findings.append(finding)
     return findings
 

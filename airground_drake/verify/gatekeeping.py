@@ -11,11 +11,14 @@ import numpy.typing as npt
 from airground_drake.nsbc.task import Array
 from airground_drake.trace import Trace
 from airground_drake.verify.decisions import POSITION_TOLERANCE_M, GateClaim, Off, Row, conclude, cost_tolerance
-from airground_drake.verify.geometry import interpolate, travelled
+from airground_drake.verify.geometry import MERGE_S, corner_times, interpolate, pairs_of, places_of, travelled
+from airground_drake.verify.safety import control_samples, slack_of
 from airground_drake.verify.verdict import TIME_TOLERANCE_S, Finding
 
 SPEED_TOLERANCE = 1e-4
 """A step may be longer than the speed limit allows by this, relative."""
+COMMAND_TOLERANCE_M_S = 1e-6
+"""A command may differ from the UGV's own task by this, m/s: positions enter with the motion gain."""
 INSIDE_M = 1e-6
 """Closer than the safe distance by more than this, m, the avoidance inequalities may ask for more speed than that:
 they ask for less than 1e-5 m/s per point before, at gains up to 10 1/s."""
@@ -29,7 +32,8 @@ class GateFeas(GateClaim):
     id = "GATE-FEAS"
     statement = (
         "Every gatekeeper decision was about the UGV's situation at that time, its plan satisfies (26b)-(26e) at the "
-        "recorded cost, and the answer given, and obeyed, is the one that follows from the costs."
+        "recorded cost, the answer given is the one that follows from the costs, and no UGV did anything but its own "
+        "task while it had accepted nothing."
     )
     formula = (
         "rho(0) = p(t); omega in {0, 1}; rho_k = rho_(k-1) + dt (omega_k a_k + (1 - omega_k) b_k); u_k = max(0, max_j "
@@ -58,7 +62,7 @@ class GateFeas(GateClaim):
     def judge_rows(self, trace: Trace, rows: list[Row]) -> Finding:
         """Compare everything recorded with what it should be; the margin is the part of a tolerance left."""
         compared = [one for row in rows for one in (*_situation(trace, row), *_plan(trace, row))]
-        compared += [*_answers(trace, rows), *_obeyed(trace, rows)]
+        compared += [*_answers(trace, rows), *_obeyed(trace, rows), *_own_task(trace, rows)]
         slack = [float(np.maximum(0.0, -row.clearance(row["positions_m"])).max()) for row in rows if row.planned]
         finding = Finding(
             "holds",
@@ -233,3 +237,32 @@ def _obeyed(trace: Trace, rows: Sequence[Row]) -> Iterator[Off]:
             if age > gate + TIME_TOLERANCE_S:
                 what = "executed without an acceptance in force"
                 yield Off(own[max(last, 0)], what, 1.0, 0.0, row_t_s=float(trace.t[k]))
+
+
+def _own_task(trace: Trace, rows: Sequence[Row]) -> Iterator[Off]:
+    """Commands, where nothing is accepted and no avoidance inequality interferes, against the UGV's own task (6)."""
+    control, places = trace.scenario["control"], places_of(trace)
+    samples = control_samples(trace.t, control["period_s"])
+    chosen = np.searchsorted(trace.t, trace.t[samples] + MERGE_S)  # what is set at a sample is in the next row
+    t, step = trace.t[samples], 1e-3 * control["period_s"]
+    at = {name: place if place.ndim == 1 else place[samples] for name, place in places.items()}
+    for ugv in trace.ugvs:
+        own = trace.scenario["ugvs"][ugv]
+        waypoints, speed = np.asarray(own["preset"]["waypoints_m"], dtype=np.float64), own["preset"]["speed_m_s"]
+        here = travelled(waypoints, speed, t)
+        wanted = (travelled(waypoints, speed, t + step) - here) / step + control["motion_gain_1_s"] * (here - at[ugv])
+        wanted[:, 2] = 0.0
+        size = np.linalg.norm(wanted, axis=1, keepdims=True)
+        wanted *= np.minimum(1.0, own["max_speed_m_s"] / np.maximum(size, 1e-12))
+        corners = np.asarray(corner_times(waypoints, speed), dtype=np.float64).reshape(-1, 1)
+        free = (np.abs(corners - t) > control["period_s"]).all(axis=0) & (
+            trace.column(f"{ugv}.accepted")[chosen] == 0.0
+        )
+        for pair in pairs_of(trace):
+            if ugv in (pair.first, pair.second):
+                other = pair.second if pair.first == ugv else pair.first
+                free &= slack_of(at[ugv] - at[other], wanted, pair, control, planar=True) > COMMAND_TOLERANCE_M_S
+        away = np.where(free, np.linalg.norm(trace.command(ugv)[chosen] - wanted, axis=1), 0.0)
+        k = int(np.argmax(away))
+        what = "not its own task, though nothing is accepted, m/s"
+        yield Off(rows[0], what, float(away[k]), COMMAND_TOLERANCE_M_S, robot=ugv, sample_t_s=float(t[k]))

@@ -12,7 +12,7 @@ from airground_drake.nsbc.avoidance import Avoidance, Composition, HalfSpaces, S
 from airground_drake.nsbc.motion import Motion
 from airground_drake.nsbc.task import Array
 from airground_drake.nsbc.team import Team
-from airground_drake.systems import UgvController
+from airground_drake.systems.controllers import UavController, UgvController
 from airground_drake.verify.conformance import loss_of_inequality
 from airground_drake.verify.pairs import Inputs, kinds, running_avoidance, running_team
 from airground_drake.verify.vectors import ROUNDOFF, SEED, nearest, rates, unit
@@ -116,7 +116,8 @@ def non_finite(inputs: Inputs) -> dict[str, str]:
 def hostile_team(inputs: Inputs, count: int, composition: Composition, on_top: bool) -> Inputs:
     """Let the running UGV controller execute hostile accepted interventions from random safe states of the team.
 
-    Every UGV (three at most) has accepted a motion to far beyond the obstacle or robot that it is nearest to.
+    Every UGV (three at most) is asked to go far beyond the obstacle or robot that it is nearest to; a quarter of them
+    has not accepted that, and has a preset there instead. The UAV is asked to fly through the UGVs.
 
     Returns:
         Evidence: number of missed inequalities (compared as floats), and for the worst a replay.
@@ -132,14 +133,15 @@ def hostile_team(inputs: Inputs, count: int, composition: Composition, on_top: b
         intervention_on_top=on_top,
     )  # fmt: skip
 
-    def command(positions: Array, wanted: Array) -> tuple[Array, HalfSpaces]:
+    def command(positions: Array, wanted: Array, asked: Array) -> tuple[Array, HalfSpaces]:
         accepted: list[Proposal | None] = [
-            Proposal("hostile", 0.0, Motion(np.array([0.0, 1.0]), np.array([here, there])))
-            for here, there in zip(positions[:n], wanted, strict=True)
+            Proposal("hostile", 0.0, Motion(np.array([0.0, 1.0]), np.array([here, there]))) if agreed else None
+            for here, there, agreed in zip(positions[:n], wanted, asked, strict=True)
         ]
         spaces = avoidance.half_spaces(positions[:n], mobility, neighbourhood.around(positions))
         return controller.velocity(1.0, positions, wanted, np.zeros((n, 3)), accepted), spaces
 
+    flier = _Flier(team, running_avoidance(inputs))
     missed, worst, state = 0, 0.0, None
     for _ in range(count):
         positions = _safe_team(team, rng)
@@ -147,11 +149,16 @@ def hostile_team(inputs: Inputs, count: int, composition: Composition, on_top: b
         x = positions[:n, None] - around.centre
         k = np.argmin(np.linalg.norm(x, axis=-1) - around.distance, axis=1)
         wanted = positions[:n] - 100.0 * x[np.arange(n), k] * mobility
-        velocity, spaces = command(positions, wanted)
+        asked = rng.random(n) < 0.75
+        velocity, spaces = command(positions, wanted, asked)
         short = spaces.bound - rates(spaces.normal, velocity)
+        missed += flier.missed(positions)
         missed += int((short > 0.0).sum()) + int((velocity[:, 2] != 0.0).sum())
         if short.max() > worst:
-            worst, state = float(short.max()), (positions, wanted, np.unravel_index(np.argmax(short), short.shape))
+            worst, state = (
+                float(short.max()),
+                (positions, wanted, np.unravel_index(np.argmax(short), short.shape), asked),
+            )
     found: Inputs = {"states": count, "ugvs": n, "missed": missed, "worst_missed_by_m_s": worst}
     if state is None:
         return found
@@ -162,12 +169,31 @@ def hostile_team(inputs: Inputs, count: int, composition: Composition, on_top: b
     begin = float(np.linalg.norm(positions[i] - centre))
     described = {"positions_m": positions.tolist(), "robot": team.ugvs[i], "avoided_m": centre.tolist()}
     while least >= safe - 0.1 and steps < 200:
-        velocity = command(positions, wanted)[0][i]
+        velocity = command(positions, wanted, state[3])[0][i]
         least = min(least, float(nearest(positions[i] - centre, velocity, avoidance.period)))
         positions[i] += avoidance.period * velocity
         steps += 1
     replay = {"distance_before_m": begin, "safe_distance_m": safe, "steps": steps, "least_distance_m": least}
     return found | {"first_missed": described | {"intervention_towards_m": wanted[i].tolist()}, "replay": replay}
+
+
+class _Flier:
+    """The running UAV controller, asked for a place below the UGVs."""
+
+    def __init__(self, team: Team, avoidance: Avoidance) -> None:
+        self._avoidance = avoidance
+        self._neighbourhood = team.neighbourhood(slice(len(team.ugvs), None))
+        self._system = UavController(team, avoidance, formation_gain=1.0 / avoidance.period, altitude=-100.0)
+        self._context = self._system.CreateDefaultContext()
+
+    def missed(self, positions: Array) -> int:
+        """How many inequalities of the UAV its command misses, from the positions of a team, (n + 1, 3), m."""
+        self._system.GetInputPort("team_position").FixValue(self._context, positions.ravel())
+        self._system.GetInputPort("ugv_command").FixValue(self._context, np.zeros(3 * (len(positions) - 1)))
+        updates = self._system.EvalUniquePeriodicDiscreteUpdate(self._context)
+        velocity = updates.value(0).reshape(1, 3)
+        spaces = self._avoidance.half_spaces(positions[-1:], np.ones((1, 3)), self._neighbourhood.around(positions))
+        return int((rates(spaces.normal, velocity) < spaces.bound).sum())
 
 
 def _safe_team(team: Team, rng: np.random.Generator) -> Array:

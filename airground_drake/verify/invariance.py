@@ -123,25 +123,25 @@ class SafeGate(ModelClaim):
     id = "SAFE-GATE"
     statement = (
         "Under method (d) no intervention, accepted or not, leaves the safe set: the avoidance layer is applied last, "
-        "to whatever finite velocity comes from below, and from a safe state its output meets every inequality "
-        "whatever its input was; SAFE-INV does the rest. Neither the optimiser nor its horizon, the UAV or the "
-        "intervention is trusted."
+        "to whatever velocity comes from below, and from a safe state its output meets every inequality "
+        "whatever its input was; SAFE-INV does the rest. Neither the optimiser nor its horizon, nor the UAV as an "
+        "adviser, nor its intervention is trusted; as a robot the UAV must keep its own share of each inequality."
     )
-    formula = "D_k >= d_k for all k => for every finite u: v = avoid(u) has n_k.v >= b_k for all k (in floating point)"
+    formula = "b_k <= 0 as computed, for all k => for every u: v = avoid(u) has n_k.v >= b_k for all k, as floats"
     method = (
         "v = 0 meets all inequalities from a safe state, and the last step of the layer shortens the velocity until "
         "none that v = 0 meets is broken; its loop ends only when a comparison of floats finds none, which is the "
         "postcondition itself (polynomial certificates show that one pass suffices but for rounding; every further one "
         "shortens v). The running layer is evaluated on hostile inputs from a deterministic sample of safe states, the "
-        "running UGV controller with hostile accepted interventions; its order of priorities is read from the built "
+        "running UGV controller with hostile interventions, accepted or not, and the running UAV controller; the order "
+        "of priorities is read from the built "
         "diagram of method (d)."
     )
     equations = "(20) against the priorities of method (d); (5), (7)-(8), (14)"
     assumptions = (
         "SAFE-INV and its assumptions; the state is safe at the start.",
-        "Velocities from below are finite: the layer does not catch NaN or infinity (see the evidence). Motions of "
-        "interventions are checked to be finite, and speeds are limited below the layer.",
-        "An intervention acts in the plane: its J_int does not mix z with x and y (the planner's never does).",
+        "b_k <= 0 as computed is D_k >= d_k up to rounding: the sampled states are moved outward by some 1e-15 m.",
+        "The UAV flies by its own avoidance layer: it takes half of each inequality, straight above a UGV all of it.",
     )
     does_not_establish = (
         "That an intervention is useful, or that the robots get anywhere. Nothing is said of methods (b) and (c), "

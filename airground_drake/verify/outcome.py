@@ -217,6 +217,8 @@ class GateTime(TraceClaim):
         """Compare p99 with the period; without measurements there is no verdict."""
         times = np.asarray(trace.timings.get("decision_times_s", []), dtype=np.float64)
         period, decisions = float(trace.scenario["gatekeeper"]["period_s"]), len(trace.decisions)
+        if not decisions and not any((trace.column(f"{ugv}.mode") == 1.0).any() for ugv in trace.ugvs):
+            return Finding("holds", evidence={"count": 0, "reason": "no UGV was intervened on: nothing to decide"})
         if not decisions or not times.size:
             return Finding("not_run", evidence={"reason": "no decision, or none timed", "decisions": decisions})
         if len(times) < decisions or not (times >= 0.0).all():

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from airground_drake.diagram import make_team
+from airground_drake.diagram import build_model, make_team
 from airground_drake.nsbc.avoidance import Avoidance, Composition
 from airground_drake.nsbc.team import Team
 from airground_drake.scenarios.schema import Scenario
@@ -18,8 +18,19 @@ Inputs = dict[str, Any]
 
 
 def constants(scenario: Scenario) -> Inputs:
-    """Constants of the running team and avoidance layer, strict JSON: what the claims about avoidance are about."""
+    """Constants of the running team and avoidance layer, strict JSON: what the claims about avoidance are about.
+
+    Raises:
+        ValueError: if the controllers of the built diagram run with other constants than the scenario's.
+    """
     team, control = make_team(scenario), scenario.control
+    diagram = build_model(scenario, "d").diagram
+    wanted = (control.avoidance_gain_1_s, control.period_s, control.sensing_range_m)
+    for name in ("ugv_controller", "uav_controller"):
+        layer = diagram.GetSubsystemByName(name).avoidance
+        running = (layer.gain, layer.period, layer.sensing_range)
+        if running != wanted:
+            raise ValueError(f"{name} runs with gain, period, range {running}, the scenario says {wanted}")
     points = [p for ugv in scenario.ugvs.values() for p in (ugv.start_m, ugv.target_m, *ugv.preset.waypoints_m)]
     points += [scenario.uav.start_m, *(obstacle.position_m for obstacle in scenario.obstacles.values())]
     listed = {name: np.asarray(getattr(team, name)).tolist() for name in ("ugvs", "obstacles", "max_speed")}

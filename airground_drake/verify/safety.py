@@ -168,7 +168,7 @@ def _static(trace: Trace) -> Iterator[_Hypothesis]:
 def _sampled(trace: Trace) -> Iterator[_Hypothesis]:
     """Hypotheses at the control samples: their spacing, the hold between them, limits and inequalities."""
     control, limits, t = trace.scenario["control"], _speed_limits(trace), trace.t
-    samples = _samples(t, control["period_s"])
+    samples = control_samples(t, control["period_s"])
     chosen = np.searchsorted(t, t[samples] + MERGE_S)  # the velocity chosen at a sample is the next row's command
     spacing = np.diff(np.append(t[samples], t[-1]))
     yield _Hypothesis("sampling", "s", t[samples], control["period_s"] - spacing, TIME_TOLERANCE_S, {})
@@ -189,14 +189,14 @@ def _sampled(trace: Trace) -> Iterator[_Hypothesis]:
         for robot, other in ((pair.first, pair.second), (pair.second, pair.first)):
             if robot not in velocities:
                 continue
-            slack = _slack(
+            slack = slack_of(
                 sampled[robot] - sampled[other], velocities[robot], pair, control, planar=robot in trace.ugvs
             )
             about = {"robot": robot, "other": other}
             yield _Hypothesis("avoidance", "m/s", t[samples], slack, VELOCITY_TOLERANCE_M_S, about)
 
 
-def _samples(t: Array, period: float) -> npt.NDArray[np.intp]:
+def control_samples(t: Array, period: float) -> npt.NDArray[np.intp]:
     """Rows of the control samples: the nearest to each multiple of the period before the last row, if it is there."""
     instants = np.arange(int((t[-1] - MERGE_S) / period) + 1) * period
     right = np.searchsorted(t, instants).clip(1, len(t) - 1)
@@ -204,7 +204,7 @@ def _samples(t: Array, period: float) -> npt.NDArray[np.intp]:
     return np.asarray(nearest[np.abs(t[nearest] - instants) <= TIME_TOLERANCE_S])
 
 
-def _slack(offset: Array, velocity: Array, pair: Pair, control: dict[str, Any], *, planar: bool) -> Array:
+def slack_of(offset: Array, velocity: Array, pair: Pair, control: dict[str, Any], *, planar: bool) -> Array:
     """n.v minus its bound for one pair at S samples, (S,), m/s; +inf out of sensing range.
 
     Args:

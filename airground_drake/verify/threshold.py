@@ -163,7 +163,8 @@ class ThrOpt(ModelClaim):
     id = "THR-OPT"
     statement = (
         "Without initial deviation the root of the threshold equation is the only minimiser of the Bayes risk over all "
-        "zeta > 0; the root of the printed equation is not one; with an initial deviation neither is stationary."
+        "zeta > 0; the root of the printed equation is not one. With initial deviations of +-zeta/2 the risk is not "
+        "stationary at that root."
     )
     formula = (
         "dB/dzeta = (c1 drift/noise^2) / (1 + cosh u) f(u), so dB/dzeta < 0 below the root and > 0 above it; "

@@ -6,6 +6,7 @@ in time plus a number that is linear in time, so its turning points and crossing
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from itertools import pairwise, zip_longest
 from typing import Any
@@ -135,6 +136,13 @@ class ZenoTrace(TraceClaim):
         )
 
 
+def _is_bayes(rule: dict[str, Any], zeta: float) -> bool:
+    """Whether zeta, m, solves (19) with c2/c1 on the right, by the sign of its residual on both sides."""
+    level = rule["c2"] / rule["c1_1_s"] * (rule["drift_m_s"] / rule["noise_m_sqrt_s"]) ** 2
+    u = [2.0 * side * zeta * rule["drift_m_s"] / rule["noise_m_sqrt_s"] ** 2 for side in (1.0 - 1e-9, 1.0 + 1e-9)]
+    return math.sinh(u[0]) + u[0] <= level <= math.sinh(u[1]) + u[1]
+
+
 class ThrTrig(TraceClaim):
     """THR-TRIG."""
 
@@ -155,7 +163,7 @@ class ThrTrig(TraceClaim):
     equations = "(15), (20)"
     assumptions = (
         "Positions and integrated noise are linear in time between rows.",
-        "The threshold in force is the one recorded in the trace (equal to the scenario's if that is fixed).",
+        "The threshold in force is the one recorded in the trace: the scenario's, or the root of (19) with c2/c1.",
         "Events in the last 1e-5 s of the run may be on either side of its end.",
     )
     does_not_establish = (
@@ -169,6 +177,8 @@ class ThrTrig(TraceClaim):
         decision, zeta = trace.scenario["decision"], float(trace.meta["zeta_m"])
         if decision["threshold"]["rule"] == "fixed" and decision["threshold"]["zeta_m"] != zeta:
             raise TraceError(f"the threshold in force, {zeta} m, is not the scenario's")
+        if decision["threshold"]["rule"] == "bayes" and not _is_bayes(decision["threshold"], zeta):
+            raise TraceError(f"the threshold in force, {zeta} m, is not the Bayes-optimal one of the scenario")
         bare = decision["trigger"] == "bare"
         release, dwell = (zeta, 0.0) if bare else (decision["release_m"], decision["min_inter_event_s"])
         wrong: list[Conflict] = [

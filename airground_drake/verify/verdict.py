@@ -92,8 +92,17 @@ class ModelClaim(Claim):
         Called through `judge`, which turns an exception into `error`.
         """
 
+    def judge_inputs(self, scenario: Scenario) -> dict[str, Any]:
+        """`inputs` under guard: what keeps them from being found is told to `judge`."""
+        try:
+            return self.inputs(scenario)
+        except Exception as error:
+            return {"error": f"{type(error).__name__}: {error}"}
+
     def judge(self, inputs: dict[str, Any]) -> Finding:
         """`check` under guard."""
+        if set(inputs) == {"error"}:
+            return Finding("error", evidence=inputs)
         try:
             finding = self.check(inputs)
             json.dumps(asdict(finding), allow_nan=False)
