@@ -16,7 +16,7 @@ from airground_drake.scenarios.validate import MODEL_CLAIMS
 from airground_drake.verify import Finding, verify_model
 from airground_drake.verify.mutants import refute_mutants
 
-FORMULAS = (2, 3, 4, 5, 8, 9, 12, 13, 14, 15)
+FORMULAS = (2, 3, 4, 5, 8, 9, 12, 13, 14, 15, 16, 17)
 
 
 @pytest.fixture(scope="module")

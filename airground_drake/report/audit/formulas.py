@@ -13,6 +13,7 @@ from scipy.optimize import brentq, minimize_scalar
 from airground_drake.decision.bayes import bayes_risk, decision_time, optimal_threshold
 from airground_drake.nsbc.task import Array
 from airground_drake.nsbc.tasks import DistanceTask
+from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify import Finding
 
@@ -35,6 +36,8 @@ def formula_findings(scenario: Scenario, proofs: Mapping[str, Finding]) -> list[
         _centroid,
         _grid_points,
         _rule_three,
+        _null_space,
+        lambda: _one_speed(scenario),
     )
     return [part() for part in parts]
 
@@ -91,8 +94,8 @@ def _seconds(proofs: Mapping[str, Finding]) -> Item:
     unbiased = optimal_threshold(drift, noise, C1, C2)
     return _item(
         3, "(17)-(19)",
-        "(17) and (18) take the initial deviation in seconds (metres over drift); in metres they are wrong. (19) is "
-        "stationary for (16) only without initial deviation.",
+        "(17) and (18) take the initial deviation in seconds (metres over drift); in metres they are wrong. (19), with "
+        "c2/c1 too, is stationary for (16) only without initial deviation.",
         {"decision_time_s": printed}, {"decision_time_s": ours},
         abs(ours - exact) < 1e-6 and abs(printed - exact) > 1e-2 and abs(biased.x - unbiased) > 1e-3,
         {
@@ -183,7 +186,10 @@ def _task_and_configuration() -> Item:
         "and (c) the wrong way round: the text of 5.2 has the refusal under (c).",
         "v = J^+ d(rho_d)/dt", "v = J^+ d(sigma_d)/dt",
         not fits and pseudo_inverse.shape == (3, 1),
-        {"shape_of_J^+": list(pseudo_inverse.shape), "shape_of_rate_of_rho": list(rate.shape), "product_defined": fits},
+        {
+            "shape_of_J^+": list(pseudo_inverse.shape), "shape_of_rate_of_rho": list(rate.shape),
+            "product_defined": fits, "(27c) and the caption of Figure 10": "by reading",
+        },
     )  # fmt: skip
 
 
@@ -261,7 +267,40 @@ def _rule_three() -> Item:
         "Rule (3) lets the lowest task's dimension exceed what the higher ones leave, 'so that n is ensured to be "
         "greater than the total dimension': it then is smaller. And the introduction to section 3 says that an "
         "intervention is triggered when the threshold is *not* reached, against (20).",
-        "m_r > n - sum of the others", "m_r <= n - sum of the others",
+        "m_r > n - sum of the others, so that n > the total", "m_r > n - sum of the others means n < the total",
         lowest > n - others and not n > others + lowest,
-        {"n": n, "higher_tasks": others, "lowest_task": lowest, "total": others + lowest},
+        {"n": n, "higher_tasks": others, "lowest_task": lowest, "total": others + lowest, "rest": "by reading"},
+    )  # fmt: skip
+
+
+def _null_space() -> Item:
+    """Item 16: under a position intervention nothing of the UGV's own task is left."""
+    jacobian = np.eye(3)
+    left = np.eye(3) - np.linalg.pinv(jacobian) @ jacobian
+    one_axis = np.array([[0.0, 1.0, 0.0]])
+    partly = np.eye(3) - np.linalg.pinv(one_axis) @ one_axis
+    return _item(
+        16, "(20), (23)",
+        "Where the intervention is a position, J_int = I, (20) executes nothing of the UGV's own task, avoidance "
+        "included, although the text says that it is partly executed. That is what makes UGV1 crash in case B, method (b).",
+        {"rank_of_the_null_space": int(np.linalg.matrix_rank(left))},
+        {"rank_for_an_intervention_in_one_direction": int(np.linalg.matrix_rank(partly))},
+        not left.any() and bool(partly.any()),
+        {"projector": left.tolist()},
+    )  # fmt: skip
+
+
+def _one_speed(scenario: Scenario) -> Item:
+    """Item 17: the times of cases A and B need two speeds of the same preset trajectory."""
+    speed = {name: load(name)[0].ugvs["ugv1"].preset.speed_m_s for name in ("case_a", "case_b")}
+    travelled = {name: speed[name] * time for name, time in (("case_a", 14.45), ("case_b", 10.6))}
+    crossed = {"case_a": travelled["case_a"] / speed["case_b"], "case_b": travelled["case_b"] / speed["case_a"]}
+    return _item(
+        17, "Table 1, section 5",
+        f"One Table 1 serves both cases, but triggers at 14.45 s and at 10.6 s need reference speeds of "
+        f"{speed['case_a']:g} and {speed['case_b']:g} m/s: with the other case's speed case A would trigger about "
+        f"{crossed['case_a']:.1f} s, case B about {crossed['case_b']:.1f} s.",
+        {"trigger_s": {"case_a": 14.45, "case_b": 10.6}, "speed_m_s": 1.0}, {"speed_m_s": speed},
+        abs(travelled["case_a"] - travelled["case_b"]) < 0.1 and abs(speed["case_a"] - speed["case_b"]) > 0.1,
+        {"reference_travelled_at_the_trigger_m": travelled, "trigger_with_the_other_speed_s": crossed},
     )  # fmt: skip
