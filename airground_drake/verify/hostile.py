@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance, Composition, HalfSpaces, Surroundings
@@ -133,7 +134,7 @@ def hostile_team(inputs: Inputs, count: int, composition: Composition, on_top: b
         intervention_on_top=on_top,
     )  # fmt: skip
 
-    def command(positions: Array, wanted: Array, asked: Array) -> tuple[Array, HalfSpaces]:
+    def command(positions: Array, wanted: Array, asked: npt.NDArray[np.bool_]) -> tuple[Array, HalfSpaces]:
         accepted: list[Proposal | None] = [
             Proposal("hostile", 0.0, Motion(np.array([0.0, 1.0]), np.array([here, there]))) if agreed else None
             for here, there, agreed in zip(positions[:n], wanted, asked, strict=True)
