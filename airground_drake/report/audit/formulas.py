@@ -282,7 +282,7 @@ def _null_space() -> Item:
     return _item(
         16, "(20), (23)",
         "Where the intervention is a position, J_int = I, (20) executes nothing of the UGV's own task, avoidance "
-        "included, although the text says that it is partly executed. That is what makes UGV1 crash in case B, method (b).",
+        "included, although the text says that it is partly executed. That is why UGV1 crashes in case B, method (b).",
         {"rank_of_the_null_space": int(np.linalg.matrix_rank(left))},
         {"rank_for_an_intervention_in_one_direction": int(np.linalg.matrix_rank(partly))},
         not left.any() and bool(partly.any()),
