@@ -130,7 +130,7 @@ class Run:  # a trace that is of the run it claims to be and obeys its law of mo
             names = ("noise_m", "decision_variable_m", "mode")
             noise, recorded, mode = (self.signals[f"{ugv}.{name}"].to_numpy() for name in names)
             x = np.linalg.norm(self.preset(ugv, self.t) - self.at[ugv], axis=1) + noise
-            now, ready, modes, ours = 0, -math.inf, [0], []
+            now, ready, modes, ours = 0, -math.inf, [0], []  # type: ignore[var-annotated]
             for when, value in zip(self.t.tolist(), x.tolist(), strict=True):
                 if now != 1 and value >= self.zeta and when >= ready - SMALL:
                     now, ready, ours = 1, when + dwell, [*ours, (when, "trigger")]

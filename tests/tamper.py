@@ -1059,6 +1059,8 @@ def theory_of_the_bare_count_changed(folder: Path) -> None:
 
 
 BEYOND = {
+    "decision_flipped": TAMPERINGS.pop("decision_flipped"),
+    "decision_and_reason_flipped_with_its_event": TAMPERINGS.pop("decision_and_reason_flipped_with_its_event"),
     "report_with_a_key_twice": TAMPERINGS.pop("report_with_a_key_twice"),
     "preset_changed": TAMPERINGS.pop("preset_changed"),
     "trigger_count_changed": TAMPERINGS.pop("trigger_count_changed"),
