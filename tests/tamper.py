@@ -802,7 +802,7 @@ def gain_changed_everywhere_and_in_the_inputs(folder: Path) -> None:
 
     def edit(report: Any) -> None:
         for claim in ("SAFE-INV", "SAFE-GATE", "SAFE-DIST"):
-            verdict(report, claim, "")["inputs"]["gain_1_s"] = 5.0
+            verdict(report, claim, "")["inputs"]["avoidance_gain_1_s"] = 5.0
 
     edit_report(folder, edit)
 
@@ -861,6 +861,16 @@ def coefficient_negative(folder: Path) -> None:
         wrong["goal"] = "-(D + s*r - d)"
         for term in wrong["certificate"]:
             term["coefficient"] = "-1"
+
+    edit_certificate(folder, "SAFE-INV", edit)
+
+
+@tampering
+def coefficient_without_a_sign(folder: Path) -> None:
+    def edit(obligations: Any) -> None:
+        wrong = obligation(obligations, "outside")
+        wrong["goal"] = "-(D + s*r - d)*(h + q - q)"
+        wrong.update(multiplier=[], certificate=[{"coefficient": "(d - D - s*r)*h", "factors": [], "square": "1"}])
 
     edit_certificate(folder, "SAFE-INV", edit)
 
@@ -1059,36 +1069,33 @@ def theory_of_the_bare_count_changed(folder: Path) -> None:
 
 
 BEYOND = {
-    "decision_flipped": TAMPERINGS.pop("decision_flipped"),
-    "decision_and_reason_flipped_with_its_event": TAMPERINGS.pop("decision_and_reason_flipped_with_its_event"),
-    "report_with_a_key_twice": TAMPERINGS.pop("report_with_a_key_twice"),
-    "preset_changed": TAMPERINGS.pop("preset_changed"),
-    "trigger_count_changed": TAMPERINGS.pop("trigger_count_changed"),
-    "executed_without_acceptance": TAMPERINGS.pop("executed_without_acceptance"),
-    "decision_on_another_policy": TAMPERINGS.pop("decision_on_another_policy"),
-    "decision_by_another_route": TAMPERINGS.pop("decision_by_another_route"),
-    "gap_hidden": TAMPERINGS.pop("gap_hidden"),
-    "clearance_raised": TAMPERINGS.pop("clearance_raised"),
-    "collision_removed": TAMPERINGS.pop("collision_removed"),
-    "refusal_removed": TAMPERINGS.pop("refusal_removed"),
-    "seed_changed": TAMPERINGS.pop("seed_changed"),
-    "distance_in_the_evidence_changed": TAMPERINGS.pop("distance_in_the_evidence_changed"),
-    "time_of_a_minimum_moved": TAMPERINGS.pop("time_of_a_minimum_moved"),
-    "obligation_left_open": TAMPERINGS.pop("obligation_left_open"),
-    "distance_in_the_metrics_changed": TAMPERINGS.pop("distance_in_the_metrics_changed"),
-    "dwell_of_the_proof_changed": TAMPERINGS.pop("dwell_of_the_proof_changed"),
-    "disagreement_of_the_running_code_recorded": TAMPERINGS.pop("disagreement_of_the_running_code_recorded"),
-    "interventions_put_on_top": TAMPERINGS.pop("interventions_put_on_top"),
-    "constants_of_the_root_changed": TAMPERINGS.pop("constants_of_the_root_changed"),
-    "sign_turned": TAMPERINGS.pop("sign_turned"),
-    "running_threshold_changed": TAMPERINGS.pop("running_threshold_changed"),
-    "interval_widened": TAMPERINGS.pop("interval_widened"),
-    "formula_fitted": TAMPERINGS.pop("formula_fitted"),
-    "counts_of_triggers_lowered": TAMPERINGS.pop("counts_of_triggers_lowered"),
-    "interval_of_the_exponent_moved": TAMPERINGS.pop("interval_of_the_exponent_moved"),
-    "theory_of_the_bare_count_changed": TAMPERINGS.pop("theory_of_the_bare_count_changed"),
+    name: TAMPERINGS.pop(name)
+    for name in (
+        "report_with_a_key_twice",
+        "preset_changed",
+        "trigger_count_changed",
+        "gap_hidden",
+        "clearance_raised",
+        "collision_removed",
+        "seed_changed",
+        "distance_in_the_evidence_changed",
+        "time_of_a_minimum_moved",
+        "obligation_left_open",
+        "distance_in_the_metrics_changed",
+        "dwell_of_the_proof_changed",
+        "disagreement_of_the_running_code_recorded",
+        "interventions_put_on_top",
+        "constants_of_the_root_changed",
+        "sign_turned",
+        "running_threshold_changed",
+        "interval_widened",
+        "formula_fitted",
+        "counts_of_triggers_lowered",
+        "interval_of_the_exponent_moved",
+        "theory_of_the_bare_count_changed",
+    )
 }
-"""Edits of evidence, of recorded comparisons and the like, which the checker, being short, does not look at."""
+"""Edits that change no verdict: of evidence, metrics, recorded comparisons. The checker, being short, ignores them."""
 
 
 def attempt(report: Path, name: str) -> tuple[int, list[str]]:

@@ -187,7 +187,7 @@ def test_the_disturbed_bound_is_tight(inputs: dict[str, Any]) -> None:
 
 def test_disturbed_deficit_follows_the_recursion(inputs: dict[str, Any]) -> None:
     """(1 - (1 - A h)^N) w/A after N periods, as the statement says, on the running layer."""
-    gain, h, w, d = inputs["gain_1_s"], inputs["period_s"], inputs["disturbance_m_s"], 2.0
+    gain, h, w, d = inputs["avoidance_gain_1_s"], inputs["period_s"], inputs["disturbance_m_s"], 2.0
     avoidance, x = Avoidance(gain, h), np.array([[d, 0.0, 0.0]])
     around = Surroundings(np.zeros((1, 1, 3)), np.full((1, 1), d), np.ones((1, 1)))
     for n in range(1, 40):
@@ -319,8 +319,8 @@ def test_disturbed_mutant_breaks_the_bound_on_the_running_code(name: str, inputs
     ("claim", "change"),
     [
         (SafeInv(), lambda i: i | {"sensing_range_m": 2.1}),
-        (SafeInv(), lambda i: i | {"gain_1_s": 30.0}),
-        (SafeDist(), lambda i: i | {"gain_1_s": 30.0}),
+        (SafeInv(), lambda i: i | {"avoidance_gain_1_s": 30.0}),
+        (SafeDist(), lambda i: i | {"avoidance_gain_1_s": 30.0}),
         (SafeDist(), lambda i: i | {"disturbance_m_s": 4.0}),
         (SafeGate(), lambda i: i | {"method_d": {"intervention_on_top": False, "compositions": ["recursion_listed"]}}),
     ],

@@ -98,7 +98,7 @@ def unscaled(avoidance: Avoidance, lower: Array, spaces: HalfSpaces) -> Array:
 def named(inputs: Inputs, name: str) -> tuple[Obligation, float, float]:
     """An obligation of `step` with the numbers of a kind of pair that it is about; its d, m; a high speed, m/s."""
     kind = next((k for k in kinds(inputs) if (k.share < 1.0) == name.startswith("pair_")), kinds(inputs)[0])
-    numbers = {"d": kind.safe, "h": inputs["period_s"], "A": inputs["gain_1_s"]}
+    numbers = {"d": kind.safe, "h": inputs["period_s"], "A": inputs["avoidance_gain_1_s"]}
     found = with_numbers(next(each for each in step() if each.name == name), kind.name, numbers)
     return found, kind.safe, kind.safe / inputs["period_s"]
 
@@ -144,7 +144,7 @@ def _no_share(inputs: Inputs) -> Finding:
 
 
 def _large_gain(inputs: Inputs) -> Finding:
-    changed = {**inputs, "gain_1_s": 1.8 / inputs["period_s"]}
+    changed = {**inputs, "avoidance_gain_1_s": 1.8 / inputs["period_s"]}
     given, safe, _ = named(changed, "no_overshoot")
     mutant = without(given, "stable", "A h = 1.8: the recovery does not lead beyond d")
     return broken(mutant, drive(changed, safe, [[0.75 * safe, 0, 0]], [[0, 0, 0]], points=[[0, 0, 0]]))

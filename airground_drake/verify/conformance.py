@@ -105,6 +105,6 @@ def rounding(inputs: Inputs) -> Inputs:
         moves = 2.0 * np.sqrt(3.0) * STEPS_PER_PERIOD * (extent + kind.closing * h) * ROUNDOFF
         clock = (STEPS_PER_PERIOD + 2.0) * duration * kind.closing * ROUNDOFF
         one = float(1.01 * (kernel + moves + clock))
-        restored = inputs["gain_1_s"] * h
+        restored = inputs["avoidance_gain_1_s"] * h
         found[kind.name] = {"margin_of_a_step_m": one, "margin_with_restoring_m": one / restored if restored else None}
     return found

@@ -107,7 +107,7 @@ def disturbed() -> list[Obligation]:
 
 def with_scenario(inputs: Inputs) -> list[Obligation]:
     """The invariance of d - W/A again, for each kind of pair, with the scenario's numbers."""
-    gain, period, found = inputs["gain_1_s"], inputs["period_s"], []
+    gain, period, found = inputs["avoidance_gain_1_s"], inputs["period_s"], []
     names = {each.name: each for each in disturbed()}
     for kind in kinds(inputs):
         push = pushed(inputs, kind.share)
@@ -170,14 +170,16 @@ class SafeDist(ModelClaim):
         given = constants(scenario)
         least = min(kind.safe for kind in kinds(given))
         tenth = 0.1 * max(given["team"]["max_speed"])
-        return given | {"disturbance_m_s": min(tenth, given["gain_1_s"] * least / 4.0)}
+        return given | {"disturbance_m_s": min(tenth, given["avoidance_gain_1_s"] * least / 4.0)}
 
     def check(self, inputs: Inputs) -> Finding:
         """Discharge the obligations, run the attacks; margin: the worst of runs whose inequalities were all met, m."""
         if not inputs["disturbance_m_s"] > 0.0:
             return Finding("inconclusive", evidence={"reason": "without a gain A > 0 nothing restores a distance"})
         compared, rows = conformance(inputs), campaign(inputs)
-        bounds = {kind.name: kind.safe - pushed(inputs, kind.share) / inputs["gain_1_s"] for kind in kinds(inputs)}
+        bounds = {
+            kind.name: kind.safe - pushed(inputs, kind.share) / inputs["avoidance_gain_1_s"] for kind in kinds(inputs)
+        }
         found = finding(
             discharge([*disturbed(), *with_scenario(inputs)], LIMIT_S),
             disturbance_m_s=inputs["disturbance_m_s"], least_distances_m=bounds, runs=rows, conformance=compared,
@@ -201,7 +203,12 @@ class SafeDist(ModelClaim):
 def _bound(inputs: Inputs, name: str) -> Obligation:
     """An obligation of `disturbed` with the numbers of a kind of pair that it is about."""
     kind = next(k for k in (*kinds(inputs), kinds(inputs)[0]) if (k.share < 1.0) == name.startswith("pair_"))
-    numbers = {"d": kind.safe, "h": inputs["period_s"], "A": inputs["gain_1_s"], "W": pushed(inputs, kind.share)}
+    numbers = {
+        "d": kind.safe,
+        "h": inputs["period_s"],
+        "A": inputs["avoidance_gain_1_s"],
+        "W": pushed(inputs, kind.share),
+    }
     return with_numbers(next(each for each in disturbed() if each.name == name), kind.name, numbers)
 
 
@@ -217,7 +224,7 @@ def _flipped(inputs: Inputs) -> Finding:
 
 
 def _large_gain(inputs: Inputs) -> Finding:
-    changed = {**inputs, "gain_1_s": 4.0 / inputs["period_s"]}
+    changed = {**inputs, "avoidance_gain_1_s": 4.0 / inputs["period_s"]}
     mutant = without(_bound(changed, "outside_bound"), "stable", "A h = 4: never below d - W/A")
     return broken(mutant, attack(changed, _scene(inputs, "obstacle"), "pinned"))
 
@@ -240,7 +247,7 @@ def _one_of_two(inputs: Inputs) -> Finding:
 def _stronger(inputs: Inputs) -> Finding:
     given = _bound(inputs, "inside_bound")
     W = rational(inputs["disturbance_m_s"])
-    goal = f"{given.goal} - {rational(inputs['gain_1_s'])}*s*({W})"
+    goal = f"{given.goal} - {rational(inputs['avoidance_gain_1_s'])}*s*({W})"
     mutant = replace(given, goal=goal, certificate=(), says="a disturbance of 2 w: never below d - w/A")
     return broken(mutant, attack(inputs, _scene(inputs, "obstacle"), "pinned", force=2.0))
 

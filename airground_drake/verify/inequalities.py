@@ -108,7 +108,7 @@ def gate() -> list[Obligation]:
 def with_scenario(inputs: Inputs) -> list[Obligation]:
     """Those of `step` again, for each kind of pair, with the scenario's numbers."""
     names = {each.name: each for each in step()}
-    gain, period, reach = inputs["gain_1_s"], inputs["period_s"], inputs["sensing_range_m"]
+    gain, period, reach = inputs["avoidance_gain_1_s"], inputs["period_s"], inputs["sensing_range_m"]
     found = [constant("stable", "A h <= 1", 1 - Fraction(rational(gain)) * Fraction(rational(period)))]
     for kind in kinds(inputs):
         numbers = {"d": kind.safe, "h": period, "A": gain}

@@ -36,7 +36,7 @@ def constants(scenario: Scenario) -> Inputs:
     listed = {name: np.asarray(getattr(team, name)).tolist() for name in ("ugvs", "obstacles", "max_speed")}
     travelled = float(team.max_speed.max()) * scenario.duration_s
     return {
-        "gain_1_s": control.avoidance_gain_1_s,
+        "avoidance_gain_1_s": control.avoidance_gain_1_s,
         "period_s": control.period_s,
         "sensing_range_m": control.sensing_range_m,
         "motion_gain_1_s": control.motion_gain_1_s,
@@ -89,4 +89,4 @@ def running_team(inputs: Inputs, ugvs: int | None = None) -> Team:
 
 def running_avoidance(inputs: Inputs, composition: Composition = "augmented") -> Avoidance:
     """The avoidance layer with the constants of the inputs."""
-    return Avoidance(inputs["gain_1_s"], inputs["period_s"], inputs["sensing_range_m"], composition)
+    return Avoidance(inputs["avoidance_gain_1_s"], inputs["period_s"], inputs["sensing_range_m"], composition)
