@@ -11,6 +11,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
 import pytest
 import tamper
 from hypothesis import given
@@ -36,6 +37,20 @@ def test_an_untouched_report_agrees_everywhere(report: Path, capsys: pytest.Capt
     assert {(claim["id"], claim["run"] or "-") for claim in claims} <= {tuple(line.split()[:2]) for line in lines}
     assert all("agrees:" in line for line in lines[:-1])
     assert lines[-1] == f"{len(lines) - 1} checks: {{'agrees': {len(lines) - 1}}}"
+
+
+@pytest.mark.parametrize(
+    ("changes", "reasons"),
+    [
+        (["gatekeeper.switching_margin=0", "gatekeeper.min_dwell_s=0.3"], {"reversed", "dwell", "not_cheaper"}),
+        (["duration_s=8"], set()),  # nothing triggers: no decisions at all
+    ],
+)
+def test_reports_of_changed_scenarios_agree(changes: list[str], reasons: set[str], tmp_path: Path) -> None:
+    settings = [word for change in changes for word in ("--set", change)]
+    assert write(["case_b", "-o", str(tmp_path / "r"), "--format", "json", *settings]) in (0, 1)
+    assert reasons <= set(pd.read_parquet(tmp_path / "r/trace/d/decisions.parquet")["reason"])
+    assert check.main([str(tmp_path / "r")]) == 0
 
 
 @pytest.mark.parametrize("name", tamper.TAMPERINGS)

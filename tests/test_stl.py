@@ -93,6 +93,12 @@ def test_agreement_on_the_shipped_runs(run: Callable[[str, str], Trace], scenari
     }
 
 
+@pytest.mark.parametrize("periods", [1, 2])
+def test_agreement_on_a_run_of_hardly_a_period(periods: int) -> None:
+    scenario = case_a()
+    assert_agreement(simulate(case_a({"duration_s": periods * scenario["control"]["period_s"]}), "d"))
+
+
 @pytest.mark.parametrize("offset", [-1e-6, -2e-9, -1e-9, -5e-10, 0.0, 1e-6])
 def test_distances_between_rows_are_seen(offset: float) -> None:
     trace = passing_by(offset)

@@ -52,6 +52,12 @@ def step() -> list[Obligation]:
             certificate=terms("1/2 s rule_i", "1/2 s rule_j", "s A deficit"),
         ),
         Obligation(
+            "pair_restores", "two robots, each radial speed >= A (d - D)/2: the deficit shrinks by 1 - A h as for one",
+            (*pair, "A"), "(1 - A*h)*(d - D) - (d - D - h*(ri + rj))", strict=h,
+            hypotheses={**gain, **DEFICIT, "rule_i": "2*ri - A*(d - D)", "rule_j": "2*rj - A*(d - D)"},
+            certificate=terms("1/2 h rule_i", "1/2 h rule_j"),
+        ),
+        Obligation(
             "planar", "v3 = 0: an inequality with the z of n dropped says the same of n.v", ("n1", "n2", "n3", *V, "b"),
             f"{dot(('n1', 'n2', 'n3'), V)} - b", hypotheses={"rule": "n1*v1 + n2*v2 - b"}, equations={"plane": "v3"},
             certificate=terms("rule"), equation_multipliers={"plane": "n3"},
@@ -82,8 +88,8 @@ def scaling() -> list[Obligation]:
     ]  # fmt: skip
 
 
-def gate() -> list[Obligation]:
-    """What makes the layer's output safe whatever its input: v = 0 is feasible, scaling ends there, no speeding up."""
+def rest() -> list[Obligation]:
+    """From a safe state v = 0 meets every inequality, whatever the share."""
     share, h = {"q": "q"}, {"h": "h"}
     return [
         Obligation(
@@ -96,6 +102,13 @@ def gate() -> list[Obligation]:
             "-b", equations={"bound": "b - q*A*(d - D)", "at": "D - d"},
             equation_multipliers={"bound": "-1", "at": "q*A"},
         ),
+    ]  # fmt: skip
+
+
+def gate() -> list[Obligation]:
+    """What makes the layer's output safe whatever its input: v = 0 is feasible, scaling ends there, no speeding up."""
+    return [
+        *rest(),
         *scaling(),
         Obligation(
             "no_faster", "p closest to u among feasible v has (u - p).(0 - p) <= 0, as 0 is feasible: |p| <= |u|; with "

@@ -20,7 +20,7 @@ from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.broken_steps import BROKEN
 from airground_drake.verify.conformance import conformance, rounding
 from airground_drake.verify.hostile import hostile_team, non_finite, postcondition
-from airground_drake.verify.inequalities import LIMIT_S, gate, scaling, step, with_scenario
+from airground_drake.verify.inequalities import LIMIT_S, gate, rest, scaling, step, with_scenario
 from airground_drake.verify.lemma import gram_certificate, lemma
 from airground_drake.verify.pairs import Inputs, constants, kinds, range_spare
 from airground_drake.verify.prover import discharge, finding
@@ -102,7 +102,7 @@ class SafeInv(ModelClaim):
         """Discharge the obligations, compare with the kernels; margin: spare of the sensing range."""
         compared, sampled = conformance(inputs), postcondition(inputs, 500)
         found = finding(
-            discharge([*step(), *scaling(), *with_scenario(inputs)], LIMIT_S),
+            discharge([*step(), *rest(), *scaling(), *with_scenario(inputs)], LIMIT_S),
             conformance=compared, composition=sampled, rounding=rounding(inputs),
         )  # fmt: skip
         spare = {kind.name: float(range_spare(inputs, kind)) for kind in kinds(inputs)}

@@ -187,7 +187,11 @@ def _robustness(rtamt: Any, text: str, semantics: str, sets: Sequence[dict[str, 
             result = spec.evaluate(*([name, np.column_stack(samples).tolist()] for name, samples in signals.items()))
         else:
             time = next(iter(signals.values()))[0]
-            result = spec.evaluate({"time": time.tolist(), **{name: v.tolist() for name, (_, v) in signals.items()}})
+            twice = (
+                2 if len(time) == 1 else 1
+            )  # rtamt needs two samples; 'always' says the same of one that is repeated
+            values = {name: v.tolist() * twice for name, (_, v) in signals.items()}
+            result = spec.evaluate({"time": [*time.tolist(), *(time + 1.0)][: len(time) * twice], **values})
         found.append(float(result[0][1]))
     if np.isnan(found).any():
         raise ValueError(f"robustness {found}")
