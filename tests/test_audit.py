@@ -10,13 +10,18 @@ import pytest
 
 from airground_drake.decision import bayes
 from airground_drake.report import document
-from airground_drake.report.audit import companions, formulas
+from airground_drake.report.audit import companions, formulas, thresholds
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.validate import MODEL_CLAIMS
 from airground_drake.verify import Finding, verify_model
 from airground_drake.verify.mutants import refute_mutants
 
-FORMULAS = (2, 3, 4, 5, 8, 9, 12, 13, 14, 15, 16, 17)
+FORMULAS = (2, 3, 4, 5, 8, 9, *range(12, 19))
+
+
+def from_formulas(proofs: dict[str, Finding]) -> list[dict[str, Any]]:
+    scenario = load("case_a")[0]
+    return [*thresholds.threshold_findings(scenario, proofs), *formulas.formula_findings(scenario)]
 
 
 @pytest.fixture(scope="module")
@@ -26,7 +31,7 @@ def proofs() -> dict[str, Finding]:
 
 @pytest.fixture(scope="module")
 def items(proofs: dict[str, Finding]) -> dict[int, dict[str, Any]]:
-    return {item["id"]: item for item in formulas.formula_findings(load("case_a")[0], proofs)}
+    return {item["id"]: item for item in from_formulas(proofs)}
 
 
 @pytest.fixture(scope="module")
@@ -50,6 +55,8 @@ def test_the_numbers_of_the_audit(items: dict[int, dict[str, Any]], companion_it
     assert items[2]["paper"]["root_m"] == pytest.approx(0.12435, abs=1e-5)
     assert items[4]["ours"]["drift_m_s"] == pytest.approx([6.0667, 99.015], abs=1e-3)
     assert items[5]["ours"]["mean_first_passage_s"] == pytest.approx(0.09)
+    assert items[18]["paper"]["time_s"] == pytest.approx(0.0890, abs=1e-4)
+    assert items[18]["ours"]["time_s"] == pytest.approx(3.0 / 6.05, rel=1e-4)
     assert companion_items[7]["evidence"]["printed"]["stalls_at_m"] == pytest.approx([-0.06, 3.05], abs=0.01)
     assert companion_items[10]["paper"]["min_distance_m"] < 2.0 - 0.5
     assert companion_items[11]["paper"]["cost_accept_minus_refuse"] == pytest.approx(0.0, abs=1e-9)
@@ -61,16 +68,16 @@ def test_with_the_printed_equation_in_the_code_item_2_would_not_pass(
     def printed(drift: float, noise: float, c1: float, c2: float) -> float:
         return bayes.optimal_threshold(drift, noise, c2, c1)
 
-    monkeypatch.setattr(formulas, "optimal_threshold", printed)
-    (item,) = [each for each in formulas.formula_findings(load("case_a")[0], proofs) if each["id"] == 2]
+    monkeypatch.setattr(thresholds, "optimal_threshold", printed)
+    (item,) = [each for each in from_formulas(proofs) if each["id"] == 2]
     assert item["demonstrated"] is False
 
 
 def test_without_proofs_the_items_that_rest_on_them_are_not_demonstrated(proofs: dict[str, Finding]) -> None:
     open_ones = {**proofs, "THR-OPT": replace(proofs["THR-OPT"], status="inconclusive")}
-    found = {item["id"]: item["demonstrated"] for item in formulas.formula_findings(load("case_a")[0], open_ones)}
+    found = {item["id"]: item["demonstrated"] for item in from_formulas(open_ones)}
     assert found == {number: number != 2 for number in FORMULAS}
-    found = {item["id"]: item["demonstrated"] for item in formulas.formula_findings(load("case_a")[0], {})}
+    found = {item["id"]: item["demonstrated"] for item in from_formulas({})}
     assert found == {number: number not in (2, 9) for number in FORMULAS}
 
 

@@ -12,6 +12,7 @@ from typing import Any
 from airground_drake.report.audit.companions import companion_findings
 from airground_drake.report.audit.formulas import formula_findings
 from airground_drake.report.audit.runs import findings as of_runs
+from airground_drake.report.audit.thresholds import threshold_findings
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify import Verdict
 
@@ -26,4 +27,4 @@ def whole(scenario: Scenario, verdicts: Sequence[Verdict]) -> list[dict[str, Any
         verdicts: on its model; findings that rest on a proof quote them.
     """
     proofs = {verdict.claim.id: verdict.finding for verdict in verdicts if not verdict.run}
-    return [*formula_findings(scenario, proofs), *companion_findings()]
+    return [*threshold_findings(scenario, proofs), *formula_findings(scenario), *companion_findings()]

@@ -10,7 +10,7 @@ from pydrake.solvers import ClarabelSolver, MathematicalProgram
 from airground_drake import diagram
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.problem import Decision, Problem
-from airground_drake.report.audit.formulas import Item
+from airground_drake.report.audit.item import Item
 from airground_drake.report.metrics import closest_obstacle
 from airground_drake.report.reproduction import MEASURES
 from airground_drake.scenarios.load import load
