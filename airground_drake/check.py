@@ -2,22 +2,20 @@
 
 Establishes status and margin of every verdict in report.json again from trace/ and certificates/, by formulas written
 here from the claims' statements, proofs in exact arithmetic. `DISAGREES`: files contradict the verdict or each other;
-`cannot be re-established`: one is unreadable, or no way is known (refuted proofs, routes other than 'relaxed').
-As recorded: simulated paths, comparisons with running code, evidence; nan: a margin that is not compared. That the
-obligations of check_obligations.json make a claim is argued in its text. Exit code 0: all agree; 1: not all; 2: usage.
+`cannot be re-established`: unreadable, or no way is known (refuted proofs, routes other than 'relaxed'). What is taken
+as recorded is listed in docs/verification.md; nan: a margin that is not compared. Exit code 0: all agree; 1: not all.
 """
 
-import ast
 import hashlib
 import json
 import math
+import re
 import sys
 from collections import Counter
 from decimal import Decimal, localcontext
 from fractions import Fraction
 from itertools import pairwise, product
 from pathlib import Path
-from statistics import NormalDist
 from typing import Any
 
 import numpy as np
@@ -32,7 +30,7 @@ def demand(condition: Any, otherwise: str) -> None:  # AssertionError is for fil
 
 
 def near(ours: Any, theirs: Any, slop: float = SMALL) -> bool:  # arrays of numbers
-    return np.shape(ours) == np.shape(theirs) and np.allclose(theirs, ours, slop, slop)
+    return np.shape(ours) == np.shape(theirs) and np.allclose(theirs, ours, slop, slop) and np.isfinite(ours).all()
 
 
 def read_json(path: Path) -> Any:  # strict JSON
@@ -57,25 +55,31 @@ class Run:  # a trace that is of the run it claims to be and obeys its law of mo
         ours |= {"seed": scenario["seed"], "events": entry["events"], "zeta_m": zeta}
         ours |= {key: scenario["runs"][name][key] for key in ("method", "composition")}
         demand(all(ours[key] == meta[key] == entry.get(key, meta[key]) for key in ours), "trace and report.json differ")
-        self.signals, self.decisions, self.problems = map(pd.read_parquet, tables)
+        self.signals, self.decisions, self.problems = (pd.read_parquet(path).reset_index(drop=True) for path in tables)
         self.times_s = read_json(folder / "timings.json")["decision_times_s"]
         self.plans: Any = [*self.decisions.join(self.problems, how="outer").itertuples()]  # each with its problem (26)
         self.scenario, self.gate, self.about, self.zeta = scenario, scenario["gatekeeper"], scenario["runs"][name], zeta
-        self.events: Any = pd.DataFrame(meta["events"], columns=["t_s", "robot", "kind", "policy"])
+        events: Any = pd.DataFrame(meta["events"], columns=["t_s", "robot", "kind", "policy"])
+        self.events, self.sent = events.sort_values("t_s"), events[events.kind == "proposal"]
         *self.ugvs, self.uav = self.spec = {**scenario["ugvs"], scenario["uav"]["name"]: scenario["uav"]}
         self.t = t = self.signals["t_s"].to_numpy()  # each of the T rows ends a segment
         self.at = {robot: self.signals[[f"{robot}.{axis}_m" for axis in "xyz"]].to_numpy() for robot in self.spec}
         self.at |= {obstacle: np.tile(o["position_m"], (len(t), 1)) for obstacle, o in scenario["obstacles"].items()}
         self.v = {robot: self.signals[[f"{robot}.v{axis}_m_s" for axis in "xyz"]].to_numpy() for robot in self.spec}
-        demand((np.diff(t) > 0.0).all() and near([0.0, scenario["duration_s"]], t[[0, -1]]), "times of the rows")
+        dt = np.diff(t, prepend=0.0)
+        demand((dt[1:] > 0.0).all() and near([0.0, scenario["duration_s"]], t[[0, -1]]), "times of the rows")
         keys = ("period_s", "avoidance_gain_1_s", "sensing_range_m", "motion_gain_1_s")
         h, *_ = self.h, self.gain, self.sensed, self.motion = [scenario["control"][key] for key in keys]
         _, self.first, self.owner = np.unique((t[1:] + t[:-1]) // (2.0 * h), return_index=True, return_inverse=True)
         demand(near(h * np.arange(math.ceil((t[-1] - SMALL) / h)), t[self.first]), "no row at a control sample")
         for robot, v in self.v.items():  # where the command of a row has led since the row before
-            moved = np.diff(self.at[robot], axis=0, prepend=[self.spec[robot]["start_m"]])
-            off = np.abs(moved - np.diff(t, prepend=0.0)[:, None] * v).max(axis=1)
+            off = np.abs(np.diff([self.spec[robot]["start_m"], *self.at[robot]], axis=0) - dt[:, None] * v).max(axis=1)
             demand(off.max() <= SMALL, f"{robot} is not where its command leads, t = {t[off.argmax()]:.6g} s")
+        inside: Any = (self.signals[f"{ugv}.mode"] == 1.0 for ugv in self.ugvs)  # intervening
+        longest = max((mode * dt).groupby((~mode).cumsum()).sum().max() for mode in inside)
+        idle = longest <= scenario["intervention"]["period_s"] + self.gate["period_s"]  # or else there are messages
+        talk = len(self.sent) and (meta["method"] == "b" or len(self.decisions))
+        self.silent: Any = {} if idle or talk else dict.fromkeys(("COMM", *GATED), ("not_run", None))
 
     def preset(self, ugv: str, t: Any) -> Any:  # preset trajectory at times (K,): (K, 3), m
         corners, speed = np.array(self.spec[ugv]["preset"]["waypoints_m"]), self.spec[ugv]["preset"]["speed_m_s"]
@@ -117,10 +121,11 @@ class Run:  # a trace that is of the run it claims to be and obeys its law of mo
         for ugv in self.ugvs:
             x = np.linalg.norm(self.preset(ugv, self.t) - self.at[ugv], axis=1) + self.signals[f"{ugv}.noise_m"]
             ready, modes = -math.inf, [0]  # 0: supervising, 1: intervening, 2: released before the dwell is over
-            for when, value in zip(self.t, x, strict=True):
+            for last, before, when, value in zip([x[0], *x], [0.0, *self.t], self.t, x, strict=False):
                 now, rested = modes[-1], when >= ready - SMALL
-                if now != 1 and value >= self.zeta and rested:
-                    now, ready = 1, when + dwell
+                if now != 1 and value >= self.zeta and rested:  # as soon as x was there, or the dwell over
+                    late = min((value - self.zeta) / max(value - last, 1e-99) * (when - before), when - ready)
+                    now, ready, right = 1, when + dwell, right and (late <= EVENT_S or when == 0.0)
                 elif (now == 1 and value < release) or now == 2:
                     now = 0 if rested else 2
                 modes.append(now)
@@ -130,7 +135,7 @@ class Run:  # a trace that is of the run it claims to be and obeys its law of mo
             right &= same and near(x, self.signals[f"{ugv}.decision_variable_m"], 1e-7)
             right &= all(m in both for m, both in zip(self.signals[f"{ugv}.mode"], pairwise(modes), strict=True))
             lags += [*np.abs(ours - theirs.t_s)] if same else []
-        right &= max(lags, default=0.0) <= EVENT_S
+        right &= len(lags) == self.events.kind.isin(["trigger", "release"]).sum() and max(lags, default=0.0) <= EVENT_S
         return right, EVENT_S - max(lags) if right and lags else None
 
     def live_goal(self) -> Any:  # ends at targets, or stalls, standing for a second, where the scenario says so
@@ -146,11 +151,10 @@ class Run:  # a trace that is of the run it claims to be and obeys its law of mo
         return min(margins) >= 0.0, min(margins)
 
     def comm(self) -> Any:  # proposals and decisions only while intervening (mode 1), and fewer than always-on
-        sent = self.events[self.events.kind == "proposal"][["robot", "t_s"]].to_numpy()
         periods, within, saved = (self.scenario["intervention"]["period_s"], self.gate["period_s"]), True, list[float]()
-        for messages, period in zip((sent, self.decisions[["robot", "t_s"]].to_numpy()), periods, strict=True):
+        for messages, period in zip((self.sent, self.decisions), periods, strict=True):
             saved.append(1.0 - len(messages) / (len(self.ugvs) * int((self.t[-1] + SMALL) / period)))
-            for ugv, when in messages:  # the mode of a row is in force since the row before
+            for ugv, when in zip(messages.robot, messages.t_s, strict=True):
                 recent = (self.t[1:] >= when - sum(periods) - SMALL) & (self.t[:-1] <= when + SMALL)
                 within &= (self.signals[f"{ugv}.mode"].to_numpy()[1:][recent] == 1.0).any()
         return within and min(saved) >= 0.0, min(saved) if within else None
@@ -158,8 +162,7 @@ class Run:  # a trace that is of the run it claims to be and obeys its law of mo
     def gate_time(self) -> Any:  # the 99th percentile of the recorded CPU times, rounded up
         demand(len(self.times_s) == len(self.decisions) and min(self.times_s, default=0.0) >= 0.0, "times of decisions")
         margin = self.gate["period_s"] - np.quantile(self.times_s or [0.0], 0.99, method="higher")
-        idle = not (self.events.kind == "proposal").any()  # nothing to decide
-        return (margin > 0.0, margin) if self.times_s else (idle or "not_run", None)
+        return (margin > 0.0, margin) if self.times_s else (True, None)
 
     def predict(self, p: Any, omega: Any, normals: Any = None) -> tuple[float, Any]:  # (25); (23): (N, 3) m; omega (N,)
         accept, refuse = p.accept_m_s.reshape(-1, 3), p.refuse_m_s.reshape(-1, 3)
@@ -170,27 +173,30 @@ class Run:  # a trace that is of the run it claims to be and obeys its law of mo
         return p.dt_s * (p.error_weight_1_m2_s * (error**2).sum() + p.slack_weight_1_m2_s * (slack**2).sum()), path
 
     def gate_feas(self) -> Any:  # problems against scenario and signals; plans; answers by the rules; obedience
-        gate, right, before, said = self.gate, True, dict[str, Any](), list[Any]()
+        gate, right, before, say = self.gate, True, dict[str, Any](), ("refuse", "accept")
         t, lead = self.t[self.first], gate["horizon_s"] / gate["stages"] * np.arange(1.0, gate["stages"] + 1.0)
         half, weights = gate["period_s"] / 2.0, [lead[0], gate["error_weight_1_m2_s"], gate["slack_weight_1_m2_s"]]
-        given = {*zip(self.events.robot, self.events.t_s, self.events.policy, strict=True)}
+        given = {*zip(self.sent.robot, self.sent.t_s, self.sent.policy, strict=True)}
         for p in self.plans:
             now, k, left = p.t_s, np.searchsorted(self.t, p.t_s - SMALL), [*range(len(p.distances_m))]
             (own, path), *rest = (self.predict(p, omega) for omega in (p.plan, 0.0 * p.plan, 0.0 * p.plan + 1.0))
+            modes = np.stack([p.accept_m_s, p.refuse_m_s]).reshape(2, -1, 3)
+            far = p.dt_s * np.cumsum(np.linalg.norm(modes, axis=2).max(axis=0))  # no plan leads farther
             for robot, other, safe, *_ in pairs(self.scenario):
                 if robot == p.robot and math.dist(self.at[other][k], p.initial_m) <= self.sensed:
                     way = self.at[other][k] + lead[:, None] * (self.v[other][k] if other in self.v else 0.0)
                     centres = p.centres_m.reshape(len(lead), -1, 3)
                     found = [j for j in left if near(way, centres[:, j]) and near(safe, p.distances_m[j])][:1]
                     left = [j for j in left if j not in found]
-                    right &= bool(found) or (np.linalg.norm(path - way, axis=1) >= safe).all()  # or left out: harmless
+                    beyond = np.maximum([math.dist(w, p.initial_m) for w in way] - far, np.abs(way - p.initial_m)[:, 2])
+                    right &= bool(found) or (beyond >= safe).all()  # left out, but out of reach
             first, keep, costs = int(p.plan[0]), [cost for cost, _ in rest], (p.objective_refuse, p.objective_accept)
             ours = [self.at[p.robot][k], self.preset(p.robot, now + lead), path, [own] * 3, keep + weights]
             theirs = [p.initial_m, p.reference_m, p.positions_m, [p.objective, min(costs), costs[first]]]
             theirs += [[p.refuse_throughout, p.accept_throughout, p.dt_s, p.error_weight_1_m2_s, p.slack_weight_1_m2_s]]
             right &= all(map(near, map(np.ravel, ours), theirs)) and not left and not {*p.plan} - {0.0, 1.0}
             issued, standing, since, due = before.get(p.robot, (None, 0, 0.0, 0.0))  # 0: refuse, 1: accept
-            new, bent, useless = issued != p.issued_s, p.bend > gate["max_bend"], own >= (1.0 - 1e-6) * keep[0]
+            new, bent, useless = issued != p.issued_s, not p.bend <= gate["max_bend"], own >= (1.0 - 1e-6) * keep[0]
             standing, since, due = (0, now, p.issued_s + half) if new else (standing, since, due)
             right &= (p.robot, p.issued_s, p.policy) in given and abs(now - due) <= half * new + SMALL
             better = first != standing and own < (1.0 - gate["switching_margin"]) * keep[standing]
@@ -198,46 +204,48 @@ class Run:  # a trace that is of the run it claims to be and obeys its law of mo
             fresh = "not_cheaper" if not first else "no_difference" if useless else "bent" if bent else "cheaper"
             reason = fresh if new else "kept" if not turn else "dwell" if early else "reversed"
             answer = standing ^ (reason in ("cheaper", "reversed"))
-            right &= (p.route, p.decision, p.reason) == (gate["route"], ("refuse", "accept")[answer], reason)
-            said += [(now, p.robot, p.decision)] * (new or answer != standing)
+            right &= (p.route, p.first_stage, p.decision, p.reason) == (gate["route"], say[first], say[answer], reason)
             before[p.robot] = p.issued_s, answer, since if answer == standing else now, now + 2.0 * half
-        recorded = self.events[self.events.kind.isin(["accept", "refuse"])][["t_s", "robot", "kind"]]
-        right &= sorted(recorded.itertuples(index=False, name=None)) == sorted(said)
+        due = ((robot, t_s) for robot, t_s, _ in given if t_s < self.t[-1] - 4.0 * half)  # proposals to be decided on
+        right &= {*due} <= {*zip(self.decisions["robot"], self.decisions["issued_s"], strict=True)}
         for ugv in self.ugvs:  # nothing is executed without an acceptance in force; nothing accepted: the own task (6)
             mine, executed = self.decisions[self.decisions["robot"] == ugv], self.signals[f"{ugv}.accepted"] != 0.0
             chosen, lasts = t[self.owner][executed[1:]] + SMALL, gate["period_s"] + 2.0 * SMALL
             right &= (mine.set_index("t_s").decision.reindex(chosen, method="ffill", tolerance=lasts) == "accept").all()
             early, here, late = (self.preset(ugv, t + s) for s in (-self.h, 0.0, self.h))
-            wanted = (late - early) / (2.0 * self.h) + self.motion * (here - self.at[ugv][self.first])
-            speed = np.linalg.norm(wanted[:, :2], axis=1, keepdims=True)
-            wanted *= np.minimum(1.0, self.spec[ugv]["max_speed_m_s"] / np.maximum(speed, 1e-99)) * [1.0, 1.0, 0.0]
+            v = (late - early) / (2.0 * self.h) + self.motion * (here - self.at[ugv][self.first])  # asks for
+            v *= np.minimum(1.0, self.spec[ugv]["max_speed_m_s"] / np.maximum(np.hypot(*v.T[:2]), 1e-99))[:, None]
             free = (np.abs(late - 2.0 * here + early).max(axis=1) <= SMALL) & ~executed[self.first + 1]  # no corner
             for robot, other, safe, _, share in pairs(self.scenario):
-                free &= (robot != ugv) | (self.spare(robot, other, safe, share, wanted) > 1e-6)
-            right &= (np.linalg.norm(self.v[ugv][self.first + 1] - wanted, axis=1)[free] <= 1e-6).all()
+                free &= (robot != ugv) | (self.spare(robot, other, safe, share, v) > 1e-6)
+            right &= (np.linalg.norm((self.v[ugv][self.first + 1] - v)[:, :2], axis=1)[free] <= 1e-6).all()
         return right, math.nan
 
     def gate_sur(self) -> Any:  # (28)-(29) again, and the integrated rounding error, at most half a stage
-        relaxed, rounded = (np.array([getattr(p, key) for p in self.plans]) for key in ("relaxed", "rounded"))
-        ahead, dt = np.cumsum(relaxed - rounded, axis=-1), np.array([p.dt_s for p in self.plans])
-        right = ((rounded == (ahead + rounded >= 0.5)) | (np.abs(ahead + rounded - 0.5) <= SMALL)).all()
-        right, error = right and (np.abs(relaxed - 0.5) <= 0.5).all(), dt * np.abs(ahead).max(axis=-1, initial=0.0)
-        right &= near(error, [p.rounding_deviation_s for p in self.plans]) and (error <= dt / 2.0 + SMALL).all()
-        return right, max(0.0, (dt / 2.0 - error).min()) if self.plans else None
+        w, z = (np.array([getattr(p, key) for p in self.plans]) for key in ("relaxed", "rounded"))
+        ahead, dt = np.cumsum(w - z, axis=-1), np.array([p.dt_s for p in self.plans])
+        right = ((z == (ahead + z >= 0.5)) | (np.abs(ahead + z - 0.5) <= SMALL)).all() and {*z.flat} <= {0.0, 1.0}
+        error = dt * np.abs(ahead).max(axis=-1, initial=0.0)
+        right &= (np.abs(w - 0.5) <= 0.5).all() and near(error, [p.rounding_deviation_s for p in self.plans])
+        return right and (error <= dt / 2.0 + SMALL).all(), max(0.0, (dt / 2.0 - error).min()) if self.plans else None
 
     def gate_opt(self) -> Any:  # against the optimum along normals: a convex cost is never below a tangent of it
-        right, margin = True, math.inf
+        right, gaps = True, [np.zeros(2)]
         for p in self.plans:
             w, n, own = p.relaxed, len(p.relaxed), self.predict(p, p.plan)[0]
-            least = max(1e-6, min(self.predict(p, np.full(n, mode))[0] for mode in (0.0, 1.0)))
+            least = max(1e-6, min(p.refuse_throughout, p.accept_throughout))
             ends = [w, p.plan, *(w + side * e for e in 1e-5 * np.eye(n) for side in (-1.0, 1.0))]
             value, along, *costs = (self.predict(p, each, p.normals)[0] for each in ends)
             slopes = np.diff(np.reshape(costs, (n, 2)))[:, 0] / 2e-5
             lower = value + np.minimum(-slopes * w, slopes * (1.0 - w)).sum()  # the tangent at a corner of the box
-            right &= near(np.linalg.norm(p.normals.reshape(-1, 3), axis=1), np.ones(p.normals.size // 3))
-            right &= p.lower_bound <= min(along, value) + 1e-5 * least and own <= (1.0 + SMALL) * least
-            margin = min(margin, 0.05 - (own - lower) / least)
-        return right and margin >= 0.0, margin if margin < math.inf else None
+            won = min(p.refuse_throughout - p.objective_refuse, p.accept_throughout - p.objective_accept, least - own)
+            right &= np.allclose(np.linalg.norm(p.normals.reshape(-1, 3), axis=1), 1.0, 0.0, SMALL) and won >= -SMALL
+            right &= p.lower_bound <= min(along, value) + 1e-5 * least and p.gap >= 1.0 - p.lower_bound / own - 1e-6
+            gaps.append((own - np.array([lower, min(along, value)])) / least)
+        low, high = 0.05 - np.max(gaps, axis=0)
+        if right and low < 0.0 <= high:
+            raise NotImplementedError("these tangents are too weak a bound")
+        return right and low >= 0.0, (low, high) if self.plans else None
 
 
 def combine(*products: Any) -> Any:  # sum of products of polynomials: coefficients by monomial, a sorted tuple of names
@@ -249,43 +257,37 @@ def combine(*products: Any) -> Any:  # sum of products of polynomials: coefficie
     return total
 
 
-def expand(text: str | ast.AST) -> Any:  # an expression in + - * / ** over numbers and names
-    match ast.parse(text, mode="eval").body if isinstance(text, str) else text:
-        case ast.Constant(int(x)) | ast.Name(x):
-            return Counter({(x,): Fraction(1)} if isinstance(x, str) else {(): Fraction(x)})
-        case ast.UnaryOp(ast.USub(), x):
-            return combine([{(): Fraction(-1)}, expand(x)])
-        case ast.BinOp(x, (ast.Add() | ast.Sub()) as sign, y):
-            return combine([expand(x)], [{(): 1 if isinstance(sign, ast.Add) else -1}, expand(y)])
-        case ast.BinOp(x, ast.Mult(), y):
-            return combine([expand(x), expand(y)])
-        case ast.BinOp(x, ast.Div(), ast.Constant(int(q))):
-            return combine([{(): Fraction(1, q)}, expand(x)])
-        case ast.BinOp(x, ast.Pow(), ast.Constant(int(n))) if 0 <= n <= 12:
-            return combine([expand(x)] * n)
-    raise ValueError("a text is no polynomial")
+def expand(text: str) -> Any:  # a sum of products of numbers and names, such as "2*h*r - 1/2*d"
+    total: Any = Counter()
+    for sign, factors in re.findall(r"([-+]?) ?([^ +-]+)", text):
+        names = [word for word in factors.split("*") if word.isidentifier()]
+        sizes = (Fraction(*map(int, word.split("/"))) for word in factors.split("*") if not word.isidentifier())
+        total[tuple(sorted(names))] += math.prod(sizes, start=Fraction(-1 if sign == "-" else 1))
+    return total
 
 
 def proof(claim: Any, folder: Path, scenario: Any) -> Any:  # m * goal = sum c * factors * square^2 + sum q * equation
-    obligations = {one["name"].replace("_2_claim", "_claim"): one for one in read_json(folder / "obligations.json")}
-    for name, one in obligations.items():
+    saved = read_json(folder / "obligations.json")
+    for one in saved:
         given, n = {**one["hypotheses"], **one["strict"]}, len(one["multiplier"])
         terms = one["multiplier"] + one["certificate"]
         cone = [[*map(expand, [t["coefficient"], *[t["square"]] * 2, *map(given.get, t["factors"])])] for t in terms]
-        demand(all({*c} == {()} and c[()] >= 0 for c, *_ in cone), f"{name}: a coefficient below 0, or no number")
-        plain = [t["square"] == "1" and {*t["factors"]} <= {*one["strict"]} for t in terms[:n]]
-        sure = not n or any(c[()] > 0 and positive for (c, *_), positive in zip(cone, plain, strict=False))
         zero = [map(expand, (text, one["equations"][key])) for key, text in one["equation_multipliers"].items()]
-        same = combine([combine(*cone[:n] or [[]]), expand(one["goal"])]) == combine(*cone[n:], *zero)
-        demand(sure and same, f"the certificate of {name} does not prove it")
+        sure = not n or any(t["square"] == "1" and {*t["factors"]} <= {*one["strict"]} for t in terms[:n])
+        demand(sure and all({*c} == {()} and c[()] > 0 for c, *_ in cone), f"{one['name']}: a term may be below 0")
+        left = combine([combine(*cone[:n] or [[]]), expand(one["goal"])])
+        demand(left == combine(*cone[n:], *zero), f"the certificate of {one['name']} does not prove it")
     for name, texts in read_json(Path(__file__).with_name("check_obligations.json"))[claim["id"]].items():
-        (goal, _), *assumed = [(expand(text.strip("= ")), text[0] == "=") for text in texts]
-        kinds, one = ("hypotheses", "strict", "equations"), obligations[name]
-        fit = ((expand(text), kind == "equations") in assumed for kind in kinds for text in one[kind].values())
+        (goal, _), *assumed = [(expand(text.strip("=> ")), text[0] in "=>" and text[0]) for text in texts]
+        kinds, one = {"hypotheses": False, "strict": ">", "equations": "="}, {o["name"]: o for o in saved}[name]
+        fit = ((expand(text), kinds[kind]) in assumed for kind in kinds for text in one[kind].values())
         demand(expand(one["goal"]) == goal and all(fit), f"{name} has another goal than the claim, or assumes more")
+    used = {"ZENO-PROOF": [scenario["decision"]["trigger"]]}  # what the proof is about
+    used["SAFE-GATE"] = [run["composition"] for run in scenario["runs"].values() if run["method"] == "d"]
+    demand({*used.get(claim["id"], [])} <= {"automaton", "augmented"}, "the proof is about another system")
     h, gain, sensed = (scenario["control"][key] for key in ("period_s", "avoidance_gain_1_s", "sensing_range_m"))
     margin = min(sensed - safe - closing * h for _, _, safe, closing, _ in pairs(scenario))
-    demand(margin >= 0.0 and gain * h <= 1.0, "range, speed, period or gain break a premise")
+    demand(margin >= 0.0 and 0.0 <= gain * h <= 1.0, "range, speed, period or gain break a premise")
     return "proved", {"SAFE-INV": margin, "SAFE-LEMMA": None}.get(claim["id"], math.nan)
 
 
@@ -293,7 +295,7 @@ def root(claim: Any, folder: Path, scenario: Any) -> Any:  # f = k (sinh u + u) 
     saved, rule = read_json(folder / "statements.json")["enclosures"], scenario["decision"]["threshold"]
     with localcontext(prec=100):
         drift, noise, c1, c2 = (Decimal(repr(rule[key])) for key in ("drift_m_s", "noise_m_sqrt_s", "c1_1_s", "c2"))
-        for name, ratio in [("printed_u", c1 / c2)] * ("printed_u" in saved) + [("u", c2 / c1)]:  # printed: upside down
+        for name, ratio in [("printed_u", c1 / c2)] * (claim["id"] == "THR-OPT") + [("u", c2 / c1)]:
             low, high = (Decimal(Fraction(end).numerator) / Fraction(end).denominator for end in saved[name])
             f = [(noise / drift) ** 2 * ((u.exp() - (-u).exp()) / 2 + u) - ratio for u in (low, high)]
             demand(f[0] < 0 < f[1] and 0 < low < high < low * (1 + Decimal("1e-12")), f"{name} encloses no root")
@@ -303,8 +305,7 @@ def root(claim: Any, folder: Path, scenario: Any) -> Any:  # f = k (sinh u + u) 
 
 
 def ddm(_: Any, folder: Path, __: Any) -> Any:  # (17)-(18) against the recorded counts, by normal approximation
-    rows, right = read_json(folder / "paths.json")["comparisons"], True
-    quantile = NormalDist().inv_cdf(1.0 - 0.005 / len(rows))  # 99 % for all rows together
+    rows, right = read_json(folder / "paths.json")["comparisons"], True  # 12, at 99 % for all of them together
     for c, n, row in ((row["constants"], row["constants"]["paths"], row) for row in rows):
         u, w = (2.0 * c[length] * c["drift"] / c["noise"] ** 2 for length in ("zeta", "deviation"))
         bias, wrong = (1.0 - math.exp(-w)) / (2.0 * math.sinh(u)), row["wrong_decisions"] / n
@@ -313,13 +314,13 @@ def ddm(_: Any, folder: Path, __: Any) -> Any:  # (17)-(18) against the recorded
             mean, drift = row["periods_sum"] / n, c["drift"] * c["noise_period_s"]
             off = mean - 0.25 - (c["zeta"] * (math.tanh(u / 2.0) + 2.0 * bias) - c["deviation"]) / drift
             variance, slack = row["periods_sum_of_squares"] / n - mean**2, 0.05
-        right &= abs(off) <= quantile * math.sqrt(variance / n) + slack
-    return "supported" if right else "refuted", math.nan
+        right &= n >= 4000 and abs(off) <= 3.34 * math.sqrt(variance / n) + slack
+    return "supported" if right and len(rows) == 12 else "refuted", math.nan
 
 
-def refine(claim: Any, folder: Path, _: Any) -> Any:  # exponents p of mean counts, c dt^p exp(b sqrt(dt))
-    counts, given = pd.read_csv(folder / "counts.csv").groupby("dt_s"), claim["inputs"]
-    dt, most = np.array([*counts.groups]), claim["evidence"]["duration_s"] / given["dwell_s"] + 1.0 + SMALL
+def refine(_: Any, folder: Path, scenario: Any) -> Any:  # exponents p of mean counts, c dt^p exp(b sqrt(dt))
+    counts, law = pd.read_csv(folder / "counts.csv").groupby("dt_s"), scenario["decision"]
+    dt, most = np.array([*counts.groups]), scenario["duration_s"] / law["min_inter_event_s"] + 1.0 + SMALL
     fit = np.linalg.pinv(np.column_stack([np.ones_like(dt), np.log(dt), np.sqrt(dt)]))[1]
     bare, ours = (fit @ np.log(counts[name].mean()) for name in ("bare", "automaton"))
     full = counts["path"].nunique().min() >= 96 and len(dt) >= 9 and counts["automaton"].max().max() <= most
@@ -341,7 +342,7 @@ def main(arguments: list[str] | None = None) -> int:
         usual = dict.fromkeys(MODEL, "supported") | dict.fromkeys(PROVED, "proved") | scenario["expected"]
         wanted = {(name, ""): usual[name] for name in MODEL}
         for run, about in scenario["runs"].items():
-            names = [*TRACE, *["COMM"] * (about["method"] != "a"), *GATED * (about["method"] in ("c", "d"))]
+            names = [*TRACE, *["COMM"] * ((rank := [*"abcd"].index(about["method"])) > 0), *GATED * (rank > 1)]
             wanted |= {(name, run): about["expected"].get(name, "holds") for name in names}
         runs, outcomes, zeta = dict[str, Run](), Counter[str](), report["runs"][run]["zeta_m"]
         labels = [(claim["id"], claim["run"]) for claim in claims]
@@ -354,23 +355,21 @@ def main(arguments: list[str] | None = None) -> int:
         demand(sorted(labels) == sorted(wanted), "claims missing, unknown or twice")
         demand({*report["runs"]} == {*scenario["runs"]} == {path.name for path in folder.glob("trace/*")}, "other runs")
         odd = [c["status"] in ("inconclusive", "error", "not_run") for c in claims if not c["as_expected"]]
-        bad = mutants and not all([*(m["refuted"] for m in mutants), *(i["demonstrated"] for i in report["audit"])])
-        code = 1 if bad or not all(odd) else 3 if odd else 0
-        status = {0: "as_expected", 1: "not_as_expected", 3: "inconclusive"}[code]
+        bad = not all([*odd, *(m["refuted"] for m in mutants), *(item["demonstrated"] for item in report["audit"])])
+        code, status = (1, "not_as_expected") if bad else (3, "inconclusive") if odd else (0, "as_expected")
         ours = {"status": status, "exit_code": code, "counts": Counter(claim["status"] for claim in claims)}
         demand(report["overall"] == report["overall"] | ours, f"verdict over all, should be {ours}")
         return status
 
     def judge(claim: Any) -> str:
-        name, run, status, recorded = (claim[key] for key in ("id", "run", "status", "margin"))
+        name, run, status, given = (claim[key] for key in ("id", "run", "status", "margin"))
         said, refuted = (claim["expected"], claim["as_expected"], bool(claim["counterexample"])), status == "refuted"
         demand(said == (wanted[name, run], status == wanted[name, run], refuted), "expectation, or counterexample")
         if (refuted and name in PROVED) or (name in GATED[:3] and scenario["gatekeeper"]["route"] != "relaxed"):
             raise NotImplementedError("refutations of the model, and other routes than 'relaxed', are not known here")
         if run:
-            runs[run] = runs[run] if run in runs else Run(folder / "trace" / run, run, report, zeta)
-            ours, margin = getattr(runs[run], name.lower().replace("-", "_"))()
-            ours = ours if isinstance(ours, str) else "holds" if ours else "refuted"
+            trace = runs[run] = runs[run] if run in runs else Run(folder / "trace" / run, run, report, zeta)
+            ours, margin = trace.silent.get(name) or getattr(trace, name.lower().replace("-", "_"))()
         else:
             place, rule = folder / "certificates" / name, scenario["decision"]["threshold"] if name[:3] == "THR" else {}
             digests = {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in place.glob("*")}
@@ -378,10 +377,11 @@ def main(arguments: list[str] | None = None) -> int:
             known = {**scenario, **scenario["control"], **scenario["decision"], **rule, "zeta_m": zeta}
             demand(all(known.get(key, x) == x for key, x in claim["inputs"].items()), "inputs are not the scenario's")
             ours, margin = MODEL[name](claim, place, scenario)
-        demand(ours == status, f"recorded {status!r}, recomputed {ours!r}")
-        same = margin is recorded if None in (margin, recorded) else near(margin, recorded, 1e-6)
-        demand(same or math.isnan(margin or 0.0), f"margin recorded {recorded}, recomputed {margin}")
-        return f"{status}, margin {recorded}"
+        demand({True: "holds", False: "refuted"}.get(ours, ours) == status, f"recorded {status!r}, recomputed {ours!r}")
+        ends = margin if isinstance(margin, tuple) else (margin, margin)  # of what is possible
+        same = margin is given if None in (margin, given) else np.isclose(given, np.clip(given, *ends), 1e-6, 1e-9)
+        demand(same or math.isnan(ends[0] or 0.0), f"margin recorded {given}, recomputed {margin}")
+        return f"{status}, margin {given}"
 
     for (subject, run), claim in zip([("report", ""), *labels], [None, *claims], strict=True):
         try:

@@ -97,13 +97,14 @@ def _obligation(
 
 def remarks(trigger: Trigger, bound: float) -> list[Obligation]:
     """That the dwell is the bound claimed, what rounding costs, and what a rate bound of x would add."""
+    spare = Fraction(rational(trigger.dwell)) - Fraction(rational(bound))
     return [
         Obligation(
             "dwell_is_the_bound",
             "the dwell of the running trigger is at least the minimum inter-event time of the scenario",
             ("dwell", "bound"), "dwell - bound",
             equations={"dwell": f"dwell - {rational(trigger.dwell)}", "bound": f"bound - {rational(bound)}"},
-            certificate=(Term(str(max(Fraction(), Fraction(rational(trigger.dwell)) - Fraction(rational(bound))))),),
+            certificate=(Term(str(spare)),) if spare > 0 else (),
             equation_multipliers={"dwell": "1", "bound": "-1"},
         ),
         Obligation(

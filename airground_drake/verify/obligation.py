@@ -9,7 +9,8 @@ with rational c_j >= 0 and a multiplier that is such a sum itself and positive b
 positive number times strict hypotheses only. Whoever expands both sides has re-done the proof; no solver is
 involved. The negated goal in SMT-LIB 2 (`smt2`) is a second, independent way: it must be unsatisfiable.
 
-Polynomials are texts such as "D + s*r - d" or "1/20*h**2"; numbers are rational, written as such.
+Polynomials are texts such as "D + s*r - d" or "1/20*h**2"; numbers are rational, written as such. In files they are
+multiplied out, so that a checker need not parse anything but sums of products.
 """
 
 from __future__ import annotations
@@ -96,8 +97,16 @@ class Obligation:
         return "\n".join(lines) + "\n"
 
     def to_json(self) -> dict[str, Any]:
-        """Strict JSON that a checker reads."""
-        return asdict(self)
+        """Strict JSON that a checker reads: polynomials multiplied out, sums of products such as "2*h*r - 1/2*d"."""
+        polynomials = ("hypotheses", "strict", "equations", "equation_multipliers")
+        groups = {
+            name: {key: self._sum_text(text) for key, text in getattr(self, name).items()} for name in polynomials
+        }
+        terms = {
+            name: [asdict(term) | {"square": self._sum_text(term.square)} for term in getattr(self, name)]
+            for name in ("certificate", "multiplier")
+        }
+        return {**asdict(self), "goal": self._sum_text(self.goal), **groups, **terms}
 
     def holds_at(self, point: Mapping[str, Fraction]) -> bool:
         """Whether the implication is true at a point: false for a genuine counterexample. Exact."""
@@ -129,6 +138,17 @@ class Obligation:
         if strangers := expression.free_symbols - set(symbols.values()):
             raise ValueError(f"{self.name}: {text!r} contains {strangers}, which are not among the variables")
         return sympy.Poly(expression, *symbols.values(), domain="QQ")
+
+    def _sum_text(self, text: str) -> str:
+        """A polynomial as a sum of products of numbers and names, without powers and brackets."""
+        total = ""
+        for powers, coefficient in self._polynomial(text).terms():
+            size = Fraction(int(coefficient.p), int(coefficient.q))
+            names = [name for name, power in zip(self.variables, powers, strict=True) for _ in range(power)]
+            factors = names if abs(size) == 1 and names else [str(abs(size)), *names]
+            sign = (" - " if size < 0 else " + ") if total else "-" if size < 0 else ""
+            total += sign + "*".join(factors)
+        return total
 
     def _prefix(self, text: str) -> str:
         """A polynomial as an SMT-LIB term."""

@@ -59,7 +59,7 @@ def resolved(obligation: Obligation, name: str) -> Obligation:
 
 def constant(name: str, says: str, value: Fraction) -> Obligation:
     """A number of the scenario is >= 0; where it is not, that is a counterexample and no missing premise."""
-    return Obligation(name, says, ("h",), str(value), certificate=(Term(str(value)),))
+    return Obligation(name, says, ("h",), str(value), certificate=(Term(str(value)),) if value else ())
 
 
 def without(obligation: Obligation, hypothesis: str, says: str) -> Obligation:
