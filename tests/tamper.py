@@ -415,6 +415,70 @@ def decisions_all_removed(folder: Path) -> None:
 
 
 @tampering
+def decisions_on_a_proposal_removed(folder: Path) -> None:
+    first = pd.read_parquet(folder / "trace" / RUN / "decisions.parquet")["issued_s"]
+    kept = np.flatnonzero(first != first.iloc[0])
+    for table in ("decisions", "problems"):
+        edit_table(folder, lambda frame: frame.iloc[kept], table)
+    edit_json(
+        folder / "trace" / RUN / "timings.json", lambda all_: all_["decision_times_s"].__delitem__(slice(0, -len(kept)))
+    )
+    without_event(folder, "refuse")
+
+
+@tampering
+def decision_on_no_proposal(folder: Path) -> None:
+    meta = json.loads((folder / "trace" / RUN / "meta.json").read_text())
+    when = next(event["t_s"] for event in meta["events"] if event["kind"] == "refuse")
+
+    def edit(frame: pd.DataFrame) -> None:
+        frame.loc[frame["issued_s"] == frame["issued_s"].iloc[0], "issued_s"] = when
+
+    edit_table(folder, edit, "decisions")
+
+
+@tampering
+def messages_all_removed(folder: Path) -> None:
+    decisions_all_removed(folder)
+    edit_json(folder / "trace" / RUN / "timings.json", lambda timings: timings.update(decision_times_s=[]))
+    talk = ("proposal", "accept", "refuse")
+    edit_both(folder, lambda entry: entry.update(events=[e for e in entry["events"] if e["kind"] not in talk]))
+
+    def edit(report: Any) -> None:
+        for claim in ("GATE-OPT", "GATE-SUR", "GATE-FEAS", "GATE-TIME"):
+            verdict(report, claim).update(margin=None)
+        verdict(report, "COMM").update(margin=1.0)
+
+    edit_report(folder, edit)
+
+
+@tampering
+def problems_with_labels(folder: Path) -> None:
+    path = folder / "trace" / RUN / "problems.parquet"
+    pd.read_parquet(path).iloc[::-1].to_parquet(path, index=True)
+    seal(folder)
+
+
+@tampering
+def first_stage_is_no_choice(folder: Path) -> None:
+    set_decision(folder, 0, first_stage="banana")
+
+
+@tampering
+def bend_is_nan(folder: Path) -> None:
+    edit_table(folder, lambda frame: frame.update(frame[["bend"]].assign(bend=np.inf)), "decisions")
+
+
+@tampering
+def losing_choice_made_dear(folder: Path) -> None:
+    def edit(frame: pd.DataFrame) -> None:
+        lost = frame["first_stage"] == "refuse"
+        frame.loc[lost, "objective_accept"] *= 3.0
+
+    edit_table(folder, edit, "decisions")
+
+
+@tampering
 def decision_of_another_robot(folder: Path) -> None:
     set_decision(folder, 20, robot="ugv2")
 
@@ -447,7 +511,7 @@ def lower_bound_raised(folder: Path) -> None:
 
 @tampering
 def gap_hidden(folder: Path) -> None:
-    edit_table(folder, lambda frame: frame.update(frame[["gap"]] * 0.1), "decisions")
+    edit_table(folder, lambda frame: frame.update(frame[["gap"]] - 0.01), "decisions")
 
 
 @tampering
@@ -614,6 +678,31 @@ def trigger_moved(folder: Path) -> None:
 
 
 @tampering
+def trigger_late(folder: Path) -> None:
+    when: list[float] = []
+
+    def edit(frame: pd.DataFrame) -> Any:
+        row = int(np.flatnonzero(np.diff(frame[f"{UGV}.mode"]) == 1.0)[0])
+        when.append(float(frame["t_s"].iloc[row + 1]))
+        return frame.drop(index=row)
+
+    edit_table(folder, edit)
+
+    def event(entry: Any) -> None:
+        next(event for event in entry["events"] if event["kind"] == "trigger")["t_s"] = when[0]
+
+    edit_both(folder, event)
+
+
+@tampering
+def trigger_of_the_uav(folder: Path) -> None:
+    def edit(entry: Any) -> None:
+        entry["events"] += [{**entry["events"][0], "kind": "trigger", "robot": "uav", "t_s": t} for t in (24.9, 24.8)]
+
+    edit_both(folder, edit)
+
+
+@tampering
 def threshold_in_force_changed(folder: Path) -> None:
     edit_both(folder, lambda entry: entry.update(zeta_m=2.9))
 
@@ -717,6 +806,19 @@ def obligation_left_open(folder: Path) -> None:
 def distance_in_the_metrics_changed(folder: Path) -> None:
     def edit(report: Any) -> None:
         report["runs"]["b"]["metrics"]["min_distance_m"][UGV]["sudden"]["value"] = 2.0
+
+    edit_report(folder, edit)
+
+
+@tampering
+def method_unknown(folder: Path) -> None:
+    edit_scenario(folder, lambda scenario: scenario["runs"][RUN].update(method="D"))
+    edit_both(folder, lambda entry: entry.update(method="D"))
+    gated = ("GATE-OPT", "GATE-SUR", "GATE-FEAS", "GATE-TIME")
+
+    def edit(report: Any) -> None:
+        report["claims"] = [c for c in report["claims"] if c["run"] != RUN or c["id"] not in gated]
+        report["overall"]["counts"]["holds"] -= len(gated)
 
     edit_report(folder, edit)
 
@@ -858,7 +960,7 @@ def coefficient_changed(folder: Path) -> None:
 def coefficient_negative(folder: Path) -> None:
     def edit(obligations: Any) -> None:
         wrong = obligation(obligations, "outside")
-        wrong["goal"] = "-(D + s*r - d)"
+        wrong["goal"] = "d - D - s*r"
         for term in wrong["certificate"]:
             term["coefficient"] = "-1"
 
@@ -869,8 +971,8 @@ def coefficient_negative(folder: Path) -> None:
 def coefficient_without_a_sign(folder: Path) -> None:
     def edit(obligations: Any) -> None:
         wrong = obligation(obligations, "outside")
-        wrong["goal"] = "-(D + s*r - d)*(h + q - q)"
-        wrong.update(multiplier=[], certificate=[{"coefficient": "(d - D - s*r)*h", "factors": [], "square": "1"}])
+        wrong["goal"] = "h*d"
+        wrong.update(multiplier=[], certificate=[{"coefficient": "h*d", "factors": [], "square": "1"}])
 
     edit_certificate(folder, "SAFE-INV", edit)
 
@@ -916,9 +1018,43 @@ def equation_added(folder: Path) -> None:
 @tampering
 def number_in_a_certificate_changed(folder: Path) -> None:
     def edit(obligations: Any) -> Any:
-        return json.loads(json.dumps(obligations).replace("(1/20)", "(1/40)"))
+        return json.loads(json.dumps(obligations).replace("1/20", "1/40"))
 
     edit_certificate(folder, "SAFE-INV", edit)
+
+
+@tampering
+def name_twice(folder: Path) -> None:
+    def edit(obligations: Any) -> None:
+        false = {**obligation(obligations, "outside"), "goal": "-1000", "hypotheses": {}, "strict": {}}
+        obligations.insert(0, false | {"multiplier": [], "certificate": []})
+
+    edit_certificate(folder, "SAFE-INV", edit)
+
+
+@tampering
+def hypotheses_made_strict(folder: Path) -> None:
+    def edit(obligations: Any) -> None:
+        for one in obligations:
+            one["strict"], one["hypotheses"] = {**one["hypotheses"], **one["strict"]}, {}
+
+    edit_certificate(folder, "SAFE-LEMMA", edit)
+
+
+@tampering
+def invariant_of_the_automaton_not_shown(folder: Path) -> None:
+    def edit(obligations: Any) -> Any:
+        return [one for one in obligations if one["name"].endswith("_claim")]
+
+    edit_certificate(folder, "ZENO-PROOF", edit)
+
+
+@tampering
+def only_half_of_the_claim_shown(folder: Path) -> None:
+    def edit(obligations: Any) -> Any:
+        return [one for one in obligations if one["name"].endswith("_bound")]
+
+    edit_certificate(folder, "SAFE-DIST", edit)
 
 
 @tampering
@@ -974,6 +1110,11 @@ def enclosure_widened(folder: Path) -> None:
 
 
 @tampering
+def printed_root_missing(folder: Path) -> None:
+    edit_certificate(folder, "THR-OPT", lambda all_: all_["enclosures"].pop("printed_u") and None, "statements.json")
+
+
+@tampering
 def printed_root_moved(folder: Path) -> None:
     def edit(statements: Any) -> None:
         statements["enclosures"]["printed_u"] = statements["enclosures"]["u"]
@@ -1008,6 +1149,11 @@ def edit_paths(folder: Path, edit: Callable[[Any], Any]) -> None:
 @tampering
 def counts_of_paths_changed(folder: Path) -> None:
     edit_paths(folder, lambda rows: [row.update(wrong_decisions=row["wrong_decisions"] + 50) for row in rows] and None)
+
+
+@tampering
+def experiments_removed(folder: Path) -> None:
+    edit_certificate(folder, "THR-DDM", lambda paths: paths.update(comparisons=paths["comparisons"][:1]), "paths.json")
 
 
 @tampering
@@ -1047,6 +1193,12 @@ def counts_of_triggers_lowered(folder: Path) -> None:
 
 
 @tampering
+def counts_of_triggers_raised_with_another_dwell(folder: Path) -> None:
+    edit_counts(folder, lambda frame: frame.update(frame[["automaton"]] * 1000))
+    edit_report(folder, lambda report: verdict(report, "ZENO-REFINE", "")["inputs"].update(dwell_s=1e-6))
+
+
+@tampering
 def counts_of_a_path_missing(folder: Path) -> None:
     edit_counts(folder, lambda frame: frame[frame["path"] > 0])
 
@@ -1074,7 +1226,7 @@ BEYOND = {
         "report_with_a_key_twice",
         "preset_changed",
         "trigger_count_changed",
-        "gap_hidden",
+        "refusal_removed",
         "clearance_raised",
         "collision_removed",
         "seed_changed",

@@ -19,6 +19,7 @@ from hypothesis import strategies as st
 
 from airground_drake import check
 from airground_drake.report.__main__ import main as write
+from airground_drake.verify.obligation import Obligation
 
 SOURCE = Path(check.__file__)
 
@@ -124,18 +125,39 @@ def test_a_report_with_a_part_of_another_kind_is_refused(report: Path, key: str,
     assert check.main([str(tmp_path)]) in (1, 2)
 
 
-NUMBERS = st.fractions(min_value=-4, max_value=4, max_denominator=8)
+NAMES = st.lists(st.sampled_from(["x", "y", "z"]), max_size=4)
+PRODUCTS = st.lists(
+    st.tuples(st.fractions(min_value=-4, max_value=4, max_denominator=8), NAMES), min_size=1, max_size=5
+)
 
 
-@given(a=NUMBERS, b=NUMBERS, c=NUMBERS)
-def test_polynomials_are_evaluated_like_numbers(a: Fraction, b: Fraction, c: Fraction) -> None:
-    polynomial = check.expand("(x - 2*y)**3*(z + 1/4) - x*y/3 + -(y + 1)*(x**2 - 1)")
-    at = {"x": a, "y": b, "z": c}
-    value = sum((k * math.prod(at[name] for name in names) for names, k in polynomial.items()), Fraction())
-    assert value == (a - 2 * b) ** 3 * (c + Fraction(1, 4)) - a * b / 3 - (b + 1) * (a**2 - 1)
+@given(
+    one=PRODUCTS, other=PRODUCTS, at=st.fixed_dictionaries(dict.fromkeys("xyz", st.fractions(-3, 3, max_denominator=4)))
+)
+def test_polynomials_are_evaluated_like_numbers(one: Any, other: Any, at: dict[str, Fraction]) -> None:
+    def text(products: Any) -> str:
+        return " ".join(f"{'-' if size < 0 else '+'} {'*'.join([str(abs(size)), *names])}" for size, names in products)
+
+    def value(polynomial: Any) -> Fraction:
+        return sum((k * math.prod(at[name] for name in names) for names, k in polynomial.items()), Fraction())
+
+    expected = [sum(size * math.prod(at[n] for n in names) for size, names in products) for products in (one, other)]
+    a, b = check.expand(text(one)), check.expand(text(other))
+    assert [value(a), value(b)] == expected
+    assert value(check.combine([a, b, b], [a])) == expected[0] * expected[1] ** 2 + expected[0]
 
 
-@pytest.mark.parametrize("text", ["x/y", "x**y", "x**-1", "f(x)", "x if y else z", "x.y", "[x]", "'x'", "1/0", "x**13"])
-def test_what_is_no_polynomial_is_refused(text: str) -> None:
-    with pytest.raises((ValueError, ZeroDivisionError)):
+@pytest.mark.parametrize("polynomial", ["(1 - A*h)*(d - D)**2", "-x", "0", "3 - 2*h*h + h", "x*y - y*x"])
+def test_polynomials_in_files_are_those_of_the_proofs(polynomial: str) -> None:
+    names = ("A", "h", "d", "D", "x", "y")
+    text = Obligation("o", "", names, polynomial).to_json()["goal"]
+    at = {name: Fraction(3 * i + 1, i + 2) for i, name in enumerate(names)}
+    found = sum((k * math.prod(at[n] for n in factors) for factors, k in check.expand(text).items()), Fraction())
+    assert found == eval(polynomial, {}, at)
+    assert Obligation("o", "", names, "(h - 2*d)/20").to_json()["goal"] == "1/20*h - 1/10*d"
+
+
+@pytest.mark.parametrize("text", ["x**2", "f(x)", "x.y", "[x]", "'x'", "1/0", "1e9", "(x)", "x/y", None, 3])
+def test_what_is_no_sum_of_products_is_refused(text: Any) -> None:
+    with pytest.raises((ValueError, ZeroDivisionError, TypeError)):
         check.expand(text)

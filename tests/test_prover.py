@@ -45,7 +45,7 @@ def test_a_true_obligation_is_proved_in_all_ways() -> None:
     found = prover.finding([proof])
     assert found.status == "proved"
     assert set(found.certificates) == {"obligations.json", "step.smt2"}
-    assert json.loads(found.certificates["obligations.json"])[0]["goal"] == STEP.goal
+    assert json.loads(found.certificates["obligations.json"])[0]["goal"] == STEP.to_json()["goal"]
 
 
 def test_a_false_one_comes_with_an_exact_counterexample() -> None:

@@ -41,9 +41,9 @@ from airground_drake.verify.triggering import transitions
 from airground_drake.verify.verdict import Finding
 from airground_drake.verify.zeno import ZenoProof
 
-ZENO = {"zeta_m": 3.0, "release_m": 2.0, "dwell_s": 0.3, "min_inter_event_s": 0.3, "duration_s": 30.0}
+ZENO = {"zeta_m": 3.0, "released_below_m": 2.0, "dwell_s": 0.3, "min_inter_event_s": 0.3, "duration_s": 30.0}
 NOISE = {"noise_m_sqrt_s": 0.004, "leak_1_s": 0.0, "noise_period_s": 0.05, "duration_s": 30.0}
-REFINE = {"zeta_m": 3.0, "release_m": 2.0, "dwell_s": 0.5, **NOISE}
+REFINE = {"zeta_m": 3.0, "released_below_m": 2.0, "dwell_s": 0.5, **NOISE}
 KINDS: dict[str, type[Trigger]] = {
     "no dwell": zeno._NoDwell,
     "no refractory mode": zeno._NoRefractory,

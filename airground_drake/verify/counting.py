@@ -63,7 +63,7 @@ class Experiment:
 
 def experiment(inputs: dict[str, Any]) -> Experiment:
     """The experiment for the constants of a scenario."""
-    trigger = Trigger(inputs["zeta_m"], inputs["release_m"], inputs["dwell_s"])
+    trigger = Trigger(inputs["zeta_m"], inputs["released_below_m"], inputs["dwell_s"])
     fewest, most = COARSE_STEPS
     scale = trigger.dwell or 1.0
     coarse = min(inputs["noise_period_s"], inputs["duration_s"] / fewest, scale / DWELL_STEPS)

@@ -80,7 +80,7 @@ class ZenoRefine(ModelClaim):
         trigger, decision = make_trigger(scenario, threshold(scenario)), scenario.decision
         return {
             "zeta_m": float(trigger.zeta),
-            "release_m": float(trigger.release),
+            "released_below_m": float(trigger.release),
             "dwell_s": float(trigger.dwell),
             "noise_m_sqrt_s": float(decision.noise_m_sqrt_s),
             "leak_1_s": float(decision.leak_1_s),

@@ -75,7 +75,7 @@ class ZenoProof(ModelClaim):
         trigger = make_trigger(scenario, threshold(scenario))
         return {
             "zeta_m": float(trigger.zeta),
-            "release_m": float(trigger.release),
+            "released_below_m": float(trigger.release),
             "dwell_s": float(trigger.dwell),
             "min_inter_event_s": float(scenario.decision.min_inter_event_s),
             "duration_s": float(scenario.duration_s),
@@ -83,7 +83,7 @@ class ZenoProof(ModelClaim):
 
     def check(self, inputs: dict[str, Any]) -> Finding:
         """Prove it for these constants, or find a run that breaks it."""
-        return prove(Trigger(inputs["zeta_m"], inputs["release_m"], inputs["dwell_s"]), inputs)
+        return prove(Trigger(inputs["zeta_m"], inputs["released_below_m"], inputs["dwell_s"]), inputs)
 
 
 def prove(trigger: Trigger, inputs: dict[str, Any]) -> Finding:
@@ -149,7 +149,7 @@ class _Forgets(Trigger):
 
 
 def _mutant(kind: type[Trigger]) -> Callable[[dict[str, Any]], Finding]:
-    return lambda inputs: prove(kind(inputs["zeta_m"], inputs["release_m"], inputs["dwell_s"]), inputs)
+    return lambda inputs: prove(kind(inputs["zeta_m"], inputs["released_below_m"], inputs["dwell_s"]), inputs)
 
 
 MUTANTS: dict[str, Callable[[dict[str, Any]], Finding]] = {
