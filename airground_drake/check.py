@@ -328,7 +328,7 @@ def refine(_: Any, folder: Path, scenario: Any) -> Any:  # exponents p of mean c
 
 
 TRACE = ("SAFE-TRACE", "SAFE-HYP", "ZENO-TRACE", "THR-TRIG", "LIVE-GOAL")  # of every run
-GATED = ("GATE-OPT", "GATE-SUR", "GATE-FEAS", "GATE-TIME")  # of methods c and d
+GATED = ("GATE-SUR", "GATE-OPT", "GATE-FEAS", "GATE-TIME")  # of methods c and d
 PROVED = ("SAFE-LEMMA", "SAFE-INV", "SAFE-GATE", "SAFE-DIST", "ZENO-PROOF", "THR-ROOT", "THR-OPT")
 MODEL = {**dict.fromkeys(PROVED, proof), "THR-ROOT": root, "THR-OPT": root, "THR-DDM": ddm, "ZENO-REFINE": refine}
 
@@ -341,8 +341,9 @@ def main(arguments: list[str] | None = None) -> int:
         scenario, claims, mutants = report["scenario"]["resolved"], report["claims"], report["mutants"]
         usual = dict.fromkeys(MODEL, "supported") | dict.fromkeys(PROVED, "proved") | scenario["expected"]
         wanted = {(name, ""): usual[name] for name in MODEL}
+        skip = scenario["gatekeeper"]["route"] not in ("relaxed", "nonlinear")  # no GATE-SUR: nothing to round
         for run, about in scenario["runs"].items():
-            names = [*TRACE, *["COMM"] * ((rank := [*"abcd"].index(about["method"])) > 0), *GATED * (rank > 1)]
+            names = [*TRACE, *["COMM"] * ((rank := [*"abcd"].index(about["method"])) > 0), *GATED[skip:] * (rank > 1)]
             wanted |= {(name, run): about["expected"].get(name, "holds") for name in names}
         runs, outcomes, zeta = dict[str, Run](), Counter[str](), report["runs"][run]["zeta_m"]
         labels = [(claim["id"], claim["run"]) for claim in claims]
@@ -351,8 +352,7 @@ def main(arguments: list[str] | None = None) -> int:
         return 2
 
     def overall() -> str:
-        demand(report["schema"] == "airground_drake.report/1", "schema")
-        demand(sorted(labels) == sorted(wanted), "claims missing, unknown or twice")
+        demand(report["schema"] == "airground_drake.report/1" and sorted(labels) == sorted(wanted), "schema, or claims")
         demand({*report["runs"]} == {*scenario["runs"]} == {path.name for path in folder.glob("trace/*")}, "other runs")
         odd = [c["status"] in ("inconclusive", "error", "not_run") for c in claims if not c["as_expected"]]
         bad = not all([*odd, *(m["refuted"] for m in mutants), *(item["demonstrated"] for item in report["audit"])])
