@@ -45,6 +45,7 @@ def test_an_untouched_report_agrees_everywhere(report: Path, capsys: pytest.Capt
     [
         (["gatekeeper.switching_margin=0", "gatekeeper.min_dwell_s=0.3"], {"reversed", "dwell", "not_cheaper"}),
         (["duration_s=8"], set()),  # nothing triggers: no decisions at all
+        (["duration_s=10.56"], set()),  # the run ends before a decision is due
     ],
 )
 def test_reports_of_changed_scenarios_agree(changes: list[str], reasons: set[str], tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ import numpy as np
 from airground_drake.errors import TraceError
 from airground_drake.nsbc.task import Array
 from airground_drake.trace import PROBLEM_ARRAYS, PROBLEM_SCALARS, Trace
-from airground_drake.verify.outcome import GATED_METHODS
+from airground_drake.verify.outcome import GATED_METHODS, talk_is_due
 from airground_drake.verify.verdict import Finding, TraceClaim
 
 POSITION_TOLERANCE_M = 1e-9
@@ -183,9 +183,8 @@ class GateClaim(TraceClaim):
         """Decide the claim; without decisions it holds only if no UGV was long enough in intervention to need one."""
         if len(trace.decisions) and not len(trace.problems):
             return Finding("not_run", evidence={"reason": "the problems of the decisions were not recorded"})
-        periods = trace.scenario["intervention"]["period_s"] + trace.scenario["gatekeeper"]["period_s"]
         for ugv in trace.ugvs:
-            needed = (trace.column(f"{ugv}.accepted") != 0.0).any() or _longest_intervention(trace, ugv) > periods
+            needed = (trace.column(f"{ugv}.accepted") != 0.0).any() or talk_is_due(trace, ugv)
             if needed and not (trace.decisions["robot"] == ugv).any():
                 reason = f"{ugv} was in mode 'intervening', but the trace has no decision of it"
                 return Finding("not_run", evidence={"reason": reason, "faults": trace.meta["faults"]})
@@ -197,10 +196,3 @@ class GateClaim(TraceClaim):
     @abc.abstractmethod
     def judge_rows(self, trace: Trace, rows: list[Row]) -> Finding:
         """Decide the claim about at least one decision."""
-
-
-def _longest_intervention(trace: Trace, ugv: str) -> float:
-    """Longest stay in mode 1, s; the mode of a row is in force since the row before."""
-    inside = np.concatenate([[False], trace.column(f"{ugv}.mode")[1:] == 1.0, [False]])
-    begins, ends = np.flatnonzero(np.diff(inside.astype(np.int8))).reshape(-1, 2).T
-    return float((trace.t[ends] - trace.t[begins]).max(initial=0.0))

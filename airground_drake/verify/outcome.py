@@ -145,7 +145,7 @@ class Comm(TraceClaim):
             for kind, times in sent.items():
                 late = _outside(times, intervals, planning + gating)
                 strays += [{"robot": ugv, "kind": kind, "t_s": float(time)} for time in times[late]]
-                if not times.size and (kind == "proposal" or gated) and (np.diff(intervals) > planning + gating).any():
+                if not times.size and (kind == "proposal" or gated) and talk_is_due(trace, ugv):
                     reason = f"{ugv} was in mode 'intervening', but the trace has no {kind}"
                     return Finding("not_run", evidence={"reason": reason, "faults": trace.meta["faults"]})
             per_ugv[ugv] = {kind: len(times) for kind, times in sent.items()} | {"intervals_s": intervals.tolist()}
@@ -217,7 +217,7 @@ class GateTime(TraceClaim):
         """Compare p99 with the period; without measurements there is no verdict."""
         times = np.asarray(trace.timings.get("decision_times_s", []), dtype=np.float64)
         period, decisions = float(trace.scenario["gatekeeper"]["period_s"]), len(trace.decisions)
-        if not decisions and not any((trace.column(f"{ugv}.mode") == 1.0).any() for ugv in trace.ugvs):
+        if not decisions and not any(talk_is_due(trace, ugv) for ugv in trace.ugvs):
             return Finding("holds", evidence={"count": 0, "reason": "no UGV was intervened on: nothing to decide"})
         if not decisions or not times.size:
             return Finding("not_run", evidence={"reason": "no decision, or none timed", "decisions": decisions})
@@ -235,3 +235,9 @@ class GateTime(TraceClaim):
         in_time = p99 < period
         counterexample = None if in_time else {"decision": int(times.argmax()), "time_s": float(times.max())}
         return Finding("holds" if in_time else "refuted", period - p99, "s", {}, counterexample, evidence)
+
+
+def talk_is_due(trace: Trace, ugv: str) -> bool:
+    """Whether a UGV is intervened on for longer than a proposal and a decision on it take."""
+    periods = trace.scenario["intervention"]["period_s"] + trace.scenario["gatekeeper"]["period_s"]
+    return bool((np.diff(_intervening(trace, ugv)) > periods).any())
