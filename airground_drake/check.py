@@ -2,8 +2,8 @@
 
 Establishes status and margin of every verdict in report.json again from trace/ and certificates/, by formulas written
 here from the claims' statements, proofs in exact arithmetic. `DISAGREES`: files contradict the verdict or each other;
-`cannot be re-established`: unreadable, or no way is known (refuted proofs, routes other than 'relaxed'). What is taken
-as recorded is listed in docs/verification.md; nan: a margin that is not compared. Exit code 0: all agree; 1: not all.
+`cannot be re-established`: unreadable, or no way is known; docs/verification.md lists limits. A margin that is nan here
+is not compared. Exit code 0: all agree; 1: not all; 2: usage.
 """
 
 import hashlib
@@ -164,13 +164,13 @@ class Run:  # a trace that is of the run it claims to be and obeys its law of mo
         margin = self.gate["period_s"] - np.quantile(self.times_s or [0.0], 0.99, method="higher")
         return (margin > 0.0, margin) if self.times_s else (True, None)
 
-    def predict(self, p: Any, omega: Any, normals: Any = None) -> tuple[float, Any]:  # (25); (23): (N, 3) m; omega (N,)
-        accept, refuse = p.accept_m_s.reshape(-1, 3), p.refuse_m_s.reshape(-1, 3)
-        path = p.initial_m + p.dt_s * np.cumsum(refuse + omega[:, None] * (accept - refuse), axis=0)
-        away = path[:, None] - p.centres_m.reshape(len(path), -1, 3)
-        reach = np.linalg.norm(away, axis=2) if normals is None else (away * normals.reshape(away.shape)).sum(axis=2)
-        slack, error = (reach - p.distances_m).min(axis=1, initial=0.0), path - p.reference_m.reshape(-1, 3)
-        return p.dt_s * (p.error_weight_1_m2_s * (error**2).sum() + p.slack_weight_1_m2_s * (slack**2).sum()), path
+    def predict(self, p: Any, omega: Any, normals: Any = None) -> Any:  # (25), and (23), (..., N, 3) m, of (..., N)
+        a, b = p.accept_m_s.reshape(-1, 3), p.refuse_m_s.reshape(-1, 3)
+        path = p.initial_m + p.dt_s * np.cumsum(b + omega[..., None] * (a - b), axis=-2)
+        away = path[..., None, :] - p.centres_m.reshape(len(b), -1, 3)
+        reach = np.linalg.norm(away, axis=-1) if normals is None else (away * normals.reshape(len(b), -1, 3)).sum(-1)
+        u, e = (reach - p.distances_m).min(axis=-1, initial=0.0), path - p.reference_m.reshape(-1, 3)  # slack, error
+        return p.dt_s * (p.error_weight_1_m2_s * (e**2).sum((-1, -2)) + p.slack_weight_1_m2_s * (u**2).sum(-1)), path
 
     def gate_feas(self) -> Any:  # problems against scenario and signals; plans; answers by the rules; obedience
         gate, right, before, say = self.gate, True, dict[str, Any](), ("refuse", "accept")
@@ -234,9 +234,9 @@ class Run:  # a trace that is of the run it claims to be and obeys its law of mo
         for p in self.plans:
             w, n, own = p.relaxed, len(p.relaxed), self.predict(p, p.plan)[0]
             least = max(1e-6, min(p.refuse_throughout, p.accept_throughout))
-            ends = [w, p.plan, *(w + side * e for e in 1e-5 * np.eye(n) for side in (-1.0, 1.0))]
-            value, along, *costs = (self.predict(p, each, p.normals)[0] for each in ends)
-            slopes = np.diff(np.reshape(costs, (n, 2)))[:, 0] / 2e-5
+            ends = np.vstack([w, p.plan, w + 1e-5 * np.eye(n), w - 1e-5 * np.eye(n)])
+            value, along, *costs = self.predict(p, ends, p.normals)[0]
+            slopes = np.subtract(costs[:n], costs[n:]) / 2e-5
             lower = value + np.minimum(-slopes * w, slopes * (1.0 - w)).sum()  # the tangent at a corner of the box
             won = min(p.refuse_throughout - p.objective_refuse, p.accept_throughout - p.objective_accept, least - own)
             right &= np.allclose(np.linalg.norm(p.normals.reshape(-1, 3), axis=1), 1.0, 0.0, SMALL) and won >= -SMALL
