@@ -466,7 +466,7 @@ def first_stage_is_no_choice(folder: Path) -> None:
 
 @tampering
 def bend_is_nan(folder: Path) -> None:
-    edit_table(folder, lambda frame: frame.update(frame[["bend"]].assign(bend=np.inf)), "decisions")
+    edit_table(folder, lambda frame: frame.assign(bend=np.nan), "decisions")
 
 
 @tampering
