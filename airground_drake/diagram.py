@@ -19,6 +19,7 @@ from pydrake.systems.primitives import (
 )
 from pydrake.trajectories import PiecewisePolynomial
 
+from airground_drake.arrays import Array
 from airground_drake.decision.bayes import optimal_threshold
 from airground_drake.decision.trigger import Trigger
 from airground_drake.gatekeeper.branch import BranchAndBoundRoute
@@ -31,7 +32,6 @@ from airground_drake.gatekeeper.rollout import RolloutRoute
 from airground_drake.intervention.database import BehaviourDatabase, make_policy
 from airground_drake.nsbc.avoidance import Avoidance, Composition
 from airground_drake.nsbc.motion import Motion
-from airground_drake.nsbc.task import Array
 from airground_drake.nsbc.team import Team
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.systems import (

@@ -21,6 +21,7 @@ from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorC
 from pydrake.systems.framework import Context, DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput, VectorLogSink
 
+from airground_drake.arrays import Array
 from airground_drake.diagram import RECORDED, Model, build_model
 from airground_drake.errors import AirgroundError
 from airground_drake.gatekeeper.prediction import Horizon, Scene, UgvLaw, predicted_problem
@@ -28,7 +29,6 @@ from airground_drake.gatekeeper.relaxed import RelaxedRoute
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance, Composition, Surroundings, limit_speed
 from airground_drake.nsbc.motion import Motion
-from airground_drake.nsbc.task import Array
 from airground_drake.nsbc.team import Team
 from airground_drake.scenarios.load import resolved
 from airground_drake.scenarios.schema import Run, Scenario

@@ -33,8 +33,8 @@ import numpy as np
 import pandas as pd
 
 from airground_drake import files
+from airground_drake.arrays import Array
 from airground_drake.errors import TraceError
-from airground_drake.nsbc.task import Array
 
 SCHEMA = "airground_drake.trace/2"
 

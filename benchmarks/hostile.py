@@ -18,13 +18,13 @@ from functools import partial
 
 import numpy as np
 
+from airground_drake.arrays import Array
 from airground_drake.diagram import make_presets, make_team
 from airground_drake.gatekeeper.prediction import Horizon, Scene, UgvLaw, predicted_problem
 from airground_drake.gatekeeper.relaxed import RelaxedRoute
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.motion import Motion
-from airground_drake.nsbc.task import Array
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Policy, Run
 from airground_drake.simulation import Recorder

@@ -16,8 +16,8 @@ import numpy as np
 import pandas as pd
 from scipy.optimize import brentq
 
+from airground_drake.arrays import Array
 from airground_drake.nsbc.avoidance import Avoidance, Surroundings
-from airground_drake.nsbc.task import Array
 from airground_drake.scenarios.schema import Decision, Obstacle, Preset, Run, Scenario, Uav, Ugv
 from airground_drake.trace import DECISION_COLUMNS, SCHEMA, Trace
 

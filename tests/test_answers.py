@@ -14,11 +14,11 @@ from airground_drake import diagram
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.candidates import Constants
 from airground_drake.gatekeeper.problem import Decision, Problem
+from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.simulation import Recorder, simulate
 from airground_drake.systems.gatekeeper import Rules, settle
-from airground_drake.systems.messages import ACCEPT, REFUSE, SILENT
 
 RULES = Rules(switching_margin=0.1, min_dwell=0.2, max_bend=0.5)
 

@@ -15,7 +15,7 @@ from airground_drake.scenarios.load import load
 
 PACKAGE = Path(airground_drake.__file__).parent
 LAYERS = (
-    ("errors", "files", "smt", "check"),
+    ("arrays", "errors", "files", "smt", "check"),
     ("nsbc",),
     ("decision", "intervention"),
     ("gatekeeper",),

@@ -18,13 +18,13 @@ from airground_drake.gatekeeper.problem import Problem
 from airground_drake.gatekeeper.relaxed import RelaxedRoute
 from airground_drake.gatekeeper.rounding import rounding_deviation, sum_up_rounding
 from airground_drake.intervention.detour import Detour
+from airground_drake.intervention.messages import SILENT
 from airground_drake.intervention.policy import Observation, Proposal
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.motion import Motion
 from airground_drake.scenarios.load import load
 from airground_drake.systems.controllers import UgvController
 from airground_drake.systems.gatekeeper import Rules, settle
-from airground_drake.systems.messages import SILENT
 
 STALL = np.array([3.36888, 5.10219, 0.0])
 

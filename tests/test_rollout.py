@@ -24,6 +24,7 @@ from airground_drake.gatekeeper.enumeration import EnumerationRoute
 from airground_drake.gatekeeper.prediction import Horizon, Scene, UgvLaw, closed_loop, predicted_problem
 from airground_drake.gatekeeper.problem import DECIDED, Decision, Problem
 from airground_drake.gatekeeper.rollout import RolloutRoute, evaluate
+from airground_drake.intervention.messages import ACCEPT, REFUSE
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.motion import Motion
@@ -31,7 +32,6 @@ from airground_drake.nsbc.team import Team
 from airground_drake.scenarios.load import load
 from airground_drake.simulation import Recorder
 from airground_drake.systems.controllers import UgvController
-from airground_drake.systems.messages import ACCEPT, REFUSE
 
 H = 0.0625
 """Control period, s: a binary fraction, so that vertices of motions can lie exactly on control samples."""

@@ -16,12 +16,12 @@ from pydrake.solvers import (
     SolverOptions,
 )
 
+from airground_drake.arrays import Array
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.candidates import Constants, choose, cut_short, remaining_cost
 from airground_drake.gatekeeper.half_planes import normals_along
 from airground_drake.gatekeeper.problem import Decision, Problem
 from airground_drake.gatekeeper.program import TeamProgram, team_program
-from airground_drake.nsbc.task import Array
 
 _SCALE = 10.0
 """Cost of the cheaper constant plan in the program: Drake's absolute tolerance is then 0.1 % of it.

@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from airground_drake.arrays import Array
 from airground_drake.gatekeeper.problem import Decision, Evaluation, Problem, Status
 from airground_drake.gatekeeper.rounding import rounding_deviation
-from airground_drake.nsbc.task import Array
 
 
 @dataclass(frozen=True, eq=False)

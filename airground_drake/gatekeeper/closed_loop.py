@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from airground_drake.arrays import Array
 from airground_drake.nsbc.kernels import avoid_one, fill_half_spaces
-from airground_drake.nsbc.task import Array
 
 REFUSED, ACCEPTED = 0, 1
 """Modes of a control period: whether the proposal is in force."""

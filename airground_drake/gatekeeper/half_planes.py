@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from airground_drake.arrays import Array
 from airground_drake.gatekeeper.problem import Problem
-from airground_drake.nsbc.task import Array
 
 
 def normals_along(problem: Problem, positions: Array) -> Array:

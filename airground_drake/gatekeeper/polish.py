@@ -8,11 +8,11 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from airground_drake.arrays import Array
 from airground_drake.gatekeeper.budget import UNLIMITED, Budget
 from airground_drake.gatekeeper.candidates import Constants, remaining_cost
 from airground_drake.gatekeeper.half_planes import Outlook
 from airground_drake.gatekeeper.problem import Evaluation, Problem
-from airground_drake.nsbc.task import Array
 
 EVERYWHERE = np.inf
 """Radius of a search that is not confined to a tube."""

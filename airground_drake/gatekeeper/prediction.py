@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from airground_drake.arrays import Array
 from airground_drake.gatekeeper.closed_loop import ClosedLoop
 from airground_drake.gatekeeper.problem import Problem
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.motion import Motion
-from airground_drake.nsbc.task import Array
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ from typing import Literal
 import numpy as np
 from numba import njit
 
+from airground_drake.arrays import Array
 from airground_drake.gatekeeper.closed_loop import ClosedLoop
-from airground_drake.nsbc.task import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
+from airground_drake.arrays import Array
 from airground_drake.intervention.paths import NoPath, shortest_path
 from airground_drake.intervention.policy import Observation, Policy
 from airground_drake.nsbc.motion import Motion
-from airground_drake.nsbc.task import Array
 
 SAMPLE_S = 0.05
 """Spacing of the vertices of the motion, s."""

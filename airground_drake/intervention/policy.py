@@ -9,8 +9,9 @@ from typing import Any, Self
 
 import numpy as np
 
+from airground_drake.arrays import Array
 from airground_drake.nsbc.motion import Motion
-from airground_drake.nsbc.task import Array, pseudoinverse
+from airground_drake.nsbc.task import pseudoinverse
 
 
 @dataclass(frozen=True)

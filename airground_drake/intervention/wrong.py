@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from airground_drake.arrays import Array
 from airground_drake.intervention.detour import Detour
 from airground_drake.intervention.policy import Observation, Policy
 from airground_drake.nsbc.motion import Motion
-from airground_drake.nsbc.task import Array
 
 
 class Towards(Policy):

@@ -18,8 +18,8 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from airground_drake.arrays import Array
 from airground_drake.nsbc import kernels
-from airground_drake.nsbc.task import Array
 
 Composition = Literal["augmented", "recursion_nearest", "recursion_listed"]
 COMPOSITIONS: tuple[Composition, ...] = get_args(Composition)

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from airground_drake.nsbc.task import Array, null_space
+from airground_drake.arrays import Array
+from airground_drake.nsbc.task import null_space
 
 Layer = tuple[Array, Array]
 """One task at the current position: velocity (n, 3) in m/s and Jacobian (n, m, 3)."""

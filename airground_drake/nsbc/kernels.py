@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from airground_drake.nsbc.task import Array
+from airground_drake.arrays import Array
 
 MARGIN_M_S = 1e-12
 """Added to every bound in the projection, so that rounding leaves the bound itself satisfied, m/s."""

@@ -8,7 +8,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from airground_drake.nsbc.task import Array
+from airground_drake.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,9 +6,8 @@ import abc
 import math
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from airground_drake.arrays import Array
 
 
 class Task(abc.ABC):

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from airground_drake.nsbc.task import Array, Task
+from airground_drake.arrays import Array
+from airground_drake.nsbc.task import Task
 
 
 class PositionTask(Task):

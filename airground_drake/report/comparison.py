@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from airground_drake.nsbc.task import Array
+from airground_drake.arrays import Array
 from airground_drake.report import canvas, maps, svg, timelines
 from airground_drake.report.metrics import closest_obstacle, place
 from airground_drake.report.panels import Figure, Panel, series

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
-from airground_drake.nsbc.task import Array
+from airground_drake.arrays import Array
 from airground_drake.report.canvas import (
     ALARM,
     INK,

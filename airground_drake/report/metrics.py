@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from airground_drake.nsbc.task import Array
+from airground_drake.arrays import Array
 from airground_drake.trace import Trace
 from airground_drake.verify.geometry import closest_approach
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
-from airground_drake.nsbc.task import Array
+from airground_drake.arrays import Array
 from airground_drake.report import canvas, svg
 from airground_drake.report.document import METHODS
 from airground_drake.trace import Trace

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from airground_drake.arrays import Array
 from airground_drake.errors import TraceError
-from airground_drake.nsbc.task import Array
 from airground_drake.report.metrics import closest_obstacle, events_of
 from airground_drake.scenarios.schema import Reproduction, Scenario
 from airground_drake.trace import Trace

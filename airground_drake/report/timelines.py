@@ -10,7 +10,7 @@ import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from airground_drake.nsbc.task import Array
+from airground_drake.arrays import Array
 from airground_drake.report.canvas import (
     ALARM,
     INK,

@@ -6,12 +6,12 @@ import numpy as np
 from pydrake.common.value import Value
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
+from airground_drake.arrays import Array
+from airground_drake.intervention.messages import accepted_proposals
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance, HalfSpaces, limit_speed
-from airground_drake.nsbc.task import Array
 from airground_drake.nsbc.tasks import FormationTask, PositionTask
 from airground_drake.nsbc.team import Team
-from airground_drake.systems.messages import accepted_proposals
 
 
 class UgvController(LeafSystem):

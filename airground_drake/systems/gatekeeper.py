@@ -11,15 +11,15 @@ import numpy as np
 from pydrake.common.value import AbstractValue, Value
 from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSystem, State
 
+from airground_drake.arrays import Array
 from airground_drake.gatekeeper.budget import Budget, Clock
 from airground_drake.gatekeeper.candidates import Constants
 from airground_drake.gatekeeper.prediction import Horizon, Scene, UgvLaw, predicted_problem
 from airground_drake.gatekeeper.problem import DECIDED, Decision, Problem
+from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT, Point, Reports, answer_to
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.motion import Motion
-from airground_drake.nsbc.task import Array
 from airground_drake.nsbc.team import Team
-from airground_drake.systems.messages import ACCEPT, REFUSE, SILENT, Point, Reports, answer_to
 
 USELESS = 1e-6
 """Relative gain below which an intervention makes no difference: ten times the solver's tolerance."""

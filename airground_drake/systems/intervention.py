@@ -10,13 +10,13 @@ import numpy as np
 from pydrake.common.value import AbstractValue, Value
 from pydrake.systems.framework import Context, EventStatus, LeafSystem, State
 
+from airground_drake.arrays import Array
 from airground_drake.decision.trigger import Mode
 from airground_drake.intervention.database import BehaviourDatabase, Desk, Fault
+from airground_drake.intervention.messages import REFUSE, Point, answer_to
 from airground_drake.intervention.policy import Observation, Proposal
 from airground_drake.nsbc.motion import Motion
-from airground_drake.nsbc.task import Array
 from airground_drake.systems.decision import FIELDS
-from airground_drake.systems.messages import REFUSE, Point, answer_to
 
 
 @dataclass(frozen=True)

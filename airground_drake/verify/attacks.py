@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from airground_drake.arrays import Array
 from airground_drake.nsbc.avoidance import HalfSpaces, limit_speed
-from airground_drake.nsbc.task import Array
 from airground_drake.nsbc.team import Team
 from airground_drake.verify.pairs import Inputs, running_avoidance, running_team
 from airground_drake.verify.vectors import SEED, nearest, rates, unit

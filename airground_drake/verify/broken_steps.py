@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from airground_drake.arrays import Array
 from airground_drake.nsbc import kernels
 from airground_drake.nsbc.avoidance import Avoidance, Composition, HalfSpaces, Surroundings
-from airground_drake.nsbc.task import Array
 from airground_drake.verify.hostile import postcondition
 from airground_drake.verify.inequalities import LIMIT_S, scaling, step, with_scenario
 from airground_drake.verify.lemma import lemma

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from airground_drake.arrays import Array
 from airground_drake.nsbc.avoidance import Surroundings
-from airground_drake.nsbc.task import Array
 from airground_drake.verify.obligation import rational
 from airground_drake.verify.pairs import Inputs, kinds, running_avoidance
 from airground_drake.verify.vectors import ROUNDOFF, SEED, unit

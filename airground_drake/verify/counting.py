@@ -24,8 +24,8 @@ from typing import Any
 import numpy as np
 from scipy.signal import lfilter
 
+from airground_drake.arrays import Array
 from airground_drake.decision.trigger import Mode, Trigger
-from airground_drake.nsbc.task import Array
 
 SEED = 5
 PATHS = 96

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from airground_drake.arrays import Array
 from airground_drake.errors import TraceError
-from airground_drake.nsbc.task import Array
 from airground_drake.trace import PROBLEM_ARRAYS, PROBLEM_SCALARS, Trace
 from airground_drake.verify.outcome import GATED_METHODS, talk_is_due
 from airground_drake.verify.verdict import Finding, TraceClaim

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from airground_drake.nsbc.task import Array
+from airground_drake.arrays import Array
 from airground_drake.trace import Trace
 from airground_drake.verify.decisions import POSITION_TOLERANCE_M, GateClaim, Off, Row, conclude, cost_tolerance
 from airground_drake.verify.geometry import MERGE_S, corner_times, interpolate, pairs_of, places_of, travelled

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.optimize import brentq
 
-from airground_drake.nsbc.task import Array
+from airground_drake.arrays import Array
 from airground_drake.trace import Trace
 
 MERGE_S = 1e-9

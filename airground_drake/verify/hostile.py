@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from airground_drake.arrays import Array
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance, Composition, HalfSpaces, Surroundings
 from airground_drake.nsbc.motion import Motion
-from airground_drake.nsbc.task import Array
 from airground_drake.nsbc.team import Team
 from airground_drake.systems.controllers import UavController, UgvController
 from airground_drake.verify.conformance import loss_of_inequality

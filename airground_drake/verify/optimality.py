@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
+from airground_drake.arrays import Array
 from airground_drake.errors import TraceError
-from airground_drake.nsbc.task import Array
 from airground_drake.trace import Trace
 from airground_drake.verify.decisions import POSITION_TOLERANCE_M, GateClaim, Off, Row, conclude, cost_tolerance
 from airground_drake.verify.verdict import Finding

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from airground_drake.arrays import Array
 from airground_drake.errors import TraceError
-from airground_drake.nsbc.task import Array
 from airground_drake.trace import Trace
 from airground_drake.verify.geometry import interpolate
 from airground_drake.verify.verdict import TIME_TOLERANCE_S, Finding, TraceClaim

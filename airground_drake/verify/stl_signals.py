@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from airground_drake.nsbc.task import Array
+from airground_drake.arrays import Array
 from airground_drake.trace import Trace
 from airground_drake.verify.outcome import AT_REST_M, AT_REST_S, GATED_METHODS
 from airground_drake.verify.triggering import EVENT_TOLERANCE_S, VARIABLE_TOLERANCE_M

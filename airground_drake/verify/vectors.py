@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from airground_drake.nsbc.task import Array
+from airground_drake.arrays import Array
 
 SEED = 20211209
 ROUNDOFF = 2.0**-53

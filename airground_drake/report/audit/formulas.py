@@ -7,7 +7,7 @@ import math
 import numpy as np
 import sympy
 
-from airground_drake.nsbc.task import Array
+from airground_drake.arrays import Array
 from airground_drake.nsbc.tasks import DistanceTask
 from airground_drake.report.audit.item import Item, item
 from airground_drake.scenarios.load import load

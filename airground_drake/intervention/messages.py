@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from airground_drake.arrays import Array
 from airground_drake.intervention.policy import Proposal
-from airground_drake.nsbc.task import Array
 
 ACCEPT, SILENT, REFUSE = 1.0, 0.0, -1.0
 
