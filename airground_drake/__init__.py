@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from airground_drake.diagram import build_diagram
-    from airground_drake.errors import AirgroundError, ScenarioError, TraceError
+    from airground_drake.errors import AirgroundError, PluginError, ScenarioError, TraceError, UnknownNameError
     from airground_drake.scenarios.load import load
     from airground_drake.scenarios.schema import Scenario
     from airground_drake.simulation import simulate
@@ -24,10 +24,12 @@ if TYPE_CHECKING:
 
 __all__ = [
     "AirgroundError",
+    "PluginError",
     "Scenario",
     "ScenarioError",
     "Trace",
     "TraceError",
+    "UnknownNameError",
     "build_diagram",
     "load",
     "simulate",
@@ -35,10 +37,12 @@ __all__ = [
 
 _HOME = {
     "AirgroundError": "errors",
+    "PluginError": "errors",
     "Scenario": "scenarios.schema",
     "ScenarioError": "errors",
     "Trace": "trace",
     "TraceError": "errors",
+    "UnknownNameError": "errors",
     "build_diagram": "diagram",
     "load": "scenarios.load",
     "simulate": "simulation",

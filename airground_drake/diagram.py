@@ -4,35 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal, TypeVar, get_args
+from typing import TypeVar
 
-import numpy as np
 from pydrake.common import RandomDistribution
-from pydrake.systems.framework import Context, Diagram, DiagramBuilder, System
-from pydrake.systems.primitives import (
-    AffineSystem,
-    Demultiplexer,
-    Integrator,
-    Multiplexer,
-    RandomSource,
-    TrajectorySource,
-)
-from pydrake.trajectories import PiecewisePolynomial
+from pydrake.systems.framework import Diagram, DiagramBuilder, System
+from pydrake.systems.primitives import Demultiplexer, Multiplexer, RandomSource, TrajectorySource
 
+from airground_drake import components
 from airground_drake.arrays import Array
-from airground_drake.decision.bayes import optimal_threshold
-from airground_drake.decision.trigger import Trigger
-from airground_drake.gatekeeper.branch import BranchAndBoundRoute
-from airground_drake.gatekeeper.budget import Budget
-from airground_drake.gatekeeper.enumeration import EnumerationRoute
-from airground_drake.gatekeeper.nonlinear import NonlinearRoute
-from airground_drake.gatekeeper.prediction import Horizon, UgvLaw
-from airground_drake.gatekeeper.relaxed import RelaxedRoute
-from airground_drake.gatekeeper.rollout import RolloutRoute
-from airground_drake.intervention.database import BehaviourDatabase, make_policy
-from airground_drake.nsbc.avoidance import Avoidance, Composition
-from airground_drake.nsbc.motion import Motion
+from airground_drake.errors import PluginError, UnknownNameError
+from airground_drake.nsbc.avoidance import COMPOSITIONS, Composition
+from airground_drake.nsbc.task import Task
 from airground_drake.nsbc.team import Team
+from airground_drake.registry import UAV_TASKS, Method, method_of
+from airground_drake.scenarios.load import validated
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.systems import (
     DecisionVariable,
@@ -42,21 +27,8 @@ from airground_drake.systems import (
     InterventionPlanner,
     UavController,
     UgvController,
+    VelocityDisturbance,
 )
-from airground_drake.systems.gatekeeper import Route, Rules
-
-Method = Literal["a", "b", "c", "d"]
-"""(a) no intervention, (b) no gatekeeper, (c) the paper's gatekeeper, (d) certified: avoidance always on top."""
-
-METHODS: tuple[Method, ...] = get_args(Method)
-
-ROUTES: dict[str, Callable[[], Route]] = {
-    "relaxed": RelaxedRoute,
-    "enumeration": EnumerationRoute,
-    "nonlinear": NonlinearRoute,
-    "branch_and_bound": BranchAndBoundRoute,
-    "rollout": RolloutRoute,
-}
 
 S = TypeVar("S", bound=System)
 
@@ -65,18 +37,20 @@ RECORDED = (
 )  # fmt: skip
 """Exported output ports of the diagram, the signals of a trace."""
 
+PlantFactory = Callable[[str, Array], System]
+"""Makes the plant of a robot from its name and its start (3,), m: a System with one input, the velocity (3,), m/s, and
+one output, the position (3,), m, both in the world frame, whose default state has the robot at its start."""
+
 
 @dataclass(frozen=True)
 class Model:
-    """A diagram and the systems in it that a simulation reads or sets.
+    """A diagram and the systems in it that a simulation reads.
 
     Attributes:
         diagram: the whole system; its exported output ports are RECORDED.
         method: which method's priorities and gatekeeper it has.
         team: names, safe distances, speed limits.
         zeta: decision threshold in force, m.
-        plants: the robots' Integrators, in team order.
-        starts: initial positions, (n + 1, 3), m.
         planner: the UAV's planner.
         gatekeeper: the optimising gatekeeper (methods (c), (d)), else None.
     """
@@ -85,54 +59,52 @@ class Model:
     method: Method
     team: Team
     zeta: float
-    plants: tuple[Integrator, ...]
-    starts: Array
     planner: InterventionPlanner
     gatekeeper: Gatekeeper | None
 
-    def create_context(self) -> Context:
-        """A default context with the robots at their starts."""
-        context = self.diagram.CreateDefaultContext()
-        self.set_starts(context)
-        return context
 
-    def set_starts(self, context: Context) -> None:
-        """Put the robots at their starts in a context of the diagram, or of one that contains it."""
-        for plant, start in zip(self.plants, self.starts, strict=True):
-            plant.set_integral_value(plant.GetMyMutableContextFromRoot(context), start)
-
-
-def build_diagram(scenario: Scenario, method: Method | None = None, composition: Composition = "augmented") -> Diagram:
+def build_diagram(
+    scenario: Scenario,
+    method: str | None = None,
+    composition: Composition = "augmented",
+    plants: PlantFactory = components.first_order_plant,
+) -> Diagram:
     """The diagram of a scenario, for inspection, simulation or embedding.
 
     Args:
-        scenario: a validated scenario.
+        scenario: from a file or made in Python.
         method: default: that of the scenario's last run.
         composition: of the UGVs' avoidance tasks.
+        plants: makes the plant of each robot. The claims are about the default, `first_order_plant`.
 
     Returns:
-        A Diagram with the exported outputs RECORDED; robots start at the origin until their integrators are
-        set (`build_model(...).create_context()` does that).
-    """
-    chosen = method if method is not None else next(reversed(scenario.runs.values())).method
-    return build_model(scenario, chosen, composition).diagram  # type: ignore[arg-type]
-
-
-def build_model(scenario: Scenario, method: Method, composition: Composition = "augmented") -> Model:
-    """Build and wire all components of one method.
+        A Diagram whose default context has every robot at its start. Outputs: RECORDED. Inputs:
+        `disturbance_<robot>` (3), m/s, added to the robot's velocity; 0 where not connected.
 
     Raises:
-        PolicyError: if the scenario names a policy that cannot be made.
+        ScenarioError: if the scenario is not valid.
+        UnknownNameError: if there is no such method or composition.
+        PluginError: if it names a policy, route or task that cannot be made, or a plant has other ports.
     """
-    control, decision = scenario.control, scenario.decision
-    team, presets = make_team(scenario), make_presets(scenario)
+    return build_model(scenario, method, composition, plants).diagram
+
+
+def build_model(
+    scenario: Scenario,
+    method: str | None = None,
+    composition: Composition = "augmented",
+    plants: PlantFactory = components.first_order_plant,
+) -> Model:
+    """Build and wire all components of one method; arguments and errors are those of `build_diagram`."""
+    scenario = validated(scenario)
+    chosen = method_of(next(reversed(scenario.runs.values())).method if method is None else method)
+    if composition not in COMPOSITIONS:
+        raise UnknownNameError("composition", composition, COMPOSITIONS)
+    team, presets = components.make_team(scenario), components.make_presets(scenario)
     n = len(team.ugvs)
-    zeta = threshold(scenario)
-    ugv_avoidance = Avoidance(control.avoidance_gain_1_s, control.period_s, control.sensing_range_m, composition)
-    uav_avoidance = Avoidance(control.avoidance_gain_1_s, control.period_s, control.sensing_range_m)
-    law = UgvLaw(
-        ugv_avoidance, control.motion_gain_1_s, control.intervention_gain_1_s, intervention_on_top=method != "d"
-    )
+    zeta = components.threshold(scenario)
+    law = components.make_law(scenario, chosen, composition)
+    decision = scenario.decision
 
     builder = DiagramBuilder()
 
@@ -140,77 +112,73 @@ def build_model(scenario: Scenario, method: Method, composition: Composition = "
         builder.AddNamedSystem(name, system)
         return system
 
-    plants = tuple(add(f"{robot}_plant", Integrator(3)) for robot in team.robots)
+    # first, so that its seed does not depend on what a plant may draw
+    noise_source = add("noise_source", RandomSource(RandomDistribution.kGaussian, n, decision.noise_period_s))
+    starts = components.make_starts(scenario)
+    bodies = [
+        add(f"{robot}_plant", _checked(robot, plants(robot, start)))
+        for robot, start in zip(team.robots, starts, strict=True)
+    ]
     team_position = add("team_position", Multiplexer([3] * (n + 1)))
     team_command = add("team_command", Multiplexer([3 * n, 3]))
-    ugv_commands = add("ugv_commands", Demultiplexer(3 * n, 3))
-    reference = add("reference", TrajectorySource(stack_presets(presets), output_derivative_order=1))
-    noise_source = add("noise_source", RandomSource(RandomDistribution.kGaussian, n, decision.noise_period_s))
+    disturbance = add("velocity_disturbance", VelocityDisturbance(team.robots))
+    velocities = add("team_velocity", Demultiplexer(3 * (n + 1), 3))
+    reference = add("reference", TrajectorySource(components.stack_presets(presets), output_derivative_order=1))
     noise = add(
-        "decision_noise", integrated_noise(n, decision.noise_m_sqrt_s, decision.leak_1_s, decision.noise_period_s)
+        "decision_noise",
+        components.integrated_noise(n, decision.noise_m_sqrt_s, decision.leak_1_s, decision.noise_period_s),
     )
     decision_variable = add("decision_variable", DecisionVariable(n))
-    trigger = add("event_trigger", EventTrigger(n, make_trigger(scenario, zeta)))
-    policies = [] if method == "a" else scenario.intervention.policies
+    trigger = add("event_trigger", EventTrigger(n, components.make_trigger(scenario, zeta)))
     planner = add(
         "intervention_planner",
         InterventionPlanner(
             team.ugvs,
-            BehaviourDatabase(
-                [(entry.name, make_policy(entry.name, entry.parameters)) for entry in policies],
-                retry=scenario.intervention.retry_s,
-                ranking=scenario.intervention.ranking,  # type: ignore[arg-type]
-                budget=scenario.intervention.budget_s,
-            ),
+            components.make_database(scenario, chosen),
             period=scenario.intervention.period_s,
             presets=presets,
-            targets=np.array([ugv.target_m for ugv in scenario.ugvs.values()]),
-            known_obstacles=_positions([o.position_m for o in scenario.obstacles.values() if o.known_to_uav]),
+            targets=components.positions([ugv.target_m for ugv in scenario.ugvs.values()]),
+            known_obstacles=components.positions(
+                [obstacle.position_m for obstacle in scenario.obstacles.values() if obstacle.known_to_uav]
+            ),
             safe_distance=team.obstacle_distance,
         ),
     )
-    ugv_controller = add(
-        "ugv_controller",
-        UgvController(
-            team,
-            ugv_avoidance,
-            motion_gain=law.motion_gain,
-            intervention_gain=law.intervention_gain,
-            intervention_on_top=law.intervention_on_top,
-        ),
-    )
+    ugv_controller = add("ugv_controller", UgvController(team, law))
     uav_controller = add(
         "uav_controller",
-        UavController(team, uav_avoidance, formation_gain=control.formation_gain_1_s, altitude=scenario.uav.altitude_m),
+        UavController(
+            team,
+            components.make_avoidance(scenario),
+            task=UAV_TASKS.load(scenario.uav.task, of=Task),
+            gain=scenario.control.formation_gain_1_s,
+            altitude=scenario.uav.altitude_m,
+        ),
     )
     gatekeeper = None
-    if method in ("c", "d"):
+    if chosen.gated:
         gatekeeper = Gatekeeper(
             team,
             law,
             presets,
-            ROUTES[scenario.gatekeeper.route](),
-            make_horizon(scenario),
+            components.make_route(scenario),
+            components.make_horizon(scenario),
             period=scenario.gatekeeper.period_s,
-            rules=make_rules(scenario),
+            rules=components.make_rules(scenario),
         )
     gate = add("gatekeeper", gatekeeper if gatekeeper is not None else DirectAcceptance(n))
 
     def connect(source: System, output: str, target: System, port: str) -> None:
         builder.Connect(source.GetOutputPort(output), target.GetInputPort(port))
 
-    def only(source: System, target: System) -> None:  # primitives with one input or output
-        builder.Connect(source.get_output_port(), target.get_input_port())
-
-    for i, plant in enumerate(plants):
-        builder.Connect(plant.get_output_port(), team_position.get_input_port(i))
-        if i < n:
-            builder.Connect(ugv_commands.get_output_port(i), plant.get_input_port())
-    builder.Connect(uav_controller.GetOutputPort("command"), plants[-1].get_input_port())
-    builder.Connect(ugv_controller.GetOutputPort("command"), ugv_commands.get_input_port())
+    for i, plant in enumerate(bodies):
+        builder.Connect(plant.get_output_port(0), team_position.get_input_port(i))
+        builder.Connect(velocities.get_output_port(i), plant.get_input_port(0))
     builder.Connect(ugv_controller.GetOutputPort("command"), team_command.get_input_port(0))
     builder.Connect(uav_controller.GetOutputPort("command"), team_command.get_input_port(1))
-    only(noise_source, noise)
+    builder.Connect(team_command.get_output_port(), disturbance.GetInputPort("command"))
+    builder.Connect(disturbance.GetOutputPort("velocity"), velocities.get_input_port())
+    builder.Connect(noise_source.get_output_port(), noise.get_input_port())
     for target in (decision_variable, ugv_controller, uav_controller, planner, gatekeeper):
         if target is not None:
             builder.Connect(team_position.get_output_port(), target.GetInputPort("team_position"))
@@ -240,79 +208,22 @@ def build_model(scenario: Scenario, method: Method, composition: Composition = "
     }
     for name in RECORDED:
         builder.ExportOutput(sources[name], name)
+    for robot in team.robots:
+        builder.ExportInput(disturbance.GetInputPort(f"disturbance_{robot}"), f"disturbance_{robot}")
     diagram = builder.Build()
-    diagram.set_name(f"{scenario.name}_method_{method}")
-    starts = _positions([*(ugv.start_m for ugv in scenario.ugvs.values()), scenario.uav.start_m])
-    return Model(diagram, method, team, zeta, plants, starts, planner, gatekeeper)
+    diagram.set_name(f"{scenario.name}_method_{chosen.id}")
+    return Model(diagram, chosen, team, zeta, planner, gatekeeper)
 
 
-def make_team(scenario: Scenario) -> Team:
-    """Names, safe distances and speed limits of the scenario's robots."""
-    speeds = [ugv.max_speed_m_s for ugv in scenario.ugvs.values()]
-    return Team(
-        ugvs=tuple(scenario.ugvs),
-        uav=scenario.uav.name,
-        obstacles=_positions([obstacle.position_m for obstacle in scenario.obstacles.values()]),
-        obstacle_distance=scenario.safe_distance.obstacle_m,
-        ugv_distance=scenario.safe_distance.ugv_m,
-        air_ground_distance=scenario.safe_distance.air_ground_m,
-        max_speed=np.array([*speeds, scenario.uav.max_speed_m_s]),
-    )
+def _checked(robot: str, plant: System) -> System:
+    """The plant of a robot, if it has the ports of one.
 
-
-def make_presets(scenario: Scenario) -> list[Motion]:
-    """Preset trajectories of the UGVs."""
-    return [Motion.at_speed(_positions(ugv.preset.waypoints_m), ugv.preset.speed_m_s) for ugv in scenario.ugvs.values()]
-
-
-def make_horizon(scenario: Scenario) -> Horizon:
-    """The gatekeeper's grid and weights."""
-    gate = scenario.gatekeeper
-    substeps = round(gate.horizon_s / gate.stages / scenario.control.period_s)
-    return Horizon(gate.stages, substeps, gate.error_weight_1_m2_s, gate.slack_weight_1_m2_s)
-
-
-def make_rules(scenario: Scenario) -> Rules:
-    """When the gatekeeper's decisions become answers, and what they may cost."""
-    gate = scenario.gatekeeper
-    return Rules(
-        switching_margin=gate.switching_margin,
-        min_dwell=gate.min_dwell_s,
-        max_bend=gate.max_bend,
-        budget=Budget(gate.budget_iterations, gate.budget_nodes),
-        budget_share=gate.budget_share if gate.budget == "wall_clock" else None,
-    )
-
-
-def make_trigger(scenario: Scenario, zeta: float) -> Trigger:
-    """The trigger automaton with threshold zeta, m."""
-    if scenario.decision.trigger == "bare":
-        return Trigger.bare(zeta)
-    return Trigger(zeta, scenario.decision.release_m, scenario.decision.min_inter_event_s)
-
-
-def threshold(scenario: Scenario) -> float:
-    """Decision threshold zeta, m: the fixed one, or the minimiser of the Bayes risk (16)."""
-    rule = scenario.decision.threshold
-    if rule.rule == "bayes":
-        return optimal_threshold(rule.drift_m_s, rule.noise_m_sqrt_s, rule.c1_1_s, rule.c2)
-    return rule.zeta_m
-
-
-def _positions(rows: list[list[float]]) -> Array:
-    return np.array(rows, dtype=np.float64).reshape(-1, 3)
-
-
-def stack_presets(presets: list[Motion]) -> PiecewisePolynomial:
-    """All presets as one trajectory of 3n components over the union of their vertices."""
-    times = np.unique(np.concatenate([preset.times for preset in presets]))
-    samples = np.concatenate([preset.sample(times) for preset in presets], axis=1)
-    return PiecewisePolynomial.FirstOrderHold(times, samples.T)
-
-
-def integrated_noise(count: int, intensity: float, leak: float, period: float) -> AffineSystem:
-    """dn = -leak n dt + intensity dW for noise samples held over `period`: Euler-Maruyama on that grid."""
-    eye, zero = np.eye(count), np.zeros(count)
-    return AffineSystem(
-        A=-leak * eye, B=intensity / np.sqrt(period) * eye, f0=zero, C=eye, D=0.0 * eye, y0=zero, time_period=0.0
-    )
+    Raises:
+        PluginError: if not.
+    """
+    ports = [plant.get_input_port(i).size() for i in range(plant.num_input_ports())]
+    outputs = [plant.get_output_port(i).size() for i in range(plant.num_output_ports())]
+    if ports[:1] != [3] or outputs[:1] != [3]:
+        wanted = "allowed: velocity (3) first among its inputs, position (3) first among its outputs"
+        raise PluginError(f"the plant of {robot} has inputs of sizes {ports}, outputs of sizes {outputs}; {wanted}")
+    return plant

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 VALUE_WIDTH = 120
 """Longer values are cut in messages, characters."""
 
@@ -30,6 +32,26 @@ class ScenarioError(AirgroundError):
         where = f"{source}: {key}: " if key else f"{source}: "
         fault = str(value) if isinstance(value, Fault) else f"{_short(repr(value))} is not allowed"
         super().__init__(_one_line(f"{where}{fault}; {allowed}"))
+
+
+class UnknownNameError(AirgroundError):
+    """A name that stands for nothing: of a run, a method, a route, a policy, a claim.
+
+    Attributes:
+        kind: what it should name.
+        name: as given.
+        allowed: names that there are.
+    """
+
+    def __init__(self, kind: str, name: object, allowed: Iterable[str]) -> None:
+        """Build the one-line message from its parts."""
+        self.kind, self.name, self.allowed = kind, name, tuple(allowed)
+        options = ", ".join(self.allowed) or "none"
+        super().__init__(_one_line(f"unknown {kind} {_short(repr(name))}; allowed: {options}"))
+
+
+class PluginError(AirgroundError):
+    """A class named in a scenario that cannot be imported, is of another kind, or does not take its parameters."""
 
 
 class TraceError(AirgroundError):

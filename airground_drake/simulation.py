@@ -7,7 +7,7 @@ import os
 import sys
 import time
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from functools import cache
@@ -23,15 +23,17 @@ from pydrake.systems.primitives import LogVectorOutput, VectorLogSink
 
 from airground_drake.arrays import Array
 from airground_drake.diagram import RECORDED, Model, build_model
-from airground_drake.errors import AirgroundError
-from airground_drake.gatekeeper.prediction import Horizon, Scene, UgvLaw, predicted_problem
+from airground_drake.errors import AirgroundError, UnknownNameError
+from airground_drake.events import extract
+from airground_drake.gatekeeper.prediction import Horizon, Scene, predicted_problem
 from airground_drake.gatekeeper.relaxed import RelaxedRoute
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance, Composition, Surroundings, limit_speed
+from airground_drake.nsbc.law import UgvLaw
 from airground_drake.nsbc.motion import Motion
 from airground_drake.nsbc.team import Team
-from airground_drake.scenarios.load import resolved
-from airground_drake.scenarios.schema import Run, Scenario
+from airground_drake.scenarios.load import resolved, validated
+from airground_drake.scenarios.schema import Scenario
 from airground_drake.systems.decision import FIELDS
 from airground_drake.systems.gatekeeper import Ruling
 from airground_drake.trace import DECISION_COLUMNS, PROBLEM_ARRAYS, PROBLEM_SCALARS, SCHEMA, Trace
@@ -49,11 +51,20 @@ class Recorder:
     A Diagram with Python systems is never garbage-collected, so that one is built per method and process.
     """
 
-    def __init__(self, scenario: Scenario, name: str, run: Run) -> None:
-        """Build the model of a run of the scenario and its loggers."""
-        composition: Composition = run.composition  # type: ignore[assignment]
-        self._scenario, self._name, self._run = scenario, name, run
-        self._model: Model = build_model(scenario, run.method, composition)  # type: ignore[arg-type]
+    def __init__(self, scenario: Scenario, name: str) -> None:
+        """Build the model of a run of the scenario and its loggers.
+
+        Raises:
+            ScenarioError: if the scenario is not valid.
+            UnknownNameError: if it has no such run.
+            PluginError: if it names a policy, route or task that cannot be made.
+        """
+        self._scenario, self._name = validated(scenario), name
+        if name not in self._scenario.runs:
+            raise UnknownNameError("run", name, self._scenario.runs)
+        self._run = self._scenario.runs[name]
+        composition: Composition = self._run.composition  # type: ignore[assignment]
+        self._model: Model = build_model(self._scenario, self._run.method, composition)
         builder = DiagramBuilder()
         builder.AddSystem(self._model.diagram)
         self._sinks: dict[str, VectorLogSink] = {}
@@ -74,7 +85,6 @@ class Recorder:
         seed = self._scenario.seed if seed is None else seed
         context = self._root.CreateDefaultContext()
         self._root.SetRandomContext(context, RandomGenerator(seed))
-        self._model.set_starts(context)
         context.SetAccuracy(EVENT_ACCURACY)
         simulator = Simulator(self._root, context)
         period = self._scenario.control.period_s
@@ -143,7 +153,7 @@ class Recorder:
         times = list(gatekeeper.decision_times_s) if gatekeeper is not None else []
         timings = {"wall_s": wall, "decision_times_s": times}
         trace = Trace(meta, signals, decisions, timings, _problems(rulings))
-        meta["events"] = events(trace, sent)
+        meta["events"] = extract(trace, sent)
         return trace
 
 
@@ -212,10 +222,17 @@ def _processors() -> int:
 def simulate(scenario: Scenario, run: str, seed: int | None = None) -> Trace:
     """Simulate one run of a scenario.
 
+    Args:
+        scenario: from a file or made in Python.
+        run: name of one of its runs.
+        seed: of the decision noise; default: the scenario's.
+
     Raises:
-        KeyError: if the scenario has no such run.
+        ScenarioError: if the scenario is not valid.
+        UnknownNameError: if it has no such run.
+        PluginError: if it names a policy, route or task that cannot be made.
     """
-    return Recorder(scenario, run, scenario.runs[run]).simulate(seed)
+    return Recorder(scenario, run).simulate(seed)
 
 
 def _distinct(t: Array, command: Array) -> npt.NDArray[np.intp]:
@@ -246,56 +263,3 @@ def _signals(t: Array, data: dict[str, Array], ugvs: tuple[str, ...], robots: tu
             columns[f"{ugv}.{name}"] = data["status"][FIELDS * i + k]
         columns[f"{ugv}.accepted"] = data["accepted"][i]
     return pd.DataFrame(columns)
-
-
-def events(trace: Trace, sent: Iterable[tuple[str, float, str]]) -> list[dict[str, Any]]:
-    """All events of a run by time, from its signals and decisions.
-
-    Args:
-        trace: the run.
-        sent: proposals as (robot, time of issue in s, policy).
-    """
-    t = trace.t
-    found: list[dict[str, Any]] = []
-
-    def add(time_s: float, robot: str, kind: str, **more: Any) -> None:
-        where = [float(np.interp(time_s, t, trace.column(f"{robot}.{axis}_m"))) for axis in "xyz"]
-        found.append({"t_s": float(time_s), "robot": robot, "kind": kind, "position_m": where, **more})
-
-    for ugv in trace.ugvs:
-        for kind, name in (("trigger", "triggered_at_s"), ("release", "released_at_s")):
-            for when in np.unique(trace.column(f"{ugv}.{name}")):
-                if when >= 0.0:
-                    add(when, ugv, kind)
-    for ugv, issued, policy in sent:
-        add(issued, ugv, "proposal", policy=policy)
-    previous: dict[tuple[str, float], str] = {}
-    for row in trace.decisions.to_dict("records"):
-        key = (row["robot"], row["issued_s"])
-        if previous.get(key) != row["decision"]:
-            previous[key] = row["decision"]
-            add(row["t_s"], row["robot"], row["decision"], policy=row["policy"], status=row["status"])
-    for robot in trace.robots:
-        _add_arrival(trace, robot, add)
-        _add_collisions(trace, robot, add)
-    return sorted(found, key=lambda event: (event["t_s"], trace.robots.index(event["robot"])))
-
-
-def _add_arrival(trace: Trace, robot: str, add: Any) -> None:
-    """The time from which on the robot stays within the arrival tolerance of its target."""
-    scenario = trace.scenario
-    spec = scenario["ugvs"].get(robot, scenario["uav"])
-    away = np.linalg.norm(trace.position(robot) - np.array(spec["target_m"]), axis=1)
-    outside = np.flatnonzero(away > scenario["arrival_tolerance_m"])
-    first = int(outside[-1]) + 1 if len(outside) else 0
-    if first < len(away):
-        add(trace.t[first], robot, "arrival")
-
-
-def _add_collisions(trace: Trace, robot: str, add: Any) -> None:
-    """The first row of each visit within collision distance of an obstacle."""
-    for name, obstacle in trace.scenario["obstacles"].items():
-        distance = np.linalg.norm(trace.position(robot) - np.array(obstacle["position_m"]), axis=1)
-        hit = distance < trace.scenario["safe_distance"]["collision_m"]
-        for k in np.flatnonzero(hit & ~np.append(False, hit[:-1])):
-            add(trace.t[k], robot, "collision", obstacle=name)

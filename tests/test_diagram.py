@@ -10,18 +10,21 @@ from pydrake.systems.framework import LeafSystem
 
 import airground_drake
 from airground_drake import graphviz
-from airground_drake.diagram import METHODS, RECORDED, build_diagram
+from airground_drake.diagram import RECORDED, build_diagram
+from airground_drake.registry import METHODS
 from airground_drake.scenarios.load import load
 
 PACKAGE = Path(airground_drake.__file__).parent
 LAYERS = (
     ("arrays", "errors", "files", "smt", "check"),
+    ("registry",),
     ("nsbc",),
     ("decision", "intervention"),
     ("gatekeeper",),
     ("scenarios",),
     ("systems",),
-    ("diagram", "trace"),
+    ("components", "trace"),
+    ("diagram", "events"),
     ("simulation", "graphviz", "verify"),
     ("report",),
 )

@@ -11,25 +11,8 @@ from airground_drake.arrays import Array
 from airground_drake.gatekeeper.closed_loop import ClosedLoop
 from airground_drake.gatekeeper.problem import Problem
 from airground_drake.intervention.policy import Proposal
-from airground_drake.nsbc.avoidance import Avoidance
+from airground_drake.nsbc.law import UgvLaw
 from airground_drake.nsbc.motion import Motion
-
-
-@dataclass(frozen=True)
-class UgvLaw:
-    """The numbers of a UGV's control law, as `systems.UgvController` runs it.
-
-    Attributes:
-        avoidance: the set-based layer.
-        motion_gain: B of (6), 1/s.
-        intervention_gain: Lambda of (14), 1/s.
-        intervention_on_top: priorities of (20) (methods (b), (c)); False: avoidance above the intervention.
-    """
-
-    avoidance: Avoidance
-    motion_gain: float
-    intervention_gain: float
-    intervention_on_top: bool
 
 
 @dataclass(frozen=True, eq=False)

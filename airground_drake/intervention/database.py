@@ -2,29 +2,17 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 import numpy as np
 
-from airground_drake.errors import AirgroundError
-from airground_drake.intervention.detour import Detour
+from airground_drake.errors import PluginError
 from airground_drake.intervention.guard import OutOfTime, time_limit
 from airground_drake.intervention.policy import Observation, Policy, Proposal
-from airground_drake.intervention.wrong import Hostile, Noisy, StaleMap, Towards
 from airground_drake.nsbc.motion import Motion
-
-POLICIES: dict[str, type[Policy]] = {
-    "detour": Detour,
-    "towards": Towards,
-    "stale_map": StaleMap,
-    "noisy": Noisy,
-    "hostile": Hostile,
-}
-"""Policies that a scenario may name; any other is named as `module:Class`."""
-
+from airground_drake.registry import POLICIES
 
 Ranking = Literal["listed", "predicted"]
 RANKINGS: tuple[Ranking, ...] = get_args(Ranking)
@@ -37,31 +25,18 @@ Candidate = tuple[int, str, Motion]
 """A proposal: its turn, the policy's name, the motion."""
 
 
-class PolicyError(AirgroundError):
-    """A policy that cannot be made from its name and parameters."""
-
-
 def make_policy(name: str, parameters: Mapping[str, float]) -> Policy:
     """Build a policy.
 
     Raises:
-        PolicyError: if the name is unknown, names something that is not a Policy, or the parameters do not fit.
+        UnknownNameError: if the name is neither registered nor of the form `module:Class`.
+        PluginError: if it cannot be imported, is no Policy, or does not take these parameters.
     """
-    kind: object = POLICIES.get(name)
-    if kind is None:
-        module, _, attribute = name.partition(":")
-        if not attribute:
-            raise PolicyError(f"policy {name!r}: allowed are {', '.join(sorted(POLICIES))} or 'module:Class'")
-        try:
-            kind = getattr(importlib.import_module(module), attribute)
-        except (ImportError, AttributeError, ValueError) as error:
-            raise PolicyError(f"policy {name!r} cannot be imported: {error}") from error
-    if not (isinstance(kind, type) and issubclass(kind, Policy)):
-        raise PolicyError(f"policy {name!r} is not a subclass of airground_drake.intervention.policy.Policy")
+    kind = POLICIES.load(name, of=Policy)
     try:
         return kind(**parameters)
     except (TypeError, ValueError) as error:
-        raise PolicyError(f"policy {name!r} with {dict(parameters)}: {error}") from error
+        raise PluginError(f"policy {name!r} with {dict(parameters)}: {error}") from error
 
 
 @dataclass(frozen=True)

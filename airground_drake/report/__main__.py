@@ -18,8 +18,7 @@ from typing import Any
 
 from airground_drake import files, graphviz, trace
 from airground_drake.diagram import build_diagram
-from airground_drake.errors import AirgroundError, ScenarioError
-from airground_drake.intervention.database import PolicyError
+from airground_drake.errors import AirgroundError, PluginError, ScenarioError, UnknownNameError
 from airground_drake.report import audit, document, figures, html, junit, refinement
 from airground_drake.report.panels import Figure
 from airground_drake.scenarios.load import load, shipped
@@ -64,7 +63,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         kept = None if options.no_cache else cache_folder()
         folder = options.output or Path("reports") / scenario.name
         report = write_report(scenario, digest, folder, options.format, shlex.join(command), kept, audited)
-    except (ScenarioError, PolicyError) as error:
+    except (ScenarioError, PluginError, UnknownNameError) as error:
         print(f"error: {error}", file=sys.stderr)
         return EXIT_USAGE
     except (AirgroundError, OSError) as error:
@@ -101,7 +100,7 @@ def write_report(
         The document, as in report.json.
 
     Raises:
-        PolicyError: if the scenario names a policy that cannot be made.
+        PluginError: if the scenario names a policy, route or task that cannot be made.
         OSError: if the folder cannot be written.
     """
     started, clock = datetime.now(UTC), time.perf_counter()

@@ -10,20 +10,15 @@ from typing import Any
 
 import numpy as np
 
+from airground_drake.registry import STATUSES, method_of
 from airground_drake.report import metrics, reproduction
 from airground_drake.report.audit import of_runs
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.trace import Trace
-from airground_drake.verify.verdict import STATUSES, Verdict
+from airground_drake.verify.verdict import Verdict
 
 SCHEMA = "airground_drake.report/1"
 
-METHODS = {
-    "a": "no intervention",
-    "b": "direct intervention, no gatekeeper",
-    "c": "the paper's MPC gatekeeper",
-    "d": "certified gatekeeper",
-}
 UNDECIDED = ("inconclusive", "error", "not_run")
 """Statuses that say nothing about the claim: unexpected, they leave the report inconclusive."""
 EXIT_CODES = {"as_expected": 0, "not_as_expected": 1, "inconclusive": 3}
@@ -169,7 +164,7 @@ def _run(scenario: Scenario, trace: Trace) -> dict[str, Any]:
     run = scenario.runs[trace.run]
     return {
         "method": run.method,
-        "method_name": METHODS.get(run.method, ""),
+        "method_name": method_of(run.method).says,
         "composition": run.composition,
         "seed": trace.meta.get("seed"),
         "zeta_m": trace.meta["zeta_m"],

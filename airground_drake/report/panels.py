@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.figure import Figure as Drawing
 
 from airground_drake.arrays import Array
+from airground_drake.registry import METHODS
 from airground_drake.report import canvas, svg
-from airground_drake.report.document import METHODS
 from airground_drake.trace import Trace
 
 MAX_TABLE_ROWS = 31
@@ -56,7 +56,7 @@ def per_run(
     panels = []
     for position, (name, trace) in enumerate(runs.items()):
         method = str(trace.meta["method"])
-        heading = f"Run {name}: method ({method}), {METHODS.get(method, 'of the user')}"
+        heading = f"Run {name}: method ({method}), {METHODS[method].says}"
         title = f"{kind} of run {name}"
         text = canvas.svg(drawing(trace))
         panels.append(Panel(heading, svg.inline(text, f"{kind}-{position}", title, describe(trace)), table(trace)))

@@ -10,36 +10,27 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
+import json
 import math
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any, NoReturn, get_args, get_origin
 
+import numpy as np
 import yaml
 from pydrake.common.yaml import yaml_load_typed
 
 from airground_drake import files
 from airground_drake.errors import Fault, ScenarioError
-from airground_drake.scenarios import schema, validate
+from airground_drake.scenarios import validate
 from airground_drake.scenarios.schema import Scenario
 
 MAX_BYTES = 2**20
-
-REQUIRED: dict[Any, tuple[str, ...]] = {
-    Scenario: ("name", "ugvs", "uav", "obstacles", "runs"),
-    schema.Ugv: ("start_m", "target_m", "preset"),
-    schema.Preset: ("waypoints_m",),
-    schema.Uav: ("start_m", "target_m"),
-    schema.Obstacle: ("position_m",),
-    schema.Policy: ("name",),
-    schema.Run: ("method",),
-    schema.Reproduction: ("id", "quantity", "measure", "run", "robot", "paper"),
-    schema.Choice: ("key", "source", "reason"),
-}
-"""Keys without a default; the dataclasses must be constructible without arguments for pydrake."""
+NO_LINE = -1
+"""Line of what was made in Python."""
 
 _TAG = "tag:yaml.org,2002:"
 _SCALARS: dict[str, tuple[str | None, Callable[[str], object]]] = {  # tag: its plain scalars, conversion
@@ -77,13 +68,17 @@ def shipped() -> list[str]:
     return sorted(name.removesuffix(".yaml") for name in _shipped_files())
 
 
-def load(name_or_path: str, overrides: Sequence[str] = ()) -> tuple[Scenario, str]:
+Overrides = Sequence[str] | Mapping[str, Any]
+"""`dotted.key=value` with the value in YAML, or values by dotted key."""
+
+
+def load(name_or_path: str | Path, overrides: Overrides = ()) -> tuple[Scenario, str]:
     """Load and validate a scenario.
 
     Args:
         name_or_path: name of a shipped scenario, or path to a YAML file.
-        overrides: `dotted.key=value`, applied in order; the value is YAML, list items are addressed by index.
-            The key must be one of the schema, or an entry that exists in the file.
+        overrides: applied in order; list items are addressed by index. A key must be one of the schema, or an
+            entry that exists in the file.
 
     Returns:
         The scenario, and the SHA-256 of the file's bytes followed by a NUL byte and the text of each override.
@@ -91,30 +86,101 @@ def load(name_or_path: str, overrides: Sequence[str] = ()) -> tuple[Scenario, st
     Raises:
         ScenarioError: if the file cannot be read or an override or the scenario is not valid.
     """
-    source, data = _read_bytes(name_or_path)
+    source, data = _read_bytes(str(name_or_path))
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
         raise ScenarioError(f"{source}:{line}", "", Fault("not UTF-8 text"), "wanted: a YAML file") from None
+    texts = _texts(overrides)
     try:
         root = _compose(text, source)
-        for override in overrides:
+        for override in texts:
             root = _override(root, override)
-        plain = _plain(root, Scenario, "", "")
+        scenario = _build(root, source)
     except RecursionError:
         raise ScenarioError(source, "", Fault("nested too deeply"), "wanted: a scenario") from None
+    digest = files.sha256(b"\0".join([data, *(override.encode() for override in texts)]))
+    return scenario, digest
+
+
+def validated(scenario: Scenario) -> Scenario:
+    """A scenario made or changed in Python, checked as strictly as a file; numpy's numbers and arrays may be in it.
+
+    Returns:
+        A copy whose values have the types of the schema.
+
+    Raises:
+        ScenarioError: if it is not valid; names the key, its value and what is allowed.
+    """
+    source = f"scenario {getattr(scenario, 'name', None) or type(scenario).__name__!r}"
+    try:
+        return _build(_node(resolved(scenario), source), source)
+    except (TypeError, RecursionError) as error:
+        raise ScenarioError(source, "", Fault(str(error)), "wanted: a Scenario") from None
+
+
+def _build(root: yaml.Node, source: str) -> Scenario:
+    """The scenario of a document, checked."""
+    plain = _plain(root, Scenario, "", "")
     scenario: Scenario = yaml_load_typed(schema=Scenario, data=yaml.safe_dump(plain, sort_keys=False))
     try:
         validate.check(scenario, source)
     except ScenarioError as error:
         raise ScenarioError(_where(_nearest(root, error.key)), error.key, error.value, error.allowed) from None
-    digest = files.sha256(b"\0".join([data, *(override.encode() for override in overrides)]))
-    return scenario, digest
+    return scenario
+
+
+def _texts(overrides: Overrides) -> list[str]:
+    """Overrides as on the command line.
+
+    Raises:
+        ScenarioError: if a value has no text in YAML.
+    """
+    if not isinstance(overrides, Mapping):
+        return list(overrides)
+    texts = []
+    for key, value in overrides.items():
+        try:
+            texts.append(f"{key}={json.dumps(_simple(value))}")
+        except (TypeError, ValueError) as error:
+            raise ScenarioError(
+                "override", str(key), Fault(str(error)), "wanted: a number, text, list or dict"
+            ) from None
+    return texts
+
+
+def _simple(value: Any) -> Any:
+    """Values of numpy, and tuples, as what YAML knows."""
+    if isinstance(value, Mapping):
+        return {name: _simple(each) for name, each in value.items()}
+    if isinstance(value, np.ndarray | np.generic):
+        return _simple(value.tolist())
+    return [_simple(each) for each in value] if isinstance(value, list | tuple) else value
+
+
+def _node(value: Any, source: str) -> yaml.Node:
+    """A value made in Python as a node of a document; what YAML has no word for is a node of its own tag."""
+    mark = yaml.Mark(source, 0, NO_LINE, 0, None, 0)
+    value = _simple(value)
+    if isinstance(value, dict):
+        pairs = [(_node(name, source), _node(each, source)) for name, each in value.items()]
+        return yaml.MappingNode(f"{_TAG}map", pairs, mark, mark)
+    if isinstance(value, list):
+        return yaml.SequenceNode(f"{_TAG}seq", [_node(each, source) for each in value], mark, mark)
+    kinds = {str: "str", bool: "bool", int: "int", float: "float", type(None): "null"}
+    text = repr(value).replace("inf", ".inf").replace("nan", ".nan") if isinstance(value, float) else str(value)
+    return yaml.ScalarNode(_TAG + kinds.get(type(value), type(value).__name__), text, mark, mark)
 
 
 def resolved(scenario: Scenario) -> dict[str, Any]:
-    """The scenario as nested dicts and lists, defaults filled in."""
+    """The scenario as nested dicts and lists, defaults filled in.
+
+    Raises:
+        TypeError: if it is none.
+    """
+    if not isinstance(scenario, Scenario):
+        raise TypeError(f"{type(scenario).__name__} is no Scenario")
     return dataclasses.asdict(scenario)
 
 
@@ -205,7 +271,7 @@ def _plain(node: yaml.Node, hint: Any, key: str, name: str) -> Any:
     for part, (name_node, _) in children.items():
         if part not in hints and (key or not part.startswith("_")):
             _unknown(name_node, key, part, hints)
-    for part in REQUIRED.get(hint, ()):
+    for part in (each.name for each in dataclasses.fields(hint) if "required" in each.metadata):
         if part not in children:
             wanted = _wanted(hints[part], part)
             raise ScenarioError(_where(node), validate.dotted(key, part), Fault("missing"), wanted)
@@ -272,9 +338,9 @@ def _nearest(node: yaml.Node, key: str) -> yaml.Node:
 
 
 def _where(node: yaml.Node) -> str:
-    """File and line, or command-line option, of a node."""
+    """File and line, or command-line option or Python object, of a node."""
     mark = node.start_mark
-    return str(mark.name) if mark.name.startswith("--set ") else f"{mark.name}:{mark.line + 1}"
+    return str(mark.name) if mark.line == NO_LINE or mark.name.startswith("--set ") else f"{mark.name}:{mark.line + 1}"
 
 
 def _wanted(hint: Any, name: str) -> str:

@@ -10,11 +10,18 @@ from dataclasses import dataclass, field
 Vector = list[float]
 
 
+REQUIRED = {"required": True}
+"""Of a key that a scenario must have; what stands there before is what pydrake needs."""
+
+FROM_ZERO = {"from_zero": True}
+"""Of a number that may be 0; every other number of the schema must be positive."""
+
+
 @dataclass
 class Preset:
     """Preset trajectory rho_rd of a UGV: a polyline travelled at constant speed from t = 0, then held."""
 
-    waypoints_m: list[Vector] = field(default_factory=list)
+    waypoints_m: list[Vector] = field(default_factory=list, metadata=REQUIRED)
     speed_m_s: float = 1.0
 
 
@@ -22,20 +29,24 @@ class Preset:
 class Ugv:
     """One UGV: a planar first-order robot."""
 
-    start_m: Vector = field(default_factory=list)
-    target_m: Vector = field(default_factory=list)
-    preset: Preset = field(default_factory=Preset)
+    start_m: Vector = field(default_factory=list, metadata=REQUIRED)
+    target_m: Vector = field(default_factory=list, metadata=REQUIRED)
+    preset: Preset = field(default_factory=Preset, metadata=REQUIRED)
     max_speed_m_s: float = 6.0
 
 
 @dataclass
 class Uav:
-    """The UAV: a spatial first-order robot that flies over the centroid of the UGVs, eqs (9)-(10)."""
+    """The UAV: a spatial first-order robot whose `task` is to fly over the centroid of the UGVs, eqs (9)-(10).
+
+    Another task is named as `module:Class`.
+    """
 
     name: str = "uav"
-    start_m: Vector = field(default_factory=list)
-    target_m: Vector = field(default_factory=list)
+    start_m: Vector = field(default_factory=list, metadata=REQUIRED)
+    target_m: Vector = field(default_factory=list, metadata=REQUIRED)
     altitude_m: float = 2.0
+    task: str = "formation"
     max_speed_m_s: float = 10.0
 
 
@@ -43,7 +54,7 @@ class Uav:
 class Obstacle:
     """A point to keep away from by the safe distance of (7)-(8)."""
 
-    position_m: Vector = field(default_factory=list)
+    position_m: Vector = field(default_factory=list, metadata=REQUIRED)
     known_to_uav: bool = True
 
 
@@ -62,10 +73,10 @@ class Control:
     """NSBC controllers of all robots: sampled with zero-order hold."""
 
     period_s: float = 0.025
-    avoidance_gain_1_s: float = 3.0
-    motion_gain_1_s: float = 2.0
-    formation_gain_1_s: float = 5.0
-    intervention_gain_1_s: float = 1.5
+    avoidance_gain_1_s: float = field(default=3.0, metadata=FROM_ZERO)
+    motion_gain_1_s: float = field(default=2.0, metadata=FROM_ZERO)
+    formation_gain_1_s: float = field(default=5.0, metadata=FROM_ZERO)
+    intervention_gain_1_s: float = field(default=1.5, metadata=FROM_ZERO)
     sensing_range_m: float = 4.0
 
 
@@ -87,10 +98,10 @@ class Decision:
 
     threshold: Threshold = field(default_factory=Threshold)
     trigger: str = "automaton"
-    release_m: float = 1.5
-    min_inter_event_s: float = 0.5
-    noise_m_sqrt_s: float = 0.0
-    leak_1_s: float = 0.0
+    release_m: float = field(default=1.5, metadata=FROM_ZERO)
+    min_inter_event_s: float = field(default=0.5, metadata=FROM_ZERO)
+    noise_m_sqrt_s: float = field(default=0.0, metadata=FROM_ZERO)
+    leak_1_s: float = field(default=0.0, metadata=FROM_ZERO)
     noise_period_s: float = 0.025
 
 
@@ -98,7 +109,7 @@ class Decision:
 class Policy:
     """One entry of the UAV's behaviour database: a policy's name and its numbers."""
 
-    name: str = "detour"
+    name: str = field(default_factory=str, metadata=REQUIRED)
     parameters: dict[str, float] = field(default_factory=dict)
 
 
@@ -111,7 +122,7 @@ class Intervention:
     """
 
     period_s: float = 0.05
-    retry_s: float = 1.0
+    retry_s: float = field(default=1.0, metadata=FROM_ZERO)
     ranking: str = "predicted"
     budget_s: float = 2.0
     policies: list[Policy] = field(default_factory=list)
@@ -133,10 +144,10 @@ class Gatekeeper:
     horizon_s: float = 3.0
     stages: int = 60
     error_weight_1_m2_s: float = 1.0
-    slack_weight_1_m2_s: float = 1000.0
-    switching_margin: float = 0.05
-    min_dwell_s: float = 0.2
-    max_bend: float = 0.5
+    slack_weight_1_m2_s: float = field(default=1000.0, metadata=FROM_ZERO)
+    switching_margin: float = field(default=0.05, metadata=FROM_ZERO)
+    min_dwell_s: float = field(default=0.2, metadata=FROM_ZERO)
+    max_bend: float = field(default=0.5, metadata=FROM_ZERO)
     budget: str = "counted"
     budget_iterations: int = 100
     budget_nodes: int = 15000
@@ -145,13 +156,13 @@ class Gatekeeper:
 
 @dataclass
 class Run:
-    """One simulation: a method of SPEC section 1 and what is expected of it.
+    """One simulation: a method (see `registry.METHODS`) and what is expected of it.
 
     `stalls_m` names the UGVs that must end (to within `stall_tolerance_m`) at that point short of their
     target. `expected` maps claim identifiers to the expected verdict; a claim not named must hold.
     """
 
-    method: str = "d"
+    method: str = field(default_factory=str, metadata=REQUIRED)
     composition: str = "augmented"
     stalls_m: dict[str, Vector] = field(default_factory=dict)
     expected: dict[str, str] = field(default_factory=dict)
@@ -161,14 +172,14 @@ class Run:
 class Reproduction:
     """One row of the reproduction table: a measure of a run against the paper's value."""
 
-    id: str = ""
-    quantity: str = ""
-    measure: str = ""
-    run: str = ""
-    robot: str = ""
-    paper: list[float] = field(default_factory=list)
+    id: str = field(default_factory=str, metadata=REQUIRED)
+    quantity: str = field(default_factory=str, metadata=REQUIRED)
+    measure: str = field(default_factory=str, metadata=REQUIRED)
+    run: str = field(default_factory=str, metadata=REQUIRED)
+    robot: str = field(default_factory=str, metadata=REQUIRED)
+    paper: list[float] = field(default_factory=list, metadata=REQUIRED)
     unit: str = ""
-    tolerance: float = 0.0
+    tolerance: float = field(default=0.0, metadata=FROM_ZERO)
     calibrated: bool = False
     why: str = ""
 
@@ -177,10 +188,10 @@ class Reproduction:
 class Choice:
     """Where a value that is not the paper's comes from: `source` is 'calibrated' or 'ours'."""
 
-    key: str = ""
-    source: str = "ours"
+    key: str = field(default_factory=str, metadata=REQUIRED)
+    source: str = field(default_factory=str, metadata=REQUIRED)
     paper: str = ""
-    reason: str = ""
+    reason: str = field(default_factory=str, metadata=REQUIRED)
 
 
 @dataclass
@@ -188,25 +199,27 @@ class Scenario:
     """A scenario file. The order of `ugvs` and `obstacles` is the order of all arrays.
 
     `expected` maps identifiers of claims about the model (proofs and experiments, whatever the run) to the
-    expected verdict; one that is not named must be proved, or supported if it is statistical.
+    expected verdict; one that is not named must be proved, or supported if it is statistical. `claims` adds claims
+    about runs to those of the package: `module:Class` by identifier.
     """
 
-    name: str = ""
+    name: str = field(default_factory=str, metadata=REQUIRED)
     title: str = ""
     description: str = ""
     seed: int = 0
     duration_s: float = 30.0
     arrival_tolerance_m: float = 0.1
     stall_tolerance_m: float = 0.1
-    ugvs: dict[str, Ugv] = field(default_factory=dict)
-    uav: Uav = field(default_factory=Uav)
-    obstacles: dict[str, Obstacle] = field(default_factory=dict)
+    ugvs: dict[str, Ugv] = field(default_factory=dict, metadata=REQUIRED)
+    uav: Uav = field(default_factory=Uav, metadata=REQUIRED)
+    obstacles: dict[str, Obstacle] = field(default_factory=dict, metadata=REQUIRED)
     safe_distance: SafeDistance = field(default_factory=SafeDistance)
     control: Control = field(default_factory=Control)
     decision: Decision = field(default_factory=Decision)
     intervention: Intervention = field(default_factory=Intervention)
     gatekeeper: Gatekeeper = field(default_factory=Gatekeeper)
-    runs: dict[str, Run] = field(default_factory=dict)
+    runs: dict[str, Run] = field(default_factory=dict, metadata=REQUIRED)
+    claims: dict[str, str] = field(default_factory=dict)
     expected: dict[str, str] = field(default_factory=dict)
     reproduction: list[Reproduction] = field(default_factory=list)
     choices: list[Choice] = field(default_factory=list)

@@ -1,7 +1,7 @@
 """What a well-formed scenario must satisfy to make sense: one small function per rule, all in `CHECKS`.
 
-A check yields its problems as (key, value, allowed); `check` raises the first. Constants that later stages
-share (methods, routes, claim identifiers) stand here, because nothing may be imported from right to left.
+A check yields its problems as (key, value, allowed); `check` raises the first. What may be named is looked up in
+`registry`; nothing that a scenario names is imported here.
 """
 
 from __future__ import annotations
@@ -15,38 +15,30 @@ from itertools import combinations, pairwise
 
 from airground_drake.decision.bayes import optimal_threshold
 from airground_drake.errors import Fault, ScenarioError
-from airground_drake.intervention.database import POLICIES, RANKINGS
+from airground_drake.intervention.database import RANKINGS
 from airground_drake.nsbc.avoidance import COMPOSITIONS
-from airground_drake.scenarios import schema
+from airground_drake.registry import (
+    METHODS,
+    MODEL_CLAIMS,
+    PLUGIN,
+    POLICIES,
+    ROUTES,
+    RUN_CLAIMS,
+    STATUSES,
+    UAV_TASKS,
+    Registry,
+    is_plugin,
+)
 from airground_drake.scenarios.schema import Scenario, Vector
 
-METHODS: tuple[str, ...] = ("a", "b", "c", "d")
-ROUTES: tuple[str, ...] = ("relaxed", "enumeration", "nonlinear", "branch_and_bound", "rollout")
 TRIGGERS: tuple[str, ...] = ("automaton", "bare")
 THRESHOLD_RULES: tuple[str, ...] = ("fixed", "bayes")
 SOURCES: tuple[str, ...] = ("calibrated", "ours")
 BUDGETS: tuple[str, ...] = ("counted", "wall_clock")
-CLAIMS: tuple[str, ...] = (
-    "SAFE-TRACE", "SAFE-HYP", "ZENO-TRACE", "THR-TRIG", "GATE-OPT", "GATE-SUR", "GATE-FEAS", "GATE-TIME", "LIVE-GOAL",
-    "COMM",
-)  # fmt: skip
-MODEL_CLAIMS: tuple[str, ...] = (
-    "SAFE-LEMMA", "SAFE-INV", "SAFE-GATE", "SAFE-DIST", "ZENO-PROOF", "ZENO-REFINE", "THR-ROOT", "THR-OPT", "THR-DDM",
-)  # fmt: skip
-STATUSES: tuple[str, ...] = ("proved", "holds", "supported", "refuted", "inconclusive", "error", "not_run")
 
 MAX_UGVS, MAX_STAGES, MAX_SEED = 100, 1000, 2**31 - 1
 LARGEST, SMALLEST = 1e9, 1e-9  # of any number; of a positive number: products and quotients stay finite
 TOLERANCE = 1e-9  # m between points; relative between periods
-
-NON_NEGATIVE: dict[type, tuple[str, ...]] = {
-    schema.Control: ("avoidance_gain_1_s", "motion_gain_1_s", "formation_gain_1_s", "intervention_gain_1_s"),
-    schema.Decision: ("release_m", "min_inter_event_s", "noise_m_sqrt_s", "leak_1_s"),
-    schema.Gatekeeper: ("slack_weight_1_m2_s", "switching_margin", "min_dwell_s", "max_bend"),
-    schema.Intervention: ("retry_s",),
-    schema.Reproduction: ("tolerance",),
-}
-"""Numbers that may be 0; every other number of the schema must be positive."""
 
 # Unit by the suffix of a key, the longest suffix first.
 _UNITS = {"m_sqrt_s": "m/sqrt(s)", "1_m2_s": "1/(m^2 s)", "m_s": "m/s", "1_s": "1/s", "m": "m", "s": "s"}
@@ -85,6 +77,11 @@ def _one_of(key: str, value: str, allowed: Iterable[str], what: str = "one of") 
         yield key, value, f"{what} {', '.join(options) or '(none)'}"
 
 
+def _registered(key: str, name: str, registry: Registry) -> Problems:
+    if not registry.accepts(name):
+        yield key, name, f"one of {', '.join(registry.allowed)}"
+
+
 def _nodes(value: object, key: str = "", name: str = "") -> Iterator[tuple[str, str, object]]:
     """(dotted key, name of the field or parameter, value) of a value and of everything in it."""
     yield key, name, value
@@ -107,7 +104,7 @@ def _finite(scenario: Scenario) -> Problems:
 def _bounds(scenario: Scenario) -> Problems:
     for key, _, value in _nodes(scenario):
         for field in fields(value) if is_dataclass(value) else ():
-            least = 0.0 if field.name in NON_NEGATIVE.get(type(value), ()) else SMALLEST
+            least = 0.0 if "from_zero" in field.metadata else SMALLEST
             if isinstance(field.default, float) and getattr(value, field.name) < least:
                 allowed = f"a number{unit_of(field.name, ' in ')}, not below {least:g}"
                 yield dotted(key, field.name), getattr(value, field.name), allowed
@@ -145,7 +142,10 @@ def _counts(scenario: Scenario) -> Problems:
 
 def _options(scenario: Scenario) -> Problems:
     yield from _one_of("intervention.ranking", scenario.intervention.ranking, RANKINGS)
-    yield from _one_of("gatekeeper.route", scenario.gatekeeper.route, ROUTES)
+    yield from _registered("gatekeeper.route", scenario.gatekeeper.route, ROUTES)
+    yield from _registered("uav.task", scenario.uav.task, UAV_TASKS)
+    for index, policy in enumerate(scenario.intervention.policies):
+        yield from _registered(f"intervention.policies.{index}.name", policy.name, POLICIES)
     yield from _one_of("gatekeeper.budget", scenario.gatekeeper.budget, BUDGETS)
     yield from _one_of("decision.trigger", scenario.decision.trigger, TRIGGERS)
     yield from _one_of("decision.threshold.rule", scenario.decision.threshold.rule, THRESHOLD_RULES)
@@ -158,11 +158,17 @@ def _runs(scenario: Scenario) -> Problems:
         for robot in run.stalls_m:
             yield from _one_of(f"runs.{name}.stalls_m.{robot}", robot, scenario.ugvs, "one of the UGVs")
         for claim, status in run.expected.items():
-            yield from _one_of(f"runs.{name}.expected.{claim}", claim, CLAIMS, "one of the claims")
+            known = (*RUN_CLAIMS, *scenario.claims)
+            yield from _one_of(f"runs.{name}.expected.{claim}", claim, known, "one of the claims")
             yield from _one_of(f"runs.{name}.expected.{claim}", status, STATUSES)
     for claim, status in scenario.expected.items():
         yield from _one_of(f"expected.{claim}", claim, MODEL_CLAIMS, "one of the claims about the model")
         yield from _one_of(f"expected.{claim}", status, STATUSES)
+    for claim, place in scenario.claims.items():
+        if claim in (*RUN_CLAIMS, *MODEL_CLAIMS) or not re.fullmatch(r"[A-Z][A-Z0-9-]*", claim):
+            yield f"claims.{claim}", claim, "a new identifier of capitals, digits and hyphens, such as MY-CLAIM"
+        if not is_plugin(place):
+            yield f"claims.{claim}", place, PLUGIN
 
 
 def _ugv_points(scenario: Scenario) -> Iterator[tuple[str, Vector]]:
@@ -202,7 +208,7 @@ def _presets(scenario: Scenario) -> Problems:
 
 def _gains(scenario: Scenario) -> Problems:
     period = scenario.control.period_s
-    for name in NON_NEGATIVE[schema.Control]:
+    for name in ("avoidance_gain_1_s", "motion_gain_1_s", "formation_gain_1_s", "intervention_gain_1_s"):
         gain = getattr(scenario.control, name)
         if gain * period > 1.0:
             yield f"control.{name}", gain, f"at most {1.0 / period:.9g} 1/s: gain * control.period_s must not exceed 1"
@@ -303,15 +309,8 @@ def _choices(scenario: Scenario) -> Problems:
         yield from _one_of(f"choices.{index}.source", choice.source, SOURCES)
 
 
-def _policies(scenario: Scenario) -> Problems:
-    known = (*sorted(POLICIES), "module:Class")
-    for index, policy in enumerate(scenario.intervention.policies):
-        if not re.fullmatch(r"[\w.]+:\w+", policy.name):  # a plug-in, which the behaviour database looks up
-            yield from _one_of(f"intervention.policies.{index}.name", policy.name, known, "one of the policies")
-
-
 CHECKS: tuple[Callable[[Scenario], Problems], ...] = (
     _finite, _bounds, _counts, _names, _options, _runs, _points, _presets, _gains, _periods, _release,
-    _distances, _sensing, _clearances, _reproduction, _choices, _policies,
+    _distances, _sensing, _clearances, _reproduction, _choices,
 )  # fmt: skip
 """Every rule; later ones rely on earlier ones (finite numbers, three coordinates)."""

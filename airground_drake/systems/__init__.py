@@ -4,6 +4,7 @@ from airground_drake.systems.controllers import UavController, UgvController
 from airground_drake.systems.decision import DecisionVariable, EventTrigger
 from airground_drake.systems.gatekeeper import DirectAcceptance, Gatekeeper
 from airground_drake.systems.intervention import InterventionPlanner
+from airground_drake.systems.plant import VelocityDisturbance
 
 __all__ = [
     "DecisionVariable",
@@ -13,4 +14,5 @@ __all__ = [
     "InterventionPlanner",
     "UavController",
     "UgvController",
+    "VelocityDisturbance",
 ]

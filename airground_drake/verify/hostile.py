@@ -11,6 +11,7 @@ import numpy.typing as npt
 from airground_drake.arrays import Array
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance, Composition, HalfSpaces, Surroundings
+from airground_drake.nsbc.law import UgvLaw
 from airground_drake.nsbc.motion import Motion
 from airground_drake.nsbc.team import Team
 from airground_drake.systems.controllers import UavController, UgvController
@@ -129,10 +130,8 @@ def hostile_team(inputs: Inputs, count: int, composition: Composition, on_top: b
         team = replace(team, obstacles=np.zeros((1, 3)))
     n, avoidance = len(team.ugvs), running_avoidance(inputs, composition)
     neighbourhood, mobility = team.neighbourhood(slice(0, n)), team.mobility[:n]
-    controller = UgvController(
-        team, avoidance, motion_gain=inputs["motion_gain_1_s"], intervention_gain=inputs["intervention_gain_1_s"],
-        intervention_on_top=on_top,
-    )  # fmt: skip
+    law = UgvLaw(avoidance, inputs["motion_gain_1_s"], inputs["intervention_gain_1_s"], on_top)
+    controller = UgvController(team, law)
 
     def command(positions: Array, wanted: Array, asked: npt.NDArray[np.bool_]) -> tuple[Array, HalfSpaces]:
         accepted: list[Proposal | None] = [
@@ -184,7 +183,7 @@ class _Flier:
     def __init__(self, team: Team, avoidance: Avoidance) -> None:
         self._avoidance = avoidance
         self._neighbourhood = team.neighbourhood(slice(len(team.ugvs), None))
-        self._system = UavController(team, avoidance, formation_gain=1.0 / avoidance.period, altitude=-100.0)
+        self._system = UavController(team, avoidance, gain=1.0 / avoidance.period, altitude=-100.0)
         self._context = self._system.CreateDefaultContext()
 
     def missed(self, positions: Array) -> int:

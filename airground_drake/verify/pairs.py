@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from airground_drake.diagram import build_model, make_team
+from airground_drake.components import make_team
+from airground_drake.diagram import build_model
 from airground_drake.nsbc.avoidance import Avoidance, Composition
 from airground_drake.nsbc.team import Team
 from airground_drake.scenarios.schema import Scenario

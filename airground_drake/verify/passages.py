@@ -24,8 +24,8 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource, LogVectorOutput, RandomSource, TrajectorySource
 
+from airground_drake.components import integrated_noise, stack_presets
 from airground_drake.decision.bayes import decision_time, error_rate, optimal_threshold
-from airground_drake.diagram import integrated_noise, stack_presets
 from airground_drake.nsbc.motion import Motion
 from airground_drake.systems.decision import DecisionVariable
 

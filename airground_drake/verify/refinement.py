@@ -27,8 +27,8 @@ from typing import Any
 import numpy as np
 
 from airground_drake.arrays import Array
+from airground_drake.components import make_trigger, threshold
 from airground_drake.decision.trigger import Trigger
-from airground_drake.diagram import make_trigger, threshold
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.counting import HALVINGS, PATHS, SEED, SERIES, Experiment, counts, expected_bare, experiment
 from airground_drake.verify.verdict import Finding, ModelClaim, Status

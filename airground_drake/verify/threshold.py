@@ -15,8 +15,8 @@ from typing import Any, Literal
 
 from scipy.optimize import brentq
 
+from airground_drake.components import threshold
 from airground_drake.decision.bayes import bayes_risk, optimal_threshold
-from airground_drake.diagram import threshold
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.smt import solve
 from airground_drake.verify.obligation import rational

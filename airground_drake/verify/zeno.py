@@ -22,8 +22,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+from airground_drake.components import make_trigger, threshold
 from airground_drake.decision.trigger import Mode, Trigger, TriggerState
-from airground_drake.diagram import make_trigger, threshold
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.smt import solve
 from airground_drake.verify.automaton import conformance, relation, rounding

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 from pydrake.solvers import ClarabelSolver, MathematicalProgram
 
-from airground_drake import diagram
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.problem import Decision, Problem
 from airground_drake.report.audit.item import Item
@@ -27,7 +26,7 @@ def _run(name: str, run: str, changes: tuple[str, ...] = ()) -> Trace:
     return simulate(load(name, changes)[0], run)
 
 
-class _Credulous:
+class Credulous:
     """A route that calls every proposal a great gain."""
 
     def decide(self, problem: Problem, budget: Budget) -> Decision:
@@ -37,13 +36,8 @@ class _Credulous:
 
 def _accepting(name: str, run: str) -> Trace:
     """A run whose gatekeeper accepts everything, however much the inequalities bend it."""
-    diagram.ROUTES["credulous"] = _Credulous
-    try:
-        scenario = load(name, ("gatekeeper.max_bend=1e9",))[0]
-        scenario.gatekeeper.route = "credulous"
-        return simulate(scenario, run)
-    finally:
-        del diagram.ROUTES["credulous"]
+    route = f"{Credulous.__module__}:{Credulous.__name__}"
+    return _run(name, run, ("gatekeeper.max_bend=1e9", f"gatekeeper.route={route}"))
 
 
 def _sign() -> Item:

@@ -1,0 +1,147 @@
+"""From a scenario to the objects that the diagram is made of: one factory each, used by whoever judges them, too."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from pydrake.systems.primitives import AffineSystem, LinearSystem
+from pydrake.trajectories import PiecewisePolynomial
+
+from airground_drake.arrays import Array
+from airground_drake.decision.bayes import optimal_threshold
+from airground_drake.decision.trigger import Trigger
+from airground_drake.gatekeeper.budget import Budget
+from airground_drake.gatekeeper.prediction import Horizon
+from airground_drake.intervention.database import BehaviourDatabase, make_policy
+from airground_drake.nsbc.avoidance import Avoidance, Composition
+from airground_drake.nsbc.law import UgvLaw
+from airground_drake.nsbc.motion import Motion
+from airground_drake.nsbc.team import Team
+from airground_drake.registry import ROUTES, Method
+from airground_drake.scenarios.schema import Scenario
+from airground_drake.systems.gatekeeper import Route, Rules
+
+
+def make_avoidance(scenario: Scenario, composition: Composition = "augmented") -> Avoidance:
+    """The set-based avoidance layer."""
+    control = scenario.control
+    return Avoidance(control.avoidance_gain_1_s, control.period_s, control.sensing_range_m, composition)
+
+
+def make_law(scenario: Scenario, method: Method, composition: Composition = "augmented") -> UgvLaw:
+    """The numbers of the UGVs' control law under a method."""
+    control, avoidance = scenario.control, make_avoidance(scenario, composition)
+    return UgvLaw(avoidance, control.motion_gain_1_s, control.intervention_gain_1_s, method.intervention_on_top)
+
+
+def make_database(scenario: Scenario, method: Method) -> BehaviourDatabase:
+    """The UAV's behaviours; none under a method without interventions.
+
+    Raises:
+        UnknownNameError, PluginError: if the scenario names a policy that cannot be made.
+    """
+    given = scenario.intervention
+    policies = given.policies if method.intervenes else []
+    return BehaviourDatabase(
+        [(entry.name, make_policy(entry.name, entry.parameters)) for entry in policies],
+        retry=given.retry_s,
+        ranking=given.ranking,  # type: ignore[arg-type]
+        budget=given.budget_s,
+    )
+
+
+def make_route(scenario: Scenario) -> Route:
+    """How the gatekeeper's problem (26) is solved.
+
+    Raises:
+        UnknownNameError, PluginError: if the scenario names a route that cannot be made.
+    """
+    route: Route = ROUTES.load(scenario.gatekeeper.route, of=object)()  # type: ignore[assignment]
+    return route
+
+
+def first_order_plant(robot: str, start: Array) -> LinearSystem:
+    """p_dot = v for one robot: input v (3,), m/s; output p (3,), m, world frame; default state `start` (3,), m."""
+    eye, zero = np.eye(3), np.zeros((3, 3))
+    plant = LinearSystem(A=zero, B=eye, C=eye, D=zero)
+    plant.configure_default_state(start)
+    return plant
+
+
+def make_starts(scenario: Scenario) -> Array:
+    """Initial positions of the UGVs and the UAV, (n + 1, 3), m."""
+    return positions([*(ugv.start_m for ugv in scenario.ugvs.values()), scenario.uav.start_m])
+
+
+def make_team(scenario: Scenario) -> Team:
+    """Names, safe distances and speed limits of the scenario's robots."""
+    speeds = [ugv.max_speed_m_s for ugv in scenario.ugvs.values()]
+    return Team(
+        ugvs=tuple(scenario.ugvs),
+        uav=scenario.uav.name,
+        obstacles=positions([obstacle.position_m for obstacle in scenario.obstacles.values()]),
+        obstacle_distance=scenario.safe_distance.obstacle_m,
+        ugv_distance=scenario.safe_distance.ugv_m,
+        air_ground_distance=scenario.safe_distance.air_ground_m,
+        max_speed=np.array([*speeds, scenario.uav.max_speed_m_s]),
+    )
+
+
+def make_presets(scenario: Scenario) -> list[Motion]:
+    """Preset trajectories of the UGVs."""
+    return [Motion.at_speed(positions(ugv.preset.waypoints_m), ugv.preset.speed_m_s) for ugv in scenario.ugvs.values()]
+
+
+def make_horizon(scenario: Scenario) -> Horizon:
+    """The gatekeeper's grid and weights."""
+    gate = scenario.gatekeeper
+    substeps = round(gate.horizon_s / gate.stages / scenario.control.period_s)
+    return Horizon(gate.stages, substeps, gate.error_weight_1_m2_s, gate.slack_weight_1_m2_s)
+
+
+def make_rules(scenario: Scenario) -> Rules:
+    """When the gatekeeper's decisions become answers, and what they may cost."""
+    gate = scenario.gatekeeper
+    return Rules(
+        switching_margin=gate.switching_margin,
+        min_dwell=gate.min_dwell_s,
+        max_bend=gate.max_bend,
+        budget=Budget(gate.budget_iterations, gate.budget_nodes),
+        budget_share=gate.budget_share if gate.budget == "wall_clock" else None,
+    )
+
+
+def make_trigger(scenario: Scenario, zeta: float) -> Trigger:
+    """The trigger automaton with threshold zeta, m."""
+    if scenario.decision.trigger == "bare":
+        return Trigger.bare(zeta)
+    return Trigger(zeta, scenario.decision.release_m, scenario.decision.min_inter_event_s)
+
+
+def threshold(scenario: Scenario) -> float:
+    """Decision threshold zeta, m: the fixed one, or the minimiser of the Bayes risk (16)."""
+    rule = scenario.decision.threshold
+    if rule.rule == "bayes":
+        return optimal_threshold(rule.drift_m_s, rule.noise_m_sqrt_s, rule.c1_1_s, rule.c2)
+    return rule.zeta_m
+
+
+def positions(rows: Sequence[Sequence[float]]) -> Array:
+    """Points as an array, (n, 3), m, also where there are none."""
+    return np.array(rows, dtype=np.float64).reshape(-1, 3)
+
+
+def stack_presets(presets: list[Motion]) -> PiecewisePolynomial:
+    """All presets as one trajectory of 3n components over the union of their vertices."""
+    times = np.unique(np.concatenate([preset.times for preset in presets]))
+    samples = np.concatenate([preset.sample(times) for preset in presets], axis=1)
+    return PiecewisePolynomial.FirstOrderHold(times, samples.T)
+
+
+def integrated_noise(count: int, intensity: float, leak: float, period: float) -> AffineSystem:
+    """dn = -leak n dt + intensity dW for noise samples held over `period`: Euler-Maruyama on that grid."""
+    eye, zero = np.eye(count), np.zeros(count)
+    return AffineSystem(
+        A=-leak * eye, B=intensity / np.sqrt(period) * eye, f0=zero, C=eye, D=0.0 * eye, y0=zero, time_period=0.0
+    )

@@ -1,0 +1,226 @@
+"""What can be named in a scenario or on the command line: each name is declared here, once.
+
+Validation, command line, report and documentation look names up here; what a name stands for is imported when it
+is used. A registry also knows what installed packages add through entry points, and takes `module:Class` for
+anything that can be imported:
+
+    [project.entry-points."airground_drake.policies"]
+    orbit = "my_package.orbit:Orbit"
+"""
+
+from __future__ import annotations
+
+import importlib
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import entry_points
+from typing import Literal, TypeVar, get_args
+
+from airground_drake.errors import PluginError, UnknownNameError
+
+T = TypeVar("T")
+
+PLUGIN = "module:Class"
+"""How anything that is not registered is named."""
+
+
+class Registry:
+    """Classes of one kind by name: the package's own, those of entry points, and `module:Class`."""
+
+    def __init__(self, kind: str, plural: str, own: Mapping[str, str]) -> None:
+        """Declare the package's own.
+
+        Args:
+            kind: what they are, for messages.
+            plural: last part of the entry points' group, `airground_drake.<plural>`.
+            own: `module:Class` by name, in the order in which they are listed.
+        """
+        self.kind = kind
+        self.group = f"airground_drake.{plural}"
+        self._own = dict(own)
+        self._added: dict[str, type] = {}
+
+    def __iter__(self) -> Iterator[str]:
+        """Every registered name: the package's own first, then those of entry points, sorted."""
+        yield from {**self._own, **dict.fromkeys(sorted(_entry_points(self.group))), **self._added}
+
+    def __contains__(self, name: object) -> bool:
+        return name in tuple(self)
+
+    @property
+    def own(self) -> tuple[str, ...]:
+        """Names of what comes with the package."""
+        return tuple(self._own)
+
+    @property
+    def allowed(self) -> tuple[str, ...]:
+        """What may be written where a name is wanted: the names, and `module:Class`."""
+        return (*self, PLUGIN)
+
+    def accepts(self, name: str) -> bool:
+        """Whether a name is registered, or has the form `module:Class`; nothing is imported."""
+        return name in self or is_plugin(name)
+
+    def load(self, name: str, of: type[T]) -> type[T]:
+        """The class that a name stands for.
+
+        Args:
+            name: registered, or `module:Class`.
+            of: what it must be a subclass of (or a protocol that it must meet).
+
+        Raises:
+            UnknownNameError: if the name is not registered and not of the form `module:Class`.
+            PluginError: if it cannot be imported, or is something else.
+        """
+        found: object = self._added.get(name)
+        if found is None:
+            place = self._own.get(name) or _entry_points(self.group).get(name) or (name if is_plugin(name) else None)
+            if place is None:
+                raise UnknownNameError(self.kind, name, self.allowed)
+            module, _, attribute = place.partition(":")
+            try:
+                found = getattr(importlib.import_module(module), attribute)
+            except Exception as error:  # a module of others may raise anything when it is imported
+                raise PluginError(f"{self.kind} {name!r} cannot be imported: {error}") from error
+        if not (isinstance(found, type) and issubclass(found, of)):
+            raise PluginError(f"{self.kind} {name!r} is not a subclass of {of.__module__}.{of.__qualname__}")
+        return found
+
+    @contextmanager
+    def adding(self, name: str, what: type) -> Iterator[None]:
+        """Have a class under a name for the time being (in a notebook, a benchmark or a test)."""
+        before = self._added.get(name)
+        self._added[name] = what
+        try:
+            yield
+        finally:
+            del self._added[name]
+            if before is not None:
+                self._added[name] = before
+
+
+def is_plugin(name: str) -> bool:
+    """Whether a name has the form `module:Class`."""
+    return re.fullmatch(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*", name) is not None
+
+
+@cache
+def _entry_points(group: str) -> dict[str, str]:
+    """`module:Class` by name, of all installed packages."""
+    return {point.name: point.value for point in entry_points(group=group)}
+
+
+@dataclass(frozen=True)
+class Method:
+    """One of the ways in which UAV and UGVs can be coupled.
+
+    Attributes:
+        id: as in scenario files.
+        says: in words.
+        intervenes: whether the UAV proposes anything.
+        gated: whether the UGVs decide about proposals by optimisation, (21)-(29).
+        intervention_on_top: priorities of (20); False: avoidance above the intervention.
+    """
+
+    id: str
+    says: str
+    intervenes: bool
+    gated: bool
+    intervention_on_top: bool
+
+
+METHODS: dict[str, Method] = {
+    method.id: method
+    for method in (
+        Method("a", "no intervention", intervenes=False, gated=False, intervention_on_top=True),
+        Method("b", "direct intervention, no gatekeeper", intervenes=True, gated=False, intervention_on_top=True),
+        Method("c", "the paper's MPC gatekeeper", intervenes=True, gated=True, intervention_on_top=True),
+        Method("d", "certified gatekeeper", intervenes=True, gated=True, intervention_on_top=False),
+    )
+}
+"""The methods that are compared, by identifier: (a) to (c) are the paper's."""
+
+
+def method_of(name: str) -> Method:
+    """A method by its identifier.
+
+    Raises:
+        UnknownNameError: if there is no such method.
+    """
+    if name not in METHODS:
+        raise UnknownNameError("method", name, METHODS)
+    return METHODS[name]
+
+
+POLICIES = Registry(
+    "policy",
+    "policies",
+    {
+        "detour": "airground_drake.intervention.detour:Detour",
+        "towards": "airground_drake.intervention.wrong:Towards",
+        "stale_map": "airground_drake.intervention.wrong:StaleMap",
+        "noisy": "airground_drake.intervention.wrong:Noisy",
+        "hostile": "airground_drake.intervention.wrong:Hostile",
+    },
+)
+"""Intervention policies: subclasses of `intervention.policy.Policy`."""
+
+ROUTES = Registry(
+    "route",
+    "routes",
+    {
+        "relaxed": "airground_drake.gatekeeper.relaxed:RelaxedRoute",
+        "enumeration": "airground_drake.gatekeeper.enumeration:EnumerationRoute",
+        "nonlinear": "airground_drake.gatekeeper.nonlinear:NonlinearRoute",
+        "branch_and_bound": "airground_drake.gatekeeper.branch:BranchAndBoundRoute",
+        "rollout": "airground_drake.gatekeeper.rollout:RolloutRoute",
+    },
+)
+"""Ways to solve the gatekeeper's problem (26)."""
+
+UAV_TASKS = Registry("task", "uav_tasks", {"formation": "airground_drake.nsbc.tasks:FormationTask"})
+"""What the UAV does below obstacle avoidance: subclasses of `nsbc.tasks.UavTask`."""
+
+RUN_CLAIMS = Registry(
+    "claim",
+    "run_claims",
+    {
+        "SAFE-TRACE": "airground_drake.verify.runs.safe_trace:SafeTrace",
+        "SAFE-HYP": "airground_drake.verify.runs.safe_hyp:SafeHyp",
+        "ZENO-TRACE": "airground_drake.verify.runs.zeno_trace:ZenoTrace",
+        "THR-TRIG": "airground_drake.verify.runs.thr_trig:ThrTrig",
+        "GATE-OPT": "airground_drake.verify.runs.gate_opt:GateOpt",
+        "GATE-SUR": "airground_drake.verify.runs.gate_sur:GateSur",
+        "GATE-FEAS": "airground_drake.verify.runs.gate_feas:GateFeas",
+        "GATE-TIME": "airground_drake.verify.runs.gate_time:GateTime",
+        "LIVE-GOAL": "airground_drake.verify.runs.live_goal:LiveGoal",
+        "COMM": "airground_drake.verify.runs.comm:Comm",
+    },
+)
+"""Claims that are decided from one trace, in the order of the report: subclasses of `verify.claim.TraceClaim`."""
+
+MODEL_CLAIMS = Registry(
+    "claim",
+    "model_claims",
+    {
+        "SAFE-LEMMA": "airground_drake.verify.model.avoidance.safe_lemma:SafeLemma",
+        "SAFE-INV": "airground_drake.verify.model.avoidance.safe_inv:SafeInv",
+        "SAFE-GATE": "airground_drake.verify.model.avoidance.safe_gate:SafeGate",
+        "SAFE-DIST": "airground_drake.verify.model.avoidance.safe_dist:SafeDist",
+        "ZENO-PROOF": "airground_drake.verify.model.trigger.zeno_proof:ZenoProof",
+        "ZENO-REFINE": "airground_drake.verify.model.trigger.zeno_refine:ZenoRefine",
+        "THR-ROOT": "airground_drake.verify.model.threshold.thr_root:ThrRoot",
+        "THR-OPT": "airground_drake.verify.model.threshold.thr_opt:ThrOpt",
+        "THR-DDM": "airground_drake.verify.model.threshold.thr_ddm:ThrDdm",
+    },
+)
+"""Claims about the model, whatever the run, in the order of the report: subclasses of `verify.claim.ModelClaim`."""
+
+Status = Literal["proved", "holds", "supported", "refuted", "inconclusive", "error", "not_run"]
+"""What can come of a claim."""
+STATUSES: tuple[Status, ...] = get_args(Status)
+PASSING: tuple[Status, ...] = ("proved", "holds", "supported")
+"""Statuses in which the claim was established, each in its way."""

@@ -1,0 +1,190 @@
+"""Using the package from Python: what is wrong is said, and a diagram is what its docstring promises."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder, System
+from pydrake.systems.primitives import ConstantVectorSource, Integrator, LinearSystem
+
+import airground_drake
+from airground_drake import ScenarioError, UnknownNameError, build_diagram, load, simulate
+from airground_drake.components import first_order_plant
+from airground_drake.errors import PluginError
+from airground_drake.nsbc.task import Array
+from airground_drake.nsbc.tasks import PositionTask
+from airground_drake.scenarios.load import resolved, validated
+from airground_drake.scenarios.schema import Scenario
+
+Edit = Callable[[Scenario], Any]
+
+
+def set_to(path: str, value: Any) -> Edit:
+    def edit(scenario: Scenario) -> None:
+        *parents, last = path.split(".")
+        node: Any = scenario
+        for part in parents:
+            node = node[part] if isinstance(node, dict) else getattr(node, part)
+        if isinstance(node, dict):
+            node[last] = value
+        else:
+            setattr(node, last, value)
+
+    return edit
+
+
+@pytest.mark.parametrize(
+    ("edit", "said"),
+    [
+        (set_to("control.period_s", "fast"), "control.period_s: 'fast' is not allowed; wanted: a number in s"),
+        (set_to("control.period_s", float("nan")), "control.period_s: nan is not allowed"),
+        (set_to("control.period_s", -0.05), "control.period_s: -0.05 is not allowed"),
+        (set_to("ugvs.ugv1.start_m", [0.0, 0.0]), "ugvs.ugv1.start_m: .* is not allowed; 3 numbers in m"),
+        (set_to("ugvs.ugv1.start_m", None), "ugvs.ugv1.start_m: no value is given"),
+        (set_to("ugvs.ugv1", 3), "ugvs.ugv1: 3 is not allowed; wanted: a mapping"),
+        (set_to("seed", 1.5), "seed: 1.5 is not allowed; wanted: a whole number"),
+        (set_to("gatekeeper.route", "magic"), "gatekeeper.route: 'magic' is not allowed"),
+        (set_to("uav.task", "hover"), "uav.task: 'hover' is not allowed; one of formation, module:Class"),
+        (set_to("runs.d.method", "e"), "runs.d.method: 'e' is not allowed"),
+        (set_to("obstacles", {"o": object()}), "obstacles.o"),
+    ],
+)
+@pytest.mark.parametrize("use", [build_diagram, lambda scenario: simulate(scenario, "d"), validated])
+def test_a_scenario_made_in_python_is_checked_like_a_file(
+    case_a: Scenario, edit: Edit, said: str, use: Callable[[Scenario], Any]
+) -> None:
+    edit(case_a)
+    with pytest.raises(ScenarioError, match=said):
+        use(case_a)
+
+
+def test_no_scenario_at_all() -> None:
+    with pytest.raises(ScenarioError, match="str is no Scenario"):
+        build_diagram("case_a")  # type: ignore[arg-type]
+
+
+def test_numbers_of_numpy_and_tuples_may_stand_in_a_scenario(case_a: Scenario) -> None:
+    before = validated(case_a)
+    case_a.ugvs["ugv1"].start_m = np.array(case_a.ugvs["ugv1"].start_m)  # type: ignore[assignment]
+    case_a.uav.start_m = tuple(case_a.uav.start_m)  # type: ignore[assignment]
+    case_a.duration_s = np.float64(case_a.duration_s)
+    case_a.seed = np.int64(case_a.seed)  # type: ignore[assignment]
+    assert validated(case_a) == before
+    assert resolved(validated(case_a)) == resolved(before)
+
+
+def test_overrides_as_a_dict() -> None:
+    changes = {"seed": 7, "decision.noise_m_sqrt_s": np.float64(0.02), "ugvs.ugv1.start_m": (1.0, 0.5, 0.0)}
+    scenario, digest = load("case_a", changes)
+    texts = ["seed=7", "decision.noise_m_sqrt_s=0.02", "ugvs.ugv1.start_m=[1.0, 0.5, 0.0]"]
+    assert (scenario, digest) == load("case_a", texts)
+    with pytest.raises(ScenarioError, match=r"decision\.nose"):
+        load("case_a", {"decision.nose": 1.0})
+    with pytest.raises(ScenarioError, match="not JSON serializable"):
+        load("case_a", {"seed": object()})
+
+
+def test_unknown_names_say_what_is_allowed(case_a: Scenario) -> None:
+    with pytest.raises(UnknownNameError, match="unknown run 'z'; allowed: a, b, c, d"):
+        simulate(case_a, "z")
+    with pytest.raises(UnknownNameError, match="unknown method 'z'; allowed: a, b, c, d"):
+        build_diagram(case_a, method="z")
+    with pytest.raises(UnknownNameError, match="unknown composition 'z'; allowed: augmented"):
+        build_diagram(case_a, composition="z")  # type: ignore[arg-type]
+
+
+def test_everything_in_all_is_there() -> None:
+    for name in airground_drake.__all__:
+        assert getattr(airground_drake, name) is not None
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        _ = airground_drake.nothing
+
+
+def starts(scenario: Scenario) -> Array:
+    return np.array([*(ugv.start_m for ugv in scenario.ugvs.values()), scenario.uav.start_m])
+
+
+@pytest.mark.parametrize("method", ["a", "b", "c", "d"])
+def test_in_the_default_context_every_robot_is_at_its_start(case_a: Scenario, method: str) -> None:
+    diagram = build_diagram(case_a, method)
+    context = diagram.CreateDefaultContext()
+    assert np.array_equal(diagram.GetOutputPort("team_position").Eval(context).reshape(-1, 3), starts(case_a))
+
+
+def test_it_runs_without_the_recorder(case_a: Scenario) -> None:
+    diagram = build_diagram(case_a, "d")
+    simulator = Simulator(diagram)
+    simulator.get_mutable_context().SetAccuracy(1e-6)
+    simulator.AdvanceTo(1.0)
+    positions = diagram.GetOutputPort("team_position").Eval(simulator.get_context()).reshape(-1, 3)
+    assert np.linalg.norm(positions[0] - starts(case_a)[0]) > 0.5
+    assert build_diagram(case_a).get_name() == "case_a_method_a"
+
+
+def drifted(case_a: Scenario, robot: str, drift: Array | None) -> Array:
+    """Positions (n + 1, 3), m, after 1 s in a larger diagram that disturbs one robot."""
+    builder = DiagramBuilder()
+    inner = builder.AddNamedSystem("airground", build_diagram(case_a, "d"))
+    if drift is not None:
+        wind = builder.AddNamedSystem("wind", ConstantVectorSource(drift))
+        builder.Connect(wind.get_output_port(), inner.GetInputPort(f"disturbance_{robot}"))
+    builder.ExportOutput(inner.GetOutputPort("team_position"), "positions")
+    outer = builder.Build()
+    simulator = Simulator(outer)
+    simulator.get_mutable_context().SetAccuracy(1e-6)
+    simulator.AdvanceTo(1.0)
+    return np.array(outer.GetOutputPort("positions").Eval(simulator.get_context()).reshape(-1, 3))
+
+
+def test_it_can_be_embedded_and_disturbed(case_a: Scenario) -> None:
+    still, nothing = drifted(case_a, "ugv2", None), drifted(case_a, "ugv2", np.zeros(3))
+    assert np.array_equal(still, nothing)
+    moved = drifted(case_a, "ugv2", np.array([-0.2, 0.0, 0.0]))
+    # tracking with gain B = 2 1/s holds against w up to an offset w (1 - exp(-B t)) / B
+    expected = -0.2 * (1.0 - np.exp(-2.0)) / 2.0
+    assert moved[1, 0] - still[1, 0] == pytest.approx(expected, rel=0.1)
+    assert np.abs(moved[0] - still[0]).max() < 1e-9
+
+
+def test_another_plant(case_a: Scenario) -> None:
+    """UGV2's motors pass on nine tenths of what they are asked for."""
+
+    def weak(robot: str, start: Array) -> System:
+        if robot != "ugv2":
+            return first_order_plant(robot, start)
+        plant = LinearSystem(A=np.zeros((3, 3)), B=0.9 * np.eye(3), C=np.eye(3), D=np.zeros((3, 3)))
+        plant.configure_default_state(start)
+        return plant
+
+    ends = []
+    for plants in (first_order_plant, weak):
+        diagram = build_diagram(case_a, "d", plants=plants)
+        simulator = Simulator(diagram)
+        simulator.get_mutable_context().SetAccuracy(1e-6)
+        simulator.AdvanceTo(0.05)
+        ends.append(diagram.GetOutputPort("team_position").Eval(simulator.get_context()).reshape(-1, 3).copy())
+    steps = [end - starts(case_a) for end in ends]
+    assert steps[1][1] == pytest.approx(0.9 * steps[0][1])
+    assert np.array_equal(steps[0][0], steps[1][0])
+
+
+def test_a_plant_with_other_ports_is_refused(case_a: Scenario) -> None:
+    with pytest.raises(PluginError, match=r"the plant of ugv1 has inputs of sizes \[2\].*velocity \(3\) first"):
+        build_diagram(case_a, plants=lambda robot, start: Integrator(2))
+
+
+class Hold(PositionTask):
+    """The UAV stays where it is at (0, 0), at its altitude."""
+
+    def __init__(self, ugv_positions: Array, ugv_velocities: Array, altitude: float, gain: float) -> None:
+        super().__init__(np.array([[0.0, 0.0, altitude]]), np.zeros((1, 3)), gain)
+
+
+def test_another_task_of_the_uav(case_a: Scenario) -> None:
+    case_a.uav.task = f"{__name__}:Hold"
+    case_a.duration_s = 5.0
+    assert np.abs(simulate(case_a, "a").position("uav")[-1] - [0.0, 0.0, 2.0]).max() < 1e-3

@@ -1,0 +1,75 @@
+"""Names: declared once, imported when used, from the package, from entry points, or as `module:Class`."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from importlib.metadata import EntryPoint
+from typing import Any
+
+import pytest
+
+from airground_drake import registry
+from airground_drake.errors import PluginError, UnknownNameError
+from airground_drake.intervention.policy import Policy
+from airground_drake.registry import METHODS, MODEL_CLAIMS, POLICIES, ROUTES, RUN_CLAIMS, UAV_TASKS, Registry
+
+ALL = (POLICIES, ROUTES, UAV_TASKS, RUN_CLAIMS, MODEL_CLAIMS)
+
+
+@pytest.mark.parametrize("names", ALL, ids=lambda names: names.group)
+def test_every_name_stands_for_a_class(names: Registry) -> None:
+    for name in names.own:
+        assert isinstance(names.load(name, of=object), type)
+
+
+def test_a_policy_that_is_added_for_the_time_being() -> None:
+    class Mine(Policy):
+        def propose(self, seen: Any) -> None:
+            return None
+
+    with POLICIES.adding("mine", Mine):
+        assert POLICIES.load("mine", of=Policy) is Mine
+        assert "mine" in POLICIES
+    assert "mine" not in POLICIES
+
+
+@pytest.mark.parametrize(
+    ("name", "error", "said"),
+    [
+        ("detuor", UnknownNameError, "unknown policy 'detuor'; allowed: detour, towards"),
+        ("no_such_module:Thing", PluginError, "cannot be imported"),
+        ("math:no_such_thing", PluginError, "cannot be imported"),
+        ("math:pi", PluginError, "is not a subclass of airground_drake.intervention.policy.Policy"),
+        ("..:x", UnknownNameError, "unknown policy"),
+        ("", UnknownNameError, "unknown policy"),
+    ],
+)
+def test_what_stands_for_nothing_is_named(name: str, error: type[Exception], said: str) -> None:
+    with pytest.raises(error, match=said.replace("(", r"\(")):
+        POLICIES.load(name, of=Policy)
+
+
+def test_entry_points_of_other_packages(monkeypatch: pytest.MonkeyPatch) -> None:
+    point = EntryPoint("orbit", "airground_drake.intervention.detour:Detour", POLICIES.group)
+    monkeypatch.setattr(registry, "entry_points", lambda group: [point] if group == POLICIES.group else [])
+    registry._entry_points.cache_clear()
+    try:
+        assert POLICIES.accepts("orbit")
+        assert "orbit" in tuple(POLICIES)
+        assert POLICIES.load("orbit", of=Policy).__name__ == "Detour"
+        assert not ROUTES.accepts("orbit")
+    finally:
+        registry._entry_points.cache_clear()
+
+
+def test_methods_say_what_the_paper_has() -> None:
+    assert list(METHODS) == ["a", "b", "c", "d"]
+    assert [m.id for m in METHODS.values() if m.gated] == ["c", "d"]
+    assert [m.id for m in METHODS.values() if not m.intervention_on_top] == ["d"]
+
+
+def test_looking_names_up_imports_nothing() -> None:
+    program = "import sys, airground_drake.registry as r; assert 'detour' in r.POLICIES; print(*sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout.split()
+    assert not {"pydrake", "numpy", "numba", "pandas"} & set(loaded)
