@@ -19,8 +19,10 @@ from typing import Any
 from airground_drake import files, graphviz, trace
 from airground_drake.diagram import build_diagram
 from airground_drake.errors import AirgroundError, PluginError, ScenarioError, UnknownNameError
-from airground_drake.report import audit, document, figures, html, junit, refinement
-from airground_drake.report.panels import Figure
+from airground_drake.report import audit, document, html, junit
+from airground_drake.report.figures import zeno_refine
+from airground_drake.report.figures.draw import draw
+from airground_drake.report.figures.panels import Figure
 from airground_drake.scenarios.load import load, shipped
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.simulation import simulate_all
@@ -133,7 +135,7 @@ def write_report(
     if "junit" in formats:
         files.write_text(folder / "junit.xml", junit.render(report))
     if "html" in formats:
-        plates = [*figures.draw(scenario, traces), *_refinement(verdicts)]
+        plates = [*draw(scenario, traces), *_refinement(verdicts)]
         files.write_text(folder / "report.html", html.render(report, plates, drawn))
     if "json" in formats:
         files.write_json(folder / "report.json", report)
@@ -181,7 +183,7 @@ def _drop_stale(folder: Path, current: set[str]) -> None:
 
 def _refinement(verdicts: Sequence[Verdict]) -> list[Figure]:
     """The figure of ZENO-REFINE, if there is such a verdict."""
-    drawn = [refinement.draw(verdict.finding.evidence) for verdict in verdicts if verdict.claim.id == "ZENO-REFINE"]
+    drawn = [zeno_refine.draw(verdict.finding.evidence) for verdict in verdicts if verdict.claim.id == "ZENO-REFINE"]
     return [figure for figure in drawn if figure is not None]
 
 

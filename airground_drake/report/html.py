@@ -10,8 +10,8 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from airground_drake.report import svg
-from airground_drake.report.panels import Figure
+from airground_drake.report.figures import svg
+from airground_drake.report.figures.panels import Figure
 from airground_drake.report.reproduction import YES_NO
 
 MAX_DIAGRAM_CHARS = 500_000

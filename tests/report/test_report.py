@@ -15,8 +15,9 @@ import pandas as pd
 import pytest
 
 from airground_drake.errors import TraceError
-from airground_drake.report import canvas, document, figures, html, junit, metrics, reproduction, svg
-from airground_drake.report.panels import Figure
+from airground_drake.report import document, html, junit, metrics, reproduction
+from airground_drake.report.figures import canvas, draw, svg
+from airground_drake.report.figures.panels import Figure
 from airground_drake.report.reproduction import MEASURES
 from airground_drake.scenarios.schema import (
     Choice,
@@ -176,7 +177,7 @@ def traces(scenario: Scenario) -> dict[str, Trace]:
 
 @pytest.fixture(scope="module")
 def drawn(scenario: Scenario, traces: dict[str, Trace]) -> list[Figure]:
-    return figures.draw(scenario, traces)
+    return draw.draw(scenario, traces)
 
 
 def built(scenario: Scenario, traces: dict[str, Trace], verdicts: list[Verdict]) -> dict[str, Any]:
@@ -432,7 +433,7 @@ class TestFigures:
         scenario: Scenario, traces: dict[str, Trace], drawn: list[Figure]
     ) -> None:
         with matplotlib.rc_context({"font.size": 30.0, "axes.linewidth": 9.0, "svg.fonttype": "path"}):
-            assert figures.draw(scenario, traces) == drawn
+            assert draw.draw(scenario, traces) == drawn
 
     @staticmethod
     def test_named_small_and_with_data(drawn: list[Figure]) -> None:
@@ -458,11 +459,11 @@ class TestFigures:
 
     @staticmethod
     def test_without_traces_there_are_none(scenario: Scenario) -> None:
-        assert figures.draw(scenario, {}) == []
+        assert draw.draw(scenario, {}) == []
 
     @staticmethod
     def test_a_single_row_can_be_drawn(scenario: Scenario) -> None:
-        assert figures.draw(scenario, {"a": make_trace(scenario, "a", [(0, 3.3, 0.5), (0.1, 3.3, 0.5)], step_s=0.3)})
+        assert draw.draw(scenario, {"a": make_trace(scenario, "a", [(0, 3.3, 0.5), (0.1, 3.3, 0.5)], step_s=0.3)})
 
     @staticmethod
     def test_thinning_keeps_ends_and_extremes() -> None:
@@ -561,7 +562,7 @@ def hostile_page() -> str:
     finding = Finding("refuted", -1.0, HOSTILE, {HOSTILE: HOSTILE}, {"x": HOSTILE}, {HOSTILE: [HOSTILE]})
     report = built(scenario, traces, [*FINE, Verdict(claim(), HOSTILE, finding, "holds")])
     report["provenance"][HOSTILE] = report["provenance"]["command"] = HOSTILE
-    return html.render(report, figures.draw(scenario, traces), DIAGRAM)
+    return html.render(report, draw.draw(scenario, traces), DIAGRAM)
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from airground_drake.arrays import Array
-from airground_drake.report.canvas import (
+from airground_drake.report.figures.canvas import (
     ALARM,
     INK,
     MUTED,

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from airground_drake.arrays import Array
-from airground_drake.report import canvas, comparison, maps, timelines
+from airground_drake.report.figures import canvas, comparison, maps, timelines
+from airground_drake.report.figures.panels import MAX_TABLE_ROWS, Figure, Table, per_run, series
 from airground_drake.report.metrics import closest_obstacle, events_of, place
-from airground_drake.report.panels import MAX_TABLE_ROWS, Figure, Table, per_run, series
 from airground_drake.report.reproduction import MEASURES
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.trace import Trace

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure as Drawing
 
 from airground_drake.arrays import Array
 from airground_drake.registry import METHODS
-from airground_drake.report import canvas, svg
+from airground_drake.report.figures import canvas, svg
 from airground_drake.trace import Trace
 
 MAX_TABLE_ROWS = 31

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
-from airground_drake.report import canvas, svg
-from airground_drake.report.panels import Figure, Panel, Table
+from airground_drake.report.figures import canvas, svg
+from airground_drake.report.figures.panels import Figure, Panel, Table
 
 _SERIES = {"bare": "bare threshold", "automaton": "automaton"}
 

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from airground_drake.arrays import Array
-from airground_drake.report import canvas, maps, svg, timelines
+from airground_drake.report.figures import canvas, maps, svg, timelines
+from airground_drake.report.figures.panels import Figure, Panel, series
 from airground_drake.report.metrics import closest_obstacle, place
-from airground_drake.report.panels import Figure, Panel, series
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.trace import Trace
 
