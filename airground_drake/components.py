@@ -14,6 +14,7 @@ from airground_drake.decision.trigger import Trigger
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.prediction import Horizon
 from airground_drake.intervention.database import BehaviourDatabase, make_policy
+from airground_drake.intervention.planner import Planner
 from airground_drake.nsbc.avoidance import Avoidance, Composition
 from airground_drake.nsbc.law import UgvLaw
 from airground_drake.nsbc.motion import Motion
@@ -48,6 +49,23 @@ def make_database(scenario: Scenario, method: Method) -> BehaviourDatabase:
         retry=given.retry_s,
         ranking=given.ranking,  # type: ignore[arg-type]
         budget=given.budget_s,
+    )
+
+
+def make_planner(scenario: Scenario, method: Method) -> Planner:
+    """The UAV's planner, with what is on its map.
+
+    Raises:
+        UnknownNameError, PluginError: if the scenario names a policy that cannot be made.
+    """
+    return Planner(
+        ugvs=tuple(scenario.ugvs),
+        database=make_database(scenario, method),
+        period=scenario.intervention.period_s,
+        presets=tuple(make_presets(scenario)),
+        targets=positions([ugv.target_m for ugv in scenario.ugvs.values()]),
+        mapped=positions([each.position_m for each in scenario.obstacles.values() if each.known_to_uav]),
+        safe_distance=scenario.safe_distance.obstacle_m,
     )
 
 

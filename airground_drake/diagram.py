@@ -130,20 +130,7 @@ def build_model(
     )
     decision_variable = add("decision_variable", DecisionVariable(n))
     trigger = add("event_trigger", EventTrigger(n, components.make_trigger(scenario, zeta)))
-    planner = add(
-        "intervention_planner",
-        InterventionPlanner(
-            team.ugvs,
-            components.make_database(scenario, chosen),
-            period=scenario.intervention.period_s,
-            presets=presets,
-            targets=components.positions([ugv.target_m for ugv in scenario.ugvs.values()]),
-            known_obstacles=components.positions(
-                [obstacle.position_m for obstacle in scenario.obstacles.values() if obstacle.known_to_uav]
-            ),
-            safe_distance=team.obstacle_distance,
-        ),
-    )
+    planner = add("intervention_planner", InterventionPlanner(components.make_planner(scenario, chosen)))
     ugv_controller = add("ugv_controller", UgvController(team, law))
     uav_controller = add(
         "uav_controller",

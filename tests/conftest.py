@@ -1,39 +1,93 @@
-"""Session-scoped simulations: every test that needs a long run shares these."""
+"""What tests share: simulations, reports and proofs that take long are made once per session, whatever its workers."""
 
 from __future__ import annotations
 
+import itertools
 import os
-from collections.abc import Callable
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import pytest
-from hypothesis import settings
+from filelock import FileLock
+from hypothesis import HealthCheck, settings
 
+from airground_drake import trace
+from airground_drake.report.__main__ import main as write_report
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.simulation import simulate
+from airground_drake.systems import gatekeeper
 from airground_drake.trace import Trace
 
-settings.register_profile("airground", deadline=None)  # the first call compiles; nothing here asserts on time
-settings.load_profile("airground")
-
-
-@pytest.fixture(scope="session", autouse=True)
-def _cache(tmp_path_factory: pytest.TempPathFactory) -> None:
-    """Findings are kept in a folder of the session, not in the user's."""
-    os.environ["AIRGROUND_DRAKE_CACHE"] = str(tmp_path_factory.mktemp("kept"))
+# The first call compiles, and nothing here asserts on time: no deadlines. The default profile draws the same examples
+# each time, so that a green suite stays green; `pytest --hypothesis-profile=fuzz` looks for new ones.
+settings.register_profile("suite", deadline=None, derandomize=True, database=None)
+settings.register_profile("fuzz", deadline=None, max_examples=5000, suppress_health_check=list(HealthCheck))
+settings.load_profile("suite")
 
 
 @pytest.fixture(scope="session")
-def run() -> Callable[[str, str], Trace]:
+def shared(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder of this session that all its workers share."""
+    own = tmp_path_factory.getbasetemp()
+    folder = (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "shared"
+    folder.mkdir(exist_ok=True)
+    return folder
+
+
+def once(folder: Path, make: Callable[[Path], None]) -> Path:
+    """The folder, made by the first worker that wants it; the others wait."""
+    with FileLock(f"{folder}.lock"):
+        if not folder.exists():
+            unfinished = folder.with_name(f".{folder.name}")
+            shutil.rmtree(unfinished, ignore_errors=True)
+            make(unfinished)
+            unfinished.rename(folder)
+    return folder
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _cache(shared: Path) -> Iterator[None]:
+    """Findings are kept in a folder of the session, not in the user's."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("AIRGROUND_DRAKE_CACHE", str(shared / "kept"))
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _steady_clock() -> Iterator[None]:
+    """Every decision of a gatekeeper takes 1 ms by the clock: no verdict depends on what else the machine does."""
+    ticks = itertools.count()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(gatekeeper, "thread_time", lambda: 1e-3 * next(ticks))
+        yield
+
+
+@pytest.fixture(scope="session")
+def run(shared: Path) -> Callable[[str, str], Trace]:
     """`run(scenario, name)`: one simulation of a shipped scenario, made once per session."""
     made: dict[tuple[str, str], Trace] = {}
 
     def get(scenario: str, name: str) -> Trace:
         if (scenario, name) not in made:
-            made[scenario, name] = simulate(load(scenario)[0], name)
+            place = shared / f"{scenario}-{name}"
+            made[scenario, name] = trace.load(
+                once(place, lambda folder: trace.save(simulate(load(scenario)[0], name), folder))
+            )
         return made[scenario, name]
 
     return get
+
+
+@pytest.fixture(scope="session")
+def report(shared: Path) -> Callable[[str], Path]:
+    """`report(scenario)`: folder of the report of a shipped scenario, made once per session; not to be changed."""
+
+    def make(scenario: str, folder: Path) -> None:
+        assert write_report([scenario, "-o", str(folder)]) == 0
+
+    return lambda scenario: once(shared / f"report-{scenario}", lambda folder: make(scenario, folder))
 
 
 @pytest.fixture

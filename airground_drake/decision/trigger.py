@@ -66,6 +66,16 @@ class Trigger:
         """State at the initial time: already at or above the threshold triggers at once."""
         return self.rise(TriggerState(), t) if x >= self.zeta else TriggerState()
 
+    def step(self, state: TriggerState, t: float, x: float) -> TriggerState:
+        """State after an event at time t, s, with the decision variable x, m: the transition that is due, if any."""
+        if state.mode is Mode.SUPERVISING and x >= self.zeta:
+            return self.rise(state, t)
+        if state.mode is Mode.INTERVENING and x <= self.release:
+            return self.fall(state, t)
+        if state.mode is Mode.REFRACTORY and t >= self.dwell_end(state):
+            return self.recover(state, t, x)
+        return state
+
     def rise(self, state: TriggerState, t: float) -> TriggerState:
         """x has risen to zeta at time t, s, while supervising: a trigger."""
         return replace(state, mode=Mode.INTERVENING, triggers=state.triggers + 1, triggered_at=t)

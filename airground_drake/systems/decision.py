@@ -127,21 +127,12 @@ class EventTrigger(LeafSystem):
 
     def _leave(self, mode: Mode, context: Context, state: State) -> None:
         """Move every UGV whose time in the mode is over at this event; its witness has just crossed zero."""
-        t, trigger = context.get_time(), self._trigger
-        x = self._x.Eval(context)
+        t, x = context.get_time(), self._x.Eval(context)
         values = state.get_mutable_discrete_state().get_mutable_value(0)
         for j in range(self._count):
             before = _unpack(values, j)
-            if before.mode is not mode:
-                continue
-            after = before
-            if mode is Mode.SUPERVISING and x[j] >= trigger.zeta:
-                after = trigger.rise(before, t)
-            elif mode is Mode.INTERVENING and x[j] <= trigger.release:
-                after = trigger.fall(before, t)
-            elif mode is Mode.REFRACTORY and t >= trigger.dwell_end(before):
-                after = trigger.recover(before, t, float(x[j]))
-            values[FIELDS * j : FIELDS * (j + 1)] = _pack([after])
+            if before.mode is mode:
+                values[FIELDS * j : FIELDS * (j + 1)] = _pack([self._trigger.step(before, t, float(x[j]))])
 
 
 def _pack(states: list[TriggerState]) -> np.ndarray:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from time import thread_time
 from typing import Any, Literal, Protocol, Self
 
 import numpy as np
@@ -195,10 +196,10 @@ class Gatekeeper(LeafSystem):
                 since.append(t)
                 reports.append(())
                 continue
-            started = time.thread_time()
+            started = thread_time()
             problem = self._problem(t, i, proposal, positions, velocities)
             decision = self._route.decide(problem, next(deadlines))
-            self.decision_times_s.append(time.thread_time() - started)
+            self.decision_times_s.append(thread_time() - started)
             standing = answer_to(proposal, memory.answers, i)
             throughout = _throughout(problem, decision)
             accepted, reason = settle(decision, throughout, problem.bend, standing, t - memory.since[i], self._rules)

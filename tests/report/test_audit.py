@@ -9,11 +9,11 @@ from typing import Any
 import pytest
 
 from airground_drake.decision import bayes
+from airground_drake.registry import MODEL_CLAIMS
 from airground_drake.report import document
 from airground_drake.report.audit import companions, formulas, thresholds
 from airground_drake.scenarios.load import load
-from airground_drake.scenarios.validate import MODEL_CLAIMS
-from airground_drake.verify import Finding, verify_model
+from airground_drake.verify import Finding, cache_folder, verify_model
 from airground_drake.verify.mutants import refute_mutants
 
 FORMULAS = (2, 3, 4, 5, 8, 9, *range(12, 19))
@@ -26,7 +26,7 @@ def from_formulas(proofs: dict[str, Finding]) -> list[dict[str, Any]]:
 
 @pytest.fixture(scope="module")
 def proofs() -> dict[str, Finding]:
-    return {verdict.claim.id: verdict.finding for verdict in verify_model(load("case_a")[0])}
+    return {verdict.claim.id: verdict.finding for verdict in verify_model(load("case_a")[0], kept=cache_folder())}
 
 
 @pytest.fixture(scope="module")

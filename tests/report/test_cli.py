@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -12,24 +13,20 @@ from airground_drake.report.__main__ import main
 from airground_drake.scenarios.load import load
 from airground_drake.verify import __main__ as judge
 
-
-@pytest.fixture(scope="module")
-def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("report")
-    assert main(["case_a", "-o", str(folder)]) == 0
-    return folder
+Report = Callable[[str], Path]
 
 
-def test_everything_is_written(report: Path) -> None:
-    names = {path.name for path in report.iterdir()}
+def test_everything_is_written(report: Report) -> None:
+    folder = report("case_a")
+    names = {path.name for path in folder.iterdir()}
     assert names == {"report.html", "report.json", "junit.xml", "diagram.dot", "diagram.svg", "trace", "certificates"}
     scenario = load("case_a")[0]
     for name in scenario.runs:
-        assert trace.load(report / "trace" / name).run == name
+        assert trace.load(folder / "trace" / name).run == name
 
 
-def test_the_reproduction_table_meets_its_targets(report: Path) -> None:
-    document = json.loads((report / "report.json").read_text())
+def test_the_reproduction_table_meets_its_targets(report: Report) -> None:
+    document = json.loads((report("case_a") / "report.json").read_text())
     rows = {row["id"]: row for row in document["reproduction"]}
     assert max(abs(a - b) for a, b in zip(rows["A1"]["ours"], (3.3, 5.1), strict=True)) < 0.1
     assert all(abs(value - 2.0) < 0.01 for value in rows["A2"]["ours"])
@@ -42,9 +39,8 @@ def test_the_reproduction_table_meets_its_targets(report: Path) -> None:
     assert document["runs"]["d"]["metrics"]["min_distance_m"]["ugv1"]["obstacle_1"]["value"] >= 2.0 - 1e-9
 
 
-def test_case_b_meets_its_targets_too(tmp_path: Path) -> None:
-    assert main(["case_b", "-o", str(tmp_path), "--format", "json"]) == 0
-    document = json.loads((tmp_path / "report.json").read_text())
+def test_case_b_meets_its_targets_too(report: Report) -> None:
+    document = json.loads((report("case_b") / "report.json").read_text())
     statuses = {row["id"]: row["status"] for row in document["reproduction"]}
     wanted = {"B1": "reproduced", "B2": "calibrated", "B3": "calibrated", "B4": "not_reproduced", "B5": "reproduced"}
     assert statuses == wanted
@@ -102,10 +98,11 @@ def test_the_shipped_scenarios_are_listed(capsys: pytest.CaptureFixture[str]) ->
     assert capsys.readouterr().out.split() == ["case_a", "case_a_table1", "case_b", "soft_gate", "audit"]
 
 
-def test_claims_are_judged_again_from_a_saved_run(report: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    document = json.loads((report / "report.json").read_text())
+def test_claims_are_judged_again_from_a_saved_run(report: Report, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = report("case_a")
+    document = json.loads((folder / "report.json").read_text())
     of_d = {claim["id"]: claim for claim in document["claims"] if claim["run"] in ("d", "")}
-    assert judge.main([str(report / "trace" / "d"), "--json"]) == 0
+    assert judge.main([str(folder / "trace" / "d"), "--json"]) == 0
     again = {claim["id"]: claim for claim in json.loads(capsys.readouterr().out)}
     assert {name: claim["status"] for name, claim in again.items()} == {n: c["status"] for n, c in of_d.items()}
     assert again["SAFE-TRACE"]["margin"] == of_d["SAFE-TRACE"]["margin"]

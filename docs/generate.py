@@ -1,0 +1,193 @@
+"""`python docs/generate.py`: the parts of the documentation that follow from the code; a test holds them to it."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import re
+import textwrap
+from collections import defaultdict
+from collections.abc import Iterator
+from pathlib import Path
+
+from airground_drake.verify.claim import Claim
+
+import airground_drake
+from airground_drake import files
+from airground_drake.registry import METHODS, MODEL_CLAIMS, POLICIES, ROUTES, RUN_CLAIMS, UAV_TASKS, Registry
+from airground_drake.verify.mutants import MUTANTS
+
+DOCS = Path(__file__).parent
+PACKAGE = Path(airground_drake.__file__).parent
+WIDTH = 120
+
+EQUATIONS = {
+    "1": "task value sigma = f(rho)",
+    "2": "its rate, through the Jacobian",
+    "3": "velocity by the pseudoinverse",
+    "4": "the same in closed loop",
+    "5": "composition by null-space projection",
+    "6": "move to target, track the preset trajectory",
+    "7": "obstacle avoidance of a UGV: task value",
+    "8": "obstacle avoidance of a UGV: velocity",
+    "9": "centroid of the UGVs: task value",
+    "10": "centroid of the UGVs: velocity",
+    "11": "obstacle avoidance of the UAV",
+    "12": "intervention: task value",
+    "13": "intervention: desired value",
+    "14": "intervention: velocity",
+    "15": "drift-diffusion model",
+    "16": "Bayes risk",
+    "17": "mean decision time",
+    "18": "decision error",
+    "19": "optimal threshold",
+    "20": "event-triggered composition",
+    "21": "gatekeeper: choice of each UGV",
+    "22": "gatekeeper: state",
+    "23": "gatekeeper: predicted motion under both choices",
+    "24": "gatekeeper: one choice per stage",
+    "25": "gatekeeper: cost",
+    "26": "gatekeeper: mixed-integer optimal control problem",
+    "27": "its relaxation, by multiple shooting",
+    "28": "sum-up rounding: accumulated deficit",
+    "29": "sum-up rounding: choice",
+}
+"""The paper's equations in words."""
+
+REALISED_IN = ("nsbc", "decision", "intervention", "gatekeeper", "systems")
+"""Packages whose docstrings say which equations they realise, in their first sentence or paragraph."""
+
+_NUMBER = re.compile(r"(?<!` )(?<![\w\]])\((\d{1,2})[a-e]?\)(?:-\((\d{1,2})[a-e]?\))?")
+
+
+def main() -> None:
+    """Write every generated page."""
+    for name, text in pages().items():
+        files.write_text(DOCS / name, text)
+
+
+def pages() -> dict[str, str]:
+    """Generated pages by file name."""
+    return {"equations.md": equations(), "claims.md": claims(), "names.md": names()}
+
+
+def equations() -> str:
+    """From each equation of the paper to the code that realises it and the claims about it."""
+    code, claimed = defaultdict(list), defaultdict(list)
+    for place, numbers in _realised():
+        for number in numbers:
+            code[number].append(place)
+    for name, claim in _claims():
+        for number in _numbers(claim.equations):
+            claimed[number].append(name)
+    rows = ["| equation | what | code | claims |", "| --- | --- | --- | --- |"]
+    for number, what in EQUATIONS.items():
+        where = ", ".join(f"`{place}`" for place in code[number]) or "-"
+        about = ", ".join(f"[{name}](claims.md#{name.lower()})" for name in claimed[number]) or "-"
+        rows.append(f"| ({number}) | {what} | {where} | {about} |")
+    return _page(
+        "From the paper's equations to the code",
+        "Code whose docstring says in its first paragraph that it is about the equation, and claims that name it. A "
+        "row, that of (25), say, is all that there is to read to follow the gatekeeper's cost.",
+        rows,
+    )
+
+
+def _realised() -> Iterator[tuple[str, list[str]]]:
+    """(name below the package, equations) of everything public whose docstring names equations at its beginning."""
+    for path in sorted(path for package in REALISED_IN for path in (PACKAGE / package).rglob("*.py")):
+        module = ".".join(path.relative_to(PACKAGE).with_suffix("").parts)
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        for parent, prefix in [(tree, module), *((n, f"{module}.{n.name}") for n in tree.body if _is_class(n))]:
+            for node in parent.body:  # type: ignore[attr-defined]
+                if isinstance(node, ast.ClassDef | ast.FunctionDef) and not node.name.startswith("__"):
+                    first = (ast.get_docstring(node) or "").split("\n\n")[0]
+                    if numbers := _numbers(first):
+                        yield f"{prefix}.{node.name}", numbers
+
+
+def _is_class(node: ast.AST) -> bool:
+    return isinstance(node, ast.ClassDef)
+
+
+def _numbers(text: str) -> list[str]:
+    """Equation numbers in a text, ranges expanded."""
+    found: list[str] = []
+    for first, last in _NUMBER.findall(text):
+        found += [str(number) for number in range(int(first), int(last or first) + 1)]
+    return [number for number in dict.fromkeys(found) if number in EQUATIONS]
+
+
+def _claims() -> Iterator[tuple[str, type[Claim]]]:
+    for registry in (MODEL_CLAIMS, RUN_CLAIMS):
+        for name in registry.own:
+            yield name, registry.load(name, of=Claim)
+
+
+def claims() -> str:
+    """What every claim says of itself."""
+    lines = []
+    for name, claim in _claims():
+        about = "the model" if name in MODEL_CLAIMS.own else "a run"
+        broken = [mutant.name for mutant in MUTANTS if mutant.claim == name]
+        lines += [
+            f"## {name}",
+            "",
+            f"About {about}; usually `{claim.expected}`. Equations: {claim.equations}. "
+            f"Code: `{claim.__module__.removeprefix('airground_drake.')}`.",
+            "",
+            claim.statement,
+            "",
+            *(f"    {line}" for line in textwrap.wrap(claim.formula, WIDTH - 4)),
+            "",
+            f"*Decided by:* {claim.method}",
+            "",
+            "*Assumes:*",
+            "",
+            *(f"- {assumption}" for assumption in claim.assumptions),
+            "",
+            f"*Does not establish:* {claim.does_not_establish}",
+            "",
+        ]
+        if broken:
+            lines += ["*Broken variants that it refutes:* " + "; ".join(broken) + ".", ""]
+    return _page("Claims", "What each claim says of itself, as in every report.", lines)
+
+
+def names() -> str:
+    """Everything that a scenario may name."""
+    lines = ["## Methods", "", "| name | |", "| --- | --- |"]
+    lines += [f"| `{method.id}` | {method.says} |" for method in METHODS.values()]
+    for title, registry in (("Policies", POLICIES), ("Routes", ROUTES), ("Tasks of the UAV", UAV_TASKS)):
+        lines += ["", f"## {title}", "", "| name | | parameters |", "| --- | --- | --- |"]
+        lines += [_row(registry, name) for name in registry.own]
+    return _page(
+        "What a scenario may name",
+        "Besides these: what installed packages register (see [extending](extending.md)), and `module:Class` for "
+        "whatever can be imported.",
+        lines,
+    )
+
+
+def _row(registry: Registry, name: str) -> str:
+    kind = registry.load(name, of=object)
+    says = " ".join((inspect.getdoc(kind) or "").split("\n\n")[0].split())
+    given = [p for p in inspect.signature(kind).parameters.values() if p.kind is p.KEYWORD_ONLY]
+    parameters = ", ".join(f"`{p.name}`" + ("" if p.default is p.empty else f" = {p.default}") for p in given)
+    return f"| `{name}` | {says} | {parameters or '-'} |"
+
+
+def _page(title: str, says: str, lines: list[str]) -> str:
+    """A page; lines that may be wrapped are."""
+    wrapped: list[str] = []
+    for line in ["<!-- Made by: python docs/generate.py -->", f"# {title}", "", says, "", *lines]:
+        if len(line) <= WIDTH or line.startswith("|"):
+            wrapped.append(line)
+        else:
+            indent = "  " if line.startswith("- ") else ""
+            wrapped += textwrap.wrap(line, WIDTH, subsequent_indent=indent, break_long_words=False)
+    return "\n".join(wrapped).rstrip() + "\n"
+
+
+if __name__ == "__main__":
+    main()
