@@ -80,16 +80,16 @@ def equations() -> str:
     for name, claim in _claims():
         for number in _numbers(claim.equations):
             claimed[number].append(name)
-    rows = ["| equation | what | code | claims |", "| --- | --- | --- | --- |"]
+    lines = []
     for number, what in EQUATIONS.items():
-        where = ", ".join(f"`{place}`" for place in code[number]) or "-"
-        about = ", ".join(f"[{name}](claims.md#{name.lower()})" for name in claimed[number]) or "-"
-        rows.append(f"| ({number}) | {what} | {where} | {about} |")
+        about = ", ".join(f"[{name}](claims.md#{name.lower()})" for name in claimed[number])
+        lines += [f"## ({number}) {what}", "", *(f"- `{place}`" for place in code[number])]
+        lines += [f"- claims: {about}"] * bool(about) + [""]
     return _page(
         "From the paper's equations to the code",
-        "Code whose docstring says in its first paragraph that it is about the equation, and claims that name it. A "
-        "row, that of (25), say, is all that there is to read to follow the gatekeeper's cost.",
-        rows,
+        "Code whose docstring says in its first paragraph that it is about the equation, and claims that name it: all "
+        "that there is to read to follow, say, the gatekeeper's cost (25).",
+        lines,
     )
 
 

@@ -200,7 +200,7 @@ class Scenario:
 
     `expected` maps identifiers of claims about the model (proofs and experiments, whatever the run) to the
     expected verdict; one that is not named must be proved, or supported if it is statistical. `claims` adds claims
-    about runs to those of the package: `module:Class` by identifier.
+    to those of the package: `module:Class` by identifier.
     """
 
     name: str = field(default_factory=str, metadata=REQUIRED)

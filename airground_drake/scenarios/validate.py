@@ -162,7 +162,8 @@ def _runs(scenario: Scenario) -> Problems:
             yield from _one_of(f"runs.{name}.expected.{claim}", claim, known, "one of the claims")
             yield from _one_of(f"runs.{name}.expected.{claim}", status, STATUSES)
     for claim, status in scenario.expected.items():
-        yield from _one_of(f"expected.{claim}", claim, MODEL_CLAIMS, "one of the claims about the model")
+        known = (*MODEL_CLAIMS, *scenario.claims)
+        yield from _one_of(f"expected.{claim}", claim, known, "one of the claims about the model")
         yield from _one_of(f"expected.{claim}", status, STATUSES)
     for claim, place in scenario.claims.items():
         if claim in (*RUN_CLAIMS, *MODEL_CLAIMS) or not re.fullmatch(r"[A-Z][A-Z0-9-]*", claim):
