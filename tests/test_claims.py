@@ -22,7 +22,7 @@ from airground_drake.nsbc.avoidance import Avoidance, Surroundings
 from airground_drake.scenarios.schema import Decision, Obstacle, Preset, Threshold
 from airground_drake.trace import Trace, load, save
 from airground_drake.verify import TRACE_CLAIMS, Finding, TraceClaim, verify
-from airground_drake.verify.geometry import NormSignal, closest_approach, corner_times, interpolate, travelled
+from airground_drake.verify.engines.segments import NormSignal, closest_approach, corner_times, interpolate, travelled
 
 CLAIMS = {claim.id: claim for claim in TRACE_CLAIMS}
 GATE = {"GATE-OPT", "GATE-SUR", "GATE-FEAS"}

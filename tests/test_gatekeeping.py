@@ -24,11 +24,12 @@ from airground_drake.simulation import simulate
 from airground_drake.systems.gatekeeper import Rules, settle
 from airground_drake.trace import DECISION_COLUMNS, PROBLEM_ARRAYS, PROBLEM_SCALARS, Trace, save
 from airground_drake.trace import load as load_trace
-from airground_drake.verify import gatekeeping, optimality
-from airground_drake.verify.decisions import Off, Row, rows_of
-from airground_drake.verify.gatekeeping import GateFeas
-from airground_drake.verify.optimality import GateOpt, GateSur, enclose
-from airground_drake.verify.verdict import TraceClaim
+from airground_drake.verify.claim import TraceClaim
+from airground_drake.verify.runs import gate_feas as gatekeeping
+from airground_drake.verify.runs import gate_opt as optimality
+from airground_drake.verify.runs.gate_feas import GateFeas
+from airground_drake.verify.runs.gate_opt import GateOpt, GateSur, enclose
+from airground_drake.verify.runs.gate_record import Off, Row, rows_of
 
 N, DT = 8, 0.05
 PLANS = np.array(list(product((0.0, 1.0), repeat=N)))

@@ -18,15 +18,17 @@ from hypothesis import strategies as st
 from airground_drake.nsbc.avoidance import Avoidance, Surroundings
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.verify import attacks, disturbance, invariance
-from airground_drake.verify.conformance import Relation, conformance, loss_of_inequality, relation
-from airground_drake.verify.disturbance import SafeDist
-from airground_drake.verify.hostile import postcondition, safe_states
-from airground_drake.verify.invariance import SafeGate, SafeInv, SafeLemma
-from airground_drake.verify.lemma import V, X, ldl
-from airground_drake.verify.pairs import kinds
-from airground_drake.verify.vectors import unit
-from airground_drake.verify.verdict import Finding, ModelClaim
+from airground_drake.verify.claim import Finding, ModelClaim
+from airground_drake.verify.engines.rounding import unit
+from airground_drake.verify.model.avoidance import disturbed_runs as attacks
+from airground_drake.verify.model.avoidance import safe_dist as disturbance
+from airground_drake.verify.model.avoidance import safe_inv as invariance
+from airground_drake.verify.model.avoidance.conformance import Relation, conformance, loss_of_inequality, relation
+from airground_drake.verify.model.avoidance.constants import kinds
+from airground_drake.verify.model.avoidance.hostile_inputs import postcondition, safe_states
+from airground_drake.verify.model.avoidance.lemma import V, X, ldl
+from airground_drake.verify.model.avoidance.safe_dist import SafeDist
+from airground_drake.verify.model.avoidance.safe_inv import SafeGate, SafeInv, SafeLemma
 
 CLAIMS: tuple[ModelClaim, ...] = (SafeLemma(), SafeInv(), SafeGate(), SafeDist())
 MUTANTS = {**invariance.MUTANTS, **disturbance.MUTANTS}

@@ -15,10 +15,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.smt import Result, solve
-from airground_drake.verify import findings, prover
-from airground_drake.verify.obligation import Obligation, Term, rational
-from airground_drake.verify.verdict import Finding, ModelClaim
+from airground_drake.verify import cache as findings
+from airground_drake.verify.claim import Finding, ModelClaim
+from airground_drake.verify.engines import prover
+from airground_drake.verify.engines.obligation import Obligation, Term, rational
+from airground_drake.verify.engines.smt import Result, solve
 
 STEP = Obligation(
     name="step",
@@ -128,7 +129,9 @@ def test_spacer_finds_an_invariant() -> None:
 
 
 def test_the_solvers_processes_load_no_drake() -> None:
-    code = "import sys, airground_drake.smt; print(any(name.startswith('pydrake') for name in sys.modules))"
+    code = (
+        "import sys, airground_drake.verify.engines.smt; print(any(name.startswith('pydrake') for name in sys.modules))"
+    )
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "False\n"
 
 

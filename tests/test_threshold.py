@@ -23,13 +23,15 @@ from scipy.special import ndtr
 from airground_drake.decision.bayes import bayes_risk, decision_time, error_rate, optimal_threshold
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.smt import Result
-from airground_drake.verify import ddm, passages, threshold
-from airground_drake.verify.ddm import ThrDdm
-from airground_drake.verify.passages import Experiment
-from airground_drake.verify.statements import Sign, conclude, enclose, evaluate
-from airground_drake.verify.threshold import Constants, ThrOpt, ThrRoot
-from airground_drake.verify.verdict import Finding
+from airground_drake.verify.claim import Finding
+from airground_drake.verify.engines.ball_arithmetic import Sign, conclude, enclose, evaluate
+from airground_drake.verify.engines.smt import Result
+from airground_drake.verify.model.threshold import first_passages as passages
+from airground_drake.verify.model.threshold import thr_ddm as ddm
+from airground_drake.verify.model.threshold import thr_root as threshold
+from airground_drake.verify.model.threshold.first_passages import Experiment
+from airground_drake.verify.model.threshold.thr_ddm import ThrDdm
+from airground_drake.verify.model.threshold.thr_root import Constants, ThrOpt, ThrRoot
 
 TABLE_1: dict[str, Any] = ThrRoot().inputs(load("case_a")[0])
 _KEYS = ("rule", "drift_m_s", "noise_m_sqrt_s", "c1_1_s", "c2", "zeta_m")

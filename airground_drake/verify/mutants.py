@@ -7,9 +7,14 @@ from pathlib import Path
 from typing import Any
 
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.verify import ddm, disturbance, invariance, refinement, threshold, zeno
-from airground_drake.verify.findings import find
-from airground_drake.verify.verdict import Finding, ModelClaim, Status
+from airground_drake.verify.cache import find
+from airground_drake.verify.claim import Finding, ModelClaim, Status
+from airground_drake.verify.model.avoidance import safe_dist as disturbance
+from airground_drake.verify.model.avoidance import safe_inv as invariance
+from airground_drake.verify.model.threshold import thr_ddm as ddm
+from airground_drake.verify.model.threshold import thr_root as threshold
+from airground_drake.verify.model.trigger import zeno_proof as zeno
+from airground_drake.verify.model.trigger import zeno_refine as refinement
 
 Check = Callable[[dict[str, Any]], Finding]
 

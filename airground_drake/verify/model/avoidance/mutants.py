@@ -1,0 +1,190 @@
+"""Broken variants of SAFE-LEMMA and of one avoidance step, each replayed on the running layer with the same break."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from airground_drake.arrays import Array
+from airground_drake.nsbc import kernels
+from airground_drake.nsbc.avoidance import Avoidance, Composition, HalfSpaces, Surroundings
+from airground_drake.verify.claim import Finding
+from airground_drake.verify.engines.obligation import Obligation
+from airground_drake.verify.engines.prover import discharge, finding
+from airground_drake.verify.engines.rewriting import with_numbers, without
+from airground_drake.verify.engines.rounding import nearest, rates
+from airground_drake.verify.model.avoidance.constants import Inputs, kinds, running_avoidance
+from airground_drake.verify.model.avoidance.hostile_inputs import postcondition
+from airground_drake.verify.model.avoidance.lemma import lemma
+from airground_drake.verify.model.avoidance.obligations import LIMIT_S, scaling, step, with_scenario
+
+
+def broken(obligation: Obligation, replay: Inputs) -> Finding:
+    """The finding on a broken obligation, with what the running code makes of the same break."""
+    found = finding(discharge([obligation], LIMIT_S))
+    return replace(found, counterexample={**(found.counterexample or {}), "replay": replay})
+
+
+def drive(
+    inputs: Inputs,
+    safe: float,
+    start: Sequence[Sequence[float]],
+    lower: Sequence[Sequence[float]],
+    *,
+    points: Sequence[Sequence[float]] = (),
+    share: float = 1.0,
+    edit: Callable[[HalfSpaces], HalfSpaces] = lambda spaces: spaces,
+    composition: Composition = "augmented",
+) -> Inputs:
+    """Hold velocities `lower` for a control period below the running layer, whose inequalities are edited.
+
+    Args:
+        inputs: constants of the layer.
+        safe: safe distance of everything, m.
+        start: one robot, or two that avoid each other.
+        lower: hostile velocity of each, m/s.
+        points: obstacles of every robot.
+        share: of every inequality.
+        edit: the mutation.
+        composition: of the layer.
+
+    Returns:
+        The start, and the least distance over continuous time of each avoided point, m, with the safe one.
+    """
+    avoidance = running_avoidance(inputs, composition)
+    position, wanted, fixed = (np.array(rows, dtype=np.float64).reshape(-1, 3) for rows in (start, lower, points))
+    n = len(position)
+    centre = np.repeat(fixed[None], n, axis=0)
+    if n == 2:
+        centre = np.concatenate([centre, position[::-1, None]], axis=1)
+    around = Surroundings(centre, np.full(centre.shape[:2], safe), np.full(centre.shape[:2], share))
+    velocity = avoidance.apply(wanted, edit(avoidance.half_spaces(position, np.ones((n, 3)), around)))
+    others = np.zeros(centre.shape)
+    if n == 2:
+        others[:, -1] = velocity[::-1]
+    reached = nearest(position[:, None] - centre, velocity[:, None] - others, avoidance.period)
+    return {
+        "start_m": position.tolist(),
+        "avoided_m": fixed.tolist() or "each other",
+        "lower_m_s": wanted.tolist(),
+        "control_periods": 1,
+        "safe_distance_m": safe,
+        "least_distances_m": reached.min(axis=0).tolist(),
+        "end_m": (position + avoidance.period * velocity).tolist(),
+    }
+
+
+def dropped(where: Sequence[Any]) -> Callable[[HalfSpaces], HalfSpaces]:
+    """Drop the inequalities that are marked; the marks (n, K) broadcast."""
+    return lambda spaces: HalfSpaces(spaces.normal, np.where(where, -np.inf, spaces.bound))
+
+
+def flipped(spaces: HalfSpaces) -> HalfSpaces:
+    """n.v <= b instead of n.v >= b, of what is in range."""
+    return HalfSpaces(-spaces.normal, np.where(np.isfinite(spaces.bound), -spaces.bound, -np.inf))
+
+
+def unscaled(avoidance: Avoidance, lower: Array, spaces: HalfSpaces) -> Array:
+    """A broken layer: the projection without the scaling step."""
+    found = lower.copy()
+    for i in np.flatnonzero((rates(spaces.normal, lower) < spaces.bound).any(axis=1)):
+        found[i] = kernels._closest_feasible(lower[i], spaces.normal[i], spaces.bound[i])
+    return found
+
+
+def named(inputs: Inputs, name: str) -> tuple[Obligation, float, float]:
+    """An obligation of `step` with the numbers of a kind of pair that it is about; its d, m; a high speed, m/s."""
+    kind = next((k for k in kinds(inputs) if (k.share < 1.0) == name.startswith("pair_")), kinds(inputs)[0])
+    numbers = {"d": kind.safe, "h": inputs["period_s"], "A": inputs["avoidance_gain_1_s"]}
+    found = with_numbers(next(each for each in step() if each.name == name), kind.name, numbers)
+    return found, kind.safe, kind.safe / inputs["period_s"]
+
+
+def _lemma_reversed(inputs: Inputs) -> Finding:
+    forward = next(each for each in lemma() if each.name == "forward")
+    x, v = np.array([4.0, 0.0, 0.0]), np.array([0.0, 3.0, 0.0])
+    ends = {"left": float(np.linalg.norm(x + v)), "right": float(np.linalg.norm(x) + x @ v / np.linalg.norm(x))}
+    mutant = replace(forward, name="forward_reversed", goal="D + s*r - E", says="E <= D + s r")
+    return broken(mutant, {"x": x.tolist(), "v": v.tolist(), "s": 1.0, **ends})
+
+
+def _flipped(inputs: Inputs) -> Finding:
+    given, safe, fast = named(inputs, "outside")
+    rule = {"rule": f"-({given.hypotheses['rule']})"}
+    mutant = replace(given, hypotheses={**given.hypotheses, **rule}, says="r <= -(D - d)/h: D + s r >= d")
+    start, lower = [[1.2 * safe, 0.0, 0.0]], [[-0.3 * fast, 0.0, 0.0]]
+    return broken(mutant, drive(inputs, safe, start, lower, points=[[0, 0, 0]], edit=flipped))
+
+
+def _dropped(inputs: Inputs) -> Finding:
+    given, safe, fast = named(inputs, "outside")
+    mutant = without(given, "rule", "without the inequality for this obstacle: D + s r >= d")
+    points, lower = [[-2.0 * safe, 0.0, 0.0], [1.1 * safe, 0.0, 0.0]], [[0.2 * fast, 0.0, 0.0]]
+    edit = dropped([False, True])
+    return broken(mutant, drive(inputs, safe, [[0, 0, 0]], lower, points=points, edit=edit))
+
+
+def _full_shares(inputs: Inputs) -> Finding:
+    given, safe, fast = named(inputs, "pair_outside")
+    rules = {f"rule_{i}": given.hypotheses[f"rule_{i}"].replace("2*", "", 1) for i in "ij"}
+    mutant = replace(given, hypotheses={**given.hypotheses, **rules}, says="each robot takes the full -(D - d)/h")
+    start = [[0.0, 0.0, 0.0], [1.1 * safe, 0.0, 0.0]]
+    return broken(mutant, drive(inputs, safe, start, [[fast, 0, 0], [-fast, 0, 0]]))
+
+
+def _no_share(inputs: Inputs) -> Finding:
+    given, safe, fast = named(inputs, "pair_outside")
+    mutant = without(given, "rule_j", "only one robot of the pair takes its half: the pair keeps d")
+    start, lower = [[0.0, 0.0, 0.0], [1.1 * safe, 0.0, 0.0]], [[0.0, 0.0, 0.0], [-fast, 0.0, 0.0]]
+    edit = dropped([[False], [True]])
+    return broken(mutant, drive(inputs, safe, start, lower, share=0.5, edit=edit))
+
+
+def _large_gain(inputs: Inputs) -> Finding:
+    changed = {**inputs, "avoidance_gain_1_s": 1.8 / inputs["period_s"]}
+    given, safe, _ = named(changed, "no_overshoot")
+    mutant = without(given, "stable", "A h = 1.8: the recovery does not lead beyond d")
+    return broken(mutant, drive(changed, safe, [[0.75 * safe, 0, 0]], [[0, 0, 0]], points=[[0, 0, 0]]))
+
+
+def _equality_tasks(inputs: Inputs) -> Finding:
+    """(5) with both obstacles at D = d: v = (I - n1 n1^T) w, w = (I - n2 n2^T) u, n1 = (1, 0), n2 = (-3/5, 4/5)."""
+    n2u = "(4/5*u2 - 3/5*u1)"
+    mutant = Obligation(
+        "equality_tasks", "prioritised equality tasks, two obstacles at D = d, both active: D2 does not decrease",
+        ("u1", "u2"), f"4/5*(u2 - 4/5*{n2u})",
+        hypotheses={"active_2": f"-{n2u}", "active_1": f"-(u1 + 3/5*{n2u})"},
+    )  # fmt: skip
+    _, safe, fast = named(inputs, "outside")
+    points, lower = [[-safe, 0.0, 0.0], [0.6 * safe, -0.8 * safe, 0.0]], [[-0.1 * fast, -0.1 * fast, 0.0]]
+    return broken(mutant, drive(inputs, safe, [[0, 0, 0]], lower, points=points, composition="recursion_listed"))
+
+
+def _short_range(inputs: Inputs) -> Finding:
+    kind = kinds(inputs)[0]
+    blind = {**inputs, "sensing_range_m": kind.safe}
+    mutant = next(o for o in with_scenario(blind) if o.name == f"unseen_{kind.name}")
+    start, v = [[kind.safe * (1.0 + 1e-9), 0.0, 0.0]], [[-kind.closing, 0.0, 0.0]]
+    return broken(mutant, drive(blind, kind.safe, start, v, points=[[0, 0, 0]]))
+
+
+def _unscaled(inputs: Inputs) -> Finding:
+    mutant = without(replace(scaling()[1], name="unscaled"), "least", "any sigma in [0, 1] will do")
+    return broken(mutant, postcondition(inputs, 2400, layer=unscaled))
+
+
+BROKEN: dict[str, Callable[[Inputs], Finding]] = {
+    "SAFE-LEMMA: inequality reversed": _lemma_reversed,
+    "SAFE-INV: sign of the inequality flipped": _flipped,
+    "SAFE-INV: one inequality dropped": _dropped,
+    "SAFE-INV: each robot of a pair takes the full share": _full_shares,
+    "SAFE-INV: one robot of a pair takes no share": _no_share,
+    "SAFE-INV: gain too large, A h = 1.8": _large_gain,
+    "SAFE-INV: prioritised equality tasks, two active obstacles": _equality_tasks,
+    "SAFE-INV: sensing range too short": _short_range,
+    "SAFE-GATE: scaling omitted": _unscaled,
+}
+"""By name; each takes the inputs of SAFE-GATE, which contain those of the other claims, and is refuted."""

@@ -1,0 +1,213 @@
+"""THR-DDM: mean decision time and error rate of simulated drift-diffusion paths against (17)-(18).
+
+Paths are those of `passages.py`; what their correction for sampling leaves is allowed for by ERROR_ALLOWANCE and
+TIME_ALLOWANCE, which the tests check against a quadrature of the sampled process.
+
+Intervals are simultaneous over all comparisons (Bonferroni), Clopper-Pearson for error rates and normal for times.
+
+Certificate `paths.json`: `tail` (probability beyond each end of an interval), its `normal_quantile`, and
+`comparisons`, each with the experiment's constants and seed, the numbers of paths and of wrong decisions, sum and sum
+of squares of the noise periods to the decision, the interval and the formula's value: from the counts on everything
+can be redone by hand.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from dataclasses import asdict, replace
+from typing import Any
+
+from scipy.stats import beta, norm
+
+from airground_drake.scenarios.schema import Scenario
+from airground_drake.verify.claim import Finding, ModelClaim
+from airground_drake.verify.model.threshold.first_passages import (
+    CHANNELS,
+    Experiment,
+    Sample,
+    experiments,
+    running,
+    simulate,
+)
+
+LEVEL = 0.99
+ERROR_ALLOWANCE = 2e-4
+"""Bias of the corrected error rate."""
+TIME_ALLOWANCE = 0.05
+"""Bias of the corrected time, in noise periods."""
+Formulas = Callable[[Experiment], tuple[float, float]]
+"""Mean decision time, s, and error rate that are to be compared with the simulation."""
+
+
+class ThrDdm(ModelClaim):
+    """THR-DDM."""
+
+    id = "THR-DDM"
+    statement = (
+        "Simulated paths of the decision variable, with and without initial deviation, have the mean decision time and "
+        "the error rate of the formulas that the threshold rests on."
+    )
+    formula = "E[min t: |x(t)| >= zeta] = T of (17), P[x(t) = -zeta] = E of (18), dx = drift dt + noise dW, x(0) = y0"
+    method = (
+        "Monte Carlo on the project's Drake systems (random source, integrated noise, decision variable) with a fixed "
+        "seed: six experiments, 36000 paths, barriers corrected for sampling. Supported if all simultaneous 99 % "
+        "confidence intervals, widened by the bias that the correction leaves (2e-4 in the error rate, a twentieth of "
+        "the noise period in the time), contain the formulas. PyDDM's values, where it is installed, are evidence only."
+    )
+    equations = "(15), (17)-(18) with the initial deviation divided by the drift"
+    assumptions = (
+        "Drift and intensity are those of the threshold rule, in three experiments others; the drift is constant "
+        "and there is no leak.",
+        "Both thresholds end a path, as in (17)-(18); the trigger (20) has the upper one only.",
+        "The noise period is chosen for the experiment (a fifth of the threshold per step), not the scenario's.",
+    )
+    does_not_establish = (
+        "That a UGV's task error follows (15) with a constant drift, or anything about the scenario's own noise, "
+        "period or leak. Statistics exclude deviations larger than the intervals, not smaller ones."
+    )
+    expected = "supported"
+
+    def inputs(self, scenario: Scenario) -> dict[str, Any]:
+        """The numbers of the threshold rule."""
+        rule = scenario.decision.threshold
+        return {
+            "drift_m_s": rule.drift_m_s,
+            "noise_m_sqrt_s": rule.noise_m_sqrt_s,
+            "c1_1_s": rule.c1_1_s,
+            "c2": rule.c2,
+        }
+
+    def check(self, inputs: dict[str, Any]) -> Finding:
+        """Simulate and compare."""
+        return compare(experiments(inputs), running)
+
+
+def compare(chosen: tuple[Experiment, ...], formulas: Formulas) -> Finding:
+    """The verdict for these formulas: 'supported' if all intervals contain them, else 'refuted'."""
+    rows = [row for each in chosen for row in _rows(simulate(each), formulas(each), 2 * len(chosen))]
+    worst = min(rows, key=lambda row: float(row["margin"]))
+    supported = worst["margin"] >= 0.0
+    evidence = {
+        "paths": sum(each.paths for each in chosen),
+        "comparisons": rows,
+        "family_level": LEVEL,
+        "pyddm": {each.name: _pyddm(each) for each in chosen},
+    }
+    tail = (1.0 - LEVEL) / len(rows) / 2.0
+    certificate = {"channels": CHANNELS, "tail": tail, "normal_quantile": float(norm.isf(tail)), "comparisons": rows}
+    return Finding(
+        "supported" if supported else "refuted",
+        margin=worst["margin"],
+        unit="interval half-widths",
+        where={key: worst[key] for key in ("experiment", "quantity")},
+        counterexample=None if supported else worst,
+        evidence=evidence,
+        certificates={"paths.json": json.dumps(certificate, indent=1) + "\n"},
+    )
+
+
+def _rows(sample: Sample, formula: tuple[float, float], comparisons: int) -> list[dict[str, Any]]:
+    """Both comparisons of an experiment: estimate, interval, formula, z-score and margin."""
+    each, count, tail = sample.experiment, sample.experiment.paths, (1.0 - LEVEL) / comparisons / 2.0
+    period = each.period
+    mean = sample.periods / count
+    deviation = math.sqrt((sample.squares - sample.periods * mean) / (count - 1.0) / count)
+    half = float(norm.isf(tail)) * deviation + TIME_ALLOWANCE
+    time = [(mean - 0.25 + side * half) * period for side in (-1.0, 1.0)]
+    low = float(beta.ppf(tail, sample.wrong, count - sample.wrong + 1)) if sample.wrong else 0.0
+    high = float(beta.isf(tail, sample.wrong + 1, count - sample.wrong)) if sample.wrong < count else 1.0
+    rate = sample.wrong / count
+    spread = math.sqrt(max(rate * (1.0 - rate), 1.0 / count) / count)
+    found = (
+        ("mean decision time", "s", (mean - 0.25) * period, deviation * period, time, formula[0]),
+        ("error rate", "", rate, spread, [low - ERROR_ALLOWANCE, high + ERROR_ALLOWANCE], formula[1]),
+    )
+    return [
+        {
+            "experiment": each.name,
+            "quantity": quantity,
+            "unit": unit,
+            "constants": {**asdict(each), "noise_period_s": period, "barrier_m": each.barrier},
+            "wrong_decisions": sample.wrong,
+            "periods_sum": sample.periods,
+            "periods_sum_of_squares": sample.squares,
+            "estimate": estimate,
+            "interval": interval,
+            "formula": value,
+            "z_score": (estimate - value) / error,
+            "margin": 2.0 * min(value - interval[0], interval[1] - value) / (interval[1] - interval[0]),
+        }
+        for quantity, unit, estimate, error, interval, value in found
+    ]
+
+
+def _pyddm(experiment: Experiment) -> dict[str, float] | str:
+    """PyDDM's mean time over all decisions, s, and error rate, computed in units of zeta and zeta^2/noise^2."""
+    try:
+        import pyddm
+    except ImportError:
+        return "not installed"
+    unit = (experiment.zeta / experiment.noise) ** 2
+    model = pyddm.gddm(
+        drift=experiment.drift * unit / experiment.zeta,
+        noise=1.0,
+        bound=1.0,
+        starting_position=experiment.deviation / experiment.zeta,
+        T_dur=20.0,
+        mixture_coef=0.0,
+    )
+    solution = model.solve()
+    density = solution.pdf("correct") + solution.pdf("error")
+    return {
+        "decision_time_s": float(density @ solution.t_domain) * float(model.dt) * unit,
+        "error_rate": float(solution.prob("error")),
+    }
+
+
+def printed(experiment: Experiment, deviation_s: float) -> tuple[float, float]:
+    """(17)-(18) as printed, where the initial deviation is a time, s."""
+    zeta, drift, noise = experiment.zeta, experiment.drift, experiment.noise
+    u = 2.0 * zeta * drift / noise**2
+    exponent = min(-2.0 * deviation_s * drift**2 / noise**2, 700.0)  # more than the largest float
+    bias = (1.0 - math.exp(exponent)) / (2.0 * math.sinh(u))
+    time = zeta / drift * math.tanh(u / 2.0) + 2.0 * zeta / drift * bias - deviation_s
+    return time, 1.0 / (1.0 + math.exp(u)) - bias
+
+
+def _printed_is_better(inputs: dict[str, Any]) -> Finding:
+    """That the threshold of (19) as printed has no larger Bayes risk than that with c2/c1: one-sided, same level."""
+    c1, c2 = float(inputs["c1_1_s"]), float(inputs["c2"])
+    chosen = experiments(inputs)
+    risks, variances = [], []
+    for sample in (simulate(chosen[-2]), simulate(chosen[-1])):
+        count, period = sample.experiment.paths, sample.experiment.period
+        mean, rate = sample.periods / count, sample.wrong / count
+        risks.append(c1 * (mean - 0.25) * period + c2 * rate)
+        # standard deviation of a sum is at most the sum of standard deviations, whatever the correlation
+        time = math.sqrt(max(sample.squares / count - mean**2, 0.0)) * c1 * period
+        variances.append((time + c2 * math.sqrt(rate * (1.0 - rate))) ** 2 / count)
+    allowance = c2 * 2.0 * ERROR_ALLOWANCE + c1 * TIME_ALLOWANCE * (chosen[-2].period + chosen[-1].period)
+    z = (risks[1] - risks[0] - allowance) / math.sqrt(sum(variances))
+    numbers = {"risk_at_the_bayes_threshold": risks[0], "risk_at_the_printed_threshold": risks[1], "z_score": z}
+    if z <= float(norm.isf(1.0 - LEVEL)):
+        return Finding("inconclusive", evidence=numbers)
+    thresholds = {"bayes_threshold_m": chosen[-2].zeta, "printed_threshold_m": chosen[-1].zeta}
+    found = {"drift_m_s": chosen[-1].drift, **thresholds, **numbers}
+    return Finding("refuted", counterexample=found, evidence=numbers)
+
+
+MUTANTS: dict[str, Callable[[dict[str, Any]], Finding]] = {
+    "THR-DDM: initial deviation in m where (17)-(18) have s": lambda inputs: compare(
+        experiments(inputs), lambda each: printed(each, each.deviation)
+    ),
+    "THR-DDM: (18) with the wrong sign of the deviation": lambda inputs: compare(
+        experiments(inputs), lambda each: (running(each)[0], running(replace(each, deviation=-each.deviation))[1])
+    ),
+    "THR-DDM: noise^2 in place of the noise": lambda inputs: compare(
+        experiments(inputs), lambda each: running(replace(each, noise=each.noise**2))
+    ),
+    "THR-DDM: the threshold with c1/c2 minimises the risk": _printed_is_better,
+}
+"""Broken variants by name: each must be refuted by the simulated paths (the last where c1 and c2 differ enough)."""
