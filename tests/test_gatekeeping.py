@@ -27,9 +27,11 @@ from airground_drake.trace import load as load_trace
 from airground_drake.verify.claim import TraceClaim
 from airground_drake.verify.runs import gate_feas as gatekeeping
 from airground_drake.verify.runs import gate_opt as optimality
+from airground_drake.verify.runs.convex_bounds import enclose
 from airground_drake.verify.runs.gate_feas import GateFeas
-from airground_drake.verify.runs.gate_opt import GateOpt, GateSur, enclose
+from airground_drake.verify.runs.gate_opt import GateOpt
 from airground_drake.verify.runs.gate_record import Off, Row, rows_of
+from airground_drake.verify.runs.gate_sur import GateSur
 
 N, DT = 8, 0.05
 PLANS = np.array(list(product((0.0, 1.0), repeat=N)))

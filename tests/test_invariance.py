@@ -18,8 +18,9 @@ from hypothesis import strategies as st
 from airground_drake.nsbc.avoidance import Avoidance, Surroundings
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.verify.claim import Finding, ModelClaim
+from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.engines.rounding import unit
+from airground_drake.verify.finding import Finding
 from airground_drake.verify.model.avoidance import disturbed_runs as attacks
 from airground_drake.verify.model.avoidance import safe_dist as disturbance
 from airground_drake.verify.model.avoidance import safe_inv as invariance
@@ -28,10 +29,12 @@ from airground_drake.verify.model.avoidance.constants import kinds
 from airground_drake.verify.model.avoidance.hostile_inputs import postcondition, safe_states
 from airground_drake.verify.model.avoidance.lemma import V, X, ldl
 from airground_drake.verify.model.avoidance.safe_dist import SafeDist
-from airground_drake.verify.model.avoidance.safe_inv import SafeGate, SafeInv, SafeLemma
+from airground_drake.verify.model.avoidance.safe_gate import SafeGate
+from airground_drake.verify.model.avoidance.safe_inv import SafeInv
+from airground_drake.verify.model.avoidance.safe_lemma import SafeLemma
 
 CLAIMS: tuple[ModelClaim, ...] = (SafeLemma(), SafeInv(), SafeGate(), SafeDist())
-MUTANTS = {**invariance.MUTANTS, **disturbance.MUTANTS}
+MUTANTS = {**invariance.MUTANTS, **disturbance.DISTURBED}
 NUMBERS = st.fractions(min_value=-20, max_value=20, max_denominator=100)
 POINTS = st.tuples(NUMBERS, NUMBERS, NUMBERS)
 
@@ -308,7 +311,7 @@ def test_overshoot_on_the_running_code(inputs: dict[str, Any]) -> None:
     assert counterexample["replay"]["end_m"][0][0] > counterexample["replay"]["safe_distance_m"] + 0.1
 
 
-@pytest.mark.parametrize("name", disturbance.MUTANTS)
+@pytest.mark.parametrize("name", disturbance.DISTURBED)
 def test_disturbed_mutant_breaks_the_bound_on_the_running_code(name: str, inputs: dict[str, Any]) -> None:
     counterexample = MUTANTS[name](inputs).counterexample
     assert counterexample is not None

@@ -16,10 +16,11 @@ from hypothesis import strategies as st
 
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify import cache as findings
-from airground_drake.verify.claim import Finding, ModelClaim
+from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.engines import prover
 from airground_drake.verify.engines.obligation import Obligation, Term, rational
 from airground_drake.verify.engines.smt import Result, solve
+from airground_drake.verify.finding import Finding
 
 STEP = Obligation(
     name="step",

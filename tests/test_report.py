@@ -30,7 +30,8 @@ from airground_drake.scenarios.schema import (
     Ugv,
 )
 from airground_drake.trace import DECISION_COLUMNS, SCHEMA, Trace
-from airground_drake.verify.claim import STATUSES, Finding, Status, TraceClaim, Verdict
+from airground_drake.verify.claim import TraceClaim, Verdict
+from airground_drake.verify.finding import STATUSES, Finding, Status
 
 HOSTILE = "<script>alert('$x$')</script>"
 STALL = (3.369, 5.102)

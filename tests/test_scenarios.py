@@ -22,7 +22,7 @@ from airground_drake.errors import ScenarioError
 from airground_drake.nsbc.avoidance import COMPOSITIONS
 from airground_drake.scenarios import schema, validate
 from airground_drake.scenarios.load import MAX_BYTES, REQUIRED, load, resolved, shipped
-from airground_drake.verify.claim import STATUSES
+from airground_drake.verify.finding import STATUSES
 
 CASE_A = Path(schema.__file__).with_name("case_a.yaml")
 DATA: dict[str, Any] = yaml.safe_load(CASE_A.read_text(encoding="utf-8"))

@@ -20,7 +20,8 @@ from synthetic import case_a, lone, simulate, with_meta, with_scenario, with_sig
 from airground_drake.scenarios.schema import Decision, Obstacle, Preset, Threshold
 from airground_drake.trace import Trace
 from airground_drake.verify import verify
-from airground_drake.verify.claim import Finding, Verdict
+from airground_drake.verify.claim import Verdict
+from airground_drake.verify.finding import Finding
 from airground_drake.verify.stl.cross_check import FORMULAS, StlFormula, cross_check, merge
 from airground_drake.verify.stl.signals import Signals, square
 

@@ -23,15 +23,17 @@ from scipy.special import ndtr
 from airground_drake.decision.bayes import bayes_risk, decision_time, error_rate, optimal_threshold
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.verify.claim import Finding
 from airground_drake.verify.engines.ball_arithmetic import Sign, conclude, enclose, evaluate
 from airground_drake.verify.engines.smt import Result
+from airground_drake.verify.finding import Finding
 from airground_drake.verify.model.threshold import first_passages as passages
 from airground_drake.verify.model.threshold import thr_ddm as ddm
 from airground_drake.verify.model.threshold import thr_root as threshold
+from airground_drake.verify.model.threshold.constants import Constants
 from airground_drake.verify.model.threshold.first_passages import Experiment
 from airground_drake.verify.model.threshold.thr_ddm import ThrDdm
-from airground_drake.verify.model.threshold.thr_root import Constants, ThrOpt, ThrRoot
+from airground_drake.verify.model.threshold.thr_opt import ThrOpt
+from airground_drake.verify.model.threshold.thr_root import ThrRoot
 
 TABLE_1: dict[str, Any] = ThrRoot().inputs(load("case_a")[0])
 _KEYS = ("rule", "drift_m_s", "noise_m_sqrt_s", "c1_1_s", "c2", "zeta_m")
@@ -358,9 +360,9 @@ def test_intervals_can_be_redone_by_hand(simulated: Finding) -> None:
         assert low < row["formula"] < high
 
 
-@pytest.mark.parametrize("name", ddm.MUTANTS)
+@pytest.mark.parametrize("name", ddm.SIMULATED)
 def test_mutants_of_the_formulas_are_refuted(simulated: Finding, name: str) -> None:
-    finding = ddm.MUTANTS[name](ThrDdm().inputs(load("case_a")[0]))
+    finding = ddm.SIMULATED[name](ThrDdm().inputs(load("case_a")[0]))
     assert finding.status == "refuted"
     assert finding.counterexample
     assert abs(finding.counterexample["z_score"]) > 5.0
@@ -368,7 +370,7 @@ def test_mutants_of_the_formulas_are_refuted(simulated: Finding, name: str) -> N
 
 def test_the_printed_threshold_is_not_refuted_where_it_is_the_same() -> None:
     inputs = {"drift_m_s": 1.0, "noise_m_sqrt_s": 1.0, "c1_1_s": 1.0, "c2": 1.0}
-    assert ddm.MUTANTS["THR-DDM: the threshold with c1/c2 minimises the risk"](inputs).status == "inconclusive"
+    assert ddm.SIMULATED["THR-DDM: the threshold with c1/c2 minimises the risk"](inputs).status == "inconclusive"
 
 
 def sampled(each: Experiment, nodes: int = 160) -> tuple[float, float]:

@@ -30,11 +30,11 @@ from airground_drake.decision.trigger import Trigger
 from airground_drake.diagram import integrated_noise
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.systems.decision import FIELDS, DecisionVariable, EventTrigger
-from airground_drake.verify.claim import Finding
 from airground_drake.verify.engines.prover import discharge
 from airground_drake.verify.engines.segments import NormSignal
 from airground_drake.verify.engines.smt import solve
 from airground_drake.verify.engines.symbolic_execution import Path
+from airground_drake.verify.finding import Finding
 from airground_drake.verify.model.trigger import induction
 from airground_drake.verify.model.trigger import refined_paths as counting
 from airground_drake.verify.model.trigger import relation as automaton
@@ -43,7 +43,7 @@ from airground_drake.verify.model.trigger import zeno_refine as refinement
 from airground_drake.verify.model.trigger.refined_paths import experiment
 from airground_drake.verify.model.trigger.zeno_proof import ZenoProof
 from airground_drake.verify.model.trigger.zeno_refine import ZenoRefine
-from airground_drake.verify.runs.thr_trig import transitions
+from airground_drake.verify.runs.trigger_replay import transitions
 
 ZENO = {"zeta_m": 3.0, "released_below_m": 2.0, "dwell_s": 0.3, "min_inter_event_s": 0.3, "duration_s": 30.0}
 NOISE = {"noise_m_sqrt_s": 0.004, "leak_1_s": 0.0, "noise_period_s": 0.05, "duration_s": 30.0}
@@ -248,7 +248,7 @@ def test_the_shipped_trigger_is_supported(case_a: Scenario) -> None:
 
 
 def test_experiments_that_must_fail() -> None:
-    found = {name: mutant(REFINE) for name, mutant in refinement.MUTANTS.items()}
+    found = {name: mutant(REFINE) for name, mutant in refinement.REFINED.items()}
     assert {finding.status for finding in found.values()} == {"refuted"}
     whats: list[Any] = [finding.counterexample["what"] for finding in found.values() if finding.counterexample]
     assert ["automaton" in whats[0], "bare" in whats[1]] == [True, True]

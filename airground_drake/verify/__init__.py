@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from airground_drake.verify.cache import cache_folder
-    from airground_drake.verify.claim import PASSING, STATUSES, Claim, Finding, ModelClaim, Status, TraceClaim, Verdict
+    from airground_drake.verify.claim import Claim, ModelClaim, TraceClaim, Verdict
+    from airground_drake.verify.finding import PASSING, STATUSES, Finding, Status
     from airground_drake.verify.judge import verify, verify_model
 
     MODEL_CLAIMS: tuple[ModelClaim, ...]
@@ -42,8 +43,8 @@ _HOME = {
     "cache_folder": "cache",
     "verify": "judge",
     "verify_model": "judge",
-    **dict.fromkeys(("PASSING", "STATUSES", "Claim", "Finding", "ModelClaim", "Status"), "claim"),
-    **dict.fromkeys(("TraceClaim", "Verdict"), "claim"),
+    **dict.fromkeys(("Claim", "ModelClaim", "TraceClaim", "Verdict"), "claim"),
+    **dict.fromkeys(("PASSING", "STATUSES", "Finding", "Status"), "finding"),
 }
 _CLAIMS = {"MODEL_CLAIMS": "model_claims", "TRACE_CLAIMS": "run_claims"}
 

@@ -15,7 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from airground_drake import files
-from airground_drake.verify.claim import PASSING, Finding, ModelClaim
+from airground_drake.verify.claim import ModelClaim
+from airground_drake.verify.finding import PASSING, Finding
 
 ENGINES = ("numpy", "scipy", "numba", "z3-solver", "cvc5", "python-flint", "sympy", "pyddm", "drake")
 """Packages whose versions are part of a finding's key."""

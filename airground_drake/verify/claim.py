@@ -5,7 +5,7 @@ from __future__ import annotations
 import abc
 import json
 from dataclasses import asdict, dataclass, field
-from typing import Any, Literal, get_args
+from typing import Any
 
 import numpy as np
 
@@ -13,39 +13,14 @@ from airground_drake import files
 from airground_drake.errors import TraceError
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.trace import Trace
-
-Status = Literal["proved", "holds", "supported", "refuted", "inconclusive", "error", "not_run"]
-STATUSES: tuple[Status, ...] = get_args(Status)
-PASSING: tuple[Status, ...] = ("proved", "holds", "supported")
+from airground_drake.verify.finding import PASSING, Finding, Status
 
 MOTION_TOLERANCE_M = 1e-9
 """A row may differ by this from the position that its command leads to, m: floating-point integration of one
 step errs by 1e-15 m, and a lie this small moves no robot more than it in any step."""
+
 TIME_TOLERANCE_S = 1e-9
 """Two instants that differ by less are the same, s: rounding of multiples of a period errs by 1e-14 s."""
-
-
-@dataclass(frozen=True)
-class Finding:
-    """What a check found.
-
-    Attributes:
-        status: the verdict class.
-        margin: signed distance from refutation (negative: refuted), in `unit`; None where there is none.
-        unit: unit of the margin.
-        where: where the margin is attained: robot, obstacle, time and the like.
-        counterexample: for `refuted`: enough to reproduce it by hand.
-        evidence: numbers behind the verdict, strict JSON.
-        certificates: texts that others can check, by file name.
-    """
-
-    status: Status
-    margin: float | None = None
-    unit: str = ""
-    where: dict[str, Any] = field(default_factory=dict)
-    counterexample: dict[str, Any] | None = None
-    evidence: dict[str, Any] = field(default_factory=dict)
-    certificates: dict[str, str] = field(default_factory=dict)
 
 
 class Claim(abc.ABC):

@@ -9,7 +9,8 @@ from typing import cast
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.trace import Trace
 from airground_drake.verify.cache import find
-from airground_drake.verify.claim import Status, Verdict
+from airground_drake.verify.claim import Verdict
+from airground_drake.verify.finding import Status
 from airground_drake.verify.registry import model_claims, run_claims
 
 

@@ -8,13 +8,17 @@ from typing import Any
 
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.cache import find
-from airground_drake.verify.claim import Finding, ModelClaim, Status
-from airground_drake.verify.model.avoidance import safe_dist as disturbance
-from airground_drake.verify.model.avoidance import safe_inv as invariance
-from airground_drake.verify.model.threshold import thr_ddm as ddm
-from airground_drake.verify.model.threshold import thr_root as threshold
-from airground_drake.verify.model.trigger import zeno_proof as zeno
-from airground_drake.verify.model.trigger import zeno_refine as refinement
+from airground_drake.verify.claim import ModelClaim
+from airground_drake.verify.finding import Finding, Status
+from airground_drake.verify.model.avoidance import mutants as avoidance
+from airground_drake.verify.model.avoidance.safe_dist import SafeDist
+from airground_drake.verify.model.avoidance.safe_gate import SafeGate
+from airground_drake.verify.model.threshold import mutants as threshold
+from airground_drake.verify.model.threshold.thr_ddm import ThrDdm
+from airground_drake.verify.model.threshold.thr_root import ThrRoot
+from airground_drake.verify.model.trigger import mutants as trigger
+from airground_drake.verify.model.trigger.zeno_proof import ZenoProof
+from airground_drake.verify.model.trigger.zeno_refine import ZenoRefine
 
 Check = Callable[[dict[str, Any]], Finding]
 
@@ -43,12 +47,12 @@ class Mutant(ModelClaim):
 
 
 _TABLES: tuple[tuple[ModelClaim, dict[str, Check]], ...] = (
-    (invariance.SafeGate(), invariance.MUTANTS),
-    (disturbance.SafeDist(), disturbance.MUTANTS),
-    (zeno.ZenoProof(), zeno.MUTANTS),
-    (refinement.ZenoRefine(), refinement.MUTANTS),
-    (threshold.ThrRoot(), threshold.MUTANTS),
-    (ddm.ThrDdm(), ddm.MUTANTS),
+    (SafeGate(), avoidance.MUTANTS),
+    (SafeDist(), avoidance.DISTURBED),
+    (ZenoProof(), trigger.MUTANTS),
+    (ZenoRefine(), trigger.REFINED),
+    (ThrRoot(), threshold.MUTANTS),
+    (ThrDdm(), threshold.SIMULATED),
 )
 
 MUTANTS: tuple[Mutant, ...] = tuple(

@@ -14,29 +14,29 @@ from airground_drake.verify.claim import ModelClaim, TraceClaim
 _RUNS, _MODEL = "airground_drake.verify.runs", "airground_drake.verify.model"
 
 MODEL_CLAIMS: dict[str, str] = {
-    "SAFE-LEMMA": f"{_MODEL}.avoidance.safe_inv:SafeLemma",
+    "SAFE-LEMMA": f"{_MODEL}.avoidance.safe_lemma:SafeLemma",
     "SAFE-INV": f"{_MODEL}.avoidance.safe_inv:SafeInv",
-    "SAFE-GATE": f"{_MODEL}.avoidance.safe_inv:SafeGate",
+    "SAFE-GATE": f"{_MODEL}.avoidance.safe_gate:SafeGate",
     "SAFE-DIST": f"{_MODEL}.avoidance.safe_dist:SafeDist",
     "ZENO-PROOF": f"{_MODEL}.trigger.zeno_proof:ZenoProof",
     "ZENO-REFINE": f"{_MODEL}.trigger.zeno_refine:ZenoRefine",
     "THR-ROOT": f"{_MODEL}.threshold.thr_root:ThrRoot",
-    "THR-OPT": f"{_MODEL}.threshold.thr_root:ThrOpt",
+    "THR-OPT": f"{_MODEL}.threshold.thr_opt:ThrOpt",
     "THR-DDM": f"{_MODEL}.threshold.thr_ddm:ThrDdm",
 }
 """Claims about the model: identifier to module:class."""
 
 RUN_CLAIMS: dict[str, str] = {
     "SAFE-TRACE": f"{_RUNS}.safe_trace:SafeTrace",
-    "SAFE-HYP": f"{_RUNS}.safe_trace:SafeHyp",
-    "ZENO-TRACE": f"{_RUNS}.thr_trig:ZenoTrace",
+    "SAFE-HYP": f"{_RUNS}.safe_hyp:SafeHyp",
+    "ZENO-TRACE": f"{_RUNS}.zeno_trace:ZenoTrace",
     "THR-TRIG": f"{_RUNS}.thr_trig:ThrTrig",
     "GATE-OPT": f"{_RUNS}.gate_opt:GateOpt",
-    "GATE-SUR": f"{_RUNS}.gate_opt:GateSur",
+    "GATE-SUR": f"{_RUNS}.gate_sur:GateSur",
     "GATE-FEAS": f"{_RUNS}.gate_feas:GateFeas",
-    "GATE-TIME": f"{_RUNS}.live_goal:GateTime",
+    "GATE-TIME": f"{_RUNS}.gate_time:GateTime",
     "LIVE-GOAL": f"{_RUNS}.live_goal:LiveGoal",
-    "COMM": f"{_RUNS}.live_goal:Comm",
+    "COMM": f"{_RUNS}.comm:Comm",
 }
 """Claims that are decided from one trace: identifier to module:class."""
 

@@ -25,7 +25,7 @@ from typing import Any, Literal
 import flint
 import sympy
 
-from airground_drake.verify.claim import Finding, Status
+from airground_drake.verify.finding import Finding, Status
 
 PRECISION_BITS = 256
 RELATIVE_WIDTH = Fraction(1, 10**12)

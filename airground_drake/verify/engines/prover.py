@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from airground_drake.verify.claim import Finding, Status
 from airground_drake.verify.engines.obligation import Obligation
 from airground_drake.verify.engines.smt import Result, solve
+from airground_drake.verify.finding import Finding, Status
 
 LIMIT_S = 20.0
 

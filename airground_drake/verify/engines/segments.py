@@ -6,15 +6,12 @@ position[k-1] at t[k-1] to position[k] at t[k].
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.optimize import brentq
 
 from airground_drake.arrays import Array
-from airground_drake.trace import Trace
 
 MERGE_S = 1e-9
 """Rows closer than this are one instant, s: periods that are not binary fractions give simulator steps of
@@ -152,41 +149,3 @@ def _minima(t: Array, parts: Array) -> Array:
     inside = (u > 0.0) & (u < 1.0)
     found: Array = (t[:-1][moving] + u * np.diff(t)[moving])[inside]
     return found
-
-
-class Pair(NamedTuple):
-    """Two things to keep apart: a robot, and an obstacle or robot; `share` is the part that each robot takes."""
-
-    first: str
-    second: str
-    safe_m: float
-    share: float
-
-
-def pairs_of(trace: Trace) -> Iterator[Pair]:
-    """All robot/obstacle and robot/robot pairs of a run, with the safe distances of its scenario."""
-    safe, uav = trace.scenario["safe_distance"], trace.scenario["uav"]["name"]
-    for i, robot in enumerate(trace.robots):
-        for obstacle in trace.scenario["obstacles"]:
-            yield Pair(robot, obstacle, safe["obstacle_m"], 1.0)
-        for other in trace.robots[i + 1 :]:
-            yield Pair(robot, other, safe["air_ground_m"] if uav in (robot, other) else safe["ugv_m"], 0.5)
-
-
-def places_of(trace: Trace) -> dict[str, Array]:
-    """Positions by name, m: (T, 3) of a robot, (3,) of an obstacle, whether the UAV knows it or not."""
-    obstacles = trace.scenario["obstacles"]
-    at_rest = {name: np.asarray(o["position_m"], dtype=np.float64) for name, o in obstacles.items()}
-    return at_rest | {robot: trace.position(robot) for robot in trace.robots}
-
-
-def snapshot(trace: Trace, names: Iterable[str], t_s: float) -> dict[str, Any]:
-    """Positions at a time, and velocities of the robots just after it, of those of `names` that are things."""
-    t, places, wanted = trace.t, places_of(trace), set(names)
-    row = min(int(np.searchsorted(t, t_s + MERGE_S)), len(t) - 1)
-    fixed = {name: place.tolist() for name, place in places.items() if name in wanted and place.ndim == 1}
-    moving = wanted.intersection(trace.robots)
-    return {
-        "positions_m": fixed | {name: interpolate(t, places[name], t_s).tolist() for name in sorted(moving)},
-        "velocities_m_s": {name: trace.command(name)[row].tolist() for name in sorted(moving)},
-    }

@@ -10,10 +10,12 @@ import numpy.typing as npt
 
 from airground_drake.arrays import Array
 from airground_drake.trace import Trace
-from airground_drake.verify.claim import TIME_TOLERANCE_S, Finding
-from airground_drake.verify.engines.segments import MERGE_S, corner_times, interpolate, pairs_of, places_of, travelled
+from airground_drake.verify.claim import TIME_TOLERANCE_S
+from airground_drake.verify.engines.segments import MERGE_S, corner_times, interpolate, travelled
+from airground_drake.verify.finding import Finding
+from airground_drake.verify.runs.control_samples import control_samples
 from airground_drake.verify.runs.gate_record import POSITION_TOLERANCE_M, GateClaim, Off, Row, conclude, cost_tolerance
-from airground_drake.verify.runs.safe_trace import control_samples, slack_of
+from airground_drake.verify.runs.pairs import pairs_of, places_of, slack_of
 
 SPEED_TOLERANCE = 1e-4
 """A step may be longer than the speed limit allows by this, relative."""

@@ -1,107 +1,39 @@
-"""GATE-SUR and GATE-OPT: how every gatekeeper decision of a run was rounded, and how good its plan is.
+"""GATE-OPT: how good the plan of every gatekeeper decision of a run is.
 
 A decision's problem is convex once its plan is relaxed and its distances are measured along recorded unit normals,
-and convexity gives bounds that need no trust in any solver: see `enclose`.
+and convexity gives bounds that need no trust in any solver: see `convex_bounds.enclose`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Iterator
 
 import numpy as np
-from scipy import sparse
 
 from airground_drake.arrays import Array
 from airground_drake.errors import TraceError
 from airground_drake.trace import Trace
-from airground_drake.verify.claim import Finding
+from airground_drake.verify.finding import Finding
+from airground_drake.verify.runs.convex_bounds import Enclosure, enclose
 from airground_drake.verify.runs.gate_record import POSITION_TOLERANCE_M, GateClaim, Off, Row, conclude, cost_tolerance
 
-TIE = 1e-9
-"""Accumulated deficits of sum-up rounding closer to 1/2 than this are a tie: either mode may follow."""
 OVERSTATED = 1e-5
 """A recorded lower bound may be above the optimum by this, relative: a solver's primal cost errs by 1e-6 or less."""
+
 UNDERSTATED = 1e-3
 """It may be below it by this, relative: farther below, it would not be the optimum of the relaxation."""
+
 GAP_TOLERANCE = 1e-6
 """Recorded and recomputed gaps may differ by this."""
-ROUNDED_ROUTES = ("relaxed", "nonlinear")
-"""Routes that solve (27) and round by (28)-(29)."""
+
 BLOCKS = 10
 """Blocks of stages, for each of which the routes with a minimum dwell choose a mode."""
+
 DWELL_ROUTES = ("enumeration", "branch_and_bound")
 """Those routes."""
+
 HALF_PLANE_ROUTES = ("relaxed", "branch_and_bound")
 """Routes that bound the cost with distances along recorded normals; the others know no bound, or an exact one."""
-
-
-class GateSur(GateClaim):
-    """GATE-SUR."""
-
-    id = "GATE-SUR"
-    statement = "Every relaxed plan was rounded by sum-up rounding, with an integrated error of at most half a stage."
-    formula = (
-        "rounded_k = 1 if D_k >= 1 - D_k else 0, D_k = sum_{r <= k} relaxed_r - sum_{r < k} rounded_r; "
-        "max_k |dt sum_{r <= k} (relaxed_r - rounded_r)| <= dt / 2"
-    )
-    method = (
-        "Running sums of the recorded relaxed and rounded plans. Each stage is judged by the deficits that the "
-        "recorded rounding before it leaves, so that one wrong stage does not blur the next; deficits within 1e-9 of "
-        "1/2 are a tie, where either mode may follow (exact ties should accept). Each error is judged against its own "
-        "bound as well, so that the verdict does not rest on the theorem that follows from the rule."
-    )
-    equations = "(28)-(29)"
-    assumptions = ("The relaxed plan recorded is the one that was rounded.",)
-    does_not_establish = (
-        "That the relaxed plan is optimal (GATE-OPT), or that the rounded one was taken: the cheapest plan known was. "
-        "A small integrated error bounds positions, not costs."
-    )
-
-    def applies(self, trace: Trace) -> bool:
-        """Only some routes round; a trace without a scenario is for `judge` to reject."""
-        gate = trace.meta.get("scenario", {}).get("gatekeeper", {})
-        return super().applies(trace) and gate.get("route", ROUNDED_ROUTES[0]) in ROUNDED_ROUTES
-
-    def judge_rows(self, trace: Trace, rows: list[Row]) -> Finding:
-        """Round again, and sum up; the margin is what is left of dt/2."""
-        without = [row for row in rows if row.data["relaxed"] is None]
-        if cut := [row for row in without if row.given["status"] == "optimal"]:
-            raise TraceError(f"{cut[0].label} claims to be complete, but has no relaxation")
-        rounded = [row for row in rows if row.data["relaxed"] is not None]
-        skipped = {"decisions": len(rows), "without_relaxation": [row.label for row in without]}
-        if not rounded:
-            return Finding("not_run", evidence={"reason": "no decision has a relaxation", **skipped})
-        worst = min(rounded, key=lambda row: row.dt / 2.0 - _deviation(row))
-        error, bound = _deviation(worst), worst.dt / 2.0
-        finding = Finding(
-            "holds",
-            margin=max(0.0, bound - error),
-            unit="s",
-            where={name: worst.given[name] for name in ("robot", "t_s")},
-            evidence={**skipped, "largest_error_s": error, "bound_s": bound},
-        )
-        return conclude(finding, (one for row in rounded for one in _rounding(row)))
-
-
-def _deviation(row: Row) -> float:
-    """Largest integrated difference of the relaxed and the rounded plan, s."""
-    return float(row.dt * np.abs(np.cumsum(row["relaxed"] - row["rounded"])).max())
-
-
-def _rounding(row: Row) -> Iterator[Off]:
-    """(28)-(29) and what was recorded about it."""
-    relaxed, rounded, given = row["relaxed"], row["rounded"], row.given
-    yield Off(row, "relaxed omega is outside [0, 1]", np.maximum(0.0, np.abs(relaxed - 0.5) - 0.5), 0.0)
-    yield Off(row, "rounded omega is not binary", np.minimum(np.abs(rounded), np.abs(rounded - 1.0)), 0.0)
-    deficit = np.cumsum(relaxed) - np.concatenate([[0.0], np.cumsum(rounded)[:-1]])
-    against = np.where(rounded == 1.0, 0.5 - deficit, deficit - 0.5)  # positive: the other mode lacks more
-    yield Off(row, "rounded against the rule", np.maximum(0.0, against), TIE, stage=int(np.argmax(against)))
-    deviation = _deviation(row)
-    yield Off(row, "integrated rounding error, s", deviation, (0.5 + TIE) * row.dt)
-    yield Off(row, "recorded rounding error, s", given["rounding_deviation_s"] - deviation, TIE, recomputed_s=deviation)
-    yield Off(row, "recorded relaxed first stage", given["relaxed_first_stage"] - relaxed[0], TIE)
 
 
 class GateOpt(GateClaim):
@@ -194,15 +126,6 @@ class GateOpt(GateClaim):
         return conclude(finding, compared)
 
 
-@dataclass(frozen=True)
-class Enclosure:
-    """Bounds of the optimum of one decision's problem, and a lower one for plans with the other first stage."""
-
-    lower: float
-    upper: float
-    other_first: float
-
-
 def _no_worse(row: Row) -> Iterator[Off]:
     """The plan against the constant ones, by the exact cost; each choice against the constant plan that makes it."""
     for name, constant in zip(("refuse", "accept"), row.cost(row.constant).tolist(), strict=True):
@@ -241,71 +164,3 @@ def _cheapest(row: Row, normals: Array | None) -> Enclosure:
     cost = row.cost(row.positions(omega), normals)
     least = float(cost.min())
     return Enclosure(least, least, float(cost[omega[:, 0] != row["plan"][0]].min()))
-
-
-def enclose(rows: Sequence[Row]) -> list[Enclosure]:
-    """Bounds of the optimum over omega in [0, 1]^N of the cost with distances along the normals.
-
-    For any multipliers l_kj >= 0 of u_k >= d_j - n_kj.(rho_k - o_kj), minimising the Lagrangian over u leaves
-    q(omega) - sum_k (sum_j l_kj)^2 / (4 dt b), q convex and quadratic, of which the tangent at any omega* is below
-    it everywhere, and least at a corner of the box. Both l and omega* are the solver's; neither need be good.
-    """
-    if not rows:
-        return []
-    shares, multipliers = _solve(rows)
-    found = []
-    for row, omega, solved in zip(rows, shares, multipliers, strict=True):
-        dt, error, slack, normals = row.dt, row.error_weight, row.slack_weight, row["normals"]
-        multiplier = solved * row.scale if slack > 0.0 else 0.0 * solved
-        positions = row.positions(omega)
-        away = positions - row["reference_m"]
-        value = dt * error * np.square(away).sum() - (multiplier * row.gaps(positions, normals)).sum()
-        value -= np.square(multiplier.sum(axis=1)).sum() / (4.0 * dt * slack) if slack > 0.0 else 0.0
-        by_position = 2.0 * dt * error * away - np.einsum("km,kmi->ki", multiplier, normals)
-        change = dt * (row["accept_m_s"] - row["refuse_m_s"])
-        slope = np.einsum("ki,ki->k", change, np.cumsum(by_position[::-1], axis=0)[::-1])
-        corner = np.minimum(-slope * omega, slope * (1.0 - omega))
-        other = value + corner[1:].sum() + slope[0] * (1.0 - row["plan"][0] - omega[0])
-        found.append(Enclosure(float(value + corner.sum()), float(row.cost(positions, normals)), float(other)))
-    return found
-
-
-def _solve(rows: Sequence[Row]) -> tuple[list[Array], list[Array]]:
-    """Relaxed plans (N,) and multipliers (N, m) >= 0, costs relative to `Row.scale`, of all rows as one program.
-
-    Variables, stage by stage of row by row: task errors e = rho - reference, omega and u.
-
-    Raises:
-        TraceError: if the solver gives no solution at all.
-    """
-    import cvxpy  # takes a second, which other claims need not wait for
-
-    cp: Any = cvxpy  # its types are incomplete
-    stages = len(rows[0]["reference_m"])
-    total = stages * len(rows)
-    change = np.concatenate([row.dt * (row["accept_m_s"] - row["refuse_m_s"]) for row in rows])
-    moved = [np.diff(row["reference_m"], axis=0, prepend=row["initial_m"][None]) for row in rows]
-    drift = np.concatenate([row.dt * row["refuse_m_s"] - step for row, step in zip(rows, moved, strict=True)])
-    follows = np.arange(3, 3 * total) // 3 % stages != 0
-    dynamics = sparse.eye(3 * total) - sparse.diags(follows.astype(float), -3)
-    steering = sparse.bsr_matrix((change[:, :, None], np.arange(total), np.arange(total + 1))).tocsr()
-    points = [len(row["distances_m"]) for row in rows]
-    at = np.repeat(np.arange(total), np.repeat(points, stages))  # inequality by inequality, its stage
-    count, normals = len(at), np.concatenate([row["normals"].reshape(-1, 1, 3) for row in rows])
-    facing = sparse.bsr_matrix((normals, at, np.arange(count + 1)), shape=(count, 3 * total)).tocsr()
-    picks = sparse.csr_matrix((np.ones(count), at, np.arange(count + 1)), shape=(count, total))
-    least = np.concatenate([-row.gaps(row["reference_m"], row["normals"]).ravel() for row in rows])
-    weights = [(row.dt * row.error_weight / row.scale, row.dt * row.slack_weight / row.scale) for row in rows]
-    of_error, of_slack = np.sqrt(weights).T
-    e, omega, u = cp.Variable(3 * total), cp.Variable(total), cp.Variable(total)
-    constraints = [dynamics @ e - steering @ omega == drift.ravel(), omega >= 0.0, omega <= 1.0, u >= 0.0]
-    constraints += [facing @ e + picks @ u >= least] if count else []
-    error = cp.sum_squares(cp.multiply(np.repeat(of_error, 3 * stages), e))
-    slack = cp.sum_squares(cp.multiply(np.repeat(of_slack, stages), u))
-    cp.Problem(cp.Minimize(error + slack), constraints).solve(solver=cp.CLARABEL)
-    if omega.value is None:
-        raise TraceError("the independent solver gave no solution")
-    shares = [np.clip(part, 0.0, 1.0) for part in np.split(omega.value, len(rows))]
-    dual = np.maximum(0.0, constraints[-1].dual_value) if count else np.empty(0)
-    parts = np.split(dual, np.cumsum(stages * np.array(points))[:-1])
-    return shares, [part.reshape(stages, m) for part, m in zip(parts, points, strict=True)]

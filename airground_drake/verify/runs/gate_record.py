@@ -16,8 +16,9 @@ import numpy as np
 from airground_drake.arrays import Array
 from airground_drake.errors import TraceError
 from airground_drake.trace import PROBLEM_ARRAYS, PROBLEM_SCALARS, Trace
-from airground_drake.verify.claim import Finding, TraceClaim
-from airground_drake.verify.runs.live_goal import GATED_METHODS, talk_is_due
+from airground_drake.verify.claim import TraceClaim
+from airground_drake.verify.finding import Finding
+from airground_drake.verify.runs.interventions import GATED_METHODS, talk_is_due
 
 POSITION_TOLERANCE_M = 1e-9
 """Recorded and recomputed positions may differ by this, m: rounding of N additions errs by 1e-13 m."""

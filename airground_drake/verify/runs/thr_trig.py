@@ -1,139 +1,32 @@
-"""ZENO-TRACE and THR-TRIG: the trigger (20) of a run, re-evaluated from positions, preset and noise.
-
-The decision variable x(t) = ||rho_rd(t) - rho(t)|| + n(t) is, between rows, the norm of a vector that is linear
-in time plus a number that is linear in time, so its turning points and crossings are found exactly.
-"""
+"""THR-TRIG: the events and modes of a run against those of the trigger (20), run again on it."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from itertools import pairwise, zip_longest
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
 
 from airground_drake.errors import TraceError
 from airground_drake.trace import Trace
-from airground_drake.verify.claim import TIME_TOLERANCE_S, Finding, TraceClaim
-from airground_drake.verify.engines.segments import NormSignal, corner_times, interpolate, travelled
+from airground_drake.verify.claim import TraceClaim
+from airground_drake.verify.engines.segments import NormSignal
+from airground_drake.verify.finding import Finding
+from airground_drake.verify.runs.trigger_record import Conflict, Transition, _column_conflict, _recorded
+from airground_drake.verify.runs.trigger_replay import decision_variable, transitions
 
 EVENT_TOLERANCE_S = 1e-5
 """Recorded and recomputed events may differ by this, s: ten times the accuracy of the simulator's event isolation."""
+
 VARIABLE_TOLERANCE_M = 1e-6
 """Recorded and recomputed decision variables may differ by this, m: x moves less within the event isolation."""
+
 MODES = {"trigger": 1, "release": 0, "refractory": 2, "resume": 0}
 """Mode after each kind of transition: 'refractory' is a release before the dwell is over, 'resume' the end of it."""
+
 EVENT_KINDS = {"trigger": "trigger", "release": "release", "refractory": "release"}
 """Event that the trace has for a transition."""
-
-Transition = tuple[float, str]
-"""Time in s, and a key of MODES or kind of event."""
-Conflict = dict[str, Any]
-"""What disagrees: `t_s`, `what`, and the values on both sides."""
-
-
-def decision_variable(trace: Trace, ugv: str) -> NormSignal:
-    """x(t) of (15) from positions and noise of the trace and the preset of its scenario, not the recorded one."""
-    rows, preset = trace.t, trace.scenario["ugvs"][ugv]["preset"]
-    waypoints, speed = np.asarray(preset["waypoints_m"], dtype=np.float64), preset["speed_m_s"]
-    corners = corner_times(waypoints, speed)
-    t = np.union1d(rows, corners[(corners > rows[0]) & (corners < rows[-1])])
-    parts = interpolate(rows, np.column_stack([trace.position(ugv), trace.column(f"{ugv}.noise_m")]), t)
-    parts[:, :3] = travelled(waypoints, speed, t) - parts[:, :3]
-    return NormSignal.of(t, parts)
-
-
-def transitions(x: NormSignal, zeta: float, release: float, dwell: float) -> Iterator[Transition]:
-    """Run the trigger automaton on x: levels zeta >= release, m, and dwell, s (release = zeta, dwell = 0: bare)."""
-    released, resume = -np.inf, float(x.t[0])
-    while resume <= x.t[-1]:
-        waited = resume > released  # at the start or the end of a refractory time x may be above already
-        if waited and np.isfinite(released):
-            yield resume, "resume"
-        trigger = resume if waited and x.at(resume) >= zeta else x.reaches(zeta, resume, above=True)
-        if trigger is None:
-            return
-        yield trigger, "trigger"
-        found = x.reaches(release, trigger, above=False)
-        if found is None:
-            return
-        released, resume = found, max(found, trigger + dwell)
-        yield released, "refractory" if resume > released else "release"
-
-
-def _recorded(trace: Trace, ugv: str) -> list[Transition]:
-    """Trigger and release events of a UGV by time."""
-    found = [(float(e["t_s"]), str(e["kind"])) for e in trace.events if e["robot"] == ugv]
-    return sorted(event for event in found if event[1] in ("trigger", "release"))
-
-
-def _column_conflict(trace: Trace, ugv: str, events: list[Transition]) -> Conflict | None:
-    """First row at which the columns on triggers and releases do not agree with the events before it."""
-    t = trace.t
-    for kind, name in (("trigger", "triggered_at_s"), ("release", "released_at_s")):
-        times = np.array([-1.0, *(time for time, what in events if what == kind)])
-        counts = [np.searchsorted(times[1:], t + shift) for shift in (-TIME_TOLERANCE_S, TIME_TOLERANCE_S)]
-        value = trace.column(f"{ugv}.{name}")
-        wrong = np.all([np.abs(value - times[n]) > TIME_TOLERANCE_S for n in counts], axis=0)
-        if kind == "trigger":
-            wrong |= np.all([trace.column(f"{ugv}.triggers") != n for n in counts], axis=0)
-        if wrong.any():
-            k = int(np.argmax(wrong))
-            return {"robot": ugv, "t_s": float(t[k]), "what": f"column {name} or count disagrees with the events"}
-    return None
-
-
-class ZenoTrace(TraceClaim):
-    """ZENO-TRACE."""
-
-    id = "ZENO-TRACE"
-    statement = "In this run no UGV was triggered twice within the minimum inter-event time."
-    formula = "t_(k+1) - t_k >= min_inter_event_s for consecutive triggers of each UGV, tolerance 1e-9 s"
-    method = (
-        "Differences of the recorded trigger times; the events must agree with the columns triggers, triggered_at_s "
-        "and released_at_s at every row, otherwise the verdict is `error`. A bare trigger is held to the same bound."
-    )
-    equations = "(20)"
-    assumptions = ("The trace records every trigger (THR-TRIG recomputes them independently).",)
-    does_not_establish = (
-        "Absence of Zeno behaviour in other runs: a finite run has finitely many events whatever the trigger is. The "
-        "statement for all runs is ZENO-PROOF, that about refined noise ZENO-REFINE. With fewer than two triggers the "
-        "claim holds for lack of a gap (the margin is then empty)."
-    )
-
-    def check(self, trace: Trace) -> Finding:
-        """Compare the smallest gap of each UGV with the bound."""
-        bound = float(trace.scenario["decision"]["min_inter_event_s"])
-        if bound <= 0.0:
-            return Finding("not_run", evidence={"reason": "min_inter_event_s is 0: no bound to compare with"})
-        triggers: dict[str, list[float]] = {}
-        for ugv in trace.ugvs:
-            events = _recorded(trace, ugv)
-            if conflict := _column_conflict(trace, ugv, events):
-                raise TraceError(f"events and columns disagree: {conflict}")
-            triggers[ugv] = [time for time, kind in events if kind == "trigger"]
-        gaps = [
-            (after - before, ugv, before, after) for ugv, times in triggers.items() for before, after in pairwise(times)
-        ]
-        evidence = {
-            "triggers": {ugv: {"count": len(times), "t_s": times} for ugv, times in triggers.items()},
-            "bound_s": bound,
-            "most_triggers_possible": int(trace.scenario["duration_s"] / bound) + 1,
-        }
-        if not gaps:
-            return Finding("holds", evidence=evidence | {"reason": "no UGV was triggered twice"})
-        gap, ugv, before, after = min(gaps)
-        smallest = {"robot": ugv, "previous_t_s": before, "t_s": after, "gap_s": gap}
-        held = gap >= bound - TIME_TOLERANCE_S
-        return Finding(
-            "holds" if held else "refuted",
-            margin=gap - bound,
-            unit="s",
-            where={"robot": ugv, "t_s": after},
-            counterexample=None if held else smallest,
-            evidence=evidence | {"smallest_gap": smallest},
-        )
 
 
 def _is_bayes(rule: dict[str, Any], zeta: float) -> bool:

@@ -17,8 +17,10 @@ from typing import Any, Literal
 import numpy as np
 
 from airground_drake.trace import Trace
-from airground_drake.verify.claim import Finding, Verdict
-from airground_drake.verify.runs.safe_trace import DISTANCE_TOLERANCE_M, VELOCITY_TOLERANCE_M_S
+from airground_drake.verify.claim import Verdict
+from airground_drake.verify.finding import Finding
+from airground_drake.verify.runs.pairs import DISTANCE_TOLERANCE_M
+from airground_drake.verify.runs.safe_hyp import VELOCITY_TOLERANCE_M_S
 from airground_drake.verify.stl import signals as stl_signals
 from airground_drake.verify.stl.signals import NEVER, Samples, Signals
 

@@ -21,7 +21,8 @@ import numpy.typing as npt
 from airground_drake.arrays import Array
 from airground_drake.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
-from airground_drake.verify.runs.live_goal import AT_REST_M, AT_REST_S, GATED_METHODS
+from airground_drake.verify.runs.interventions import GATED_METHODS
+from airground_drake.verify.runs.live_goal import AT_REST_M, AT_REST_S
 from airground_drake.verify.runs.thr_trig import EVENT_TOLERANCE_S, VARIABLE_TOLERANCE_M
 
 PULSE_S = 1e-9

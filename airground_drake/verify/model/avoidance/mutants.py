@@ -1,4 +1,4 @@
-"""Broken variants of SAFE-LEMMA and of one avoidance step, each replayed on the running layer with the same break."""
+"""Broken variants of what the claims about avoidance are about, each replayed on the running layer."""
 
 from __future__ import annotations
 
@@ -11,15 +11,23 @@ import numpy as np
 from airground_drake.arrays import Array
 from airground_drake.nsbc import kernels
 from airground_drake.nsbc.avoidance import Avoidance, Composition, HalfSpaces, Surroundings
-from airground_drake.verify.claim import Finding
-from airground_drake.verify.engines.obligation import Obligation
+from airground_drake.verify.engines.obligation import Obligation, rational
 from airground_drake.verify.engines.prover import discharge, finding
 from airground_drake.verify.engines.rewriting import with_numbers, without
 from airground_drake.verify.engines.rounding import nearest, rates
+from airground_drake.verify.finding import Finding
 from airground_drake.verify.model.avoidance.constants import Inputs, kinds, running_avoidance
+from airground_drake.verify.model.avoidance.disturbed_obligations import disturbed, pushed
+from airground_drake.verify.model.avoidance.disturbed_runs import Scene, attack, scenes
 from airground_drake.verify.model.avoidance.hostile_inputs import postcondition
 from airground_drake.verify.model.avoidance.lemma import lemma
-from airground_drake.verify.model.avoidance.obligations import LIMIT_S, scaling, step, with_scenario
+from airground_drake.verify.model.avoidance.obligations import (
+    LIMIT_S,
+    scaling,
+    step,
+    with_scenario,
+)
+from airground_drake.verify.model.avoidance.safe_gate import SafeGate
 
 
 def broken(obligation: Obligation, replay: Inputs) -> Finding:
@@ -188,3 +196,80 @@ BROKEN: dict[str, Callable[[Inputs], Finding]] = {
     "SAFE-GATE: scaling omitted": _unscaled,
 }
 """By name; each takes the inputs of SAFE-GATE, which contain those of the other claims, and is refuted."""
+
+
+def _built(inputs: Inputs, **changed: Any) -> Finding:
+    """SAFE-GATE for a diagram of method (d) that was built differently."""
+    return SafeGate().check(inputs | {"method_d": inputs["method_d"] | changed})
+
+
+MUTANTS: dict[str, Callable[[Inputs], Finding]] = {
+    **BROKEN,
+    "SAFE-GATE: intervention on top": lambda inputs: _built(inputs, intervention_on_top=True),
+    "SAFE-GATE: recursion (5) as printed": lambda inputs: _built(inputs, compositions=["recursion_nearest"]),
+}
+"""Broken variants; each takes the inputs of SAFE-GATE and is refuted."""
+
+
+def _disturbed_bound(inputs: Inputs, name: str) -> Obligation:
+    """An obligation of `disturbed` with the numbers of a kind of pair that it is about."""
+    kind = next(k for k in (*kinds(inputs), kinds(inputs)[0]) if (k.share < 1.0) == name.startswith("pair_"))
+    numbers = {
+        "d": kind.safe,
+        "h": inputs["period_s"],
+        "A": inputs["avoidance_gain_1_s"],
+        "W": pushed(inputs, kind.share),
+    }
+    return with_numbers(next(each for each in disturbed() if each.name == name), kind.name, numbers)
+
+
+def _disturbed_scene(inputs: Inputs, name: str) -> Scene:
+    return next(scene for scene in scenes(inputs) if scene.name == name)
+
+
+def _disturbed_flipped(inputs: Inputs) -> Finding:
+    given = _disturbed_bound(inputs, "inside_bound")
+    rule = {"rule": f"-({given.hypotheses['rule']})"}
+    mutant = replace(given, hypotheses={**given.hypotheses, **rule}, says="r <= A (d - D): never below d - W/A")
+    return broken(mutant, attack(inputs, _disturbed_scene(inputs, "obstacle"), "pinned", edit=flipped))
+
+
+def _disturbed_large_gain(inputs: Inputs) -> Finding:
+    changed = {**inputs, "avoidance_gain_1_s": 4.0 / inputs["period_s"]}
+    mutant = without(_disturbed_bound(changed, "outside_bound"), "stable", "A h = 4: never below d - W/A")
+    return broken(mutant, attack(changed, _disturbed_scene(inputs, "obstacle"), "pinned"))
+
+
+def _disturbed_dropped(inputs: Inputs) -> Finding:
+    mutant = without(_disturbed_bound(inputs, "inside_bound"), "rule", "without the inequality for this obstacle")
+    return broken(
+        mutant, attack(inputs, _disturbed_scene(inputs, "notch"), "pinned", edit=dropped([True, False, False]))
+    )
+
+
+def _disturbed_one_of_two(inputs: Inputs) -> Finding:
+    given = _disturbed_bound(inputs, "pair_inside_bound")
+    W = rational(2.0 * inputs["disturbance_m_s"])
+    mutant = replace(
+        given, goal=f"{given.goal} - ({W})/2", certificate=(), says="two disturbed robots: never below d - w/A",
+        hypotheses={**given.hypotheses, "bounded": f"{given.hypotheses['bounded']} - ({W})/2"},
+    )  # fmt: skip
+    return broken(mutant, attack(inputs, _disturbed_scene(inputs, "uav_low"), "pinned", pairs=1.0))
+
+
+def _disturbed_stronger(inputs: Inputs) -> Finding:
+    given = _disturbed_bound(inputs, "inside_bound")
+    W = rational(inputs["disturbance_m_s"])
+    goal = f"{given.goal} - {rational(inputs['avoidance_gain_1_s'])}*s*({W})"
+    mutant = replace(given, goal=goal, certificate=(), says="a disturbance of 2 w: never below d - w/A")
+    return broken(mutant, attack(inputs, _disturbed_scene(inputs, "obstacle"), "pinned", force=2.0))
+
+
+DISTURBED: dict[str, Callable[[Inputs], Finding]] = {
+    "SAFE-DIST: sign of the inequality flipped": _disturbed_flipped,
+    "SAFE-DIST: gain too large, A h = 4": _disturbed_large_gain,
+    "SAFE-DIST: one inequality dropped": _disturbed_dropped,
+    "SAFE-DIST: only one robot of a pair counted as disturbed": _disturbed_one_of_two,
+    "SAFE-DIST: disturbance twice the bound": _disturbed_stronger,
+}
+"""Broken variants; each takes the inputs of SAFE-DIST and is refuted."""

@@ -16,13 +16,14 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from typing import Any
 
 from scipy.stats import beta, norm
 
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.verify.claim import Finding, ModelClaim
+from airground_drake.verify.claim import ModelClaim
+from airground_drake.verify.finding import Finding
 from airground_drake.verify.model.threshold.first_passages import (
     CHANNELS,
     Experiment,
@@ -33,10 +34,13 @@ from airground_drake.verify.model.threshold.first_passages import (
 )
 
 LEVEL = 0.99
+
 ERROR_ALLOWANCE = 2e-4
 """Bias of the corrected error rate."""
+
 TIME_ALLOWANCE = 0.05
 """Bias of the corrected time, in noise periods."""
+
 Formulas = Callable[[Experiment], tuple[float, float]]
 """Mean decision time, s, and error rate that are to be compared with the simulation."""
 
@@ -164,50 +168,3 @@ def _pyddm(experiment: Experiment) -> dict[str, float] | str:
         "decision_time_s": float(density @ solution.t_domain) * float(model.dt) * unit,
         "error_rate": float(solution.prob("error")),
     }
-
-
-def printed(experiment: Experiment, deviation_s: float) -> tuple[float, float]:
-    """(17)-(18) as printed, where the initial deviation is a time, s."""
-    zeta, drift, noise = experiment.zeta, experiment.drift, experiment.noise
-    u = 2.0 * zeta * drift / noise**2
-    exponent = min(-2.0 * deviation_s * drift**2 / noise**2, 700.0)  # more than the largest float
-    bias = (1.0 - math.exp(exponent)) / (2.0 * math.sinh(u))
-    time = zeta / drift * math.tanh(u / 2.0) + 2.0 * zeta / drift * bias - deviation_s
-    return time, 1.0 / (1.0 + math.exp(u)) - bias
-
-
-def _printed_is_better(inputs: dict[str, Any]) -> Finding:
-    """That the threshold of (19) as printed has no larger Bayes risk than that with c2/c1: one-sided, same level."""
-    c1, c2 = float(inputs["c1_1_s"]), float(inputs["c2"])
-    chosen = experiments(inputs)
-    risks, variances = [], []
-    for sample in (simulate(chosen[-2]), simulate(chosen[-1])):
-        count, period = sample.experiment.paths, sample.experiment.period
-        mean, rate = sample.periods / count, sample.wrong / count
-        risks.append(c1 * (mean - 0.25) * period + c2 * rate)
-        # standard deviation of a sum is at most the sum of standard deviations, whatever the correlation
-        time = math.sqrt(max(sample.squares / count - mean**2, 0.0)) * c1 * period
-        variances.append((time + c2 * math.sqrt(rate * (1.0 - rate))) ** 2 / count)
-    allowance = c2 * 2.0 * ERROR_ALLOWANCE + c1 * TIME_ALLOWANCE * (chosen[-2].period + chosen[-1].period)
-    z = (risks[1] - risks[0] - allowance) / math.sqrt(sum(variances))
-    numbers = {"risk_at_the_bayes_threshold": risks[0], "risk_at_the_printed_threshold": risks[1], "z_score": z}
-    if z <= float(norm.isf(1.0 - LEVEL)):
-        return Finding("inconclusive", evidence=numbers)
-    thresholds = {"bayes_threshold_m": chosen[-2].zeta, "printed_threshold_m": chosen[-1].zeta}
-    found = {"drift_m_s": chosen[-1].drift, **thresholds, **numbers}
-    return Finding("refuted", counterexample=found, evidence=numbers)
-
-
-MUTANTS: dict[str, Callable[[dict[str, Any]], Finding]] = {
-    "THR-DDM: initial deviation in m where (17)-(18) have s": lambda inputs: compare(
-        experiments(inputs), lambda each: printed(each, each.deviation)
-    ),
-    "THR-DDM: (18) with the wrong sign of the deviation": lambda inputs: compare(
-        experiments(inputs), lambda each: (running(each)[0], running(replace(each, deviation=-each.deviation))[1])
-    ),
-    "THR-DDM: noise^2 in place of the noise": lambda inputs: compare(
-        experiments(inputs), lambda each: running(replace(each, noise=each.noise**2))
-    ),
-    "THR-DDM: the threshold with c1/c2 minimises the risk": _printed_is_better,
-}
-"""Broken variants by name: each must be refuted by the simulated paths (the last where c1 and c2 differ enough)."""

@@ -18,17 +18,17 @@ and `inv_safety.smt2` (the invariant above, for any solver: each must be unsatis
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from airground_drake.decision.trigger import Mode, Trigger, TriggerState
+from airground_drake.decision.trigger import Trigger
 from airground_drake.diagram import make_trigger, threshold
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.verify.claim import TIME_TOLERANCE_S, Finding, ModelClaim, Status
+from airground_drake.verify.claim import TIME_TOLERANCE_S, ModelClaim
 from airground_drake.verify.engines.obligation import rational
 from airground_drake.verify.engines.prover import LIMIT_S, discharge, finding
 from airground_drake.verify.engines.smt import solve
+from airground_drake.verify.finding import Finding, Status
 from airground_drake.verify.model.trigger.induction import counterexample, horn, invariant, obligations, remarks
 from airground_drake.verify.model.trigger.relation import conformance, relation, rounding
 
@@ -118,45 +118,3 @@ def prove(trigger: Trigger, inputs: dict[str, Any]) -> Finding:
         found, status=status, margin=TIME_TOLERANCE_S - evidence["rounding_s"], unit="s", where={"bound_s": bound},
         evidence={**evidence, "invariant": ours, **found.evidence}, certificates={**saved, **found.certificates},
     )  # fmt: skip
-
-
-class _NoDwell(Trigger):
-    """The dwell is over at once."""
-
-    def dwell_end(self, state: TriggerState) -> float:
-        return state.triggered_at
-
-
-class _NoRefractory(Trigger):
-    """A release always leads back to SUPERVISING."""
-
-    def fall(self, state: TriggerState, t: float) -> TriggerState:
-        return replace(super().fall(state, t), mode=Mode.SUPERVISING)
-
-
-class _RecoversAtOnce(Trigger):
-    """REFRACTORY is over as soon as it begins."""
-
-    def dwell_end(self, state: TriggerState) -> float:
-        return state.released_at if state.mode is Mode.REFRACTORY else super().dwell_end(state)
-
-
-class _Forgets(Trigger):
-    """A trigger at the end of REFRACTORY keeps the time of the one before."""
-
-    def recover(self, state: TriggerState, t: float, x: float) -> TriggerState:
-        return replace(super().recover(state, t, x), triggered_at=state.triggered_at)
-
-
-def _mutant(kind: type[Trigger]) -> Callable[[dict[str, Any]], Finding]:
-    return lambda inputs: prove(kind(inputs["zeta_m"], inputs["released_below_m"], inputs["dwell_s"]), inputs)
-
-
-MUTANTS: dict[str, Callable[[dict[str, Any]], Finding]] = {
-    "no dwell": _mutant(_NoDwell),
-    "no refractory mode": _mutant(_NoRefractory),
-    "recovers at once": _mutant(_RecoversAtOnce),
-    "forgets a trigger after the dwell": _mutant(_Forgets),
-    "no hysteresis, no dwell": lambda inputs: prove(Trigger.bare(inputs["zeta_m"]), inputs),
-}
-"""Broken triggers; each must be refuted by a run that is replayed on it."""

@@ -20,17 +20,15 @@ theoretical counts follow from the formula in `counting.py`.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from airground_drake.arrays import Array
-from airground_drake.decision.trigger import Trigger
 from airground_drake.diagram import make_trigger, threshold
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.verify.claim import Finding, ModelClaim, Status
+from airground_drake.verify.claim import ModelClaim
+from airground_drake.verify.finding import Finding, Status
 from airground_drake.verify.model.trigger.refined_paths import (
     HALVINGS,
     PATHS,
@@ -43,10 +41,15 @@ from airground_drake.verify.model.trigger.refined_paths import (
 )
 
 LEVEL = 0.99
+
 RESAMPLES = 4000
+
 DIVERGES_BELOW = -0.25
+
 FLAT_WITHIN = 0.1
+
 STANDARD_ERRORS = 5.0
+
 ROUNDING = 1e-9
 """Exponents are equal within this: the fit to equal counts gives about 1e-15."""
 
@@ -196,12 +199,3 @@ def judge_experiment(setting: Experiment) -> Finding:
     ]
     table = "\n".join([f"path,dt_s,{','.join(SERIES)}", *rows]) + "\n"
     return Finding(status, slack[condition], "", {"condition": condition}, broken, evidence, {"counts.csv": table})
-
-
-MUTANTS: dict[str, Callable[[dict[str, Any]], Finding]] = {
-    "automaton with no hysteresis and no dwell": lambda inputs: judge_experiment(
-        replace(experiment(inputs), trigger=Trigger.bare(inputs["zeta_m"]))
-    ),
-    "a smooth signal instead of noise": lambda inputs: judge_experiment(replace(experiment(inputs), smooth=True)),
-}
-"""Experiments that must be refuted: the first is not flat, the second does not diverge."""
