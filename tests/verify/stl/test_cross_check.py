@@ -15,35 +15,21 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from synthetic import case_a, lone, simulate, with_meta, with_scenario, with_signals
+from builders import STILL, case_a, lone, passing_by, run_of, simulate, with_events, with_scenario, with_signals
 
-from airground_drake.scenarios.schema import Decision, Obstacle, Preset, Threshold
+from airground_drake.scenarios.schema import Decision, Threshold
 from airground_drake.trace import Trace
 from airground_drake.verify import verify
 from airground_drake.verify.claim import Verdict
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.stl.cross_check import FORMULAS, StlFormula, cross_check, merge
-from airground_drake.verify.stl.signals import Signals, square
+from airground_drake.verify.stl.signals import Signals
 
 pytest.importorskip("rtamt")
 
 CLAIMS = {"SAFE-TRACE", "SAFE-HYP", "ZENO-TRACE", "THR-TRIG", "LIVE-GOAL", "COMM"}
-STILL = Preset([[0.0, 0.0, 0.0]], 1.0)
+
 SHIPPED = [(scenario, name) for scenario in ("case_a", "case_b") for name in "abcd" if scenario + name != "case_ba"]
-
-
-@cache
-def run_of(method: str) -> Trace:
-    """One run of the synthetic case A by each method."""
-    return simulate(case_a(), method)
-
-
-def passing_by(offset: float) -> Trace:
-    """A UGV passes an obstacle at 2 m + offset, closest in the middle between two rows."""
-    scenario = lone(
-        [-0.5125, 2.0 + offset, 0.0], [0.4875, 2.0 + offset, 0.0], STILL, 1.0, obstacles={"o": Obstacle([0.0] * 3)}
-    )
-    return simulate(scenario, drive=lambda t: [[1.0, 0.0, 0.0], [0.0] * 3])
 
 
 def out_and_back(dwell: float, trigger: str = "automaton") -> Trace:
@@ -58,13 +44,6 @@ def checked(trace: Trace, formulas: tuple[StlFormula, ...] = FORMULAS) -> dict[s
     merged = merge(verify(trace), cross_check(trace, formulas))
     named = {formula.claim for formula in formulas}
     return {verdict.claim.id: verdict for verdict in merged if verdict.claim.id in named}
-
-
-def with_events(trace: Trace, change: Callable[[list[dict[str, Any]]], list[dict[str, Any]]]) -> Trace:
-    return with_meta(trace, events=sorted(change(list(trace.events)), key=lambda event: float(event["t_s"])))
-
-
-# --- agreement on runs ------------------------------------------------------------------------------------------------
 
 
 def assert_agreement(trace: Trace) -> None:
@@ -108,9 +87,6 @@ def test_distances_between_rows_are_seen(offset: float) -> None:
     assert checked(trace)["SAFE-TRACE"].finding.evidence["stl"]["agrees"]
     if abs(offset + 1e-9) > 1e-12:
         assert check["verdict"] == ("satisfied" if offset > -1e-9 else "violated")
-
-
-# --- agreement on random traces ---------------------------------------------------------------------------------------
 
 
 def random_trace(seed: int) -> Trace:
@@ -189,9 +165,6 @@ def test_agreement_on_random_traces(claim: str) -> None:
         assert sum(n for (_, said, _), n in compared.items() if said == verdict) >= 20, compared
     for status in ("holds", "refuted"):
         assert sum(n for (ours, _, _), n in compared.items() if ours == status) >= 20, compared
-
-
-# --- wrong formulas and wrong checkers --------------------------------------------------------------------------------
 
 
 def formula_of(claim: str, part: str = "") -> StlFormula:
@@ -318,9 +291,6 @@ def test_a_margin_that_is_off_is_noticed() -> None:
         assert merge([moved], cross_check(trace))[0].finding.status == status
 
 
-# --- what is not decided never passes ---------------------------------------------------------------------------------
-
-
 def test_without_rtamt_nothing_is_decided(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "rtamt", None)
     checks = cross_check(run_of("d"))
@@ -385,24 +355,3 @@ def test_a_formula_about_nothing_is_left_out_or_vacuous() -> None:
     (check,) = (c for c in cross_check(far) if c["part"] == "avoidance inequalities")
     assert (check["verdict"], check["robustness"]) == ("satisfied", None)
     assert_agreement(far)
-
-
-@pytest.mark.parametrize(
-    ("intervals", "inside"),
-    [
-        ([], []),
-        ([(0.0, 1.0)], [(0.0, 1.0)]),
-        ([(-1.0, 1.0)], [(0.0, 1.0)]),
-        ([(2.0, 3.0), (1.0, 2.5)], [(1.0, 3.0)]),
-        ([(1.0, 2.0), (2.0, 4.0)], [(1.0, 4.0)]),
-        ([(1.0, 4.0), (2.0, 3.0), (5.0, 9.0)], [(1.0, 4.0), (5.0, 9.0)]),
-    ],
-)
-def test_square_signals(intervals: list[tuple[float, float]], inside: list[tuple[float, float]]) -> None:
-    t, value = square(intervals, 8.0)
-    assert t[0] == 0.0
-    assert (np.diff(t) > 0.0).all()
-    assert t[-1] >= 8.0
-    for at in np.arange(0.0, 8.0, 0.25):
-        held = value[np.searchsorted(t, at, side="right") - 1]
-        assert held == (1.0 if any(a <= at < b for a, b in inside) else -1.0)

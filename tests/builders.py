@@ -9,22 +9,27 @@ import copy
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, replace
-from itertools import pairwise
+from functools import cache
+from itertools import pairwise, product
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from scipy.optimize import brentq
+from scipy.optimize import brentq, minimize
 
 from airground_drake.arrays import Array
+from airground_drake.gatekeeper import problem as gatekeeper_problem
+from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT
 from airground_drake.nsbc.avoidance import Avoidance, Surroundings
-from airground_drake.scenarios.schema import Decision, Obstacle, Preset, Run, Scenario, Uav, Ugv
-from airground_drake.trace import DECISION_COLUMNS, SCHEMA, Trace
+from airground_drake.scenarios.schema import Decision, Gatekeeper, Obstacle, Preset, Run, Scenario, Uav, Ugv
+from airground_drake.systems.gatekeeper import Rules, settle
+from airground_drake.trace import DECISION_COLUMNS, PROBLEM_ARRAYS, PROBLEM_SCALARS, SCHEMA, Trace
 
 Drive = Callable[[float], list[list[float]]]
 """Scripted velocities of all robots, m/s, at a control sample, s."""
 
 DETOUR = np.array([[6.3, 4.8, 0.0], [6.3, 7.5, 0.0]])
+
 AWAY = Uav(start_m=[50.0, 50.0, 2.0], target_m=[50.0, 50.0, 2.0])
 
 
@@ -263,3 +268,252 @@ def moved(trace: Trace, robot: str, row: int, offset: list[float]) -> Trace:
             signals[f"{robot}.{axis}_m"], signals[f"{robot}.v{axis}_m_s"] = place, velocity
 
     return with_signals(trace, edit)
+
+
+STILL = Preset([[0.0, 0.0, 0.0]], 1.0)
+
+
+@cache
+def run_of(method: str) -> Trace:
+    """One run of the synthetic case A by each method."""
+    return simulate(case_a(), method)
+
+
+@cache
+def chattering() -> Trace:
+    """A bare trigger whose decision variable hovers at the threshold: many triggers."""
+    decision = Decision(trigger="bare", noise_m_sqrt_s=0.3, min_inter_event_s=0.5)
+    return simulate(lone([3.01, 0.0, 0.0], [3.0, 0.0, 0.0], STILL, 3.0, decision=decision), drive=at_rest, seed=28)
+
+
+def at_rest(t: float) -> list[list[float]]:
+    """Nobody moves."""
+    return [[0.0] * 3, [0.0] * 3]
+
+
+def there_and_back(t: float) -> list[list[float]]:
+    """Out beyond the threshold, back below the release level, out again and home."""
+    speed = 2.0 if t < 2.0 or 3.5 <= t < 6.0 else -2.0 if t < 8.9 else 0.0
+    return [[speed, 0.0, 0.0], [0.0] * 3]
+
+
+def refractory(noise: float = 0.0) -> Trace:
+    """Triggers at 1.5 s; released at 3.25 s; above again before the dwell of 4 s is over: triggers at 5.5 s."""
+    decision = Decision(min_inter_event_s=4.0, noise_m_sqrt_s=noise)
+    return simulate(lone([0.0] * 3, [0.2, 0.0, 0.0], STILL, 10.0, decision=decision), drive=there_and_back)
+
+
+def passing_by(offset: float) -> Trace:
+    """A UGV passes an obstacle at 2 m + offset, closest in the middle between two rows."""
+    scenario = lone(
+        [-0.5125, 2.0 + offset, 0.0], [0.4875, 2.0 + offset, 0.0], STILL, 1.0, obstacles={"o": Obstacle([0.0] * 3)}
+    )
+    return simulate(scenario, drive=lambda t: [[1.0, 0.0, 0.0], [0.0] * 3])
+
+
+def set_nan(column: str) -> Callable[[Trace], Trace]:
+    def edit(signals: pd.DataFrame) -> None:
+        signals.loc[300, column] = np.nan
+
+    return lambda trace: with_signals(trace, edit)
+
+
+def dropped(column: str) -> Callable[[Trace], Trace]:
+    return lambda trace: with_signals(trace, lambda signals: signals.drop(columns=column))
+
+
+def bumped(column: str, by: float, row: int = 500) -> Callable[[Trace], Trace]:
+    def edit(signals: pd.DataFrame) -> None:
+        signals[column] += by * (signals.index == row)
+
+    return lambda trace: with_signals(trace, edit)
+
+
+def rows(keep: Callable[[pd.DataFrame], pd.DataFrame]) -> Callable[[Trace], Trace]:
+    return lambda trace: with_signals(trace, lambda signals: keep(signals).reset_index(drop=True))
+
+
+def first_of(events: list[dict[str, Any]], kind: str) -> dict[str, Any]:
+    return next(event for event in events if event["kind"] == kind)
+
+
+N, DT = 8, 0.05
+
+PLANS = np.array(list(product((0.0, 1.0), repeat=N)))
+
+
+class Data:
+    """One problem (26) and its costs, written down for a test: loops instead of the checkers' broadcasting."""
+
+    def __init__(
+        self,
+        seed: int,
+        initial: Array,
+        reference: Array,
+        centres: Array,
+        distances: Array,
+        slack_weight: float = 10.0,
+    ) -> None:
+        rng = np.random.default_rng(seed)
+        planar = np.array([1.0, 1.0, 0.0])
+        self.accept = (np.array([2.0, 3.0, 0.0]) + rng.uniform(-1.0, 1.0, (N, 3))) * planar
+        self.refuse = (np.array([0.0, 0.5, 0.0]) + rng.uniform(-0.4, 0.4, (N, 3))) * planar
+        self.initial, self.reference, self.centres, self.distances = initial, reference, centres, distances
+        self.error_weight, self.slack_weight = 1.0, slack_weight
+        self.guide = min((self.positions(np.full(N, mode)) for mode in (0.0, 1.0)), key=self.cost)
+        away = self.guide[:, None] - centres
+        self.normals = away / np.linalg.norm(away, axis=2)[:, :, None]
+
+    def positions(self, omega: Array) -> Array:
+        at, path = self.initial.copy(), []
+        for k in range(N):
+            at = at + DT * (omega[k] * self.accept[k] + (1.0 - omega[k]) * self.refuse[k])
+            path.append(at)
+        return np.array(path)
+
+    def cost(self, positions: Array, along: bool = False) -> float:
+        total = 0.0
+        for k, at in enumerate(positions):
+            slack = 0.0
+            for j, distance in enumerate(self.distances):
+                away = at - self.centres[k, j]
+                slack = max(slack, distance - (self.normals[k, j] @ away if along else np.linalg.norm(away)))
+            total += DT * (self.error_weight * np.sum((self.reference[k] - at) ** 2) + self.slack_weight * slack**2)
+        return float(total)
+
+    def plan_cost(self, omega: Array, along: bool = False) -> float:
+        return self.cost(self.positions(omega), along)
+
+    def relaxed(self) -> tuple[Array, float]:
+        """By a quasi-Newton method in a box: another method, and another form, than the checker's."""
+        best = minimize(
+            lambda omega: self.plan_cost(omega, along=True), np.full(N, 0.5), bounds=[(0.0, 1.0)] * N,
+            method="L-BFGS-B", options={"ftol": 1e-15, "gtol": 1e-10, "maxfun": 100000},
+        )  # fmt: skip
+        return np.clip(best.x, 0.0, 1.0), float(best.fun)
+
+    def clearance(self, positions: Array) -> float:
+        return float((np.linalg.norm(positions[:, None] - self.centres, axis=2) - self.distances).min())
+
+
+def rounding(relaxed: Array) -> Array:
+    rounded: list[float] = []
+    for k in range(N):
+        deficits = relaxed[: k + 1].sum() - sum(rounded), (1.0 - relaxed[: k + 1]).sum() - (k - sum(rounded))
+        rounded.append(1.0 if deficits[0] >= deficits[1] else 0.0)
+    return np.array(rounded)
+
+
+def scenario(route: str) -> dict[str, Any]:
+    def ugv(x: float) -> Ugv:
+        return Ugv([x, 0.0, 0.0], [x, 9.0, 0.0], Preset([[x, 2.0, 0.0], [x, 9.0, 0.0]], 1.0))
+
+    gate = Gatekeeper(route=route, horizon_s=N * DT, stages=N, slack_weight_1_m2_s=10.0)
+    spec = Scenario(
+        duration_s=0.5, ugvs={"ugv1": ugv(0.0), "ugv2": ugv(-3.0)}, uav=AWAY, gatekeeper=gate,
+        obstacles={"rock": Obstacle([1.2, 2.4, 0.0]), "far": Obstacle([30.0, 0.0, 0.0])}, runs={"d": Run()},
+    )  # fmt: skip
+    return asdict(spec)
+
+
+def problem_at(trace: Trace, t: float) -> Data:
+    """What ugv1 senses: the rock, and ugv2, which drives at it."""
+    k = int(np.argmin(np.abs(trace.t - t)))
+    after = DT * np.arange(1, N + 1)[:, None]
+    rock = np.tile([1.2, 2.4, 0.0], (N, 1))
+    other = trace.position("ugv2")[k] + after * np.array([0.5, 0.1, 0.0])
+    centres, distances = np.stack([rock, other], axis=1), np.array([2.0, 2.0])
+    reference = np.array([0.0, 2.0, 0.0]) + (t + after) * np.array([0.0, 1.0, 0.0])
+    return Data(round(1000 * t), trace.position("ugv1")[k], reference, centres, distances)
+
+
+def decide(data: Data, route: str) -> gatekeeper_problem.Decision:
+    """As the route's documentation has it."""
+    relaxed, optimum = data.relaxed()
+    rounded = rounding(relaxed)
+    every = route in ("enumeration", "branch_and_bound")
+    plans = [*PLANS] if every else [rounded, np.ones(N), np.zeros(N)]
+    best = min(plans, key=data.plan_cost)
+    positions = data.positions(best)
+    along = route in ("relaxed", "branch_and_bound")
+    least = min(data.plan_cost(plan, along) for plan in (best, rounded, np.ones(N), np.zeros(N)))
+    bound = {"relaxed": optimum, "enumeration": least}.get(route, -1.0)
+    if route == "branch_and_bound":
+        bound = 0.99 * min(data.plan_cost(plan, along=True) for plan in PLANS)
+        least = min(data.plan_cost(plan, along=True) for plan in (best, np.ones(N), np.zeros(N)))
+    rounds, solves = route in ("relaxed", "nonlinear"), route in ("relaxed", "enumeration", "branch_and_bound")
+    return gatekeeper_problem.Decision(
+        accept=best[0] == 1.0,
+        status="optimal",
+        objective=data.cost(positions),
+        lower_bound=bound,
+        gap=(least - bound) / least if solves else -1.0,
+        objective_accept=min(data.plan_cost(plan) for plan in plans if plan[0] == 1.0),
+        objective_refuse=min(data.plan_cost(plan) for plan in plans if plan[0] == 0.0),
+        relaxed_first_stage=float(relaxed[0]) if rounds else -1.0,
+        rounding_deviation=float(DT * np.abs(np.cumsum(relaxed - rounded)).max()) if rounds else -1.0,
+        clearance=data.clearance(positions),
+        plan=best,
+        positions=positions,
+        relaxed=relaxed if rounds else None,
+        rounded=rounded if rounds else None,
+        normals=data.normals if along else None,
+    )
+
+
+def recorded(route: str = "relaxed") -> Trace:
+    """Six decisions of ugv1 on a proposal of t = 0."""
+    spec = scenario(route)
+    base = simulate(spec, "d", lambda t: [[0.1, 0.2, 0.0], [0.5, 0.1, 0.0], [0.0, 0.0, 0.0]])
+    rules = Rules(switching_margin=spec["gatekeeper"]["switching_margin"], min_dwell=0.2, max_bend=0.5)
+    standing, since, decisions, problems = SILENT, 0.0, [], []
+    for k in range(1, 7):
+        t = k * DT
+        data = problem_at(base, t)
+        found = decide(data, route)
+        throughout = data.plan_cost(np.ones(N)), data.plan_cost(np.zeros(N))
+        accepted, reason = settle(found, throughout, 0.1, standing, t - since, rules)
+        answer = ACCEPT if accepted else REFUSE
+        standing, since = answer, since if answer == standing else t
+        decisions.append(
+            {
+                "t_s": t, "robot": "ugv1", "policy": "detour", "issued_s": 0.0, "reason": reason,
+                "decision": "accept" if accepted else "refuse", "status": found.status, "route": route,
+                "first_stage": "accept" if found.accept else "refuse", "objective": found.objective,
+                "relaxed_first_stage": found.relaxed_first_stage, "lower_bound": found.lower_bound, "gap": found.gap,
+                "objective_accept": found.objective_accept, "objective_refuse": found.objective_refuse,
+                "accept_throughout": throughout[0], "refuse_throughout": throughout[1],
+                "rounding_deviation_s": found.rounding_deviation, "predicted_clearance_m": found.clearance,
+                "bend": 0.1,
+            }
+        )  # fmt: skip
+        arrays = (
+            data.initial, data.accept, data.refuse, data.reference, data.centres, data.distances,
+            found.plan, found.positions, found.relaxed, found.rounded, found.normals,
+        )  # fmt: skip
+        flat = [[] if array is None else array.ravel().tolist() for array in arrays]
+        problems.append([DT, data.error_weight, data.slack_weight, *flat])
+    return replace(
+        base,
+        decisions=pd.DataFrame(decisions, columns=list(DECISION_COLUMNS)).astype(DECISION_COLUMNS),
+        problems=pd.DataFrame(problems, columns=[*PROBLEM_SCALARS, *PROBLEM_ARRAYS]),
+    )
+
+
+Edit = Callable[[dict[str, Any], dict[str, Any]], None]
+
+
+def edited(trace: Trace, edit: Edit, row: int = 2) -> Trace:
+    """A copy in which one decision, given as its columns and its problem (arrays flat), was edited."""
+    decisions, problems = trace.decisions.to_dict("records"), trace.problems.to_dict("records")
+    problems[row] = {k: np.array(v, dtype=float) if k in PROBLEM_ARRAYS else v for k, v in problems[row].items()}
+    edit(decisions[row], problems[row])
+    return replace(
+        trace,
+        decisions=pd.DataFrame(decisions, columns=list(DECISION_COLUMNS)).astype(DECISION_COLUMNS),
+        problems=pd.DataFrame(problems, columns=[*PROBLEM_SCALARS, *PROBLEM_ARRAYS]),
+    )
+
+
+def with_events(trace: Trace, change: Callable[[list[dict[str, Any]]], list[dict[str, Any]]]) -> Trace:
+    return with_meta(trace, events=sorted(change(list(trace.events)), key=lambda event: float(event["t_s"])))
