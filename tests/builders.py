@@ -337,12 +337,12 @@ def first_of(events: list[dict[str, Any]], kind: str) -> dict[str, Any]:
     return next(event for event in events if event["kind"] == kind)
 
 
-N, DT = 8, 0.05
+STAGES, STAGE_S = 8, 0.05
 
-PLANS = np.array(list(product((0.0, 1.0), repeat=N)))
+ALL_PLANS = np.array(list(product((0.0, 1.0), repeat=STAGES)))
 
 
-class Data:
+class GateData:
     """One problem (26) and its costs, written down for a test: loops instead of the checkers' broadcasting."""
 
     def __init__(
@@ -356,18 +356,18 @@ class Data:
     ) -> None:
         rng = np.random.default_rng(seed)
         planar = np.array([1.0, 1.0, 0.0])
-        self.accept = (np.array([2.0, 3.0, 0.0]) + rng.uniform(-1.0, 1.0, (N, 3))) * planar
-        self.refuse = (np.array([0.0, 0.5, 0.0]) + rng.uniform(-0.4, 0.4, (N, 3))) * planar
+        self.accept = (np.array([2.0, 3.0, 0.0]) + rng.uniform(-1.0, 1.0, (STAGES, 3))) * planar
+        self.refuse = (np.array([0.0, 0.5, 0.0]) + rng.uniform(-0.4, 0.4, (STAGES, 3))) * planar
         self.initial, self.reference, self.centres, self.distances = initial, reference, centres, distances
         self.error_weight, self.slack_weight = 1.0, slack_weight
-        self.guide = min((self.positions(np.full(N, mode)) for mode in (0.0, 1.0)), key=self.cost)
+        self.guide = min((self.positions(np.full(STAGES, mode)) for mode in (0.0, 1.0)), key=self.cost)
         away = self.guide[:, None] - centres
         self.normals = away / np.linalg.norm(away, axis=2)[:, :, None]
 
     def positions(self, omega: Array) -> Array:
         at, path = self.initial.copy(), []
-        for k in range(N):
-            at = at + DT * (omega[k] * self.accept[k] + (1.0 - omega[k]) * self.refuse[k])
+        for k in range(STAGES):
+            at = at + STAGE_S * (omega[k] * self.accept[k] + (1.0 - omega[k]) * self.refuse[k])
             path.append(at)
         return np.array(path)
 
@@ -378,7 +378,9 @@ class Data:
             for j, distance in enumerate(self.distances):
                 away = at - self.centres[k, j]
                 slack = max(slack, distance - (self.normals[k, j] @ away if along else np.linalg.norm(away)))
-            total += DT * (self.error_weight * np.sum((self.reference[k] - at) ** 2) + self.slack_weight * slack**2)
+            total += STAGE_S * (
+                self.error_weight * np.sum((self.reference[k] - at) ** 2) + self.slack_weight * slack**2
+            )
         return float(total)
 
     def plan_cost(self, omega: Array, along: bool = False) -> float:
@@ -387,7 +389,7 @@ class Data:
     def relaxed(self) -> tuple[Array, float]:
         """By a quasi-Newton method in a box: another method, and another form, than the checker's."""
         best = minimize(
-            lambda omega: self.plan_cost(omega, along=True), np.full(N, 0.5), bounds=[(0.0, 1.0)] * N,
+            lambda omega: self.plan_cost(omega, along=True), np.full(STAGES, 0.5), bounds=[(0.0, 1.0)] * STAGES,
             method="L-BFGS-B", options={"ftol": 1e-15, "gtol": 1e-10, "maxfun": 100000},
         )  # fmt: skip
         return np.clip(best.x, 0.0, 1.0), float(best.fun)
@@ -396,19 +398,19 @@ class Data:
         return float((np.linalg.norm(positions[:, None] - self.centres, axis=2) - self.distances).min())
 
 
-def rounding(relaxed: Array) -> Array:
+def sum_up_rounding(relaxed: Array) -> Array:
     rounded: list[float] = []
-    for k in range(N):
+    for k in range(STAGES):
         deficits = relaxed[: k + 1].sum() - sum(rounded), (1.0 - relaxed[: k + 1]).sum() - (k - sum(rounded))
         rounded.append(1.0 if deficits[0] >= deficits[1] else 0.0)
     return np.array(rounded)
 
 
-def scenario(route: str) -> dict[str, Any]:
+def gate_scenario(route: str) -> dict[str, Any]:
     def ugv(x: float) -> Ugv:
         return Ugv([x, 0.0, 0.0], [x, 9.0, 0.0], Preset([[x, 2.0, 0.0], [x, 9.0, 0.0]], 1.0))
 
-    gate = Gatekeeper(route=route, horizon_s=N * DT, stages=N, slack_weight_1_m2_s=10.0)
+    gate = Gatekeeper(route=route, horizon_s=STAGES * STAGE_S, stages=STAGES, slack_weight_1_m2_s=10.0)
     spec = Scenario(
         duration_s=0.5, ugvs={"ugv1": ugv(0.0), "ugv2": ugv(-3.0)}, uav=AWAY, gatekeeper=gate,
         obstacles={"rock": Obstacle([1.2, 2.4, 0.0]), "far": Obstacle([30.0, 0.0, 0.0])}, runs={"d": Run()},
@@ -416,31 +418,31 @@ def scenario(route: str) -> dict[str, Any]:
     return asdict(spec)
 
 
-def problem_at(trace: Trace, t: float) -> Data:
+def gate_data_at(trace: Trace, t: float) -> GateData:
     """What ugv1 senses: the rock, and ugv2, which drives at it."""
     k = int(np.argmin(np.abs(trace.t - t)))
-    after = DT * np.arange(1, N + 1)[:, None]
-    rock = np.tile([1.2, 2.4, 0.0], (N, 1))
+    after = STAGE_S * np.arange(1, STAGES + 1)[:, None]
+    rock = np.tile([1.2, 2.4, 0.0], (STAGES, 1))
     other = trace.position("ugv2")[k] + after * np.array([0.5, 0.1, 0.0])
     centres, distances = np.stack([rock, other], axis=1), np.array([2.0, 2.0])
     reference = np.array([0.0, 2.0, 0.0]) + (t + after) * np.array([0.0, 1.0, 0.0])
-    return Data(round(1000 * t), trace.position("ugv1")[k], reference, centres, distances)
+    return GateData(round(1000 * t), trace.position("ugv1")[k], reference, centres, distances)
 
 
-def decide(data: Data, route: str) -> gatekeeper_problem.Decision:
+def decide_as_documented(data: GateData, route: str) -> gatekeeper_problem.Decision:
     """As the route's documentation has it."""
     relaxed, optimum = data.relaxed()
-    rounded = rounding(relaxed)
+    rounded = sum_up_rounding(relaxed)
     every = route in ("enumeration", "branch_and_bound")
-    plans = [*PLANS] if every else [rounded, np.ones(N), np.zeros(N)]
+    plans = [*ALL_PLANS] if every else [rounded, np.ones(STAGES), np.zeros(STAGES)]
     best = min(plans, key=data.plan_cost)
     positions = data.positions(best)
     along = route in ("relaxed", "branch_and_bound")
-    least = min(data.plan_cost(plan, along) for plan in (best, rounded, np.ones(N), np.zeros(N)))
+    least = min(data.plan_cost(plan, along) for plan in (best, rounded, np.ones(STAGES), np.zeros(STAGES)))
     bound = {"relaxed": optimum, "enumeration": least}.get(route, -1.0)
     if route == "branch_and_bound":
-        bound = 0.99 * min(data.plan_cost(plan, along=True) for plan in PLANS)
-        least = min(data.plan_cost(plan, along=True) for plan in (best, np.ones(N), np.zeros(N)))
+        bound = 0.99 * min(data.plan_cost(plan, along=True) for plan in ALL_PLANS)
+        least = min(data.plan_cost(plan, along=True) for plan in (best, np.ones(STAGES), np.zeros(STAGES)))
     rounds, solves = route in ("relaxed", "nonlinear"), route in ("relaxed", "enumeration", "branch_and_bound")
     return gatekeeper_problem.Decision(
         accept=best[0] == 1.0,
@@ -451,7 +453,7 @@ def decide(data: Data, route: str) -> gatekeeper_problem.Decision:
         objective_accept=min(data.plan_cost(plan) for plan in plans if plan[0] == 1.0),
         objective_refuse=min(data.plan_cost(plan) for plan in plans if plan[0] == 0.0),
         relaxed_first_stage=float(relaxed[0]) if rounds else -1.0,
-        rounding_deviation=float(DT * np.abs(np.cumsum(relaxed - rounded)).max()) if rounds else -1.0,
+        rounding_deviation=float(STAGE_S * np.abs(np.cumsum(relaxed - rounded)).max()) if rounds else -1.0,
         clearance=data.clearance(positions),
         plan=best,
         positions=positions,
@@ -461,17 +463,17 @@ def decide(data: Data, route: str) -> gatekeeper_problem.Decision:
     )
 
 
-def recorded(route: str = "relaxed") -> Trace:
+def decided_run(route: str = "relaxed") -> Trace:
     """Six decisions of ugv1 on a proposal of t = 0."""
-    spec = scenario(route)
+    spec = gate_scenario(route)
     base = simulate(spec, "d", lambda t: [[0.1, 0.2, 0.0], [0.5, 0.1, 0.0], [0.0, 0.0, 0.0]])
     rules = Rules(switching_margin=spec["gatekeeper"]["switching_margin"], min_dwell=0.2, max_bend=0.5)
     standing, since, decisions, problems = SILENT, 0.0, [], []
     for k in range(1, 7):
-        t = k * DT
-        data = problem_at(base, t)
-        found = decide(data, route)
-        throughout = data.plan_cost(np.ones(N)), data.plan_cost(np.zeros(N))
+        t = k * STAGE_S
+        data = gate_data_at(base, t)
+        found = decide_as_documented(data, route)
+        throughout = data.plan_cost(np.ones(STAGES)), data.plan_cost(np.zeros(STAGES))
         accepted, reason = settle(found, throughout, 0.1, standing, t - since, rules)
         answer = ACCEPT if accepted else REFUSE
         standing, since = answer, since if answer == standing else t
@@ -492,7 +494,7 @@ def recorded(route: str = "relaxed") -> Trace:
             found.plan, found.positions, found.relaxed, found.rounded, found.normals,
         )  # fmt: skip
         flat = [[] if array is None else array.ravel().tolist() for array in arrays]
-        problems.append([DT, data.error_weight, data.slack_weight, *flat])
+        problems.append([STAGE_S, data.error_weight, data.slack_weight, *flat])
     return replace(
         base,
         decisions=pd.DataFrame(decisions, columns=list(DECISION_COLUMNS)).astype(DECISION_COLUMNS),
@@ -500,10 +502,10 @@ def recorded(route: str = "relaxed") -> Trace:
     )
 
 
-Edit = Callable[[dict[str, Any], dict[str, Any]], None]
+DecisionEdit = Callable[[dict[str, Any], dict[str, Any]], None]
 
 
-def edited(trace: Trace, edit: Edit, row: int = 2) -> Trace:
+def with_decision(trace: Trace, edit: DecisionEdit, row: int = 2) -> Trace:
     """A copy in which one decision, given as its columns and its problem (arrays flat), was edited."""
     decisions, problems = trace.decisions.to_dict("records"), trace.problems.to_dict("records")
     problems[row] = {k: np.array(v, dtype=float) if k in PROBLEM_ARRAYS else v for k, v in problems[row].items()}

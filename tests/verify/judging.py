@@ -16,7 +16,7 @@ from airground_drake.verify.runs.gate_sur import GateSur
 CLAIMS = {claim.id: claim for claim in TRACE_CLAIMS}
 
 GATE = {"GATE-OPT", "GATE-SUR", "GATE-FEAS"}
-"""Claims about recorded problems, which the synthetic runs do not have: see tests/test_gatekeeping.py."""
+"""Claims about recorded problems, which the synthetic runs do not have: see runs/test_gate_claims.py."""
 
 
 def judge(claim: str, trace: Trace) -> Finding:
@@ -36,14 +36,16 @@ def counterexample(claim: str, trace: Trace) -> dict[str, Any]:
 FEAS, SUR, OPT = GateFeas(), GateSur(), GateOpt()
 
 
-def _compared(claim: TraceClaim, trace: Trace) -> list[Off]:
+def comparisons(claim: TraceClaim, trace: Trace) -> list[Off]:
     rows = rows_of(trace)
     if claim is SUR:
-        return [one for row in rows for one in gate_sur._rounding(row)]
+        return [one for row in rows for one in gate_sur.compare_rounding(row)]
     if claim is OPT:
         pairs = zip(rows, enclose(rows), strict=True)
-        return [one for row in rows for one in gate_opt._no_worse(row)] + [
-            one for row, found in pairs for one in gate_opt._bounds(row, found, row["normals"])
+        return [one for row in rows for one in gate_opt.compare_with_constant_plans(row)] + [
+            one for row, found in pairs for one in gate_opt.compare_bounds(row, found, row["normals"])
         ]
-    described = [one for row in rows for one in (*gate_feas._situation(trace, row), *gate_feas._plan(trace, row))]
-    return [*described, *gate_feas._answers(trace, rows)]
+    described = [
+        one for row in rows for one in (*gate_feas.compare_situation(trace, row), *gate_feas.compare_plan(trace, row))
+    ]
+    return [*described, *gate_feas.compare_answers(trace, rows)]

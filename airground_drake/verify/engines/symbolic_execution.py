@@ -17,7 +17,7 @@ SYMBOLS = ("n", "k", "s", "t", "a", "l", "r", "x", "zeta", "release", "dwell")
 class Linear:
     """A linear form in symbols, exact; `path` decides how a comparison of two forms comes out."""
 
-    def __init__(self, path: Path, parts: dict[str, Fraction]) -> None:
+    def __init__(self, path: Branch, parts: dict[str, Fraction]) -> None:
         """`parts`: coefficient by symbol, the constant under ''."""
         self.path, self.parts = path, {name: value for name, value in parts.items() if value}
 
@@ -84,7 +84,7 @@ class Linear:
         return sum((value * (point[name] if name else 1) for name, value in self.parts.items()), Fraction())
 
 
-class Path:
+class Branch:
     """One way through a function of symbols: the outcomes of its comparisons, `guards` that make them so."""
 
     def __init__(self, outcomes: Sequence[bool]) -> None:
@@ -107,13 +107,13 @@ class Path:
         return Linear(self, {name: Fraction(1)})
 
 
-def paths(function: Callable[[Path], TriggerState]) -> list[tuple[Path, TriggerState]]:
+def paths(function: Callable[[Branch], TriggerState]) -> list[tuple[Branch, TriggerState]]:
     """All ways through a function; those that end in a ValueError (refused parameters) lead nowhere."""
-    found: list[tuple[Path, TriggerState]] = []
+    found: list[tuple[Branch, TriggerState]] = []
     todo: list[list[bool]] = [[]]
     while todo:
         given = todo.pop()
-        path = Path(given)
+        path = Branch(given)
         with suppress(ValueError):
             found.append((path, function(path)))
         todo += [[*path.outcomes[:i], False] for i in range(len(given), len(path.outcomes))]

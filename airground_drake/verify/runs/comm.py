@@ -12,7 +12,7 @@ from airground_drake.errors import TraceError
 from airground_drake.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S, TraceClaim
 from airground_drake.verify.finding import Finding
-from airground_drake.verify.runs.interventions import GATED_METHODS, _intervening, talk_is_due
+from airground_drake.verify.runs.interventions import GATED_METHODS, intervening, talk_is_due
 
 
 class Comm(TraceClaim):
@@ -57,7 +57,7 @@ class Comm(TraceClaim):
         strays: list[dict[str, Any]] = []
         per_ugv: dict[str, dict[str, Any]] = {}
         for ugv in trace.ugvs:
-            intervals = _intervening(trace, ugv)
+            intervals = intervening(trace, ugv)
             sent = {
                 "proposal": np.array(
                     [float(e["t_s"]) for e in trace.events if (e["kind"], e["robot"]) == ("proposal", ugv)]

@@ -63,8 +63,8 @@ class GateFeas(GateClaim):
 
     def judge_rows(self, trace: Trace, rows: list[Row]) -> Finding:
         """Compare everything recorded with what it should be; the margin is the part of a tolerance left."""
-        compared = [one for row in rows for one in (*_situation(trace, row), *_plan(trace, row))]
-        compared += [*_answers(trace, rows), *_obeyed(trace, rows), *_own_task(trace, rows)]
+        compared = [one for row in rows for one in (*compare_situation(trace, row), *compare_plan(trace, row))]
+        compared += [*compare_answers(trace, rows), *compare_obedience(trace, rows), *compare_own_task(trace, rows)]
         slack = [float(np.maximum(0.0, -row.clearance(row["positions_m"])).max()) for row in rows if row.planned]
         finding = Finding(
             "holds",
@@ -83,7 +83,7 @@ class GateFeas(GateClaim):
         return conclude(finding, compared)
 
 
-def _situation(trace: Trace, row: Row) -> Iterator[Off]:
+def compare_situation(trace: Trace, row: Row) -> Iterator[Off]:
     """The data of (26) against the scenario and the signals at the time of the decision."""
     gate, t, robot = trace.scenario["gatekeeper"], float(row.given["t_s"]), str(row.given["robot"])
     preset = trace.scenario["ugvs"][robot]["preset"]
@@ -134,7 +134,7 @@ def _sensed(trace: Trace, robot: str, t: float, own: Array, after: Array) -> lis
     ]
 
 
-def _plan(trace: Trace, row: Row) -> Iterator[Off]:
+def compare_plan(trace: Trace, row: Row) -> Iterator[Off]:
     """(26b)-(26e), (25) and what was recorded about the plan."""
     limit, period = trace.scenario["ugvs"][row.given["robot"]]["max_speed_m_s"], trace.scenario["control"]["period_s"]
     trajectories = dict(zip(("refusing throughout", "accepting throughout"), row.constant, strict=True))
@@ -175,7 +175,7 @@ def _clear(row: Row, positions: Array, period: float) -> npt.NDArray[np.bool_]:
     return ~(inside[:-1] | (inside[1:] & several))
 
 
-def _answers(trace: Trace, rows: Sequence[Row]) -> Iterator[Off]:
+def compare_answers(trace: Trace, rows: Sequence[Row]) -> Iterator[Off]:
     """The answers against the rules, decision by decision, and the times of the decisions."""
     gate = trace.scenario["gatekeeper"]
     for ugv in trace.ugvs:
@@ -190,14 +190,14 @@ def _answers(trace: Trace, rows: Sequence[Row]) -> Iterator[Off]:
             late = given["issued_s"] + period if last is None else early
             yield Off(row, "a decision is missing before this one, s", max(0.0, t - late), TIME_TOLERANCE_S)
             yield Off(row, "a decision too many, s", max(0.0, early - t), TIME_TOLERANCE_S)
-            accept, reason = _rule(row, standing, t - since, gate)
+            accept, reason = rule(row, standing, t - since, gate)
             ours, theirs = ("accept" if accept else "refuse", reason), (given["decision"], given["reason"])
             yield Off(row, "answer or reason", float(ours != theirs), 0.0, recomputed=list(ours), standing=standing)
             since = since if given["decision"] == standing else t
             last = row
 
 
-def _rule(row: Row, standing: str | None, stood: float, gate: dict[str, Any]) -> tuple[bool, str]:
+def rule(row: Row, standing: str | None, stood: float, gate: dict[str, Any]) -> tuple[bool, str]:
     """Whether a proposal is accepted and why, from the recorded costs and bend.
 
     Args:
@@ -225,7 +225,7 @@ def _rule(row: Row, standing: str | None, stood: float, gate: dict[str, Any]) ->
     return not accepted, "reversed"
 
 
-def _obeyed(trace: Trace, rows: Sequence[Row]) -> Iterator[Off]:
+def compare_obedience(trace: Trace, rows: Sequence[Row]) -> Iterator[Off]:
     """Interventions executed, by the signals, without an acceptance in force."""
     control, gate = trace.scenario["control"]["period_s"], trace.scenario["gatekeeper"]["period_s"]
     # a row has what the last control sample before it has set, by the answer given up to then
@@ -241,7 +241,7 @@ def _obeyed(trace: Trace, rows: Sequence[Row]) -> Iterator[Off]:
                 yield Off(own[max(last, 0)], what, 1.0, 0.0, row_t_s=float(trace.t[k]))
 
 
-def _own_task(trace: Trace, rows: Sequence[Row]) -> Iterator[Off]:
+def compare_own_task(trace: Trace, rows: Sequence[Row]) -> Iterator[Off]:
     """Commands, where nothing is accepted and no avoidance inequality interferes, against the UGV's own task (6)."""
     control, places = trace.scenario["control"], places_of(trace)
     samples = control_samples(trace.t, control["period_s"])

@@ -82,13 +82,13 @@ class GateOpt(GateClaim):
         lacking = [row for row in planned if halfplanes and row.data["normals"] is None]
         if cut := [row for row in lacking if row.given["status"] == "optimal"]:
             raise TraceError(f"{cut[0].label} claims to be complete, but has no normals")
-        compared = [one for row in planned for one in _no_worse(row)]
+        compared = [one for row in planned for one in compare_with_constant_plans(row)]
         if not (halfplanes or dwelling):
             reason = f"route {route!r} has no bound that can be established again"
             return conclude(Finding("inconclusive", evidence={"decisions": len(rows), "reason": reason}), compared)
         bounded = [row for row in planned if row not in lacking]
         lines = [row["normals"] if halfplanes else None for row in bounded]
-        found = [_cheapest(*one) for one in zip(bounded, lines, strict=True)] if dwelling else enclose(bounded)
+        found = [cheapest_of_blocks(*one) for one in zip(bounded, lines, strict=True)] if dwelling else enclose(bounded)
         gaps, widths, certified = [], [], 0
         open_gaps: list[str] = []
         for row, normals, one in zip(bounded, lines, found, strict=True):
@@ -96,10 +96,10 @@ class GateOpt(GateClaim):
             gaps.append(gap)
             widths.append((one.upper - one.lower) / row.scale)
             certified += bool(one.other_first > one.lower + gap * row.scale)
-            compared += _bounds(row, one, normals)
+            compared += compare_bounds(row, one, normals)
             if gap > self.largest_gap:  # open, unless a cheaper plan can be shown: rounding may cost that much
                 open_gaps.append(row.label)
-                shown = (float(row.cost(row["positions_m"])) - _cheapest(row, None).lower) / row.scale
+                shown = (float(row.cost(row["positions_m"])) - cheapest_of_blocks(row, None).lower) / row.scale
                 compared.append(Off(row, "a plan of blocks is cheaper", max(0.0, shown), self.largest_gap))
         width = max(widths, default=0.0)
         undecided = bool(lacking) or not bounded or width > self.widest or bool(open_gaps)
@@ -126,7 +126,7 @@ class GateOpt(GateClaim):
         return conclude(finding, compared)
 
 
-def _no_worse(row: Row) -> Iterator[Off]:
+def compare_with_constant_plans(row: Row) -> Iterator[Off]:
     """The plan against the constant ones, by the exact cost; each choice against the constant plan that makes it."""
     for name, constant in zip(("refuse", "accept"), row.cost(row.constant).tolist(), strict=True):
         tolerance = cost_tolerance(constant)
@@ -135,7 +135,7 @@ def _no_worse(row: Row) -> Iterator[Off]:
             yield Off(row, f"{column} above {name} throughout", excess, tolerance, constant_plan=constant)
 
 
-def _bounds(row: Row, found: Enclosure, normals: Array | None) -> Iterator[Off]:
+def compare_bounds(row: Row, found: Enclosure, normals: Array | None) -> Iterator[Off]:
     """The recorded normals, lower bound and gap."""
     given, bound, scale = row.given, float(row.given["lower_bound"]), row.scale
     own = float(row.cost(row["positions_m"], normals))
@@ -155,7 +155,7 @@ def _bounds(row: Row, found: Enclosure, normals: Array | None) -> Iterator[Off]:
     yield Off(row, "recorded gap", beyond, GAP_TOLERANCE, recorded=given["gap"], at_least=least, at_most=most)
 
 
-def _cheapest(row: Row, normals: Array | None) -> Enclosure:
+def cheapest_of_blocks(row: Row, normals: Array | None) -> Enclosure:
     """The cheapest of all plans that are constant on blocks, by evaluating each."""
     stages = len(row["reference_m"])
     blocks = min(BLOCKS, stages)

@@ -63,7 +63,7 @@ class GateSur(GateClaim):
             where={name: worst.given[name] for name in ("robot", "t_s")},
             evidence={**skipped, "largest_error_s": error, "bound_s": bound},
         )
-        return conclude(finding, (one for row in rounded for one in _rounding(row)))
+        return conclude(finding, (one for row in rounded for one in compare_rounding(row)))
 
 
 def _deviation(row: Row) -> float:
@@ -71,7 +71,7 @@ def _deviation(row: Row) -> float:
     return float(row.dt * np.abs(np.cumsum(row["relaxed"] - row["rounded"])).max())
 
 
-def _rounding(row: Row) -> Iterator[Off]:
+def compare_rounding(row: Row) -> Iterator[Off]:
     """(28)-(29) and what was recorded about it."""
     relaxed, rounded, given = row["relaxed"], row["rounded"], row.given
     yield Off(row, "relaxed omega is outside [0, 1]", np.maximum(0.0, np.abs(relaxed - 0.5) - 0.5), 0.0)

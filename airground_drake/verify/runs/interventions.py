@@ -11,7 +11,7 @@ GATED_METHODS = ("c", "d")
 """Methods with an optimising gatekeeper."""
 
 
-def _intervening(trace: Trace, ugv: str) -> Array:
+def intervening(trace: Trace, ugv: str) -> Array:
     """Intervals of mode 1, (K, 2), s; the mode of a row is in force since the row before."""
     inside = np.concatenate([[False], trace.column(f"{ugv}.mode")[1:] == 1.0, [False]])
     edges = np.flatnonzero(np.diff(inside.astype(np.int8)))
@@ -21,4 +21,4 @@ def _intervening(trace: Trace, ugv: str) -> Array:
 def talk_is_due(trace: Trace, ugv: str) -> bool:
     """Whether a UGV is intervened on for longer than a proposal and a decision on it take."""
     periods = trace.scenario["intervention"]["period_s"] + trace.scenario["gatekeeper"]["period_s"]
-    return bool((np.diff(_intervening(trace, ugv)) > periods).any())
+    return bool((np.diff(intervening(trace, ugv)) > periods).any())

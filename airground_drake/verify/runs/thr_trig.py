@@ -13,7 +13,7 @@ from airground_drake.trace import Trace
 from airground_drake.verify.claim import TraceClaim
 from airground_drake.verify.engines.segments import NormSignal
 from airground_drake.verify.finding import Finding
-from airground_drake.verify.runs.trigger_record import Conflict, Transition, _column_conflict, _recorded
+from airground_drake.verify.runs.trigger_record import Conflict, Transition, column_conflict, recorded_events
 from airground_drake.verify.runs.trigger_replay import decision_variable, transitions
 
 EVENT_TOLERANCE_S = 1e-5
@@ -83,10 +83,10 @@ class ThrTrig(TraceClaim):
         lags: list[tuple[float, str]] = []
         for ugv in trace.ugvs:
             x = decision_variable(trace, ugv)
-            predicted, recorded = list(transitions(x, zeta, release, dwell)), _recorded(trace, ugv)
+            predicted, recorded = list(transitions(x, zeta, release, dwell)), recorded_events(trace, ugv)
             expected = [(time, EVENT_KINDS[kind]) for time, kind in predicted if kind in EVENT_KINDS]
             lag, mismatch = _compare(expected, recorded, x)
-            found = (mismatch, _column_conflict(trace, ugv, recorded), _signal_conflict(trace, ugv, x, predicted))
+            found = (mismatch, column_conflict(trace, ugv, recorded), _signal_conflict(trace, ugv, x, predicted))
             wrong += [{"robot": ugv, **conflict} for conflict in found if conflict is not None]
             lags += [(lag, ugv)] if expected else []
             evidence.append(

@@ -16,13 +16,13 @@ Conflict = dict[str, Any]
 """What disagrees: `t_s`, `what`, and the values on both sides."""
 
 
-def _recorded(trace: Trace, ugv: str) -> list[Transition]:
+def recorded_events(trace: Trace, ugv: str) -> list[Transition]:
     """Trigger and release events of a UGV by time."""
     found = [(float(e["t_s"]), str(e["kind"])) for e in trace.events if e["robot"] == ugv]
     return sorted(event for event in found if event[1] in ("trigger", "release"))
 
 
-def _column_conflict(trace: Trace, ugv: str, events: list[Transition]) -> Conflict | None:
+def column_conflict(trace: Trace, ugv: str, events: list[Transition]) -> Conflict | None:
     """First row at which the columns on triggers and releases do not agree with the events before it."""
     t = trace.t
     for kind, name in (("trigger", "triggered_at_s"), ("release", "released_at_s")):

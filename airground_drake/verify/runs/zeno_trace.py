@@ -8,7 +8,7 @@ from airground_drake.errors import TraceError
 from airground_drake.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S, TraceClaim
 from airground_drake.verify.finding import Finding
-from airground_drake.verify.runs.trigger_record import _column_conflict, _recorded
+from airground_drake.verify.runs.trigger_record import column_conflict, recorded_events
 
 
 class ZenoTrace(TraceClaim):
@@ -36,8 +36,8 @@ class ZenoTrace(TraceClaim):
             return Finding("not_run", evidence={"reason": "min_inter_event_s is 0: no bound to compare with"})
         triggers: dict[str, list[float]] = {}
         for ugv in trace.ugvs:
-            events = _recorded(trace, ugv)
-            if conflict := _column_conflict(trace, ugv, events):
+            events = recorded_events(trace, ugv)
+            if conflict := column_conflict(trace, ugv, events):
                 raise TraceError(f"events and columns disagree: {conflict}")
             triggers[ugv] = [time for time, kind in events if kind == "trigger"]
         gaps = [

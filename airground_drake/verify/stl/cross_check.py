@@ -1,6 +1,6 @@
 """Trace claims as Signal Temporal Logic, evaluated by rtamt: a cross-check of our own checkers.
 
-Signals come from `stl_signals.py`. A formula is satisfied if its robustness is >= -tolerance; of true-or-false signals
+Signals come from `signals.py`. A formula is satisfied if its robustness is >= -tolerance; of true-or-false signals
 (+-1) only its sign means anything. `discrete` formulas have no time bounds, `dense` ones have.
 `relation` says how a claim and its formulas are tied: `equivalent` (the claim holds if and only if all of these are
 satisfied) or `implied` (the formula follows from the claim, which says more).

@@ -1,4 +1,4 @@
-"""Signals that the formulas of `stl.py` are about, from the columns, events and decisions of a trace.
+"""Signals that the formulas of `cross_check.py` are about, from the columns, events and decisions of a trace.
 
 Other formulas than those of the checkers are used; from the checkers come only the tolerances, which are part of the
 claims. Two kinds of signals:

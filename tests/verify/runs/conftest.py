@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from builders import recorded
+from builders import decided_run
 
 from airground_drake.trace import Trace
 from airground_drake.verify.runs import gate_feas
@@ -13,9 +13,9 @@ from airground_drake.verify.runs import gate_feas
 def _scripted(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """The UGVs of scripted traces do not follow their own task; those of real runs do."""
     if "real" not in request.node.name and "hides" not in request.node.name:
-        monkeypatch.setattr(gate_feas, "_own_task", lambda trace, rows: iter(()))
+        monkeypatch.setattr(gate_feas, "compare_own_task", lambda trace, rows: iter(()))
 
 
 @pytest.fixture(scope="session")
 def relaxed() -> Trace:
-    return recorded()
+    return decided_run()

@@ -9,8 +9,8 @@ import builders
 import numpy as np
 import pandas as pd
 import pytest
-from builders import DT, PLANS, Edit, N, edited, recorded
-from verify.judging import FEAS, OPT, SUR, _compared
+from builders import ALL_PLANS, STAGE_S, STAGES, DecisionEdit, decided_run, with_decision
+from verify.judging import FEAS, OPT, SUR, comparisons
 
 from airground_drake.arrays import Array
 from airground_drake.scenarios.load import load
@@ -31,7 +31,7 @@ from airground_drake.verify.claim import TraceClaim
     ],
 )
 def test_good_decisions_pass_where_there_is_something_to_check(route: str, expected: tuple[str | None, ...]) -> None:
-    trace = recorded(route)
+    trace = decided_run(route)
     for claim, status in zip((FEAS, SUR, OPT), expected, strict=True):
         assert claim.applies(trace) == (status is not None)
         finding = claim.judge(trace)
@@ -81,11 +81,11 @@ def wrong_first_stage(row: dict[str, Any], problem: dict[str, Any]) -> None:
     row["first_stage"] = {"accept": "refuse", "refuse": "accept"}[row["first_stage"]]
 
 
-def without_point(index: int) -> Edit:
+def without_point(index: int) -> DecisionEdit:
     def edit(row: dict[str, Any], problem: dict[str, Any]) -> None:
         keep = 1 - index
-        problem["centres_m"] = problem["centres_m"].reshape(N, 2, 3)[:, keep : keep + 1].ravel()
-        problem["normals"] = problem["normals"].reshape(N, 2, 3)[:, keep : keep + 1].ravel()
+        problem["centres_m"] = problem["centres_m"].reshape(STAGES, 2, 3)[:, keep : keep + 1].ravel()
+        problem["normals"] = problem["normals"].reshape(STAGES, 2, 3)[:, keep : keep + 1].ravel()
         problem["distances_m"] = problem["distances_m"][keep : keep + 1]
 
     return edit
@@ -96,7 +96,7 @@ def smaller_distance(row: dict[str, Any], problem: dict[str, Any]) -> None:
 
 
 def standing_robot(row: dict[str, Any], problem: dict[str, Any]) -> None:
-    centres = problem["centres_m"].reshape(N, 2, 3)
+    centres = problem["centres_m"].reshape(STAGES, 2, 3)
     centres[:, 1] = centres[0, 1]
 
 
@@ -153,24 +153,24 @@ def long_normals(row: dict[str, Any], problem: dict[str, Any]) -> None:
 
 def worst_plan(row: dict[str, Any], problem: dict[str, Any]) -> None:
     """A consistent record of a plan that is worse than both constant ones."""
-    accept, refuse = (problem[name].reshape(N, 3) for name in ("accept_m_s", "refuse_m_s"))
-    shape = (N, len(problem["distances_m"]), 3)
+    accept, refuse = (problem[name].reshape(STAGES, 3) for name in ("accept_m_s", "refuse_m_s"))
+    shape = (STAGES, len(problem["distances_m"]), 3)
 
     def cost(plan: Array) -> float:
-        positions = problem["initial_m"] + DT * np.cumsum(np.where(plan[:, None] == 1.0, accept, refuse), axis=0)
+        positions = problem["initial_m"] + STAGE_S * np.cumsum(np.where(plan[:, None] == 1.0, accept, refuse), axis=0)
         gap = problem["distances_m"] - np.linalg.norm(positions[:, None] - problem["centres_m"].reshape(shape), axis=2)
-        error = positions - problem["reference_m"].reshape(N, 3)
-        return float(DT * (np.sum(error**2) + 10.0 * np.sum(np.maximum(0.0, gap.max(axis=1)) ** 2)))
+        error = positions - problem["reference_m"].reshape(STAGES, 3)
+        return float(STAGE_S * (np.sum(error**2) + 10.0 * np.sum(np.maximum(0.0, gap.max(axis=1)) ** 2)))
 
-    plan = max(PLANS, key=cost)
+    plan = max(ALL_PLANS, key=cost)
     problem["plan"] = plan
     problem["positions_m"] = (
-        problem["initial_m"] + DT * np.cumsum(np.where(plan[:, None] == 1.0, accept, refuse), axis=0)
+        problem["initial_m"] + STAGE_S * np.cumsum(np.where(plan[:, None] == 1.0, accept, refuse), axis=0)
     ).ravel()
     row["objective"] = cost(plan)
 
 
-MUTANTS: list[tuple[TraceClaim, Edit, str]] = [
+MUTANTS: list[tuple[TraceClaim, DecisionEdit, str]] = [
     (FEAS, flip_plan, "positions are not those of (23)"),
     (FEAS, fractional_plan, "omega is not binary"),
     (FEAS, shift_position, "positions are not those of (23)"),
@@ -203,14 +203,14 @@ MUTANTS: list[tuple[TraceClaim, Edit, str]] = [
 @pytest.mark.parametrize(
     ("claim", "edit", "what"), MUTANTS, ids=[f"{m[0].id}-{m[2]}-{i}" for i, m in enumerate(MUTANTS)]
 )
-def test_a_mutant_is_refuted(relaxed: Trace, claim: TraceClaim, edit: Edit, what: str) -> None:
-    trace = edited(relaxed, edit)
+def test_a_mutant_is_refuted(relaxed: Trace, claim: TraceClaim, edit: DecisionEdit, what: str) -> None:
+    trace = with_decision(relaxed, edit)
     finding = claim.judge(trace)
     assert finding.status == "refuted", finding
     assert finding.counterexample is not None
     assert finding.counterexample["robot"] == "ugv1"
     assert finding.counterexample["t_s"] <= 0.2 + 1e-9  # the edited row, or the one that has to follow from it
-    found = {one.what for one in _compared(claim, trace) if one.wrong}
+    found = {one.what for one in comparisons(claim, trace) if one.wrong}
     assert any(what in text for text in found), found
 
 
@@ -232,7 +232,7 @@ def test_malformed_records_are_errors(relaxed: Trace) -> None:
 
     for claim in (FEAS, SUR, OPT):
         for edit in (nan, nan_cost, cut, planless, other_route):
-            assert claim.judge(edited(relaxed, edit)).status == "error"
+            assert claim.judge(with_decision(relaxed, edit)).status == "error"
         assert claim.judge(replace(relaxed, problems=relaxed.problems.iloc[1:])).status == "error"
         assert claim.judge(replace(relaxed, problems=relaxed.problems.drop(columns="plan"))).status == "error"
 
@@ -245,7 +245,7 @@ def refused_for_want_of_a_plan(row: dict[str, Any], problem: dict[str, Any]) -> 
 
 def test_a_refusal_without_a_plan_is_in_order_but_an_acceptance_is_not(relaxed: Trace) -> None:
     last = len(relaxed.decisions) - 1
-    trace = edited(relaxed, refused_for_want_of_a_plan, row=last)
+    trace = with_decision(relaxed, refused_for_want_of_a_plan, row=last)
     for claim in (FEAS, SUR, OPT):
         assert claim.judge(trace).status == "holds"
     assert len(FEAS.judge(trace).evidence["without_a_plan"]) == 1
@@ -254,19 +254,19 @@ def test_a_refusal_without_a_plan_is_in_order_but_an_acceptance_is_not(relaxed: 
         refused_for_want_of_a_plan(row, problem)
         row["decision"] = "accept"
 
-    assert FEAS.judge(edited(relaxed, accepted, row=last)).status == "refuted"
+    assert FEAS.judge(with_decision(relaxed, accepted, row=last)).status == "refuted"
 
 
 def test_without_a_single_plan_nothing_is_established(relaxed: Trace) -> None:
     trace = relaxed
     for row in range(len(relaxed.decisions)):
-        trace = edited(trace, refused_for_want_of_a_plan, row=row)
+        trace = with_decision(trace, refused_for_want_of_a_plan, row=row)
     assert SUR.judge(trace).status == "not_run"
     assert OPT.judge(trace).status == "inconclusive"
 
 
 def test_no_decision_at_all() -> None:
-    trace = recorded()
+    trace = decided_run()
     none = replace(trace, decisions=trace.decisions.iloc[:0], problems=trace.problems.iloc[:0])
 
     def intervening(signals: pd.DataFrame) -> None:
@@ -315,7 +315,7 @@ def test_a_real_run_saved_and_broken(tmp_path: Any) -> None:
         (SUR, round_otherwise), (SUR, understate_rounding), (OPT, overstate_bound), (OPT, understate_bound),
         (OPT, understate_gap), (OPT, long_normals), (OPT, inflate_loser),
     ):  # fmt: skip
-        assert claim.judge(edited(trace, edit)).status == "refuted", edit
+        assert claim.judge(with_decision(trace, edit)).status == "refuted", edit
 
 
 def test_a_run_that_hides_an_intervention_is_refuted() -> None:

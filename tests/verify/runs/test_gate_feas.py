@@ -8,10 +8,10 @@ from typing import Any
 import builders
 import numpy as np
 import pandas as pd
-from builders import DT, N, edited, recorded
+from builders import STAGE_S, STAGES, decided_run, with_decision
 from hypothesis import given
 from hypothesis import strategies as st
-from verify.judging import FEAS, _compared
+from verify.judging import FEAS, comparisons
 
 from airground_drake.gatekeeper.problem import Decision
 from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT
@@ -27,18 +27,18 @@ def bent(row: dict[str, Any], problem: dict[str, Any]) -> None:
 
 def test_hidden_slack_is_refuted() -> None:
     """The cost of the error alone, of a plan that leads inside the safe distance."""
-    trace = recorded()
+    trace = decided_run()
 
     def hide(row: dict[str, Any], problem: dict[str, Any]) -> None:
-        accept = problem["accept_m_s"].reshape(N, 3)
-        positions = problem["initial_m"] + DT * np.cumsum(accept, axis=0)
-        problem["plan"], problem["positions_m"] = np.ones(N), positions.ravel()
-        row["objective"] = float(DT * np.sum((positions - problem["reference_m"].reshape(N, 3)) ** 2))
+        accept = problem["accept_m_s"].reshape(STAGES, 3)
+        positions = problem["initial_m"] + STAGE_S * np.cumsum(accept, axis=0)
+        problem["plan"], problem["positions_m"] = np.ones(STAGES), positions.ravel()
+        row["objective"] = float(STAGE_S * np.sum((positions - problem["reference_m"].reshape(STAGES, 3)) ** 2))
         row["objective_accept"], row["first_stage"] = row["objective"], "accept"
-        away = np.linalg.norm(positions[:, None] - problem["centres_m"].reshape(N, 2, 3), axis=2)
+        away = np.linalg.norm(positions[:, None] - problem["centres_m"].reshape(STAGES, 2, 3), axis=2)
         row["predicted_clearance_m"] = float((away - problem["distances_m"]).min())
 
-    mutant = edited(trace, hide)
+    mutant = with_decision(trace, hide)
     assert rows_of(mutant)[2].clearance(rows_of(mutant)[2]["positions_m"]).min() < 0.0
     finding = FEAS.judge(mutant)
     assert finding.status == "refuted"
@@ -47,20 +47,20 @@ def test_hidden_slack_is_refuted() -> None:
 
 
 def test_a_bend_that_should_have_refused_is_refuted() -> None:
-    trace = recorded()
-    first = edited(trace, bent, row=0)
+    trace = decided_run()
+    first = with_decision(trace, bent, row=0)
     accepted = trace.decisions["decision"].iloc[0] == "accept"
     assert (FEAS.judge(first).status == "refuted") == accepted
     assert accepted, "the example should start with an acceptance"
 
 
 def test_rollouts_may_leave_23_after_the_first_change_only() -> None:
-    trace = recorded("rollout")
+    trace = decided_run("rollout")
 
     def record(row: dict[str, Any], problem: dict[str, Any], shifts: dict[int, list[float]]) -> None:
         """A plan that refuses up to stage 5, and whose positions are elsewhere at some stages."""
-        plan = (np.arange(N) > 5).astype(float)
-        positions = problem["initial_m"] + DT * np.cumsum(problem["refuse_m_s"].reshape(N, 3), axis=0)
+        plan = (np.arange(STAGES) > 5).astype(float)
+        positions = problem["initial_m"] + STAGE_S * np.cumsum(problem["refuse_m_s"].reshape(STAGES, 3), axis=0)
         for stage, shift in shifts.items():
             positions[stage] += shift
         problem["plan"], problem["positions_m"], row["first_stage"] = plan, positions.ravel(), "refuse"
@@ -68,8 +68,8 @@ def test_rollouts_may_leave_23_after_the_first_change_only() -> None:
         row["predicted_clearance_m"] = _clearance(problem)
 
     def wrong(shifts: dict[int, list[float]]) -> set[str]:
-        mutant = edited(trace, lambda row, problem: record(row, problem, shifts))
-        return {one.what for one in _compared(FEAS, mutant) if one.wrong} - {"the other choice is cheaper"}
+        mutant = with_decision(trace, lambda row, problem: record(row, problem, shifts))
+        return {one.what for one in comparisons(FEAS, mutant) if one.wrong} - {"the other choice is cheaper"}
 
     accepts = {"answer or reason"} if trace.decisions["decision"].iloc[2] == "accept" else set()
     assert wrong({6: [0.1, 0.0, 0.0], 7: [0.1, 0.0, 0.0]}) <= accepts
@@ -78,13 +78,13 @@ def test_rollouts_may_leave_23_after_the_first_change_only() -> None:
 
 
 def _cost(problem: dict[str, Any]) -> float:
-    away = problem["positions_m"].reshape(N, 3)[:, None] - problem["centres_m"].reshape(N, -1, 3)
+    away = problem["positions_m"].reshape(STAGES, 3)[:, None] - problem["centres_m"].reshape(STAGES, -1, 3)
     slack = np.maximum(0.0, (problem["distances_m"] - np.linalg.norm(away, axis=2)).max(axis=1))
-    return float(DT * (np.sum((problem["positions_m"] - problem["reference_m"]) ** 2) + 10.0 * np.sum(slack**2)))
+    return float(STAGE_S * (np.sum((problem["positions_m"] - problem["reference_m"]) ** 2) + 10.0 * np.sum(slack**2)))
 
 
 def _clearance(problem: dict[str, Any]) -> float:
-    away = problem["positions_m"].reshape(N, 3)[:, None] - problem["centres_m"].reshape(N, -1, 3)
+    away = problem["positions_m"].reshape(STAGES, 3)[:, None] - problem["centres_m"].reshape(STAGES, -1, 3)
     return float((np.linalg.norm(away, axis=2) - problem["distances_m"]).min())
 
 
@@ -150,4 +150,4 @@ def test_the_rules_are_those_of_the_running_gatekeeper(
     gate = {"max_bend": 0.5, "switching_margin": margin, "min_dwell_s": 0.2}
     stands = {SILENT: None, ACCEPT: "accept", REFUSE: "refuse"}[standing]
     rules = Rules(switching_margin=margin, min_dwell=0.2, max_bend=0.5)
-    assert gate_feas._rule(row, stands, stood, gate) == settle(decision, kept, bend, standing, stood, rules)
+    assert gate_feas.rule(row, stands, stood, gate) == settle(decision, kept, bend, standing, stood, rules)

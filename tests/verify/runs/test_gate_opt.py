@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builders import PLANS, Edit, N, edited, problem_at, recorded
+from builders import ALL_PLANS, STAGES, DecisionEdit, decided_run, gate_data_at, with_decision
 from verify.judging import OPT, SUR
 
 from airground_drake.arrays import Array
@@ -27,14 +27,14 @@ def test_the_example_is_not_trivial(relaxed: Trace) -> None:
 
 
 def test_a_complete_decision_without_its_evidence_is_an_error(relaxed: Trace) -> None:
-    def without(name: str) -> Edit:
+    def without(name: str) -> DecisionEdit:
         def edit(row: dict[str, Any], problem: dict[str, Any]) -> None:
             problem[name] = []
 
         return edit
 
-    assert SUR.judge(edited(relaxed, without("relaxed"))).status == "error"
-    assert OPT.judge(edited(relaxed, without("normals"))).status == "error"
+    assert SUR.judge(with_decision(relaxed, without("relaxed"))).status == "error"
+    assert OPT.judge(with_decision(relaxed, without("normals"))).status == "error"
 
 
 def test_a_decision_cut_short_by_its_budget_is_listed_and_never_passes_for_bounded(relaxed: Trace) -> None:
@@ -42,7 +42,7 @@ def test_a_decision_cut_short_by_its_budget_is_listed_and_never_passes_for_bound
         row["status"] = "budget_spent"
         problem["relaxed"], problem["rounded"], problem["normals"] = [], [], []
 
-    trace = edited(relaxed, spent)
+    trace = with_decision(relaxed, spent)
     assert SUR.judge(trace).evidence["without_relaxation"] == ["decision of ugv1 at t = 0.15000000000000002 s"]
     finding = OPT.judge(trace)
     assert finding.status == "inconclusive"
@@ -51,21 +51,21 @@ def test_a_decision_cut_short_by_its_budget_is_listed_and_never_passes_for_bound
 
 def test_a_bad_solution_decides_nothing(relaxed: Trace, monkeypatch: pytest.MonkeyPatch) -> None:
     def nothing(rows: list[Row]) -> tuple[list[Array], list[Array]]:
-        return [np.full(N, 0.5) for _ in rows], [np.zeros((N, 2)) for _ in rows]
+        return [np.full(STAGES, 0.5) for _ in rows], [np.zeros((STAGES, 2)) for _ in rows]
 
     monkeypatch.setattr(convex_bounds, "_solve", nothing)
     assert OPT.judge(relaxed).status != "holds"
 
 
 def test_blocks_are_enumerated_exactly() -> None:
-    trace = recorded("enumeration")
+    trace = decided_run("enumeration")
     for row in rows_of(trace):
-        data = problem_at(trace, row.given["t_s"])
-        best = min(data.plan_cost(plan) for plan in PLANS)
-        assert gate_opt._cheapest(row, None).lower == pytest.approx(best, rel=1e-12)
+        data = gate_data_at(trace, row.given["t_s"])
+        best = min(data.plan_cost(plan) for plan in ALL_PLANS)
+        assert gate_opt.cheapest_of_blocks(row, None).lower == pytest.approx(best, rel=1e-12)
 
     def second_best(row: dict[str, Any], problem: dict[str, Any]) -> None:
         row["lower_bound"] *= 1.01
         row["gap"] = 0.0
 
-    assert OPT.judge(edited(trace, second_best)).status == "refuted"
+    assert OPT.judge(with_decision(trace, second_best)).status == "refuted"

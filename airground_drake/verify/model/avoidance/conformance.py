@@ -89,7 +89,7 @@ def loss_of_inequality(distance: Array | float, speed: Array | float, period: fl
     return ROUNDOFF * (7.0 * np.asarray(distance) + 9.0 * np.asarray(speed) * period)
 
 
-def rounding(inputs: Inputs) -> Inputs:
+def rounding_margins(inputs: Inputs) -> Inputs:
     """What rounding can take from the safe distance, m, by kind of pair.
 
     One step loses what the kernels lose (`loss_of_inequality`, both robots), u (P + h V) per coordinate, integration

@@ -85,7 +85,7 @@ def disturbed() -> list[Obligation]:
     ]  # fmt: skip
 
 
-def with_scenario(inputs: Inputs) -> list[Obligation]:
+def disturbed_with_scenario(inputs: Inputs) -> list[Obligation]:
     """The invariance of d - W/A again, for each kind of pair, with the scenario's numbers."""
     gain, period, found = inputs["avoidance_gain_1_s"], inputs["period_s"], []
     names = {each.name: each for each in disturbed()}

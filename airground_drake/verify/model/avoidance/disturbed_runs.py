@@ -23,7 +23,7 @@ Edit = Callable[[HalfSpaces], HalfSpaces]
 
 
 @dataclass(frozen=True)
-class Scene:
+class SafeStart:
     """A safe start of a team of the running code; `positions` (n + 1, 3), m."""
 
     name: str
@@ -31,7 +31,7 @@ class Scene:
     positions: Array
 
 
-def scenes(inputs: Inputs) -> list[Scene]:
+def scenes(inputs: Inputs) -> list[SafeStart]:
     """Safe starts, from one obstacle to a field of them.
 
     In `squeezed` a UGV has no room between another and an obstacle: there the inequalities contradict each other.
@@ -45,9 +45,9 @@ def scenes(inputs: Inputs) -> list[Scene]:
     field = np.column_stack([rng.uniform(-3.0 * d, 3.0 * d, (10, 2)), np.zeros(10)])
     field = field[np.linalg.norm(field, axis=1) >= 1.2 * d]
 
-    def alone(name: str, obstacles: list[list[float]] | Array, ugv: list[float], uav: Array = far) -> Scene:
+    def alone(name: str, obstacles: list[list[float]] | Array, ugv: list[float], uav: Array = far) -> SafeStart:
         around = np.array(obstacles, dtype=np.float64).reshape(-1, 3)
-        return Scene(name, replace(first, obstacles=around), np.array([ugv, uav]))
+        return SafeStart(name, replace(first, obstacles=around), np.array([ugv, uav]))
 
     found = [
         alone("obstacle", [[0.0, 0.0, 0.0]], [1.01 * d, 0.0, 0.0]),
@@ -58,14 +58,20 @@ def scenes(inputs: Inputs) -> list[Scene]:
     ]
     if len(team.ugvs) == 2:
         two = np.array([[0.0, 0.0, 0.0], [1.1 * dd, 0.0, 0.0], far])
-        found.append(Scene("ugv_pair", replace(team, obstacles=np.zeros((0, 3))), two))
+        found.append(SafeStart("ugv_pair", replace(team, obstacles=np.zeros((0, 3))), two))
         between = np.array([[d, 0.0, 0.0], [d + dd, 0.0, 0.0], far])
-        found.append(Scene("squeezed", replace(team, obstacles=np.zeros((1, 3))), between))
+        found.append(SafeStart("squeezed", replace(team, obstacles=np.zeros((1, 3))), between))
     return [*found, alone("field", field, [0.0, 0.0, 0.0], np.array([0.0, 0.0, max(d, low)]))]
 
 
 def attack(
-    inputs: Inputs, scene: Scene, how: str, *, edit: Edit = lambda given: given, force: float = 1.0, pairs: float = 2.0
+    inputs: Inputs,
+    scene: SafeStart,
+    how: str,
+    *,
+    edit: Edit = lambda given: given,
+    force: float = 1.0,
+    pairs: float = 2.0,
 ) -> Inputs:
     """One disturbed run of the running layer, every robot of the team driven and disturbed; exact motion.
 

@@ -18,7 +18,7 @@ from airground_drake.verify.engines.rounding import nearest, rates
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.model.avoidance.constants import Inputs, kinds, running_avoidance
 from airground_drake.verify.model.avoidance.disturbed_obligations import disturbed, pushed
-from airground_drake.verify.model.avoidance.disturbed_runs import Scene, attack, scenes
+from airground_drake.verify.model.avoidance.disturbed_runs import SafeStart, attack, scenes
 from airground_drake.verify.model.avoidance.hostile_inputs import postcondition
 from airground_drake.verify.model.avoidance.lemma import lemma
 from airground_drake.verify.model.avoidance.obligations import (
@@ -223,7 +223,7 @@ def _disturbed_bound(inputs: Inputs, name: str) -> Obligation:
     return with_numbers(next(each for each in disturbed() if each.name == name), kind.name, numbers)
 
 
-def _disturbed_scene(inputs: Inputs, name: str) -> Scene:
+def _disturbed_scene(inputs: Inputs, name: str) -> SafeStart:
     return next(scene for scene in scenes(inputs) if scene.name == name)
 
 

@@ -1,6 +1,6 @@
 """SAFE-DIST: what is left of the safe distance when velocities are disturbed.
 
-Symbols are those of `invariance.py`; besides, every robot moves with v + e(t), ||e(t)|| <= w, instead of v, and W is
+Symbols are those of `safe_inv.py`; besides, every robot moves with v + e(t), ||e(t)|| <= w, instead of v, and W is
 what the disturbances of a pair add up to: w beside an obstacle, 2 w between robots. In a period the disturbance
 displaces by q, ||q|| <= s W, so that D(s) >= D + s r + n.q >= D + s (r - W). From this, with A h <= 1:
 
@@ -8,7 +8,7 @@ displaces by q, ||q|| <= s W, so that D(s) >= D + s r + n.q >= D + s (r - W). Fr
     inside, deficit c = d - D:  c after the period <= (1 - A h) c + h W, and c <= W/A stays so during the period.
 
 Hence c <= (1 - (1 - A h)^N) W/A after N periods inside in a row: h W after one, W/A in the limit, never more. The
-certificates are `obligations.json` and `<obligation>.smt2`, as `obligation.py` describes them.
+certificates are `obligations.json` and `<obligation>.smt2`, as `engines/obligation.py` describes them.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from airground_drake.verify.engines.prover import discharge, finding
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.model.avoidance.conformance import conformance
 from airground_drake.verify.model.avoidance.constants import Inputs, constants, kinds
-from airground_drake.verify.model.avoidance.disturbed_obligations import disturbed, pushed, with_scenario
+from airground_drake.verify.model.avoidance.disturbed_obligations import disturbed, disturbed_with_scenario, pushed
 from airground_drake.verify.model.avoidance.disturbed_runs import campaign
 from airground_drake.verify.model.avoidance.obligations import LIMIT_S
 
@@ -81,7 +81,7 @@ class SafeDist(ModelClaim):
             kind.name: kind.safe - pushed(inputs, kind.share) / inputs["avoidance_gain_1_s"] for kind in kinds(inputs)
         }
         found = finding(
-            discharge([*disturbed(), *with_scenario(inputs)], LIMIT_S),
+            discharge([*disturbed(), *disturbed_with_scenario(inputs)], LIMIT_S),
             disturbance_m_s=inputs["disturbance_m_s"], least_distances_m=bounds, runs=rows, conformance=compared,
         )  # fmt: skip
         covered = [row for row in rows if not row["unmet"]]

@@ -5,7 +5,7 @@ vector n = x/D and velocity v, has the radial speed r = n.v; E = ||x + s v|| is 
 the safe distance, A the gain, h the control period, q the share of an inequality (1 obstacle, 1/2 robot of a pair), b
 its bound. SAFE-LEMMA is E >= D + s r; everything else is about the numbers D, r, s.
 
-Certificate files: `obligations.json` and `<obligation>.smt2` as `obligation.py` describes them, and from SAFE-LEMMA
+Certificate files: `obligations.json` and `<obligation>.smt2` as `engines/obligation.py` describes them, and from SAFE-LEMMA
 `gram.json`, see `lemma.py`.
 """
 
@@ -17,7 +17,7 @@ from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.engines.prover import discharge, finding
 from airground_drake.verify.finding import Finding
-from airground_drake.verify.model.avoidance.conformance import conformance, rounding
+from airground_drake.verify.model.avoidance.conformance import conformance, rounding_margins
 from airground_drake.verify.model.avoidance.constants import Inputs, constants, kinds, range_spare
 from airground_drake.verify.model.avoidance.hostile_inputs import postcondition
 from airground_drake.verify.model.avoidance.obligations import LIMIT_S, rest, scaling, step, with_scenario
@@ -69,7 +69,7 @@ class SafeInv(ModelClaim):
         compared, sampled = conformance(inputs), postcondition(inputs, 500)
         found = finding(
             discharge([*step(), *rest(), *scaling(), *with_scenario(inputs)], LIMIT_S),
-            conformance=compared, composition=sampled, rounding=rounding(inputs),
+            conformance=compared, composition=sampled, rounding=rounding_margins(inputs),
         )  # fmt: skip
         spare = {kind.name: float(range_spare(inputs, kind)) for kind in kinds(inputs)}
         kind = min(spare, key=lambda name: spare[name])

@@ -14,7 +14,7 @@ FLOAT_TOLERANCE = 1e-12
 
 
 @dataclass(frozen=True)
-class Constants:
+class ThresholdRule:
     """The threshold rule's numbers as rationals (the decimals that they print as)."""
 
     drift: Fraction
@@ -23,7 +23,7 @@ class Constants:
     c2: Fraction
 
     @classmethod
-    def of(cls, inputs: Mapping[str, Any]) -> Constants:
+    def of(cls, inputs: Mapping[str, Any]) -> ThresholdRule:
         """From a claim's inputs."""
         return cls(*(Fraction(rational(inputs[name])) for name in ("drift_m_s", "noise_m_sqrt_s", "c1_1_s", "c2")))
 
@@ -50,6 +50,6 @@ Rule = Callable[[float, float, float, float], float]
 """Threshold, m, from drift, noise, c1 and c2."""
 
 
-def _running(inputs: Mapping[str, Any], rule: Rule) -> Fraction:
+def running_threshold(inputs: Mapping[str, Any], rule: Rule) -> Fraction:
     """The threshold, m, that the code computes, exactly as it stands in the computer."""
     return Fraction(rule(inputs["drift_m_s"], inputs["noise_m_sqrt_s"], inputs["c1_1_s"], inputs["c2"]))

@@ -40,7 +40,7 @@ DRIFT_STEP = 0.02
 
 
 @dataclass(frozen=True)
-class Experiment:
+class PassageExperiment:
     """Paths of (15) between +-zeta: lengths in m, drift in m/s, noise in m/sqrt(s)."""
 
     name: str
@@ -66,13 +66,13 @@ class Experiment:
 class Sample:
     """What an experiment gave: wrong decisions, sum and sum of squares of the noise periods to the decision."""
 
-    experiment: Experiment
+    experiment: PassageExperiment
     wrong: int
     periods: int
     squares: int
 
 
-def experiments(inputs: dict[str, Any]) -> tuple[Experiment, ...]:
+def experiments(inputs: dict[str, Any]) -> tuple[PassageExperiment, ...]:
     """At the Bayes threshold with and without deviation, with other drift and noise, and Bayes against printed (19).
 
     The last two have the drift at which the Bayes threshold is at u = 1, where both kinds of decision are common and
@@ -83,23 +83,25 @@ def experiments(inputs: dict[str, Any]) -> tuple[Experiment, ...]:
     clear = noise * math.sqrt((math.sinh(1.0) + 1.0) * c1 / c2)
     bayes, printed_zeta = optimal_threshold(clear, noise, c1, c2), optimal_threshold(clear, noise, c2, c1)
     return (
-        Experiment("no deviation", drift, noise, zeta, 0.0, 10000, SEED),
-        Experiment("deviation ahead", drift, noise, zeta, 0.4 * zeta, 5000, SEED + 1),
-        Experiment("deviation behind", drift, noise, zeta, -0.4 * zeta, 5000, SEED + 2),
-        Experiment("other drift and noise", 4.0 * noise**2 / zeta, 2.0 * noise, zeta, -0.4 * zeta, 4000, SEED + 3),
-        Experiment("Bayes threshold at u = 1", clear, noise, bayes, 0.0, 6000, SEED + 4),
-        Experiment("printed threshold instead", clear, noise, printed_zeta, 0.0, 6000, SEED + 5),
+        PassageExperiment("no deviation", drift, noise, zeta, 0.0, 10000, SEED),
+        PassageExperiment("deviation ahead", drift, noise, zeta, 0.4 * zeta, 5000, SEED + 1),
+        PassageExperiment("deviation behind", drift, noise, zeta, -0.4 * zeta, 5000, SEED + 2),
+        PassageExperiment(
+            "other drift and noise", 4.0 * noise**2 / zeta, 2.0 * noise, zeta, -0.4 * zeta, 4000, SEED + 3
+        ),
+        PassageExperiment("Bayes threshold at u = 1", clear, noise, bayes, 0.0, 6000, SEED + 4),
+        PassageExperiment("printed threshold instead", clear, noise, printed_zeta, 0.0, 6000, SEED + 5),
     )
 
 
-def running(experiment: Experiment) -> tuple[float, float]:
+def running(experiment: PassageExperiment) -> tuple[float, float]:
     """(17)-(18) as the package computes them."""
     constants = (experiment.zeta, experiment.drift, experiment.noise, experiment.deviation)
     return decision_time(*constants), error_rate(*constants)
 
 
 @lru_cache(maxsize=16)
-def simulate(experiment: Experiment) -> Sample:
+def simulate(experiment: PassageExperiment) -> Sample:
     """Decide `experiment.paths` paths, simulated by Drake.
 
     Raises:
@@ -126,7 +128,7 @@ def passage(steps: Iterator[float], x: float, barrier: float) -> tuple[int, floa
     raise ArithmeticError("the record ended within a path")
 
 
-def increments(experiment: Experiment, rows: int) -> list[float]:
+def increments(experiment: PassageExperiment, rows: int) -> list[float]:
     """Increments of the decision variable over the noise period, m, (rows * CHANNELS), from a Drake simulation."""
     period, duration = experiment.period, rows * experiment.period
     ends = np.array([[0.0, 0.0, 0.0], [1.01 * experiment.drift * duration, 0.0, 0.0]])

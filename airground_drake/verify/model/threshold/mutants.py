@@ -14,14 +14,14 @@ from airground_drake.decision.bayes import optimal_threshold
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.model.threshold.expressions import FACTORISATION
 from airground_drake.verify.model.threshold.first_passages import (
-    Experiment,
+    PassageExperiment,
     experiments,
     running,
     simulate,
 )
 from airground_drake.verify.model.threshold.thr_ddm import ERROR_ALLOWANCE, LEVEL, TIME_ALLOWANCE, compare
-from airground_drake.verify.model.threshold.thr_opt import _optimum
-from airground_drake.verify.model.threshold.thr_root import _root
+from airground_drake.verify.model.threshold.thr_opt import judge_optimum
+from airground_drake.verify.model.threshold.thr_root import judge_root
 
 
 def _swapped(drift: float, noise: float, c1: float, c2: float) -> float:
@@ -37,22 +37,22 @@ def _subtracted(drift: float, noise: float, c1: float, c2: float) -> float:
 
 
 MUTANTS: dict[str, Callable[[dict[str, Any]], Finding]] = {
-    "THR-ROOT: the code solves (19) as printed, c1/c2": lambda inputs: _root(inputs, _swapped),
-    "THR-ROOT: the code solves (19) with sinh u - u": lambda inputs: _root(inputs, _subtracted),
-    "THR-ROOT: an enclosure that misses the root": lambda inputs: _root(inputs, optimal_threshold, shift=2),
-    "THR-OPT: the threshold of (19) as printed, c1/c2": lambda inputs: _optimum(inputs, _swapped),
-    "THR-OPT: the threshold with sinh u - u": lambda inputs: _optimum(inputs, _subtracted),
-    "THR-OPT: dB/dzeta with a wrong sign": lambda inputs: _optimum(
+    "THR-ROOT: the code solves (19) as printed, c1/c2": lambda inputs: judge_root(inputs, _swapped),
+    "THR-ROOT: the code solves (19) with sinh u - u": lambda inputs: judge_root(inputs, _subtracted),
+    "THR-ROOT: an enclosure that misses the root": lambda inputs: judge_root(inputs, optimal_threshold, shift=2),
+    "THR-OPT: the threshold of (19) as printed, c1/c2": lambda inputs: judge_optimum(inputs, _swapped),
+    "THR-OPT: the threshold with sinh u - u": lambda inputs: judge_optimum(inputs, _subtracted),
+    "THR-OPT: dB/dzeta with a wrong sign": lambda inputs: judge_optimum(
         inputs, optimal_threshold, replace(FACTORISATION, derivative=FACTORISATION.derivative.replace("+u)", "-u)"))
     ),
-    "THR-OPT: (19) with an initial deviation": lambda inputs: _optimum(
+    "THR-OPT: (19) with an initial deviation": lambda inputs: judge_optimum(
         inputs, optimal_threshold, stationary_with_deviation=True
     ),
 }
 """Broken variants by name: each must be refuted (the first and the fourth cannot be where c1 = c2)."""
 
 
-def printed(experiment: Experiment, deviation_s: float) -> tuple[float, float]:
+def printed(experiment: PassageExperiment, deviation_s: float) -> tuple[float, float]:
     """(17)-(18) as printed, where the initial deviation is a time, s."""
     zeta, drift, noise = experiment.zeta, experiment.drift, experiment.noise
     u = 2.0 * zeta * drift / noise**2

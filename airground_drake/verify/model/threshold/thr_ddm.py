@@ -1,6 +1,6 @@
 """THR-DDM: mean decision time and error rate of simulated drift-diffusion paths against (17)-(18).
 
-Paths are those of `passages.py`; what their correction for sampling leaves is allowed for by ERROR_ALLOWANCE and
+Paths are those of `first_passages.py`; what their correction for sampling leaves is allowed for by ERROR_ALLOWANCE and
 TIME_ALLOWANCE, which the tests check against a quadrature of the sampled process.
 
 Intervals are simultaneous over all comparisons (Bonferroni), Clopper-Pearson for error rates and normal for times.
@@ -26,7 +26,7 @@ from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.model.threshold.first_passages import (
     CHANNELS,
-    Experiment,
+    PassageExperiment,
     Sample,
     experiments,
     running,
@@ -41,7 +41,7 @@ ERROR_ALLOWANCE = 2e-4
 TIME_ALLOWANCE = 0.05
 """Bias of the corrected time, in noise periods."""
 
-Formulas = Callable[[Experiment], tuple[float, float]]
+Formulas = Callable[[PassageExperiment], tuple[float, float]]
 """Mean decision time, s, and error rate that are to be compared with the simulation."""
 
 
@@ -88,7 +88,7 @@ class ThrDdm(ModelClaim):
         return compare(experiments(inputs), running)
 
 
-def compare(chosen: tuple[Experiment, ...], formulas: Formulas) -> Finding:
+def compare(chosen: tuple[PassageExperiment, ...], formulas: Formulas) -> Finding:
     """The verdict for these formulas: 'supported' if all intervals contain them, else 'refuted'."""
     rows = [row for each in chosen for row in _rows(simulate(each), formulas(each), 2 * len(chosen))]
     worst = min(rows, key=lambda row: float(row["margin"]))
@@ -147,7 +147,7 @@ def _rows(sample: Sample, formula: tuple[float, float], comparisons: int) -> lis
     ]
 
 
-def _pyddm(experiment: Experiment) -> dict[str, float] | str:
+def _pyddm(experiment: PassageExperiment) -> dict[str, float] | str:
     """PyDDM's mean time over all decisions, s, and error rate, computed in units of zeta and zeta^2/noise^2."""
     try:
         import pyddm

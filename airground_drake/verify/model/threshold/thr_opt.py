@@ -21,7 +21,7 @@ from airground_drake.verify.engines.ball_arithmetic import (
 )
 from airground_drake.verify.engines.obligation import rational
 from airground_drake.verify.finding import Finding
-from airground_drake.verify.model.threshold.constants import FLOAT_TOLERANCE, Constants, Rule, _running
+from airground_drake.verify.model.threshold.constants import FLOAT_TOLERANCE, Rule, ThresholdRule, running_threshold
 from airground_drake.verify.model.threshold.expressions import (
     BIAS,
     BIASED,
@@ -78,19 +78,19 @@ class ThrOpt(ModelClaim):
 
     def check(self, inputs: dict[str, Any]) -> Finding:
         """Signs of dB/dzeta around the running threshold, the printed root, the deviations and the drifts."""
-        return _optimum(inputs, optimal_threshold)
+        return judge_optimum(inputs, optimal_threshold)
 
 
-def _optimum(
+def judge_optimum(
     inputs: dict[str, Any],
     rule: Rule,
     factorisation: Derivative = FACTORISATION,
     stationary_with_deviation: bool = False,
 ) -> Finding:
     """THR-OPT for the threshold that `rule` computes; the last two are for mutants."""
-    constants = Constants.of(inputs)
+    constants = ThresholdRule.of(inputs)
     root = enclose(RESIDUAL, constants.values, Fraction(0))
-    running = _running(inputs, rule)
+    running = running_threshold(inputs, rule)
     around = [constants.u(running) * (1 + side * Fraction(FLOAT_TOLERANCE)) for side in (-1, 1)]
     statements: list[Statement] = [INCREASING, factorisation, BIASED, TURNING]
     statements += bracket("root", "f changes its sign here.", RESIDUAL, constants.values, root)
@@ -118,7 +118,7 @@ def _optimum(
 
 
 def _printed(
-    constants: Constants, root: tuple[Fraction, Fraction]
+    constants: ThresholdRule, root: tuple[Fraction, Fraction]
 ) -> tuple[list[Statement], dict[str, tuple[Fraction, Fraction]], float | None]:
     """That the root of the printed equation is elsewhere and worse, its enclosures, and by how much at least."""
     if constants.c1 == constants.c2:
@@ -140,7 +140,7 @@ def _printed(
 
 
 def _deviations(
-    constants: Constants, root: tuple[Fraction, Fraction], stationary: bool
+    constants: ThresholdRule, root: tuple[Fraction, Fraction], stationary: bool
 ) -> tuple[list[Statement], dict[str, tuple[Fraction, Fraction]]]:
     """Bounds of dB/dzeta, 1/m, at the root with initial deviations of +-zeta/2 (for a mutant: that it is 0)."""
     statements: list[Statement] = []
@@ -158,7 +158,7 @@ def _deviations(
     return statements, slopes
 
 
-def _drifts(constants: Constants, zeta: Fraction) -> tuple[list[Statement], dict[str, tuple[Fraction, Fraction]]]:
+def _drifts(constants: ThresholdRule, zeta: Fraction) -> tuple[list[Statement], dict[str, tuple[Fraction, Fraction]]]:
     """All drifts, m/s, for which zeta, m, solves the equation: with c2/c1, and as printed."""
     turn = enclose(DRIFT_TURN, {}, Fraction(1), Fraction(4))
     statements = bracket("turn", "(sinh u + u)/u^2 has its minimum here.", DRIFT_TURN, {}, turn)
@@ -181,7 +181,7 @@ def _drifts(constants: Constants, zeta: Fraction) -> tuple[list[Statement], dict
 
 def _replay(inputs: Mapping[str, Any], running: Fraction, root: float) -> dict[str, Any]:
     """The running Bayes risk at the root and at the code's threshold, and how far it is from the certified one."""
-    constants = Constants.of(inputs)
+    constants = ThresholdRule.of(inputs)
     drift, noise, c1, c2 = (inputs[name] for name in ("drift_m_s", "noise_m_sqrt_s", "c1_1_s", "c2"))
     differences = []
     for scale, share in ((0.3, 0.0), (1.0, 0.0), (3.0, 0.0), (1.0, 0.5), (1.0, -0.5)):

@@ -18,7 +18,7 @@ from airground_drake.verify.engines.ball_arithmetic import (
 )
 from airground_drake.verify.engines.smt import solve
 from airground_drake.verify.finding import Finding
-from airground_drake.verify.model.threshold.constants import FLOAT_TOLERANCE, Constants, Rule, _running
+from airground_drake.verify.model.threshold.constants import FLOAT_TOLERANCE, Rule, ThresholdRule, running_threshold
 from airground_drake.verify.model.threshold.expressions import INCREASING, ONE_ROOT, RESIDUAL
 
 CVC5_LIMIT_S = 5.0
@@ -70,17 +70,17 @@ class ThrRoot(ModelClaim):
 
     def check(self, inputs: dict[str, Any]) -> Finding:
         """Enclose the root and look for the code's in it."""
-        return _root(inputs, optimal_threshold)
+        return judge_root(inputs, optimal_threshold)
 
 
-def _root(inputs: dict[str, Any], rule: Rule, shift: int = 0) -> Finding:
+def judge_root(inputs: dict[str, Any], rule: Rule, shift: int = 0) -> Finding:
     """THR-ROOT for the threshold that `rule` computes; `shift` moves the enclosure by multiples of its width."""
-    constants = Constants.of(inputs)
+    constants = ThresholdRule.of(inputs)
     low, high = enclose(RESIDUAL, constants.values, Fraction(0))
     low, high = low + shift * (high - low), high + shift * (high - low)
     zeta = constants.zeta(low), constants.zeta(high)
     statements = [INCREASING, *bracket("root", "f changes its sign here.", RESIDUAL, constants.values, (low, high))]
-    running = _running(inputs, rule)
+    running = running_threshold(inputs, rule)
     in_force = Fraction(inputs["zeta_m"]) if inputs["rule"] == "bayes" else running
     outside = max(max(zeta[0] - value, value - zeta[1]) for value in (running, in_force))
     [cvc5] = solve([UNIQUE_SMT2], "cvc5", CVC5_LIMIT_S)

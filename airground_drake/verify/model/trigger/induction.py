@@ -13,7 +13,7 @@ from airground_drake.verify.engines.obligation import Obligation, Term, rational
 from airground_drake.verify.engines.prover import LIMIT_S
 from airground_drake.verify.engines.rewriting import terms
 from airground_drake.verify.engines.smt import solve
-from airground_drake.verify.engines.symbolic_execution import SYMBOLS, Linear, Path
+from airground_drake.verify.engines.symbolic_execution import SYMBOLS, Branch, Linear
 from airground_drake.verify.model.trigger.relation import Transition, replay
 
 _GUARDS = {
@@ -146,7 +146,7 @@ def _after(each: Transition) -> list[str]:
 
 
 def _number(value: float) -> str:
-    return (Linear(Path([]), {}) + value).smt()
+    return (Linear(Branch([]), {}) + value).smt()
 
 
 def _definitions(transitions: Sequence[Transition], trigger: Trigger, bound: float) -> list[str]:

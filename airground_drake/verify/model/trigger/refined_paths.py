@@ -39,7 +39,7 @@ DWELL_STEPS = 10
 
 
 @dataclass(frozen=True)
-class Experiment:
+class Refinement:
     """Constants of the experiment.
 
     Attributes:
@@ -61,7 +61,7 @@ class Experiment:
     smooth: bool = False
 
 
-def experiment(inputs: dict[str, Any]) -> Experiment:
+def experiment(inputs: dict[str, Any]) -> Refinement:
     """The experiment for the constants of a scenario."""
     trigger = Trigger(inputs["zeta_m"], inputs["released_below_m"], inputs["dwell_s"])
     fewest, most = COARSE_STEPS
@@ -71,10 +71,10 @@ def experiment(inputs: dict[str, Any]) -> Experiment:
     own = inputs["noise_m_sqrt_s"]
     intensity = max(own, (trigger.zeta - trigger.release) / math.sqrt(scale)) or 1.0
     dts = tuple(coarse / 2**k for k in range(HALVINGS + 1))
-    return Experiment(trigger, intensity, own, inputs["leak_1_s"], steps * coarse, dts)
+    return Refinement(trigger, intensity, own, inputs["leak_1_s"], steps * coarse, dts)
 
 
-def path(setting: Experiment, index: int) -> list[Array]:
+def path(setting: Refinement, index: int) -> list[Array]:
     """x - zeta at the grid points of every dt, m, for one path of unit intensity (or the sine)."""
     coarse = setting.dt_s[0]
     steps = [round(setting.duration_s / dt) for dt in setting.dt_s]
@@ -120,7 +120,7 @@ def _crossings(height: Array, dt: float) -> Array:
     return (k + height[k] / (height[k] - height[k + 1])) * dt
 
 
-def expected_bare(setting: Experiment, dt: float) -> float:
+def expected_bare(setting: Refinement, dt: float) -> float:
     """Expected number of triggers of the bare threshold, exact (module docstring)."""
     count, keep = round(setting.duration_s / dt), 1.0 - setting.leak_1_s * dt
     variance = lfilter([1.0], [1.0, -keep * keep], np.concatenate([[setting.dt_s[0]], np.full(count, dt)]))
@@ -128,7 +128,7 @@ def expected_bare(setting: Experiment, dt: float) -> float:
     return 0.5 + float(np.arccos(np.minimum(rho, 1.0)).sum()) / (2.0 * math.pi)
 
 
-def counts(setting: Experiment) -> dict[str, Array]:
+def counts(setting: Refinement) -> dict[str, Array]:
     """Triggers by path and dt, (PATHS, dt): bare threshold, automaton, automaton at the scenario's own noise."""
     trigger = setting.trigger
     found = {name: np.zeros((PATHS, len(setting.dt_s))) for name in SERIES}

@@ -14,7 +14,7 @@ from airground_drake.decision.trigger import Mode, Trigger, TriggerState
 from airground_drake.systems.decision import FIELDS, EventTrigger
 from airground_drake.verify.engines.obligation import rational
 from airground_drake.verify.engines.rounding import ROUNDOFF
-from airground_drake.verify.engines.symbolic_execution import Linear, Path, paths
+from airground_drake.verify.engines.symbolic_execution import Branch, Linear, paths
 
 
 @dataclass(frozen=True)
@@ -54,14 +54,14 @@ def step(trigger: Trigger, state: TriggerState, t: float, x: float) -> TriggerSt
     return state
 
 
-def relation(make: Callable[[Path], Trigger]) -> list[Transition]:
+def read_off(make: Callable[[Branch], Trigger]) -> list[Transition]:
     """All transitions of the trigger that `make` makes, whose parameters may be symbols of the path.
 
     The start and waiting are included.
     """
     found: list[Transition] = []
 
-    def add(name: str, source: Mode | None, path: Path, after: TriggerState) -> None:
+    def add(name: str, source: Mode | None, path: Branch, after: TriggerState) -> None:
         def form(value: Any) -> Linear:
             return value if isinstance(value, Linear) else Linear(path, {}) + value
 
@@ -79,12 +79,12 @@ def relation(make: Callable[[Path], Trigger]) -> list[Transition]:
         add(f"start_{after.mode.name.lower()}", None, path, after)
     for mode in Mode:
 
-        def event(path: Path, mode: Mode = mode) -> TriggerState:
+        def event(path: Branch, mode: Mode = mode) -> TriggerState:
             trigger = make(path)
             before = TriggerState(mode, *map(path.symbol, "nar"))
             return step(trigger, before, path.symbol("s"), path.symbol("x"))
 
-        def wait(path: Path, mode: Mode = mode) -> TriggerState:
+        def wait(path: Branch, mode: Mode = mode) -> TriggerState:
             make(path)
             return TriggerState(mode, *map(path.symbol, "nar"))
 
@@ -106,7 +106,7 @@ def replay(trigger: Trigger, events: Sequence[tuple[float, float]]) -> list[dict
     return rows
 
 
-def rounding(trigger: Trigger, duration: float) -> float:
+def dwell_rounding(trigger: Trigger, duration: float) -> float:
     """Largest error of the running automaton's end of dwell in a run, s.
 
     triggered_at + dwell is rounded once, by at most the unit roundoff times itself, and the float that stands for
@@ -157,7 +157,7 @@ def conformance(trigger: Trigger, transitions: Sequence[Transition], duration: f
             moved[taken] = moved.get(taken, 0) + 1
             if predicted != [Fraction(v) for v in became] and predicted:
                 off = abs(point["s"] - point["a"] - Fraction(rational(trigger.dwell)))
-                if point["n"] > 0 and off <= Fraction(rounding(trigger, duration)):
+                if point["n"] > 0 and off <= Fraction(dwell_rounding(trigger, duration)):
                     excused += 1
                     continue
                 wrong += 1

@@ -30,7 +30,7 @@ from airground_drake.verify.engines.prover import LIMIT_S, discharge, finding
 from airground_drake.verify.engines.smt import solve
 from airground_drake.verify.finding import Finding, Status
 from airground_drake.verify.model.trigger.induction import counterexample, horn, invariant, obligations, remarks
-from airground_drake.verify.model.trigger.relation import conformance, relation, rounding
+from airground_drake.verify.model.trigger.relation import conformance, dwell_rounding, read_off
 
 SHORTEST_S = 1e-3
 """Bound that is tried where the scenario has none (0 s), s: any number would do, the counterexample scales with it."""
@@ -89,7 +89,7 @@ class ZenoProof(ModelClaim):
 def prove(trigger: Trigger, inputs: dict[str, Any]) -> Finding:
     """The finding for a trigger, the scenario's or a mutant of it."""
     bound, duration = inputs["min_inter_event_s"] or SHORTEST_S, inputs["duration_s"]
-    numeric = relation(lambda _: trigger)
+    numeric = read_off(lambda _: trigger)
     files = {"zeno_horn.smt2": horn(numeric, trigger, bound), **invariant(numeric, trigger, bound)}
     described = json.dumps({"bound_s": rational(bound), "transitions": [each.to_json() for each in numeric]}, indent=1)
     spacer, *z3 = solve(list(files.values()), "z3", LIMIT_S)
@@ -97,7 +97,7 @@ def prove(trigger: Trigger, inputs: dict[str, Any]) -> Finding:
         "bound_s": bound,
         "spacer": {"sat": "an invariant exists", "unsat": "violated"}.get(spacer.answer, spacer.answer),
         "conformance": conformance(trigger, numeric, duration),
-        "rounding_s": rounding(trigger, duration),
+        "rounding_s": dwell_rounding(trigger, duration),
     }
     saved = {"relation.json": described + "\n", **files}
     if spacer.answer == "unsat":
@@ -106,7 +106,7 @@ def prove(trigger: Trigger, inputs: dict[str, Any]) -> Finding:
         margin = broken["gap_s"] - bound if broken else None
         return Finding(status, margin, "s", {}, broken, evidence, saved)
     cvc5 = solve(list(files.values())[1:], "cvc5", LIMIT_S)
-    general = relation(lambda path: type(trigger)(*map(path.symbol, ("zeta", "release", "dwell"))))
+    general = read_off(lambda path: type(trigger)(*map(path.symbol, ("zeta", "release", "dwell"))))
     found = finding(discharge([*obligations(general), *remarks(trigger, bound)]))
     ours = {name: [a.answer, b.answer] for name, a, b in zip(list(files)[1:], z3, cvc5, strict=True)}
     status = found.status

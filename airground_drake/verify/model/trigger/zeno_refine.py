@@ -1,6 +1,6 @@
 """ZENO-REFINE: as the noise step is refined, the bare threshold's event count diverges and the automaton's does not.
 
-Paths and counts are those of `counting.py`: the bare count grows like dt^(-1/2) with a relative correction of order
+Paths and counts are those of `refined_paths.py`: the bare count grows like dt^(-1/2) with a relative correction of order
 sqrt(dt). The delay of a level crossing that is seen on a grid, 0.58 s sqrt(dt) (Chernoff 1965, Siegmund 1979), makes
 the correction of the automaton's count one of order sqrt(dt) as well. Both counts are therefore fitted by
 
@@ -14,7 +14,7 @@ counts); 'inconclusive' if an interval is wider than 1/5, or all holds but the b
 expectation at some dt; else 'refuted'. Margin: the smallest distance of an interval's end from breaking the rule.
 
 Certificate `counts.csv`: trigger counts by path and dt, from which means, standard errors and fits can be redone; the
-theoretical counts follow from the formula in `counting.py`.
+theoretical counts follow from the formula in `refined_paths.py`.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from airground_drake.verify.model.trigger.refined_paths import (
     PATHS,
     SEED,
     SERIES,
-    Experiment,
+    Refinement,
     counts,
     expected_bare,
     experiment,
@@ -105,7 +105,7 @@ class ZenoRefine(ModelClaim):
         return judge_experiment(experiment(inputs))
 
 
-def series(setting: Experiment, found: dict[str, Array]) -> dict[str, Any]:
+def series(setting: Refinement, found: dict[str, Array]) -> dict[str, Any]:
     """Everything that the figure needs, from the counts of an experiment: the finding's evidence.
 
     Returns:
@@ -158,7 +158,7 @@ def _fit(dt: Array, mean: Array) -> Array:
     return np.linalg.lstsq(design, np.log(mean).T, rcond=None)[0]
 
 
-def judge_experiment(setting: Experiment) -> Finding:
+def judge_experiment(setting: Refinement) -> Finding:
     """The finding of an experiment by the rule of the module docstring."""
     found = counts(setting)
     evidence = series(setting, found)

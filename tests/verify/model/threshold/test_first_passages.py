@@ -12,10 +12,10 @@ from scipy.special import ndtr
 from verify.model.threshold.cases import INPUTS
 
 from airground_drake.verify.model.threshold import first_passages, thr_ddm
-from airground_drake.verify.model.threshold.first_passages import Experiment
+from airground_drake.verify.model.threshold.first_passages import PassageExperiment
 
 
-def sampled(each: Experiment, nodes: int = 160) -> tuple[float, float]:
+def sampled(each: PassageExperiment, nodes: int = 160) -> tuple[float, float]:
     """Mean number of periods and error rate of the sampled walk between the barriers, by Gauss-Legendre quadrature."""
     x, weight = (each.barrier * values for values in np.polynomial.legendre.leggauss(nodes))
     step, mean = each.noise * math.sqrt(each.period), each.drift * each.period
@@ -34,7 +34,7 @@ def sampled(each: Experiment, nodes: int = 160) -> tuple[float, float]:
 @pytest.mark.parametrize("deviation", [-0.4, 0.0, 0.4])
 @pytest.mark.parametrize("drift", [0.01, 0.1815, 0.5, 1.0, 2.0, 4.0, 10.0])
 def test_what_the_barrier_correction_leaves_is_within_the_allowances(drift: float, deviation: float) -> None:
-    each = Experiment("", drift, 1.0, 1.0, deviation, 1, 0)
+    each = PassageExperiment("", drift, 1.0, 1.0, deviation, 1, 0)
     periods, wrong = sampled(each)
     time, rate = first_passages.running(each)
     assert abs(periods - 0.25 - time / each.period) < thr_ddm.TIME_ALLOWANCE
@@ -50,7 +50,7 @@ def test_the_experiments_are_within_the_range_of_that_test() -> None:
 
 @pytest.mark.parametrize("zeta", [1.0, 1e-3])  # noise periods of 4 ms and 4 ns
 def test_increments_are_those_of_the_process(zeta: float) -> None:
-    each = Experiment("", 2.0, 3.0, zeta, 0.0, 1, 5)
+    each = PassageExperiment("", 2.0, 3.0, zeta, 0.0, 1, 5)
     steps = np.array(first_passages.increments(each, 1000))
     assert steps.shape == (1000 * first_passages.CHANNELS,)
     deviation = each.noise * math.sqrt(each.period)

@@ -13,7 +13,7 @@ from airground_drake.decision.bayes import decision_time, error_rate
 from airground_drake.scenarios.load import load
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.model.threshold import mutants
-from airground_drake.verify.model.threshold.first_passages import Experiment
+from airground_drake.verify.model.threshold.first_passages import PassageExperiment
 from airground_drake.verify.model.threshold.thr_ddm import ThrDdm
 
 
@@ -44,7 +44,7 @@ def test_the_printed_formulas_are_ours_with_the_deviation_in_seconds(
     drift: float, noise: float, zeta: float, share: float
 ) -> None:
     assume(0.01 < zeta * drift / noise**2 < 20.0)
-    each = Experiment("", drift, noise, zeta, share * zeta, 1, 0)
+    each = PassageExperiment("", drift, noise, zeta, share * zeta, 1, 0)
     time, rate = mutants.printed(each, each.deviation / drift)
     assert time == pytest.approx(decision_time(zeta, drift, noise, share * zeta), rel=1e-6, abs=1e-9)
     assert rate == pytest.approx(error_rate(zeta, drift, noise, share * zeta), rel=1e-6, abs=1e-9)

@@ -10,7 +10,7 @@ import pytest
 
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.model.threshold import thr_ddm
-from airground_drake.verify.model.threshold.first_passages import Experiment
+from airground_drake.verify.model.threshold.first_passages import PassageExperiment
 
 
 def test_formulas_are_supported(simulated: Finding) -> None:
@@ -59,4 +59,4 @@ def test_pyddm_agrees(simulated: Finding) -> None:
 
 def test_without_pyddm(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pyddm", None)
-    assert thr_ddm._pyddm(Experiment("", 1.0, 1.0, 1.0, 0.0, 1, 0)) == "not installed"
+    assert thr_ddm._pyddm(PassageExperiment("", 1.0, 1.0, 1.0, 0.0, 1, 0)) == "not installed"

@@ -19,7 +19,7 @@ from airground_drake.verify.engines.ball_arithmetic import enclose
 from airground_drake.verify.engines.smt import Result
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.model.threshold import expressions, thr_root
-from airground_drake.verify.model.threshold.constants import Constants
+from airground_drake.verify.model.threshold.constants import ThresholdRule
 from airground_drake.verify.model.threshold.thr_opt import ThrOpt
 from airground_drake.verify.model.threshold.thr_root import ThrRoot
 
@@ -78,7 +78,7 @@ def test_enclosures_contain_roots_found_by_mpmath(found: dict[str, tuple[Finding
 @settings(max_examples=40)
 @given(*[st.floats(0.05, 20.0)] * 4)
 def test_enclosure_agrees_with_the_running_code(drift: float, noise: float, c1: float, c2: float) -> None:
-    constants = Constants.of({"drift_m_s": drift, "noise_m_sqrt_s": noise, "c1_1_s": c1, "c2": c2})
+    constants = ThresholdRule.of({"drift_m_s": drift, "noise_m_sqrt_s": noise, "c1_1_s": c1, "c2": c2})
     low, high = enclose(expressions.RESIDUAL, constants.values, Fraction(0))
     assert high - low <= low / 10**12
     zeta = optimal_threshold(drift, noise, c1, c2)

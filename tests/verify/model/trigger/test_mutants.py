@@ -16,8 +16,7 @@ from verify.model.trigger.cases import KINDS, REFINE, ZENO, simulate, trigger_ti
 from airground_drake.decision.trigger import Trigger
 from airground_drake.systems.decision import EventTrigger
 from airground_drake.verify.engines.prover import discharge
-from airground_drake.verify.model.trigger import induction, mutants
-from airground_drake.verify.model.trigger import relation as automaton
+from airground_drake.verify.model.trigger import induction, mutants, relation
 
 
 @pytest.mark.parametrize("name", mutants.MUTANTS)
@@ -30,7 +29,7 @@ def test_mutants_are_refuted_by_a_run(name: str) -> None:
     t, x = [row["t_s"] for row in run], [row["x_m"] for row in run]
     mutant = KINDS[name](3.0, 2.0, 0.3) if name in KINDS else Trigger.bare(3.0)
     for trigger, broken in ((mutant, True), (Trigger(3.0, 2.0, 0.3), False)):
-        times = [row["t_s"] for row in automaton.replay(trigger, list(zip(t, x, strict=True))) if row["trigger"]]
+        times = [row["t_s"] for row in relation.replay(trigger, list(zip(t, x, strict=True))) if row["trigger"]]
         assert (min((b - a for a, b in pairwise(times)), default=math.inf) < 0.3) == broken
     if name in ("no dwell", "no refractory mode", "no hysteresis, no dwell"):
         source = TrajectorySource(PiecewisePolynomial.FirstOrderHold([*t, t[-1] + 1.0], [[*x, x[-1]]]))
@@ -41,7 +40,7 @@ def test_mutants_are_refuted_by_a_run(name: str) -> None:
 
 @pytest.mark.parametrize("name", KINDS)
 def test_mutants_have_no_symbolic_proof_either(name: str) -> None:
-    broken = automaton.relation(lambda path: KINDS[name](*map(path.symbol, ("zeta", "release", "dwell"))))
+    broken = relation.read_off(lambda path: KINDS[name](*map(path.symbol, ("zeta", "release", "dwell"))))
     failing = [each for each in induction.obligations(broken) if not each.certified()]
     assert failing
     assert "refuted" in {proof.status for proof in discharge(failing)}
