@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from airground_drake.verify.claim import Claim, ModelClaim, TraceClaim, Verdict
     from airground_drake.verify.finding import PASSING, STATUSES, Finding, Status
     from airground_drake.verify.judge import verify, verify_model
+    from airground_drake.verify.registry import UnknownClaimError
 
     MODEL_CLAIMS: tuple[ModelClaim, ...]
     TRACE_CLAIMS: tuple[TraceClaim, ...]
@@ -33,6 +34,7 @@ __all__ = [
     "ModelClaim",
     "Status",
     "TraceClaim",
+    "UnknownClaimError",
     "Verdict",
     "cache_folder",
     "verify",
@@ -40,19 +42,20 @@ __all__ = [
 ]
 
 _HOME = {
+    "UnknownClaimError": "registry",
     "cache_folder": "cache",
     "verify": "judge",
     "verify_model": "judge",
     **dict.fromkeys(("Claim", "ModelClaim", "TraceClaim", "Verdict"), "claim"),
     **dict.fromkeys(("PASSING", "STATUSES", "Finding", "Status"), "finding"),
 }
-_CLAIMS = {"MODEL_CLAIMS": "model_claims", "TRACE_CLAIMS": "run_claims"}
+_INSTANCES = {"MODEL_CLAIMS": "model_claims", "TRACE_CLAIMS": "run_claims"}
 
 
 def __getattr__(name: str) -> Any:
     """Import on first use, so that the solvers' processes load no Drake."""
-    if name in _CLAIMS:
-        return getattr(import_module(f"{__name__}.registry"), _CLAIMS[name])()
+    if name in _INSTANCES:
+        return tuple(getattr(import_module(f"{__name__}.registry"), _INSTANCES[name])())
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)

@@ -15,7 +15,8 @@ from airground_drake import trace
 from airground_drake.errors import AirgroundError
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.verify import MODEL_CLAIMS, TRACE_CLAIMS, Verdict, verify, verify_model
+from airground_drake.verify import Verdict, verify, verify_model
+from airground_drake.verify.registry import MODEL_CLAIMS, RUN_CLAIMS
 
 EXIT_DIFFERS, EXIT_USAGE = 1, 2
 
@@ -34,11 +35,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("claims", nargs="*", metavar="CLAIM", help="identifiers (default: all that apply)")
     parser.add_argument("--json", action="store_true", help="print the whole verdicts as JSON")
     options = parser.parse_args(arguments)
-    known = [claim.id for claim in (*TRACE_CLAIMS, *MODEL_CLAIMS)]
+    known = [*RUN_CLAIMS, *MODEL_CLAIMS]
     if unknown := [name for name in options.claims if name not in known]:
         parser.error(f"unknown claim {', '.join(unknown)}; claims are {', '.join(known)}")
     try:
-        verdicts = _judge(options.target, set(options.claims or known))
+        verdicts = _judge(options.target, options.claims or known)
     except (AirgroundError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return EXIT_USAGE
@@ -47,26 +48,29 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return EXIT_USAGE
     if options.json:
         print(json.dumps([verdict.to_json() for verdict in verdicts], indent=1, allow_nan=False))
-    for verdict in () if options.json else verdicts:
-        margin = (
-            "" if verdict.finding.margin is None else f", margin {verdict.finding.margin:.6g} {verdict.finding.unit}"
-        )
-        expected = "" if verdict.as_expected else f", expected {verdict.expected}"
-        print(f"{verdict.claim.id} {verdict.run}: {verdict.finding.status}{margin}{expected}".replace(" :", ":"))
+    else:
+        print("".join(f"{_line(verdict)}\n" for verdict in verdicts), end="")
     return 0 if all(verdict.as_expected for verdict in verdicts) else EXIT_DIFFERS
 
 
-def _judge(target: str, wanted: set[str]) -> list[Verdict]:
+def _line(verdict: Verdict) -> str:
+    """A verdict in one line."""
+    finding = verdict.finding
+    name = f"{verdict.claim.id} {verdict.run}" if verdict.run else verdict.claim.id
+    margin = "" if finding.margin is None else f", margin {finding.margin:.6g} {finding.unit}"
+    expected = "" if verdict.as_expected else f", expected {verdict.expected}"
+    return f"{name}: {finding.status}{margin}{expected}"
+
+
+def _judge(target: str, wanted: Sequence[str]) -> list[Verdict]:
     """Verdicts on the claims wanted, as far as they say anything about the target."""
-    verdicts: list[Verdict] = []
+    about_model = [name for name in wanted if name in MODEL_CLAIMS]
     folder = Path(target)
-    if (folder / "meta.json").is_file():
-        run = trace.load(folder)
-        verdicts += [verdict for verdict in verify(run) if verdict.claim.id in wanted]
-        scenario = _scenario_of(run)
-    else:
-        scenario = load(target)[0]
-    return verdicts + verify_model(scenario, only=wanted)
+    if not (folder / "meta.json").is_file():
+        return verify_model(load(target)[0], claims=about_model)
+    run = trace.load(folder)
+    about_run = [name for name in wanted if name in RUN_CLAIMS]
+    return verify(run, about_run) + verify_model(_scenario_of(run), claims=about_model)
 
 
 def _scenario_of(run: trace.Trace) -> Scenario:

@@ -64,10 +64,13 @@ def key(claim: ModelClaim, inputs: Mapping[str, Any]) -> str:
 
 @cache
 def _code() -> str:
-    """SHA-256 of all Python files of the package."""
-    package = Path(__file__).parent.parent
-    sources = sorted(package.rglob("*.py"))
-    return files.sha256(b"".join(files.sha256(path.read_bytes()).encode() for path in sources))
+    return code_digest(Path(__file__).parent.parent)
+
+
+def code_digest(package: Path) -> str:
+    """SHA-256 of all Python files of a package, those of its sub-packages too: where they are and what they say."""
+    digests = {str(path.relative_to(package)): files.sha256(path.read_bytes()) for path in package.rglob("*.py")}
+    return files.sha256(json.dumps(digests, sort_keys=True).encode())
 
 
 @cache

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import abc
 import json
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -13,7 +14,21 @@ from airground_drake import files
 from airground_drake.errors import TraceError
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.trace import Trace
-from airground_drake.verify.finding import PASSING, Finding, Status
+from airground_drake.verify.finding import PASSING, STATUSES, Finding, Status
+
+__all__ = [
+    "PASSING",
+    "STATUSES",
+    "Claim",
+    "Finding",
+    "ModelClaim",
+    "Mutant",
+    "Status",
+    "TraceClaim",
+    "Verdict",
+    "require_motion",
+    "require_whole_run",
+]
 
 MOTION_TOLERANCE_M = 1e-9
 """A row may differ by this from the position that its command leads to, m: floating-point integration of one
@@ -116,6 +131,21 @@ class TraceClaim(Claim):
 
 
 @dataclass(frozen=True)
+class Mutant:
+    """A broken variant of what a claim about the model is about: it must be refuted, or the claim proves nothing.
+
+    Attributes:
+        claim: identifier of the claim that must refute it.
+        says: what is broken.
+        check: decides the broken variant for the claim's inputs; 'refuted' with a counterexample is wanted.
+    """
+
+    claim: str
+    says: str
+    check: Callable[[dict[str, Any]], Finding]
+
+
+@dataclass(frozen=True)
 class Verdict:
     """A claim and what was found.
 
@@ -182,7 +212,9 @@ def require_whole_run(trace: Trace) -> None:
     Raises:
         TraceError: if they do not.
     """
-    t, duration, period = trace.t, trace.scenario["duration_s"], trace.scenario["control"]["period_s"]
+    t = trace.t
+    duration = trace.scenario["duration_s"]
+    period = trace.scenario["control"]["period_s"]
     if abs(t[0]) > TIME_TOLERANCE_S or abs(t[-1] - duration) > TIME_TOLERANCE_S:
         raise TraceError(f"the trace covers {t[0]} to {t[-1]} s of a run from 0 to {duration} s")
     gap = np.diff(t)

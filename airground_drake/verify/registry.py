@@ -5,11 +5,13 @@ Modules are imported on use.
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
 from functools import cache
 from importlib import import_module
 from typing import Any
 
-from airground_drake.verify.claim import ModelClaim, TraceClaim
+from airground_drake.errors import AirgroundError
+from airground_drake.verify.claim import ModelClaim, Mutant, TraceClaim
 
 _RUNS, _MODEL = "airground_drake.verify.runs", "airground_drake.verify.model"
 
@@ -41,18 +43,44 @@ RUN_CLAIMS: dict[str, str] = {
 """Claims that are decided from one trace: identifier to module:class."""
 
 
-def _made(entry: str) -> Any:
+MUTANTS: tuple[str, ...] = (f"{_MODEL}.avoidance.mutants", f"{_MODEL}.trigger.mutants", f"{_MODEL}.threshold.mutants")
+"""Modules with a table MUTANTS of broken variants, each of which names the claim that must refute it."""
+
+
+class UnknownClaimError(AirgroundError):
+    """An identifier that is no claim's, or not of this kind."""
+
+
+def model_claims(ids: Collection[str] | None = None) -> list[ModelClaim]:
+    """The claims about the model, or those with these identifiers.
+
+    Raises:
+        UnknownClaimError: if an identifier is not among MODEL_CLAIMS.
+    """
+    return _made(MODEL_CLAIMS, ids, "about the model")
+
+
+def run_claims(ids: Collection[str] | None = None) -> list[TraceClaim]:
+    """The claims that are decided from one trace, or those with these identifiers.
+
+    Raises:
+        UnknownClaimError: if an identifier is not among RUN_CLAIMS.
+    """
+    return _made(RUN_CLAIMS, ids, "about a run")
+
+
+def mutants() -> list[Mutant]:
+    """All broken variants."""
+    return [mutant for module in MUTANTS for mutant in import_module(module).MUTANTS]
+
+
+def _made(table: Mapping[str, str], ids: Collection[str] | None, about: str) -> list[Any]:
+    if unknown := sorted(set(ids or ()) - set(table)):
+        raise UnknownClaimError(f"unknown claim {', '.join(unknown)}; claims {about} are {', '.join(table)}")
+    return [_instance(entry) for name, entry in table.items() if ids is None or name in ids]
+
+
+@cache
+def _instance(entry: str) -> Any:
     module, _, name = entry.partition(":")
     return getattr(import_module(module), name)()
-
-
-@cache
-def model_claims() -> tuple[ModelClaim, ...]:
-    """The claims about the model."""
-    return tuple(_made(entry) for entry in MODEL_CLAIMS.values())
-
-
-@cache
-def run_claims() -> tuple[TraceClaim, ...]:
-    """The claims that are decided from one trace."""
-    return tuple(_made(entry) for entry in RUN_CLAIMS.values())

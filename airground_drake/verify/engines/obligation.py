@@ -15,7 +15,7 @@ multiplied out, so that a checker need not parse anything but sums of products.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from fractions import Fraction
 from typing import Any
@@ -84,8 +84,11 @@ class Obligation:
             difference -= self._polynomial(multiplier) * self._polynomial(self.equations[name])
         return bool(difference.is_zero)
 
-    def smt2(self) -> str:
-        """The negation in SMT-LIB 2 (QF_NRA): unsatisfiable exactly if the implication holds."""
+    def smt2(self, *, goal: bool = True) -> str:
+        """The negation in SMT-LIB 2 (QF_NRA): unsatisfiable exactly if the implication holds.
+
+        Without the goal: satisfiable exactly if its premises can be met.
+        """
         lines = [f"; {self.name}: {self.says}", "(set-logic QF_NRA)"]
         lines += [f"(declare-const {name} Real)" for name in self.variables]
         for relation, group in ((">=", self.hypotheses), (">", self.strict), ("=", self.equations)):
@@ -93,7 +96,9 @@ class Obligation:
                 f"(assert (! ({relation} {self._prefix(text)} 0.0) :named given_{name}))"
                 for name, text in group.items()
             ]
-        lines += [f"(assert (! (< {self._prefix(self.goal)} 0.0) :named negated_goal))", "(check-sat)"]
+        if goal:
+            lines.append(f"(assert (! (< {self._prefix(self.goal)} 0.0) :named negated_goal))")
+        lines.append("(check-sat)")
         return "\n".join(lines) + "\n"
 
     def to_json(self) -> dict[str, Any]:
@@ -133,11 +138,10 @@ class Obligation:
         return total
 
     def _polynomial(self, text: str) -> Any:
-        symbols = {name: sympy.Symbol(name) for name in self.variables or ("unused",)}
-        expression = sympy.parse_expr(text, local_dict=symbols, global_dict=_NUMBERS, transformations=_RATIONAL)
-        if strangers := expression.free_symbols - set(symbols.values()):
-            raise ValueError(f"{self.name}: {text!r} contains {strangers}, which are not among the variables")
-        return sympy.Poly(expression, *symbols.values(), domain="QQ")
+        try:
+            return polynomial(text, self.variables)
+        except ValueError as error:
+            raise ValueError(f"{self.name}: {error}") from error
 
     def _sum_text(self, text: str) -> str:
         """A polynomial as a sum of products of numbers and names, without powers and brackets."""
@@ -162,6 +166,19 @@ class Obligation:
 
 _NUMBERS = {"Integer": sympy.Integer, "Float": sympy.Float, "Rational": sympy.Rational, "Symbol": sympy.Symbol}
 _RATIONAL = (*sympy.parsing.sympy_parser.standard_transformations, sympy.parsing.sympy_parser.rationalize)
+
+
+def polynomial(text: str, variables: Sequence[str]) -> Any:
+    """A text as a sympy polynomial with rational coefficients.
+
+    Raises:
+        ValueError: if it is none, or in other variables.
+    """
+    symbols = {name: sympy.Symbol(name) for name in variables or ("unused",)}
+    expression = sympy.parse_expr(text, local_dict=symbols, global_dict=_NUMBERS, transformations=_RATIONAL)
+    if strangers := expression.free_symbols - set(symbols.values()):
+        raise ValueError(f"{text!r} contains {strangers}, which are not among the variables")
+    return sympy.Poly(expression, *symbols.values(), domain="QQ")
 
 
 def rational(number: float) -> str:

@@ -71,7 +71,7 @@ class Proof:
 def discharge(obligations: Sequence[Obligation], limit_s: float = LIMIT_S) -> list[Proof]:
     """Try every obligation in all ways; limit_s per solver call, s."""
     scripts = [each.smt2() for each in obligations]
-    premises = [_without_goal(script) for script in scripts]
+    premises = [each.smt2(goal=False) for each in obligations]
     z3 = solve([*scripts, *premises], "z3", limit_s)
     cvc5 = solve(scripts, "cvc5", limit_s)
     count = len(obligations)
@@ -96,7 +96,3 @@ def certificates(obligations: Sequence[Obligation]) -> dict[str, str]:
     """Files for independent checkers: all obligations with their certificates, and an SMT-LIB script for each."""
     described = json.dumps([each.to_json() for each in obligations], indent=1, ensure_ascii=False)
     return {"obligations.json": described + "\n"} | {f"{each.name}.smt2": each.smt2() for each in obligations}
-
-
-def _without_goal(script: str) -> str:
-    return "\n".join(line for line in script.splitlines() if "negated_goal" not in line) + "\n"

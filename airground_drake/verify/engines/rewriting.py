@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from dataclasses import replace
 from fractions import Fraction
 
 import sympy
 
-from airground_drake.verify.engines.obligation import Obligation, Term, rational
+from airground_drake.verify.engines.obligation import Obligation, Term, polynomial, rational
 
 
 def terms(*products: str) -> tuple[Term, ...]:
@@ -20,10 +19,10 @@ def terms(*products: str) -> tuple[Term, ...]:
 
 def with_numbers(obligation: Obligation, suffix: str, numbers: Mapping[str, float]) -> Obligation:
     """The same obligation with rational numbers in place of some variables."""
-    pattern = re.compile(r"\b(" + "|".join(numbers) + r")\b")
+    values = {sympy.Symbol(name): sympy.Rational(rational(number)) for name, number in numbers.items()}
 
     def put(text: str) -> str:
-        return pattern.sub(lambda found: f"({rational(numbers[found[0]])})", text)
+        return str(polynomial(text, obligation.variables).as_expr().subs(values))
 
     def put_all(texts: Mapping[str, str]) -> dict[str, str]:
         return {name: put(text) for name, text in texts.items()}
@@ -40,6 +39,17 @@ def with_numbers(obligation: Obligation, suffix: str, numbers: Mapping[str, floa
         certificate=tuple(replace(term, square=put(term.square)) for term in obligation.certificate),
         equation_multipliers=put_all(obligation.equation_multipliers),
     )
+
+
+def with_hypotheses(obligation: Obligation, **texts: str) -> Obligation:
+    """The obligation with other hypotheses under names that it has.
+
+    Raises:
+        KeyError: if it has none of a name.
+    """
+    if strangers := sorted(set(texts) - set(obligation.hypotheses)):
+        raise KeyError(f"{obligation.name} has no hypotheses {strangers}; it has {sorted(obligation.hypotheses)}")
+    return replace(obligation, hypotheses={**obligation.hypotheses, **texts})
 
 
 def resolved(obligation: Obligation, name: str) -> Obligation:

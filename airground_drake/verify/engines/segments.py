@@ -137,15 +137,22 @@ def _minima(t: Array, parts: Array) -> Array:
     """Interior minima of x on the intervals between t (T,), s: at most one on each, as x is convex there.
 
     With r = r0 + u w and n = n0 + u m, u in [0, 1], let p be the distance of the line from the origin and
-    s = ||w|| u + r0.w/||w||; then x' = 0 where ||w|| s / sqrt(p^2 + s^2) = -m.
+    s = ||w|| u + r0.w/||w||; then x' = 0 where ||w|| s / sqrt(p^2 + s^2) = -m. Steps w and m are first divided by a
+    power of 2 close to their size, which is exact: squares of very short ones would be 0.
     """
-    step = np.diff(parts, axis=0)
+    change = np.diff(parts, axis=0)
+    exponent = np.frexp(np.abs(change).max(axis=1))[1]
+    step = np.ldexp(change, -exponent[:, None])
     moving = np.linalg.norm(step[:, :3], axis=1) > np.abs(step[:, 3])  # otherwise x is monotone
-    start, w, m = parts[:-1][moving, :3], step[moving, :3], step[moving, 3]
+    start = parts[:-1][moving, :3]
+    w = step[moving, :3]
+    m = step[moving, 3]
     length = np.linalg.norm(w, axis=1)
     along = (start * w).sum(axis=1) / length
     across = np.linalg.norm(start - (along / length)[:, None] * w, axis=1)
-    u = (-m * across / np.sqrt(length**2 - m**2) - along) / length
-    inside = (u > 0.0) & (u < 1.0)
-    found: Array = (t[:-1][moving] + u * np.diff(t)[moving])[inside]
-    return found
+    towards = -m * across / np.sqrt(length**2 - m**2) - along
+    whole = np.ldexp(length, exponent[moving])
+    inside = (towards > 0.0) & (towards < whole)
+    u = towards[inside] / whole[inside]
+    found: Array = t[:-1][moving][inside] + u * np.diff(t)[moving][inside]
+    return found[u < 1.0]

@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from fractions import Fraction
-from typing import Any
+from typing import Any, TypeVar
 
-from airground_drake.decision.trigger import TriggerState
 from airground_drake.verify.engines.obligation import rational
 
-SYMBOLS = ("n", "k", "s", "t", "a", "l", "r", "x", "zeta", "release", "dwell")
-"""Of the relation, in the order of print: r is the automaton's time of the last release; the others as above."""
+Result = TypeVar("Result")
 
 
 class Linear:
@@ -19,7 +17,8 @@ class Linear:
 
     def __init__(self, path: Branch, parts: dict[str, Fraction]) -> None:
         """`parts`: coefficient by symbol, the constant under ''."""
-        self.path, self.parts = path, {name: value for name, value in parts.items() if value}
+        self.path = path
+        self.parts = {name: value for name, value in parts.items() if value}
 
     def __add__(self, other: Linear | float) -> Linear:
         theirs = other.parts if isinstance(other, Linear) else {"": Fraction(rational(other))}
@@ -47,7 +46,7 @@ class Linear:
         return not self >= other
 
     def __bool__(self) -> bool:
-        if not set(self.parts) <= {"n", ""}:
+        if not set(self.parts) <= {*self.path.counts, ""}:
             raise TypeError(
                 f"whether {self} is 0 cannot be asked: only counts, which are not negative, have truth values"
             )
@@ -60,14 +59,15 @@ class Linear:
 
     def __str__(self) -> str:
         text = ""
-        for name in (*SYMBOLS, ""):
+        order = [name for name in self.path.order if name in self.parts]
+        for name in (*order, *(name for name in self.parts if name and name not in order), ""):
             if value := self.parts.get(name):
                 size = name if name and abs(value) == 1 else "*".join(filter(None, (str(abs(value)), name)))
                 text += f" {'-' if value < 0 else '+'} {size}" if text else f"{'-' if value < 0 else ''}{size}"
         return text or "0"
 
     def smt(self, sort: str = "Real") -> str:
-        """As an SMT-LIB term; n and k are integers, all other symbols real."""
+        """As an SMT-LIB term of this sort."""
 
         def number(value: Fraction) -> str:
             size = str(abs(value)) if sort == "Int" else f"(/ {abs(value.numerator)}.0 {value.denominator}.0)"
@@ -85,11 +85,21 @@ class Linear:
 
 
 class Branch:
-    """One way through a function of symbols: the outcomes of its comparisons, `guards` that make them so."""
+    """One way through a function of symbols: the outcomes of its comparisons, `guards` that make them so.
 
-    def __init__(self, outcomes: Sequence[bool]) -> None:
+    Attributes:
+        outcomes: of the comparisons so far.
+        guards: forms that are >= 0, or > 0 if marked so, on this branch.
+        order: of symbols in print; others follow.
+        counts: symbols that are never negative, so that they have truth values.
+    """
+
+    def __init__(self, outcomes: Sequence[bool] = (), order: Sequence[str] = (), counts: Sequence[str] = ()) -> None:
         """Comparisons beyond `outcomes` come out true."""
-        self.outcomes, self.guards = list(outcomes), list[tuple[Linear, bool]]()
+        self.outcomes = list(outcomes)
+        self.guards: list[tuple[Linear, bool]] = []
+        self.order = order
+        self.counts = counts
 
     def decide(self, form: Linear) -> bool:
         """Whether form >= 0 on this path; its guard is (form, strict?)."""
@@ -107,14 +117,16 @@ class Branch:
         return Linear(self, {name: Fraction(1)})
 
 
-def paths(function: Callable[[Branch], TriggerState]) -> list[tuple[Branch, TriggerState]]:
+def branches(
+    function: Callable[[Branch], Result], order: Sequence[str] = (), counts: Sequence[str] = ()
+) -> list[tuple[Branch, Result]]:
     """All ways through a function; those that end in a ValueError (refused parameters) lead nowhere."""
-    found: list[tuple[Branch, TriggerState]] = []
+    found: list[tuple[Branch, Result]] = []
     todo: list[list[bool]] = [[]]
     while todo:
         given = todo.pop()
-        path = Branch(given)
+        branch = Branch(given, order, counts)
         with suppress(ValueError):
-            found.append((path, function(path)))
-        todo += [[*path.outcomes[:i], False] for i in range(len(given), len(path.outcomes))]
+            found.append((branch, function(branch)))
+        todo += [[*branch.outcomes[:i], False] for i in range(len(given), len(branch.outcomes))]
     return found

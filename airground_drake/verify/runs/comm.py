@@ -49,7 +49,8 @@ class Comm(TraceClaim):
     def check(self, trace: Trace) -> Finding:
         """Count, look for strays, compare with always-on; the margin is the fraction saved of what saves least."""
         scenario = trace.scenario
-        planning, gating = scenario["intervention"]["period_s"], scenario["gatekeeper"]["period_s"]
+        planning = scenario["intervention"]["period_s"]
+        gating = scenario["gatekeeper"]["period_s"]
         gated = trace.meta["method"] in GATED_METHODS
         named = {e["robot"] for e in trace.events if e["kind"] == "proposal"} | set(trace.decisions["robot"])
         if strangers := named - set(trace.ugvs):
@@ -103,6 +104,7 @@ def _decisions(trace: Trace, ugv: str, column: str) -> Array:
 
 def _outside(times: Array, intervals: Array, allowance: float) -> npt.NDArray[np.bool_]:
     """Which of the times (M,) are in none of the intervals (K, 2) extended by the allowance: (M,) bool."""
-    begins, ends = intervals[:, 0] - TIME_TOLERANCE_S, intervals[:, 1] + allowance + TIME_TOLERANCE_S
+    begins = intervals[:, 0] - TIME_TOLERANCE_S
+    ends = intervals[:, 1] + allowance + TIME_TOLERANCE_S
     inside = (times[:, None] >= begins) & (times[:, None] <= ends)
     return np.asarray(~inside.any(axis=1))

@@ -35,7 +35,10 @@ def enclose(rows: Sequence[Row]) -> list[Enclosure]:
     shares, multipliers = _solve(rows)
     found = []
     for row, omega, solved in zip(rows, shares, multipliers, strict=True):
-        dt, error, slack, normals = row.dt, row.error_weight, row.slack_weight, row["normals"]
+        dt = row.dt
+        error = row.error_weight
+        slack = row.slack_weight
+        normals = row["normals"]
         multiplier = solved * row.scale if slack > 0.0 else 0.0 * solved
         positions = row.positions(omega)
         away = positions - row["reference_m"]
@@ -71,13 +74,16 @@ def _solve(rows: Sequence[Row]) -> tuple[list[Array], list[Array]]:
     steering = sparse.bsr_matrix((change[:, :, None], np.arange(total), np.arange(total + 1))).tocsr()
     points = [len(row["distances_m"]) for row in rows]
     at = np.repeat(np.arange(total), np.repeat(points, stages))  # inequality by inequality, its stage
-    count, normals = len(at), np.concatenate([row["normals"].reshape(-1, 1, 3) for row in rows])
+    count = len(at)
+    normals = np.concatenate([row["normals"].reshape(-1, 1, 3) for row in rows])
     facing = sparse.bsr_matrix((normals, at, np.arange(count + 1)), shape=(count, 3 * total)).tocsr()
     picks = sparse.csr_matrix((np.ones(count), at, np.arange(count + 1)), shape=(count, total))
     least = np.concatenate([-row.gaps(row["reference_m"], row["normals"]).ravel() for row in rows])
     weights = [(row.dt * row.error_weight / row.scale, row.dt * row.slack_weight / row.scale) for row in rows]
     of_error, of_slack = np.sqrt(weights).T
-    e, omega, u = cp.Variable(3 * total), cp.Variable(total), cp.Variable(total)
+    e = cp.Variable(3 * total)
+    omega = cp.Variable(total)
+    u = cp.Variable(total)
     constraints = [dynamics @ e - steering @ omega == drift.ravel(), omega >= 0.0, omega <= 1.0, u >= 0.0]
     constraints += [facing @ e + picks @ u >= least] if count else []
     error = cp.sum_squares(cp.multiply(np.repeat(of_error, 3 * stages), e))

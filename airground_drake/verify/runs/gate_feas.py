@@ -85,7 +85,9 @@ class GateFeas(GateClaim):
 
 def compare_situation(trace: Trace, row: Row) -> Iterator[Off]:
     """The data of (26) against the scenario and the signals at the time of the decision."""
-    gate, t, robot = trace.scenario["gatekeeper"], float(row.given["t_s"]), str(row.given["robot"])
+    gate = trace.scenario["gatekeeper"]
+    t = float(row.given["t_s"])
+    robot = str(row.given["robot"])
     preset = trace.scenario["ugvs"][robot]["preset"]
     after = gate["horizon_s"] / gate["stages"] * np.arange(1.0, gate["stages"] + 1.0)
     yield Off(row, "length of a stage, s", row.dt - after[0], TIME_TOLERANCE_S)
@@ -136,16 +138,20 @@ def _sensed(trace: Trace, robot: str, t: float, own: Array, after: Array) -> lis
 
 def compare_plan(trace: Trace, row: Row) -> Iterator[Off]:
     """(26b)-(26e), (25) and what was recorded about the plan."""
-    limit, period = trace.scenario["ugvs"][row.given["robot"]]["max_speed_m_s"], trace.scenario["control"]["period_s"]
+    limit = trace.scenario["ugvs"][row.given["robot"]]["max_speed_m_s"]
+    period = trace.scenario["control"]["period_s"]
     trajectories = dict(zip(("refusing throughout", "accepting throughout"), row.constant, strict=True))
     if row.planned:
-        plan, positions, given = row["plan"], row["positions_m"], row.given
+        plan = row["plan"]
+        positions = row["positions_m"]
+        given = row.given
         yield Off(row, "omega is not binary", np.minimum(np.abs(plan), np.abs(plan - 1.0)), 0.0)
         same = np.logical_and.accumulate(plan == plan[0]) | (given["route"] != "rollout")
         away = positions - row.positions(plan)
         yield Off(row, "positions are not those of (23), m", away[same], POSITION_TOLERANCE_M)
         trajectories["the plan"] = positions
-        cost, clearance = float(row.cost(positions)), min(float(row.clearance(positions).min()), 1e9)
+        cost = float(row.cost(positions))
+        clearance = min(float(row.clearance(positions).min()), 1e9)
         first = "accept" if plan[0] == 1.0 else "refuse"
         tolerance = cost_tolerance(cost)
         yield Off(row, "objective", given["objective"] - cost, tolerance, recomputed=cost, recorded=given["objective"])
@@ -182,7 +188,9 @@ def compare_answers(trace: Trace, rows: Sequence[Row]) -> Iterator[Off]:
         last: Row | None = None
         since = 0.0
         for row in (row for row in rows if row.given["robot"] == ugv):
-            given, t, period = row.given, float(row.given["t_s"]), gate["period_s"]
+            given = row.given
+            t = float(row.given["t_s"])
+            period = gate["period_s"]
             if last is not None and last.given["issued_s"] != given["issued_s"]:
                 last = None
             standing = None if last is None else str(last.given["decision"])
@@ -191,7 +199,8 @@ def compare_answers(trace: Trace, rows: Sequence[Row]) -> Iterator[Off]:
             yield Off(row, "a decision is missing before this one, s", max(0.0, t - late), TIME_TOLERANCE_S)
             yield Off(row, "a decision too many, s", max(0.0, early - t), TIME_TOLERANCE_S)
             accept, reason = rule(row, standing, t - since, gate)
-            ours, theirs = ("accept" if accept else "refuse", reason), (given["decision"], given["reason"])
+            ours = ("accept" if accept else "refuse", reason)
+            theirs = (given["decision"], given["reason"])
             yield Off(row, "answer or reason", float(ours != theirs), 0.0, recomputed=list(ours), standing=standing)
             since = since if given["decision"] == standing else t
             last = row
@@ -227,7 +236,8 @@ def rule(row: Row, standing: str | None, stood: float, gate: dict[str, Any]) -> 
 
 def compare_obedience(trace: Trace, rows: Sequence[Row]) -> Iterator[Off]:
     """Interventions executed, by the signals, without an acceptance in force."""
-    control, gate = trace.scenario["control"]["period_s"], trace.scenario["gatekeeper"]["period_s"]
+    control = trace.scenario["control"]["period_s"]
+    gate = trace.scenario["gatekeeper"]["period_s"]
     # a row has what the last control sample before it has set, by the answer given up to then
     sample = control * (np.ceil(trace.t / control - 1e-6) - 1.0)
     for ugv in trace.ugvs:
@@ -250,7 +260,8 @@ def compare_own_task(trace: Trace, rows: Sequence[Row]) -> Iterator[Off]:
     at = {name: place if place.ndim == 1 else place[samples] for name, place in places.items()}
     for ugv in trace.ugvs:
         own = trace.scenario["ugvs"][ugv]
-        waypoints, speed = np.asarray(own["preset"]["waypoints_m"], dtype=np.float64), own["preset"]["speed_m_s"]
+        waypoints = np.asarray(own["preset"]["waypoints_m"], dtype=np.float64)
+        speed = own["preset"]["speed_m_s"]
         here = travelled(waypoints, speed, t)
         wanted = (travelled(waypoints, speed, t + step) - here) / step + control["motion_gain_1_s"] * (here - at[ugv])
         wanted[:, 2] = 0.0

@@ -77,7 +77,8 @@ class GateOpt(GateClaim):
 
     def judge_rows(self, trace: Trace, rows: list[Row]) -> Finding:
         """Enclose every optimum; the margin is what is left of the largest gap allowed."""
-        route, planned = trace.scenario["gatekeeper"]["route"], [row for row in rows if row.planned]
+        route = trace.scenario["gatekeeper"]["route"]
+        planned = [row for row in rows if row.planned]
         halfplanes, dwelling = route in HALF_PLANE_ROUTES, route in DWELL_ROUTES
         lacking = [row for row in planned if halfplanes and row.data["normals"] is None]
         if cut := [row for row in lacking if row.given["status"] == "optimal"]:
@@ -89,7 +90,9 @@ class GateOpt(GateClaim):
         bounded = [row for row in planned if row not in lacking]
         lines = [row["normals"] if halfplanes else None for row in bounded]
         found = [cheapest_of_blocks(*one) for one in zip(bounded, lines, strict=True)] if dwelling else enclose(bounded)
-        gaps, widths, certified = [], [], 0
+        gaps = []
+        widths = []
+        certified = 0
         open_gaps: list[str] = []
         for row, normals, one in zip(bounded, lines, found, strict=True):
             gap = (float(row.cost(row["positions_m"])) - one.lower) / row.scale
@@ -137,7 +140,9 @@ def compare_with_constant_plans(row: Row) -> Iterator[Off]:
 
 def compare_bounds(row: Row, found: Enclosure, normals: Array | None) -> Iterator[Off]:
     """The recorded normals, lower bound and gap."""
-    given, bound, scale = row.given, float(row.given["lower_bound"]), row.scale
+    given = row.given
+    bound = float(row.given["lower_bound"])
+    scale = row.scale
     own = float(row.cost(row["positions_m"], normals))
     known = [*row.constant, *([row.positions(row["rounded"])] if row.data["rounded"] is not None else [])]
     # the losing choice's plan is not recorded, but along normals it costs no less than by exact distances

@@ -145,7 +145,10 @@ class Off:
 
     def __init__(self, row: Row, what: str, by: Any, allowed: float, **more: Any) -> None:
         """`by`: absolute differences, any shape, of which the largest counts; `more` goes into a counterexample."""
-        self.row, self.what, self.allowed, self.more = row, what, allowed, more
+        self.row = row
+        self.what = what
+        self.allowed = allowed
+        self.more = more
         self.off = float(np.max(np.abs(by), initial=0.0))
 
     @property

@@ -73,7 +73,9 @@ def _deviation(row: Row) -> float:
 
 def compare_rounding(row: Row) -> Iterator[Off]:
     """(28)-(29) and what was recorded about it."""
-    relaxed, rounded, given = row["relaxed"], row["rounded"], row.given
+    relaxed = row["relaxed"]
+    rounded = row["rounded"]
+    given = row.given
     yield Off(row, "relaxed omega is outside [0, 1]", np.maximum(0.0, np.abs(relaxed - 0.5) - 0.5), 0.0)
     yield Off(row, "rounded omega is not binary", np.minimum(np.abs(rounded), np.abs(rounded - 1.0)), 0.0)
     deficit = np.cumsum(relaxed) - np.concatenate([[0.0], np.cumsum(rounded)[:-1]])

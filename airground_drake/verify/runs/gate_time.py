@@ -36,7 +36,8 @@ class GateTime(TraceClaim):
     def check(self, trace: Trace) -> Finding:
         """Compare p99 with the period; without measurements there is no verdict."""
         times = np.asarray(trace.timings.get("decision_times_s", []), dtype=np.float64)
-        period, decisions = float(trace.scenario["gatekeeper"]["period_s"]), len(trace.decisions)
+        period = float(trace.scenario["gatekeeper"]["period_s"])
+        decisions = len(trace.decisions)
         if not decisions and not any(talk_is_due(trace, ugv) for ugv in trace.ugvs):
             return Finding("holds", evidence={"count": 0, "reason": "no UGV was intervened on: nothing to decide"})
         if not decisions or not times.size:

@@ -40,7 +40,9 @@ def places_of(trace: Trace) -> dict[str, Array]:
 
 def snapshot(trace: Trace, names: Iterable[str], t_s: float) -> dict[str, Any]:
     """Positions at a time, and velocities of the robots just after it, of those of `names` that are things."""
-    t, places, wanted = trace.t, places_of(trace), set(names)
+    t = trace.t
+    places = places_of(trace)
+    wanted = set(names)
     row = min(int(np.searchsorted(t, t_s + MERGE_S)), len(t) - 1)
     fixed = {name: place.tolist() for name, place in places.items() if name in wanted and place.ndim == 1}
     moving = wanted.intersection(trace.robots)

@@ -99,7 +99,9 @@ class SafeHyp(TraceClaim):
 def _static(trace: Trace) -> Iterator[_Hypothesis]:
     """Hypotheses on the scenario and the start: gain, sensing range, distances at t = 0."""
     control, places = trace.scenario["control"], places_of(trace)
-    start, period, limits = trace.t[:1], control["period_s"], _speed_limits(trace)
+    start = trace.t[:1]
+    period = control["period_s"]
+    limits = _speed_limits(trace)
     stable = np.array([1.0 - control["avoidance_gain_1_s"] * period])
     yield _Hypothesis("gain: A h <= 1", "1", start, stable, 1e-12, {})
     for pair in pairs_of(trace):
@@ -113,7 +115,9 @@ def _static(trace: Trace) -> Iterator[_Hypothesis]:
 
 def _sampled(trace: Trace) -> Iterator[_Hypothesis]:
     """Hypotheses at the control samples: their spacing, the hold between them, limits and inequalities."""
-    control, limits, t = trace.scenario["control"], _speed_limits(trace), trace.t
+    control = trace.scenario["control"]
+    limits = _speed_limits(trace)
+    t = trace.t
     samples = control_samples(t, control["period_s"])
     chosen = np.searchsorted(t, t[samples] + MERGE_S)  # the velocity chosen at a sample is the next row's command
     spacing = np.diff(np.append(t[samples], t[-1]))

@@ -83,7 +83,8 @@ class ThrTrig(TraceClaim):
         lags: list[tuple[float, str]] = []
         for ugv in trace.ugvs:
             x = decision_variable(trace, ugv)
-            predicted, recorded = list(transitions(x, zeta, release, dwell)), recorded_events(trace, ugv)
+            predicted = list(transitions(x, zeta, release, dwell))
+            recorded = recorded_events(trace, ugv)
             expected = [(time, EVENT_KINDS[kind]) for time, kind in predicted if kind in EVENT_KINDS]
             lag, mismatch = _compare(expected, recorded, x)
             found = (mismatch, column_conflict(trace, ugv, recorded), _signal_conflict(trace, ugv, x, predicted))
@@ -125,8 +126,11 @@ def _compare(expected: list[Transition], recorded: list[Transition], x: NormSign
 
 def _signal_conflict(trace: Trace, ugv: str, x: NormSignal, predicted: list[Transition]) -> Conflict | None:
     """First row at which the recorded decision variable or mode is not the recomputed one."""
-    t, mode, value = trace.t, trace.column(f"{ugv}.mode"), x.at(trace.t)
-    times, modes = np.array([time for time, _ in predicted]), np.array([0, *(MODES[kind] for _, kind in predicted)])
+    t = trace.t
+    mode = trace.column(f"{ugv}.mode")
+    value = x.at(trace.t)
+    times = np.array([time for time, _ in predicted])
+    modes = np.array([0, *(MODES[kind] for _, kind in predicted)])
     sides = [modes[np.searchsorted(times, t + shift)] for shift in (-EVENT_TOLERANCE_S, EVENT_TOLERANCE_S)]
     off = np.abs(trace.column(f"{ugv}.decision_variable_m") - value)
     wrong = (off > VARIABLE_TOLERANCE_M) | ((mode != sides[0]) & (mode != sides[1]))

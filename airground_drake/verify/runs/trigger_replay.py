@@ -18,7 +18,8 @@ from airground_drake.verify.runs.trigger_record import Transition
 def decision_variable(trace: Trace, ugv: str) -> NormSignal:
     """x(t) of (15) from positions and noise of the trace and the preset of its scenario, not the recorded one."""
     rows, preset = trace.t, trace.scenario["ugvs"][ugv]["preset"]
-    waypoints, speed = np.asarray(preset["waypoints_m"], dtype=np.float64), preset["speed_m_s"]
+    waypoints = np.asarray(preset["waypoints_m"], dtype=np.float64)
+    speed = preset["speed_m_s"]
     corners = corner_times(waypoints, speed)
     t = np.union1d(rows, corners[(corners > rows[0]) & (corners < rows[-1])])
     parts = interpolate(rows, np.column_stack([trace.position(ugv), trace.column(f"{ugv}.noise_m")]), t)

@@ -60,7 +60,9 @@ def clearance(trace: Trace) -> Signals:
     that of a point from a line, by the cross product.
     """
     t = trace.t
-    at_rows, between, instant = np.full(len(t), NEVER), np.full(len(t) - 1, NEVER), t[:-1].copy()
+    at_rows = np.full(len(t), NEVER)
+    between = np.full(len(t) - 1, NEVER)
+    instant = t[:-1].copy()
     for _, _, offset, safe, _ in _pairs(trace):
         at_rows = np.minimum(at_rows, np.sqrt((offset**2).sum(axis=1)) - safe)
         step = offset[1:] - offset[:-1]
@@ -73,7 +75,8 @@ def clearance(trace: Trace) -> Signals:
         between[k] = margin
         instant[k] = t[k] + (t[k + 1] - t[k]) * (rates[0][k] / (rates[0][k] - rates[1][k]))
     inner = between < NEVER
-    times, values = np.concatenate([t, instant[inner]]), np.concatenate([at_rows, between[inner]])
+    times = np.concatenate([t, instant[inner]])
+    values = np.concatenate([at_rows, between[inner]])
     order = np.argsort(times, kind="stable")
     return Signals({}, [{"margin_m": (times[order], values[order])}])
 
@@ -124,18 +127,23 @@ def motion(trace: Trace) -> Signals:
 
 def levels(trace: Trace) -> Signals:
     """x at the rows from recorded reference, position and noise; modes on both sides of a row; time since trigger."""
-    decision, zeta, t = trace.scenario["decision"], float(trace.meta["zeta_m"]), trace.t
+    decision = trace.scenario["decision"]
+    zeta = float(trace.meta["zeta_m"])
+    t = trace.t
     bare = decision["trigger"] == "bare"
     release, dwell = (zeta, 0.0) if bare else (decision["release_m"], decision["min_inter_event_s"])
     sets, rate = [], 0.0
     for ugv in trace.ugvs:
-        noise, mode, spec = trace.column(f"{ugv}.noise_m"), trace.column(f"{ugv}.mode"), trace.scenario["ugvs"][ugv]
+        noise = trace.column(f"{ugv}.noise_m")
+        mode = trace.column(f"{ugv}.mode")
+        spec = trace.scenario["ugvs"][ugv]
         gap = np.diff(t)
         slope = np.abs(np.diff(noise))[gap >= TIME_TOLERANCE_S] / gap[gap >= TIME_TOLERANCE_S]
         rate = max(rate, spec["max_speed_m_s"] + spec["preset"]["speed_m_s"] + float(slope.max()))
         x = np.linalg.norm(trace.reference(ugv) - trace.position(ugv), axis=1) + noise
         last = trace.column(f"{ugv}.triggered_at_s")
-        before, since = np.append(2.0, mode[1:-1]), np.where(last >= 0.0, t - last, NEVER)
+        before = np.append(2.0, mode[1:-1])
+        since = np.where(last >= 0.0, t - last, NEVER)
         values = {"x_m": x[:-1], "before": before, "after": mode[1:], "since_s": since[:-1]}
         sets.append({name: (t[:-1], value) for name, value in values.items()})
     slop = EVENT_TOLERANCE_S * rate + VARIABLE_TOLERANCE_M
@@ -164,7 +172,8 @@ def _times(trace: Trace, ugv: str, kind: str) -> list[float]:
 
 def triggers(trace: Trace) -> Signals | None:
     """Per UGV a pulse at each trigger, and the number of triggers in it."""
-    bound, end = float(trace.scenario["decision"]["min_inter_event_s"]), float(trace.t[-1]) + 1.0
+    bound = float(trace.scenario["decision"]["min_inter_event_s"])
+    end = float(trace.t[-1]) + 1.0
     if bound <= 0.0:
         return None
     sets: list[dict[str, Samples]] = []
@@ -180,7 +189,9 @@ def messages(trace: Trace) -> Signals | None:
     """Per UGV a pulse at each proposal and decision, and when the events say that it was intervened on."""
     if trace.meta["method"] == "a":
         return None
-    end, scenario, table = float(trace.t[-1]), trace.scenario, trace.decisions
+    end = float(trace.t[-1])
+    scenario = trace.scenario
+    table = trace.decisions
     sets: list[dict[str, Samples]] = []
     for ugv in trace.ugvs:
         sent = [*_times(trace, ugv, "proposal"), *table.loc[table["robot"] == ugv, "t_s"].tolist()]
@@ -196,7 +207,9 @@ def counts(trace: Trace) -> Signals | None:
     """Messages so far."""
     if trace.meta["method"] == "a":
         return None
-    scenario, n, end = trace.scenario, len(trace.ugvs), trace.scenario["duration_s"] + TIME_TOLERANCE_S
+    scenario = trace.scenario
+    n = len(trace.ugvs)
+    end = trace.scenario["duration_s"] + TIME_TOLERANCE_S
     gated = trace.meta["method"] in GATED_METHODS
     sent = {
         "proposals": np.sort([t for ugv in trace.ugvs for t in _times(trace, ugv, "proposal")]),
@@ -214,7 +227,8 @@ def counts(trace: Trace) -> Signals | None:
 def goal(trace: Trace) -> Signals:
     """Least margin of what a robot must be near to or away from, and of standing still in the last second."""
     scenario, t = trace.scenario, trace.t
-    stalls, arrival = scenario["runs"][trace.run]["stalls_m"], scenario["arrival_tolerance_m"]
+    stalls = scenario["runs"][trace.run]["stalls_m"]
+    arrival = scenario["arrival_tolerance_m"]
     place = {robot: trace.position(robot) for robot in trace.robots}
     goal, rest = np.full(len(t), NEVER), np.full(len(t), NEVER)
     uav = scenario["uav"]

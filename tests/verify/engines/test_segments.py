@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
@@ -52,6 +52,7 @@ def test_travelled_holds_its_last_point() -> None:
 
 @settings(max_examples=100, deadline=None)
 @given(arrays(np.float64, (4, 4), elements=st.floats(-2.0, 2.0, allow_subnormal=False)), st.floats(-1.0, 3.0))
+@example(np.array([[0.0] * 4, [2.4e-161, 0.0, 0.0, 0.0], [0.0] * 4, [0.0] * 4]), 0.0)  # squares are 0
 def test_norm_signal_against_sampling(parts: np.ndarray, level: float) -> None:
     t = np.array([0.0, 0.3, 1.0, 1.2])
     x = NormSignal.of(t, parts)

@@ -43,7 +43,8 @@ def conformance(inputs: Inputs, encoded: Relation = relation) -> dict[str, Any]:
         Evidence; `agrees` is the verdict, and ratios are differences over what rounding may do.
     """
     rng, count = np.random.default_rng(SEED), POINTS
-    avoidance, kind = running_avoidance(inputs), [(k.safe, k.share) for k in kinds(inputs)]
+    avoidance = running_avoidance(inputs)
+    kind = [(k.safe, k.share) for k in kinds(inputs)]
     safe, share = np.array(kind)[rng.integers(len(kind), size=count)].T
     factor = rng.choice([0.0, 1e-15, 1e-9, 1.0], count) * rng.uniform(-1.0, 1.0, count)
     reach = np.where(rng.random(count) < 0.1, 2.0 * avoidance.sensing_range, safe * (1.0 + 0.9 * factor))
@@ -52,12 +53,16 @@ def conformance(inputs: Inputs, encoded: Relation = relation) -> dict[str, Any]:
     mobility = np.array([1.0, 1.0, 0.0])
     spaces = avoidance.half_spaces(position[None], mobility[None], around)
     h, gain = Fraction(rational(avoidance.period)), Fraction(rational(avoidance.gain))
-    u, steep, unseen = Fraction(ROUNDOFF), max(gain, 1 / h), 0
+    u = Fraction(ROUNDOFF)
+    steep = max(gain, 1 / h)
+    unseen = 0
     worst = {"bound": 0.0, "normal": 0.0}
     first: dict[str, Any] | None = None
     for k in range(count):
         x = [Fraction(float(a)) - Fraction(float(b)) for a, b in zip(position, around.centre[0, k], strict=True)]
-        D, d, part = root(sum((c * c for c in x), Fraction(0))), Fraction(float(safe[k])), Fraction(float(share[k]))
+        D = root(sum((c * c for c in x), Fraction(0)))
+        d = Fraction(float(safe[k]))
+        part = Fraction(float(share[k]))
         bound, normal = float(spaces.bound[0, k]), spaces.normal[0, k]
         off = [abs(Fraction(float(normal[a])) * D / x[a] - int(mobility[a])) for a in range(3)]
         worst["normal"] = max(worst["normal"], float(max(off) / (6 * u)))
@@ -99,7 +104,9 @@ def rounding_margins(inputs: Inputs) -> Inputs:
     not restored: then only (loss of a step) * (number of steps) would be certain while v = 0 is kept.
     """
     found = {}
-    h, extent, duration = inputs["period_s"], inputs["extent_m"], inputs["duration_s"]
+    h = inputs["period_s"]
+    extent = inputs["extent_m"]
+    duration = inputs["duration_s"]
     for kind in kinds(inputs):
         kernel = float(loss_of_inequality(max(inputs["sensing_range_m"], kind.safe), kind.closing, h))
         moves = 2.0 * np.sqrt(3.0) * STEPS_PER_PERIOD * (extent + kind.closing * h) * ROUNDOFF

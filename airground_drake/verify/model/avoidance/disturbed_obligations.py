@@ -14,7 +14,8 @@ def disturbed() -> list[Obligation]:
     """One disturbed control period, symbolic in A, h, d and W; goals about d - W/A are multiplied by A."""
     h, free = {"h": "h"}, {"A": "A", "W": "W", "stable": "1 - A*h"}
     inside = {**S, **REST, **free, **DEFICIT, "bounded": "A*(D - d) + W"}
-    of, pair = ("D", "r", "s", "d", "h", "A", "W"), ("D", "ri", "rj", "s", "d", "h", "A", "W")
+    of = ("D", "r", "s", "d", "h", "A", "W")
+    pair = ("D", "ri", "rj", "s", "d", "h", "A", "W")
     goal, pair_goal = "A*(D + s*r - s*W - d) + W", "A*(D + s*(ri + rj) - s*W - d) + W"
     outside = {**S, **REST, **EXCESS}
     kept = terms("stable bounded", "A rest bounded")
@@ -87,7 +88,9 @@ def disturbed() -> list[Obligation]:
 
 def disturbed_with_scenario(inputs: Inputs) -> list[Obligation]:
     """The invariance of d - W/A again, for each kind of pair, with the scenario's numbers."""
-    gain, period, found = inputs["avoidance_gain_1_s"], inputs["period_s"], []
+    gain = inputs["avoidance_gain_1_s"]
+    period = inputs["period_s"]
+    found = []
     names = {each.name: each for each in disturbed()}
     for kind in kinds(inputs):
         push = pushed(inputs, kind.share)

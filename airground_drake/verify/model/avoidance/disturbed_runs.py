@@ -37,7 +37,9 @@ def scenes(inputs: Inputs) -> list[SafeStart]:
     In `squeezed` a UGV has no room between another and an obstacle: there the inequalities contradict each other.
     """
     team, far = running_team(inputs, ugvs=2), np.array([0.0, 0.0, 1e3])
-    d, dd, low = team.obstacle_distance, team.ugv_distance, team.air_ground_distance
+    d = team.obstacle_distance
+    dd = team.ugv_distance
+    low = team.air_ground_distance
     first = replace(team, ugvs=team.ugvs[:1], max_speed=team.max_speed[[0, -1]])
     turn = np.deg2rad([90.0, 210.0, 330.0])
     triangle = d * np.column_stack([np.cos(turn), np.sin(turn), np.zeros(3)])
@@ -90,13 +92,24 @@ def attack(
         `broken`, those that did so although all their own inequalities had been met.
     """
     rng = np.random.default_rng([SEED, ATTACKS.index(how)])
-    team, positions, avoidance = scene.team, scene.positions.copy(), running_avoidance(inputs)
-    neighbourhood, mobility, n = team.neighbourhood(slice(None)), team.mobility, len(team.robots)
-    m, w, h, rows = len(team.obstacles), inputs["disturbance_m_s"], avoidance.period, np.arange(n)
+    team = scene.team
+    positions = scene.positions.copy()
+    avoidance = running_avoidance(inputs)
+    neighbourhood = team.neighbourhood(slice(None))
+    mobility = team.mobility
+    n = len(team.robots)
+    m = len(team.obstacles)
+    w = inputs["disturbance_m_s"]
+    h = avoidance.period
+    rows = np.arange(n)
     added = np.where(neighbourhood.share < 1.0, pairs, 1.0) * w
     bound = neighbourhood.distance - added / avoidance.gain
     met = np.ones(bound.shape, dtype=bool)  # all inequalities of this pair so far
-    worst, unmet, shortfall, broke, uncovered = np.inf, 0, 0.0, 0, 0
+    worst = np.inf
+    unmet = 0
+    shortfall = 0.0
+    broke = 0
+    uncovered = 0
     where: dict[str, Any] = {}
     target = rng.integers(bound.shape[1], size=n)
     for k in range(STEPS):
@@ -113,7 +126,8 @@ def attack(
         spaces = edit(avoidance.half_spaces(positions, mobility, around))
         velocity = avoidance.apply(limit_speed(wanted, team.max_speed), spaces)
         short = np.where(np.isfinite(spaces.bound), spaces.bound - rates(spaces.normal, velocity), -np.inf)
-        unmet, shortfall = unmet + int((short > TOLERANCE).sum()), max(shortfall, float(short.max()))
+        unmet = unmet + int((short > TOLERANCE).sum())
+        shortfall = max(shortfall, float(short.max()))
         met &= short <= TOLERANCE
         moved = velocity + force * w * push * mobility
         others = np.zeros(x.shape)
@@ -124,7 +138,8 @@ def attack(
             for j, other in enumerate(neighbourhood.others[i]):
                 both[i, m + j] &= met[other, m + int(np.flatnonzero(neighbourhood.others[other] == i)[0])]
         below = least < bound - TOLERANCE
-        broke, uncovered = broke + int((below & both).sum()), uncovered + int((below & ~both).sum())
+        broke = broke + int((below & both).sum())
+        uncovered = uncovered + int((below & ~both).sum())
         i, j = divmod(int(np.argmin(least - bound)), bound.shape[1])
         if least[i, j] - bound[i, j] < worst:
             worst = float(least[i, j] - bound[i, j])

@@ -35,7 +35,8 @@ class States:
 def safe_states(inputs: Inputs, count: int, most: int = 12) -> States:
     """Deterministic states with 1 to `most` points, many at exactly the safe distance; velocities up to 1e6 m/s."""
     rng = np.random.default_rng(SEED)
-    avoidance, kind = running_avoidance(inputs), np.array([(k.safe, k.share) for k in kinds(inputs)])
+    avoidance = running_avoidance(inputs)
+    kind = np.array([(k.safe, k.share) for k in kinds(inputs)])
     safe, share = np.moveaxis(kind[rng.integers(len(kind), size=(count, most))], -1, 0)
     position = rng.uniform(-20.0, 20.0, (count, 3))
     mobility = np.where(rng.random((count, 1)) < 0.5, [1.0, 1.0, 0.0], 1.0)
@@ -64,7 +65,8 @@ def postcondition(
         Evidence: `met`, the worst slack, m/s, the worst loss of distance to points at rest over what rounding may
         cost (at most 1), the largest gain in speed, and the first state where an inequality was missed.
     """
-    states, avoidance = safe_states(inputs, count), running_avoidance(inputs, composition)
+    states = safe_states(inputs, count)
+    avoidance = running_avoidance(inputs, composition)
     spaces = avoidance.half_spaces(states.position, states.mobility, states.around)
     velocity = layer(avoidance, states.lower, spaces)
     rate = rates(spaces.normal, velocity)
@@ -143,7 +145,9 @@ def hostile_team(inputs: Inputs, count: int, composition: Composition, on_top: b
         return controller.velocity(1.0, positions, wanted, np.zeros((n, 3)), accepted), spaces
 
     flier = _Flier(team, running_avoidance(inputs))
-    missed, worst, state = 0, 0.0, None
+    missed = 0
+    worst = 0.0
+    state = None
     for _ in range(count):
         positions = _safe_team(team, rng)
         around = neighbourhood.around(positions)
@@ -156,14 +160,14 @@ def hostile_team(inputs: Inputs, count: int, composition: Composition, on_top: b
         missed += flier.missed(positions)
         missed += int((short > 0.0).sum()) + int((velocity[:, 2] != 0.0).sum())
         if short.max() > worst:
-            worst, state = (
-                float(short.max()),
-                (positions, wanted, np.unravel_index(np.argmax(short), short.shape), asked),
-            )
+            worst = float(short.max())
+            state = (positions, wanted, np.unravel_index(np.argmax(short), short.shape), asked)
     found: Inputs = {"states": count, "ugvs": n, "missed": missed, "worst_missed_by_m_s": worst}
     if state is None:
         return found
-    positions, wanted, (i, k) = state[0].copy(), state[1], (int(state[2][0]), int(state[2][1]))
+    positions = state[0].copy()
+    wanted = state[1]
+    (i, k) = (int(state[2][0]), int(state[2][1]))
     least, steps = np.inf, 0
     around = neighbourhood.around(positions)
     centre, safe = around.centre[i, k], float(around.distance[i, k])
@@ -199,7 +203,9 @@ class _Flier:
 
 def _safe_team(team: Team, rng: np.random.Generator) -> Array:
     """A random safe state of a team, (n + 1, 3), m: UGVs close to obstacles, the UAV above one of them."""
-    n, pairs, spread = len(team.ugvs), team.pair_distance(), 3.0
+    n = len(team.ugvs)
+    pairs = team.pair_distance()
+    spread = 3.0
     placed: list[Array] = []
     while len(placed) <= n:
         i, spread = len(placed), spread * 1.001  # so that there will be room

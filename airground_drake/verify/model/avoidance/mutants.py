@@ -11,9 +11,10 @@ import numpy as np
 from airground_drake.arrays import Array
 from airground_drake.nsbc import kernels
 from airground_drake.nsbc.avoidance import Avoidance, Composition, HalfSpaces, Surroundings
-from airground_drake.verify.engines.obligation import Obligation, rational
+from airground_drake.verify.claim import Mutant
+from airground_drake.verify.engines.obligation import Obligation
 from airground_drake.verify.engines.prover import discharge, finding
-from airground_drake.verify.engines.rewriting import with_numbers, without
+from airground_drake.verify.engines.rewriting import with_hypotheses, with_numbers, without
 from airground_drake.verify.engines.rounding import nearest, rates
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.model.avoidance.constants import Inputs, kinds, running_avoidance
@@ -103,12 +104,15 @@ def unscaled(avoidance: Avoidance, lower: Array, spaces: HalfSpaces) -> Array:
     return found
 
 
-def named(inputs: Inputs, name: str) -> tuple[Obligation, float, float]:
-    """An obligation of `step` with the numbers of a kind of pair that it is about; its d, m; a high speed, m/s."""
+def named(inputs: Inputs, name: str, **hypotheses: str) -> tuple[Obligation, float, float]:
+    """An obligation of `step` with the numbers of a kind of pair that it is about; its d, m; a high speed, m/s.
+
+    `hypotheses` take the place of those of the same names.
+    """
     kind = next((k for k in kinds(inputs) if (k.share < 1.0) == name.startswith("pair_")), kinds(inputs)[0])
     numbers = {"d": kind.safe, "h": inputs["period_s"], "A": inputs["avoidance_gain_1_s"]}
-    found = with_numbers(next(each for each in step() if each.name == name), kind.name, numbers)
-    return found, kind.safe, kind.safe / inputs["period_s"]
+    symbolic = with_hypotheses(next(each for each in step() if each.name == name), **hypotheses)
+    return with_numbers(symbolic, kind.name, numbers), kind.safe, kind.safe / inputs["period_s"]
 
 
 def _lemma_reversed(inputs: Inputs) -> Finding:
@@ -120,9 +124,8 @@ def _lemma_reversed(inputs: Inputs) -> Finding:
 
 
 def _flipped(inputs: Inputs) -> Finding:
-    given, safe, fast = named(inputs, "outside")
-    rule = {"rule": f"-({given.hypotheses['rule']})"}
-    mutant = replace(given, hypotheses={**given.hypotheses, **rule}, says="r <= -(D - d)/h: D + s r >= d")
+    given, safe, fast = named(inputs, "outside", rule="-(h*r + (D - d))")
+    mutant = replace(given, says="r <= -(D - d)/h: D + s r >= d")
     start, lower = [[1.2 * safe, 0.0, 0.0]], [[-0.3 * fast, 0.0, 0.0]]
     return broken(mutant, drive(inputs, safe, start, lower, points=[[0, 0, 0]], edit=flipped))
 
@@ -130,15 +133,15 @@ def _flipped(inputs: Inputs) -> Finding:
 def _dropped(inputs: Inputs) -> Finding:
     given, safe, fast = named(inputs, "outside")
     mutant = without(given, "rule", "without the inequality for this obstacle: D + s r >= d")
-    points, lower = [[-2.0 * safe, 0.0, 0.0], [1.1 * safe, 0.0, 0.0]], [[0.2 * fast, 0.0, 0.0]]
+    points = [[-2.0 * safe, 0.0, 0.0], [1.1 * safe, 0.0, 0.0]]
+    lower = [[0.2 * fast, 0.0, 0.0]]
     edit = dropped([False, True])
     return broken(mutant, drive(inputs, safe, [[0, 0, 0]], lower, points=points, edit=edit))
 
 
 def _full_shares(inputs: Inputs) -> Finding:
-    given, safe, fast = named(inputs, "pair_outside")
-    rules = {f"rule_{i}": given.hypotheses[f"rule_{i}"].replace("2*", "", 1) for i in "ij"}
-    mutant = replace(given, hypotheses={**given.hypotheses, **rules}, says="each robot takes the full -(D - d)/h")
+    given, safe, fast = named(inputs, "pair_outside", rule_i="h*ri + (D - d)", rule_j="h*rj + (D - d)")
+    mutant = replace(given, says="each robot takes the full -(D - d)/h")
     start = [[0.0, 0.0, 0.0], [1.1 * safe, 0.0, 0.0]]
     return broken(mutant, drive(inputs, safe, start, [[fast, 0, 0], [-fast, 0, 0]]))
 
@@ -146,7 +149,8 @@ def _full_shares(inputs: Inputs) -> Finding:
 def _no_share(inputs: Inputs) -> Finding:
     given, safe, fast = named(inputs, "pair_outside")
     mutant = without(given, "rule_j", "only one robot of the pair takes its half: the pair keeps d")
-    start, lower = [[0.0, 0.0, 0.0], [1.1 * safe, 0.0, 0.0]], [[0.0, 0.0, 0.0], [-fast, 0.0, 0.0]]
+    start = [[0.0, 0.0, 0.0], [1.1 * safe, 0.0, 0.0]]
+    lower = [[0.0, 0.0, 0.0], [-fast, 0.0, 0.0]]
     edit = dropped([[False], [True]])
     return broken(mutant, drive(inputs, safe, start, lower, share=0.5, edit=edit))
 
@@ -167,7 +171,8 @@ def _equality_tasks(inputs: Inputs) -> Finding:
         hypotheses={"active_2": f"-{n2u}", "active_1": f"-(u1 + 3/5*{n2u})"},
     )  # fmt: skip
     _, safe, fast = named(inputs, "outside")
-    points, lower = [[-safe, 0.0, 0.0], [0.6 * safe, -0.8 * safe, 0.0]], [[-0.1 * fast, -0.1 * fast, 0.0]]
+    points = [[-safe, 0.0, 0.0], [0.6 * safe, -0.8 * safe, 0.0]]
+    lower = [[-0.1 * fast, -0.1 * fast, 0.0]]
     return broken(mutant, drive(inputs, safe, [[0, 0, 0]], lower, points=points, composition="recursion_listed"))
 
 
@@ -184,35 +189,13 @@ def _unscaled(inputs: Inputs) -> Finding:
     return broken(mutant, postcondition(inputs, 2400, layer=unscaled))
 
 
-BROKEN: dict[str, Callable[[Inputs], Finding]] = {
-    "SAFE-LEMMA: inequality reversed": _lemma_reversed,
-    "SAFE-INV: sign of the inequality flipped": _flipped,
-    "SAFE-INV: one inequality dropped": _dropped,
-    "SAFE-INV: each robot of a pair takes the full share": _full_shares,
-    "SAFE-INV: one robot of a pair takes no share": _no_share,
-    "SAFE-INV: gain too large, A h = 1.8": _large_gain,
-    "SAFE-INV: prioritised equality tasks, two active obstacles": _equality_tasks,
-    "SAFE-INV: sensing range too short": _short_range,
-    "SAFE-GATE: scaling omitted": _unscaled,
-}
-"""By name; each takes the inputs of SAFE-GATE, which contain those of the other claims, and is refuted."""
-
-
 def _built(inputs: Inputs, **changed: Any) -> Finding:
     """SAFE-GATE for a diagram of method (d) that was built differently."""
     return SafeGate().check(inputs | {"method_d": inputs["method_d"] | changed})
 
 
-MUTANTS: dict[str, Callable[[Inputs], Finding]] = {
-    **BROKEN,
-    "SAFE-GATE: intervention on top": lambda inputs: _built(inputs, intervention_on_top=True),
-    "SAFE-GATE: recursion (5) as printed": lambda inputs: _built(inputs, compositions=["recursion_nearest"]),
-}
-"""Broken variants; each takes the inputs of SAFE-GATE and is refuted."""
-
-
-def _disturbed_bound(inputs: Inputs, name: str) -> Obligation:
-    """An obligation of `disturbed` with the numbers of a kind of pair that it is about."""
+def _disturbed_bound(inputs: Inputs, name: str, goal: str | None = None, **hypotheses: str) -> Obligation:
+    """An obligation of `disturbed` with the numbers of a kind of pair that it is about, changed as `named` does."""
     kind = next(k for k in (*kinds(inputs), kinds(inputs)[0]) if (k.share < 1.0) == name.startswith("pair_"))
     numbers = {
         "d": kind.safe,
@@ -220,7 +203,8 @@ def _disturbed_bound(inputs: Inputs, name: str) -> Obligation:
         "A": inputs["avoidance_gain_1_s"],
         "W": pushed(inputs, kind.share),
     }
-    return with_numbers(next(each for each in disturbed() if each.name == name), kind.name, numbers)
+    symbolic = with_hypotheses(next(each for each in disturbed() if each.name == name), **hypotheses)
+    return with_numbers(replace(symbolic, goal=goal or symbolic.goal), kind.name, numbers)
 
 
 def _disturbed_scene(inputs: Inputs, name: str) -> SafeStart:
@@ -228,9 +212,8 @@ def _disturbed_scene(inputs: Inputs, name: str) -> SafeStart:
 
 
 def _disturbed_flipped(inputs: Inputs) -> Finding:
-    given = _disturbed_bound(inputs, "inside_bound")
-    rule = {"rule": f"-({given.hypotheses['rule']})"}
-    mutant = replace(given, hypotheses={**given.hypotheses, **rule}, says="r <= A (d - D): never below d - W/A")
+    given = _disturbed_bound(inputs, "inside_bound", rule="-(r - A*(d - D))")
+    mutant = replace(given, says="r <= A (d - D): never below d - W/A")
     return broken(mutant, attack(inputs, _disturbed_scene(inputs, "obstacle"), "pinned", edit=flipped))
 
 
@@ -248,28 +231,34 @@ def _disturbed_dropped(inputs: Inputs) -> Finding:
 
 
 def _disturbed_one_of_two(inputs: Inputs) -> Finding:
-    given = _disturbed_bound(inputs, "pair_inside_bound")
-    W = rational(2.0 * inputs["disturbance_m_s"])
-    mutant = replace(
-        given, goal=f"{given.goal} - ({W})/2", certificate=(), says="two disturbed robots: never below d - w/A",
-        hypotheses={**given.hypotheses, "bounded": f"{given.hypotheses['bounded']} - ({W})/2"},
-    )  # fmt: skip
+    goal = "A*(D + s*(ri + rj) - s*W - d) + W - W/2"
+    given = _disturbed_bound(inputs, "pair_inside_bound", goal, bounded="A*(D - d) + W - W/2")
+    mutant = replace(given, certificate=(), says="two disturbed robots: never below d - w/A")
     return broken(mutant, attack(inputs, _disturbed_scene(inputs, "uav_low"), "pinned", pairs=1.0))
 
 
 def _disturbed_stronger(inputs: Inputs) -> Finding:
-    given = _disturbed_bound(inputs, "inside_bound")
-    W = rational(inputs["disturbance_m_s"])
-    goal = f"{given.goal} - {rational(inputs['avoidance_gain_1_s'])}*s*({W})"
-    mutant = replace(given, goal=goal, certificate=(), says="a disturbance of 2 w: never below d - w/A")
+    given = _disturbed_bound(inputs, "inside_bound", "A*(D + s*r - s*W - d) + W - A*s*W")
+    mutant = replace(given, certificate=(), says="a disturbance of 2 w: never below d - w/A")
     return broken(mutant, attack(inputs, _disturbed_scene(inputs, "obstacle"), "pinned", force=2.0))
 
 
-DISTURBED: dict[str, Callable[[Inputs], Finding]] = {
-    "SAFE-DIST: sign of the inequality flipped": _disturbed_flipped,
-    "SAFE-DIST: gain too large, A h = 4": _disturbed_large_gain,
-    "SAFE-DIST: one inequality dropped": _disturbed_dropped,
-    "SAFE-DIST: only one robot of a pair counted as disturbed": _disturbed_one_of_two,
-    "SAFE-DIST: disturbance twice the bound": _disturbed_stronger,
-}
-"""Broken variants; each takes the inputs of SAFE-DIST and is refuted."""
+MUTANTS: tuple[Mutant, ...] = (
+    Mutant("SAFE-LEMMA", "inequality reversed", _lemma_reversed),
+    Mutant("SAFE-INV", "sign of the inequality flipped", _flipped),
+    Mutant("SAFE-INV", "one inequality dropped", _dropped),
+    Mutant("SAFE-INV", "each robot of a pair takes the full share", _full_shares),
+    Mutant("SAFE-INV", "one robot of a pair takes no share", _no_share),
+    Mutant("SAFE-INV", "gain too large, A h = 1.8", _large_gain),
+    Mutant("SAFE-INV", "prioritised equality tasks, two active obstacles", _equality_tasks),
+    Mutant("SAFE-INV", "sensing range too short", _short_range),
+    Mutant("SAFE-GATE", "scaling omitted", _unscaled),
+    Mutant("SAFE-GATE", "intervention on top", lambda inputs: _built(inputs, intervention_on_top=True)),
+    Mutant("SAFE-GATE", "recursion (5) as printed", lambda inputs: _built(inputs, compositions=["recursion_nearest"])),
+    Mutant("SAFE-DIST", "sign of the inequality flipped", _disturbed_flipped),
+    Mutant("SAFE-DIST", "gain too large, A h = 4", _disturbed_large_gain),
+    Mutant("SAFE-DIST", "one inequality dropped", _disturbed_dropped),
+    Mutant("SAFE-DIST", "only one robot of a pair counted as disturbed", _disturbed_one_of_two),
+    Mutant("SAFE-DIST", "disturbance twice the bound", _disturbed_stronger),
+)
+"""Broken variants, in the order of the report."""

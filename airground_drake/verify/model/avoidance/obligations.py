@@ -11,12 +11,17 @@ from airground_drake.verify.model.avoidance.lemma import V, dot
 
 LIMIT_S = 10.0
 """For one solver call, s; they take milliseconds."""
-S, REST, EXCESS, DEFICIT = {"s": "s"}, {"rest": "h - s"}, {"excess": "D - d"}, {"deficit": "d - D"}
+S = {"s": "s"}
+REST = {"rest": "h - s"}
+EXCESS = {"excess": "D - d"}
+DEFICIT = {"deficit": "d - D"}
 
 
 def step() -> list[Obligation]:
     """One control period, symbolic in A, h and d: obstacle, pair, planar robot, recovery, what is not seen."""
-    of, h, gain = ("D", "r", "s", "d", "h"), {"h": "h"}, {"A": "A"}
+    of = ("D", "r", "s", "d", "h")
+    h = {"h": "h"}
+    gain = {"A": "A"}
     pair = ("D", "ri", "rj", "s", "d", "h")
     recovers = {**gain, **DEFICIT, "rule": "r - A*(d - D)"}
     return [
@@ -121,7 +126,9 @@ def gate() -> list[Obligation]:
 def with_scenario(inputs: Inputs) -> list[Obligation]:
     """Those of `step` again, for each kind of pair, with the scenario's numbers."""
     names = {each.name: each for each in step()}
-    gain, period, reach = inputs["avoidance_gain_1_s"], inputs["period_s"], inputs["sensing_range_m"]
+    gain = inputs["avoidance_gain_1_s"]
+    period = inputs["period_s"]
+    reach = inputs["sensing_range_m"]
     found = [constant("stable", "A h <= 1", 1 - Fraction(rational(gain)) * Fraction(rational(period)))]
     for kind in kinds(inputs):
         numbers = {"d": kind.safe, "h": period, "A": gain}

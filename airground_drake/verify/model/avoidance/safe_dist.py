@@ -8,7 +8,8 @@ displaces by q, ||q|| <= s W, so that D(s) >= D + s r + n.q >= D + s (r - W). Fr
     inside, deficit c = d - D:  c after the period <= (1 - A h) c + h W, and c <= W/A stays so during the period.
 
 Hence c <= (1 - (1 - A h)^N) W/A after N periods inside in a row: h W after one, W/A in the limit, never more. The
-certificates are `obligations.json` and `<obligation>.smt2`, as `engines/obligation.py` describes them.
+obligations are in `disturbed_obligations.py`, the disturbed runs in `disturbed_runs.py`; certificates are
+`obligations.json` and `<obligation>.smt2`, as `engines/obligation.py` describes them.
 """
 
 from __future__ import annotations

@@ -1,4 +1,8 @@
-"""SAFE-GATE: under method (d) no intervention, accepted or not, leaves the safe set."""
+"""SAFE-GATE: under method (d) no intervention, accepted or not, leaves the safe set.
+
+Symbols and certificates are those of `safe_inv.py`; the obligations are `gate()` of `obligations.py`, the attacks on
+the running layer and controllers are in `hostile_inputs.py`.
+"""
 
 from __future__ import annotations
 

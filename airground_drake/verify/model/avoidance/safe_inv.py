@@ -1,12 +1,17 @@
-"""SAFE-LEMMA, SAFE-INV and SAFE-GATE: why no sampled step of set-based avoidance leaves the safe set.
+"""SAFE-INV: why no sampled step of set-based avoidance leaves the safe set.
+
+The way through the proof: `lemma.py` (SAFE-LEMMA) turns motion in space into statements about one number, the
+distance; `obligations.py` has those statements, each with its certificate; `constants.py` the numbers of the running
+team that they are repeated with; `conformance.py` compares the relation that they encode with the compiled kernels;
+`hostile_inputs.py` drives the running layer from safe states by hostile velocities; `mutants.py` has the broken
+variants that must be refuted. SAFE-GATE (`safe_gate.py`) and SAFE-DIST (`safe_dist.py`) build on it.
 
 Symbols, in proofs and in their texts: a robot at x relative to what it avoids, at distance D = ||x||, with unit
 vector n = x/D and velocity v, has the radial speed r = n.v; E = ||x + s v|| is the distance after s, 0 <= s <= h; d is
 the safe distance, A the gain, h the control period, q the share of an inequality (1 obstacle, 1/2 robot of a pair), b
 its bound. SAFE-LEMMA is E >= D + s r; everything else is about the numbers D, r, s.
 
-Certificate files: `obligations.json` and `<obligation>.smt2` as `engines/obligation.py` describes them, and from SAFE-LEMMA
-`gram.json`, see `lemma.py`.
+Certificate files: `obligations.json` and `<obligation>.smt2` as `engines/obligation.py` describes them.
 """
 
 from __future__ import annotations

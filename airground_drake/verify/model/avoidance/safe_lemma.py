@@ -1,4 +1,8 @@
-"""SAFE-LEMMA: the distance on a straight line is at least its linear part."""
+"""SAFE-LEMMA: the distance on a straight line is at least its linear part.
+
+The obligations and the Gram matrix are in `lemma.py`. Certificate files: `obligations.json` and `<obligation>.smt2` as
+`engines/obligation.py` describes them, and `gram.json`, see `lemma.py`.
+"""
 
 from __future__ import annotations
 

@@ -8,18 +8,22 @@ the signs of elementary functions at rational points and on a few identities. Ce
 
 from __future__ import annotations
 
-from airground_drake.verify.engines.ball_arithmetic import (
-    Derivative,
-)
+from typing import Literal
+
+from airground_drake.verify.engines.ball_arithmetic import Derivative
 
 SINH = "((exp(u)-exp(-u))/2)"
 
 RESIDUAL = f"k*({SINH}+u)-r"
 
-RISK = "c1*k/2*u*(exp(u)-1)/(exp(u)+1)+c2/(exp(u)+1)"
-"""B of (16) without initial deviation; B with a deviation is this plus BIAS, w = 2 deviation drift / noise^2."""
+
+def risk(u: str = "u") -> str:
+    """B of (16) without initial deviation, at the argument of this name."""
+    return f"c1*k/2*{u}*(exp({u})-1)/(exp({u})+1)+c2/(exp({u})+1)"
+
 
 BIAS = "(1-exp(-w))*(c1*k*u-c2)/(exp(u)-exp(-u))-c1*k*w/2"
+"""B with an initial deviation is `risk` plus this, w = 2 deviation drift / noise^2."""
 
 SLOPE_AT_ROOT = "c1/drift*(1-exp(-w))*(exp(u)+1)/(exp(u)-1)"
 """dB/dzeta, 1/(m), where f(u) = 0: (c1/drift) (1 - exp(-w)) coth(u/2)."""
@@ -28,7 +32,10 @@ DRIFT_LEVEL = f"({SINH}+u)/u**2-m"
 
 DRIFT_TURN = f"u*(exp(u)+exp(-u))/2-u-2*{SINH}"
 
-_FACTOR = "q/(q+1)**2*(c1*k*((q-1/q)/2+u)-c2)"
+
+def _factor(sign: Literal["+", "-"] = "+") -> str:
+    return f"q/(q+1)**2*(c1*k*((q-1/q)/2{sign}u)-c2)"
+
 
 INCREASING = Derivative(
     "increasing",
@@ -39,21 +46,25 @@ INCREASING = Derivative(
     {"k": 1, "r": 1, "u": 1, "q": 3},
 )
 
-FACTORISATION = Derivative(
-    "factorisation",
-    "dB/du = c1 exp(u) / (exp(u) + 1)^2 f(u): dB/dzeta has the sign of f.",
-    "c1*k/2*u*(q-1)/(q+1)+c2/(q+1)",
-    {"u": "1", "q": "q"},
-    _FACTOR,
-    {"c1": 1, "c2": 1, "k": 1, "u": 1, "q": 4},
-)
+
+def factorisation(sign: Literal["+", "-"] = "+") -> Derivative:
+    """dB/du; with the other sign a mutant, sinh u - u."""
+    return Derivative(
+        "factorisation",
+        "dB/du = c1 exp(u) / (exp(u) + 1)^2 f(u): dB/dzeta has the sign of f.",
+        "c1*k/2*u*(q-1)/(q+1)+c2/(q+1)",
+        {"u": "1", "q": "q"},
+        _factor(sign),
+        {"c1": 1, "c2": 1, "k": 1, "u": 1, "q": 4},
+    )
+
 
 BIASED = Derivative(
     "biased",
     "With b = 1 - exp(-w) for an initial deviation, dB/du is b c1 k coth(u/2) / 2 where f(u) = 0: not 0 unless b is.",
     "c1*k/2*u*(q-1)/(q+1)+c2/(q+1)+b*(c1*k*u-c2)/(q-1/q)",
     {"u": "1", "q": "q"},
-    f"{_FACTOR}-(c1*k*((q-1/q)/2+u)-c2)*b*(q+1/q)/(q-1/q)**2+b*c1*k*(q+1)/(2*(q-1))",
+    f"{_factor()}-(c1*k*((q-1/q)/2+u)-c2)*b*(q+1/q)/(q-1/q)**2+b*c1*k*(q+1)/(2*(q-1))",
     {"b": 1, "c1": 1, "c2": 1, "k": 1, "u": 1, "q": 12},
 )
 

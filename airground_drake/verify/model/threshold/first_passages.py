@@ -81,7 +81,8 @@ def experiments(inputs: dict[str, Any]) -> tuple[PassageExperiment, ...]:
     drift, noise, c1, c2 = (float(inputs[name]) for name in ("drift_m_s", "noise_m_sqrt_s", "c1_1_s", "c2"))
     zeta = optimal_threshold(drift, noise, c1, c2)
     clear = noise * math.sqrt((math.sinh(1.0) + 1.0) * c1 / c2)
-    bayes, printed_zeta = optimal_threshold(clear, noise, c1, c2), optimal_threshold(clear, noise, c2, c1)
+    bayes = optimal_threshold(clear, noise, c1, c2)
+    printed_zeta = optimal_threshold(clear, noise, c2, c1)
     return (
         PassageExperiment("no deviation", drift, noise, zeta, 0.0, 10000, SEED),
         PassageExperiment("deviation ahead", drift, noise, zeta, 0.4 * zeta, 5000, SEED + 1),
@@ -110,7 +111,9 @@ def simulate(experiment: PassageExperiment) -> Sample:
     expected = (running(experiment)[0] / experiment.period + 1.0) * experiment.paths
     steps = iter(increments(experiment, math.ceil((1.1 * expected + 1000.0) / CHANNELS)))
     start, barrier = experiment.deviation, experiment.barrier
-    wrong, total, squares = 0, 0, 0
+    wrong = 0
+    total = 0
+    squares = 0
     for _ in range(experiment.paths):
         periods, x = passage(steps, start, barrier)
         wrong += x < 0.0

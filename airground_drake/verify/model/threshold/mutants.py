@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -11,8 +10,9 @@ from scipy.optimize import brentq
 from scipy.stats import norm
 
 from airground_drake.decision.bayes import optimal_threshold
+from airground_drake.verify.claim import Mutant
 from airground_drake.verify.finding import Finding
-from airground_drake.verify.model.threshold.expressions import FACTORISATION
+from airground_drake.verify.model.threshold.expressions import factorisation
 from airground_drake.verify.model.threshold.first_passages import (
     PassageExperiment,
     experiments,
@@ -36,25 +36,11 @@ def _subtracted(drift: float, noise: float, c1: float, c2: float) -> float:
     return float(brentq(lambda u: math.sinh(u) - u - level, 0.0, upper)) * noise**2 / (2.0 * drift)
 
 
-MUTANTS: dict[str, Callable[[dict[str, Any]], Finding]] = {
-    "THR-ROOT: the code solves (19) as printed, c1/c2": lambda inputs: judge_root(inputs, _swapped),
-    "THR-ROOT: the code solves (19) with sinh u - u": lambda inputs: judge_root(inputs, _subtracted),
-    "THR-ROOT: an enclosure that misses the root": lambda inputs: judge_root(inputs, optimal_threshold, shift=2),
-    "THR-OPT: the threshold of (19) as printed, c1/c2": lambda inputs: judge_optimum(inputs, _swapped),
-    "THR-OPT: the threshold with sinh u - u": lambda inputs: judge_optimum(inputs, _subtracted),
-    "THR-OPT: dB/dzeta with a wrong sign": lambda inputs: judge_optimum(
-        inputs, optimal_threshold, replace(FACTORISATION, derivative=FACTORISATION.derivative.replace("+u)", "-u)"))
-    ),
-    "THR-OPT: (19) with an initial deviation": lambda inputs: judge_optimum(
-        inputs, optimal_threshold, stationary_with_deviation=True
-    ),
-}
-"""Broken variants by name: each must be refuted (the first and the fourth cannot be where c1 = c2)."""
-
-
 def printed(experiment: PassageExperiment, deviation_s: float) -> tuple[float, float]:
     """(17)-(18) as printed, where the initial deviation is a time, s."""
-    zeta, drift, noise = experiment.zeta, experiment.drift, experiment.noise
+    zeta = experiment.zeta
+    drift = experiment.drift
+    noise = experiment.noise
     u = 2.0 * zeta * drift / noise**2
     exponent = min(-2.0 * deviation_s * drift**2 / noise**2, 700.0)  # more than the largest float
     bias = (1.0 - math.exp(exponent)) / (2.0 * math.sinh(u))
@@ -84,16 +70,41 @@ def _printed_is_better(inputs: dict[str, Any]) -> Finding:
     return Finding("refuted", counterexample=found, evidence=numbers)
 
 
-SIMULATED: dict[str, Callable[[dict[str, Any]], Finding]] = {
-    "THR-DDM: initial deviation in m where (17)-(18) have s": lambda inputs: compare(
-        experiments(inputs), lambda each: printed(each, each.deviation)
+def _deviation_in_metres(inputs: dict[str, Any]) -> Finding:
+    return compare(experiments(inputs), lambda each: printed(each, each.deviation))
+
+
+def _wrong_sign_of_the_deviation(inputs: dict[str, Any]) -> Finding:
+    def formulas(each: PassageExperiment) -> tuple[float, float]:
+        return running(each)[0], running(replace(each, deviation=-each.deviation))[1]
+
+    return compare(experiments(inputs), formulas)
+
+
+def _noise_squared(inputs: dict[str, Any]) -> Finding:
+    return compare(experiments(inputs), lambda each: running(replace(each, noise=each.noise**2)))
+
+
+def _with_a_wrong_sign(inputs: dict[str, Any]) -> Finding:
+    return judge_optimum(inputs, optimal_threshold, factorisation(sign="-"))
+
+
+MUTANTS: tuple[Mutant, ...] = (
+    Mutant("THR-ROOT", "the code solves (19) as printed, c1/c2", lambda inputs: judge_root(inputs, _swapped)),
+    Mutant("THR-ROOT", "the code solves (19) with sinh u - u", lambda inputs: judge_root(inputs, _subtracted)),
+    Mutant(
+        "THR-ROOT", "an enclosure that misses the root", lambda inputs: judge_root(inputs, optimal_threshold, shift=2),
     ),
-    "THR-DDM: (18) with the wrong sign of the deviation": lambda inputs: compare(
-        experiments(inputs), lambda each: (running(each)[0], running(replace(each, deviation=-each.deviation))[1])
+    Mutant("THR-OPT", "the threshold of (19) as printed, c1/c2", lambda inputs: judge_optimum(inputs, _swapped)),
+    Mutant("THR-OPT", "the threshold with sinh u - u", lambda inputs: judge_optimum(inputs, _subtracted)),
+    Mutant("THR-OPT", "dB/dzeta with a wrong sign", _with_a_wrong_sign),
+    Mutant(
+        "THR-OPT", "(19) with an initial deviation",
+        lambda inputs: judge_optimum(inputs, optimal_threshold, stationary_with_deviation=True),
     ),
-    "THR-DDM: noise^2 in place of the noise": lambda inputs: compare(
-        experiments(inputs), lambda each: running(replace(each, noise=each.noise**2))
-    ),
-    "THR-DDM: the threshold with c1/c2 minimises the risk": _printed_is_better,
-}
-"""Broken variants by name: each must be refuted by the simulated paths (the last where c1 and c2 differ enough)."""
+    Mutant("THR-DDM", "initial deviation in m where (17)-(18) have s", _deviation_in_metres),
+    Mutant("THR-DDM", "(18) with the wrong sign of the deviation", _wrong_sign_of_the_deviation),
+    Mutant("THR-DDM", "noise^2 in place of the noise", _noise_squared),
+    Mutant("THR-DDM", "the threshold with c1/c2 minimises the risk", _printed_is_better),
+)  # fmt: skip
+"""Broken variants: each must be refuted (those with c1/c2 cannot be where c1 = c2)."""

@@ -114,7 +114,9 @@ def compare(chosen: tuple[PassageExperiment, ...], formulas: Formulas) -> Findin
 
 def _rows(sample: Sample, formula: tuple[float, float], comparisons: int) -> list[dict[str, Any]]:
     """Both comparisons of an experiment: estimate, interval, formula, z-score and margin."""
-    each, count, tail = sample.experiment, sample.experiment.paths, (1.0 - LEVEL) / comparisons / 2.0
+    each = sample.experiment
+    count = sample.experiment.paths
+    tail = (1.0 - LEVEL) / comparisons / 2.0
     period = each.period
     mean = sample.periods / count
     deviation = math.sqrt((sample.squares - sample.periods * mean) / (count - 1.0) / count)

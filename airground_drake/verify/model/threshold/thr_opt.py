@@ -27,15 +27,15 @@ from airground_drake.verify.model.threshold.expressions import (
     BIASED,
     DRIFT_LEVEL,
     DRIFT_TURN,
-    FACTORISATION,
     INCREASING,
     MINIMUM,
     ONE_ROOT,
     RESIDUAL,
-    RISK,
     SINH,
     SLOPE_AT_ROOT,
     TURNING,
+    factorisation,
+    risk,
 )
 from airground_drake.verify.model.threshold.thr_root import ThrRoot
 
@@ -84,15 +84,15 @@ class ThrOpt(ModelClaim):
 def judge_optimum(
     inputs: dict[str, Any],
     rule: Rule,
-    factorisation: Derivative = FACTORISATION,
+    dB: Derivative | None = None,
     stationary_with_deviation: bool = False,
 ) -> Finding:
-    """THR-OPT for the threshold that `rule` computes; the last two are for mutants."""
+    """THR-OPT for the threshold that `rule` computes; for mutants: another dB/du, or that the slopes are 0."""
     constants = ThresholdRule.of(inputs)
     root = enclose(RESIDUAL, constants.values, Fraction(0))
     running = running_threshold(inputs, rule)
     around = [constants.u(running) * (1 + side * Fraction(FLOAT_TOLERANCE)) for side in (-1, 1)]
-    statements: list[Statement] = [INCREASING, factorisation, BIASED, TURNING]
+    statements: list[Statement] = [INCREASING, dB or factorisation(), BIASED, TURNING]
     statements += bracket("root", "f changes its sign here.", RESIDUAL, constants.values, root)
     statements += bracket(
         "running", "dB/dzeta changes its sign at the code's zeta.", RESIDUAL, constants.values, around
@@ -127,7 +127,7 @@ def _printed(
     ends = enclose(RESIDUAL, swapped, Fraction(0))
     too_low = constants.c1 < constants.c2
     v, u = (ends[1], root[0]) if too_low else (ends[0], root[1])  # the ends next to each other
-    difference = f"({RISK.replace('u', 'v')})-({RISK})"
+    difference = f"({risk('v')})-({risk()})"
     slope: Literal["<", ">"] = "<" if too_low else ">"
     statements = [
         *bracket("printed", "The printed equation has its root here.", RESIDUAL, swapped, ends),
@@ -166,7 +166,8 @@ def _drifts(constants: ThresholdRule, zeta: Fraction) -> tuple[list[Statement], 
     for name, ratio in (("drift", constants.c2 / constants.c1), ("printed_drift", constants.c1 / constants.c2)):
         m = {"m": ratio * constants.noise**2 / (4 * zeta**2)}
         if evaluate(DRIFT_LEVEL, m | {"u": turn[0]}) > 0:
-            says, values = "zeta in force is optimal for no drift.", {**m, "u": turn[0], "v": turn[1]}
+            says = "zeta in force is optimal for no drift."
+            values = {**m, "u": turn[0], "v": turn[1]}
             statements.append(sign(f"{name}_none", says, f"({SINH}+u)/v**2-m", values, ">"))
             continue
         low = enclose(DRIFT_LEVEL, m, Fraction(0), turn[0], rising=False)
@@ -187,7 +188,7 @@ def _replay(inputs: Mapping[str, Any], running: Fraction, root: float) -> dict[s
     for scale, share in ((0.3, 0.0), (1.0, 0.0), (3.0, 0.0), (1.0, 0.5), (1.0, -0.5)):
         zeta, deviation = scale * root, share * scale * root
         u, w = constants.u(Fraction(zeta)), constants.u(Fraction(deviation))
-        exact = float(evaluate(f"{RISK}+{BIAS}", constants.at(u=u, w=w)).mid())
+        exact = float(evaluate(f"{risk()}+{BIAS}", constants.at(u=u, w=w)).mid())
         differences.append(abs(bayes_risk(zeta, drift, noise, c1, c2, deviation) / exact - 1.0))
     step = 1e-4 * root
     above, below = (bayes_risk(root + side * step, drift, noise, c1, c2, 0.5 * root) for side in (1, -1))

@@ -13,8 +13,8 @@ from airground_drake.verify.engines.obligation import Obligation, Term, rational
 from airground_drake.verify.engines.prover import LIMIT_S
 from airground_drake.verify.engines.rewriting import terms
 from airground_drake.verify.engines.smt import solve
-from airground_drake.verify.engines.symbolic_execution import SYMBOLS, Branch, Linear
-from airground_drake.verify.model.trigger.relation import Transition, replay
+from airground_drake.verify.engines.symbolic_execution import Branch, Linear
+from airground_drake.verify.model.trigger.relation import SYMBOLS, Transition, replay
 
 _GUARDS = {
     "zeta": "threshold_positive",
@@ -42,7 +42,8 @@ def obligations(transitions: Sequence[Transition]) -> list[Obligation]:
     """That every transition keeps the invariant and the invariant implies the claim, for symbolic parameters."""
     found = []
     for each in transitions:
-        supervised, remembers = each.source is Mode.SUPERVISING, each.source in (Mode.INTERVENING, Mode.REFRACTORY)
+        supervised = each.source is Mode.SUPERVISING
+        remembers = each.source in (Mode.INTERVENING, Mode.REFRACTORY)
         if remembers and any(str(form) == "-n" for form, _ in each.guards):
             continue  # n <= 0 against k >= 1 and n = k: never taken (Spacer is given it all the same)
         after = each.after
@@ -72,7 +73,9 @@ def _obligation(
     each: Transition, goal: str, says: str, text: str, proof: tuple[Term, ...], multipliers: dict[str, str]
 ) -> Obligation:
     """A goal after a transition from the invariant, its guards and time not running backwards."""
-    hypotheses, strict, equations = {"waited": "s - t", "count": "k"}, dict[str, str](), dict[str, str]()
+    hypotheses = {"waited": "s - t", "count": "k"}
+    strict = dict[str, str]()
+    equations = dict[str, str]()
     if each.source is not None:
         equations["same_count"] = "n - k"
     if each.source is Mode.SUPERVISING:
@@ -146,7 +149,7 @@ def _after(each: Transition) -> list[str]:
 
 
 def _number(value: float) -> str:
-    return (Linear(Branch([]), {}) + value).smt()
+    return (Linear(Branch(), {}) + value).smt()
 
 
 def _definitions(transitions: Sequence[Transition], trigger: Trigger, bound: float) -> list[str]:
@@ -171,7 +174,9 @@ def _definitions(transitions: Sequence[Transition], trigger: Trigger, bound: flo
 
 def horn(transitions: Sequence[Transition], trigger: Trigger, bound: float) -> str:
     """Constrained Horn clauses: satisfiable exactly if an invariant P excludes triggers closer than the bound, s."""
-    event, state, later = _declared(_EVENT), _declared(_STATE), _declared(_STATE, "2")
+    event = _declared(_EVENT)
+    state = _declared(_STATE)
+    later = _declared(_STATE, "2")
     after = " ".join(f"{name}2" for name in _STATE)
     lines = [
         "(set-logic HORN)",

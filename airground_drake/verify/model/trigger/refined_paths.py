@@ -92,32 +92,43 @@ def path(setting: Refinement, index: int) -> list[Array]:
 
 
 def triggers(trigger: Trigger, x: Array, dt: float) -> list[float]:
-    """Times, s, of the running automaton's triggers on the linear path through x, m, at 0, dt, 2 dt, ..., s."""
-    rises, falls = _crossings(x - trigger.zeta, dt), _crossings(trigger.release - x, dt)
-    state, t, end = trigger.start(0.0, float(x[0])), 0.0, (len(x) - 1) * dt
+    """Times, s, of the running automaton's triggers on the linear path through x, m, at 0, dt, 2 dt, ..., s.
+
+    A touch from below is a rise. Where the levels are one, a touch from above is no fall: x >= zeta all the time.
+    """
+    above, below = x - trigger.zeta, trigger.release - x
+    rises = np.flatnonzero(above[1:] >= 0.0)  # segments at whose end x is at or above zeta
+    falls = np.flatnonzero(below[1:] >= 0.0 if trigger.release < trigger.zeta else below[1:] > 0.0)
+    state = trigger.start(0.0, float(x[0]))
+    t = 0.0
+    segment = 0
+    end = (len(x) - 1) * dt
     times = [0.0] if state.triggers else []
     while True:
         if state.mode is Mode.REFRACTORY:
             t = max(t, trigger.dwell_end(state))
             if t > end:
                 return times
-            k = min(int(t / dt), len(x) - 2)
-            state = trigger.recover(state, t, float(x[k] + (x[k + 1] - x[k]) * (t / dt - k)))
+            segment = min(int(t / dt), len(x) - 2)
+            now = x[segment] + (x[segment + 1] - x[segment]) * (t / dt - segment)
+            state = trigger.recover(state, t, float(now))
         else:
-            level = rises if state.mode is Mode.SUPERVISING else falls
-            i = int(np.searchsorted(level, t, side="right"))
-            if i == len(level):
+            supervising = state.mode is Mode.SUPERVISING
+            ends, height = (rises, above) if supervising else (falls, below)
+            i = int(np.searchsorted(ends, segment))
+            if i == len(ends):
                 return times
-            t = float(level[i])
-            state = trigger.rise(state, t) if state.mode is Mode.SUPERVISING else trigger.fall(state, t)
+            segment = int(ends[i])
+            t = max(t, _crossing(height, segment, dt))
+            state = trigger.rise(state, t) if supervising else trigger.fall(state, t)
         if state.triggers > len(times):
             times.append(t)
 
 
-def _crossings(height: Array, dt: float) -> Array:
-    """Times at which a piecewise linear signal rises to 0 from below."""
-    k = np.flatnonzero((height[:-1] < 0.0) & (height[1:] >= 0.0))
-    return (k + height[k] / (height[k] - height[k + 1])) * dt
+def _crossing(height: Array, segment: int, dt: float) -> float:
+    """Time, s, at which a piecewise linear signal is 0 in a segment at whose end it is not negative."""
+    before, after = height[segment], height[segment + 1]
+    return float((segment + before / (before - after)) * dt) if before < 0.0 else float(segment * dt)
 
 
 def expected_bare(setting: Refinement, dt: float) -> float:

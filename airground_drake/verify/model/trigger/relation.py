@@ -14,7 +14,14 @@ from airground_drake.decision.trigger import Mode, Trigger, TriggerState
 from airground_drake.systems.decision import FIELDS, EventTrigger
 from airground_drake.verify.engines.obligation import rational
 from airground_drake.verify.engines.rounding import ROUNDOFF
-from airground_drake.verify.engines.symbolic_execution import Branch, Linear, paths
+from airground_drake.verify.engines.symbolic_execution import Branch, Linear, branches
+
+SYMBOLS = ("n", "k", "s", "t", "a", "l", "r", "x", "zeta", "release", "dwell")
+"""Of the relation, in the order of print: r is the automaton's time of the last release; others as in `zeno_proof`."""
+
+
+def _branches(function: Callable[[Branch], TriggerState]) -> list[tuple[Branch, TriggerState]]:
+    return branches(function, order=SYMBOLS, counts=("n",))
 
 
 @dataclass(frozen=True)
@@ -75,7 +82,7 @@ def read_off(make: Callable[[Branch], Trigger]) -> list[Transition]:
         new.after.update(k=count, l=last, t=path.symbol("s"))
         found.append(new)
 
-    for path, after in paths(lambda path: make(path).start(path.symbol("s"), path.symbol("x"))):
+    for path, after in _branches(lambda path: make(path).start(path.symbol("s"), path.symbol("x"))):
         add(f"start_{after.mode.name.lower()}", None, path, after)
     for mode in Mode:
 
@@ -88,10 +95,10 @@ def read_off(make: Callable[[Branch], Trigger]) -> list[Transition]:
             make(path)
             return TriggerState(mode, *map(path.symbol, "nar"))
 
-        for path, after in paths(event):
+        for path, after in _branches(event):
             if after.mode is not mode:
                 add(f"{mode.name.lower()}_{after.mode.name.lower()}", mode, path, after)
-        for path, after in paths(wait):
+        for path, after in _branches(wait):
             add(f"{mode.name.lower()}_waits", mode, path, after)
     return found
 
@@ -100,7 +107,8 @@ def replay(trigger: Trigger, events: Sequence[tuple[float, float]]) -> list[dict
     """Run the running trigger through events (t in s, x in m): the state after each."""
     state, rows = TriggerState(), list[dict[str, Any]]()
     for i, (t, x) in enumerate(events):
-        before, state = state.mode, trigger.start(t, x) if i == 0 else step(trigger, state, t, x)
+        before = state.mode
+        state = trigger.start(t, x) if i == 0 else step(trigger, state, t, x)
         fired = state.mode is Mode.INTERVENING and before is not Mode.INTERVENING
         rows.append({"t_s": t, "x_m": x, "mode": state.mode.name, "trigger": fired})
     return rows

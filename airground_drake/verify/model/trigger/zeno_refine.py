@@ -1,8 +1,8 @@
 """ZENO-REFINE: as the noise step is refined, the bare threshold's event count diverges and the automaton's does not.
 
-Paths and counts are those of `refined_paths.py`: the bare count grows like dt^(-1/2) with a relative correction of order
-sqrt(dt). The delay of a level crossing that is seen on a grid, 0.58 s sqrt(dt) (Chernoff 1965, Siegmund 1979), makes
-the correction of the automaton's count one of order sqrt(dt) as well. Both counts are therefore fitted by
+Paths and counts are those of `refined_paths.py`: the bare count grows like dt^(-1/2) with a relative correction of
+order sqrt(dt). The delay of a level crossing that is seen on a grid, 0.58 s sqrt(dt) (Chernoff 1965, Siegmund 1979),
+makes the correction of the automaton's count one of order sqrt(dt) as well. Both counts are therefore fitted by
 
     ln(mean count) = intercept + exponent ln(dt) + correction sqrt(dt)        (least squares over the dt)
 
@@ -89,7 +89,8 @@ class ZenoRefine(ModelClaim):
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
         """The running trigger, the noise of (15) and its step, the duration."""
-        trigger, decision = make_trigger(scenario, threshold(scenario)), scenario.decision
+        trigger = make_trigger(scenario, threshold(scenario))
+        decision = scenario.decision
         return {
             "zeta_m": float(trigger.zeta),
             "released_below_m": float(trigger.release),

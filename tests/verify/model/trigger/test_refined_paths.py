@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 from pydrake.systems.framework import DiagramBuilder
@@ -55,6 +55,7 @@ def test_expected_bare_count_grows_as_stated() -> None:
     st.lists(st.floats(0.0, 6.0), min_size=3, max_size=40),
     st.sampled_from([Trigger(3.0, 2.0, 0.5), Trigger(3.0, 3.0, 0.5), Trigger(3.0, 2.0, 0.0), Trigger.bare(3.0)]),
 )
+@example([0.0, 3.0, 0.0, 0.0, 0.0, 3.0], Trigger(3.0, 2.0, 0.5))  # x rises to zeta just when the dwell is over
 def test_fast_triggers_are_those_of_the_independent_checker(values: list[float], trigger: Trigger) -> None:
     x = np.array(values) + 1e-3 * math.sqrt(2.0)  # not at a level, where a touch may count or not
     dt = 0.125
