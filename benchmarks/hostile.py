@@ -29,7 +29,7 @@ from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Policy, Run
 from airground_drake.simulation import Recorder
 from airground_drake.systems.controllers import UgvController
-from airground_drake.verify.safety import SafeTrace
+from airground_drake.verify.runs.safe_trace import SafeTrace
 
 STEPS = 30
 """Control periods for which a proposal is executed at decision level."""

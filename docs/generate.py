@@ -10,12 +10,11 @@ from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
 
-from airground_drake.verify.claim import Claim
-
 import airground_drake
 from airground_drake import files
 from airground_drake.registry import METHODS, MODEL_CLAIMS, POLICIES, ROUTES, RUN_CLAIMS, UAV_TASKS, Registry
-from airground_drake.verify.mutants import MUTANTS
+from airground_drake.verify.claim import Claim
+from airground_drake.verify.registry import mutants
 
 DOCS = Path(__file__).parent
 PACKAGE = Path(airground_drake.__file__).parent
@@ -129,7 +128,7 @@ def claims() -> str:
     lines = []
     for name, claim in _claims():
         about = "the model" if name in MODEL_CLAIMS.own else "a run"
-        broken = [mutant.name for mutant in MUTANTS if mutant.claim == name]
+        broken = [mutant.says for mutant in mutants() if mutant.claim == name]
         lines += [
             f"## {name}",
             "",
@@ -156,11 +155,9 @@ def claims() -> str:
 
 def names() -> str:
     """Everything that a scenario may name."""
-    lines = ["## Methods", "", "| name | |", "| --- | --- |"]
-    lines += [f"| `{method.id}` | {method.says} |" for method in METHODS.values()]
+    lines = ["## Methods", "", *(f"- `{method.id}`: {method.says}" for method in METHODS.values())]
     for title, registry in (("Policies", POLICIES), ("Routes", ROUTES), ("Tasks of the UAV", UAV_TASKS)):
-        lines += ["", f"## {title}", "", "| name | | parameters |", "| --- | --- | --- |"]
-        lines += [_row(registry, name) for name in registry.own]
+        lines += ["", f"## {title}", "", *(_entry(registry, name) for name in registry.own)]
     return _page(
         "What a scenario may name",
         "Besides these: what installed packages register (see [extending](extending.md)), and `module:Class` for "
@@ -169,23 +166,25 @@ def names() -> str:
     )
 
 
-def _row(registry: Registry, name: str) -> str:
+def _entry(registry: Registry, name: str) -> str:
     kind = registry.load(name, of=object)
     says = " ".join((inspect.getdoc(kind) or "").split("\n\n")[0].split())
     given = [p for p in inspect.signature(kind).parameters.values() if p.kind is p.KEYWORD_ONLY]
     parameters = ", ".join(f"`{p.name}`" + ("" if p.default is p.empty else f" = {p.default}") for p in given)
-    return f"| `{name}` | {says} | {parameters or '-'} |"
+    return f"- `{name}`: {says}" + (f" Parameters: {parameters}." if parameters else "")
 
 
 def _page(title: str, says: str, lines: list[str]) -> str:
     """A page; lines that may be wrapped are."""
     wrapped: list[str] = []
     for line in ["<!-- Made by: python docs/generate.py -->", f"# {title}", "", says, "", *lines]:
-        if len(line) <= WIDTH or line.startswith("|"):
+        if len(line) <= WIDTH:
             wrapped.append(line)
         else:
             indent = "  " if line.startswith("- ") else ""
-            wrapped += textwrap.wrap(line, WIDTH, subsequent_indent=indent, break_long_words=False)
+            wrapped += textwrap.wrap(
+                line, WIDTH, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False
+            )
     return "\n".join(wrapped).rstrip() + "\n"
 
 

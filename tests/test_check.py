@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 
 from airground_drake import check
 from airground_drake.report.__main__ import main as write
-from airground_drake.verify.obligation import Obligation
+from airground_drake.verify.engines.obligation import Obligation
 
 SOURCE = Path(check.__file__)
 

@@ -16,7 +16,7 @@ from airground_drake.scenarios.load import load
 
 PACKAGE = Path(airground_drake.__file__).parent
 LAYERS = (
-    ("arrays", "errors", "files", "smt", "check"),
+    ("arrays", "errors", "files", "check"),
     ("registry",),
     ("nsbc",),
     ("decision", "intervention"),

@@ -1,23 +1,64 @@
-"""The documentation's Python blocks run, its commands exist, and its links lead somewhere."""
+"""The documentation: its Python blocks run, its links lead somewhere, what is generated is current, its recipes work."""
 
 from __future__ import annotations
 
+import json
 import re
+import runpy
 from pathlib import Path
 
 import pytest
 
+from airground_drake.report.__main__ import main
+
 ROOT = Path(__file__).parent.parent
 PAGES = sorted([ROOT / "README.md", ROOT / "CHANGELOG.md", *(ROOT / "docs").glob("*.md")])
+EXTENDING = ROOT / "docs" / "extending.md"
+
+
+def blocks(page: Path, language: str) -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", page.read_text(encoding="utf-8"), flags=re.DOTALL)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_python_blocks_run(page: Path) -> None:
-    for block in re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), flags=re.DOTALL):
+    for block in blocks(page, "python"):
         exec(compile(block, str(page), "exec"), {"__name__": "docs"})
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_links_lead_somewhere(page: Path) -> None:
-    for target in re.findall(r"\]\((?!https?:)([^)#]+)\)", page.read_text(encoding="utf-8")):
-        assert (page.parent / target).exists(), target
+    for target, anchor in re.findall(r"\]\((?!https?:)([^)#]+)#?([^)]*)\)", page.read_text(encoding="utf-8")):
+        found = page.parent / target
+        assert found.exists(), target
+        headings = re.findall(r"^#+ (.+)$", found.read_text(encoding="utf-8"), re.MULTILINE) if anchor else []
+        assert not anchor or anchor in {heading.lower().replace(" ", "-") for heading in headings}, anchor
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_lines_are_short_enough_to_read(page: Path) -> None:
+    assert max(map(len, page.read_text(encoding="utf-8").splitlines())) <= 120
+
+
+def test_what_follows_from_the_code_is_current() -> None:
+    pages = runpy.run_path(str(ROOT / "docs" / "generate.py"))["pages"]()
+    for name, text in pages.items():
+        assert (ROOT / "docs" / name).read_text(encoding="utf-8") == text, "run python docs/generate.py"
+
+
+def test_everything_that_can_be_added_works_from_a_folder_of_its_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for block in [*blocks(EXTENDING, "python"), *blocks(EXTENDING, "yaml")]:
+        path = tmp_path / block.splitlines()[0].removeprefix("# file: ")
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(block, encoding="utf-8")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    assert main([str(tmp_path / "mine.yaml"), "-o", str(tmp_path / "report"), "--format", "json"]) == 0
+    document = json.loads((tmp_path / "report" / "report.json").read_text())
+    found = {claim["id"]: claim["status"] for claim in document["claims"]}
+    assert (found["CORRIDOR"], found["STABLE"], found["SAFE-TRACE"]) == ("holds", "proved", "holds")
+    kinds = [event["kind"] for event in document["runs"]["d"]["events"] if event["robot"] == "ugv1"]
+    assert kinds == ["trigger", "proposal", "accept", "release", "arrival"]
+    reached = document["runs"]["d"]["metrics"]["final_position_m"]
+    assert reached["uav"][:2] == pytest.approx(reached["ugv1"][:2], abs=0.01)

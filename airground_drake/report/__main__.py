@@ -26,8 +26,10 @@ from airground_drake.report.figures.panels import Figure
 from airground_drake.scenarios.load import load, shipped
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.simulation import simulate_all
-from airground_drake.verify import MODEL_CLAIMS, Verdict, cache_folder, stl, verify, verify_model
+from airground_drake.verify import Verdict, cache_folder, verify, verify_model
 from airground_drake.verify.mutants import refute_mutants
+from airground_drake.verify.registry import model_claims
+from airground_drake.verify.stl import cross_check as stl
 
 EXIT_USAGE, EXIT_TOOL = 2, 4
 FORMATS = ("html", "json", "junit")
@@ -106,6 +108,8 @@ def write_report(
         OSError: if the folder cannot be written.
     """
     started, clock = datetime.now(UTC), time.perf_counter()
+    required = [claim.id for claim in model_claims(added=scenario.claims)]
+    folder.mkdir(parents=True, exist_ok=True)  # before the work, in case it cannot be
     _progress(f"simulating {', '.join(scenario.runs)}")
     traces = simulate_all(scenario)
     _progress("checking claims")
@@ -128,7 +132,6 @@ def write_report(
     files.write_text(folder / "diagram.dot", dot)
     files.write_text(folder / "diagram.svg", drawn)
     provenance["wall_s"] = time.perf_counter() - clock
-    required = [claim.id for claim in MODEL_CLAIMS]
     report = document.build(
         scenario, digest, traces, verdicts, provenance, audit=findings, mutants=mutants, required=required
     )
@@ -189,8 +192,7 @@ def _refinement(verdicts: Sequence[Verdict]) -> list[Figure]:
 
 def _save_certificates(folder: Path, verdicts: Sequence[Verdict]) -> None:
     """Write every certificate to <folder>/<claim>/; those of an earlier report are removed."""
-    for claim in MODEL_CLAIMS:
-        shutil.rmtree(folder / claim.id, ignore_errors=True)
+    shutil.rmtree(folder, ignore_errors=True)
     for verdict in verdicts:
         for name, text in verdict.finding.certificates.items():
             files.write_text(folder / verdict.claim.id / name, text)

@@ -15,7 +15,7 @@ from airground_drake.report import metrics, reproduction
 from airground_drake.report.audit import of_runs
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.trace import Trace
-from airground_drake.verify.verdict import Verdict
+from airground_drake.verify.claim import Verdict
 
 SCHEMA = "airground_drake.report/1"
 

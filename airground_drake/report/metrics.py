@@ -10,7 +10,7 @@ import numpy as np
 
 from airground_drake.arrays import Array
 from airground_drake.trace import Trace
-from airground_drake.verify.geometry import closest_approach
+from airground_drake.verify.engines.segments import closest_approach
 
 
 class Closest(NamedTuple):

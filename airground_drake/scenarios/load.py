@@ -115,9 +115,25 @@ def validated(scenario: Scenario) -> Scenario:
     """
     source = f"scenario {getattr(scenario, 'name', None) or type(scenario).__name__!r}"
     try:
-        return _build(_node(resolved(scenario), source), source)
-    except (TypeError, RecursionError) as error:
+        return from_data(resolved(scenario), source)
+    except TypeError as error:
         raise ScenarioError(source, "", Fault(str(error)), "wanted: a Scenario") from None
+
+
+def from_data(data: Mapping[str, Any], source: str) -> Scenario:
+    """A scenario from nested dicts and lists, such as `resolved` gives, checked like a file.
+
+    Args:
+        data: with the keys of a scenario file.
+        source: where it comes from, for messages.
+
+    Raises:
+        ScenarioError: if it is not valid.
+    """
+    try:
+        return _build(_node(data, source), source)
+    except RecursionError:
+        raise ScenarioError(source, "", Fault("nested too deeply"), "wanted: a scenario") from None
 
 
 def _build(root: yaml.Node, source: str) -> Scenario:

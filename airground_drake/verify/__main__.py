@@ -5,17 +5,14 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-import yaml
-
 from airground_drake import trace
-from airground_drake.errors import AirgroundError
-from airground_drake.scenarios.load import load
-from airground_drake.scenarios.schema import Scenario
-from airground_drake.verify import MODEL_CLAIMS, TRACE_CLAIMS, Verdict, verify, verify_model
+from airground_drake.errors import AirgroundError, UnknownNameError
+from airground_drake.scenarios.load import from_data, load
+from airground_drake.verify import Verdict, verify, verify_model
+from airground_drake.verify.registry import model_claims, run_claims
 
 EXIT_DIFFERS, EXIT_USAGE = 1, 2
 
@@ -34,11 +31,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("claims", nargs="*", metavar="CLAIM", help="identifiers (default: all that apply)")
     parser.add_argument("--json", action="store_true", help="print the whole verdicts as JSON")
     options = parser.parse_args(arguments)
-    known = [claim.id for claim in (*TRACE_CLAIMS, *MODEL_CLAIMS)]
-    if unknown := [name for name in options.claims if name not in known]:
-        parser.error(f"unknown claim {', '.join(unknown)}; claims are {', '.join(known)}")
     try:
-        verdicts = _judge(options.target, set(options.claims or known))
+        verdicts = _judge(options.target, options.claims)
     except (AirgroundError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return EXIT_USAGE
@@ -47,34 +41,36 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return EXIT_USAGE
     if options.json:
         print(json.dumps([verdict.to_json() for verdict in verdicts], indent=1, allow_nan=False))
-    for verdict in () if options.json else verdicts:
-        margin = (
-            "" if verdict.finding.margin is None else f", margin {verdict.finding.margin:.6g} {verdict.finding.unit}"
-        )
-        expected = "" if verdict.as_expected else f", expected {verdict.expected}"
-        print(f"{verdict.claim.id} {verdict.run}: {verdict.finding.status}{margin}{expected}".replace(" :", ":"))
+    else:
+        print("".join(f"{_line(verdict)}\n" for verdict in verdicts), end="")
     return 0 if all(verdict.as_expected for verdict in verdicts) else EXIT_DIFFERS
 
 
-def _judge(target: str, wanted: set[str]) -> list[Verdict]:
-    """Verdicts on the claims wanted, as far as they say anything about the target."""
-    verdicts: list[Verdict] = []
+def _line(verdict: Verdict) -> str:
+    """A verdict in one line."""
+    finding = verdict.finding
+    name = f"{verdict.claim.id} {verdict.run}" if verdict.run else verdict.claim.id
+    margin = "" if finding.margin is None else f", margin {finding.margin:.6g} {finding.unit}"
+    expected = "" if verdict.as_expected else f", expected {verdict.expected}"
+    return f"{name}: {finding.status}{margin}{expected}"
+
+
+def _judge(target: str, wanted: Sequence[str]) -> list[Verdict]:
+    """Verdicts on the claims wanted (none: all), as far as they say anything about the target.
+
+    Raises:
+        UnknownNameError: if there is no such claim.
+    """
     folder = Path(target)
-    if (folder / "meta.json").is_file():
-        run = trace.load(folder)
-        verdicts += [verdict for verdict in verify(run) if verdict.claim.id in wanted]
-        scenario = _scenario_of(run)
-    else:
-        scenario = load(target)[0]
-    return verdicts + verify_model(scenario, only=wanted)
-
-
-def _scenario_of(run: trace.Trace) -> Scenario:
-    """The resolved scenario that a trace carries, validated again."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "scenario.yaml"
-        path.write_text(yaml.safe_dump(run.scenario, sort_keys=False), encoding="utf-8")
-        return load(str(path))[0]
+    run = trace.load(folder) if (folder / "meta.json").is_file() else None
+    scenario = load(target)[0] if run is None else from_data(run.scenario, target)
+    about_run = [claim.id for claim in run_claims(added=scenario.claims)]
+    about_model = [claim.id for claim in model_claims(added=scenario.claims)]
+    for name in wanted:
+        if name not in (known := [*about_run, *about_model]):
+            raise UnknownNameError("claim", name, known)
+    verdicts = [] if run is None else verify(run, [name for name in about_run if name in (wanted or about_run)])
+    return verdicts + verify_model(scenario, claims=[name for name in about_model if name in (wanted or about_model)])
 
 
 if __name__ == "__main__":

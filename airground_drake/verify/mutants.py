@@ -1,54 +1,42 @@
-"""Broken variants of what the proofs are about: each must be refuted, or its claim proves nothing."""
+"""Judging the broken variants that are registered: each must be refuted, or its claim proves nothing."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from airground_drake.registry import Status
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.verify import ddm, disturbance, invariance, refinement, threshold, zeno
-from airground_drake.verify.findings import find
-from airground_drake.verify.verdict import Finding, ModelClaim, Status
+from airground_drake.verify.cache import find
+from airground_drake.verify.claim import ModelClaim, Mutant
+from airground_drake.verify.finding import Finding
+from airground_drake.verify.registry import model_claims, mutants
 
-Check = Callable[[dict[str, Any]], Finding]
 
-
-class Mutant(ModelClaim):
-    """A broken variant as a claim of its own, expected to be refuted."""
+class MutantClaim(ModelClaim):
+    """A broken variant as a claim of its own, expected to be refuted, so that its finding is kept like any other."""
 
     expected: Status = "refuted"
-    formula = method = equations = does_not_establish = ""
+    formula = ""
+    method = ""
+    equations = ""
     assumptions = ()
+    does_not_establish = ""
 
-    def __init__(self, claim: ModelClaim, name: str, check: Check) -> None:
-        """A variant of a claim that takes the claim's inputs."""
-        self.of = name.partition(":")[0] if name.startswith(("SAFE-", "THR-")) else claim.id
-        self.statement = name.removeprefix(f"{self.of}: ")
-        self.id = f"{self.of} mutant: {self.statement}"
-        self._claim, self._check = claim, check
+    def __init__(self, mutant: Mutant) -> None:
+        """The claim that a mutant is."""
+        self.mutant = mutant
+        self.statement = mutant.says
+        self.id = f"{mutant.claim} mutant: {mutant.says}"
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
-        """Those of the claim."""
-        return self._claim.inputs(scenario)
+        """Those of the claim that must refute it."""
+        (claim,) = model_claims([self.mutant.claim])
+        return claim.inputs(scenario)
 
     def check(self, inputs: dict[str, Any]) -> Finding:
         """Decide the broken variant."""
-        return self._check(inputs)
-
-
-_TABLES: tuple[tuple[ModelClaim, dict[str, Check]], ...] = (
-    (invariance.SafeGate(), invariance.MUTANTS),
-    (disturbance.SafeDist(), disturbance.MUTANTS),
-    (zeno.ZenoProof(), zeno.MUTANTS),
-    (refinement.ZenoRefine(), refinement.MUTANTS),
-    (threshold.ThrRoot(), threshold.MUTANTS),
-    (ddm.ThrDdm(), ddm.MUTANTS),
-)
-
-MUTANTS: tuple[Mutant, ...] = tuple(
-    Mutant(claim, name, check) for claim, table in _TABLES for name, check in table.items()
-)
+        return self.mutant.check(inputs)
 
 
 def refute_mutants(scenario: Scenario, *, kept: Path | None = None) -> list[dict[str, Any]]:
@@ -58,15 +46,16 @@ def refute_mutants(scenario: Scenario, *, kept: Path | None = None) -> list[dict
         scenario: its constants.
         kept: folder of kept findings, see `verify_model`.
     """
-    found = find(MUTANTS, [mutant.inputs(scenario) for mutant in MUTANTS], folder=kept)
+    broken = [MutantClaim(mutant) for mutant in mutants()]
+    found = find(broken, [claim.inputs(scenario) for claim in broken], folder=kept)
     return [
         {
-            "claim": mutant.of,
-            "mutant": mutant.statement,
+            "claim": claim.mutant.claim,
+            "mutant": claim.mutant.says,
             "status": finding.status,
             "refuted": finding.status == "refuted" and finding.counterexample is not None,
             "counterexample": finding.counterexample,
             "error": finding.evidence.get("error"),
         }
-        for mutant, finding in zip(MUTANTS, found, strict=True)
+        for claim, finding in zip(broken, found, strict=True)
     ]

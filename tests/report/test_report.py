@@ -15,6 +15,7 @@ import pandas as pd
 import pytest
 
 from airground_drake.errors import TraceError
+from airground_drake.registry import STATUSES, Status
 from airground_drake.report import document, html, junit, metrics, reproduction
 from airground_drake.report.figures import canvas, draw, svg
 from airground_drake.report.figures.panels import Figure
@@ -31,7 +32,8 @@ from airground_drake.scenarios.schema import (
     Ugv,
 )
 from airground_drake.trace import DECISION_COLUMNS, SCHEMA, Trace
-from airground_drake.verify.verdict import STATUSES, Finding, Status, TraceClaim, Verdict
+from airground_drake.verify.claim import TraceClaim, Verdict
+from airground_drake.verify.finding import Finding
 
 HOSTILE = "<script>alert('$x$')</script>"
 STALL = (3.369, 5.102)

@@ -1,0 +1,220 @@
+"""The shape of a claim and of a verdict, and what any trace must be before a claim may pass on it."""
+
+from __future__ import annotations
+
+import abc
+import json
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+
+from airground_drake import files
+from airground_drake.errors import TraceError
+from airground_drake.registry import PASSING, Status
+from airground_drake.scenarios.schema import Scenario
+from airground_drake.trace import Trace
+from airground_drake.verify.finding import Finding
+
+__all__ = [
+    "Claim",
+    "Finding",
+    "ModelClaim",
+    "Mutant",
+    "TraceClaim",
+    "Verdict",
+    "require_motion",
+    "require_whole_run",
+]
+
+MOTION_TOLERANCE_M = 1e-9
+"""A row may differ by this from the position that its command leads to, m: floating-point integration of one
+step errs by 1e-15 m, and a lie this small moves no robot more than it in any step."""
+
+TIME_TOLERANCE_S = 1e-9
+"""Two instants that differ by less are the same, s: rounding of multiples of a period errs by 1e-14 s."""
+
+
+class Claim(abc.ABC):
+    """What a claim says of itself.
+
+    Attributes (all of the class):
+        id: stable identifier.
+        statement: the claim in words.
+        formula: the claim as a formula (plain text).
+        method: how it is decided.
+        equations: equation numbers of the paper that it is about.
+        assumptions: what is taken for granted.
+        does_not_establish: what a reader must not conclude from it.
+        expected: the status that a scenario expects unless it says otherwise.
+    """
+
+    id: str
+    statement: str
+    formula: str
+    method: str
+    equations: str
+    assumptions: tuple[str, ...]
+    does_not_establish: str
+    expected: Status
+
+
+class ModelClaim(Claim):
+    """A claim about the model and its constants, whatever the run: a proof, or an experiment of its own.
+
+    `check` sees nothing but `inputs`, so that equal inputs (and equal code) give equal findings: that is what the
+    cache of findings rests on.
+    """
+
+    expected: Status = "proved"
+
+    @abc.abstractmethod
+    def inputs(self, scenario: Scenario) -> dict[str, Any]:
+        """The constants of a scenario that the claim is about, strict JSON; {} if it is about none."""
+
+    @abc.abstractmethod
+    def check(self, inputs: dict[str, Any]) -> Finding:
+        """Decide the claim for these constants; whatever a solver leaves open is `inconclusive`, never a pass.
+
+        Called through `judge`, which turns an exception into `error`.
+        """
+
+    def judge_inputs(self, scenario: Scenario) -> dict[str, Any]:
+        """`inputs` under guard: what keeps them from being found is told to `judge`."""
+        try:
+            return self.inputs(scenario)
+        except Exception as error:
+            return {"error": f"{type(error).__name__}: {error}"}
+
+    def judge(self, inputs: dict[str, Any]) -> Finding:
+        """`check` under guard."""
+        if set(inputs) == {"error"}:
+            return Finding("error", evidence=inputs)
+        try:
+            finding = self.check(inputs)
+            json.dumps(asdict(finding), allow_nan=False)
+        except Exception as error:  # whatever went wrong, the claim was not decided
+            return Finding("error", evidence={"error": f"{type(error).__name__}: {error}"})
+        return finding
+
+
+class TraceClaim(Claim):
+    """A claim about one run, decided from its trace alone."""
+
+    expected: Status = "holds"
+
+    @abc.abstractmethod
+    def check(self, trace: Trace) -> Finding:
+        """Decide the claim on this trace; missing data is `error` or `not_run`, never a pass.
+
+        Called through `judge`, which turns an exception into `error`.
+        """
+
+    def applies(self, trace: Trace) -> bool:
+        """Whether the claim says anything about a run of this method; if not it is left out, not passed."""
+        return True
+
+    def judge(self, trace: Trace) -> Finding:
+        """`check` under guard: a malformed trace or a failing checker is `error`, and so is a pass on half a run."""
+        try:
+            require_motion(trace)
+            finding = self.check(trace)
+            if finding.status in PASSING:
+                require_whole_run(trace)
+            json.dumps(asdict(finding), allow_nan=False)  # a margin that is not a number must not pass
+        except Exception as error:  # whatever went wrong, the claim was not decided
+            return Finding("error", evidence={"error": f"{type(error).__name__}: {error}"})
+        return finding
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """A broken variant of what a claim about the model is about: it must be refuted, or the claim proves nothing.
+
+    Attributes:
+        claim: identifier of the claim that must refute it.
+        says: what is broken.
+        check: decides the broken variant for the claim's inputs; 'refuted' with a counterexample is wanted.
+    """
+
+    claim: str
+    says: str
+    check: Callable[[dict[str, Any]], Finding]
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """A claim and what was found.
+
+    Attributes:
+        claim: the claim.
+        run: on which run; '' for a claim about the model.
+        finding: what was found.
+        expected: the status that the scenario expects.
+        inputs: the constants that a claim about the model is about.
+    """
+
+    claim: Claim
+    run: str
+    finding: Finding
+    expected: Status
+    inputs: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def as_expected(self) -> bool:
+        """Whether the status is the expected one."""
+        return self.finding.status == self.expected
+
+    def to_json(self) -> dict[str, Any]:
+        """The entry of `claims` in report.json; of certificates, their names and SHA-256."""
+        described = ("id", "statement", "formula", "method", "equations", "does_not_establish")
+        digests = {name: files.sha256(text.encode()) for name, text in self.finding.certificates.items()}
+        return {
+            **{name: getattr(self.claim, name) for name in described},
+            "assumptions": list(self.claim.assumptions),
+            "run": self.run,
+            "expected": self.expected,
+            "as_expected": self.as_expected,
+            "inputs": self.inputs,
+            **asdict(self.finding),
+            "certificates": digests,
+        }
+
+
+def require_motion(trace: Trace) -> None:
+    """Check that the trace is of the shape that its docstring states: position[k] = position[k-1] + dt command[k].
+
+    Raises:
+        TraceError: if time runs backwards, the run or the robots are not those of the scenario, or a step does
+            not agree with its command to within `MOTION_TOLERANCE_M`.
+    """
+    scenario, t = trace.scenario, trace.t
+    if scenario["runs"].get(trace.run, {}).get("method") != trace.meta["method"]:
+        raise TraceError(f"the scenario declares no run {trace.run!r} of method {trace.meta['method']!r}")
+    if trace.ugvs != list(scenario["ugvs"]) or trace.robots != [*trace.ugvs, scenario["uav"]["name"]]:
+        raise TraceError(f"the trace is of the robots {trace.robots}, which are not those of its scenario")
+    if len(t) < 2 or (np.diff(t) < 0.0).any():
+        raise TraceError("the trace has fewer than two rows, or its time runs backwards")
+    for robot in trace.robots:
+        predicted = np.diff(t)[:, None] * trace.command(robot)[1:]
+        off = np.abs(np.diff(trace.position(robot), axis=0) - predicted).max(axis=1)
+        k = int(np.argmax(off))
+        if off[k] > MOTION_TOLERANCE_M:
+            raise TraceError(f"{robot} at t = {t[k + 1]} s is {off[k]:.3g} m from where its command leads to")
+
+
+def require_whole_run(trace: Trace) -> None:
+    """Check that the rows cover the run, t = 0 to its duration, with no control period left out.
+
+    Raises:
+        TraceError: if they do not.
+    """
+    t = trace.t
+    duration = trace.scenario["duration_s"]
+    period = trace.scenario["control"]["period_s"]
+    if abs(t[0]) > TIME_TOLERANCE_S or abs(t[-1] - duration) > TIME_TOLERANCE_S:
+        raise TraceError(f"the trace covers {t[0]} to {t[-1]} s of a run from 0 to {duration} s")
+    gap = np.diff(t)
+    if gap.max() > period + TIME_TOLERANCE_S:
+        raise TraceError(f"the trace has no row in the {gap.max()} s before t = {t[1:][np.argmax(gap)]} s")

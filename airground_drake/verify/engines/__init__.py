@@ -1,0 +1,1 @@
+"""What proves and computes, and knows no claim: solvers, obligations, exact arithmetic, segments."""

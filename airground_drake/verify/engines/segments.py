@@ -1,0 +1,158 @@
+"""Exact geometry in continuous time of robots that move on straight lines between the rows of a trace.
+
+Times are in s, positions in m in one common frame; T is the number of rows. Row k ends segment k, which joins
+position[k-1] at t[k-1] to position[k] at t[k].
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import brentq
+
+from airground_drake.arrays import Array
+
+MERGE_S = 1e-9
+"""Rows closer than this are one instant, s: periods that are not binary fractions give simulator steps of
+1e-17 s, and at 10 m/s a robot moves 1e-8 m meanwhile."""
+
+
+@dataclass(frozen=True)
+class Approach:
+    """A minimum of the distance over continuous time.
+
+    Attributes:
+        distance_m: the minimum.
+        t_s: the earliest time at which it is attained, inside [t[row-1], t[row]].
+        row: row that ends the segment on which it is attained (0 only for a single row).
+    """
+
+    distance_m: float
+    t_s: float
+    row: int
+
+
+def closest_approach(t: Array, first: Array, second: Array) -> Approach:
+    """Minimum distance between two points that move at the same time on straight segments, as (7) defines D.
+
+    The relative position r(s) = r0 + s (r1 - r0), s in [0, 1], of a segment is closest to the origin at
+    s = clip(-r0.(r1 - r0) / ||r1 - r0||^2, 0, 1), because ||r(s)||^2 is a convex parabola.
+
+    Args:
+        t: times of the rows, (T,), T >= 1, s, not decreasing.
+        first: positions, (T, 3), m.
+        second: positions, (T, 3), m, or (3,), m, of a point at rest.
+
+    Returns:
+        The minimum over [t[0], t[-1]], its time and its row.
+    """
+    relative = first - second
+    if len(t) == 1:
+        return Approach(float(np.linalg.norm(relative[0])), float(t[0]), 0)
+    begin, step = relative[:-1], np.diff(relative, axis=0)
+    squared = np.einsum("ki,ki->k", step, step)
+    along = -np.einsum("ki,ki->k", begin, step)
+    fraction = np.clip(np.divide(along, squared, out=np.zeros_like(squared), where=squared > 0.0), 0.0, 1.0)
+    distance = np.linalg.norm(begin + fraction[:, None] * step, axis=1)
+    k = int(np.argmin(distance))
+    instant = min(t[k] + fraction[k] * (t[k + 1] - t[k]), t[k + 1])
+    return Approach(float(distance[k]), float(instant), k + 1)
+
+
+def interpolate(t: Array, values: Array, at: float | Array) -> Array:
+    """Values (T, m) that are linear between the rows, at other times: (m,), or (K, m) for K times."""
+    return np.stack([np.interp(at, t, column) for column in values.T], axis=-1)
+
+
+def travelled(waypoints: Array, speed: float, t: float | Array) -> Array:
+    """Position on a polyline travelled at constant speed from t = 0, held at its last point.
+
+    Args:
+        waypoints: corners, (m, 3), m >= 1, m.
+        speed: m/s.
+        t: one time, or (K,) times, s.
+
+    Returns:
+        (3,) or (K, 3), m.
+    """
+    return interpolate(_lengths(waypoints), waypoints, speed * np.asarray(t))
+
+
+def corner_times(waypoints: Array, speed: float) -> Array:
+    """Times at which `travelled` passes its corners and stops, (m - 1,), s; none at standstill."""
+    return _lengths(waypoints)[1:] / speed if speed > 0.0 else np.empty(0)
+
+
+def _lengths(waypoints: Array) -> Array:
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(waypoints, axis=0), axis=1))])
+
+
+@dataclass(frozen=True)
+class NormSignal:
+    """x(t) = ||r(t)|| + n(t) for a vector r and a number n that are linear in time between knots, such as (15).
+
+    Attributes:
+        t: knots, (K,), s; x is monotone between them.
+        parts: r and n at the knots, (K, 4), m.
+        x: value at the knots, (K,), m.
+    """
+
+    t: Array
+    parts: Array
+    x: Array
+
+    @classmethod
+    def of(cls, t: Array, parts: Array) -> NormSignal:
+        """From times (T,) and parts (T, 4) of which x is convex between rows: its minima become knots too."""
+        knots = np.union1d(t, _minima(t, parts))
+        refined = interpolate(t, parts, knots)
+        return cls(knots, refined, norm_sum(refined))
+
+    def at(self, t: float | Array) -> Array:
+        """x at one time or at (K,) times, m."""
+        return norm_sum(interpolate(self.t, self.parts, t))
+
+    def reaches(self, level: float, after: float, *, above: bool) -> float | None:
+        """First time after `after`, s, at which x comes to be >= level (above) or < level (not above)."""
+        begin = int(np.searchsorted(self.t, after, side="right"))
+        there = (self.x[begin:] >= level) == above
+        if not there.any():
+            return None
+        k = begin + int(np.argmax(there))
+        left, right = max(after, float(self.t[k - 1])), float(self.t[k])
+        ends = self.at(np.array([left, right])) - level
+        if ends[0] * ends[1] >= 0.0:  # a crossing at a knot, up to rounding
+            return left if abs(ends[0]) <= abs(ends[1]) else right
+        return float(brentq(lambda t: float(self.at(t)) - level, left, right, xtol=1e-12))
+
+
+def norm_sum(parts: Array) -> Array:
+    """||r|| + n of parts (..., 4): (...), m."""
+    total: Array = np.linalg.norm(parts[..., :3], axis=-1) + parts[..., 3]
+    return total
+
+
+def _minima(t: Array, parts: Array) -> Array:
+    """Interior minima of x on the intervals between t (T,), s: at most one on each, as x is convex there.
+
+    With r = r0 + u w and n = n0 + u m, u in [0, 1], let p be the distance of the line from the origin and
+    s = ||w|| u + r0.w/||w||; then x' = 0 where ||w|| s / sqrt(p^2 + s^2) = -m. Steps w and m are first divided by a
+    power of 2 close to their size, which is exact: squares of very short ones would be 0.
+    """
+    change = np.diff(parts, axis=0)
+    exponent = np.frexp(np.abs(change).max(axis=1))[1]
+    step = np.ldexp(change, -exponent[:, None])
+    moving = np.linalg.norm(step[:, :3], axis=1) > np.abs(step[:, 3])  # otherwise x is monotone
+    start = parts[:-1][moving, :3]
+    w = step[moving, :3]
+    m = step[moving, 3]
+    length = np.linalg.norm(w, axis=1)
+    along = (start * w).sum(axis=1) / length
+    across = np.linalg.norm(start - (along / length)[:, None] * w, axis=1)
+    towards = -m * across / np.sqrt(length**2 - m**2) - along
+    whole = np.ldexp(length, exponent[moving])
+    inside = (towards > 0.0) & (towards < whole)
+    u = towards[inside] / whole[inside]
+    found: Array = t[:-1][moving][inside] + u * np.diff(t)[moving][inside]
+    return found[u < 1.0]

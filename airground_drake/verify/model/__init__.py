@@ -1,0 +1,1 @@
+"""Claims about the model and its constants, whatever the run."""

@@ -1,0 +1,170 @@
+"""Disturbed runs of the running avoidance layer: safe starts under hostile velocities and disturbances."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from airground_drake.arrays import Array
+from airground_drake.nsbc.avoidance import HalfSpaces, limit_speed
+from airground_drake.nsbc.team import Team
+from airground_drake.verify.engines.rounding import SEED, nearest, rates, unit
+from airground_drake.verify.model.avoidance.constants import Inputs, running_avoidance, running_team
+
+TOLERANCE = 1e-9
+"""For distances, m, and inequalities, m/s, of the disturbed runs: thousands of rounded steps err by 1e-12."""
+STEPS = 250
+"""Control periods of each disturbed run."""
+ATTACKS = ("pinned", "idle", "switching", "random")
+Edit = Callable[[HalfSpaces], HalfSpaces]
+
+
+@dataclass(frozen=True)
+class SafeStart:
+    """A safe start of a team of the running code; `positions` (n + 1, 3), m."""
+
+    name: str
+    team: Team
+    positions: Array
+
+
+def scenes(inputs: Inputs) -> list[SafeStart]:
+    """Safe starts, from one obstacle to a field of them.
+
+    In `squeezed` a UGV has no room between another and an obstacle: there the inequalities contradict each other.
+    """
+    team, far = running_team(inputs, ugvs=2), np.array([0.0, 0.0, 1e3])
+    d = team.obstacle_distance
+    dd = team.ugv_distance
+    low = team.air_ground_distance
+    first = replace(team, ugvs=team.ugvs[:1], max_speed=team.max_speed[[0, -1]])
+    turn = np.deg2rad([90.0, 210.0, 330.0])
+    triangle = d * np.column_stack([np.cos(turn), np.sin(turn), np.zeros(3)])
+    rng = np.random.default_rng(SEED)
+    field = np.column_stack([rng.uniform(-3.0 * d, 3.0 * d, (10, 2)), np.zeros(10)])
+    field = field[np.linalg.norm(field, axis=1) >= 1.2 * d]
+
+    def alone(name: str, obstacles: list[list[float]] | Array, ugv: list[float], uav: Array = far) -> SafeStart:
+        around = np.array(obstacles, dtype=np.float64).reshape(-1, 3)
+        return SafeStart(name, replace(first, obstacles=around), np.array([ugv, uav]))
+
+    found = [
+        alone("obstacle", [[0.0, 0.0, 0.0]], [1.01 * d, 0.0, 0.0]),
+        alone("notch", [[-0.8 * d, 0.0, 0.0], [0.8 * d, 0.0, 0.0]], [0.0, 0.7 * d, 0.0]),
+        alone("gap", [[-d, 0.0, 0.0], [d, 0.0, 0.0]], [0.0, 0.0, 0.0]),
+        alone("triangle", triangle, [0.0, 0.0, 0.0]),
+        alone("uav_low", [], [0.0, 0.0, 0.0], np.array([0.1 * low, 0.0, 1.01 * low])),
+    ]
+    if len(team.ugvs) == 2:
+        two = np.array([[0.0, 0.0, 0.0], [1.1 * dd, 0.0, 0.0], far])
+        found.append(SafeStart("ugv_pair", replace(team, obstacles=np.zeros((0, 3))), two))
+        between = np.array([[d, 0.0, 0.0], [d + dd, 0.0, 0.0], far])
+        found.append(SafeStart("squeezed", replace(team, obstacles=np.zeros((1, 3))), between))
+    return [*found, alone("field", field, [0.0, 0.0, 0.0], np.array([0.0, 0.0, max(d, low)]))]
+
+
+def attack(
+    inputs: Inputs,
+    scene: SafeStart,
+    how: str,
+    *,
+    edit: Edit = lambda given: given,
+    force: float = 1.0,
+    pairs: float = 2.0,
+) -> Inputs:
+    """One disturbed run of the running layer, every robot of the team driven and disturbed; exact motion.
+
+    Args:
+        inputs: constants, with the disturbance's bound.
+        scene: the start.
+        how: 'pinned': velocities below the layer and disturbances both towards what has the least excess; 'idle': the
+            disturbance alone; 'switching': both towards a point that changes every 20 periods; 'random'.
+        edit: a mutation of the inequalities.
+        force: a mutation: size of the disturbance over its bound.
+        pairs: disturbances that the bound counts between robots.
+
+    Returns:
+        `worst_margin_m` (least distance minus d - W/A), where; `unmet`, the inequalities that the layer's velocity
+        missed by more than 1e-9 m/s; `uncovered`, robots and points that went below the bound after such a miss;
+        `broken`, those that did so although all their own inequalities had been met.
+    """
+    rng = np.random.default_rng([SEED, ATTACKS.index(how)])
+    team = scene.team
+    positions = scene.positions.copy()
+    avoidance = running_avoidance(inputs)
+    neighbourhood = team.neighbourhood(slice(None))
+    mobility = team.mobility
+    n = len(team.robots)
+    m = len(team.obstacles)
+    w = inputs["disturbance_m_s"]
+    h = avoidance.period
+    rows = np.arange(n)
+    added = np.where(neighbourhood.share < 1.0, pairs, 1.0) * w
+    bound = neighbourhood.distance - added / avoidance.gain
+    met = np.ones(bound.shape, dtype=bool)  # all inequalities of this pair so far
+    worst = np.inf
+    unmet = 0
+    shortfall = 0.0
+    broke = 0
+    uncovered = 0
+    where: dict[str, Any] = {}
+    target = rng.integers(bound.shape[1], size=n)
+    for k in range(STEPS):
+        around = neighbourhood.around(positions)
+        x = positions[:, None] - around.centre
+        reach = np.linalg.norm(x, axis=-1)
+        if how != "switching":
+            target = np.argmin(reach - around.distance, axis=1)
+        elif k % 20 == 0:
+            target = rng.integers(bound.shape[1], size=n)
+        inward = -x[rows, target] / reach[rows, target][:, None]
+        wanted, push = (unit(rng, n), unit(rng, n)) if how == "random" else (inward, inward)
+        wanted = wanted * mobility * (0.0 if how == "idle" else 100.0)
+        spaces = edit(avoidance.half_spaces(positions, mobility, around))
+        velocity = avoidance.apply(limit_speed(wanted, team.max_speed), spaces)
+        short = np.where(np.isfinite(spaces.bound), spaces.bound - rates(spaces.normal, velocity), -np.inf)
+        unmet = unmet + int((short > TOLERANCE).sum())
+        shortfall = max(shortfall, float(short.max()))
+        met &= short <= TOLERANCE
+        moved = velocity + force * w * push * mobility
+        others = np.zeros(x.shape)
+        others[:, m:] = moved[neighbourhood.others]
+        least = nearest(x, moved[:, None] - others, h)
+        both = met.copy()
+        for i in range(n):  # a pair needs both robots' halves
+            for j, other in enumerate(neighbourhood.others[i]):
+                both[i, m + j] &= met[other, m + int(np.flatnonzero(neighbourhood.others[other] == i)[0])]
+        below = least < bound - TOLERANCE
+        broke = broke + int((below & both).sum())
+        uncovered = uncovered + int((below & ~both).sum())
+        i, j = divmod(int(np.argmin(least - bound)), bound.shape[1])
+        if least[i, j] - bound[i, j] < worst:
+            worst = float(least[i, j] - bound[i, j])
+            where = {
+                "scene": scene.name, "attack": how, "robot": team.robots[i], "t_s": k * h,
+                "distance_m": float(least[i, j]), "bound_m": float(bound[i, j]),
+                "safe_distance_m": float(around.distance[i, j]),
+                "positions_m": positions.tolist(), "avoided_m": around.centre[i, j].tolist(),
+                "velocity_with_disturbance_m_s": moved[i].tolist(),
+            }  # fmt: skip
+        positions = positions + h * moved
+    return {
+        "worst_margin_m": worst, "where": where, "unmet": unmet, "worst_shortfall_m_s": shortfall,
+        "broken": broke, "uncovered": uncovered,
+    }  # fmt: skip
+
+
+def campaign(inputs: Inputs) -> list[Inputs]:
+    """Every scene under every attack: one row for each scene."""
+    rows = []
+    for scene in scenes(inputs):
+        runs = [attack(inputs, scene, how) for how in ATTACKS]
+        worst = min(runs, key=lambda run: float(run["worst_margin_m"]))
+        total = {name: sum(run[name] for run in runs) for name in ("unmet", "broken", "uncovered")}
+        shortfall = max(run["worst_shortfall_m_s"] for run in runs)
+        row = {"scene": scene.name, "steps": STEPS * len(runs), **worst, **total}
+        rows.append({**row, "worst_shortfall_m_s": shortfall})
+    return rows

@@ -1,0 +1,88 @@
+"""SAFE-INV: why no sampled step of set-based avoidance leaves the safe set.
+
+The way through the proof: `lemma.py` (SAFE-LEMMA) turns motion in space into statements about one number, the
+distance; `obligations.py` has those statements, each with its certificate; `constants.py` the numbers of the running
+team that they are repeated with; `conformance.py` compares the relation that they encode with the compiled kernels;
+`hostile_inputs.py` drives the running layer from safe states by hostile velocities; `mutants.py` has the broken
+variants that must be refuted. SAFE-GATE (`safe_gate.py`) and SAFE-DIST (`safe_dist.py`) build on it.
+
+Symbols, in proofs and in their texts: a robot at x relative to what it avoids, at distance D = ||x||, with unit
+vector n = x/D and velocity v, has the radial speed r = n.v; E = ||x + s v|| is the distance after s, 0 <= s <= h; d is
+the safe distance, A the gain, h the control period, q the share of an inequality (1 obstacle, 1/2 robot of a pair), b
+its bound. SAFE-LEMMA is E >= D + s r; everything else is about the numbers D, r, s.
+
+Certificate files: `obligations.json` and `<obligation>.smt2` as `engines/obligation.py` describes them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from airground_drake.scenarios.schema import Scenario
+from airground_drake.verify.claim import ModelClaim
+from airground_drake.verify.engines.prover import discharge, finding
+from airground_drake.verify.finding import Finding
+from airground_drake.verify.model.avoidance.conformance import conformance, rounding_margins
+from airground_drake.verify.model.avoidance.constants import Inputs, constants, kinds, range_spare
+from airground_drake.verify.model.avoidance.hostile_inputs import postcondition
+from airground_drake.verify.model.avoidance.obligations import LIMIT_S, rest, scaling, step, with_scenario
+
+
+class SafeInv(ModelClaim):
+    """SAFE-INV."""
+
+    id = "SAFE-INV"
+    statement = (
+        "One control period under the avoidance inequalities keeps the distance: if D >= d at a sample and the "
+        "velocities held until the next meet their inequality, the distance is >= d all the time in between; if D <= d "
+        "it never decreases, and the deficit shrinks by the factor 1 - A h per period at least. It holds for an "
+        "obstacle, for two robots that take half the inequality each, for a UGV under a UAV (z of n dropped, v_z = 0), "
+        "and for what is beyond the sensing range. With several obstacles and robots each pair has its own inequality "
+        "and its own conclusion; all hold together where all inequalities do, and from a safe state v = 0 meets them "
+        "all. Scaling a velocity towards 0 breaks no inequality that v = 0 meets."
+    )
+    formula = (
+        "D >= d, n.v >= -q (D - d)/h (sum over the pair: q = 1) => ||x + s v|| >= d for all s in [0, h]; "
+        "D <= d, n.v >= q A (d - D) => ||x + s v|| >= D and d - ||x + h v|| <= (1 - A h)(d - D); "
+        "D > R, R >= d + c h => ||x + s v|| >= d"
+    )
+    method = (
+        "In D, r = n.v and s through SAFE-LEMMA: polynomial certificates, symbolic in A, h, d and again with the "
+        "scenario's numbers; z3 and cvc5 on the negations. The encoded relation is compared in exact arithmetic with "
+        "what the running kernel computes, and the running composition is sampled with up to 12 points."
+    )
+    equations = "(7)-(8), (11) in the inequality form of the package (set-based avoidance)"
+    assumptions = (
+        "SAFE-LEMMA; integrator plant with zero-order hold, both robots of a pair sampled at the same instants.",
+        "Obstacles stand still; robots are points and obey their speed limits (what is out of range counts on that).",
+        "A UGV's velocity has no z component.",
+        "Rounding: binary64, a period cut into at most 64 integration steps, coordinates <= start + speed * duration.",
+    )
+    does_not_establish = (
+        "That the inequalities hold in a run (SAFE-HYP), nor under disturbance (SAFE-DIST). In floating point the "
+        "distance is kept up to the margins in the evidence: what one step loses is restored while D < d by the lower "
+        "branch, one deficit at a time; contradictory deficits of several points are not restored, and then losses may "
+        "add up over the steps. Inside two safe distances at once there may be no velocity that meets both."
+    )
+
+    def inputs(self, scenario: Scenario) -> Inputs:
+        """Gain, period, sensing range and the team."""
+        return constants(scenario)
+
+    def check(self, inputs: Inputs) -> Finding:
+        """Discharge the obligations, compare with the kernels; margin: spare of the sensing range."""
+        compared, sampled = conformance(inputs), postcondition(inputs, 500)
+        found = finding(
+            discharge([*step(), *rest(), *scaling(), *with_scenario(inputs)], LIMIT_S),
+            conformance=compared, composition=sampled, rounding=rounding_margins(inputs),
+        )  # fmt: skip
+        spare = {kind.name: float(range_spare(inputs, kind)) for kind in kinds(inputs)}
+        kind = min(spare, key=lambda name: spare[name])
+        where = {"quantity": "sensing range - d - c h", "pair": kind}
+        found = replace(found, margin=spare[kind], unit="m", where=where)
+        if found.status == "proved" and not compared["agrees"]:
+            return replace(found, status="refuted", counterexample=compared["first_difference"] or compared)
+        lost = sampled["worst_loss_over_rounding"] > 1.0
+        if found.status == "proved" and (lost or not sampled["met"]):
+            return replace(found, status="refuted", counterexample=sampled["first_missed"] or sampled)
+        return found

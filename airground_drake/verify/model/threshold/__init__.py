@@ -1,0 +1,1 @@
+"""THR-ROOT, THR-OPT, THR-DDM: the threshold and the drift-diffusion model that it comes from."""

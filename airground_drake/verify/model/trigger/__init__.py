@@ -1,0 +1,1 @@
+"""ZENO-PROOF and ZENO-REFINE: the trigger's events neither accumulate nor multiply."""

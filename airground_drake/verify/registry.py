@@ -1,0 +1,66 @@
+"""The claims and mutants that are registered, made on use.
+
+Which claims there are stands in `airground_drake.registry`, in the order of the report: a new claim is one file and one
+line there. A scenario adds its own under `claims`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from functools import cache
+from importlib import import_module
+from typing import TypeVar
+
+from airground_drake.errors import PluginError, UnknownNameError
+from airground_drake.registry import MODEL_CLAIMS, RUN_CLAIMS, Registry
+from airground_drake.verify.claim import Claim, ModelClaim, Mutant, TraceClaim
+
+C = TypeVar("C", bound=Claim)
+
+MUTANTS: tuple[str, ...] = (
+    "airground_drake.verify.model.avoidance.mutants",
+    "airground_drake.verify.model.trigger.mutants",
+    "airground_drake.verify.model.threshold.mutants",
+)
+"""Modules with a table MUTANTS of broken variants, each of which names the claim that must refute it."""
+
+
+def model_claims(ids: Collection[str] | None = None, added: Mapping[str, str] | None = None) -> list[ModelClaim]:
+    """The claims about the model, or those with these identifiers.
+
+    Args:
+        ids: default: all.
+        added: claims of a scenario, `module:Class` by identifier; those about runs are left out.
+
+    Raises:
+        UnknownNameError: if an identifier is not that of a claim about the model.
+        PluginError: if a claim cannot be imported, or has another identifier than its name.
+    """
+    return _made(MODEL_CLAIMS, ModelClaim, ids, added or {})
+
+
+def run_claims(ids: Collection[str] | None = None, added: Mapping[str, str] | None = None) -> list[TraceClaim]:
+    """The claims that are decided from one trace, or those with these identifiers; as `model_claims` otherwise."""
+    return _made(RUN_CLAIMS, TraceClaim, ids, added or {})
+
+
+def mutants() -> list[Mutant]:
+    """All broken variants."""
+    return [mutant for module in MUTANTS for mutant in import_module(module).MUTANTS]
+
+
+def _made(registry: Registry, kind: type[C], ids: Collection[str] | None, added: Mapping[str, str]) -> list[C]:
+    places = {name: name for name in registry}
+    places |= {name: place for name, place in added.items() if issubclass(registry.load(place, of=Claim), kind)}
+    for name in ids or ():
+        if name not in places:
+            raise UnknownNameError("claim", name, places)
+    return [_instance(registry, kind, name, place) for name, place in places.items() if ids is None or name in ids]
+
+
+@cache
+def _instance(registry: Registry, kind: type[C], name: str, place: str) -> C:
+    claim = registry.load(place, of=kind)()
+    if claim.id != name:
+        raise PluginError(f"claim {name!r}: {place} has the identifier {claim.id!r}")
+    return claim

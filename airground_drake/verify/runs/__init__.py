@@ -1,0 +1,1 @@
+"""Claims about a run, decided from its trace alone; one claim, one file, named by its identifier."""

@@ -1,0 +1,110 @@
+"""COMM: what a run spent on messages and gatekeeper solves."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from airground_drake.arrays import Array
+from airground_drake.errors import TraceError
+from airground_drake.trace import Trace
+from airground_drake.verify.claim import TIME_TOLERANCE_S, TraceClaim
+from airground_drake.verify.finding import Finding
+from airground_drake.verify.runs.interventions import GATED_METHODS, intervening, talk_is_due
+
+
+class Comm(TraceClaim):
+    """COMM."""
+
+    id = "COMM"
+    statement = (
+        "Messages and gatekeeper solves were spent only while a UGV was being intervened on, and no more of them than "
+        "an always-on scheme would have spent."
+    )
+    formula = (
+        "every proposal and decision in [trigger, release + intervention period + gatekeeper period]; "
+        "proposals <= n floor(duration / intervention period), decisions <= n floor(duration / gatekeeper period)"
+    )
+    method = (
+        "Counts of proposal events and of decisions (each one solve and one answer), each looked up in the intervals "
+        "in which the mode column says 'intervening'. After a release the UAV withdraws its proposal at its next "
+        "planning instant and the gatekeeper notices at its next sample: hence the allowance of one period each."
+    )
+    equations = "(20), (26)"
+    assumptions = (
+        "Always-on means a proposal per planning period and a decision per gatekeeper period, for every UGV.",
+        "Every proposal sent and every decision made is recorded.",
+    )
+    does_not_establish = (
+        "Bytes on a channel, or the cost of supervising: the UAV observes all UGVs all the time, which is not counted. "
+        "The saving is that of this run; one with more trouble triggers more. Whether triggers were right is THR-TRIG."
+    )
+
+    def applies(self, trace: Trace) -> bool:
+        """Method (a) sends nothing by construction."""
+        return trace.meta.get("method") != "a"
+
+    def check(self, trace: Trace) -> Finding:
+        """Count, look for strays, compare with always-on; the margin is the fraction saved of what saves least."""
+        scenario = trace.scenario
+        planning = scenario["intervention"]["period_s"]
+        gating = scenario["gatekeeper"]["period_s"]
+        gated = trace.meta["method"] in GATED_METHODS
+        named = {e["robot"] for e in trace.events if e["kind"] == "proposal"} | set(trace.decisions["robot"])
+        if strangers := named - set(trace.ugvs):
+            raise TraceError(f"proposals or decisions for {sorted(strangers)}, which are not UGVs of the trace")
+        strays: list[dict[str, Any]] = []
+        per_ugv: dict[str, dict[str, Any]] = {}
+        for ugv in trace.ugvs:
+            intervals = intervening(trace, ugv)
+            sent = {
+                "proposal": np.array(
+                    [float(e["t_s"]) for e in trace.events if (e["kind"], e["robot"]) == ("proposal", ugv)]
+                ),
+                "decision": _decisions(trace, ugv, "t_s"),
+            }
+            if np.setdiff1d(_decisions(trace, ugv, "issued_s"), sent["proposal"]).size:
+                raise TraceError(f"{ugv}: a decision is about a proposal that is not among the events")
+            for kind, times in sent.items():
+                late = _outside(times, intervals, planning + gating)
+                strays += [{"robot": ugv, "kind": kind, "t_s": float(time)} for time in times[late]]
+                if not times.size and (kind == "proposal" or gated) and talk_is_due(trace, ugv):
+                    reason = f"{ugv} was in mode 'intervening', but the trace has no {kind}"
+                    return Finding("not_run", evidence={"reason": reason, "faults": trace.meta["faults"]})
+            per_ugv[ugv] = {kind: len(times) for kind, times in sent.items()} | {"intervals_s": intervals.tolist()}
+        n, duration = len(trace.ugvs), scenario["duration_s"] + TIME_TOLERANCE_S
+        most = {"proposal": n * int(duration / planning), "decision": n * int(duration / gating) if gated else 0}
+        spent = {kind: sum(int(entry[kind]) for entry in per_ugv.values()) for kind in most}
+        saved = {kind: 1.0 - spent[kind] / most[kind] for kind in most if most[kind]}
+        over = None if all(spent[kind] <= most[kind] for kind in most) else {"spent": spent, "always_on": most}
+        return Finding(
+            "refuted" if strays or over else "holds",
+            margin=None if strays else min(saved.values(), default=None),
+            unit="fraction saved",
+            counterexample=min(strays, key=lambda stray: float(stray["t_s"])) if strays else over,
+            evidence={
+                "spent": spent,
+                "always_on": most,
+                "saved": saved,
+                "ugvs": per_ugv,
+                "outside_interventions": strays,
+            },
+        )
+
+
+def _decisions(trace: Trace, ugv: str, column: str) -> Array:
+    table = trace.decisions
+    values = table.loc[table["robot"] == ugv, column].to_numpy(dtype=np.float64)
+    if not np.isfinite(values).all():
+        raise TraceError(f"decisions of {ugv}: column {column!r} has values that are not finite")
+    return values
+
+
+def _outside(times: Array, intervals: Array, allowance: float) -> npt.NDArray[np.bool_]:
+    """Which of the times (M,) are in none of the intervals (K, 2) extended by the allowance: (M,) bool."""
+    begins = intervals[:, 0] - TIME_TOLERANCE_S
+    ends = intervals[:, 1] + allowance + TIME_TOLERANCE_S
+    inside = (times[:, None] >= begins) & (times[:, None] <= ends)
+    return np.asarray(~inside.any(axis=1))

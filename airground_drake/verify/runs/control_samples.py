@@ -1,0 +1,18 @@
+"""The control samples of a run: rows at which the controllers chose velocities."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from airground_drake.arrays import Array
+from airground_drake.verify.claim import TIME_TOLERANCE_S
+from airground_drake.verify.engines.segments import MERGE_S
+
+
+def control_samples(t: Array, period: float) -> npt.NDArray[np.intp]:
+    """Rows of the control samples: the nearest to each multiple of the period before the last row, if it is there."""
+    instants = np.arange(int((t[-1] - MERGE_S) / period) + 1) * period
+    right = np.searchsorted(t, instants).clip(1, len(t) - 1)
+    nearest = right - (instants - t[right - 1] < t[right] - instants)
+    return np.asarray(nearest[np.abs(t[nearest] - instants) <= TIME_TOLERANCE_S])

@@ -1,0 +1,97 @@
+"""Bounds of the optimum of a decision's convex problem, by weak duality: whatever solver gave the multipliers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+
+from airground_drake.arrays import Array
+from airground_drake.errors import TraceError
+from airground_drake.verify.runs.gate_record import Row
+
+
+@dataclass(frozen=True)
+class Enclosure:
+    """Bounds of the optimum of one decision's problem, and a lower one for plans with the other first stage."""
+
+    lower: float
+    upper: float
+    other_first: float
+
+
+def enclose(rows: Sequence[Row]) -> list[Enclosure]:
+    """Bounds of the optimum over omega in [0, 1]^N of the cost with distances along the normals.
+
+    For any multipliers l_kj >= 0 of u_k >= d_j - n_kj.(rho_k - o_kj), minimising the Lagrangian over u leaves
+    q(omega) - sum_k (sum_j l_kj)^2 / (4 dt b), q convex and quadratic, of which the tangent at any omega* is below
+    it everywhere, and least at a corner of the box. Both l and omega* are the solver's; neither need be good.
+    """
+    if not rows:
+        return []
+    shares, multipliers = _solve(rows)
+    found = []
+    for row, omega, solved in zip(rows, shares, multipliers, strict=True):
+        dt = row.dt
+        error = row.error_weight
+        slack = row.slack_weight
+        normals = row["normals"]
+        multiplier = solved * row.scale if slack > 0.0 else 0.0 * solved
+        positions = row.positions(omega)
+        away = positions - row["reference_m"]
+        value = dt * error * np.square(away).sum() - (multiplier * row.gaps(positions, normals)).sum()
+        value -= np.square(multiplier.sum(axis=1)).sum() / (4.0 * dt * slack) if slack > 0.0 else 0.0
+        by_position = 2.0 * dt * error * away - np.einsum("km,kmi->ki", multiplier, normals)
+        change = dt * (row["accept_m_s"] - row["refuse_m_s"])
+        slope = np.einsum("ki,ki->k", change, np.cumsum(by_position[::-1], axis=0)[::-1])
+        corner = np.minimum(-slope * omega, slope * (1.0 - omega))
+        other = value + corner[1:].sum() + slope[0] * (1.0 - row["plan"][0] - omega[0])
+        found.append(Enclosure(float(value + corner.sum()), float(row.cost(positions, normals)), float(other)))
+    return found
+
+
+def _solve(rows: Sequence[Row]) -> tuple[list[Array], list[Array]]:
+    """Relaxed plans (N,) and multipliers (N, m) >= 0, costs relative to `Row.scale`, of all rows as one program.
+
+    Variables, stage by stage of row by row: task errors e = rho - reference, omega and u.
+
+    Raises:
+        TraceError: if the solver gives no solution at all.
+    """
+    import cvxpy  # takes a second, which other claims need not wait for
+
+    cp: Any = cvxpy  # its types are incomplete
+    stages = len(rows[0]["reference_m"])
+    total = stages * len(rows)
+    change = np.concatenate([row.dt * (row["accept_m_s"] - row["refuse_m_s"]) for row in rows])
+    moved = [np.diff(row["reference_m"], axis=0, prepend=row["initial_m"][None]) for row in rows]
+    drift = np.concatenate([row.dt * row["refuse_m_s"] - step for row, step in zip(rows, moved, strict=True)])
+    follows = np.arange(3, 3 * total) // 3 % stages != 0
+    dynamics = sparse.eye(3 * total) - sparse.diags(follows.astype(float), -3)
+    steering = sparse.bsr_matrix((change[:, :, None], np.arange(total), np.arange(total + 1))).tocsr()
+    points = [len(row["distances_m"]) for row in rows]
+    at = np.repeat(np.arange(total), np.repeat(points, stages))  # inequality by inequality, its stage
+    count = len(at)
+    normals = np.concatenate([row["normals"].reshape(-1, 1, 3) for row in rows])
+    facing = sparse.bsr_matrix((normals, at, np.arange(count + 1)), shape=(count, 3 * total)).tocsr()
+    picks = sparse.csr_matrix((np.ones(count), at, np.arange(count + 1)), shape=(count, total))
+    least = np.concatenate([-row.gaps(row["reference_m"], row["normals"]).ravel() for row in rows])
+    weights = [(row.dt * row.error_weight / row.scale, row.dt * row.slack_weight / row.scale) for row in rows]
+    of_error, of_slack = np.sqrt(weights).T
+    e = cp.Variable(3 * total)
+    omega = cp.Variable(total)
+    u = cp.Variable(total)
+    constraints = [dynamics @ e - steering @ omega == drift.ravel(), omega >= 0.0, omega <= 1.0, u >= 0.0]
+    constraints += [facing @ e + picks @ u >= least] if count else []
+    error = cp.sum_squares(cp.multiply(np.repeat(of_error, 3 * stages), e))
+    slack = cp.sum_squares(cp.multiply(np.repeat(of_slack, stages), u))
+    cp.Problem(cp.Minimize(error + slack), constraints).solve(solver=cp.CLARABEL)
+    if omega.value is None:
+        raise TraceError("the independent solver gave no solution")
+    shares = [np.clip(part, 0.0, 1.0) for part in np.split(omega.value, len(rows))]
+    dual = np.maximum(0.0, constraints[-1].dual_value) if count else np.empty(0)
+    parts = np.split(dual, np.cumsum(stages * np.array(points))[:-1])
+    return shares, [part.reshape(stages, m) for part, m in zip(parts, points, strict=True)]

@@ -1,0 +1,281 @@
+"""GATE-FEAS: every gatekeeper decision of a run, its plan and the answer given, from the data that it recorded."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from airground_drake.arrays import Array
+from airground_drake.trace import Trace
+from airground_drake.verify.claim import TIME_TOLERANCE_S
+from airground_drake.verify.engines.segments import MERGE_S, corner_times, interpolate, travelled
+from airground_drake.verify.finding import Finding
+from airground_drake.verify.runs.control_samples import control_samples
+from airground_drake.verify.runs.gate_record import POSITION_TOLERANCE_M, GateClaim, Off, Row, conclude, cost_tolerance
+from airground_drake.verify.runs.pairs import pairs_of, places_of, slack_of
+
+SPEED_TOLERANCE = 1e-4
+"""A step may be longer than the speed limit allows by this, relative."""
+COMMAND_TOLERANCE_M_S = 1e-6
+"""A command may differ from the UGV's own task by this, m/s: positions enter with the motion gain."""
+INSIDE_M = 1e-6
+"""Closer than the safe distance by more than this, m, the avoidance inequalities may ask for more speed than that:
+they ask for less than 1e-5 m/s per point before, at gains up to 10 1/s."""
+NO_DIFFERENCE = 1e-6
+"""Relative gain from which on a new proposal makes a difference."""
+
+
+class GateFeas(GateClaim):
+    """GATE-FEAS."""
+
+    id = "GATE-FEAS"
+    statement = (
+        "Every gatekeeper decision was about the UGV's situation at that time, its plan satisfies (26b)-(26e) at the "
+        "recorded cost, the answer given is the one that follows from the costs, and no UGV did anything but its own "
+        "task while it had accepted nothing."
+    )
+    formula = (
+        "rho(0) = p(t); omega in {0, 1}; rho_k = rho_(k-1) + dt (omega_k a_k + (1 - omega_k) b_k); u_k = max(0, max_j "
+        "d_j - ||rho_k - o_jk||); objective = dt sum_k a ||rho_rd - rho_k||^2 + b u_k^2; reference, centres and "
+        "distances as the scenario and the signals at t have them; answer = rules(costs, bend, standing answer)"
+    )
+    method = (
+        "All recomputed in numpy from the scenario, the signals and the recorded mode velocities. A sensed obstacle or "
+        "robot may be missing only if no plan can come within its safe distance. The rules (no difference below a "
+        "relative gain of 1e-6, bend, switching margin, dwell) are run again over the decisions of each UGV, which "
+        "must follow each other without a gap while a proposal stands. Route 'rollout' predicts the nonlinear closed "
+        "loop: there (23) is checked up to the first change of mode, after it that no step is longer than the speed "
+        "limit allows, except where it begins more than 1e-6 m inside a safe distance: avoidance may then demand more."
+    )
+    equations = "(22)-(26)"
+    assumptions = (
+        "The mode velocities of (23) are the recorded ones, in stages of the recorded length.",
+        "Other robots keep the velocity that they have at the time of the decision.",
+        "The bend, and the cost of the choice that lost, are the recorded ones.",
+    )
+    does_not_establish = (
+        "That the mode velocities are those of the closed loop, or that the run went as predicted. (26d) is soft: a "
+        "feasible plan may lead inside a safe distance, at the cost of its slack; safety is SAFE-TRACE."
+    )
+
+    def judge_rows(self, trace: Trace, rows: list[Row]) -> Finding:
+        """Compare everything recorded with what it should be; the margin is the part of a tolerance left."""
+        compared = [one for row in rows for one in (*compare_situation(trace, row), *compare_plan(trace, row))]
+        compared += [*compare_answers(trace, rows), *compare_obedience(trace, rows), *compare_own_task(trace, rows)]
+        slack = [float(np.maximum(0.0, -row.clearance(row["positions_m"])).max()) for row in rows if row.planned]
+        finding = Finding(
+            "holds",
+            margin=min((1.0 - one.off / one.allowed for one in compared if one.allowed > 0.0), default=None),
+            unit="of the tolerance",
+            evidence={
+                "decisions": len(rows),
+                "without_a_plan": [row.label for row in rows if not row.planned],
+                "comparisons": len(compared),
+                "wrong": sum(one.wrong for one in compared),
+                "reasons": {str(k): int(v) for k, v in trace.decisions["reason"].value_counts().items()},
+                "largest_slack_m": max(slack, default=0.0),
+                "plans_with_slack": sum(value > 0.0 for value in slack),
+            },
+        )
+        return conclude(finding, compared)
+
+
+def compare_situation(trace: Trace, row: Row) -> Iterator[Off]:
+    """The data of (26) against the scenario and the signals at the time of the decision."""
+    gate = trace.scenario["gatekeeper"]
+    t = float(row.given["t_s"])
+    robot = str(row.given["robot"])
+    preset = trace.scenario["ugvs"][robot]["preset"]
+    after = gate["horizon_s"] / gate["stages"] * np.arange(1.0, gate["stages"] + 1.0)
+    yield Off(row, "length of a stage, s", row.dt - after[0], TIME_TOLERANCE_S)
+    yield Off(row, "weight of task errors", row.error_weight - gate["error_weight_1_m2_s"], 0.0)
+    yield Off(row, "weight of slack", row.slack_weight - gate["slack_weight_1_m2_s"], 0.0)
+    own = interpolate(trace.t, trace.position(robot), t)
+    yield Off(row, "initial position, m", row["initial_m"] - own, POSITION_TOLERANCE_M, position_m=own.tolist())
+    reference = travelled(np.asarray(preset["waypoints_m"], dtype=np.float64), preset["speed_m_s"], t + after)
+    yield Off(row, "reference, m", row["reference_m"] - reference, POSITION_TOLERANCE_M)
+    left = _sensed(trace, robot, t, own, after)
+    for j, distance in enumerate(row["distances_m"]):
+        differ = [max(np.abs(at - row["centres_m"][:, j]).max(), abs(safe - distance)) for _, at, safe in left]
+        nearest = int(np.argmin(differ)) if left else -1
+        found = float(differ[nearest]) if left else np.inf
+        yield Off(row, f"point {j}: nothing that the UGV senses, m", min(found, 1e9), POSITION_TOLERANCE_M)
+        if found <= POSITION_TOLERANCE_M:
+            left.pop(nearest)
+    fastest = np.linalg.norm(np.stack([row["accept_m_s"], row["refuse_m_s"]]), axis=2).max(axis=0)
+    if row.given["route"] == "rollout":  # between two changes of mode a plan may be as fast as any
+        fastest = np.maximum(fastest, trace.scenario["ugvs"][robot]["max_speed_m_s"])
+    reach = row.dt * np.cumsum(fastest)
+    for name, at, safe in left:
+        lacking = np.minimum(
+            safe + reach - np.linalg.norm(at - own, axis=1),
+            safe - np.abs(at[:, 2] - own[2]),  # UGVs keep their height
+        ).max()
+        if row.planned:
+            lacking = max(lacking, (safe - np.linalg.norm(row["positions_m"] - at, axis=1)).max())
+        yield Off(row, f"{name} is left out though within reach, m", max(0.0, lacking), POSITION_TOLERANCE_M)
+
+
+def _sensed(trace: Trace, robot: str, t: float, own: Array, after: Array) -> list[tuple[str, Array, float]]:
+    """Obstacles and other robots within sensing range: name, places (N, 3) at times `after` t, safe distance, m."""
+    scenario, safe = trace.scenario, trace.scenario["safe_distance"]
+    held = min(int(np.searchsorted(trace.t, t - TIME_TOLERANCE_S)), len(trace.t) - 1)
+    fixed = scenario["obstacles"].items()
+    things = [(name, np.array(o["position_m"]), np.zeros(3), safe["obstacle_m"]) for name, o in fixed]
+    for other in trace.robots:
+        if other != robot:
+            distance = safe["ugv_m"] if other in trace.ugvs else safe["air_ground_m"]
+            things.append((other, interpolate(trace.t, trace.position(other), t), trace.command(other)[held], distance))
+    return [
+        (name, place + after[:, None] * velocity, float(distance))
+        for name, place, velocity, distance in things
+        if np.linalg.norm(place - own) <= scenario["control"]["sensing_range_m"]
+    ]
+
+
+def compare_plan(trace: Trace, row: Row) -> Iterator[Off]:
+    """(26b)-(26e), (25) and what was recorded about the plan."""
+    limit = trace.scenario["ugvs"][row.given["robot"]]["max_speed_m_s"]
+    period = trace.scenario["control"]["period_s"]
+    trajectories = dict(zip(("refusing throughout", "accepting throughout"), row.constant, strict=True))
+    if row.planned:
+        plan = row["plan"]
+        positions = row["positions_m"]
+        given = row.given
+        yield Off(row, "omega is not binary", np.minimum(np.abs(plan), np.abs(plan - 1.0)), 0.0)
+        same = np.logical_and.accumulate(plan == plan[0]) | (given["route"] != "rollout")
+        away = positions - row.positions(plan)
+        yield Off(row, "positions are not those of (23), m", away[same], POSITION_TOLERANCE_M)
+        trajectories["the plan"] = positions
+        cost = float(row.cost(positions))
+        clearance = min(float(row.clearance(positions).min()), 1e9)
+        first = "accept" if plan[0] == 1.0 else "refuse"
+        tolerance = cost_tolerance(cost)
+        yield Off(row, "objective", given["objective"] - cost, tolerance, recomputed=cost, recorded=given["objective"])
+        yield Off(row, "objective of its first stage", given[f"objective_{first}"] - cost, tolerance, recomputed=cost)
+        other = min(given["objective_accept"], given["objective_refuse"])
+        for name, trajectory in zip(("refuse", "accept"), row.constant, strict=True):
+            thus = float(row.cost(trajectory))
+            shift = given[f"{name}_throughout"] - thus
+            yield Off(row, f"{name} throughout", shift, cost_tolerance(thus), recomputed=thus)
+        yield Off(row, "the other choice is cheaper", max(0.0, given["objective"] - other), tolerance)
+        yield Off(row, "first stage", float(given["first_stage"] != first), 0.0, plan=first)
+        shift = given["predicted_clearance_m"] - clearance
+        yield Off(row, "predicted clearance, m", shift, POSITION_TOLERANCE_M, recomputed_m=clearance)
+    for name, positions in trajectories.items():
+        step = np.linalg.norm(np.diff(positions, axis=0, prepend=row["initial_m"][None]), axis=1)
+        over = (step / (limit * row.dt) - 1.0)[_clear(row, positions, period)]
+        yield Off(row, f"{name}: faster than the speed limit", np.maximum(0.0, over), SPEED_TOLERANCE)
+
+
+def _clear(row: Row, positions: Array, period: float) -> npt.NDArray[np.bool_]:
+    """Stages (N,) in which no control sample (every `period`, s) is within a safe distance by more than rounding."""
+    centres = row["centres_m"]
+    before = centres[0] - (centres[min(1, len(centres) - 1)] - centres[0])
+    start = (np.linalg.norm(row["initial_m"] - before, axis=1) - row["distances_m"]).min(initial=np.inf)
+    inside = np.concatenate([[start], row.clearance(positions)]) < -INSIDE_M
+    several = row.dt > period + TIME_TOLERANCE_S  # samples within the stage: what they see is not recorded
+    return ~(inside[:-1] | (inside[1:] & several))
+
+
+def compare_answers(trace: Trace, rows: Sequence[Row]) -> Iterator[Off]:
+    """The answers against the rules, decision by decision, and the times of the decisions."""
+    gate = trace.scenario["gatekeeper"]
+    for ugv in trace.ugvs:
+        last: Row | None = None
+        since = 0.0
+        for row in (row for row in rows if row.given["robot"] == ugv):
+            given = row.given
+            t = float(row.given["t_s"])
+            period = gate["period_s"]
+            if last is not None and last.given["issued_s"] != given["issued_s"]:
+                last = None
+            standing = None if last is None else str(last.given["decision"])
+            early = given["issued_s"] if last is None else last.given["t_s"] + period
+            late = given["issued_s"] + period if last is None else early
+            yield Off(row, "a decision is missing before this one, s", max(0.0, t - late), TIME_TOLERANCE_S)
+            yield Off(row, "a decision too many, s", max(0.0, early - t), TIME_TOLERANCE_S)
+            accept, reason = rule(row, standing, t - since, gate)
+            ours = ("accept" if accept else "refuse", reason)
+            theirs = (given["decision"], given["reason"])
+            yield Off(row, "answer or reason", float(ours != theirs), 0.0, recomputed=list(ours), standing=standing)
+            since = since if given["decision"] == standing else t
+            last = row
+
+
+def rule(row: Row, standing: str | None, stood: float, gate: dict[str, Any]) -> tuple[bool, str]:
+    """Whether a proposal is accepted and why, from the recorded costs and bend.
+
+    Args:
+        row: the decision.
+        standing: the answer to this proposal so far, or None.
+        stood: for how long it has been that, s.
+        gate: the scenario's margins.
+    """
+    given, bent = row.given, row.given["bend"] > gate["max_bend"]
+    if not row.planned:
+        return False, "no_plan"
+    if standing is None:
+        if row["plan"][0] != 1.0:
+            return False, "not_cheaper"
+        if given["objective"] >= (1.0 - NO_DIFFERENCE) * given["refuse_throughout"]:
+            return False, "no_difference"
+        return not bent, "bent" if bent else "cheaper"
+    accepted = standing == "accept"
+    enough = (1.0 - gate["switching_margin"]) * given[f"{standing}_throughout"]
+    cheaper = (row["plan"][0] == 1.0) != accepted and given["objective"] < enough
+    if not ((cheaper or bent) if accepted else (cheaper and not bent)):
+        return accepted, "kept"
+    if stood < gate["min_dwell_s"] - TIME_TOLERANCE_S:
+        return accepted, "dwell"
+    return not accepted, "reversed"
+
+
+def compare_obedience(trace: Trace, rows: Sequence[Row]) -> Iterator[Off]:
+    """Interventions executed, by the signals, without an acceptance in force."""
+    control = trace.scenario["control"]["period_s"]
+    gate = trace.scenario["gatekeeper"]["period_s"]
+    # a row has what the last control sample before it has set, by the answer given up to then
+    sample = control * (np.ceil(trace.t / control - 1e-6) - 1.0)
+    for ugv in trace.ugvs:
+        own = [row for row in rows if row.given["robot"] == ugv]  # not empty if anything was executed: see `check`
+        times = np.array([row.given["t_s"] for row in own])
+        for k in np.flatnonzero(trace.column(f"{ugv}.accepted") == 1.0):
+            last = int(np.searchsorted(times, sample[k] + TIME_TOLERANCE_S)) - 1
+            age = sample[k] - times[last] if last >= 0 and own[last].given["decision"] == "accept" else np.inf
+            if age > gate + TIME_TOLERANCE_S:
+                what = "executed without an acceptance in force"
+                yield Off(own[max(last, 0)], what, 1.0, 0.0, row_t_s=float(trace.t[k]))
+
+
+def compare_own_task(trace: Trace, rows: Sequence[Row]) -> Iterator[Off]:
+    """Commands, where nothing is accepted and no avoidance inequality interferes, against the UGV's own task (6)."""
+    control, places = trace.scenario["control"], places_of(trace)
+    samples = control_samples(trace.t, control["period_s"])
+    chosen = np.searchsorted(trace.t, trace.t[samples] + MERGE_S)  # what is set at a sample is in the next row
+    t, step = trace.t[samples], 1e-3 * control["period_s"]
+    at = {name: place if place.ndim == 1 else place[samples] for name, place in places.items()}
+    for ugv in trace.ugvs:
+        own = trace.scenario["ugvs"][ugv]
+        waypoints = np.asarray(own["preset"]["waypoints_m"], dtype=np.float64)
+        speed = own["preset"]["speed_m_s"]
+        here = travelled(waypoints, speed, t)
+        wanted = (travelled(waypoints, speed, t + step) - here) / step + control["motion_gain_1_s"] * (here - at[ugv])
+        wanted[:, 2] = 0.0
+        size = np.linalg.norm(wanted, axis=1, keepdims=True)
+        wanted *= np.minimum(1.0, own["max_speed_m_s"] / np.maximum(size, 1e-12))
+        corners = np.asarray(corner_times(waypoints, speed), dtype=np.float64).reshape(-1, 1)
+        free = (np.abs(corners - t) > control["period_s"]).all(axis=0) & (
+            trace.column(f"{ugv}.accepted")[chosen] == 0.0
+        )
+        for pair in pairs_of(trace):
+            if ugv in (pair.first, pair.second):
+                other = pair.second if pair.first == ugv else pair.first
+                free &= slack_of(at[ugv] - at[other], wanted, pair, control, planar=True) > COMMAND_TOLERANCE_M_S
+        away = np.where(free, np.linalg.norm(trace.command(ugv)[chosen] - wanted, axis=1), 0.0)
+        k = int(np.argmax(away))
+        what = "not its own task, though nothing is accepted, m/s"
+        yield Off(rows[0], what, float(away[k]), COMMAND_TOLERANCE_M_S, robot=ugv, sample_t_s=float(t[k]))

@@ -1,0 +1,202 @@
+"""What a recorded gatekeeper decision is, and what the claims about decisions share.
+
+The paper's formulas are written again in plain numpy; N is the number of stages, m of the points to keep away from.
+"""
+
+from __future__ import annotations
+
+import abc
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from airground_drake.arrays import Array
+from airground_drake.errors import TraceError
+from airground_drake.trace import PROBLEM_ARRAYS, PROBLEM_SCALARS, Trace
+from airground_drake.verify.claim import TraceClaim
+from airground_drake.verify.finding import Finding
+from airground_drake.verify.runs.interventions import GATED_METHODS, talk_is_due
+
+POSITION_TOLERANCE_M = 1e-9
+"""Recorded and recomputed positions may differ by this, m: rounding of N additions errs by 1e-13 m."""
+LEAST_COST = 1e-6
+"""Costs are compared relative to the cheaper constant plan's, but to no less than this: 1 mm of error for 1 s."""
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """One decision and its problem: a row of `Trace.decisions` and of `Trace.problems`, arrays in shape.
+
+    Attributes:
+        given: the columns of `Trace.decisions`.
+        dt: length of a stage, s.
+        error_weight: a of (25), 1/(m^2 s).
+        slack_weight: b of (25), 1/(m^2 s).
+        data: arrays of `Trace.problems` by name, in the shapes that are stated there; None where empty.
+    """
+
+    given: dict[str, Any]
+    dt: float
+    error_weight: float
+    slack_weight: float
+    data: dict[str, Array | None]
+
+    def __getitem__(self, name: str) -> Array:
+        """An array that must be there.
+
+        Raises:
+            TraceError: if it is not.
+        """
+        found = self.data[name]
+        if found is None:
+            raise TraceError(f"{self.label}: the problem has no {name!r}")
+        return found
+
+    @property
+    def label(self) -> str:
+        """Which decision."""
+        return f"decision of {self.given['robot']} at t = {self.given['t_s']} s"
+
+    @property
+    def planned(self) -> bool:
+        """Whether it rests on a plan; otherwise it is a refusal for want of one."""
+        return self.data["plan"] is not None
+
+    def positions(self, omega: Array) -> Array:
+        """(23): omega (..., N) to positions at the ends of the stages, (..., N, 3), m."""
+        velocity = self["refuse_m_s"] + omega[..., None] * (self["accept_m_s"] - self["refuse_m_s"])
+        return self["initial_m"] + self.dt * np.cumsum(velocity, axis=-2)
+
+    def gaps(self, positions: Array, normals: Array | None = None) -> Array:
+        """Distances minus d at the end of each stage, (..., N, m), m; along unit normals (N, m, 3) if given."""
+        away = positions[..., None, :] - self["centres_m"]
+        reach = np.linalg.norm(away, axis=-1) if normals is None else np.einsum("...kmi,kmi->...km", away, normals)
+        return reach - self["distances_m"]
+
+    def clearance(self, positions: Array, normals: Array | None = None) -> Array:
+        """The least of the `gaps` of each stage, (..., N), m; infinite without points."""
+        return self.gaps(positions, normals).min(axis=-1, initial=np.inf)
+
+    def cost(self, positions: Array, normals: Array | None = None) -> Any:
+        """(25) by the right-hand rectangle rule, slack being max(0, d - distance); (...)."""
+        error = np.square(positions - self["reference_m"]).sum(axis=(-1, -2))
+        slack = np.square(np.minimum(0.0, self.clearance(positions, normals))).sum(axis=-1)
+        return self.dt * (self.error_weight * error + self.slack_weight * slack)
+
+    @cached_property
+    def constant(self) -> Array:
+        """Positions of the plans that refuse and that accept throughout, (2, N, 3), m."""
+        return self.positions(np.array([[0.0], [1.0]]) * np.ones(len(self["reference_m"])))
+
+    @cached_property
+    def scale(self) -> float:
+        """What differences of cost are compared with."""
+        return max(LEAST_COST, float(self.cost(self.constant).min()))
+
+
+def rows_of(trace: Trace) -> list[Row]:
+    """All decisions with their problems.
+
+    Raises:
+        TraceError: if the tables do not belong together, a shape is wrong or a number is not finite.
+    """
+    if len(trace.problems) != len(trace.decisions):
+        raise TraceError(f"{len(trace.decisions)} decisions, but {len(trace.problems)} problems")
+    gate, rows = trace.scenario["gatekeeper"], []
+    for given, problem in zip(trace.decisions.to_dict("records"), trace.problems.to_dict("records"), strict=True):
+        scalars = [float(problem[name]) for name in PROBLEM_SCALARS]
+        flat = {name: np.asarray(problem[name], dtype=np.float64).ravel() for name in PROBLEM_ARRAYS}
+        columns = {str(name): value for name, value in given.items()}
+        row = Row(columns, scalars[0], scalars[1], scalars[2], _shaped(flat, int(gate["stages"])))
+        numbers = [np.array(scalars), np.array([v for v in given.values() if isinstance(v, float)]), *flat.values()]
+        if not all(np.isfinite(values).all() for values in numbers):
+            raise TraceError(f"{row.label}: it or its problem has numbers that are not finite")
+        if given["robot"] not in trace.ugvs or given["route"] != gate["route"]:
+            raise TraceError(f"{row.label}: not of a UGV of the trace, or not by the scenario's route")
+        decided = given["status"] in ("optimal", "budget_spent")
+        if row.planned != decided or (decided and row.data["positions_m"] is None):
+            raise TraceError(f"{row.label}: a plan without positions, or not what its status {given['status']!r} says")
+        rows.append(row)
+    return rows
+
+
+def _shaped(flat: dict[str, Array], n: int) -> dict[str, Array | None]:
+    """Arrays of a problem of n stages in their shapes; None for what is empty and may be."""
+    m = len(flat["distances_m"])
+    shapes: dict[str, tuple[int, ...]] = {"initial_m": (3,), "distances_m": (m,), "centres_m": (n, m, 3)}
+    shapes |= dict.fromkeys(("accept_m_s", "refuse_m_s", "reference_m"), (n, 3))
+    optional: dict[str, tuple[int, ...]] = dict.fromkeys(("plan", "relaxed", "rounded"), (n,))
+    optional |= {"positions_m": (n, 3), "normals": (n, m, 3)}
+    shaped: dict[str, Array | None] = {}
+    for name, values in flat.items():
+        shape = optional[name] if name in optional else shapes[name]
+        size = int(np.prod(shape))
+        if values.size != size and (values.size or name not in optional):
+            raise TraceError(f"a problem's {name!r} has {values.size} numbers, not {size}")
+        shaped[name] = values.reshape(shape) if values.size == size else None
+    return shaped
+
+
+class Off:
+    """How far something is from what it should be, and how far it may be."""
+
+    def __init__(self, row: Row, what: str, by: Any, allowed: float, **more: Any) -> None:
+        """`by`: absolute differences, any shape, of which the largest counts; `more` goes into a counterexample."""
+        self.row = row
+        self.what = what
+        self.allowed = allowed
+        self.more = more
+        self.off = float(np.max(np.abs(by), initial=0.0))
+
+    @property
+    def wrong(self) -> bool:
+        """Whether it is too far; also for a comparison that came out as no number."""
+        return not self.off <= self.allowed
+
+    def to_json(self) -> dict[str, Any]:
+        """For a counterexample."""
+        at = {name: self.row.given[name] for name in ("t_s", "robot", "policy", "decision", "reason", "status")}
+        return {**at, "what": self.what, "off": self.off, "allowed": self.allowed, **self.more}
+
+
+def cost_tolerance(cost: float) -> float:
+    """What recorded and recomputed costs may differ by: rounding of 3 N additions errs by 1e-13, relative."""
+    return 1e-9 * max(cost, LEAST_COST)
+
+
+def conclude(finding: Finding, compared: Iterable[Off]) -> Finding:
+    """The finding; refuted if anything is wrong, by what is so first in time."""
+    wrong = [one for one in compared if one.wrong]
+    if not wrong:
+        return finding
+    first = min(wrong, key=lambda one: float(one.row.given["t_s"]))
+    return replace(finding, status="refuted", margin=None, counterexample=first.to_json())
+
+
+class GateClaim(TraceClaim):
+    """What the three claims share: they are about the decisions of an optimising gatekeeper, all of them recorded."""
+
+    def applies(self, trace: Trace) -> bool:
+        """Methods (a) and (b) optimise nothing."""
+        return trace.meta.get("method") in GATED_METHODS
+
+    def check(self, trace: Trace) -> Finding:
+        """Decide the claim; without decisions it holds only if no UGV was long enough in intervention to need one."""
+        if len(trace.decisions) and not len(trace.problems):
+            return Finding("not_run", evidence={"reason": "the problems of the decisions were not recorded"})
+        for ugv in trace.ugvs:
+            needed = (trace.column(f"{ugv}.accepted") != 0.0).any() or talk_is_due(trace, ugv)
+            if needed and not (trace.decisions["robot"] == ugv).any():
+                reason = f"{ugv} was in mode 'intervening', but the trace has no decision of it"
+                return Finding("not_run", evidence={"reason": reason, "faults": trace.meta["faults"]})
+        rows = rows_of(trace)
+        if not rows:
+            return Finding("holds", evidence={"decisions": 0, "reason": "no UGV was intervened on: nothing to decide"})
+        return self.judge_rows(trace, rows)
+
+    @abc.abstractmethod
+    def judge_rows(self, trace: Trace, rows: list[Row]) -> Finding:
+        """Decide the claim about at least one decision."""

@@ -1,0 +1,62 @@
+"""SAFE-TRACE: the distances of a run, over continuous time."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from airground_drake.trace import Trace
+from airground_drake.verify.claim import TraceClaim
+from airground_drake.verify.engines.segments import closest_approach
+from airground_drake.verify.finding import Finding
+from airground_drake.verify.runs.pairs import DISTANCE_TOLERANCE_M, pairs_of, places_of, snapshot
+
+
+class SafeTrace(TraceClaim):
+    """SAFE-TRACE."""
+
+    id = "SAFE-TRACE"
+    statement = "During the whole run every robot kept the safe distance from every obstacle and every other robot."
+    formula = "min over t in [0, duration] of ||p_i(t) - q_j(t)|| >= d_ij for every pair (i, j), tolerance 1e-9 m"
+    method = (
+        "Exact minimum of the distance on every segment between two rows (closest point of a relative straight motion "
+        "to the origin, closed form): nothing is sampled. Before that, each recorded step must equal command times "
+        "duration to 1e-9 m, otherwise the verdict is `error`."
+    )
+    equations = "(7)-(8), (11)"
+    assumptions = (
+        "Between two rows every robot moves on a straight line at constant speed (integrator plant, zero-order hold).",
+        "Robots and obstacles are points; their extent must be contained in the safe distances.",
+        "Obstacles stand still for the whole run, as the scenario lists them.",
+    )
+    does_not_establish = (
+        "Safety of any other run, start or seed, or of a plant that does not follow its velocity exactly (SAFE-DIST); "
+        "nor that positions in the trace are those of a real robot. It says nothing about why the distance was kept."
+    )
+
+    def check(self, trace: Trace) -> Finding:
+        """Compare the minimum distance of each pair with its safe distance; the worst pair gives the margin."""
+        t, places = trace.t, places_of(trace)
+        pairs: list[dict[str, Any]] = []
+        for pair in pairs_of(trace):
+            nearest = closest_approach(t, places[pair.first], places[pair.second])
+            pairs.append(
+                {
+                    "first": pair.first,
+                    "second": pair.second,
+                    "safe_distance_m": pair.safe_m,
+                    "min_distance_m": nearest.distance_m,
+                    "margin_m": nearest.distance_m - pair.safe_m,
+                    "t_s": nearest.t_s,
+                    "row": nearest.row,
+                }
+            )
+        worst = min(pairs, key=lambda entry: float(entry["margin_m"]))
+        safe = worst["margin_m"] >= -DISTANCE_TOLERANCE_M
+        return Finding(
+            "holds" if safe else "refuted",
+            margin=worst["margin_m"],
+            unit="m",
+            where={key: worst[key] for key in ("first", "second", "t_s")},
+            counterexample=None if safe else worst | snapshot(trace, (worst["first"], worst["second"]), worst["t_s"]),
+            evidence={"pairs": pairs, "tolerance_m": DISTANCE_TOLERANCE_M},
+        )

@@ -1,0 +1,142 @@
+"""THR-TRIG: the events and modes of a run against those of the trigger (20), run again on it."""
+
+from __future__ import annotations
+
+import math
+from itertools import zip_longest
+from typing import Any
+
+import numpy as np
+
+from airground_drake.errors import TraceError
+from airground_drake.trace import Trace
+from airground_drake.verify.claim import TraceClaim
+from airground_drake.verify.engines.segments import NormSignal
+from airground_drake.verify.finding import Finding
+from airground_drake.verify.runs.trigger_record import Conflict, Transition, column_conflict, recorded_events
+from airground_drake.verify.runs.trigger_replay import decision_variable, transitions
+
+EVENT_TOLERANCE_S = 1e-5
+"""Recorded and recomputed events may differ by this, s: ten times the accuracy of the simulator's event isolation."""
+
+VARIABLE_TOLERANCE_M = 1e-6
+"""Recorded and recomputed decision variables may differ by this, m: x moves less within the event isolation."""
+
+MODES = {"trigger": 1, "release": 0, "refractory": 2, "resume": 0}
+"""Mode after each kind of transition: 'refractory' is a release before the dwell is over, 'resume' the end of it."""
+
+EVENT_KINDS = {"trigger": "trigger", "release": "release", "refractory": "release"}
+"""Event that the trace has for a transition."""
+
+
+def _is_bayes(rule: dict[str, Any], zeta: float) -> bool:
+    """Whether zeta, m, solves (19) with c2/c1 on the right, by the sign of its residual on both sides."""
+    level = rule["c2"] / rule["c1_1_s"] * (rule["drift_m_s"] / rule["noise_m_sqrt_s"]) ** 2
+    u = [2.0 * side * zeta * rule["drift_m_s"] / rule["noise_m_sqrt_s"] ** 2 for side in (1.0 - 1e-9, 1.0 + 1e-9)]
+    return math.sinh(u[0]) + u[0] <= level <= math.sinh(u[1]) + u[1]
+
+
+class ThrTrig(TraceClaim):
+    """THR-TRIG."""
+
+    id = "THR-TRIG"
+    statement = (
+        "The UAV triggered exactly when the decision variable reached the threshold, none missing and none spurious; "
+        "a crossing inside the minimum inter-event time triggers at its end if the variable is still above."
+    )
+    formula = (
+        "recorded triggers and releases = those of the automaton run on x(t) = ||rho_rd(t) - rho(t)|| + n(t), "
+        "times equal within 1e-5 s; recorded x equal within 1e-6 m at every row"
+    )
+    method = (
+        "x is rebuilt from positions, noise and the scenario's preset, cut at the preset's corners and at its turning "
+        "points (closed form) into monotone pieces; crossings are then sign changes, located by Brent's method to "
+        "1e-12 s. The automaton is run again on it and its events, and the mode column, are compared one by one."
+    )
+    equations = "(15), (20)"
+    assumptions = (
+        "Positions and integrated noise are linear in time between rows.",
+        "The threshold in force is the one recorded in the trace: the scenario's, or the root of (19) with c2/c1.",
+        "Events in the last 1e-5 s of the run may be on either side of its end.",
+    )
+    does_not_establish = (
+        "That the threshold is a good one (THR-ROOT, THR-OPT), that the noise has the stated distribution (THR-DDM), "
+        "or anything about a Wiener path between the noise samples. Where x only touches a level to within rounding, "
+        "1e-12 m, a trigger and none are equally right and the verdict follows the rounding."
+    )
+
+    def check(self, trace: Trace) -> Finding:
+        """Compare the events of each UGV with the recomputed ones; the first disagreement is the counterexample."""
+        decision, zeta = trace.scenario["decision"], float(trace.meta["zeta_m"])
+        if decision["threshold"]["rule"] == "fixed" and decision["threshold"]["zeta_m"] != zeta:
+            raise TraceError(f"the threshold in force, {zeta} m, is not the scenario's")
+        if decision["threshold"]["rule"] == "bayes" and not _is_bayes(decision["threshold"], zeta):
+            raise TraceError(f"the threshold in force, {zeta} m, is not the Bayes-optimal one of the scenario")
+        bare = decision["trigger"] == "bare"
+        release, dwell = (zeta, 0.0) if bare else (decision["release_m"], decision["min_inter_event_s"])
+        wrong: list[Conflict] = [
+            {"robot": str(e["robot"]), "t_s": float(e["t_s"]), "what": f"spurious {e['kind']}: not a UGV"}
+            for e in trace.events
+            if e["kind"] in ("trigger", "release") and e["robot"] not in trace.ugvs
+        ]
+        evidence: list[dict[str, Any]] = []
+        lags: list[tuple[float, str]] = []
+        for ugv in trace.ugvs:
+            x = decision_variable(trace, ugv)
+            predicted = list(transitions(x, zeta, release, dwell))
+            recorded = recorded_events(trace, ugv)
+            expected = [(time, EVENT_KINDS[kind]) for time, kind in predicted if kind in EVENT_KINDS]
+            lag, mismatch = _compare(expected, recorded, x)
+            found = (mismatch, column_conflict(trace, ugv, recorded), _signal_conflict(trace, ugv, x, predicted))
+            wrong += [{"robot": ugv, **conflict} for conflict in found if conflict is not None]
+            lags += [(lag, ugv)] if expected else []
+            evidence.append(
+                {
+                    "robot": ugv,
+                    "events": [{"t_s": time, "kind": kind} for time, kind in expected],
+                    "worst_time_difference_s": lag,
+                    "largest_decision_variable_m": float(x.x.max()),
+                }
+            )
+        worst = max(lags) if lags and not wrong else None
+        return Finding(
+            "refuted" if wrong else "holds",
+            margin=EVENT_TOLERANCE_S - worst[0] if worst else None,
+            unit="s",
+            where={"robot": worst[1]} if worst else {},
+            counterexample=min(wrong, key=lambda conflict: float(conflict["t_s"])) if wrong else None,
+            evidence={"ugvs": evidence, "zeta_m": zeta, "release_m": release, "dwell_s": dwell},
+        )
+
+
+def _compare(expected: list[Transition], recorded: list[Transition], x: NormSignal) -> tuple[float, Conflict | None]:
+    """Largest time difference of the events that agree, s, and the first one that does not."""
+    lag, end = 0.0, float(x.t[-1]) - EVENT_TOLERANCE_S
+    for ours, theirs in zip_longest(expected, recorded):
+        if ours and theirs and ours[1] == theirs[1] and abs(ours[0] - theirs[0]) <= EVENT_TOLERANCE_S:
+            lag = max(lag, abs(ours[0] - theirs[0]))
+            continue
+        time, kind = min(event for event in (ours, theirs) if event)
+        if (ours and theirs) or time < end:
+            what = f"{'missing' if (time, kind) == ours else 'spurious'} {kind}"
+            both = {"recomputed": ours, "recorded": theirs}
+            return lag, {"t_s": time, "what": what, **both, "decision_variable_m": float(x.at(time))}
+    return lag, None
+
+
+def _signal_conflict(trace: Trace, ugv: str, x: NormSignal, predicted: list[Transition]) -> Conflict | None:
+    """First row at which the recorded decision variable or mode is not the recomputed one."""
+    t = trace.t
+    mode = trace.column(f"{ugv}.mode")
+    value = x.at(trace.t)
+    times = np.array([time for time, _ in predicted])
+    modes = np.array([0, *(MODES[kind] for _, kind in predicted)])
+    sides = [modes[np.searchsorted(times, t + shift)] for shift in (-EVENT_TOLERANCE_S, EVENT_TOLERANCE_S)]
+    off = np.abs(trace.column(f"{ugv}.decision_variable_m") - value)
+    wrong = (off > VARIABLE_TOLERANCE_M) | ((mode != sides[0]) & (mode != sides[1]))
+    if not wrong.any():
+        return None
+    k = int(np.argmax(wrong))
+    recomputed = {"decision_variable_m": float(value[k]), "mode": int(sides[1][k])}
+    difference = {"difference_m": float(off[k]), "recorded_mode": float(mode[k])}
+    return {"t_s": float(t[k]), "what": "recorded decision variable or mode", **recomputed, **difference}

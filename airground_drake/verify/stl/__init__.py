@@ -1,0 +1,1 @@
+"""Claims about a run again, in Signal Temporal Logic."""

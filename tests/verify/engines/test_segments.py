@@ -1,0 +1,74 @@
+"""Exact geometry of segments, against sampling."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from airground_drake.verify.engines.segments import NormSignal, closest_approach, corner_times, interpolate, travelled
+
+COORDINATES = st.floats(-10.0, 10.0, allow_subnormal=False)
+
+PATHS = st.integers(2, 6).flatmap(lambda n: st.tuples(*[arrays(np.float64, (n, 3), elements=COORDINATES)] * 2))
+
+
+@settings(max_examples=150, deadline=None)
+@given(PATHS, st.booleans())
+def test_closest_approach_against_sampling(paths: tuple[np.ndarray, np.ndarray], at_rest: bool) -> None:
+    first, second = paths[0], paths[1][0] if at_rest else paths[1]
+    t = np.cumsum(np.linspace(0.1, 0.5, len(first)))
+    found = closest_approach(t, first, second)
+    fine = np.unique(np.concatenate([np.linspace(a, b, 101) for a, b in pairwise(t)]))
+    there = second if at_rest else interpolate(t, second, fine)
+    sampled = np.linalg.norm(interpolate(t, first, fine) - there, axis=1).min()
+    longest = np.linalg.norm(np.diff(first - second, axis=0), axis=1).max() / 100.0
+    assert sampled - longest / 2.0 - 1e-9 <= found.distance_m <= sampled + 1e-9
+    assert t[found.row - 1] <= found.t_s <= t[found.row]
+    at = interpolate(t, first, found.t_s) - (second if at_rest else interpolate(t, second, found.t_s))
+    assert np.linalg.norm(at) == pytest.approx(found.distance_m, abs=1e-9)
+
+
+def test_closest_approach_by_hand() -> None:
+    t = np.array([0.0, 1.0, 3.0])
+    first = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [5.0, 0.0, 0.0]])
+    second = np.array([[4.0, 1.0, 0.0], [4.0, 1.0, 0.0], [2.0, 1.0, 0.0]])  # meet at x = 3, t = 2
+    found = closest_approach(t, first, second)
+    assert (found.distance_m, found.t_s, found.row) == (1.0, 2.0, 2)
+    assert closest_approach(t[:1], first[:1], second[0]).row == 0
+    assert closest_approach(t, first * 0.0, second[0]).t_s == 0.0
+
+
+def test_travelled_holds_its_last_point() -> None:
+    corners = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [2.0, 1.0, 0.0]])
+    np.testing.assert_allclose(corner_times(corners, 0.5), [4.0, 6.0])
+    np.testing.assert_allclose(travelled(corners, 0.5, np.array([2.0, 5.0, 9.0]))[:, :2], [[1, 0], [2, 0.5], [2, 1]])
+    assert corner_times(corners[:1], 0.5).size == corner_times(corners, 0.0).size == 0
+
+
+@settings(max_examples=100, deadline=None)
+@given(arrays(np.float64, (4, 4), elements=st.floats(-2.0, 2.0, allow_subnormal=False)), st.floats(-1.0, 3.0))
+@example(np.array([[0.0] * 4, [2.4e-161, 0.0, 0.0, 0.0], [0.0] * 4, [0.0] * 4]), 0.0)  # squares are 0
+def test_norm_signal_against_sampling(parts: np.ndarray, level: float) -> None:
+    t = np.array([0.0, 0.3, 1.0, 1.2])
+    x = NormSignal.of(t, parts)
+    fine = np.linspace(0.0, 1.2, 2401)
+    sampled = np.linalg.norm(interpolate(t, parts[:, :3], fine), axis=1) + np.interp(fine, t, parts[:, 3])
+    np.testing.assert_allclose(x.at(fine), sampled, atol=1e-9)
+    for a, b in pairwise(x.t):  # monotone between knots
+        steps = np.diff(x.at(np.linspace(a, b, 20)))
+        assert (steps >= -1e-9).all() or (steps <= 1e-9).all()
+    for above in (True, False):
+        begin = next((s for s, v in zip(fine, sampled, strict=True) if (v >= level) != above), None)
+        if begin is None:
+            continue
+        reached = x.reaches(level, begin, above=above)
+        beyond = fine[(fine > begin) & ((sampled >= level + 1e-9) if above else (sampled < level - 1e-9))]
+        assert reached is not None or not beyond.size
+        if reached is not None:
+            assert float(x.at(reached)) == pytest.approx(level, abs=1e-8)
+            assert not beyond.size or reached <= beyond[0] + 1e-9

@@ -1,0 +1,51 @@
+"""Claims about a run, by their identifiers, on one trace."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from airground_drake.trace import Trace
+from airground_drake.verify import TRACE_CLAIMS, Finding, TraceClaim
+from airground_drake.verify.runs import gate_feas, gate_opt, gate_sur
+from airground_drake.verify.runs.convex_bounds import enclose
+from airground_drake.verify.runs.gate_feas import GateFeas
+from airground_drake.verify.runs.gate_opt import GateOpt
+from airground_drake.verify.runs.gate_record import Off, rows_of
+from airground_drake.verify.runs.gate_sur import GateSur
+
+CLAIMS = {claim.id: claim for claim in TRACE_CLAIMS}
+
+GATE = {"GATE-OPT", "GATE-SUR", "GATE-FEAS"}
+"""Claims about recorded problems, which the synthetic runs do not have: see runs/test_gate_claims.py."""
+
+
+def judge(claim: str, trace: Trace) -> Finding:
+    """One claim on one trace."""
+    return CLAIMS[claim].judge(trace)
+
+
+def counterexample(claim: str, trace: Trace) -> dict[str, Any]:
+    """That of a claim which must be refuted; where there is a margin, it is negative."""
+    finding = judge(claim, trace)
+    assert finding.status == "refuted"
+    assert finding.counterexample is not None
+    assert finding.margin is None or finding.margin < 0.0
+    return finding.counterexample
+
+
+FEAS, SUR, OPT = GateFeas(), GateSur(), GateOpt()
+
+
+def comparisons(claim: TraceClaim, trace: Trace) -> list[Off]:
+    rows = rows_of(trace)
+    if claim is SUR:
+        return [one for row in rows for one in gate_sur.compare_rounding(row)]
+    if claim is OPT:
+        pairs = zip(rows, enclose(rows), strict=True)
+        return [one for row in rows for one in gate_opt.compare_with_constant_plans(row)] + [
+            one for row, found in pairs for one in gate_opt.compare_bounds(row, found, row["normals"])
+        ]
+    described = [
+        one for row in rows for one in (*gate_feas.compare_situation(trace, row), *gate_feas.compare_plan(trace, row))
+    ]
+    return [*described, *gate_feas.compare_answers(trace, rows)]

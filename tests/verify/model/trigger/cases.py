@@ -1,0 +1,86 @@
+"""What the tests about the trigger share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+
+import numpy as np
+from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
+from pydrake.systems.framework import DiagramBuilder, LeafSystem
+from pydrake.systems.primitives import (
+    ConstantVectorSource,
+    Integrator,
+    LogVectorOutput,
+    ZeroOrderHold,
+)
+
+from airground_drake.decision.trigger import Trigger
+from airground_drake.systems.decision import FIELDS, DecisionVariable
+from airground_drake.verify.finding import Finding
+from airground_drake.verify.model.trigger import mutants
+from airground_drake.verify.model.trigger.zeno_proof import ZenoProof
+from airground_drake.verify.model.trigger.zeno_refine import ZenoRefine
+
+ZENO = {"zeta_m": 3.0, "released_below_m": 2.0, "dwell_s": 0.3, "min_inter_event_s": 0.3, "duration_s": 30.0}
+
+NOISE = {"noise_m_sqrt_s": 0.004, "leak_1_s": 0.0, "noise_period_s": 0.05, "duration_s": 30.0}
+
+REFINE = {"zeta_m": 3.0, "released_below_m": 2.0, "dwell_s": 0.5, **NOISE}
+
+KINDS: dict[str, type[Trigger]] = {
+    "no dwell": mutants._NoDwell,
+    "no refractory mode": mutants._NoRefractory,
+    "recovers at once": mutants._RecoversAtOnce,
+    "forgets a trigger after the dwell": mutants._Forgets,
+}
+
+
+@cache
+def proved() -> Finding:
+    return ZenoProof().judge(ZENO)
+
+
+@cache
+def refined() -> Finding:
+    return ZenoRefine().judge(REFINE)
+
+
+def simulate(systems: Sequence[tuple[LeafSystem, str]], source: LeafSystem, until: float, step: float) -> np.ndarray:
+    """Status (4n, rows) of the last of the systems, which are in a row behind a source."""
+    builder = DiagramBuilder()
+    builder.AddNamedSystem("source", source)
+    output = source.get_output_port()
+    for system, port in systems:
+        builder.AddNamedSystem(f"{port}_reader", system)
+        builder.Connect(output, system.GetInputPort(port))
+        if isinstance(system, DecisionVariable):
+            count = output.size()
+            for name, value in (("team_position", np.zeros(3 * count + 3)), ("reference", [3.0, 0.0, 0.0] * count)):
+                given = np.zeros(system.GetInputPort(name).size())
+                given[: len(value)] = value
+                constant = builder.AddNamedSystem(name, ConstantVectorSource(given))
+                builder.Connect(constant.get_output_port(), system.GetInputPort(name))
+        output = system.get_output_port()
+    # steps end at the multiples of `step`, as they do at the noise samples in the diagram; they need a continuous state
+    clock = builder.AddNamedSystem("clock", Integrator(1))
+    sampled = builder.AddNamedSystem("sampled", ZeroOrderHold(step, 1))
+    rate = builder.AddNamedSystem("rate", ConstantVectorSource([1.0]))
+    builder.Connect(rate.get_output_port(), clock.get_input_port())
+    builder.Connect(clock.get_output_port(), sampled.get_input_port())
+    log = LogVectorOutput(output, builder)
+    log.set_name("log")
+    simulator = Simulator(builder.Build())
+    context = simulator.get_mutable_context()
+    context.SetAccuracy(1e-6)
+    config = SimulatorConfig(integration_scheme="explicit_euler", max_step_size=step, use_error_control=False)
+    ApplySimulatorConfig(config, simulator)
+    simulator.Initialize()
+    simulator.AdvanceTo(until)
+    found: np.ndarray = log.FindLog(context).data()
+    return found
+
+
+def trigger_times(status: np.ndarray, j: int) -> list[float]:
+    """Times of the triggers of UGV j by a log of the trigger's status."""
+    return sorted({float(t) for t in status[FIELDS * j + 2] if t >= 0.0})

@@ -1,0 +1,77 @@
+"""COMM."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from builders import (
+    first_of,
+    run_of,
+    with_meta,
+    with_signals,
+)
+from verify.judging import judge
+
+from airground_drake.trace import Trace
+
+
+def more_decisions(trace: Trace, **columns: Any) -> Trace:
+    """The last decision once more, with some columns changed."""
+    extra = trace.decisions.iloc[[-1]].assign(**columns)
+    return replace(trace, decisions=pd.concat([trace.decisions, extra], ignore_index=True))
+
+
+def proposals(trace: Trace, *times: float, robot: str = "ugv1") -> Trace:
+    template = first_of(trace.events, "proposal")
+    return with_meta(trace, events=[*trace.events, *({**template, "t_s": t, "robot": robot} for t in times)])
+
+
+def without(trace: Trace, kind: str) -> Trace:
+    return with_meta(trace, events=[event for event in trace.events if event["kind"] != kind])
+
+
+def supervising(signals: pd.DataFrame) -> pd.DataFrame:
+    return signals.assign(**{"ugv1.mode": 0.0})
+
+
+MESSAGES: dict[str, tuple[str, Callable[[Trace], Trace]]] = {
+    "decision after the allowance": ("refuted", lambda trace: more_decisions(trace, t_s=10.95)),
+    "decision before the trigger": ("refuted", lambda trace: more_decisions(trace, t_s=8.1)),
+    "decision for the other UGV": ("error", lambda trace: more_decisions(trace, robot="ugv2")),
+    "decision for nobody": ("error", lambda trace: more_decisions(trace, robot="ugv9")),
+    "decision at no time": ("error", lambda trace: more_decisions(trace, t_s=np.nan)),
+    "decision on no proposal": ("error", lambda trace: more_decisions(trace, issued_s=9.0)),
+    "proposal while supervising": ("refuted", lambda trace: proposals(trace, 5.0)),
+    "proposal to the other UGV": ("refuted", lambda trace: proposals(trace, 9.0, robot="ugv2")),
+    "proposal to the UAV": ("error", lambda trace: proposals(trace, 9.0, robot="uav")),
+    "more proposals than always-on": ("refuted", lambda trace: proposals(trace, *np.linspace(8.2, 10.7, 721))),
+    "no proposals": ("error", lambda trace: without(trace, "proposal")),
+    "no decisions": ("not_run", lambda trace: replace(trace, decisions=trace.decisions.iloc[:0])),
+    "nothing": ("not_run", lambda trace: with_meta(replace(trace, decisions=trace.decisions.iloc[:0]), events=[])),
+    "no column": ("error", lambda trace: replace(trace, decisions=trace.decisions.drop(columns="t_s"))),
+    "never intervening": ("refuted", lambda trace: with_signals(trace, supervising)),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", MESSAGES)
+def test_comm_mutants(name: str) -> None:
+    status, mutate = MESSAGES[name]
+    assert judge("COMM", mutate(run_of("d"))).status == status
+
+
+def test_comm_allows_the_latency_of_a_withdrawal() -> None:
+    released = next(event["t_s"] for event in run_of("d").events if event["kind"] == "release")
+    assert judge("COMM", more_decisions(run_of("d"), t_s=released + 0.1)).status == "holds"
+    assert judge("COMM", more_decisions(run_of("d"), t_s=released + 0.1001)).status == "refuted"
+
+
+def test_comm_counts() -> None:
+    finding = judge("COMM", run_of("d"))
+    assert finding.evidence["spent"] == {"proposal": 1, "decision": len(run_of("d").decisions)}
+    assert finding.evidence["always_on"] == {"proposal": 720, "decision": 720}
+    assert finding.margin == pytest.approx(1.0 - len(run_of("d").decisions) / 720)

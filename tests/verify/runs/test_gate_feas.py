@@ -1,0 +1,153 @@
+"""GATE-FEAS."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import builders
+import numpy as np
+import pandas as pd
+from builders import STAGE_S, STAGES, decided_run, with_decision
+from hypothesis import given
+from hypothesis import strategies as st
+from verify.judging import FEAS, comparisons
+
+from airground_drake.gatekeeper.problem import Decision
+from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT
+from airground_drake.systems.gatekeeper import Rules, settle
+from airground_drake.trace import Trace
+from airground_drake.verify.runs import gate_feas
+from airground_drake.verify.runs.gate_record import Row, rows_of
+
+
+def bent(row: dict[str, Any], problem: dict[str, Any]) -> None:
+    row["bend"] = 0.9
+
+
+def test_hidden_slack_is_refuted() -> None:
+    """The cost of the error alone, of a plan that leads inside the safe distance."""
+    trace = decided_run()
+
+    def hide(row: dict[str, Any], problem: dict[str, Any]) -> None:
+        accept = problem["accept_m_s"].reshape(STAGES, 3)
+        positions = problem["initial_m"] + STAGE_S * np.cumsum(accept, axis=0)
+        problem["plan"], problem["positions_m"] = np.ones(STAGES), positions.ravel()
+        row["objective"] = float(STAGE_S * np.sum((positions - problem["reference_m"].reshape(STAGES, 3)) ** 2))
+        row["objective_accept"], row["first_stage"] = row["objective"], "accept"
+        away = np.linalg.norm(positions[:, None] - problem["centres_m"].reshape(STAGES, 2, 3), axis=2)
+        row["predicted_clearance_m"] = float((away - problem["distances_m"]).min())
+
+    mutant = with_decision(trace, hide)
+    assert rows_of(mutant)[2].clearance(rows_of(mutant)[2]["positions_m"]).min() < 0.0
+    finding = FEAS.judge(mutant)
+    assert finding.status == "refuted"
+    assert finding.counterexample is not None
+    assert finding.counterexample["what"] == "objective"
+
+
+def test_a_bend_that_should_have_refused_is_refuted() -> None:
+    trace = decided_run()
+    first = with_decision(trace, bent, row=0)
+    accepted = trace.decisions["decision"].iloc[0] == "accept"
+    assert (FEAS.judge(first).status == "refuted") == accepted
+    assert accepted, "the example should start with an acceptance"
+
+
+def test_rollouts_may_leave_23_after_the_first_change_only() -> None:
+    trace = decided_run("rollout")
+
+    def record(row: dict[str, Any], problem: dict[str, Any], shifts: dict[int, list[float]]) -> None:
+        """A plan that refuses up to stage 5, and whose positions are elsewhere at some stages."""
+        plan = (np.arange(STAGES) > 5).astype(float)
+        positions = problem["initial_m"] + STAGE_S * np.cumsum(problem["refuse_m_s"].reshape(STAGES, 3), axis=0)
+        for stage, shift in shifts.items():
+            positions[stage] += shift
+        problem["plan"], problem["positions_m"], row["first_stage"] = plan, positions.ravel(), "refuse"
+        row["objective"] = row["objective_refuse"] = _cost(problem)
+        row["predicted_clearance_m"] = _clearance(problem)
+
+    def wrong(shifts: dict[int, list[float]]) -> set[str]:
+        mutant = with_decision(trace, lambda row, problem: record(row, problem, shifts))
+        return {one.what for one in comparisons(FEAS, mutant) if one.wrong} - {"the other choice is cheaper"}
+
+    accepts = {"answer or reason"} if trace.decisions["decision"].iloc[2] == "accept" else set()
+    assert wrong({6: [0.1, 0.0, 0.0], 7: [0.1, 0.0, 0.0]}) <= accepts
+    assert "positions are not those of (23), m" in wrong({3: [0.01, 0.0, 0.0]})
+    assert "the plan: faster than the speed limit" in wrong({7: [0.0, -2.0, 0.0]})
+
+
+def _cost(problem: dict[str, Any]) -> float:
+    away = problem["positions_m"].reshape(STAGES, 3)[:, None] - problem["centres_m"].reshape(STAGES, -1, 3)
+    slack = np.maximum(0.0, (problem["distances_m"] - np.linalg.norm(away, axis=2)).max(axis=1))
+    return float(STAGE_S * (np.sum((problem["positions_m"] - problem["reference_m"]) ** 2) + 10.0 * np.sum(slack**2)))
+
+
+def _clearance(problem: dict[str, Any]) -> float:
+    away = problem["positions_m"].reshape(STAGES, 3)[:, None] - problem["centres_m"].reshape(STAGES, -1, 3)
+    return float((np.linalg.norm(away, axis=2) - problem["distances_m"]).min())
+
+
+def test_a_decision_removed_from_both_tables_is_missed(relaxed: Trace) -> None:
+    for row in (0, 2):
+        gone = replace(relaxed, decisions=relaxed.decisions.drop(row), problems=relaxed.problems.drop(row))
+        finding = FEAS.judge(gone)
+        assert finding.status == "refuted"
+        assert finding.counterexample is not None
+        assert "missing" in finding.counterexample["what"]
+    twice = [0, 1, 1, 2, 3, 4, 5]
+    doubled = replace(relaxed, decisions=relaxed.decisions.iloc[twice], problems=relaxed.problems.iloc[twice])
+    assert FEAS.judge(doubled).status == "refuted"
+
+
+def test_no_row_is_exchanged_unnoticed(relaxed: Trace) -> None:
+    order = [0, 2, 1, 3, 4, 5]
+    assert FEAS.judge(replace(relaxed, problems=relaxed.problems.iloc[order])).status == "refuted"
+
+
+def test_an_execution_needs_an_acceptance(relaxed: Trace) -> None:
+    def executed(signals: pd.DataFrame) -> None:
+        signals.loc[signals["t_s"] > 0.42, "ugv1.accepted"] = 1.0
+
+    trace = builders.with_signals(relaxed, executed)
+    finding = FEAS.judge(trace)
+    assert finding.status == "refuted"
+    assert finding.counterexample is not None
+    assert finding.counterexample["what"] == "executed without an acceptance in force"
+    assert (
+        FEAS.judge(replace(trace, decisions=trace.decisions.iloc[:0], problems=trace.problems.iloc[:0])).status
+        == "not_run"
+    )
+
+
+@given(
+    st.tuples(st.floats(0.1, 10.0), st.floats(0.1, 10.0)),
+    st.tuples(st.floats(0.1, 10.0), st.floats(0.1, 10.0)),
+    st.sampled_from([0.0, 0.4, 0.6]),
+    st.sampled_from([SILENT, ACCEPT, REFUSE]),
+    st.sampled_from([0.0, 0.1, 0.2, 0.3]),
+    st.sampled_from([0.0, 0.05, 0.2]),
+    st.booleans(),
+    st.booleans(),
+)
+def test_the_rules_are_those_of_the_running_gatekeeper(
+    costs: tuple[float, float],
+    throughout: tuple[float, float],
+    bend: float,
+    standing: float,
+    stood: float,
+    margin: float,
+    equal: bool,
+    planned: bool,
+) -> None:
+    accept, refuse = (costs[0], costs[0]) if equal else costs
+    status: Any = "optimal" if planned else "refused_not_finite"
+    decision = Decision(accept <= refuse, status, objective=min(costs))
+    kept = throughout
+    plan = np.array([float(accept <= refuse)]) if planned else None
+    given = {"objective": min(costs), "accept_throughout": kept[0], "refuse_throughout": kept[1], "bend": bend}
+    row = Row(given, 1.0, 1.0, 1.0, {"plan": plan})
+    gate = {"max_bend": 0.5, "switching_margin": margin, "min_dwell_s": 0.2}
+    stands = {SILENT: None, ACCEPT: "accept", REFUSE: "refuse"}[standing]
+    rules = Rules(switching_margin=margin, min_dwell=0.2, max_bend=0.5)
+    assert gate_feas.rule(row, stands, stood, gate) == settle(decision, kept, bend, standing, stood, rules)

@@ -1,0 +1,71 @@
+"""GATE-OPT."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from builders import ALL_PLANS, STAGES, DecisionEdit, decided_run, gate_data_at, with_decision
+from verify.judging import OPT, SUR
+
+from airground_drake.arrays import Array
+from airground_drake.trace import Trace
+from airground_drake.verify.runs import convex_bounds, gate_opt
+from airground_drake.verify.runs.gate_record import Row, rows_of
+
+
+def test_the_example_is_not_trivial(relaxed: Trace) -> None:
+    rows = rows_of(relaxed)
+    assert {0.0, 1.0} <= {float(row["plan"][0]) for row in rows} | {float(row["plan"][-1]) for row in rows}
+    assert any(0.0 < value < 1.0 for row in rows for value in row["relaxed"])
+    assert any(row.clearance(row.constant).min() < 0.0 for row in rows)
+    evidence = OPT.judge(relaxed).evidence
+    assert evidence["bounded"] == len(rows)
+    assert evidence["largest_gap"] > 1e-4
+    assert evidence["widest_enclosure"] < 1e-6
+
+
+def test_a_complete_decision_without_its_evidence_is_an_error(relaxed: Trace) -> None:
+    def without(name: str) -> DecisionEdit:
+        def edit(row: dict[str, Any], problem: dict[str, Any]) -> None:
+            problem[name] = []
+
+        return edit
+
+    assert SUR.judge(with_decision(relaxed, without("relaxed"))).status == "error"
+    assert OPT.judge(with_decision(relaxed, without("normals"))).status == "error"
+
+
+def test_a_decision_cut_short_by_its_budget_is_listed_and_never_passes_for_bounded(relaxed: Trace) -> None:
+    def spent(row: dict[str, Any], problem: dict[str, Any]) -> None:
+        row["status"] = "budget_spent"
+        problem["relaxed"], problem["rounded"], problem["normals"] = [], [], []
+
+    trace = with_decision(relaxed, spent)
+    assert SUR.judge(trace).evidence["without_relaxation"] == ["decision of ugv1 at t = 0.15000000000000002 s"]
+    finding = OPT.judge(trace)
+    assert finding.status == "inconclusive"
+    assert len(finding.evidence["without_a_bound"]) == 1
+
+
+def test_a_bad_solution_decides_nothing(relaxed: Trace, monkeypatch: pytest.MonkeyPatch) -> None:
+    def nothing(rows: list[Row]) -> tuple[list[Array], list[Array]]:
+        return [np.full(STAGES, 0.5) for _ in rows], [np.zeros((STAGES, 2)) for _ in rows]
+
+    monkeypatch.setattr(convex_bounds, "_solve", nothing)
+    assert OPT.judge(relaxed).status != "holds"
+
+
+def test_blocks_are_enumerated_exactly() -> None:
+    trace = decided_run("enumeration")
+    for row in rows_of(trace):
+        data = gate_data_at(trace, row.given["t_s"])
+        best = min(data.plan_cost(plan) for plan in ALL_PLANS)
+        assert gate_opt.cheapest_of_blocks(row, None).lower == pytest.approx(best, rel=1e-12)
+
+    def second_best(row: dict[str, Any], problem: dict[str, Any]) -> None:
+        row["lower_bound"] *= 1.01
+        row["gap"] = 0.0
+
+    assert OPT.judge(with_decision(trace, second_best)).status == "refuted"

@@ -1,0 +1,134 @@
+"""What every claim about a run must do, whatever it claims."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import Any
+
+import pandas as pd
+import pytest
+from builders import (
+    bumped,
+    dropped,
+    passing_by,
+    rows,
+    run_of,
+    set_nan,
+    with_meta,
+    with_scenario,
+    with_signals,
+)
+from verify.judging import CLAIMS, GATE, judge
+
+from airground_drake.errors import TraceError
+from airground_drake.trace import Trace, load, save
+from airground_drake.verify import TRACE_CLAIMS, Finding, TraceClaim, verify
+
+
+@pytest.mark.parametrize("method", "abcd")
+def test_every_claim_holds_on_a_valid_run(method: str) -> None:
+    verdicts = {verdict.claim.id: verdict for verdict in verify(run_of(method))}
+    assert {name: v.finding.status for name, v in verdicts.items()} == {
+        name: "not_run" if name in GATE else "holds" for name in verdicts
+    }
+    left_out = {"a": {"GATE-TIME", "COMM", *GATE}, "b": {"GATE-TIME", *GATE}, "c": set(), "d": set()}[method]
+    assert set(verdicts) == set(CLAIMS) - left_out
+    assert all(json.dumps(v.to_json(), allow_nan=False) for v in verdicts.values())
+
+
+def test_verdicts_survive_saving(tmp_path: Any) -> None:
+    save(run_of("d"), tmp_path)
+    assert [v.finding for v in verify(load(tmp_path))] == [v.finding for v in verify(run_of("d"))]
+
+
+def test_every_claim_says_what_it_is() -> None:
+    for claim in TRACE_CLAIMS:
+        for name in ("statement", "formula", "method", "equations", "does_not_establish"):
+            assert getattr(claim, name).strip(), (claim.id, name)
+        assert claim.assumptions
+        assert all(claim.assumptions)
+
+
+def test_expected_status_is_the_scenarios() -> None:
+    trace = with_scenario(run_of("a"), runs__a__expected={"SAFE-TRACE": "refuted"})
+    assert {v.claim.id for v in verify(trace) if not v.as_expected} == {"SAFE-TRACE"}
+
+
+BROKEN: dict[str, Callable[[Trace], Trace]] = {
+    "NaN in a position": set_nan("ugv1.x_m"),
+    "NaN in a command": set_nan("uav.vz_m_s"),
+    "no column of positions": dropped("ugv2.y_m"),
+    "no column of commands": dropped("ugv2.vy_m_s"),
+    "one command altered": bumped("ugv1.vx_m_s", 1e-4),
+    "one position altered": bumped("uav.z_m", 1e-8),
+    "truncated at the end": rows(lambda signals: signals.iloc[:-1]),
+    "truncated at the start": rows(lambda signals: signals.iloc[1:]),
+    "one row left out": rows(lambda signals: signals.drop(index=400)),
+    "time runs backwards": rows(lambda signals: signals.iloc[[0, 2, 1, *range(3, len(signals))]]),
+    "no rows": rows(lambda signals: signals.iloc[:0]),
+    "a robot left out": lambda trace: with_meta(trace, robots=["ugv1", "uav"], ugvs=["ugv1"]),
+    "no scenario": lambda trace: with_meta(trace, scenario={}),
+    "another run": lambda trace: with_meta(trace, run="none"),
+    "another method": lambda trace: with_meta(trace, method="b"),
+}
+
+
+@pytest.mark.parametrize("claim", CLAIMS)
+@pytest.mark.parametrize("name", BROKEN)
+def test_broken_traces_never_pass(claim: str, name: str) -> None:
+    finding = judge(claim, BROKEN[name](run_of("d")))
+    assert finding.status in ("refuted", "not_run") or (finding.status == "error" and finding.evidence["error"])
+
+
+def test_checkers_that_fail_are_errors() -> None:
+    class Failing(type(CLAIMS["COMM"])):  # type: ignore[misc]
+        def check(self, trace: Trace) -> Finding:
+            return self.finding(trace)
+
+    def crash(trace: Trace) -> Finding:
+        raise ZeroDivisionError("division")
+
+    claim = Failing()
+    for behaviour in (crash, lambda trace: Finding("holds", margin=float("nan")), lambda trace: None):
+        claim.finding = behaviour
+        assert claim.judge(run_of("d")).status == "error"
+    assert TraceClaim.applies(claim, run_of("a"))
+
+
+def test_half_a_run_can_refute_but_not_pass() -> None:
+    cut = rows(lambda signals: signals[signals["t_s"] < 0.8])
+    assert judge("SAFE-TRACE", cut(passing_by(-1e-3))).status == "refuted"
+    assert judge("SAFE-TRACE", cut(passing_by(+1e-3))).status == "error"
+
+
+@pytest.mark.parametrize("gap", [0.0, 1e-17, 5e-10])
+def test_rows_of_one_instant_are_merged(gap: float) -> None:
+    """Around control samples, a row before with the old and a row after with the new command."""
+
+    def split(signals: pd.DataFrame) -> pd.DataFrame:
+        pieces, done = [], 0
+        for k in range(100, 700, 20):
+            row = signals.iloc[[k]]
+            before, after = shifted(row, -gap, row.iloc[0]), shifted(row, gap, signals.iloc[k + 1])
+            pieces += [signals.iloc[done:k], before, row, after]
+            done = k + 1
+        return pd.concat([*pieces, signals.iloc[done:]], ignore_index=True)
+
+    def shifted(row: pd.DataFrame, dt: float, commanded: Any) -> pd.DataFrame:
+        row = row.assign(t_s=row["t_s"] + dt)
+        for name in (f"{robot}.{{}}{axis}_m" for robot in ("ugv1", "ugv2", "uav") for axis in "xyz"):
+            velocity = float(commanded[name.format("v") + "_s"])
+            row = row.assign(
+                **{name.format(""): row[name.format("")] + dt * velocity, name.format("v") + "_s": velocity}
+            )
+        return row
+
+    verdicts = verify(with_signals(run_of("d"), split))
+    assert {v.claim.id for v in verdicts if v.finding.status != "holds"} == GATE
+
+
+def test_trace_errors_name_the_place() -> None:
+    finding = judge("SAFE-TRACE", BROKEN["one command altered"](run_of("d")))
+    assert TraceError.__name__ in finding.evidence["error"]
+    assert "ugv1" in finding.evidence["error"]
