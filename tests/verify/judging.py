@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from airground_drake.trace import Trace
 from airground_drake.verify import TRACE_CLAIMS, Finding, TraceClaim
+from airground_drake.verify.claim import ModelClaim, Mutant
 from airground_drake.verify.runs import gate_feas, gate_opt, gate_sur
 from airground_drake.verify.runs.convex_bounds import enclose
 from airground_drake.verify.runs.gate_feas import GateFeas
 from airground_drake.verify.runs.gate_opt import GateOpt
 from airground_drake.verify.runs.gate_record import Off, rows_of
 from airground_drake.verify.runs.gate_sur import GateSur
+
+Judged = Callable[[ModelClaim | Mutant, dict[str, Any]], Finding]
+"""The fixture `judged` of conftest.py."""
 
 CLAIMS = {claim.id: claim for claim in TRACE_CLAIMS}
 
@@ -49,3 +54,14 @@ def comparisons(claim: TraceClaim, trace: Trace) -> list[Off]:
         one for row in rows for one in (*gate_feas.compare_situation(trace, row), *gate_feas.compare_plan(trace, row))
     ]
     return [*described, *gate_feas.compare_answers(trace, rows)]
+
+
+def assert_decision_refuted(claim: TraceClaim, trace: Trace, what: str) -> None:
+    """That a claim refutes a record of which the third decision was edited, and for the right reason."""
+    finding = claim.judge(trace)
+    assert finding.status == "refuted", finding
+    assert finding.counterexample is not None
+    assert finding.counterexample["robot"] == "ugv1"
+    assert finding.counterexample["t_s"] <= 0.2 + 1e-9  # the edited row, or the one that has to follow from it
+    found = {one.what for one in comparisons(claim, trace) if one.wrong}
+    assert any(what in text for text in found), found

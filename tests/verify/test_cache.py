@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import airground_drake
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify import cache
 from airground_drake.verify.claim import ModelClaim
@@ -57,3 +58,18 @@ def test_a_kept_finding_that_cannot_be_read_is_made_anew(tmp_path: Path) -> None
     kept.write_text("{", encoding="utf-8")
     assert cache.find([claim], [{}], folder=tmp_path)[0].status == "proved"
     assert claim.calls == 2
+
+
+def test_the_key_covers_every_file_of_the_package_where_it_is(tmp_path: Path) -> None:
+    (tmp_path / "sub" / "deeper").mkdir(parents=True)
+    for name in ("a.py", "sub/b.py", "sub/deeper/c.py"):
+        (tmp_path / name).write_text("x = 1\n", encoding="utf-8")
+    digests = [cache.code_digest(tmp_path)]
+    (tmp_path / "sub/deeper/c.py").write_text("x = 2\n", encoding="utf-8")
+    digests.append(cache.code_digest(tmp_path))
+    (tmp_path / "sub/b.py").rename(tmp_path / "sub/deeper/b.py")
+    digests.append(cache.code_digest(tmp_path))
+    assert len(set(digests)) == 3
+    assert cache.code_digest(tmp_path) == digests[-1]
+    package = Path(airground_drake.__file__).parent
+    assert cache.code_digest(package) == cache._code()

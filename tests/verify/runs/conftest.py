@@ -9,11 +9,10 @@ from airground_drake.trace import Trace
 from airground_drake.verify.runs import gate_feas
 
 
-@pytest.fixture(autouse=True)
-def _scripted(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The UGVs of scripted traces do not follow their own task; those of real runs do."""
-    if "real" not in request.node.name and "hides" not in request.node.name:
-        monkeypatch.setattr(gate_feas, "compare_own_task", lambda trace, rows: iter(()))
+@pytest.fixture
+def scripted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The UGVs of scripted traces do not follow their own task."""
+    monkeypatch.setattr(gate_feas, "compare_own_task", lambda trace, rows: iter(()))
 
 
 @pytest.fixture(scope="session")

@@ -8,10 +8,28 @@ from typing import Any
 import builders
 import numpy as np
 import pandas as pd
-from builders import STAGE_S, STAGES, decided_run, with_decision
+import pytest
+from builders import STAGE_S, STAGES, DecisionEdit, decided_run, with_decision
 from hypothesis import given
 from hypothesis import strategies as st
-from verify.judging import FEAS, comparisons
+from verify.judging import FEAS, assert_decision_refuted, comparisons
+from verify.runs.cases import (
+    contrary_answer,
+    flip_plan,
+    fractional_plan,
+    lighter_slack,
+    overstate_clearance,
+    shift_initial,
+    shift_position,
+    shift_reference,
+    smaller_distance,
+    standing_robot,
+    too_fast,
+    understate_cost,
+    without_point,
+    wrong_first_stage,
+    wrong_reason,
+)
 
 from airground_drake.gatekeeper.problem import Decision
 from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT
@@ -19,6 +37,32 @@ from airground_drake.systems.gatekeeper import Rules, settle
 from airground_drake.trace import Trace
 from airground_drake.verify.runs import gate_feas
 from airground_drake.verify.runs.gate_record import Row, rows_of
+
+pytestmark = pytest.mark.usefixtures("scripted")
+
+MUTANTS: list[tuple[DecisionEdit, str]] = [
+    (flip_plan, "positions are not those of (23)"),
+    (fractional_plan, "omega is not binary"),
+    (shift_position, "positions are not those of (23)"),
+    (shift_initial, "initial position"),
+    (shift_reference, "reference"),
+    (understate_cost, "objective"),
+    (overstate_clearance, "predicted clearance"),
+    (wrong_first_stage, "first stage"),
+    (without_point(0), "rock is left out"),
+    (without_point(1), "ugv2 is left out"),
+    (smaller_distance, "nothing that the UGV senses"),
+    (standing_robot, "nothing that the UGV senses"),
+    (lighter_slack, "weight of slack"),
+    (too_fast, "faster than the speed limit"),
+    (contrary_answer, "answer or reason"),
+    (wrong_reason, "answer or reason"),
+]
+
+
+@pytest.mark.parametrize(("edit", "what"), MUTANTS, ids=[f"{what}-{i}" for i, (_, what) in enumerate(MUTANTS)])
+def test_a_mutant_is_refuted(relaxed: Trace, edit: DecisionEdit, what: str) -> None:
+    assert_decision_refuted(FEAS, with_decision(relaxed, edit), what)
 
 
 def bent(row: dict[str, Any], problem: dict[str, Any]) -> None:

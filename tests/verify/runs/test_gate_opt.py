@@ -7,12 +7,29 @@ from typing import Any
 import numpy as np
 import pytest
 from builders import ALL_PLANS, STAGES, DecisionEdit, decided_run, gate_data_at, with_decision
-from verify.judging import OPT, SUR
+from verify.judging import OPT, SUR, assert_decision_refuted
+from verify.runs.cases import inflate_loser, long_normals, overstate_bound, understate_bound, understate_gap, worst_plan
 
 from airground_drake.arrays import Array
 from airground_drake.trace import Trace
 from airground_drake.verify.runs import convex_bounds, gate_opt
 from airground_drake.verify.runs.gate_record import Row, rows_of
+
+pytestmark = pytest.mark.usefixtures("scripted")
+
+MUTANTS: list[tuple[DecisionEdit, str]] = [
+    (overstate_bound, "lower bound overstated"),
+    (understate_bound, "lower bound understated"),
+    (understate_gap, "recorded gap"),
+    (long_normals, "length of a normal"),
+    (inflate_loser, "throughout"),
+    (worst_plan, "objective above"),
+]
+
+
+@pytest.mark.parametrize(("edit", "what"), MUTANTS, ids=[f"{what}-{i}" for i, (_, what) in enumerate(MUTANTS)])
+def test_a_mutant_is_refuted(relaxed: Trace, edit: DecisionEdit, what: str) -> None:
+    assert_decision_refuted(OPT, with_decision(relaxed, edit), what)
 
 
 def test_the_example_is_not_trivial(relaxed: Trace) -> None:

@@ -14,7 +14,7 @@ from airground_drake.verify.model.avoidance.safe_lemma import SafeLemma
 
 CLAIMS: tuple[ModelClaim, ...] = (SafeLemma(), SafeInv(), SafeGate(), SafeDist())
 
-MUTANTS = {**mutants.MUTANTS, **mutants.DISTURBED}
+MUTANTS = {f"{mutant.claim}: {mutant.says}": mutant for mutant in mutants.MUTANTS}
 
 
 def evaluate(text: str, point: dict[str, Fraction]) -> Fraction:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from verify.judging import Judged
 from verify.model.avoidance.cases import CLAIMS
 
 from airground_drake.scenarios.load import load
@@ -21,5 +22,7 @@ def inputs() -> dict[str, Any]:
 
 
 @pytest.fixture(scope="session")
-def found(inputs: dict[str, Any]) -> dict[str, Finding]:
-    return {claim.id: claim.judge(inputs) for claim in CLAIMS}
+def found(judged: Judged) -> dict[str, Finding]:
+    """Findings on case A."""
+    scenario = load("case_a")[0]
+    return {claim.id: judged(claim, claim.inputs(scenario)) for claim in CLAIMS}

@@ -9,6 +9,7 @@ from fractions import Fraction
 from typing import Any
 
 import pytest
+from verify.judging import Judged
 from verify.model.avoidance.cases import CLAIMS, evaluate
 
 from airground_drake.scenarios.load import load
@@ -29,12 +30,12 @@ def test_proved(claim: ModelClaim, found: dict[str, Finding]) -> None:
 
 
 @pytest.mark.parametrize("name", ["case_a_table1", "case_b", "soft_gate"])
-def test_every_shipped_scenario(name: str) -> None:
+def test_every_shipped_scenario(name: str, judged: Judged) -> None:
     scenario = load(name)[0]
     for claim in CLAIMS[1:]:
         given_ = claim.inputs(scenario)
         assert json.loads(json.dumps(given_, allow_nan=False)) == given_
-        assert claim.judge(given_).status == "proved"
+        assert judged(claim, given_).status == "proved"
 
 
 def test_one_ugv_and_no_obstacle(case_a: Scenario) -> None:

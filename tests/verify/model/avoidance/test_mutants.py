@@ -8,18 +8,18 @@ from dataclasses import asdict
 from typing import Any
 
 import pytest
+from verify.judging import Judged
 from verify.model.avoidance.cases import MUTANTS
 
 from airground_drake.verify.claim import ModelClaim
-from airground_drake.verify.model.avoidance import mutants
 from airground_drake.verify.model.avoidance.safe_dist import SafeDist
 from airground_drake.verify.model.avoidance.safe_gate import SafeGate
 from airground_drake.verify.model.avoidance.safe_inv import SafeInv
 
 
 @pytest.mark.parametrize("name", MUTANTS)
-def test_mutant_is_refuted(name: str, inputs: dict[str, Any]) -> None:
-    finding = MUTANTS[name](inputs)
+def test_mutant_is_refuted(name: str, inputs: dict[str, Any], judged: Judged) -> None:
+    finding = judged(MUTANTS[name], inputs)
     assert finding.status == "refuted", finding
     assert finding.counterexample is not None
     assert finding.counterexample.get("exactly_checked", True)
@@ -28,25 +28,27 @@ def test_mutant_is_refuted(name: str, inputs: dict[str, Any]) -> None:
 
 @pytest.mark.parametrize(
     "name",
-    [n for n in mutants.MUTANTS if n.startswith("SAFE-INV") and "gain" not in n] + ["SAFE-GATE: intervention on top"],
+    [n for n in MUTANTS if n.startswith("SAFE-INV") and "gain" not in n] + ["SAFE-GATE: intervention on top"],
 )
-def test_mutant_comes_too_close_on_the_running_code(name: str, inputs: dict[str, Any]) -> None:
-    counterexample = MUTANTS[name](inputs).counterexample
+def test_mutant_comes_too_close_on_the_running_code(name: str, inputs: dict[str, Any], judged: Judged) -> None:
+    counterexample = judged(MUTANTS[name], inputs).counterexample
     assert counterexample is not None
     replay = counterexample["replay"]
     least = replay.get("least_distances_m", [replay.get("least_distance_m")])
     assert min(least) < replay["safe_distance_m"] - 0.05
 
 
-def test_overshoot_on_the_running_code(inputs: dict[str, Any]) -> None:
-    counterexample = MUTANTS["SAFE-INV: gain too large, A h = 1.8"](inputs).counterexample
+def test_overshoot_on_the_running_code(inputs: dict[str, Any], judged: Judged) -> None:
+    counterexample = judged(MUTANTS["SAFE-INV: gain too large, A h = 1.8"], inputs).counterexample
     assert counterexample is not None
     assert counterexample["replay"]["end_m"][0][0] > counterexample["replay"]["safe_distance_m"] + 0.1
 
 
-@pytest.mark.parametrize("name", mutants.DISTURBED)
-def test_disturbed_mutant_breaks_the_bound_on_the_running_code(name: str, inputs: dict[str, Any]) -> None:
-    counterexample = MUTANTS[name](inputs).counterexample
+@pytest.mark.parametrize("name", [n for n in MUTANTS if n.startswith("SAFE-DIST")])
+def test_disturbed_mutant_breaks_the_bound_on_the_running_code(
+    name: str, inputs: dict[str, Any], judged: Judged
+) -> None:
+    counterexample = judged(MUTANTS[name], inputs).counterexample
     assert counterexample is not None
     replay = counterexample["replay"]
     assert replay["worst_margin_m"] < -0.01

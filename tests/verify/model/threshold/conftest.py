@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from verify.judging import Judged
 from verify.model.threshold.cases import INPUTS
 
 from airground_drake.scenarios.load import load
@@ -13,10 +14,10 @@ from airground_drake.verify.model.threshold.thr_root import ThrRoot
 
 
 @pytest.fixture(scope="session")
-def found() -> dict[str, tuple[Finding, Finding]]:
-    return {name: (ThrRoot().check(inputs), ThrOpt().check(inputs)) for name, inputs in INPUTS.items()}
+def found(judged: Judged) -> dict[str, tuple[Finding, Finding]]:
+    return {name: (judged(ThrRoot(), inputs), judged(ThrOpt(), inputs)) for name, inputs in INPUTS.items()}
 
 
 @pytest.fixture(scope="session")
-def simulated() -> Finding:
-    return ThrDdm().judge(ThrDdm().inputs(load("case_a")[0]))
+def simulated(judged: Judged) -> Finding:
+    return judged(ThrDdm(), ThrDdm().inputs(load("case_a")[0]))

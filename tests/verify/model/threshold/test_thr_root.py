@@ -10,6 +10,7 @@ import mpmath
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from verify.judging import Judged
 from verify.model.threshold.cases import INPUTS, OTHERS, TABLE_1
 
 from airground_drake.decision.bayes import optimal_threshold
@@ -37,9 +38,9 @@ def test_root_and_optimum_are_proved(found: dict[str, tuple[Finding, Finding]], 
 
 
 @pytest.mark.parametrize("scenario", ["case_a", "case_a_table1", "case_b", "soft_gate"])
-def test_shipped_scenarios(scenario: str) -> None:
+def test_shipped_scenarios(scenario: str, judged: Judged) -> None:
     for claim in (ThrRoot(), ThrOpt()):
-        assert claim.judge(claim.inputs(load(scenario)[0])).status == "proved"
+        assert judged(claim, claim.inputs(load(scenario)[0])).status == "proved"
 
 
 def test_inputs_name_the_threshold_in_force(case_a: Scenario) -> None:

@@ -29,10 +29,10 @@ NOISE = {"noise_m_sqrt_s": 0.004, "leak_1_s": 0.0, "noise_period_s": 0.05, "dura
 REFINE = {"zeta_m": 3.0, "released_below_m": 2.0, "dwell_s": 0.5, **NOISE}
 
 KINDS: dict[str, type[Trigger]] = {
-    "no dwell": mutants._NoDwell,
-    "no refractory mode": mutants._NoRefractory,
-    "recovers at once": mutants._RecoversAtOnce,
-    "forgets a trigger after the dwell": mutants._Forgets,
+    "no dwell": mutants.NoDwell,
+    "no refractory mode": mutants.NoRefractory,
+    "recovers at once": mutants.RecoversAtOnce,
+    "forgets a trigger after the dwell": mutants.Forgets,
 }
 
 

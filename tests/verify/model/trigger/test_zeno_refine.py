@@ -36,7 +36,7 @@ def test_the_shipped_trigger_is_supported(case_a: Scenario) -> None:
 
 
 def test_more_triggers_than_the_dwell_admits_are_noticed() -> None:
-    kind = mutants._NoDwell(3.0, 3.0, 0.5)
+    kind = mutants.NoDwell(3.0, 3.0, 0.5)
     setting = dataclasses.replace(experiment(REFINE), trigger=kind)
     finding = zeno_refine.judge_experiment(setting)
     assert finding.status == "refuted"

@@ -1,0 +1,94 @@
+"""GATE-FEAS, GATE-SUR and GATE-OPT on runs of the simulator."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from builders import with_decision
+from verify.judging import FEAS, OPT, SUR
+from verify.runs.cases import (
+    contrary_answer,
+    flip_plan,
+    inflate_loser,
+    long_normals,
+    overstate_bound,
+    overstate_clearance,
+    round_otherwise,
+    shift_initial,
+    shift_position,
+    shift_reference,
+    smaller_distance,
+    too_fast,
+    understate_bound,
+    understate_cost,
+    understate_gap,
+    understate_rounding,
+)
+
+from airground_drake.scenarios.load import load
+from airground_drake.simulation import simulate
+from airground_drake.trace import Trace, save
+from airground_drake.trace import load as load_trace
+
+Simulated = Callable[[str, str, str], Trace]
+
+
+@pytest.fixture(scope="session")
+def record_of(run: Callable[[str, str], Trace]) -> Simulated:
+    """`record_of(scenario, run, route)`; runs by the scenario's own route are those that all tests share."""
+
+    def get(name: str, run_name: str, route: str) -> Trace:
+        described = load(name)[0]
+        if described.gatekeeper.route == route:
+            return run(name, run_name)
+        described.gatekeeper.route = route
+        return simulate(described, run_name)
+
+    return get
+
+
+@pytest.mark.parametrize(
+    ("name", "run_name"), [("case_b", "c"), ("case_a", "d"), ("soft_gate", "c"), ("soft_gate", "d")]
+)
+def test_real_runs_pass(record_of: Simulated, name: str, run_name: str) -> None:
+    trace = record_of(name, run_name, "relaxed")
+    assert len(trace.decisions) > 5
+    for claim in (FEAS, SUR, OPT):
+        finding = claim.judge(trace)
+        assert finding.status == "holds", finding
+
+
+@pytest.mark.parametrize("route", ["enumeration", "branch_and_bound", "nonlinear", "rollout"])
+def test_real_runs_of_other_routes(record_of: Simulated, route: str) -> None:
+    trace = record_of("case_b", "d", route)
+    assert FEAS.judge(trace).status == "holds"
+    bounded = route in ("enumeration", "branch_and_bound")
+    assert OPT.judge(trace).status == ("holds" if bounded else "inconclusive")
+    assert not SUR.applies(trace) or SUR.judge(trace).status == "holds"
+
+
+def test_a_real_run_saved_and_broken(record_of: Simulated, tmp_path: Any) -> None:
+    trace = record_of("case_b", "d", "relaxed")
+    save(trace, tmp_path)
+    for claim in (FEAS, SUR, OPT):
+        assert claim.judge(load_trace(tmp_path)) == claim.judge(trace)
+    for claim, edit in (
+        (FEAS, flip_plan), (FEAS, shift_position), (FEAS, shift_initial), (FEAS, shift_reference), (FEAS, too_fast),
+        (FEAS, understate_cost), (FEAS, smaller_distance), (FEAS, overstate_clearance), (FEAS, contrary_answer),
+        (SUR, round_otherwise), (SUR, understate_rounding), (OPT, overstate_bound), (OPT, understate_bound),
+        (OPT, understate_gap), (OPT, long_normals), (OPT, inflate_loser),
+    ):  # fmt: skip
+        assert claim.judge(with_decision(trace, edit)).status == "refuted", edit
+
+
+def test_a_run_that_hides_an_intervention_is_refuted(record_of: Simulated) -> None:
+    """What was executed is not the UGV's own task, whatever the `accepted` column says."""
+    trace = record_of("case_b", "d", "relaxed")
+    assert FEAS.judge(trace).status == "holds"
+    hidden = replace(trace, signals=trace.signals.assign(**{"ugv1.accepted": 0.0}))
+    finding = FEAS.judge(hidden)
+    assert finding.status == "refuted"
+    assert "own task" in str(finding.counterexample)

@@ -1,0 +1,24 @@
+"""GATE-SUR."""
+
+from __future__ import annotations
+
+import pytest
+from builders import DecisionEdit, with_decision
+from verify.judging import SUR, assert_decision_refuted
+from verify.runs.cases import fractional_rounding, relaxed_outside, round_otherwise, understate_rounding
+
+from airground_drake.trace import Trace
+
+pytestmark = pytest.mark.usefixtures("scripted")
+
+MUTANTS: list[tuple[DecisionEdit, str]] = [
+    (round_otherwise, "rounded against the rule"),
+    (fractional_rounding, "rounded omega is not binary"),
+    (relaxed_outside, "outside [0, 1]"),
+    (understate_rounding, "recorded rounding error"),
+]
+
+
+@pytest.mark.parametrize(("edit", "what"), MUTANTS, ids=[f"{what}-{i}" for i, (_, what) in enumerate(MUTANTS)])
+def test_a_mutant_is_refuted(relaxed: Trace, edit: DecisionEdit, what: str) -> None:
+    assert_decision_refuted(SUR, with_decision(relaxed, edit), what)

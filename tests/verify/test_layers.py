@@ -1,0 +1,71 @@
+"""Who may import whom inside verify/: claims about a run share no code with what they judge, engines know no claim."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import airground_drake
+
+PACKAGE = Path(airground_drake.__file__).parent
+ALLOWED: dict[str, set[str]] = {
+    "engines": {"arrays", "verify.engines", "verify.finding"},
+    "runs": {"arrays", "errors", "trace", "verify.engines", "verify.runs", "verify.claim", "verify.finding"},
+    "stl": {"arrays", "trace", "verify.runs", "verify.stl", "verify.claim", "verify.finding"},
+}
+"""By folder of verify/, beginnings of what its modules may import of this package."""
+JUDGED = {"nsbc", "gatekeeper", "systems", "decision", "diagram", "simulation", "intervention"}
+SHELVES = {"avoidance", "trigger", "threshold"}
+
+
+def imported(path: Path) -> Iterator[str]:
+    """Modules of this package that a file imports, wherever in it, without the package's name."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        found: list[str] = []
+        if isinstance(node, ast.Import):
+            found = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, path
+            found = [f"{node.module}.{alias.name}" for alias in node.names]
+        for name in found:
+            head, _, tail = name.partition(".")
+            if head == "airground_drake":
+                yield tail
+
+
+def within(name: str, places: set[str]) -> bool:
+    return any(name == place or name.startswith(f"{place}.") for place in places)
+
+
+@pytest.mark.parametrize("folder", ALLOWED)
+def test_a_folder_imports_only_what_it_may(folder: str) -> None:
+    paths = sorted((PACKAGE / "verify" / folder).rglob("*.py"))
+    assert len(paths) > 2
+    for path in paths:
+        strangers = [name for name in imported(path) if not within(name, ALLOWED[folder])]
+        assert not strangers, f"{path.name} imports {strangers}"
+
+
+def test_what_runs_may_import_loads_nothing_that_is_judged() -> None:
+    """Not even at second hand: neither `runs` nor anything that it imports."""
+    todo, seen = sorted((PACKAGE / "verify" / "runs").rglob("*.py")), set[Path]()
+    while todo:
+        path = todo.pop()
+        seen.add(path)
+        for name in imported(path):
+            assert not within(name, JUDGED), f"{path} imports {name}"
+            module = PACKAGE.joinpath(*name.split("."))
+            for found in (module.with_suffix(".py"), module.parent.with_suffix(".py")):
+                if found.is_file() and found not in seen:
+                    todo.append(found)
+    assert {"segments.py", "claim.py", "trace.py"} <= {path.name for path in seen}
+
+
+def test_the_shelves_of_model_do_not_import_each_other() -> None:
+    for shelf in SHELVES:
+        others = {f"verify.model.{other}" for other in SHELVES - {shelf}} | {"verify.runs", "verify.stl"}
+        for path in (PACKAGE / "verify" / "model" / shelf).glob("*.py"):
+            assert not [name for name in imported(path) if within(name, others)], path
