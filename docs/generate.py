@@ -177,14 +177,13 @@ def _entry(registry: Registry, name: str) -> str:
 def _page(title: str, says: str, lines: list[str]) -> str:
     """A page; lines that may be wrapped are."""
     wrapped: list[str] = []
+    wrapper = textwrap.TextWrapper(WIDTH, break_long_words=False, break_on_hyphens=False)
     for line in ["<!-- Made by: python docs/generate.py -->", f"# {title}", "", says, "", *lines]:
         if len(line) <= WIDTH:
             wrapped.append(line)
         else:
-            indent = "  " if line.startswith("- ") else ""
-            wrapped += textwrap.wrap(
-                line, WIDTH, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False
-            )
+            wrapper.subsequent_indent = "  " if line.startswith("- ") else ""
+            wrapped += wrapper.wrap(line)
     return "\n".join(wrapped).rstrip() + "\n"
 
 

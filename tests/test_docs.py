@@ -1,4 +1,4 @@
-"""The documentation: its Python blocks run, its links lead somewhere, what is generated is current, its recipes work."""
+"""The documentation: Python blocks run, links lead somewhere, what is generated is current, recipes work."""
 
 from __future__ import annotations
 
