@@ -54,7 +54,7 @@ class SafeGate(ModelClaim):
         controller = build_model(scenario, "d").diagram.GetSubsystemByName("ugv_controller")
         compositions = sorted({run.composition for run in scenario.runs.values() if run.method == "d"})
         built = {
-            "intervention_on_top": bool(controller.intervention_on_top),
+            "intervention_on_top": bool(controller.law.intervention_on_top),
             "compositions": compositions or ["augmented"],
         }
         return constants(scenario) | {"method_d": built}
