@@ -1,9 +1,10 @@
 """ZENO-PROOF: two triggers are never closer than the minimum inter-event time, whatever the decision variable does.
 
-The transition relation (`relation.py`) is not written down a second time: `read_off` runs the methods of the running `Trigger` on
-symbols, once for every way in which their comparisons can come out. An observer that sees nothing but entries into
-INTERVENING is added to it: k triggers so far, the last of them at l; what the automaton itself remembers, n triggers
-and the last at a, is not trusted. t is the time of the last event or wait, s >= t now, x any number. The invariant:
+The transition relation is not written down a second time: `read_off` (`relation.py`) runs the methods of the running
+`Trigger` on symbols, once for every way in which their comparisons can come out. The induction on it is in
+`induction.py`, broken triggers are in `mutants.py`. An observer that sees nothing but entries into INTERVENING is
+added to it: k triggers so far, the last of them at l; what the automaton itself remembers, n triggers and the last at
+a, is not trusted. t is the time of the last event or wait, s >= t now, x any number. The invariant:
 
     n = k; SUPERVISING: k = 0 or t >= l + dwell; INTERVENING and REFRACTORY: k >= 1 and a = l
 
