@@ -1,6 +1,13 @@
-"""Valid traces without the simulator: a small numpy simulation of case A, of scripted motions, and edits of both.
+"""Traces and scenarios for tests, made without the simulator.
 
-Nothing here is shared with the checkers; of the package only the avoidance inequalities are used.
+- Scenarios: `case_a`, `lone`, `changed`; `gate_scenario` for recorded decisions.
+- Runs: `simulate` (a small numpy simulation, of case A or of scripted motions), and those that many tests share.
+- Edits of a trace: `with_signals`, `with_meta`, `with_scenario`, `with_events`, `with_decision`, `moved`; edits by name
+  (`set_nan`, `dropped`, `bumped`, `rows`) are functions from trace to trace.
+- Recorded decisions: `decided_run`, six of them on problems (`GateData`) that are small enough to enumerate every plan.
+
+Nothing here is shared with the checkers; of the package the avoidance inequalities and the rules of the gatekeeper's
+answer are used.
 """
 
 from __future__ import annotations
@@ -249,6 +256,10 @@ def with_scenario(trace: Trace, **changes: Any) -> Trace:
     """A copy that claims to be of another scenario: dotted keys, with __ for the dots."""
     dotted = {key.replace("__", "."): value for key, value in changes.items()}
     return with_meta(trace, scenario=changed(trace.scenario, dotted))
+
+
+def with_events(trace: Trace, change: Callable[[list[dict[str, Any]]], list[dict[str, Any]]]) -> Trace:
+    return with_meta(trace, events=sorted(change(list(trace.events)), key=lambda event: float(event["t_s"])))
 
 
 def moved(trace: Trace, robot: str, row: int, offset: list[float]) -> Trace:
@@ -515,7 +526,3 @@ def with_decision(trace: Trace, edit: DecisionEdit, row: int = 2) -> Trace:
         decisions=pd.DataFrame(decisions, columns=list(DECISION_COLUMNS)).astype(DECISION_COLUMNS),
         problems=pd.DataFrame(problems, columns=[*PROBLEM_SCALARS, *PROBLEM_ARRAYS]),
     )
-
-
-def with_events(trace: Trace, change: Callable[[list[dict[str, Any]]], list[dict[str, Any]]]) -> Trace:
-    return with_meta(trace, events=sorted(change(list(trace.events)), key=lambda event: float(event["t_s"])))

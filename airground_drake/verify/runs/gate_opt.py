@@ -6,7 +6,9 @@ and convexity gives bounds that need no trust in any solver: see `convex_bounds.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -79,54 +81,93 @@ class GateOpt(GateClaim):
         """Enclose every optimum; the margin is what is left of the largest gap allowed."""
         route = trace.scenario["gatekeeper"]["route"]
         planned = [row for row in rows if row.planned]
-        halfplanes, dwelling = route in HALF_PLANE_ROUTES, route in DWELL_ROUTES
-        lacking = [row for row in planned if halfplanes and row.data["normals"] is None]
+        lacking = [row for row in planned if route in HALF_PLANE_ROUTES and row.data["normals"] is None]
         if cut := [row for row in lacking if row.given["status"] == "optimal"]:
             raise TraceError(f"{cut[0].label} claims to be complete, but has no normals")
         compared = [one for row in planned for one in compare_with_constant_plans(row)]
-        if not (halfplanes or dwelling):
+        if route not in (*HALF_PLANE_ROUTES, *DWELL_ROUTES):
             reason = f"route {route!r} has no bound that can be established again"
             return conclude(Finding("inconclusive", evidence={"decisions": len(rows), "reason": reason}), compared)
-        bounded = [row for row in planned if row not in lacking]
-        lines = [row["normals"] if halfplanes else None for row in bounded]
-        found = [cheapest_of_blocks(*one) for one in zip(bounded, lines, strict=True)] if dwelling else enclose(bounded)
-        gaps = []
-        widths = []
-        certified = 0
-        open_gaps: list[str] = []
-        for row, normals, one in zip(bounded, lines, found, strict=True):
-            gap = (float(row.cost(row["positions_m"])) - one.lower) / row.scale
-            gaps.append(gap)
-            widths.append((one.upper - one.lower) / row.scale)
-            certified += bool(one.other_first > one.lower + gap * row.scale)
-            compared += compare_bounds(row, one, normals)
-            if gap > self.largest_gap:  # open, unless a cheaper plan can be shown: rounding may cost that much
-                open_gaps.append(row.label)
-                shown = (float(row.cost(row["positions_m"])) - cheapest_of_blocks(row, None).lower) / row.scale
-                compared.append(Off(row, "a plan of blocks is cheaper", max(0.0, shown), self.largest_gap))
-        width = max(widths, default=0.0)
-        undecided = bool(lacking) or not bounded or width > self.widest or bool(open_gaps)
-        at = [{name: row.given[name] for name in ("t_s", "robot")} for row in bounded]
-        worst = [{**at[i], "gap": float(gaps[i])} for i in np.argsort(gaps)[:-6:-1]]
-        finding = Finding(
-            "inconclusive" if undecided else "holds",
-            margin=None if undecided else self.largest_gap - worst[0]["gap"],
+        bounded = bound([row for row in planned if row not in lacking], route)
+        for each in bounded:
+            compared += compare_bounds(each.row, each.optimum, each.normals)
+            if each.gap > self.largest_gap:
+                compared.append(compare_with_blocks(each, self.largest_gap))
+        finding = self._finding(bounded, lacking)
+        listed = {"decisions": len(rows), "without_a_plan": [row.label for row in rows if not row.planned]}
+        return conclude(replace(finding, evidence=listed | finding.evidence), compared)
+
+    def _finding(self, bounded: Sequence[Bounded], lacking: Sequence[Row]) -> Finding:
+        """What the gaps say, as long as nothing recorded is wrong; a gap that is too wide is open, not refuted."""
+        too_wide = [each.row.label for each in bounded if each.gap > self.largest_gap]
+        width = max((each.width for each in bounded), default=0.0)
+        decided = bool(bounded) and not lacking and not too_wide and width <= self.widest
+        gaps = [each.gap for each in bounded]
+        largest = [bounded[i] for i in np.argsort(gaps)[:-6:-1]]
+        worst = [{**{name: each.row.given[name] for name in ("t_s", "robot")}, "gap": each.gap} for each in largest]
+        return Finding(
+            "holds" if decided else "inconclusive",
+            margin=self.largest_gap - worst[0]["gap"] if decided else None,
             unit="of the cheaper constant plan's cost",
             where={name: worst[0][name] for name in ("robot", "t_s")} if worst else {},
             evidence={
-                "decisions": len(rows),
                 "bounded": len(bounded),
                 "without_a_bound": [row.label for row in lacking],
-                "gap_too_wide_to_decide": open_gaps,
-                "without_a_plan": [row.label for row in rows if not row.planned],
+                "gap_too_wide_to_decide": too_wide,
                 "largest_gap": worst[0]["gap"] if worst else None,
                 "median_gap": float(np.median(gaps)) if gaps else None,
-                "widest_enclosure": float(width),
-                "first_stage_certified": certified,
+                "widest_enclosure": width,
+                "first_stage_certified": sum(each.first_stage_certified for each in bounded),
                 "largest_gaps": worst,
             },
         )
-        return conclude(finding, compared)
+
+
+@dataclass(frozen=True)
+class Bounded:
+    """A decision with a plan, and bounds of the optimum of the problem that its route solves.
+
+    Attributes:
+        row: the decision.
+        normals: along which that problem measures distances; None: exact distances.
+        optimum: its bounds.
+    """
+
+    row: Row
+    normals: Array | None
+    optimum: Enclosure
+
+    @cached_property
+    def gap(self) -> float:
+        """Cost of the plan by exact distances above the lower bound, in units of the row's scale."""
+        return (float(self.row.cost(self.row["positions_m"])) - self.optimum.lower) / self.row.scale
+
+    @property
+    def width(self) -> float:
+        """Of the enclosure, in the same units."""
+        return (self.optimum.upper - self.optimum.lower) / self.row.scale
+
+    @property
+    def first_stage_certified(self) -> bool:
+        """Whether no plan with the other first stage can be as cheap as this one."""
+        return self.optimum.other_first > self.optimum.lower + self.gap * self.row.scale
+
+
+def bound(rows: Sequence[Row], route: str) -> list[Bounded]:
+    """Bounds for each decision, by the way that suits the route."""
+    normals = [row["normals"] if route in HALF_PLANE_ROUTES else None for row in rows]
+    if route in DWELL_ROUTES:
+        optima = [cheapest_of_blocks(row, along) for row, along in zip(rows, normals, strict=True)]
+    else:
+        optima = enclose(rows)
+    return [Bounded(*one) for one in zip(rows, normals, optima, strict=True)]
+
+
+def compare_with_blocks(each: Bounded, allowed: float) -> Off:
+    """A gap that is too wide is wrong only if a cheaper plan can be shown: rounding may cost that much."""
+    row = each.row
+    shown = (float(row.cost(row["positions_m"])) - cheapest_of_blocks(row, None).lower) / row.scale
+    return Off(row, "a plan of blocks is cheaper", max(0.0, shown), allowed)
 
 
 def compare_with_constant_plans(row: Row) -> Iterator[Off]:
@@ -141,7 +182,7 @@ def compare_with_constant_plans(row: Row) -> Iterator[Off]:
 def compare_bounds(row: Row, found: Enclosure, normals: Array | None) -> Iterator[Off]:
     """The recorded normals, lower bound and gap."""
     given = row.given
-    bound = float(row.given["lower_bound"])
+    lower = float(row.given["lower_bound"])
     scale = row.scale
     own = float(row.cost(row["positions_m"], normals))
     known = [*row.constant, *([row.positions(row["rounded"])] if row.data["rounded"] is not None else [])]
@@ -150,12 +191,12 @@ def compare_bounds(row: Row, found: Enclosure, normals: Array | None) -> Iterato
     best = min(own, loser, *(float(row.cost(positions, normals)) for positions in known))
     if normals is not None:
         yield Off(row, "length of a normal, minus 1", np.linalg.norm(normals, axis=2) - 1.0, POSITION_TOLERANCE_M)
-    more = {"lower_bound": bound, "optimum_at_least": found.lower, "optimum_at_most": found.upper}
-    yield Off(row, "lower bound above the plan's cost", max(0.0, bound - own) / scale, OVERSTATED, cost=own)
-    yield Off(row, "lower bound overstated", max(0.0, bound - found.upper) / scale, OVERSTATED, **more)
+    more = {"lower_bound": lower, "optimum_at_least": found.lower, "optimum_at_most": found.upper}
+    yield Off(row, "lower bound above the plan's cost", max(0.0, lower - own) / scale, OVERSTATED, cost=own)
+    yield Off(row, "lower bound overstated", max(0.0, lower - found.upper) / scale, OVERSTATED, **more)
     if given["status"] == "optimal" and given["route"] != "branch_and_bound":
-        yield Off(row, "lower bound understated", max(0.0, found.lower - bound) / scale, UNDERSTATED, **more)
-    least, most = ((cost - bound) / max(cost, 1e-12) for cost in (best, own))
+        yield Off(row, "lower bound understated", max(0.0, found.lower - lower) / scale, UNDERSTATED, **more)
+    least, most = ((cost - lower) / max(cost, 1e-12) for cost in (best, own))
     beyond = max(0.0, least - given["gap"], given["gap"] - most)
     yield Off(row, "recorded gap", beyond, GAP_TOLERANCE, recorded=given["gap"], at_least=least, at_most=most)
 

@@ -175,29 +175,39 @@ def _robustness(rtamt: Any, text: str, semantics: str, sets: Sequence[dict[str, 
     Raises:
         ValueError: if it is not a number, or there are no signals, or some have values that are not finite.
     """
-    dense = semantics == "dense"
     if not sets or not all(np.isfinite(part).all() for one in sets for samples in one.values() for part in samples):
         raise ValueError("there are no signals, or some have values that are not finite")
-    spec = rtamt.StlDenseTimeOfflineSpecification() if dense else rtamt.StlDiscreteTimeOfflineSpecification()
+    if semantics == "dense":
+        specification = rtamt.StlDenseTimeOfflineSpecification()
+        evaluate = _dense
+    else:
+        specification = rtamt.StlDiscreteTimeOfflineSpecification()
+        evaluate = _discrete
     for name in sets[0]:
-        spec.declare_var(name, "float")
-    spec.spec = text
-    spec.parse()
-    found = []
-    for signals in sets:
-        if dense:
-            result = spec.evaluate(*([name, np.column_stack(samples).tolist()] for name, samples in signals.items()))
-        else:
-            time = next(iter(signals.values()))[0]
-            twice = (
-                2 if len(time) == 1 else 1
-            )  # rtamt needs two samples; 'always' says the same of one that is repeated
-            values = {name: v.tolist() * twice for name, (_, v) in signals.items()}
-            result = spec.evaluate({"time": [*time.tolist(), *(time + 1.0)][: len(time) * twice], **values})
-        found.append(float(result[0][1]))
+        specification.declare_var(name, "float")
+    specification.spec = text
+    specification.parse()
+    found = [evaluate(specification, signals) for signals in sets]
     if np.isnan(found).any():
         raise ValueError(f"robustness {found}")
     return min(found)
+
+
+def _dense(specification: Any, signals: dict[str, Samples]) -> float:
+    """Robustness at the first sample; rtamt takes [time, value] pairs, signal by signal."""
+    pairs = [[name, np.column_stack(samples).tolist()] for name, samples in signals.items()]
+    return float(specification.evaluate(*pairs)[0][1])
+
+
+def _discrete(specification: Any, signals: dict[str, Samples]) -> float:
+    """Robustness at the first sample; rtamt takes one sequence of times and the values of all signals at them."""
+    time = next(iter(signals.values()))[0]
+    values = {name: value for name, (_, value) in signals.items()}
+    if len(time) == 1:  # rtamt needs two samples; 'always' says the same of one that is repeated
+        time = np.append(time, time + 1.0)
+        values = {name: np.append(value, value) for name, value in values.items()}
+    data = {"time": time.tolist(), **{name: value.tolist() for name, value in values.items()}}
+    return float(specification.evaluate(data)[0][1])
 
 
 def merge(verdicts: Iterable[Verdict], checks: Sequence[dict[str, Any]]) -> list[Verdict]:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from airground_drake.arrays import Array
 from airground_drake.nsbc.avoidance import HalfSpaces, limit_speed
@@ -97,21 +98,14 @@ def attack(
     avoidance = running_avoidance(inputs)
     neighbourhood = team.neighbourhood(slice(None))
     mobility = team.mobility
-    n = len(team.robots)
-    m = len(team.obstacles)
+    robots = np.arange(len(team.robots))
     w = inputs["disturbance_m_s"]
     h = avoidance.period
-    rows = np.arange(n)
     added = np.where(neighbourhood.share < 1.0, pairs, 1.0) * w
     bound = neighbourhood.distance - added / avoidance.gain
-    met = np.ones(bound.shape, dtype=bool)  # all inequalities of this pair so far
-    worst = np.inf
-    unmet = 0
-    shortfall = 0.0
-    broke = 0
-    uncovered = 0
-    where: dict[str, Any] = {}
-    target = rng.integers(bound.shape[1], size=n)
+    met = np.ones(bound.shape, dtype=bool)  # all inequalities of this robot against this point so far
+    tally = _Tally()
+    target = rng.integers(bound.shape[1], size=len(robots))
     for k in range(STEPS):
         around = neighbourhood.around(positions)
         x = positions[:, None] - around.centre
@@ -119,31 +113,24 @@ def attack(
         if how != "switching":
             target = np.argmin(reach - around.distance, axis=1)
         elif k % 20 == 0:
-            target = rng.integers(bound.shape[1], size=n)
-        inward = -x[rows, target] / reach[rows, target][:, None]
-        wanted, push = (unit(rng, n), unit(rng, n)) if how == "random" else (inward, inward)
+            target = rng.integers(bound.shape[1], size=len(robots))
+        inward = -x[robots, target] / reach[robots, target][:, None]
+        wanted, push = inward, inward
+        if how == "random":
+            wanted = unit(rng, len(robots))
+            push = unit(rng, len(robots))
         wanted = wanted * mobility * (0.0 if how == "idle" else 100.0)
         spaces = edit(avoidance.half_spaces(positions, mobility, around))
         velocity = avoidance.apply(limit_speed(wanted, team.max_speed), spaces)
         short = np.where(np.isfinite(spaces.bound), spaces.bound - rates(spaces.normal, velocity), -np.inf)
-        unmet = unmet + int((short > TOLERANCE).sum())
-        shortfall = max(shortfall, float(short.max()))
         met &= short <= TOLERANCE
         moved = velocity + force * w * push * mobility
         others = np.zeros(x.shape)
-        others[:, m:] = moved[neighbourhood.others]
+        others[:, len(team.obstacles) :] = moved[neighbourhood.others]
         least = nearest(x, moved[:, None] - others, h)
-        both = met.copy()
-        for i in range(n):  # a pair needs both robots' halves
-            for j, other in enumerate(neighbourhood.others[i]):
-                both[i, m + j] &= met[other, m + int(np.flatnonzero(neighbourhood.others[other] == i)[0])]
-        below = least < bound - TOLERANCE
-        broke = broke + int((below & both).sum())
-        uncovered = uncovered + int((below & ~both).sum())
-        i, j = divmod(int(np.argmin(least - bound)), bound.shape[1])
-        if least[i, j] - bound[i, j] < worst:
-            worst = float(least[i, j] - bound[i, j])
-            where = {
+        if tally.add(short, least - bound, _both(met, neighbourhood.others)):
+            i, j = divmod(int(np.argmin(least - bound)), bound.shape[1])
+            tally.where = {
                 "scene": scene.name, "attack": how, "robot": team.robots[i], "t_s": k * h,
                 "distance_m": float(least[i, j]), "bound_m": float(bound[i, j]),
                 "safe_distance_m": float(around.distance[i, j]),
@@ -151,10 +138,50 @@ def attack(
                 "velocity_with_disturbance_m_s": moved[i].tolist(),
             }  # fmt: skip
         positions = positions + h * moved
-    return {
-        "worst_margin_m": worst, "where": where, "unmet": unmet, "worst_shortfall_m_s": shortfall,
-        "broken": broke, "uncovered": uncovered,
-    }  # fmt: skip
+    return tally.to_json()
+
+
+def _both(met: npt.NDArray[np.bool_], others: npt.NDArray[np.intp]) -> npt.NDArray[np.bool_]:
+    """`met` (n, obstacles + n - 1), but for a pair of robots only where both have met their halves."""
+    count = len(met)
+    obstacles = met.shape[1] - others.shape[1]
+    of_pair = np.ones((count, count), dtype=bool)
+    rows = np.arange(count)[:, None]
+    of_pair[rows, others] = met[:, obstacles:]
+    both = met.copy()
+    both[:, obstacles:] &= of_pair[others, rows]
+    return both
+
+
+@dataclass
+class _Tally:
+    """What a disturbed run is judged by, so far: see `attack`."""
+
+    worst: float = np.inf
+    unmet: int = 0
+    shortfall: float = 0.0
+    broken: int = 0
+    uncovered: int = 0
+    where: dict[str, Any] = field(default_factory=dict)
+
+    def add(self, short: Array, margin: Array, met: npt.NDArray[np.bool_]) -> bool:
+        """One period: shortfalls of the inequalities, m/s, margins of the bounds, m; whether it is the worst so far."""
+        self.unmet += int((short > TOLERANCE).sum())
+        self.shortfall = max(self.shortfall, float(short.max()))
+        below = margin < -TOLERANCE
+        self.broken += int((below & met).sum())
+        self.uncovered += int((below & ~met).sum())
+        least = float(margin.min())
+        is_worst = least < self.worst
+        self.worst = min(self.worst, least)
+        return is_worst
+
+    def to_json(self) -> Inputs:
+        """As `attack` returns it."""
+        return {
+            "worst_margin_m": self.worst, "where": self.where, "unmet": self.unmet,
+            "worst_shortfall_m_s": self.shortfall, "broken": self.broken, "uncovered": self.uncovered,
+        }  # fmt: skip
 
 
 def campaign(inputs: Inputs) -> list[Inputs]:

@@ -160,25 +160,49 @@ def hostile_team(inputs: Inputs, count: int, composition: Composition, on_top: b
         missed += int((short > 0.0).sum()) + int((velocity[:, 2] != 0.0).sum())
         if short.max() > worst:
             worst = float(short.max())
-            state = (positions, wanted, np.unravel_index(np.argmax(short), short.shape), asked)
+            state = (positions, wanted, asked, divmod(int(np.argmax(short)), short.shape[1]))
     found: Inputs = {"states": count, "ugvs": n, "missed": missed, "worst_missed_by_m_s": worst}
     if state is None:
         return found
-    positions = state[0].copy()
-    wanted = state[1]
-    (i, k) = (int(state[2][0]), int(state[2][1]))
-    least, steps = np.inf, 0
+    positions, wanted, asked, (i, k) = state
     around = neighbourhood.around(positions)
-    centre, safe = around.centre[i, k], float(around.distance[i, k])
-    begin = float(np.linalg.norm(positions[i] - centre))
-    described = {"positions_m": positions.tolist(), "robot": team.ugvs[i], "avoided_m": centre.tolist()}
-    while least >= safe - 0.1 and steps < 200:
-        velocity = command(positions, wanted, state[3])[0][i]
-        least = min(least, float(nearest(positions[i] - centre, velocity, avoidance.period)))
-        positions[i] += avoidance.period * velocity
-        steps += 1
-    replay = {"distance_before_m": begin, "safe_distance_m": safe, "steps": steps, "least_distance_m": least}
-    return found | {"first_missed": described | {"intervention_towards_m": wanted[i].tolist()}, "replay": replay}
+    described = {
+        "positions_m": positions.tolist(),
+        "robot": team.ugvs[i],
+        "avoided_m": around.centre[i, k].tolist(),
+        "intervention_towards_m": wanted[i].tolist(),
+    }
+    approach = _Approach(i, around.centre[i, k], float(around.distance[i, k]), avoidance.period)
+    replay = approach.replay(positions, lambda at: command(at, wanted, asked)[0][i])
+    return found | {"first_missed": described, "replay": replay}
+
+
+@dataclass(frozen=True)
+class _Approach:
+    """A robot on its way to a point at rest that it should avoid: which robot, where the point is, d m, h s."""
+
+    robot: int
+    centre: Array
+    safe: float
+    period: float
+
+    def replay(self, start: Array, velocity: Callable[[Array], Array]) -> Inputs:
+        """Let that robot alone move, until it is clearly too close or for 200 periods: the distances, m."""
+        positions = start.copy()
+        begin = float(np.linalg.norm(positions[self.robot] - self.centre))
+        least = np.inf
+        steps = 0
+        while least >= self.safe - 0.1 and steps < 200:
+            chosen = velocity(positions)
+            least = min(least, float(nearest(positions[self.robot] - self.centre, chosen, self.period)))
+            positions[self.robot] += self.period * chosen
+            steps += 1
+        return {
+            "distance_before_m": begin,
+            "safe_distance_m": self.safe,
+            "steps": steps,
+            "least_distance_m": least,
+        }
 
 
 class _Flier:

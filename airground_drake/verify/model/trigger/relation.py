@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -10,12 +11,15 @@ from typing import Any
 
 import numpy as np
 
+from airground_drake.arrays import Array
 from airground_drake.decision.trigger import Mode, Trigger, TriggerState
-from airground_drake.systems.decision import FIELDS, EventTrigger
+from airground_drake.systems.decision import EventTrigger
 from airground_drake.verify.engines.obligation import rational
 from airground_drake.verify.engines.rounding import ROUNDOFF
 from airground_drake.verify.engines.symbolic_execution import Branch, Linear, branches
 
+UGVS = 320
+"""States compared at a time: all UGVs of an EventTrigger share the time, so that one update decides many."""
 SYMBOLS = ("n", "k", "s", "t", "a", "l", "r", "x", "zeta", "release", "dwell")
 """Of the relation, in the order of print: r is the automaton's time of the last release; others as in `zeno_proof`."""
 
@@ -116,51 +120,67 @@ def dwell_rounding(trigger: Trigger, duration: float) -> float:
 def conformance(trigger: Trigger, transitions: Sequence[Transition], duration: float) -> dict[str, Any]:
     """The relation against the running `EventTrigger` on random states, most of them next to a guard's border.
 
-    All UGVs of an EventTrigger share the time, so that one update decides many states. The relation is evaluated
-    exactly at the floats' values (x and the levels as the decimals that they print as). A disagreement is excused
-    only if the time is within `rounding` of the end of the dwell.
+    The relation is evaluated exactly at the floats' values (x and the levels as the decimals that they print as). A
+    disagreement is excused only if the time is within `dwell_rounding` of the end of the dwell; where more than one
+    transition is possible, the relation disagrees.
     """
-    count, rng = 320, np.random.default_rng(1)
-    system = EventTrigger(count, trigger)
-    context = system.CreateDefaultContext()
-    rows = wrong = excused = 0
+    rng = np.random.default_rng(1)
+    system = EventTrigger(UGVS, trigger)
+    compared: list[tuple[str, str]] = []
     first: dict[str, Any] | None = None
-    moved = dict[str, int]()
     for now in rng.uniform(0.0, duration, 8):
-        context.SetTime(now)
-        near = now - trigger.dwell + np.spacing(now) * rng.integers(-3, 4, count)
-        triggered_at = np.where(rng.random(count) < 0.5, near, rng.uniform(0.0, now, count))
-        levels = np.array([trigger.zeta, trigger.release])[rng.integers(0, 2, count)]
-        x = np.select(
-            [rng.random(count) < 0.3, rng.random(count) < 0.5],
-            [levels, levels + np.spacing(levels) * rng.integers(-2, 3, count)],
-            rng.uniform(trigger.release - 1.0, trigger.zeta + 1.0, count),
-        )
-        modes, triggers = rng.integers(0, 3, count), rng.integers(0, 4, count)
-        released_at = rng.uniform(-1.0, now, count)
-        before = np.column_stack([modes, triggers, np.where(triggers > 0, triggered_at, -1.0), released_at])
-        after = np.empty_like(before)
-        system.GetInputPort("decision_variable").FixValue(context, x)
-        for mode in Mode:
-            context.SetDiscreteState(before.ravel())
-            system._leave(mode, context, context.get_mutable_state())
-            chosen = modes == mode
-            after[chosen] = context.get_discrete_state_vector().value().reshape(count, FIELDS)[chosen]
-        for was, became, value in zip(before, after, x, strict=True):
+        before, x = _random_states(trigger, float(now), rng)
+        for was, became, value in zip(before, _left(system, float(now), before, x), x, strict=True):
             names = ("n", "a", "r", "s", "x")
             point = dict(zip(names, map(Fraction, (*was[1:], now)), strict=False)) | {"x": Fraction(rational(value))}
             predicted, taken = _predict(transitions, Mode(int(was[0])), point)
-            rows += 1
-            moved[taken] = moved.get(taken, 0) + 1
-            if predicted != [Fraction(v) for v in became] and predicted:
+            outcome = "agrees"
+            if predicted != [Fraction(v) for v in became]:
                 off = abs(point["s"] - point["a"] - Fraction(rational(trigger.dwell)))
-                if point["n"] > 0 and off <= Fraction(dwell_rounding(trigger, duration)):
-                    excused += 1
-                    continue
-                wrong += 1
+                close = point["n"] > 0 and off <= Fraction(dwell_rounding(trigger, duration))
+                outcome = "within rounding" if close and predicted else "disagrees"
+            if outcome == "disagrees" and first is None:
                 states = {"before": was.tolist(), "after": became.tolist()}
-                first = first or {"t_s": float(now), "x_m": float(value), **states}
-    return {"states": rows, "disagreements": wrong, "within_rounding": excused, "first": first, "transitions": moved}
+                first = {"t_s": float(now), "x_m": float(value), **states}
+            compared.append((outcome, taken))
+    outcomes = Counter(outcome for outcome, _ in compared)
+    return {
+        "states": len(compared),
+        "disagreements": outcomes["disagrees"],
+        "within_rounding": outcomes["within rounding"],
+        "first": first,
+        "transitions": dict(Counter(taken for _, taken in compared)),
+    }
+
+
+def _random_states(trigger: Trigger, now: float, rng: np.random.Generator) -> tuple[Array, Array]:
+    """States of the UGVs of an EventTrigger, (UGVS, FIELDS), and decision variables (UGVS,), m, next to guards."""
+    near = now - trigger.dwell + np.spacing(now) * rng.integers(-3, 4, UGVS)
+    triggered_at = np.where(rng.random(UGVS) < 0.5, near, rng.uniform(0.0, now, UGVS))
+    levels = np.array([trigger.zeta, trigger.release])[rng.integers(0, 2, UGVS)]
+    x = np.select(
+        [rng.random(UGVS) < 0.3, rng.random(UGVS) < 0.5],
+        [levels, levels + np.spacing(levels) * rng.integers(-2, 3, UGVS)],
+        rng.uniform(trigger.release - 1.0, trigger.zeta + 1.0, UGVS),
+    )
+    modes = rng.integers(0, 3, UGVS)
+    triggers = rng.integers(0, 4, UGVS)
+    released_at = rng.uniform(-1.0, now, UGVS)
+    return np.column_stack([modes, triggers, np.where(triggers > 0, triggered_at, -1.0), released_at]), x
+
+
+def _left(system: EventTrigger, now: float, before: Array, x: Array) -> Array:
+    """The states (UGVS, FIELDS) after the running system's event at time `now`, s, for the mode of each."""
+    context = system.CreateDefaultContext()
+    context.SetTime(now)
+    system.GetInputPort("decision_variable").FixValue(context, x)
+    after = np.empty_like(before)
+    for mode in Mode:
+        context.SetDiscreteState(before.ravel())
+        system._leave(mode, context, context.get_mutable_state())
+        chosen = before[:, 0] == mode
+        after[chosen] = context.get_discrete_state_vector().value().reshape(before.shape)[chosen]
+    return after
 
 
 def _predict(transitions: Sequence[Transition], mode: Mode, point: dict[str, Fraction]) -> tuple[list[Fraction], str]:

@@ -1,9 +1,10 @@
 """ZENO-PROOF: two triggers are never closer than the minimum inter-event time, whatever the decision variable does.
 
-The transition relation is not written down a second time: `relation` runs the methods of the running `Trigger` on
-symbols, once for every way in which their comparisons can come out. An observer that sees nothing but entries into
-INTERVENING is added to it: k triggers so far, the last of them at l; what the automaton itself remembers, n triggers
-and the last at a, is not trusted. t is the time of the last event or wait, s >= t now, x any number. The invariant:
+The transition relation is not written down a second time: `read_off` (`relation.py`) runs the methods of the running
+`Trigger` on symbols, once for every way in which their comparisons can come out. The induction on it is in
+`induction.py`, broken triggers are in `mutants.py`. An observer that sees nothing but entries into INTERVENING is
+added to it: k triggers so far, the last of them at l; what the automaton itself remembers, n triggers and the last at
+a, is not trusted. t is the time of the last event or wait, s >= t now, x any number. The invariant:
 
     n = k; SUPERVISING: k = 0 or t >= l + dwell; INTERVENING and REFRACTORY: k >= 1 and a = l
 
@@ -93,7 +94,9 @@ def prove(trigger: Trigger, inputs: dict[str, Any]) -> Finding:
     numeric = read_off(lambda _: trigger)
     files = {"zeno_horn.smt2": horn(numeric, trigger, bound), **invariant(numeric, trigger, bound)}
     described = json.dumps({"bound_s": rational(bound), "transitions": [each.to_json() for each in numeric]}, indent=1)
-    spacer, *z3 = solve(list(files.values()), "z3", LIMIT_S)
+    answers = solve(list(files.values()), "z3", LIMIT_S)
+    spacer = answers[0]  # on the clauses; the others on our invariant
+    z3 = answers[1:]
     evidence: dict[str, Any] = {
         "bound_s": bound,
         "spacer": {"sat": "an invariant exists", "unsat": "violated"}.get(spacer.answer, spacer.answer),
@@ -111,7 +114,7 @@ def prove(trigger: Trigger, inputs: dict[str, Any]) -> Finding:
     found = finding(discharge([*obligations(general), *remarks(trigger, bound)]))
     ours = {name: [a.answer, b.answer] for name, a, b in zip(list(files)[1:], z3, cvc5, strict=True)}
     status = found.status
-    if any("sat" in answers for answers in ours.values()) or evidence["conformance"]["disagreements"]:
+    if any("sat" in pair for pair in ours.values()) or evidence["conformance"]["disagreements"]:
         status = "error"  # the invariant or the relation is not the running code's
     elif status == "proved" and (spacer.answer != "sat" or any(pair != ["unsat", "unsat"] for pair in ours.values())):
         status = "inconclusive"
