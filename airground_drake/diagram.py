@@ -22,13 +22,13 @@ from pydrake.trajectories import PiecewisePolynomial
 from airground_drake.arrays import Array
 from airground_drake.decision.bayes import optimal_threshold
 from airground_drake.decision.trigger import Trigger
-from airground_drake.gatekeeper.branch import BranchAndBoundRoute
 from airground_drake.gatekeeper.budget import Budget
-from airground_drake.gatekeeper.enumeration import EnumerationRoute
-from airground_drake.gatekeeper.nonlinear import NonlinearRoute
 from airground_drake.gatekeeper.prediction import Horizon, UgvLaw
-from airground_drake.gatekeeper.relaxed import RelaxedRoute
-from airground_drake.gatekeeper.rollout import RolloutRoute
+from airground_drake.gatekeeper.routes.branch_and_bound import BranchAndBoundRoute
+from airground_drake.gatekeeper.routes.closed_loop_enumeration import RolloutRoute
+from airground_drake.gatekeeper.routes.enumeration import EnumerationRoute
+from airground_drake.gatekeeper.routes.nonlinear import NonlinearRoute
+from airground_drake.gatekeeper.routes.relaxed import RelaxedRoute
 from airground_drake.intervention.database import BehaviourDatabase, make_policy
 from airground_drake.nsbc.avoidance import Avoidance, Composition
 from airground_drake.nsbc.motion import Motion

@@ -25,7 +25,7 @@ from airground_drake.arrays import Array
 from airground_drake.diagram import RECORDED, Model, build_model
 from airground_drake.errors import AirgroundError
 from airground_drake.gatekeeper.prediction import Horizon, Scene, UgvLaw, predicted_problem
-from airground_drake.gatekeeper.relaxed import RelaxedRoute
+from airground_drake.gatekeeper.routes.relaxed import RelaxedRoute
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance, Composition, Surroundings, limit_speed
 from airground_drake.nsbc.motion import Motion

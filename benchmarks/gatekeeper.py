@@ -33,14 +33,14 @@ import numpy as np
 
 from airground_drake import diagram
 from airground_drake.gatekeeper.budget import Budget
-from airground_drake.gatekeeper.candidates import Constants, choose
 from airground_drake.gatekeeper.half_planes import normals_along
-from airground_drake.gatekeeper.nonlinear import NonlinearRoute
-from airground_drake.gatekeeper.polish import best_known
+from airground_drake.gatekeeper.local_search import best_known
 from airground_drake.gatekeeper.prediction import Horizon, Scene, UgvLaw, predicted_problem
 from airground_drake.gatekeeper.problem import DECIDED, Decision, Problem
-from airground_drake.gatekeeper.relaxed import RelaxedRoute
 from airground_drake.gatekeeper.rounding import sum_up_rounding
+from airground_drake.gatekeeper.routes.nonlinear import NonlinearRoute
+from airground_drake.gatekeeper.routes.relaxed import RelaxedRoute
+from airground_drake.gatekeeper.solution import Constants, choose
 from airground_drake.intervention.paths import NoPath, shortest_path
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance

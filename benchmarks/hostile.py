@@ -21,7 +21,7 @@ import numpy as np
 from airground_drake.arrays import Array
 from airground_drake.diagram import make_presets, make_team
 from airground_drake.gatekeeper.prediction import Horizon, Scene, UgvLaw, predicted_problem
-from airground_drake.gatekeeper.relaxed import RelaxedRoute
+from airground_drake.gatekeeper.routes.relaxed import RelaxedRoute
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.motion import Motion

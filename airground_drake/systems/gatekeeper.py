@@ -13,9 +13,9 @@ from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSys
 
 from airground_drake.arrays import Array
 from airground_drake.gatekeeper.budget import Budget, Clock
-from airground_drake.gatekeeper.candidates import Constants
 from airground_drake.gatekeeper.prediction import Horizon, Scene, UgvLaw, predicted_problem
 from airground_drake.gatekeeper.problem import DECIDED, Decision, Problem
+from airground_drake.gatekeeper.solution import Constants
 from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT, Point, Reports, answer_to
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.motion import Motion

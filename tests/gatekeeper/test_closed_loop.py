@@ -16,14 +16,14 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource, Integrator, Multiplexer, TrajectorySource
 
 from airground_drake import diagram
-from airground_drake.gatekeeper import rollout
 from airground_drake.gatekeeper.budget import UNLIMITED, Budget
-from airground_drake.gatekeeper.candidates import block_of_stage
 from airground_drake.gatekeeper.closed_loop import ClosedLoop
-from airground_drake.gatekeeper.enumeration import EnumerationRoute
 from airground_drake.gatekeeper.prediction import Horizon, Scene, UgvLaw, closed_loop, predicted_problem
 from airground_drake.gatekeeper.problem import DECIDED, Decision, Problem
-from airground_drake.gatekeeper.rollout import RolloutRoute, evaluate
+from airground_drake.gatekeeper.routes import closed_loop_enumeration as rollout
+from airground_drake.gatekeeper.routes.closed_loop_enumeration import RolloutRoute, evaluate
+from airground_drake.gatekeeper.routes.enumeration import EnumerationRoute
+from airground_drake.gatekeeper.solution import block_of_stage
 from airground_drake.intervention.messages import ACCEPT, REFUSE
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance

@@ -9,12 +9,12 @@ from pydrake.solvers import ClarabelSolver, MathematicalProgramResult, SolutionR
 
 from airground_drake.arrays import Array
 from airground_drake.gatekeeper.budget import Budget
-from airground_drake.gatekeeper.candidates import Constants, choose, cut_short, remaining_cost
+from airground_drake.gatekeeper.convex_program import Shape, TeamProgram, empty_program
 from airground_drake.gatekeeper.half_planes import Outlook, multipliers_at, normals_along, outlook
-from airground_drake.gatekeeper.polish import EVERYWHERE, Polish
+from airground_drake.gatekeeper.local_search import EVERYWHERE, Polish
 from airground_drake.gatekeeper.problem import Decision, Problem
-from airground_drake.gatekeeper.program import Shape, TeamProgram, empty_program
 from airground_drake.gatekeeper.rounding import sum_up_rounding
+from airground_drake.gatekeeper.solution import Constants, choose, cut_short, remaining_cost
 
 _TOLERANCE = 1e-6
 

@@ -10,10 +10,10 @@ from numba import njit
 
 from airground_drake.arrays import Array
 from airground_drake.gatekeeper.budget import Budget
-from airground_drake.gatekeeper.candidates import block_of_stage
 from airground_drake.gatekeeper.closed_loop import ACCEPTED, REFUSED, ClosedLoop, velocity_of, workspace
-from airground_drake.gatekeeper.enumeration import EnumerationRoute
 from airground_drake.gatekeeper.problem import Decision, Evaluation, Problem
+from airground_drake.gatekeeper.routes.enumeration import EnumerationRoute
+from airground_drake.gatekeeper.solution import block_of_stage
 
 _CHUNK = 64
 """Blocks rolled out between two looks at the clock; it takes them about 0.1 ms if they have six stages."""

@@ -18,10 +18,10 @@ from pydrake.solvers import (
 
 from airground_drake.arrays import Array
 from airground_drake.gatekeeper.budget import Budget
-from airground_drake.gatekeeper.candidates import Constants, choose, cut_short, remaining_cost
+from airground_drake.gatekeeper.convex_program import TeamProgram, team_program
 from airground_drake.gatekeeper.half_planes import normals_along
 from airground_drake.gatekeeper.problem import Decision, Problem
-from airground_drake.gatekeeper.program import TeamProgram, team_program
+from airground_drake.gatekeeper.solution import Constants, choose, cut_short, remaining_cost
 
 _SCALE = 10.0
 """Cost of the cheaper constant plan in the program: Drake's absolute tolerance is then 0.1 % of it.

@@ -17,18 +17,19 @@ from hypothesis.extra.numpy import arrays
 from pydrake.solvers import ClarabelSolver, MixedIntegerBranchAndBound, SnoptSolver, SolutionResult, SolverOptions
 
 from airground_drake.diagram import ROUTES
-from airground_drake.gatekeeper import branch, nonlinear
-from airground_drake.gatekeeper.branch import BranchAndBoundRoute
 from airground_drake.gatekeeper.budget import Budget
-from airground_drake.gatekeeper.candidates import Constants, block_of_stage, remaining_cost
-from airground_drake.gatekeeper.enumeration import EnumerationRoute
+from airground_drake.gatekeeper.convex_program import team_program
 from airground_drake.gatekeeper.half_planes import normals_along, outlook
-from airground_drake.gatekeeper.nonlinear import NonlinearRoute
-from airground_drake.gatekeeper.polish import Polish, best_known
+from airground_drake.gatekeeper.local_search import Polish, best_known
 from airground_drake.gatekeeper.prediction import Horizon, Scene, UgvLaw, predicted_problem
 from airground_drake.gatekeeper.problem import DECIDED, Decision, Evaluation, Problem, Status
-from airground_drake.gatekeeper.program import team_program
 from airground_drake.gatekeeper.rounding import sum_up_rounding
+from airground_drake.gatekeeper.routes import branch_and_bound as branch
+from airground_drake.gatekeeper.routes import nonlinear
+from airground_drake.gatekeeper.routes.branch_and_bound import BranchAndBoundRoute
+from airground_drake.gatekeeper.routes.enumeration import EnumerationRoute
+from airground_drake.gatekeeper.routes.nonlinear import NonlinearRoute
+from airground_drake.gatekeeper.solution import Constants, block_of_stage, remaining_cost
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.motion import Motion

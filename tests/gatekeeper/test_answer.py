@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from airground_drake import diagram
 from airground_drake.gatekeeper.budget import Budget
-from airground_drake.gatekeeper.candidates import Constants
 from airground_drake.gatekeeper.problem import Decision, Problem
+from airground_drake.gatekeeper.solution import Constants
 from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Scenario

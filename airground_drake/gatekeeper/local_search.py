@@ -10,9 +10,9 @@ from numba import njit
 
 from airground_drake.arrays import Array
 from airground_drake.gatekeeper.budget import UNLIMITED, Budget
-from airground_drake.gatekeeper.candidates import Constants, remaining_cost
 from airground_drake.gatekeeper.half_planes import Outlook
 from airground_drake.gatekeeper.problem import Evaluation, Problem
+from airground_drake.gatekeeper.solution import Constants, remaining_cost
 
 EVERYWHERE = np.inf
 """Radius of a search that is not confined to a tube."""

@@ -18,10 +18,10 @@ from pydrake.solvers import (
 
 from airground_drake.arrays import Array
 from airground_drake.gatekeeper.budget import Budget
-from airground_drake.gatekeeper.candidates import Constants, choose, cut_short, remaining_cost
 from airground_drake.gatekeeper.half_planes import reachable
 from airground_drake.gatekeeper.problem import Decision, Evaluation, Problem
 from airground_drake.gatekeeper.rounding import sum_up_rounding
+from airground_drake.gatekeeper.solution import Constants, choose, cut_short, remaining_cost
 
 NlpSolver = Literal["snopt", "ipopt"]
 

@@ -8,9 +8,9 @@ from numba import njit
 
 from airground_drake.arrays import Array
 from airground_drake.gatekeeper.budget import Budget
-from airground_drake.gatekeeper.candidates import Constants, block_of_stage, choose, cut_short, remaining_cost
-from airground_drake.gatekeeper.polish import stage_cost
+from airground_drake.gatekeeper.local_search import stage_cost
 from airground_drake.gatekeeper.problem import Decision, Evaluation, Problem
+from airground_drake.gatekeeper.solution import Constants, block_of_stage, choose, cut_short, remaining_cost
 
 
 class EnumerationRoute:

@@ -13,9 +13,9 @@ from pydrake.solvers import MathematicalProgram
 from scipy.sparse import csc_matrix
 
 from airground_drake.arrays import Array
-from airground_drake.gatekeeper.candidates import block_of_stage
 from airground_drake.gatekeeper.half_planes import offsets, reachable
 from airground_drake.gatekeeper.problem import Problem
+from airground_drake.gatekeeper.solution import block_of_stage
 
 AXES = 2  # UGVs move in their plane
 

@@ -15,8 +15,8 @@ from airground_drake.diagram import make_presets, make_team
 from airground_drake.gatekeeper.half_planes import normals_along
 from airground_drake.gatekeeper.prediction import Horizon, Scene, UgvLaw, closed_loop, predicted_problem
 from airground_drake.gatekeeper.problem import Problem
-from airground_drake.gatekeeper.relaxed import RelaxedRoute
 from airground_drake.gatekeeper.rounding import rounding_deviation, sum_up_rounding
+from airground_drake.gatekeeper.routes.relaxed import RelaxedRoute
 from airground_drake.intervention.detour import Detour
 from airground_drake.intervention.messages import SILENT
 from airground_drake.intervention.policy import Observation, Proposal
