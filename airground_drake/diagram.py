@@ -25,7 +25,7 @@ from airground_drake.decision.trigger import Trigger
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.prediction import Horizon, UgvLaw
 from airground_drake.gatekeeper.routes.branch_and_bound import BranchAndBoundRoute
-from airground_drake.gatekeeper.routes.closed_loop_enumeration import RolloutRoute
+from airground_drake.gatekeeper.routes.closed_loop_enumeration import ClosedLoopEnumerationRoute
 from airground_drake.gatekeeper.routes.enumeration import EnumerationRoute
 from airground_drake.gatekeeper.routes.nonlinear import NonlinearRoute
 from airground_drake.gatekeeper.routes.relaxed import RelaxedRoute
@@ -55,7 +55,7 @@ ROUTES: dict[str, Callable[[], Route]] = {
     "enumeration": EnumerationRoute,
     "nonlinear": NonlinearRoute,
     "branch_and_bound": BranchAndBoundRoute,
-    "rollout": RolloutRoute,
+    "rollout": ClosedLoopEnumerationRoute,
 }
 
 S = TypeVar("S", bound=System)

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize
 
 from airground_drake.arrays import Array
-from airground_drake.gatekeeper.problem import Decision
+from airground_drake.gatekeeper.problem import Solution
 from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Gatekeeper, Obstacle, Preset, Run, Scenario, Ugv
@@ -127,7 +127,7 @@ def problem_at(trace: Trace, t: float) -> Data:
     return Data(round(1000 * t), trace.position("ugv1")[k], reference, centres, distances)
 
 
-def decide(data: Data, route: str) -> Decision:
+def solve(data: Data, route: str) -> Solution:
     """As the route's documentation has it."""
     relaxed, optimum = data.relaxed()
     rounded = rounding(relaxed)
@@ -142,8 +142,8 @@ def decide(data: Data, route: str) -> Decision:
         bound = 0.99 * min(data.plan_cost(plan, along=True) for plan in PLANS)
         least = min(data.plan_cost(plan, along=True) for plan in (best, np.ones(N), np.zeros(N)))
     rounds, solves = route in ("relaxed", "nonlinear"), route in ("relaxed", "enumeration", "branch_and_bound")
-    return Decision(
-        accept=best[0] == 1.0,
+    return Solution(
+        accept_first=best[0] == 1.0,
         status="optimal",
         objective=data.cost(positions),
         lower_bound=bound,
@@ -170,7 +170,7 @@ def recorded(route: str = "relaxed") -> Trace:
     for k in range(1, 7):
         t = k * DT
         data = problem_at(base, t)
-        found = decide(data, route)
+        found = solve(data, route)
         throughout = data.plan_cost(np.ones(N)), data.plan_cost(np.zeros(N))
         accepted, reason = settle(found, throughout, 0.1, standing, t - since, rules)
         answer = ACCEPT if accepted else REFUSE
@@ -179,7 +179,7 @@ def recorded(route: str = "relaxed") -> Trace:
             {
                 "t_s": t, "robot": "ugv1", "policy": "detour", "issued_s": 0.0, "reason": reason,
                 "decision": "accept" if accepted else "refuse", "status": found.status, "route": route,
-                "first_stage": "accept" if found.accept else "refuse", "objective": found.objective,
+                "first_stage": "accept" if found.accept_first else "refuse", "objective": found.objective,
                 "relaxed_first_stage": found.relaxed_first_stage, "lower_bound": found.lower_bound, "gap": found.gap,
                 "objective_accept": found.objective_accept, "objective_refuse": found.objective_refuse,
                 "accept_throughout": throughout[0], "refuse_throughout": throughout[1],
@@ -719,7 +719,7 @@ def test_the_rules_are_those_of_the_running_gatekeeper(
 ) -> None:
     accept, refuse = (costs[0], costs[0]) if equal else costs
     status: Any = "optimal" if planned else "refused_not_finite"
-    decision = Decision(accept <= refuse, status, objective=min(costs))
+    solution = Solution(accept <= refuse, status, objective=min(costs))
     kept = throughout
     plan = np.array([float(accept <= refuse)]) if planned else None
     given = {"objective": min(costs), "accept_throughout": kept[0], "refuse_throughout": kept[1], "bend": bend}
@@ -727,7 +727,7 @@ def test_the_rules_are_those_of_the_running_gatekeeper(
     gate = {"max_bend": 0.5, "switching_margin": margin, "min_dwell_s": 0.2}
     stands = {SILENT: None, ACCEPT: "accept", REFUSE: "refuse"}[standing]
     rules = Rules(switching_margin=margin, min_dwell=0.2, max_bend=0.5)
-    assert gatekeeping._rule(row, stands, stood, gate) == settle(decision, kept, bend, standing, stood, rules)
+    assert gatekeeping._rule(row, stands, stood, gate) == settle(solution, kept, bend, standing, stood, rules)
 
 
 def record_of(name: str, run: str, route: str = "relaxed") -> Trace:

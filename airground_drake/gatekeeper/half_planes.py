@@ -58,7 +58,7 @@ def _reachable(
 
 
 @dataclass(frozen=True, eq=False)
-class Outlook:
+class DualBound:
     """Lower bounds of the cost (25) still to come, with distances along half-planes: affine in the position.
 
     Whatever a relaxed plan does from the end of stage k - 1 on, where it is in p, its stages k, k + 1, ... cost
@@ -82,7 +82,7 @@ class Outlook:
         return float(self.constants[0])
 
 
-def outlook(problem: Problem, normals: Array, omega: Array, multipliers: Array) -> Outlook:
+def outlook(problem: Problem, normals: Array, omega: Array, multipliers: Array) -> DualBound:
     """Lower bounds by weak duality, valid for any arguments.
 
     For multipliers l >= 0 of the half-planes, (25) is at least the Lagrangian, whose minimum over u >= 0 is
@@ -101,7 +101,7 @@ def outlook(problem: Problem, normals: Array, omega: Array, multipliers: Array) 
         at, omega, multipliers, normals, problem.dt, problem.accept, problem.refuse, problem.reference,
         problem.centres, problem.distances, problem.error_weight, problem.slack_weight,
     )  # fmt: skip
-    return Outlook(constants, slopes, at, bool((multipliers > 0.0).any()))
+    return DualBound(constants, slopes, at, bool((multipliers > 0.0).any()))
 
 
 @njit(cache=True)

@@ -10,15 +10,15 @@ from numba import njit
 
 from airground_drake.arrays import Array
 from airground_drake.gatekeeper.budget import UNLIMITED, Budget
-from airground_drake.gatekeeper.half_planes import Outlook
+from airground_drake.gatekeeper.half_planes import DualBound
 from airground_drake.gatekeeper.problem import Evaluation, Problem
-from airground_drake.gatekeeper.solution import Constants, remaining_cost
+from airground_drake.gatekeeper.solution import ConstantPlans, remaining_cost
 
 EVERYWHERE = np.inf
 """Radius of a search that is not confined to a tube."""
 
 
-class Polish:
+class LocalSearch:
     """Improves the cheapest known plans that start by refusing and by accepting, each for itself.
 
     The searches prove no optimality; they only ever replace a plan by a cheaper one, so that the result is
@@ -30,7 +30,7 @@ class Polish:
     """
 
     def __init__(
-        self, problem: Problem, constants: Constants, tail: Array, budget: Budget, outlook: Outlook | None = None
+        self, problem: Problem, constants: ConstantPlans, tail: Array, budget: Budget, outlook: DualBound | None = None
     ) -> None:
         """Start from the constant plans.
 
@@ -46,7 +46,7 @@ class Polish:
         self._modes = np.stack([problem.refuse, problem.accept])
         self._tail = tail
         none = np.zeros((problem.stages + 1, 3))
-        self._blind = Outlook(np.full(problem.stages + 1, -np.inf), none, none[1:], pressed=False)
+        self._blind = DualBound(np.full(problem.stages + 1, -np.inf), none, none[1:], pressed=False)
         self._outlook = self._blind if outlook is None else outlook
         self.plans = [constants.refuse, constants.accept]
         self.complete = True
@@ -112,7 +112,7 @@ def best_known(problem: Problem, width: int = 4096, offers: Sequence[Array] = ()
         width: labels per stage.
         offers: plans (N,) known from elsewhere.
     """
-    polish = Polish(problem, Constants.of(problem), remaining_cost(problem), UNLIMITED)
+    polish = LocalSearch(problem, ConstantPlans.of(problem), remaining_cost(problem), UNLIMITED)
     for omega in offers:
         polish.offer(problem.evaluate(omega))
     polish.exchanges(3)

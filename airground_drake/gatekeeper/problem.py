@@ -137,7 +137,7 @@ DECIDED: tuple[Status, ...] = ("optimal", "budget_spent")
 
 
 @dataclass(frozen=True, eq=False)
-class Decision:
+class Solution:
     """What a route decided, with its evidence. Numbers that do not apply are -1, arrays None.
 
     Attributes:
@@ -160,7 +160,7 @@ class Decision:
         normals: of the half-planes that `lower_bound` and `gap` are about, (N, m, 3).
     """
 
-    accept: bool
+    accept_first: bool
     status: Status
     objective: float = -1.0
     lower_bound: float = -1.0

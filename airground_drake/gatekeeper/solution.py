@@ -10,19 +10,19 @@ import numpy.typing as npt
 from numba import njit
 
 from airground_drake.arrays import Array
-from airground_drake.gatekeeper.problem import Decision, Evaluation, Problem, Status
+from airground_drake.gatekeeper.problem import Evaluation, Problem, Solution, Status
 from airground_drake.gatekeeper.rounding import rounding_deviation
 
 
 @dataclass(frozen=True, eq=False)
-class Constants:
+class ConstantPlans:
     """The two constant plans, evaluated: accept throughout, refuse throughout."""
 
     accept: Evaluation
     refuse: Evaluation
 
     @classmethod
-    def of(cls, problem: Problem) -> Constants:
+    def of(cls, problem: Problem) -> ConstantPlans:
         """Evaluate them by the exact cost (25)."""
         stages = problem.stages
         return cls(problem.evaluate(np.ones(stages)), problem.evaluate(np.zeros(stages)))
@@ -36,11 +36,11 @@ class Constants:
         """False where finite data overflow in the cost."""
         return bool(np.isfinite(self.accept.objective) and np.isfinite(self.refuse.objective))
 
-    def failed(self) -> Decision:
+    def failed(self) -> Solution:
         """Refuse because the solver gave no optimum; the costs of the constant plans are the evidence."""
         status: Status = "refused_solver_failed"
         accept, refuse = self.accept.objective, self.refuse.objective
-        return Decision(False, status, objective_accept=accept, objective_refuse=refuse)
+        return Solution(False, status, objective_accept=accept, objective_refuse=refuse)
 
 
 def choose(
@@ -53,7 +53,7 @@ def choose(
     normals: Array | None = None,
     relaxed: Array | None = None,
     rounded: Array | None = None,
-) -> Decision:
+) -> Solution:
     """The cheapest of some evaluated plans, among them both constant ones; the first on a tie.
 
     Args:
@@ -70,8 +70,8 @@ def choose(
     if normals is not None:
         convexified = min(problem.evaluate_half_planes(plan.positions, normals) for plan in plans)
         gap = (convexified - lower_bound) / max(convexified, 1e-12)
-    return Decision(
-        accept=bool(best.omega[0] == 1.0),
+    return Solution(
+        accept_first=bool(best.omega[0] == 1.0),
         status=status,
         objective=best.objective,
         lower_bound=lower_bound,
@@ -99,7 +99,7 @@ def cut_short(
     bound: float = 0.0,
     relaxed: Array | None = None,
     rounded: Array | None = None,
-) -> Decision:
+) -> Solution:
     """The decision when the budget is spent: the best plan so far, and a bound for which no solver is needed.
 
     Args:

@@ -14,8 +14,8 @@ from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSys
 from airground_drake.arrays import Array
 from airground_drake.gatekeeper.budget import Budget, Clock
 from airground_drake.gatekeeper.prediction import Horizon, Scene, UgvLaw, predicted_problem
-from airground_drake.gatekeeper.problem import DECIDED, Decision, Problem
-from airground_drake.gatekeeper.solution import Constants
+from airground_drake.gatekeeper.problem import DECIDED, Problem, Solution
+from airground_drake.gatekeeper.solution import ConstantPlans
 from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT, Point, Reports, answer_to
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.motion import Motion
@@ -28,7 +28,7 @@ USELESS = 1e-6
 class Route(Protocol):
     """A way to solve (26): any object with this method."""
 
-    def decide(self, problem: Problem, budget: Budget, /) -> Decision:
+    def solve(self, problem: Problem, budget: Budget, /) -> Solution:
         """Accept or refuse, within the budget; never raises."""
 
 
@@ -58,7 +58,7 @@ Reason = Literal["cheaper", "not_cheaper", "no_difference", "bent", "kept", "dwe
 
 
 @dataclass(frozen=True)
-class Ruling:
+class Decision:
     """One decision on one proposal.
 
     Attributes:
@@ -66,7 +66,7 @@ class Ruling:
         robot: for which UGV.
         proposal: on what.
         problem: (26) as predicted.
-        decision: the route's.
+        solution: the route's.
         throughout: costs (25) of accepting and of refusing throughout; -1 without a plan.
         accepted: the answer.
         reason: why.
@@ -76,7 +76,7 @@ class Ruling:
     robot: int
     proposal: Proposal
     problem: Problem
-    decision: Decision
+    solution: Solution
     throughout: tuple[float, float]
     accepted: bool
     reason: Reason
@@ -90,13 +90,13 @@ class GatekeeperMemory:
         answers: in force, (2n,), see `messages`.
         since: when each UGV's answer became what it is, (n,), s.
         reports: what was sensed with them.
-        rulings: every one so far.
+        decisions: every one so far.
     """
 
     answers: tuple[float, ...]
     since: tuple[float, ...]
     reports: Reports
-    rulings: tuple[Ruling, ...] = ()
+    decisions: tuple[Decision, ...] = ()
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
         """Immutable: the copy is the object itself."""
@@ -160,10 +160,10 @@ class Gatekeeper(LeafSystem):
         self.DeclarePeriodicUnrestrictedUpdateEvent(period, 0.0, self._update)
         self.decision_times_s: list[float] = []
 
-    def rulings(self, context: Context) -> tuple[Ruling, ...]:
+    def decisions(self, context: Context) -> tuple[Decision, ...]:
         """Every decision up to the context's time."""
         memory: GatekeeperMemory = context.get_abstract_state(int(self._memory)).get_value()
-        return memory.rulings
+        return memory.decisions
 
     def reset_timing(self) -> None:
         """Forget the measured decision times."""
@@ -186,7 +186,7 @@ class Gatekeeper(LeafSystem):
         answers: list[float] = []
         since: list[float] = []
         reports: list[tuple[Point, ...]] = []
-        rulings = list(memory.rulings)
+        decisions = list(memory.decisions)
         deadlines = self._deadlines(sum(proposal is not None for proposal in proposals))
         for i, proposal in enumerate(proposals):
             if proposal is None:
@@ -196,17 +196,17 @@ class Gatekeeper(LeafSystem):
                 continue
             started = time.thread_time()
             problem = self._problem(t, i, proposal, positions, velocities)
-            decision = self._route.decide(problem, next(deadlines))
+            solution = self._route.solve(problem, next(deadlines))
             self.decision_times_s.append(time.thread_time() - started)
             standing = answer_to(proposal, memory.answers, i)
-            throughout = _throughout(problem, decision)
-            accepted, reason = settle(decision, throughout, problem.bend, standing, t - memory.since[i], self._rules)
-            rulings.append(Ruling(t, i, proposal, problem, decision, throughout, accepted, reason))
+            throughout = _throughout(problem, solution)
+            accepted, reason = settle(solution, throughout, problem.bend, standing, t - memory.since[i], self._rules)
+            decisions.append(Decision(t, i, proposal, problem, solution, throughout, accepted, reason))
             answer = ACCEPT if accepted else REFUSE
             answers += [answer, proposal.issued]
             since.append(memory.since[i] if answer == standing else t)
             reports.append(self._sensed(positions[i]))
-        new = GatekeeperMemory(tuple(answers), tuple(since), tuple(reports), tuple(rulings))
+        new = GatekeeperMemory(tuple(answers), tuple(since), tuple(reports), tuple(decisions))
         state.get_mutable_abstract_state(int(self._memory)).set_value(new)
         return EventStatus.Succeeded()
 
@@ -241,16 +241,16 @@ class Gatekeeper(LeafSystem):
         return predicted_problem(scene, self._law, proposal, self._horizon)
 
 
-def _throughout(problem: Problem, decision: Decision) -> tuple[float, float]:
+def _throughout(problem: Problem, solution: Solution) -> tuple[float, float]:
     """Costs (25) of the two constant plans; mode velocities are exact for them."""
-    if decision.status not in DECIDED:
+    if solution.status not in DECIDED:
         return -1.0, -1.0
-    constants = Constants.of(problem)
+    constants = ConstantPlans.of(problem)
     return constants.accept.objective, constants.refuse.objective
 
 
 def settle(
-    decision: Decision, throughout: tuple[float, float], bend: float, standing: float, stood: float, rules: Rules
+    solution: Solution, throughout: tuple[float, float], bend: float, standing: float, stood: float, rules: Rules
 ) -> tuple[bool, Reason]:
     """Whether the proposal is accepted, and why.
 
@@ -262,25 +262,27 @@ def settle(
     changes it costs nearly the same as the one that changes it now: that comparison would decide nothing.)
 
     Args:
-        decision: the route's.
+        solution: the route's.
         throughout: costs (25) of accepting and of refusing throughout the horizon.
         bend: see `Problem.bend`.
         standing: ACCEPT, REFUSE or SILENT.
         stood: for how long that has been the answer, s.
         rules: margins and limits.
     """
-    if decision.status not in DECIDED:
+    if solution.status not in DECIDED:
         return False, "no_plan"
     accept, refuse = throughout
     bent = bend > rules.max_bend
     if standing == SILENT:
-        if not decision.accept:
+        if not solution.accept_first:
             return False, "not_cheaper"
-        if not decision.objective < (1.0 - USELESS) * refuse:
+        if not solution.objective < (1.0 - USELESS) * refuse:
             return False, "no_difference"
         return (False, "bent") if bent else (True, "cheaper")
     kept = accept if standing == ACCEPT else refuse
-    better = decision.accept != (standing == ACCEPT) and decision.objective < (1.0 - rules.switching_margin) * kept
+    better = (
+        solution.accept_first != (standing == ACCEPT) and solution.objective < (1.0 - rules.switching_margin) * kept
+    )
     if not ((better or bent) if standing == ACCEPT else (better and not bent)):
         return standing == ACCEPT, "kept"
     if stood < rules.min_dwell - 1e-9:

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from airground_drake import diagram
 from airground_drake.gatekeeper.budget import Budget
-from airground_drake.gatekeeper.problem import Decision, Problem
-from airground_drake.gatekeeper.solution import Constants
+from airground_drake.gatekeeper.problem import Problem, Solution
+from airground_drake.gatekeeper.solution import ConstantPlans
 from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Scenario
@@ -23,13 +23,13 @@ from airground_drake.systems.gatekeeper import Rules, settle
 RULES = Rules(switching_margin=0.1, min_dwell=0.2, max_bend=0.5)
 
 
-def decision(accept: float, refuse: float, status: Any = "optimal") -> Decision:
-    return Decision(accept < refuse, status, objective=min(accept, refuse))
+def solution(accept: float, refuse: float, status: Any = "optimal") -> Solution:
+    return Solution(accept < refuse, status, objective=min(accept, refuse))
 
 
 def answer(accept: float, refuse: float, bend: float, standing: float, stood: float) -> tuple[bool, str]:
     """`settle` where keeping an answer throughout costs what the best plan costs that starts with it."""
-    return settle(decision(accept, refuse), (accept, refuse), bend, standing, stood, RULES)
+    return settle(solution(accept, refuse), (accept, refuse), bend, standing, stood, RULES)
 
 
 def test_a_new_proposal_is_judged_by_the_plan_alone() -> None:
@@ -60,7 +60,7 @@ def test_no_reversal_before_the_dwell_is_over() -> None:
 @given(st.sampled_from([SILENT, ACCEPT, REFUSE]), st.floats(0.0, 1.0), st.floats(0.0, 2.0))
 def test_without_a_plan_everything_is_refused_at_once(standing: float, stood: float, bend: float) -> None:
     for status in ("refused_solver_failed", "refused_not_finite", "refused_budget_spent"):
-        assert settle(decision(1.0, 2.0, status), (1.0, 2.0), bend, standing, stood, RULES) == (False, "no_plan")
+        assert settle(solution(1.0, 2.0, status), (1.0, 2.0), bend, standing, stood, RULES) == (False, "no_plan")
 
 
 @given(
@@ -75,8 +75,8 @@ def test_opposite_answers_never_want_each_other(
 ) -> None:
     """Reversed once, the same costs do not reverse it back."""
     rules = Rules(switching_margin=margin)
-    accepted, _ = settle(decision(accept, refuse), kept, 0.0, standing, 1.0, rules)
-    assert settle(decision(accept, refuse), kept, 0.0, ACCEPT if accepted else REFUSE, 1.0, rules)[1] == "kept"
+    accepted, _ = settle(solution(accept, refuse), kept, 0.0, standing, 1.0, rules)
+    assert settle(solution(accept, refuse), kept, 0.0, ACCEPT if accepted else REFUSE, 1.0, rules)[1] == "kept"
 
 
 @dataclass
@@ -85,11 +85,11 @@ class Alternating:
 
     calls: int = 0
 
-    def decide(self, problem: Problem, budget: Budget) -> Decision:
+    def solve(self, problem: Problem, budget: Budget) -> Solution:
         self.calls += 1
-        throughout = Constants.of(problem)
+        throughout = ConstantPlans.of(problem)
         least = 0.1 * min(throughout.accept.objective, throughout.refuse.objective)
-        return Decision(bool(self.calls % 2), "optimal", objective=least)
+        return Solution(bool(self.calls % 2), "optimal", objective=least)
 
 
 @pytest.mark.parametrize("dwell", [0.0, 0.2, 1.0])
@@ -131,9 +131,9 @@ class Watching:
 
     given: list[Budget] = field(default_factory=list)
 
-    def decide(self, problem: Problem, budget: Budget) -> Decision:
+    def solve(self, problem: Problem, budget: Budget) -> Solution:
         self.given.append(budget)
-        return Constants.of(problem).failed()
+        return ConstantPlans.of(problem).failed()
 
 
 def recorded_budgets(scenario: Scenario, monkeypatch: pytest.MonkeyPatch, clock: Clock | None) -> list[Budget]:

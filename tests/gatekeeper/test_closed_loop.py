@@ -19,9 +19,9 @@ from airground_drake import diagram
 from airground_drake.gatekeeper.budget import UNLIMITED, Budget
 from airground_drake.gatekeeper.closed_loop import ClosedLoop
 from airground_drake.gatekeeper.prediction import Horizon, Scene, UgvLaw, closed_loop, predicted_problem
-from airground_drake.gatekeeper.problem import DECIDED, Decision, Problem
+from airground_drake.gatekeeper.problem import DECIDED, Problem, Solution
 from airground_drake.gatekeeper.routes import closed_loop_enumeration as rollout
-from airground_drake.gatekeeper.routes.closed_loop_enumeration import RolloutRoute, evaluate
+from airground_drake.gatekeeper.routes.closed_loop_enumeration import ClosedLoopEnumerationRoute, evaluate
 from airground_drake.gatekeeper.routes.enumeration import EnumerationRoute
 from airground_drake.gatekeeper.solution import block_of_stage
 from airground_drake.intervention.messages import ACCEPT, REFUSE
@@ -194,7 +194,7 @@ def test_what_is_no_plan_is_an_error(omega: np.ndarray) -> None:
 # --- the search --------------------------------------------------------------------------------------------------
 
 
-ROUTES = {blocks: RolloutRoute(blocks) for blocks in (1, 2, 3, 4, 5, 6, 10)}
+ROUTES = {blocks: ClosedLoopEnumerationRoute(blocks) for blocks in (1, 2, 3, 4, 5, 6, 10)}
 
 
 def brute_force(case: Instance, problem: Problem, substeps: int, blocks: int) -> dict[float, float]:
@@ -220,18 +220,18 @@ def test_the_search_finds_the_optimum_of_all_plans(
 ) -> None:
     case = Instance(seed, on_top=on_top)
     problem = case.problem(9, substeps, error_weight)
-    decision = ROUTES[blocks].decide(problem, UNLIMITED)
+    solution = ROUTES[blocks].solve(problem, UNLIMITED)
     best = brute_force(case, problem, substeps, blocks)
-    assert decision.status == "optimal"
-    assert decision.objective_refuse == pytest.approx(best[0.0], rel=1e-9, abs=1e-12)
-    assert decision.objective_accept == pytest.approx(best[1.0], rel=1e-9, abs=1e-12)
-    assert decision.accept == (decision.objective_accept <= decision.objective_refuse)
+    assert solution.status == "optimal"
+    assert solution.objective_refuse == pytest.approx(best[0.0], rel=1e-9, abs=1e-12)
+    assert solution.objective_accept == pytest.approx(best[1.0], rel=1e-9, abs=1e-12)
+    assert solution.accept_first == (solution.objective_accept <= solution.objective_refuse)
 
 
 def test_what_is_predicted_runs_the_search_that_was_compiled(proposals_of_case_b: dict[str, Problem]) -> None:
     """Another layout or type of one array would compile it again, for seconds, in the middle of a run."""
     for problem in (*proposals_of_case_b.values(), Instance(0).problem(24, 2), Instance(0, obstacles=0).problem(1)):
-        ROUTES[6].decide(problem)
+        ROUTES[6].solve(problem)
     for kernel in (rollout._search, rollout._evaluate):
         assert len(kernel.signatures) == 1
 
@@ -240,36 +240,36 @@ def test_what_is_predicted_runs_the_search_that_was_compiled(proposals_of_case_b
 @given(st.integers(0, 10**6), st.booleans(), st.integers(1, 70))
 def test_every_decision_carries_its_evidence(seed: int, on_top: bool, stages: int) -> None:
     problem = Instance(seed, on_top=on_top).problem(stages)
-    decision = ROUTES[6].decide(problem)
-    assert decision.status == "optimal"
-    assert decision.plan is not None
-    assert decision.positions is not None
-    assert decision.accept == (decision.plan[0] == 1.0)
-    assert decision.objective == min(decision.objective_accept, decision.objective_refuse)
-    assert decision.lower_bound == pytest.approx(decision.objective, rel=1e-12)
-    assert decision.gap == pytest.approx(0.0, abs=1e-12)
-    again = evaluate(problem, decision.plan)
-    np.testing.assert_array_equal(decision.positions, again.positions)
-    assert decision.objective == again.objective
-    assert decision.clearance == min(again.clearance, 1e9)
+    solution = ROUTES[6].solve(problem)
+    assert solution.status == "optimal"
+    assert solution.plan is not None
+    assert solution.positions is not None
+    assert solution.accept_first == (solution.plan[0] == 1.0)
+    assert solution.objective == min(solution.objective_accept, solution.objective_refuse)
+    assert solution.lower_bound == pytest.approx(solution.objective, rel=1e-12)
+    assert solution.gap == pytest.approx(0.0, abs=1e-12)
+    again = evaluate(problem, solution.plan)
+    np.testing.assert_array_equal(solution.positions, again.positions)
+    assert solution.objective == again.objective
+    assert solution.clearance == min(again.clearance, 1e9)
     gaps = np.linalg.norm(again.positions[:, None] - problem.centres, axis=2) - problem.distances
-    assert decision.objective == pytest.approx(problem.cost(again.positions, gaps.min(axis=1, initial=np.inf)))
-    assert decision.objective_refuse <= evaluate(problem, np.zeros(stages)).objective
-    assert decision.objective_accept <= evaluate(problem, np.ones(stages)).objective
+    assert solution.objective == pytest.approx(problem.cost(again.positions, gaps.min(axis=1, initial=np.inf)))
+    assert solution.objective_refuse <= evaluate(problem, np.zeros(stages)).objective
+    assert solution.objective_accept <= evaluate(problem, np.ones(stages)).objective
     for block in range(6):
-        assert len(set(decision.plan[block_of_stage(stages, 6) == block])) <= 1
+        assert len(set(solution.plan[block_of_stage(stages, 6) == block])) <= 1
 
 
 @given(st.integers(0, 10**6))
 def test_finer_blocks_never_cost_more(seed: int) -> None:
     problem = Instance(seed).problem(24)
-    costs = [ROUTES[blocks].decide(problem).objective for blocks in (1, 2, 4)]
+    costs = [ROUTES[blocks].solve(problem).objective for blocks in (1, 2, 4)]
     assert costs[2] <= costs[1] <= costs[0]
 
 
 def test_a_problem_of_mode_velocities_is_searched_as_such() -> None:
     problem = replace(Instance(5).problem(24), loop=None)
-    ours, theirs = ROUTES[6].decide(problem), EnumerationRoute(6).decide(problem, Budget())
+    ours, theirs = ROUTES[6].solve(problem), EnumerationRoute(6).solve(problem, Budget())
     assert (ours.objective_accept, ours.objective_refuse) == (theirs.objective_accept, theirs.objective_refuse)
 
 
@@ -287,15 +287,15 @@ def broken() -> Iterator[tuple[str, Problem]]:
 
 @pytest.mark.parametrize("what", [name for name, _ in broken()])
 def test_numbers_that_are_not_finite_are_refused(what: str) -> None:
-    decision = ROUTES[6].decide(dict(broken())[what])
-    assert not decision.accept
-    assert decision.status == "refused_not_finite"
+    solution = ROUTES[6].solve(dict(broken())[what])
+    assert not solution.accept_first
+    assert solution.status == "refused_not_finite"
 
 
 @pytest.mark.parametrize("blocks", [0, 21])
 def test_blocks_out_of_range(blocks: int) -> None:
     with pytest.raises(ValueError, match="1 to 20"):
-        RolloutRoute(blocks)
+        ClosedLoopEnumerationRoute(blocks)
 
 
 # --- its budget --------------------------------------------------------------------------------------------------
@@ -319,31 +319,31 @@ def visited(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 @given(st.integers(0, 10**6), st.integers(1, 200))
 def test_a_spent_budget_leaves_valid_bounds(seed: int, nodes: int) -> None:
     problem = Instance(seed).problem(24)
-    best, decision = ROUTES[6].decide(problem, UNLIMITED), ROUTES[6].decide(problem, Budget(nodes=nodes))
-    assert decision.status in DECIDED
-    assert decision.lower_bound <= best.objective * (1.0 + 1e-12)
-    assert decision.objective >= best.objective
-    assert 0.0 <= decision.gap <= 1.0
-    assert decision.lower_bound == pytest.approx(decision.objective * (1.0 - decision.gap), rel=1e-9, abs=1e-9)
+    best, solution = ROUTES[6].solve(problem, UNLIMITED), ROUTES[6].solve(problem, Budget(nodes=nodes))
+    assert solution.status in DECIDED
+    assert solution.lower_bound <= best.objective * (1.0 + 1e-12)
+    assert solution.objective >= best.objective
+    assert 0.0 <= solution.gap <= 1.0
+    assert solution.lower_bound == pytest.approx(solution.objective * (1.0 - solution.gap), rel=1e-9, abs=1e-9)
     for half, mode in (("objective_accept", 1.0), ("objective_refuse", 0.0)):
-        assert getattr(best, half) <= getattr(decision, half) <= evaluate(problem, np.full(24, mode)).objective
+        assert getattr(best, half) <= getattr(solution, half) <= evaluate(problem, np.full(24, mode)).objective
     if nodes >= 2**7 - 2:
-        assert decision.status == "optimal"
-    if decision.status == "optimal":
-        assert decision.objective == best.objective
+        assert solution.status == "optimal"
+    if solution.status == "optimal":
+        assert solution.objective == best.objective
 
 
 def test_nodes_are_counted(visited: list[int]) -> None:
     problem = Instance(11).problem(60)
-    ROUTES[10].decide(problem, UNLIMITED)
+    ROUTES[10].solve(problem, UNLIMITED)
     total = sum(visited)
     assert 20 < total <= 2**11 - 2
     for nodes in (1, 7, 64, 65, total - 1):
         visited.clear()
-        assert ROUTES[10].decide(problem, Budget(nodes=nodes)).status == "budget_spent"
+        assert ROUTES[10].solve(problem, Budget(nodes=nodes)).status == "budget_spent"
         assert sum(visited) == nodes
     visited.clear()
-    assert ROUTES[10].decide(problem, Budget(nodes=total)).status == "optimal"
+    assert ROUTES[10].solve(problem, Budget(nodes=total)).status == "optimal"
 
 
 def ticking(deadline: int) -> Budget:
@@ -354,24 +354,24 @@ def ticking(deadline: int) -> Budget:
 
 def test_the_clock_ends_the_search(visited: list[int], monkeypatch: pytest.MonkeyPatch) -> None:
     problem = Instance(11).problem(60)
-    best = ROUTES[10].decide(problem, UNLIMITED)
+    best = ROUTES[10].solve(problem, UNLIMITED)
     visited.clear()
-    late = ROUTES[10].decide(problem, ticking(1))
-    assert (late.status, late.accept, late.plan, visited) == ("refused_budget_spent", False, None, [])
+    late = ROUTES[10].solve(problem, ticking(1))
+    assert (late.status, late.accept_first, late.plan, visited) == ("refused_budget_spent", False, None, [])
     monkeypatch.setattr(rollout, "_CHUNK", 8)
     objectives, gaps = [], []
     for deadline in range(2, 6):
         visited.clear()
-        decision = ROUTES[10].decide(problem, ticking(deadline))
+        solution = ROUTES[10].solve(problem, ticking(deadline))
         assert 16 * (deadline - 3) < sum(visited) <= 16 * (deadline - 2)
-        assert decision.status == "budget_spent"
-        objectives.append(decision.objective)
-        gaps.append(decision.gap)
+        assert solution.status == "budget_spent"
+        objectives.append(solution.objective)
+        gaps.append(solution.gap)
     constants = [evaluate(problem, np.full(60, w)).objective for w in (0.0, 1.0)]
     assert (objectives[0], gaps[0]) == (min(constants), 1.0)  # only the constant plans were known, and no bound
     assert objectives == sorted(objectives, reverse=True)
     assert gaps == sorted(gaps, reverse=True)
-    assert ROUTES[10].decide(problem, ticking(1000)).objective == best.objective
+    assert ROUTES[10].solve(problem, ticking(1000)).objective == best.objective
 
 
 # --- bend --------------------------------------------------------------------------------------------------------
@@ -447,11 +447,11 @@ def proposals_of_case_b() -> dict[str, Problem]:
     """The first problem that UGV1's gatekeeper has with the wrong proposal, and with the detour, method (d)."""
     seen: list[Problem] = []
 
-    class Listening(RolloutRoute):
-        def decide(self, problem: Problem, budget: Budget = UNLIMITED) -> Decision:
+    class Listening(ClosedLoopEnumerationRoute):
+        def solve(self, problem: Problem, budget: Budget = UNLIMITED) -> Solution:
             if problem.reference.any():  # not the one that the constructor compiles the search with
                 seen.append(problem)
-            return super().decide(problem, budget)
+            return super().solve(problem, budget)
 
     scenario = load("case_b")[0]
     scenario.gatekeeper.route = "listening"
@@ -478,9 +478,9 @@ def test_heavy_errors_do_not_make_the_detour_look_bad(
 ) -> None:
     """By mode velocities, a plan that waits first and drives later goes through obstacles at no cost."""
     problem = replace(proposals_of_case_b["detour"], error_weight=error_weight)
-    decision = ROUTES[10].decide(problem)
-    assert decision.accept
-    assert decision.objective_accept < 0.9 * decision.objective_refuse
-    by_velocities = EnumerationRoute(10).decide(replace(problem, loop=None))
-    assert by_velocities.accept == (error_weight < 30.0)
-    assert not ROUTES[10].decide(replace(proposals_of_case_b["towards"], error_weight=error_weight)).accept
+    solution = ROUTES[10].solve(problem)
+    assert solution.accept_first
+    assert solution.objective_accept < 0.9 * solution.objective_refuse
+    by_velocities = EnumerationRoute(10).solve(replace(problem, loop=None))
+    assert by_velocities.accept_first == (error_weight < 30.0)
+    assert not ROUTES[10].solve(replace(proposals_of_case_b["towards"], error_weight=error_weight)).accept_first

@@ -1,4 +1,4 @@
-"""The gatekeeper: prediction, relaxation, rounding, decision."""
+"""The gatekeeper: prediction, relaxation, rounding, solution."""
 
 from __future__ import annotations
 
@@ -89,22 +89,22 @@ def test_relaxation_agrees_with_an_independent_model(seed: int) -> None:
         constraints.append(reach >= problem.distances[m] - u)
     cost = problem.dt * (cvxpy.sum_squares(problem.reference - p) + 200.0 * cvxpy.sum_squares(u))
     best = cvxpy.Problem(cvxpy.Minimize(cost), constraints).solve(solver="CLARABEL")
-    decision = RelaxedRoute().decide(problem)
-    assert decision.status == "optimal"
-    assert decision.lower_bound == pytest.approx(best, rel=1e-5, abs=1e-6)
+    solution = RelaxedRoute().solve(problem)
+    assert solution.status == "optimal"
+    assert solution.lower_bound == pytest.approx(best, rel=1e-5, abs=1e-6)
 
 
 @settings(max_examples=50)
 @given(st.integers(0, 10**6))
 def test_every_decision_carries_its_evidence(seed: int) -> None:
     problem = random_problem(seed)
-    decision = RelaxedRoute().decide(problem)
-    assert decision.objective == min(decision.objective_accept, decision.objective_refuse)
-    assert decision.accept == (decision.objective_accept <= decision.objective_refuse)
-    assert decision.gap >= -1e-6
-    assert decision.rounding_deviation <= problem.dt / 2 + 1e-9
+    solution = RelaxedRoute().solve(problem)
+    assert solution.objective == min(solution.objective_accept, solution.objective_refuse)
+    assert solution.accept_first == (solution.objective_accept <= solution.objective_refuse)
+    assert solution.gap >= -1e-6
+    assert solution.rounding_deviation <= problem.dt / 2 + 1e-9
     constant = [problem.evaluate(np.full(20, w)).objective for w in (0.0, 1.0)]
-    assert decision.objective <= min(constant)
+    assert solution.objective <= min(constant)
 
 
 @given(st.integers(0, 10**6), arrays(np.float64, 20, elements=st.floats(0.0, 1.0)))
@@ -135,20 +135,20 @@ def test_costs_follow_25(seed: int, omega: np.ndarray) -> None:
 
 
 def test_pruned_rows_do_not_change_the_optimum() -> None:
-    """A far obstacle that no plan can reach leaves every number of the decision as it was."""
+    """A far obstacle that no plan can reach leaves every number of the solution as it was."""
     problem = random_problem(3)
     far = np.concatenate([problem.centres, np.full((20, 1, 3), [50.0, 0.0, 0.0])], axis=1)
-    decision, more = (
-        RelaxedRoute().decide(p) for p in (problem, replace(problem, centres=far, distances=np.full(3, 1.0)))
+    solution, more = (
+        RelaxedRoute().solve(p) for p in (problem, replace(problem, centres=far, distances=np.full(3, 1.0)))
     )
-    assert more.lower_bound == pytest.approx(decision.lower_bound, rel=1e-6)
-    assert more.accept == decision.accept
+    assert more.lower_bound == pytest.approx(solution.lower_bound, rel=1e-6)
+    assert more.accept_first == solution.accept_first
 
 
 def test_no_obstacle_at_all() -> None:
-    decision = RelaxedRoute().decide(random_problem(1, points=0))
-    assert decision.status == "optimal"
-    assert np.isfinite(decision.clearance)
+    solution = RelaxedRoute().solve(random_problem(1, points=0))
+    assert solution.status == "optimal"
+    assert np.isfinite(solution.clearance)
 
 
 @pytest.mark.parametrize("field", ["accept", "refuse", "reference", "initial", "centres"])
@@ -156,9 +156,9 @@ def test_numbers_that_are_not_finite_are_refused(field: str) -> None:
     problem = random_problem(0)
     broken = getattr(problem, field).copy()
     broken.flat[1] = np.nan
-    decision = RelaxedRoute().decide(replace(problem, **{field: broken}))
-    assert not decision.accept
-    assert decision.status == "refused_not_finite"
+    solution = RelaxedRoute().solve(replace(problem, **{field: broken}))
+    assert not solution.accept_first
+    assert solution.status == "refused_not_finite"
 
 
 def test_a_failing_solver_refuses(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -178,20 +178,20 @@ def test_a_failing_solver_refuses(monkeypatch: pytest.MonkeyPatch) -> None:
 
     route = RelaxedRoute()
     monkeypatch.setattr(route, "_solver", Solver())
-    decision = route.decide(random_problem(0))
-    assert not decision.accept
-    assert decision.status == "refused_solver_failed"
-    assert RelaxedRoute().decide(random_problem(0)).status == "optimal"
+    solution = route.solve(random_problem(0))
+    assert not solution.accept_first
+    assert solution.status == "refused_solver_failed"
+    assert RelaxedRoute().solve(random_problem(0)).status == "optimal"
 
 
 def test_the_detour_of_case_a_is_accepted() -> None:
     scene, law, proposal, horizon = case_a_proposal()
     for on_top in (True, False):
-        decision = RelaxedRoute().decide(
+        solution = RelaxedRoute().solve(
             predicted_problem(scene, replace(law, intervention_on_top=on_top), proposal, horizon)
         )
-        assert decision.accept
-        assert decision.objective_accept < 0.85 * decision.objective_refuse  # to wait one block and then accept
+        assert solution.accept_first
+        assert solution.objective_accept < 0.85 * solution.objective_refuse  # to wait one block and then accept
 
 
 def test_a_proposal_into_an_obstacle_is_refused() -> None:
@@ -202,8 +202,8 @@ def test_a_proposal_into_an_obstacle_is_refused() -> None:
             scene, replace(law, intervention_on_top=on_top), Proposal("bad", scene.t, motion), horizon
         )
         throughout = tuple(problem.evaluate(np.full(problem.stages, answer)).objective for answer in (1.0, 0.0))
-        decision = RelaxedRoute().decide(problem)
-        assert not settle(decision, throughout, problem.bend, SILENT, 0.0, Rules(max_bend=0.5))[0]
+        solution = RelaxedRoute().solve(problem)
+        assert not settle(solution, throughout, problem.bend, SILENT, 0.0, Rules(max_bend=0.5))[0]
         assert (problem.bend > 0.5) == (not on_top)
 
 

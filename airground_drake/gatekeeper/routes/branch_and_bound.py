@@ -20,8 +20,8 @@ from airground_drake.arrays import Array
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.convex_program import TeamProgram, team_program
 from airground_drake.gatekeeper.half_planes import normals_along
-from airground_drake.gatekeeper.problem import Decision, Problem
-from airground_drake.gatekeeper.solution import Constants, choose, cut_short, remaining_cost
+from airground_drake.gatekeeper.problem import Problem, Solution
+from airground_drake.gatekeeper.solution import ConstantPlans, choose, cut_short, remaining_cost
 
 _SCALE = 10.0
 """Cost of the cheaper constant plan in the program: Drake's absolute tolerance is then 0.1 % of it.
@@ -71,15 +71,15 @@ class BranchAndBoundRoute:
         self._blocks = blocks
         self._licensed = licensed_solver()
 
-    def decide(self, problem: Problem, budget: Budget = Budget()) -> Decision:  # noqa: B008 (immutable)
+    def solve(self, problem: Problem, budget: Budget = Budget()) -> Solution:  # noqa: B008 (immutable)
         """Accept or refuse: never raises for a hard or broken problem, but refuses and says why."""
         if not problem.is_finite():
-            return Decision(False, "refused_not_finite")
+            return Solution(False, "refused_not_finite")
         if budget.spent():
-            return Decision(False, "refused_budget_spent")
-        constants = Constants.of(problem)
+            return Solution(False, "refused_budget_spent")
+        constants = ConstantPlans.of(problem)
         if not constants.are_finite():
-            return Decision(False, "refused_not_finite")
+            return Solution(False, "refused_not_finite")
         plans = [constants.accept, constants.refuse]
         if budget.spent():
             return cut_short(problem, plans, remaining_cost(problem))

@@ -11,7 +11,7 @@ from numba import njit
 from airground_drake.arrays import Array
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.closed_loop import ACCEPTED, REFUSED, ClosedLoop, velocity_of, workspace
-from airground_drake.gatekeeper.problem import Decision, Evaluation, Problem
+from airground_drake.gatekeeper.problem import Evaluation, Problem, Solution
 from airground_drake.gatekeeper.routes.enumeration import EnumerationRoute
 from airground_drake.gatekeeper.solution import block_of_stage
 
@@ -19,7 +19,7 @@ _CHUNK = 64
 """Blocks rolled out between two looks at the clock; it takes them about 0.1 ms if they have six stages."""
 
 
-class RolloutRoute:
+class ClosedLoopEnumerationRoute:
     """Exact minimum of (25) over the plans that are constant on blocks of N / `blocks` stages.
 
     Not with the mode velocities of (23), which hold along the two constant plans only: every plan is rolled out on
@@ -49,19 +49,19 @@ class RolloutRoute:
             raise ValueError(f"blocks: {blocks}, allowed: 1 to 20")
         self._blocks = blocks
         self._by_velocities = EnumerationRoute(blocks)
-        self.decide(_smallest())
+        self.solve(_smallest())
 
-    def decide(self, problem: Problem, budget: Budget = Budget()) -> Decision:  # noqa: B008 (immutable)
+    def solve(self, problem: Problem, budget: Budget = Budget()) -> Solution:  # noqa: B008 (immutable)
         """Accept or refuse; a tie accepts. Never raises for a broken problem, but refuses and says why."""
         if problem.loop is None:
-            return self._by_velocities.decide(problem, budget)
+            return self._by_velocities.solve(problem, budget)
         if not problem.is_finite():
-            return Decision(False, "refused_not_finite")
+            return Solution(False, "refused_not_finite")
         if budget.spent():
-            return Decision(False, "refused_budget_spent")
+            return Solution(False, "refused_budget_spent")
         best = [evaluate(problem, np.full(problem.stages, float(mode))) for mode in (REFUSED, ACCEPTED)]
         if not all(np.isfinite(plan.objective) for plan in best):  # finite data overflow in the cost
-            return Decision(False, "refused_not_finite")
+            return Solution(False, "refused_not_finite")
         block = block_of_stage(problem.stages, self._blocks)
         halves = [_Half(problem, problem.loop, block, mode, best[mode].objective) for mode in (REFUSED, ACCEPTED)]
         nodes = budget.nodes
@@ -74,8 +74,8 @@ class RolloutRoute:
         )
         chosen = accept if accept.objective <= refuse.objective else refuse
         bound = min(chosen.objective, *(half.bound() for half in halves))
-        return Decision(
-            accept=chosen is accept,
+        return Solution(
+            accept_first=chosen is accept,
             status="budget_spent" if any(half.open for half in halves) else "optimal",
             objective=chosen.objective,
             lower_bound=bound,

@@ -9,8 +9,8 @@ from numba import njit
 from airground_drake.arrays import Array
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.local_search import stage_cost
-from airground_drake.gatekeeper.problem import Decision, Evaluation, Problem
-from airground_drake.gatekeeper.solution import Constants, block_of_stage, choose, cut_short, remaining_cost
+from airground_drake.gatekeeper.problem import Evaluation, Problem, Solution
+from airground_drake.gatekeeper.solution import ConstantPlans, block_of_stage, choose, cut_short, remaining_cost
 
 
 class EnumerationRoute:
@@ -40,17 +40,17 @@ class EnumerationRoute:
         self._blocks = blocks
         none = np.zeros((1, 0, 3))
         row = np.zeros((1, 3))
-        self.decide(Problem(1.0, np.zeros(3), row, row, row, none, np.zeros(0), 1.0, 1.0))
+        self.solve(Problem(1.0, np.zeros(3), row, row, row, none, np.zeros(0), 1.0, 1.0))
 
-    def decide(self, problem: Problem, budget: Budget = Budget()) -> Decision:  # noqa: B008 (immutable)
+    def solve(self, problem: Problem, budget: Budget = Budget()) -> Solution:  # noqa: B008 (immutable)
         """Accept or refuse; a tie accepts. Never raises for a broken problem, but refuses and says why."""
         if not problem.is_finite():
-            return Decision(False, "refused_not_finite")
+            return Solution(False, "refused_not_finite")
         if budget.spent():
-            return Decision(False, "refused_budget_spent")
-        constants = Constants.of(problem)
+            return Solution(False, "refused_budget_spent")
+        constants = ConstantPlans.of(problem)
         if not constants.are_finite():
-            return Decision(False, "refused_not_finite")
+            return Solution(False, "refused_not_finite")
         block = block_of_stage(problem.stages, self._blocks)
         starts = np.searchsorted(block, np.arange(block[-1] + 2)).astype(np.int64)
         modes = np.stack([problem.refuse, problem.accept])

@@ -19,9 +19,9 @@ from pydrake.solvers import (
 from airground_drake.arrays import Array
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.half_planes import reachable
-from airground_drake.gatekeeper.problem import Decision, Evaluation, Problem
+from airground_drake.gatekeeper.problem import Evaluation, Problem, Solution
 from airground_drake.gatekeeper.rounding import sum_up_rounding
-from airground_drake.gatekeeper.solution import Constants, choose, cut_short, remaining_cost
+from airground_drake.gatekeeper.solution import ConstantPlans, choose, cut_short, remaining_cost
 
 NlpSolver = Literal["snopt", "ipopt"]
 
@@ -77,15 +77,15 @@ class NonlinearRoute:
         self._name = solver
         self._id = self._solver.solver_id()
 
-    def decide(self, problem: Problem, budget: Budget = Budget()) -> Decision:  # noqa: B008 (immutable)
+    def solve(self, problem: Problem, budget: Budget = Budget()) -> Solution:  # noqa: B008 (immutable)
         """Accept or refuse: never raises for a hard or broken problem, but refuses and says why."""
         if not problem.is_finite():
-            return Decision(False, "refused_not_finite")
+            return Solution(False, "refused_not_finite")
         if budget.spent():
-            return Decision(False, "refused_budget_spent")
-        constants = Constants.of(problem)
+            return Solution(False, "refused_budget_spent")
+        constants = ConstantPlans.of(problem)
         if not constants.are_finite():
-            return Decision(False, "refused_not_finite")
+            return Solution(False, "refused_not_finite")
         plans = [constants.accept, constants.refuse]
         if budget.spent():
             return cut_short(problem, plans, remaining_cost(problem))

@@ -10,11 +10,11 @@ from pydrake.solvers import ClarabelSolver, MathematicalProgramResult, SolutionR
 from airground_drake.arrays import Array
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.convex_program import Shape, TeamProgram, empty_program
-from airground_drake.gatekeeper.half_planes import Outlook, multipliers_at, normals_along, outlook
-from airground_drake.gatekeeper.local_search import EVERYWHERE, Polish
-from airground_drake.gatekeeper.problem import Decision, Problem
+from airground_drake.gatekeeper.half_planes import DualBound, multipliers_at, normals_along, outlook
+from airground_drake.gatekeeper.local_search import EVERYWHERE, LocalSearch
+from airground_drake.gatekeeper.problem import Problem, Solution
 from airground_drake.gatekeeper.rounding import sum_up_rounding
-from airground_drake.gatekeeper.solution import Constants, choose, cut_short, remaining_cost
+from airground_drake.gatekeeper.solution import ConstantPlans, choose, cut_short, remaining_cost
 
 _TOLERANCE = 1e-6
 
@@ -37,7 +37,7 @@ _NEAR = 0.005
 _GUIDED = ((128, EVERYWHERE, 0.02),)
 _BLIND = ((128, EVERYWHERE, math.inf),)
 _WIDE = ((2048, EVERYWHERE, 0.0), (512, 0.3, math.inf), (512, 0.1, 0.02))
-"""Searches, see `Polish.labels`: labels per stage, radius of the tube (m), relative slackness.
+"""Searches, see `LocalSearch.labels`: labels per stage, radius of the tube (m), relative slackness.
 
 Those of infinite slackness do without the outlook, for the sides of obstacles that the half-planes hide. All
 were chosen on recorded and random problems: see `benchmarks/gatekeeper.py` for how near the plans come to the best
@@ -53,7 +53,7 @@ class RelaxedRoute:
     taken along the better of the two constant plans. Taking them along the best plan found and solving again
     was tried: it costs half as much again and brought the plans no nearer to the best known.
 
-    The rounded plan is the start of a search with the exact distances (`Polish`), which the multipliers of the
+    The rounded plan is the start of a search with the exact distances (`LocalSearch`), which the multipliers of the
     relaxation guide: for the best plan that accepts first and for the best that refuses first. Wider searches
     follow where the gap is open or the two cost nearly the same. The cheaper plan is returned.
 
@@ -72,15 +72,15 @@ class RelaxedRoute:
         self._programs: dict[Shape, TeamProgram] = {}
         self._solver = ClarabelSolver()
 
-    def decide(self, problem: Problem, budget: Budget = Budget()) -> Decision:  # noqa: B008 (immutable)
+    def solve(self, problem: Problem, budget: Budget = Budget()) -> Solution:  # noqa: B008 (immutable)
         """Accept or refuse: never raises for a hard or broken problem, but refuses and says why."""
         if not problem.is_finite():
-            return Decision(False, "refused_not_finite")
+            return Solution(False, "refused_not_finite")
         if budget.spent():
-            return Decision(False, "refused_budget_spent")
-        constants = Constants.of(problem)
+            return Solution(False, "refused_budget_spent")
+        constants = ConstantPlans.of(problem)
         if not constants.are_finite():
-            return Decision(False, "refused_not_finite")
+            return Solution(False, "refused_not_finite")
         tail = remaining_cost(problem)
         if budget.spent():
             return cut_short(problem, (constants.accept, constants.refuse), tail)
@@ -90,7 +90,7 @@ class RelaxedRoute:
             plans = (constants.accept, constants.refuse)
             return cut_short(problem, plans, tail) if budget.spent() else constants.failed()
         rounded = sum_up_rounding(relaxed)
-        polish = Polish(problem, constants, tail, budget, ahead)
+        polish = LocalSearch(problem, constants, tail, budget, ahead)
         polish.offer_both(rounded)
         finished = _improve(polish, ahead, budget) and finished
         refuse, accept = polish.plans
@@ -106,7 +106,7 @@ class RelaxedRoute:
 
     def _solve(
         self, problem: Problem, normals: Array, cost: float, budget: Budget
-    ) -> tuple[Array | None, Outlook | None, bool]:
+    ) -> tuple[Array | None, DualBound | None, bool]:
         """Omega (N,), the bounds that follow, and whether it is an optimum; None where the solver failed."""
         scale = _scale(cost)
         shape = Shape.of(problem, scale=scale)
@@ -137,7 +137,7 @@ def _stopped(result: MathematicalProgramResult, budget: Budget) -> bool:
     return budget.spent() or result.get_solution_result() == SolutionResult.kIterationLimit
 
 
-def _improve(polish: Polish, ahead: Outlook, budget: Budget) -> bool:
+def _improve(polish: LocalSearch, ahead: DualBound, budget: Budget) -> bool:
     """Search for cheaper plans until the gap is closed; whether the budget lasted for that.
 
     Where a half-plane has a multiplier, the bound is one of the half-planes' problem only, and a plan on the other

@@ -20,16 +20,16 @@ from airground_drake.diagram import ROUTES
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.convex_program import team_program
 from airground_drake.gatekeeper.half_planes import normals_along, outlook
-from airground_drake.gatekeeper.local_search import Polish, best_known
+from airground_drake.gatekeeper.local_search import LocalSearch, best_known
 from airground_drake.gatekeeper.prediction import Horizon, Scene, UgvLaw, predicted_problem
-from airground_drake.gatekeeper.problem import DECIDED, Decision, Evaluation, Problem, Status
+from airground_drake.gatekeeper.problem import DECIDED, Evaluation, Problem, Solution, Status
 from airground_drake.gatekeeper.rounding import sum_up_rounding
 from airground_drake.gatekeeper.routes import branch_and_bound as branch
 from airground_drake.gatekeeper.routes import nonlinear
 from airground_drake.gatekeeper.routes.branch_and_bound import BranchAndBoundRoute
 from airground_drake.gatekeeper.routes.enumeration import EnumerationRoute
 from airground_drake.gatekeeper.routes.nonlinear import NonlinearRoute
-from airground_drake.gatekeeper.solution import Constants, block_of_stage, remaining_cost
+from airground_drake.gatekeeper.solution import ConstantPlans, block_of_stage, remaining_cost
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.motion import Motion
@@ -156,62 +156,62 @@ def cost(problem: Problem, omega: np.ndarray) -> np.ndarray:
     return problem.dt * (problem.error_weight * error + problem.slack_weight * np.square(slack).sum(axis=1))
 
 
-def check_contract(route: Route, problem: Problem, broken: bool = False, budget: Budget = DEFAULT) -> Decision:
+def check_contract(route: Route, problem: Problem, broken: bool = False, budget: Budget = DEFAULT) -> Solution:
     """What every route owes for every problem and every budget."""
     recording = Recording(**vars(problem))
-    decision = route.decide(recording, budget)
-    assert decision.status in get_args(Status)
-    assert all(np.isfinite(v).all() for v in vars(decision).values() if v is not None and not isinstance(v, str))
+    solution = route.solve(recording, budget)
+    assert solution.status in get_args(Status)
+    assert all(np.isfinite(v).all() for v in vars(solution).values() if v is not None and not isinstance(v, str))
     if broken:
-        assert same(decision, Decision(False, "refused_not_finite"))
-        return decision
-    if decision.status not in DECIDED:
-        assert decision.status == "refused_budget_spent"
+        assert same(solution, Solution(False, "refused_not_finite"))
+        return solution
+    if solution.status not in DECIDED:
+        assert solution.status == "refused_budget_spent"
         assert budget.deadline_s < np.inf
-        assert same(decision, Decision(False, "refused_budget_spent"))
-        return decision
+        assert same(solution, Solution(False, "refused_budget_spent"))
+        return solution
     plans = [plan for plan in recording.plans if set(plan.omega.tolist()) <= {0.0, 1.0}]
     for first in (0.0, 1.0):
-        claimed = decision.objective_accept if first else decision.objective_refuse
+        claimed = solution.objective_accept if first else solution.objective_refuse
         own = [plan.omega for plan in plans if plan.omega[0] == first and plan.objective == claimed]
         assert own, "the cost is that of a binary plan"
         np.testing.assert_allclose(cost(problem, np.array(own)), claimed, rtol=1e-9, atol=1e-12)
-    assert decision.objective == min(decision.objective_accept, decision.objective_refuse)
-    if decision.objective_accept != decision.objective_refuse:
-        assert decision.accept == (decision.objective_accept < decision.objective_refuse)
+    assert solution.objective == min(solution.objective_accept, solution.objective_refuse)
+    if solution.objective_accept != solution.objective_refuse:
+        assert solution.accept_first == (solution.objective_accept < solution.objective_refuse)
     constant = cost(problem, np.array([np.zeros(problem.stages), np.ones(problem.stages)]))
-    assert decision.objective <= constant.min() + 1e-9
-    if decision.gap != -1.0 and decision.objective > 1e-6:  # relative: means nothing at a cost of 0
-        assert -1e-5 <= decision.gap <= 1.0
-    check_arrays(decision, problem)
-    return decision
+    assert solution.objective <= constant.min() + 1e-9
+    if solution.gap != -1.0 and solution.objective > 1e-6:  # relative: means nothing at a cost of 0
+        assert -1e-5 <= solution.gap <= 1.0
+    check_arrays(solution, problem)
+    return solution
 
 
-def check_arrays(decision: Decision, problem: Problem) -> None:
+def check_arrays(solution: Solution, problem: Problem) -> None:
     """The plan is the one that is claimed, rounding is (28)-(29), and no plan that is there beats the bound."""
-    assert decision.plan is not None
-    assert decision.positions is not None
-    assert decision.plan.shape == (problem.stages,)
-    assert set(decision.plan.tolist()) <= {0.0, 1.0}
-    assert decision.accept == bool(decision.plan[0])
-    assert cost(problem, decision.plan[None])[0] == pytest.approx(decision.objective, rel=1e-9, abs=1e-12)
-    np.testing.assert_allclose(decision.positions, problem.positions(decision.plan), atol=1e-12)
-    assert (decision.relaxed is None) == (decision.rounded is None)
-    witnesses = [decision.plan]
-    if decision.relaxed is not None and decision.rounded is not None:
-        assert ((decision.relaxed >= 0.0) & (decision.relaxed <= 1.0)).all()
-        np.testing.assert_array_equal(decision.rounded, sum_up_rounding(decision.relaxed))
-        assert decision.relaxed_first_stage == decision.relaxed[0]
-        assert 0.0 <= decision.rounding_deviation <= problem.dt / 2 + 1e-12
-        witnesses += [decision.relaxed, decision.rounded] if decision.normals is not None else [decision.rounded]
-    if decision.normals is None:
+    assert solution.plan is not None
+    assert solution.positions is not None
+    assert solution.plan.shape == (problem.stages,)
+    assert set(solution.plan.tolist()) <= {0.0, 1.0}
+    assert solution.accept_first == bool(solution.plan[0])
+    assert cost(problem, solution.plan[None])[0] == pytest.approx(solution.objective, rel=1e-9, abs=1e-12)
+    np.testing.assert_allclose(solution.positions, problem.positions(solution.plan), atol=1e-12)
+    assert (solution.relaxed is None) == (solution.rounded is None)
+    witnesses = [solution.plan]
+    if solution.relaxed is not None and solution.rounded is not None:
+        assert ((solution.relaxed >= 0.0) & (solution.relaxed <= 1.0)).all()
+        np.testing.assert_array_equal(solution.rounded, sum_up_rounding(solution.relaxed))
+        assert solution.relaxed_first_stage == solution.relaxed[0]
+        assert 0.0 <= solution.rounding_deviation <= problem.dt / 2 + 1e-12
+        witnesses += [solution.relaxed, solution.rounded] if solution.normals is not None else [solution.rounded]
+    if solution.normals is None:
         # of the plans with a dwell, or of all plans: in both cases of the one returned
-        assert decision.lower_bound <= decision.objective * (1.0 + 1e-12)
+        assert solution.lower_bound <= solution.objective * (1.0 + 1e-12)
         return
-    assert decision.normals.shape == problem.centres.shape
-    np.testing.assert_allclose(np.linalg.norm(decision.normals, axis=2), 1.0, atol=1e-12)
+    assert solution.normals.shape == problem.centres.shape
+    np.testing.assert_allclose(np.linalg.norm(solution.normals, axis=2), 1.0, atol=1e-12)
     for omega in witnesses:
-        assert decision.lower_bound <= half_plane_cost(problem, omega, decision.normals) * (1.0 + 1e-9) + 1e-12
+        assert solution.lower_bound <= half_plane_cost(problem, omega, solution.normals) * (1.0 + 1e-9) + 1e-12
 
 
 def half_plane_cost(problem: Problem, omega: np.ndarray, normals: np.ndarray) -> float:
@@ -225,7 +225,7 @@ def half_plane_cost(problem: Problem, omega: np.ndarray, normals: np.ndarray) ->
     return float(problem.dt * (error + problem.slack_weight * np.square(slack).sum()))
 
 
-def same(one: Decision, other: Decision) -> bool:
+def same(one: Solution, other: Solution) -> bool:
     """Equal to the last bit, arrays too."""
     return all(np.array_equal(a, b) for a, b in zip(vars(one).values(), vars(other).values(), strict=True))
 
@@ -241,17 +241,17 @@ PAIRS = [(name, key) for name in MAKERS for key, p in INSTANCES.items() if name 
 
 @pytest.mark.parametrize(("name", "instance"), PAIRS)
 def test_contract(name: str, instance: str) -> None:
-    decision = check_contract(used(name), INSTANCES[instance], instance in BROKEN, ENOUGH)
-    assert instance in BROKEN or decision.status == "optimal"
-    assert same(decision, used(name).decide(INSTANCES[instance], ENOUGH))  # deterministic
+    solution = check_contract(used(name), INSTANCES[instance], instance in BROKEN, ENOUGH)
+    assert instance in BROKEN or solution.status == "optimal"
+    assert same(solution, used(name).solve(INSTANCES[instance], ENOUGH))  # deterministic
 
 
 @pytest.mark.parametrize("name", MAKERS)
 def test_finite_data_whose_cost_overflows_are_refused(name: str) -> None:
     problem = random_problem(0)
-    decision = used(name).decide(replace(problem, reference=problem.reference * 1e200))
-    assert not decision.accept
-    assert decision.status == "refused_not_finite"
+    solution = used(name).solve(replace(problem, reference=problem.reference * 1e200))
+    assert not solution.accept_first
+    assert solution.status == "refused_not_finite"
     check_contract(used(name), problem)
 
 
@@ -277,20 +277,20 @@ def test_a_deadline_leaves_the_best_plan_so_far(name: str, instance: str) -> Non
     problem = INSTANCES[instance]
     for ticks in (0, 1, 2, 3, 4, 5, 6, 8, 12, 1000):
         budget = Budget(deadline_s=float(ticks), clock=Ticking())
-        decision = check_contract(used(name), problem, instance in BROKEN, budget)
+        solution = check_contract(used(name), problem, instance in BROKEN, budget)
         if instance in BROKEN:
             continue
         if ticks == 0:
-            assert decision.status == "refused_budget_spent"
+            assert solution.status == "refused_budget_spent"
         elif ticks == 1:
-            assert decision.status == "budget_spent"
-            assert decision.objective == Constants.of(problem).better.objective
-            assert decision.lower_bound == min(remaining_cost(problem)[0], decision.objective)
+            assert solution.status == "budget_spent"
+            assert solution.objective == ConstantPlans.of(problem).better.objective
+            assert solution.lower_bound == min(remaining_cost(problem)[0], solution.objective)
         elif ticks == 1000:
-            assert decision.status == "optimal"
-        if decision.status == "budget_spent":
-            assert decision.lower_bound >= 0.0
-            assert decision.gap <= 1.0
+            assert solution.status == "optimal"
+        if solution.status == "budget_spent":
+            assert solution.lower_bound >= 0.0
+            assert solution.gap <= 1.0
 
 
 @pytest.mark.parametrize("instance", SPENT)
@@ -298,15 +298,15 @@ def test_a_deadline_leaves_the_best_plan_so_far(name: str, instance: str) -> Non
 @pytest.mark.parametrize(("iterations", "nodes"), [(1, 1), (3, 7), (100, 50), (1, 20_000)])
 def test_tiny_counts_leave_the_best_plan_so_far(name: str, instance: str, iterations: int, nodes: int) -> None:
     problem, budget = INSTANCES[instance], Budget(iterations, nodes)
-    decision = check_contract(used(name), problem, instance in BROKEN, budget)
-    assert same(decision, used(name).decide(problem, budget))
+    solution = check_contract(used(name), problem, instance in BROKEN, budget)
+    assert same(solution, used(name).solve(problem, budget))
     if (iterations, nodes) == (1, 1) and instance == "rolled out 1":
-        assert decision.status == "budget_spent"
+        assert solution.status == "budget_spent"
 
 
 def test_more_budget_is_never_dearer_for_enumeration() -> None:
     for seed in range(5):
-        costs = [used("enumeration").decide(rolled_out(seed), Budget(nodes=n)) for n in (1, 10, 100, 1000)]
+        costs = [used("enumeration").solve(rolled_out(seed), Budget(nodes=n)) for n in (1, 10, 100, 1000)]
         assert all(a.objective >= b.objective for a, b in pairwise(costs))
         assert all(a.lower_bound <= costs[-1].objective for a in costs)
 
@@ -314,19 +314,19 @@ def test_more_budget_is_never_dearer_for_enumeration() -> None:
 class IgnoresSlack:
     """A mutant: chooses, and says what it costs, without (26d)."""
 
-    def decide(self, problem: Problem, budget: Budget = DEFAULT) -> Decision:
-        return EnumerationRoute(8).decide(replace(problem, slack_weight=0.0))
+    def solve(self, problem: Problem, budget: Budget = DEFAULT) -> Solution:
+        return EnumerationRoute(8).solve(replace(problem, slack_weight=0.0))
 
 
 class ChoosesWithoutSlack:
     """A subtler mutant: chooses without (26d), but says what the choice costs."""
 
-    def decide(self, problem: Problem, budget: Budget = DEFAULT) -> Decision:
+    def solve(self, problem: Problem, budget: Budget = DEFAULT) -> Solution:
         wrong = Recording(**vars(replace(problem, slack_weight=0.0)))
-        decision = EnumerationRoute(8).decide(wrong)
-        plan = next(plan.omega for plan in wrong.plans if plan.objective == decision.objective)
+        solution = EnumerationRoute(8).solve(wrong)
+        plan = next(plan.omega for plan in wrong.plans if plan.objective == solution.objective)
         true = problem.evaluate(plan).objective
-        return replace(decision, objective=true, lower_bound=true)
+        return replace(solution, objective=true, lower_bound=true)
 
 
 def test_the_contract_and_the_oracle_refute_mutants() -> None:
@@ -334,8 +334,8 @@ def test_the_contract_and_the_oracle_refute_mutants() -> None:
     with pytest.raises(AssertionError):
         check_contract(IgnoresSlack(), problem)
     plans = blocked(24, 8)
-    assert ChoosesWithoutSlack().decide(problem).objective > 1.01 * cost(problem, plans).min()
-    assert EnumerationRoute(8).decide(problem).objective == pytest.approx(cost(problem, plans).min(), rel=1e-12)
+    assert ChoosesWithoutSlack().solve(problem).objective > 1.01 * cost(problem, plans).min()
+    assert EnumerationRoute(8).solve(problem).objective == pytest.approx(cost(problem, plans).min(), rel=1e-12)
 
 
 # --- enumeration -------------------------------------------------------------------------------------------------
@@ -354,12 +354,12 @@ def test_enumeration_agrees_with_brute_force(make: Any) -> None:
         problem = make(seed)
         plans = blocked(problem.stages, 8)
         costs, first = cost(problem, plans), plans[:, 0]
-        decision = route.decide(problem)
-        assert decision.objective_accept == pytest.approx(costs[first == 1.0].min(), rel=1e-10)
-        assert decision.objective_refuse == pytest.approx(costs[first == 0.0].min(), rel=1e-10)
-        assert decision.lower_bound == decision.objective
-        assert decision.gap == 0.0
-        short = route.decide(problem, Budget(nodes=1 + seed))
+        solution = route.solve(problem)
+        assert solution.objective_accept == pytest.approx(costs[first == 1.0].min(), rel=1e-10)
+        assert solution.objective_refuse == pytest.approx(costs[first == 0.0].min(), rel=1e-10)
+        assert solution.lower_bound == solution.objective
+        assert solution.gap == 0.0
+        short = route.solve(problem, Budget(nodes=1 + seed))
         assert short.lower_bound <= costs.min() * (1.0 + 1e-12)
         assert short.objective >= costs.min() * (1.0 - 1e-12)
 
@@ -398,7 +398,7 @@ def test_no_plan_costs_less_than_what_remains(seed: int, omega: np.ndarray) -> N
 def check_outlook(
     problem: Problem, seed: int, at: np.ndarray, omega: np.ndarray, *, twist: float = 1.0, loaded: bool = True
 ) -> None:
-    """Constants and slopes bound the cost to come, in half-planes, of any plan from any stage on."""
+    """ConstantPlans and slopes bound the cost to come, in half-planes, of any plan from any stage on."""
     rng = np.random.default_rng(seed)
     normals = normals_along(problem, problem.positions(rng.random(problem.stages)))
     multipliers = rng.exponential(3.0, normals.shape[:2]) * (rng.random(normals.shape[:2]) < 0.3) * loaded
@@ -429,7 +429,7 @@ def test_a_wrong_slope_is_refuted() -> None:
     rng = np.random.default_rng(0)
     for seed in range(5):
         problem = random_problem(seed)
-        at = used("relaxed").decide(problem).relaxed
+        at = used("relaxed").solve(problem).relaxed
         assert at is not None
         omega = np.clip(at + 0.2 * rng.normal(size=24), 0.0, 1.0)  # near the optimum, where bounds are tight
         check_outlook(problem, seed, at, omega, loaded=False)
@@ -443,11 +443,11 @@ def test_the_bound_of_the_relaxation_is_tight() -> None:
     for name in ("tol_gap_abs", "tol_gap_rel", "tol_feas"):
         options.SetOption(ClarabelSolver.id(), name, 1e-9)
     for problem in [*(random_problem(s, 24, 1 + s % 3) for s in range(8)), *(rolled_out(s) for s in range(8))]:
-        decision = used("relaxed").decide(problem)
-        program = team_program([problem], [decision.normals], relaxed=True).program
+        solution = used("relaxed").solve(problem)
+        program = team_program([problem], [solution.normals], relaxed=True).program
         optimum = ClarabelSolver().Solve(program, None, options).get_optimal_cost()
-        assert decision.lower_bound == pytest.approx(optimum, rel=2e-5, abs=1e-8)
-        assert decision.lower_bound <= optimum * (1.0 + 1e-7) + 1e-9
+        assert solution.lower_bound == pytest.approx(optimum, rel=2e-5, abs=1e-8)
+        assert solution.lower_bound <= optimum * (1.0 + 1e-7) + 1e-9
 
 
 # --- the program of a team ---------------------------------------------------------------------------------------
@@ -460,7 +460,7 @@ TEAM = (
 
 
 def team_normals() -> list[np.ndarray]:
-    return [normals_along(p, Constants.of(p).better.positions) for p in TEAM]
+    return [normals_along(p, ConstantPlans.of(p).better.positions) for p in TEAM]
 
 
 def test_the_optimum_of_a_team_is_the_sum_of_the_optima() -> None:
@@ -476,7 +476,7 @@ def test_the_optimum_of_a_team_is_the_sum_of_the_optima() -> None:
 def test_the_binary_optimum_of_a_team_is_the_sum_of_the_optima() -> None:
     """Drake's branch and bound, within its gap, against brute force over the blocks of each UGV."""
     problems = [random_problem(5, 12, 2), random_problem(6, 24, 1)]
-    normals = [normals_along(p, Constants.of(p).better.positions) for p in problems]
+    normals = [normals_along(p, ConstantPlans.of(p).better.positions) for p in problems]
     team = team_program(problems, normals, relaxed=False, blocks=3)
     search = MixedIntegerBranchAndBound(team.program, ClarabelSolver.id())
     assert search.Solve() == SolutionResult.kSolutionFound
@@ -568,8 +568,8 @@ def test_the_search_finds_what_brute_force_finds() -> None:
 @settings(max_examples=50)
 def test_the_search_never_makes_a_plan_dearer(seed: int, width: int, reach: int, nodes: int) -> None:
     problem = random_problem(seed)
-    constants = Constants.of(problem)
-    polish = Polish(problem, constants, remaining_cost(problem), Budget(nodes=nodes))
+    constants = ConstantPlans.of(problem)
+    polish = LocalSearch(problem, constants, remaining_cost(problem), Budget(nodes=nodes))
     known = [constants.refuse.objective, constants.accept.objective]
     for step in (lambda: polish.labels(width), lambda: polish.exchanges(reach), lambda: polish.labels(width, 0.1)):
         step()
@@ -584,7 +584,7 @@ def test_the_search_never_makes_a_plan_dearer(seed: int, width: int, reach: int,
 def test_exchanges_leave_no_better_neighbour() -> None:
     for seed in range(10):
         problem = random_problem(seed)
-        polish = Polish(problem, Constants.of(problem), remaining_cost(problem), Budget())
+        polish = LocalSearch(problem, ConstantPlans.of(problem), remaining_cost(problem), Budget())
         polish.exchanges(2)
         for plan in polish.plans:
             around = []
@@ -601,7 +601,7 @@ def test_exchanges_leave_no_better_neighbour() -> None:
 def test_nodes_that_do_not_last_are_admitted() -> None:
     problem = rolled_out(1)
     for nodes, lasts in ((1, False), (100, False), (20_000, True)):
-        polish = Polish(problem, Constants.of(problem), remaining_cost(problem), Budget(nodes=nodes))
+        polish = LocalSearch(problem, ConstantPlans.of(problem), remaining_cost(problem), Budget(nodes=nodes))
         polish.labels(64)
         assert polish.complete == lasts
 
@@ -618,22 +618,22 @@ def test_routes_agree() -> None:
     for kind, make, count in (("rolled out", rolled_out, 40), ("random", random_problem, 20)):
         for seed in range(count):
             problem = make(seed)
-            decisions = {name: used(name).decide(problem) for name in ROUTES}
-            assert all(decision.status in DECIDED for decision in decisions.values())
-            constants = Constants.of(problem)
-            assert decisions["enumeration"].objective <= constants.better.objective
+            solutions = {name: used(name).solve(problem) for name in ROUTES}
+            assert all(solution.status in DECIDED for solution in solutions.values())
+            constants = ConstantPlans.of(problem)
+            assert solutions["enumeration"].objective <= constants.better.objective
             for other in (constants.accept, constants.refuse):
-                half = decisions["enumeration"]
+                half = solutions["enumeration"]
                 assert (half.objective_accept if other.omega[0] else half.objective_refuse) <= other.objective
-            assert decisions["branch_and_bound"].objective >= decisions["enumeration"].objective * (1.0 - 1e-9)
-            plans = [d.plan for d in decisions.values() if d.plan is not None]
+            assert solutions["branch_and_bound"].objective >= solutions["enumeration"].objective * (1.0 - 1e-9)
+            plans = [d.plan for d in solutions.values() if d.plan is not None]
             refuse, accept = best_known(problem, 2048, plans)
             best = min(refuse, accept)
-            excess = (decisions["relaxed"].objective - best) / max(best, 0.01 * constants.better.objective, 1e-12)
+            excess = (solutions["relaxed"].objective - best) / max(best, 0.01 * constants.better.objective, 1e-12)
             if excess > 1e-3:
                 worse[f"{kind} {seed}"] = round(excess, 4)
             if abs(accept - refuse) > 1e-3 * best:
-                assert decisions["relaxed"].accept == (accept < refuse)
+                assert solutions["relaxed"].accept_first == (accept < refuse)
     assert worse == WORSE
 
 
@@ -645,7 +645,7 @@ def test_routes_agree() -> None:
 def test_the_nonlinear_program_is_27(instance: str) -> None:
     """The guess is feasible and, like the optimum, costs what (25) says with the exact slack."""
     problem = INSTANCES[instance]
-    for start in (Constants.of(problem).accept, Constants.of(problem).refuse):
+    for start in (ConstantPlans.of(problem).accept, ConstantPlans.of(problem).refuse):
         nlp = nonlinear.relaxation(problem, start)
         program = nlp.program
         bindings = program.GetAllConstraints()
@@ -684,10 +684,10 @@ class Raising:
 def test_a_failing_solver_refuses(name: str, solver: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     route = MAKERS[name]()
     monkeypatch.setattr(route, "_solver" if name == "nonlinear" else "_licensed", solver)
-    decision = route.decide(random_problem(0))
-    assert not decision.accept
-    assert decision.status == "refused_solver_failed"
-    assert decision.objective_accept > 0.0
+    solution = route.solve(random_problem(0))
+    assert not solution.accept_first
+    assert solution.status == "refused_solver_failed"
+    assert solution.objective_accept > 0.0
 
 
 def test_unknown_nonlinear_solvers_are_named() -> None:
@@ -701,11 +701,11 @@ def test_unknown_nonlinear_solvers_are_named() -> None:
 def test_branch_and_bound_bounds_the_convexified_problem() -> None:
     for seed in range(12):
         problem = random_problem(seed, 24, 1 + seed % 3)
-        normals = normals_along(problem, Constants.of(problem).better.positions)
+        normals = normals_along(problem, ConstantPlans.of(problem).better.positions)
         best = min(problem.evaluate_half_planes(problem.positions(w), normals) for w in blocked(24, 8))
-        decision = BranchAndBoundRoute(8).decide(problem)
-        assert 0.975 * best <= decision.lower_bound <= best * (1.0 + 1e-6)
-        assert decision.gap <= 0.0105
+        solution = BranchAndBoundRoute(8).solve(problem)
+        assert 0.975 * best <= solution.lower_bound <= best * (1.0 + 1e-6)
+        assert solution.gap <= 0.0105
 
 
 @pytest.mark.parametrize("how", ["RuntimeError", "infeasible"])
@@ -722,9 +722,9 @@ def test_a_failing_branch_and_bound_refuses(how: str, monkeypatch: pytest.Monkey
             return SolutionResult.kInfeasibleConstraints
 
     monkeypatch.setattr(branch, "MixedIntegerBranchAndBound", Search)
-    decision = BranchAndBoundRoute().decide(random_problem(0))
-    assert not decision.accept
-    assert decision.status == "refused_solver_failed"
+    solution = BranchAndBoundRoute().solve(random_problem(0))
+    assert not solution.accept_first
+    assert solution.status == "refused_solver_failed"
 
 
 def test_a_licensed_solver_gets_one_binary_per_stage(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -739,7 +739,7 @@ def test_a_licensed_solver_gets_one_binary_per_stage(monkeypatch: pytest.MonkeyP
             )
 
     problem = random_problem(3, 12, 1)
-    blocks = BranchAndBoundRoute(4).decide(problem)
+    blocks = BranchAndBoundRoute(4).solve(problem)
     monkeypatch.setattr(branch, "licensed_solver", Licensed)
     stages = check_contract(BranchAndBoundRoute(4), problem)
     assert stages.objective < blocks.objective
