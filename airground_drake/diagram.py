@@ -22,6 +22,7 @@ from pydrake.trajectories import PiecewisePolynomial
 from airground_drake.arrays import Array
 from airground_drake.decision.bayes import optimal_threshold
 from airground_drake.decision.trigger import Trigger
+from airground_drake.gatekeeper.answer import Rules
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.prediction import Horizon, UgvLaw
 from airground_drake.gatekeeper.routes.branch_and_bound import BranchAndBoundRoute
@@ -29,6 +30,7 @@ from airground_drake.gatekeeper.routes.closed_loop_enumeration import ClosedLoop
 from airground_drake.gatekeeper.routes.enumeration import EnumerationRoute
 from airground_drake.gatekeeper.routes.nonlinear import NonlinearRoute
 from airground_drake.gatekeeper.routes.relaxed import RelaxedRoute
+from airground_drake.gatekeeper.routes.route import Route
 from airground_drake.intervention.database import BehaviourDatabase, make_policy
 from airground_drake.nsbc.avoidance import Avoidance, Composition
 from airground_drake.nsbc.motion import Motion
@@ -43,7 +45,6 @@ from airground_drake.systems import (
     UavController,
     UgvController,
 )
-from airground_drake.systems.gatekeeper import Route, Rules
 
 Method = Literal["a", "b", "c", "d"]
 """(a) no intervention, (b) no gatekeeper, (c) the paper's gatekeeper, (d) certified: avoidance always on top."""

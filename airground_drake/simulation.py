@@ -24,6 +24,7 @@ from pydrake.systems.primitives import LogVectorOutput, VectorLogSink
 from airground_drake.arrays import Array
 from airground_drake.diagram import RECORDED, Model, build_model
 from airground_drake.errors import AirgroundError
+from airground_drake.gatekeeper.answer import Decision
 from airground_drake.gatekeeper.prediction import Horizon, Scene, UgvLaw, predicted_problem
 from airground_drake.gatekeeper.routes.relaxed import RelaxedRoute
 from airground_drake.intervention.policy import Proposal
@@ -33,7 +34,6 @@ from airground_drake.nsbc.team import Team
 from airground_drake.scenarios.load import resolved
 from airground_drake.scenarios.schema import Run, Scenario
 from airground_drake.systems.decision import FIELDS
-from airground_drake.systems.gatekeeper import Decision
 from airground_drake.trace import DECISION_COLUMNS, PROBLEM_ARRAYS, PROBLEM_SCALARS, SCHEMA, Trace
 
 EVENT_ACCURACY = 1e-6

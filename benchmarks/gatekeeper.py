@@ -36,11 +36,11 @@ from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.half_planes import normals_along
 from airground_drake.gatekeeper.local_search import best_known
 from airground_drake.gatekeeper.prediction import Horizon, Scene, UgvLaw, predicted_problem
-from airground_drake.gatekeeper.problem import DECIDED, Problem, Solution
+from airground_drake.gatekeeper.problem import Problem
 from airground_drake.gatekeeper.rounding import sum_up_rounding
 from airground_drake.gatekeeper.routes.nonlinear import NonlinearRoute
 from airground_drake.gatekeeper.routes.relaxed import RelaxedRoute
-from airground_drake.gatekeeper.solution import ConstantPlans, choose
+from airground_drake.gatekeeper.solution import ConstantPlans, Solution, cheapest
 from airground_drake.intervention.paths import NoPath, shortest_path
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
@@ -181,7 +181,7 @@ class CasadiRoute:
         if not solver.stats()["success"]:
             return constants.failed()
         relaxed = np.clip(np.asarray(solution["x"]).ravel()[2 * stages : 3 * stages], 0.0, 1.0)
-        return choose(problem, (problem.evaluate(sum_up_rounding(relaxed)), constants.accept, constants.refuse))
+        return cheapest(problem, (problem.evaluate(sum_up_rounding(relaxed)), constants.accept, constants.refuse))
 
 
 class ScipRoute:
@@ -208,7 +208,7 @@ class ScipRoute:
         if model.status != "optimal" or omega.value is None:
             return constants.failed()
         plan = problem.evaluate((omega.value[:, 0] > 0.5).astype(float))
-        return choose(problem, (plan, constants.accept, constants.refuse))
+        return cheapest(problem, (plan, constants.accept, constants.refuse))
 
 
 def contestants() -> dict[str, Callable[[], Any]]:
@@ -249,7 +249,7 @@ class Known:
     @classmethod
     def of(cls, problem: Problem, solutions: list[Solution]) -> Known:
         """By `best_known`, and by every plan of `solutions`."""
-        plans = [d.plan for d in solutions if d.status in DECIDED and d.plan is not None]
+        plans = [d.plan for d in solutions if d.has_plan and d.plan is not None]
         refuse, accept = best_known(problem, 4096 if problem.stages <= 60 else 1024, plans)
         constant = ConstantPlans.of(problem).better.objective
         return cls(refuse, accept, max(refuse if refuse < accept else accept, 0.01 * constant, 1e-12))
@@ -276,7 +276,7 @@ class Result:
 def row(name: str, result: Result, known: list[list[Known]], default: Result | None) -> list[Any]:
     """The columns from `route` on."""
     pairs = [(d, k) for i, ds in enumerate(result.solutions) for d, k in zip(ds, known[i * result.step], strict=True)]
-    decided = [(d, k) for d, k in pairs if d.status in DECIDED]
+    decided = [(d, k) for d, k in pairs if d.has_plan]
     excess = 100.0 * np.array([k.excess(d) for d, k in decided] or [np.nan])
     return [
         name, len(result.times),
@@ -292,7 +292,7 @@ def exceptions(title: str, result: Result, known: list[list[Known]]) -> list[str
     lines = []
     for i, ds in enumerate(result.solutions):
         for j, (d, k) in enumerate(zip(ds, known[i * result.step], strict=True)):
-            if d.status not in DECIDED or k.excess(d) > RULE or k.differs(d):
+            if not d.has_plan or k.excess(d) > RULE or k.differs(d):
                 lines.append(
                     f"{title}, sample {i}, UGV {j + 1}: {d.status}, cost {d.objective:.6g} "
                     f"({'accept' if d.accept_first else 'refuse'}), best known accepting {k.accept:.6g}, refusing "

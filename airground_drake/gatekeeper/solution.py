@@ -1,17 +1,64 @@
-"""The plans among which every route chooses by the exact cost (25), and the decision that follows."""
+"""What a route returns: the plan that it found for problem (26), and the evidence."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
-from numba import njit
 
 from airground_drake.arrays import Array
-from airground_drake.gatekeeper.problem import Evaluation, Problem, Solution, Status
+from airground_drake.gatekeeper.problem import Evaluation, Problem
 from airground_drake.gatekeeper.rounding import rounding_deviation
+
+Status = Literal["optimal", "budget_spent", "refused_budget_spent", "refused_solver_failed", "refused_not_finite"]
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """A solution of (26), with its evidence. Numbers that do not apply are -1, arrays None.
+
+    Attributes:
+        accept_first: the first stage of the plan; False without one.
+        status: 'optimal': the route did all that it does; 'budget_spent': the best plan known when the budget
+            was spent, with its gap; else why there is none, so that the proposal is refused.
+        objective: cost (25) of the plan returned.
+        lower_bound: of the problem that the route solves: relaxed or branched, for the same supporting
+            half-planes; enumerated, for the same dwell. A local optimum has none.
+        gap: (objective - lower_bound) / objective, the objective being that of the same problem.
+        objective_accept: lowest cost found of a plan that starts by accepting.
+        objective_refuse: lowest cost found of a plan that starts by refusing.
+        relaxed_first_stage: omega_0 of the relaxation.
+        rounding_deviation: largest integrated difference of sum-up rounding, s.
+        clearance: smallest predicted distance minus d of the plan, m.
+        plan: omega of the plan returned, (N,), 0 or 1.
+        positions: where that leads, (N, 3), m.
+        relaxed: omega of the relaxation, (N,), in [0, 1].
+        rounded: `relaxed` after sum-up rounding, (N,), 0 or 1.
+        normals: of the half-planes that `lower_bound` and `gap` are about, (N, m, 3).
+    """
+
+    accept_first: bool
+    status: Status
+    objective: float = -1.0
+    lower_bound: float = -1.0
+    gap: float = -1.0
+    objective_accept: float = -1.0
+    objective_refuse: float = -1.0
+    relaxed_first_stage: float = -1.0
+    rounding_deviation: float = -1.0
+    clearance: float = -1.0
+    plan: Array | None = None
+    positions: Array | None = None
+    relaxed: Array | None = None
+    rounded: Array | None = None
+    normals: Array | None = None
+
+    @property
+    def has_plan(self) -> bool:
+        """Whether it rests on a plan, by its status."""
+        return self.status in ("optimal", "budget_spent")
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,9 +70,20 @@ class ConstantPlans:
 
     @classmethod
     def of(cls, problem: Problem) -> ConstantPlans:
-        """Evaluate them by the exact cost (25)."""
+        """Evaluate them by the mode velocities, which are exact for them up to rounding."""
         stages = problem.stages
         return cls(problem.evaluate(np.ones(stages)), problem.evaluate(np.zeros(stages)))
+
+    @classmethod
+    def of_closed_loop(cls, problem: Problem) -> ConstantPlans:
+        """Evaluate them on the closed loop."""
+        stages = problem.stages
+        return cls(problem.evaluate_closed_loop(np.ones(stages)), problem.evaluate_closed_loop(np.zeros(stages)))
+
+    @property
+    def both(self) -> tuple[Evaluation, Evaluation]:
+        """Accepting, refusing: in the order in which ties are broken."""
+        return self.accept, self.refuse
 
     @property
     def better(self) -> Evaluation:
@@ -37,13 +95,12 @@ class ConstantPlans:
         return bool(np.isfinite(self.accept.objective) and np.isfinite(self.refuse.objective))
 
     def failed(self) -> Solution:
-        """Refuse because the solver gave no optimum; the costs of the constant plans are the evidence."""
-        status: Status = "refused_solver_failed"
+        """No solution, because the solver gave no optimum; the costs of the constant plans are the evidence."""
         accept, refuse = self.accept.objective, self.refuse.objective
-        return Solution(False, status, objective_accept=accept, objective_refuse=refuse)
+        return Solution(False, "refused_solver_failed", objective_accept=accept, objective_refuse=refuse)
 
 
-def choose(
+def cheapest(
     problem: Problem,
     plans: Sequence[Evaluation],
     *,
@@ -69,7 +126,7 @@ def choose(
     best = min(plans, key=lambda plan: plan.objective)
     if normals is not None:
         convexified = min(problem.evaluate_half_planes(plan.positions, normals) for plan in plans)
-        gap = (convexified - lower_bound) / max(convexified, 1e-12)
+        gap = relative_gap(convexified, lower_bound)
     return Solution(
         accept_first=bool(best.omega[0] == 1.0),
         status=status,
@@ -94,59 +151,26 @@ def choose(
 def cut_short(
     problem: Problem,
     plans: Sequence[Evaluation],
-    tail: Array,
+    bound: float,
     *,
-    bound: float = 0.0,
     relaxed: Array | None = None,
     rounded: Array | None = None,
 ) -> Solution:
-    """The decision when the budget is spent: the best plan so far, and a bound for which no solver is needed.
+    """The solution when the budget is spent: the best plan so far, and a bound for which no solver is needed.
 
     Args:
         problem: what they are plans of.
-        plans: as for `choose`.
-        tail: `remaining_cost(problem)`; its first element bounds every plan.
-        bound: another lower bound of (25), if there is one.
-        relaxed: as for `choose`.
-        rounded: as for `choose`.
+        plans: as for `cheapest`.
+        bound: lower bound of every plan.
+        relaxed: as for `cheapest`.
+        rounded: as for `cheapest`.
     """
     best = min(plan.objective for plan in plans)
-    bound = min(max(float(tail[0]), bound), best)
-    gap = (best - bound) / max(best, 1e-12)
-    return choose(problem, plans, status="budget_spent", lower_bound=bound, gap=gap, relaxed=relaxed, rounded=rounded)
+    bound = min(bound, best)
+    gap = relative_gap(best, bound)
+    return cheapest(problem, plans, status="budget_spent", lower_bound=bound, gap=gap, relaxed=relaxed, rounded=rounded)
 
 
-def remaining_cost(problem: Problem) -> Array:
-    """Lower bound of (25) over the stages from k on, for k = 0..N, (N + 1,): task error from the reachable box.
-
-    Any plan stays, per axis, between the running sums of the smaller and of the larger mode velocity.
-    """
-    return _remaining_cost(
-        problem.dt, problem.initial, problem.accept, problem.refuse, problem.reference, problem.error_weight
-    )
-
-
-@njit(cache=True)
-def _remaining_cost(
-    dt: float, initial: Array, accept: Array, refuse: Array, reference: Array, error_weight: float
-) -> Array:
-    stages = len(accept)
-    tail = np.zeros(stages + 1)
-    low, high = initial.copy(), initial.copy()
-    for k in range(stages):
-        squared = 0.0
-        for a in range(3):
-            low[a] += dt * min(accept[k, a], refuse[k, a])
-            high[a] += dt * max(accept[k, a], refuse[k, a])
-            squared += max(0.0, low[a] - reference[k, a], reference[k, a] - high[a]) ** 2
-        tail[k] = dt * error_weight * squared
-    for k in range(stages - 1, -1, -1):
-        tail[k] += tail[k + 1]
-    return (1.0 - 1e-9) * tail  # the last digits of the running sums must not cut an optimum
-
-
-def block_of_stage(stages: int, blocks: int) -> npt.NDArray[np.int64]:
-    """Block (N,) that each stage belongs to: lengths differ by one stage at most, none is empty."""
-    used = min(blocks, stages)
-    block: npt.NDArray[np.int64] = np.arange(stages, dtype=np.int64) * used // stages
-    return block
+def relative_gap(objective: float, lower_bound: float) -> float:
+    """(objective - lower_bound) / objective; 0 / 0 is 0."""
+    return (objective - lower_bound) / max(objective, 1e-12)

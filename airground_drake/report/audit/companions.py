@@ -9,7 +9,8 @@ from pydrake.solvers import ClarabelSolver, MathematicalProgram
 
 from airground_drake import diagram
 from airground_drake.gatekeeper.budget import Budget
-from airground_drake.gatekeeper.problem import Problem, Solution
+from airground_drake.gatekeeper.problem import Problem
+from airground_drake.gatekeeper.solution import Solution
 from airground_drake.report.audit.item import Item
 from airground_drake.report.metrics import closest_obstacle
 from airground_drake.report.reproduction import MEASURES
