@@ -16,12 +16,12 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize
 
 from airground_drake.arrays import Array
-from airground_drake.gatekeeper.problem import Solution
+from airground_drake.gatekeeper.answer import Rules, settle
+from airground_drake.gatekeeper.solution import Solution
 from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Gatekeeper, Obstacle, Preset, Run, Scenario, Ugv
 from airground_drake.simulation import simulate
-from airground_drake.systems.gatekeeper import Rules, settle
 from airground_drake.trace import DECISION_COLUMNS, PROBLEM_ARRAYS, PROBLEM_SCALARS, Trace, save
 from airground_drake.trace import load as load_trace
 from airground_drake.verify import gatekeeping, optimality
