@@ -11,8 +11,10 @@ from pydrake.trajectories import PiecewisePolynomial
 from airground_drake.arrays import Array
 from airground_drake.decision.bayes import optimal_threshold
 from airground_drake.decision.trigger import Trigger
+from airground_drake.gatekeeper.answer import Rules
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.prediction import Horizon
+from airground_drake.gatekeeper.routes.route import Route
 from airground_drake.intervention.database import BehaviourDatabase, make_policy
 from airground_drake.intervention.planner import Planner
 from airground_drake.nsbc.avoidance import Avoidance, Composition
@@ -21,7 +23,6 @@ from airground_drake.nsbc.motion import Motion
 from airground_drake.nsbc.team import Team
 from airground_drake.registry import ROUTES, Method
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.systems.gatekeeper import Route, Rules
 
 
 def make_avoidance(scenario: Scenario, composition: Composition = "augmented") -> Avoidance:
@@ -75,8 +76,7 @@ def make_route(scenario: Scenario) -> Route:
     Raises:
         UnknownNameError, PluginError: if the scenario names a route that cannot be made.
     """
-    route: Route = ROUTES.load(scenario.gatekeeper.route, of=object)()  # type: ignore[assignment]
-    return route
+    return ROUTES.load(scenario.gatekeeper.route, of=Route)()
 
 
 def first_order_plant(robot: str, start: Array) -> LinearSystem:

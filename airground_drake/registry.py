@@ -172,11 +172,11 @@ ROUTES = Registry(
     "route",
     "routes",
     {
-        "relaxed": "airground_drake.gatekeeper.relaxed:RelaxedRoute",
-        "enumeration": "airground_drake.gatekeeper.enumeration:EnumerationRoute",
-        "nonlinear": "airground_drake.gatekeeper.nonlinear:NonlinearRoute",
-        "branch_and_bound": "airground_drake.gatekeeper.branch:BranchAndBoundRoute",
-        "rollout": "airground_drake.gatekeeper.rollout:RolloutRoute",
+        "relaxed": "airground_drake.gatekeeper.routes.relaxed:RelaxedRoute",
+        "enumeration": "airground_drake.gatekeeper.routes.enumeration:EnumerationRoute",
+        "nonlinear": "airground_drake.gatekeeper.routes.nonlinear:NonlinearRoute",
+        "branch_and_bound": "airground_drake.gatekeeper.routes.branch_and_bound:BranchAndBoundRoute",
+        "rollout": "airground_drake.gatekeeper.routes.closed_loop_enumeration:ClosedLoopEnumerationRoute",
     },
 )
 """Ways to solve the gatekeeper's problem (26)."""

@@ -25,8 +25,9 @@ from airground_drake.arrays import Array
 from airground_drake.diagram import RECORDED, Model, build_model
 from airground_drake.errors import AirgroundError, UnknownNameError
 from airground_drake.events import extract
+from airground_drake.gatekeeper.answer import Decision
 from airground_drake.gatekeeper.prediction import Horizon, Scene, predicted_problem
-from airground_drake.gatekeeper.relaxed import RelaxedRoute
+from airground_drake.gatekeeper.routes.relaxed import RelaxedRoute
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance, Composition, Surroundings, limit_speed
 from airground_drake.nsbc.law import UgvLaw
@@ -35,7 +36,6 @@ from airground_drake.nsbc.team import Team
 from airground_drake.scenarios.load import resolved, validated
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.systems.decision import FIELDS
-from airground_drake.systems.gatekeeper import Ruling
 from airground_drake.trace import DECISION_COLUMNS, PROBLEM_ARRAYS, PROBLEM_SCALARS, SCHEMA, Trace
 
 EVENT_ACCURACY = 1e-6
@@ -106,7 +106,7 @@ class Recorder:
         data = {port: log.data()[:, keep] for port, log in logs.items()}
         signals = _signals(t[keep], data, ugvs, robots)
         gatekeeper = model.gatekeeper
-        rulings = gatekeeper.rulings(gatekeeper.GetMyContextFromRoot(context)) if gatekeeper is not None else ()
+        decided = gatekeeper.decisions(gatekeeper.GetMyContextFromRoot(context)) if gatekeeper is not None else ()
         memory = model.planner.memory(model.planner.GetMyContextFromRoot(context))
         decisions = pd.DataFrame(
             [
@@ -117,22 +117,22 @@ class Recorder:
                     "issued_s": r.proposal.issued,
                     "decision": "accept" if r.accepted else "refuse",
                     "reason": r.reason,
-                    "status": r.decision.status,
+                    "status": r.solution.status,
                     "route": self._scenario.gatekeeper.route,
-                    "first_stage": "accept" if r.decision.accept else "refuse",
-                    "relaxed_first_stage": r.decision.relaxed_first_stage,
-                    "objective": r.decision.objective,
-                    "lower_bound": r.decision.lower_bound,
-                    "gap": r.decision.gap,
-                    "objective_accept": r.decision.objective_accept,
-                    "objective_refuse": r.decision.objective_refuse,
+                    "first_stage": "accept" if r.solution.accept_first else "refuse",
+                    "relaxed_first_stage": r.solution.relaxed_first_stage,
+                    "objective": r.solution.objective,
+                    "lower_bound": r.solution.lower_bound,
+                    "gap": r.solution.gap,
+                    "objective_accept": r.solution.objective_accept,
+                    "objective_refuse": r.solution.objective_refuse,
                     "accept_throughout": r.throughout[0],
                     "refuse_throughout": r.throughout[1],
-                    "rounding_deviation_s": r.decision.rounding_deviation,
-                    "predicted_clearance_m": r.decision.clearance,
+                    "rounding_deviation_s": r.solution.rounding_deviation,
+                    "predicted_clearance_m": r.solution.clearance,
                     "bend": r.problem.bend,
                 }
-                for r in rulings
+                for r in decided
             ],
             columns=list(DECISION_COLUMNS),
         ).astype(DECISION_COLUMNS)
@@ -152,13 +152,13 @@ class Recorder:
         }
         times = list(gatekeeper.decision_times_s) if gatekeeper is not None else []
         timings = {"wall_s": wall, "decision_times_s": times}
-        trace = Trace(meta, signals, decisions, timings, _problems(rulings))
+        trace = Trace(meta, signals, decisions, timings, _problems(decided))
         meta["events"] = extract(trace, sent)
         return trace
 
 
-def _problems(rulings: Sequence[Ruling]) -> pd.DataFrame:
-    """`Trace.problems` of the rulings."""
+def _problems(decided: Sequence[Decision]) -> pd.DataFrame:
+    """`Trace.problems` of the decisions."""
 
     def flat(array: Array | None) -> list[float]:
         return [] if array is None else array.ravel().tolist()
@@ -168,11 +168,11 @@ def _problems(rulings: Sequence[Ruling]) -> pd.DataFrame:
             r.problem.dt, r.problem.error_weight, r.problem.slack_weight,
             *map(flat, (
                 r.problem.initial, r.problem.accept, r.problem.refuse, r.problem.reference, r.problem.centres,
-                r.problem.distances, r.decision.plan, r.decision.positions, r.decision.relaxed, r.decision.rounded,
-                r.decision.normals,
+                r.problem.distances, r.solution.plan, r.solution.positions, r.solution.relaxed, r.solution.rounded,
+                r.solution.normals,
             )),
         )
-        for r in rulings
+        for r in decided
     ]  # fmt: skip
     return pd.DataFrame(rows, columns=[*PROBLEM_SCALARS, *PROBLEM_ARRAYS])
 
@@ -188,7 +188,7 @@ def warm_up() -> None:
     team.neighbourhood(slice(0, 1)).around(np.ones((2, 3)))
     scene = Scene(0.0, one[0], motion, one, one, np.ones(1), np.ones(1), 1.0)
     law, horizon = UgvLaw(avoidance, 1.0, 1.0, False), Horizon(2, 1, 1.0, 1.0)
-    RelaxedRoute().decide(predicted_problem(scene, law, Proposal("", 0.0, motion), horizon))
+    RelaxedRoute().solve(predicted_problem(scene, law, Proposal("", 0.0, motion), horizon))
 
 
 def simulate_all(scenario: Scenario, jobs: int | None = None) -> dict[str, Trace]:

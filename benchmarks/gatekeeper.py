@@ -3,7 +3,7 @@
     python benchmarks/gatekeeper.py [--quick] [--routes relaxed,enumeration] [-o table.csv]
 
 Problems are those that the gatekeeper of cases A and B was given in a run, and closed loops rolled out among random
-discs (a detour or a straight line proposed), for one to eight UGVs. A decision is one sample: with two UGVs, both
+discs (a detour or a straight line proposed), for one to eight UGVs. A solution is one sample: with two UGVs, both
 problems. Times are CPU times of the process.
 
 Plans are compared with the best known: the best of all rows of the same problem, and of a search with 4096 labels
@@ -31,25 +31,27 @@ from typing import Any
 import cvxpy
 import numpy as np
 
-from airground_drake import diagram
 from airground_drake.gatekeeper.budget import Budget
-from airground_drake.gatekeeper.candidates import Constants, choose
 from airground_drake.gatekeeper.half_planes import normals_along
-from airground_drake.gatekeeper.nonlinear import NonlinearRoute
-from airground_drake.gatekeeper.polish import best_known
-from airground_drake.gatekeeper.prediction import Horizon, Scene, UgvLaw, predicted_problem
-from airground_drake.gatekeeper.problem import DECIDED, Decision, Problem
-from airground_drake.gatekeeper.relaxed import RelaxedRoute
+from airground_drake.gatekeeper.local_search import best_known
+from airground_drake.gatekeeper.prediction import Horizon, Scene, predicted_problem
+from airground_drake.gatekeeper.problem import Problem
 from airground_drake.gatekeeper.rounding import sum_up_rounding
+from airground_drake.gatekeeper.routes.nonlinear import NonlinearRoute
+from airground_drake.gatekeeper.routes.relaxed import RelaxedRoute
+from airground_drake.gatekeeper.routes.route import Route
+from airground_drake.gatekeeper.solution import ConstantPlans, Solution, cheapest
 from airground_drake.intervention.paths import NoPath, shortest_path
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
+from airground_drake.nsbc.law import UgvLaw
 from airground_drake.nsbc.motion import Motion
+from airground_drake.registry import ROUTES
 from airground_drake.scenarios.load import load
 from airground_drake.simulation import Recorder
 
 Sample = list[Problem]
-"""The problems of one decision, one per UGV."""
+"""The problems of one solution, one per UGV."""
 
 COLUMNS = ("problems", "ugvs", "points", "stages", "route", "decisions", "p50_ms", "p99_ms", "max_ms", "mean_excess_%",
            "max_excess_%", "over_0.1_%", "accepted", "other_choice", "no_plan", "p50_ratio")  # fmt: skip
@@ -57,7 +59,7 @@ DEFAULT = "relaxed"
 RULE = 1e-3
 """What the default route may miss, relative."""
 SLOW = {"nonlinear_ipopt": 60, "cvxpy+scip": 60}
-"""Most stages, and one in ten decisions, for what takes seconds."""
+"""Most stages, and one in ten solutions, for what takes seconds."""
 SCIP_LIMIT_S = 10.0
 
 
@@ -69,15 +71,14 @@ def recorded(case: str, run: str, most: int) -> list[Sample]:
     seen: list[Sample] = []
 
     class Listening(RelaxedRoute):
-        def decide(self, problem: Problem, budget: Budget = Budget()) -> Decision:  # noqa: B008 (immutable)
+        def solve(self, problem: Problem, budget: Budget = Budget()) -> Solution:  # noqa: B008 (immutable)
             seen.append([replace(problem, loop=None)])
-            return super().decide(problem, budget)
+            return super().solve(problem, budget)
 
     scenario = load(case)[0]
-    diagram.ROUTES["listening"] = Listening
     scenario.gatekeeper.route = "listening"
-    Recorder(scenario, run, scenario.runs[run]).simulate()
-    del diagram.ROUTES["listening"]
+    with ROUTES.adding("listening", Listening):
+        Recorder(scenario, run).simulate()
     return seen[:: -(-len(seen) // most)]
 
 
@@ -152,12 +153,12 @@ def groups(quick: bool) -> Iterator[tuple[str, int, int, int, list[Sample]]]:
 class CasadiRoute:
     """(27) with exact distances in CasADi, IPOPT with exact Hessians, sum-up rounding."""
 
-    def decide(self, problem: Problem) -> Decision:
+    def solve(self, problem: Problem) -> Solution:
         """Build, solve, round."""
         import casadi
 
         stages, points = problem.centres.shape[:2]
-        constants = Constants.of(problem)
+        constants = ConstantPlans.of(problem)
         p, omega, u = casadi.SX.sym("p", 2, stages), casadi.SX.sym("w", stages), casadi.SX.sym("u", stages)
         velocity = problem.refuse[:, :2].T + casadi.repmat(omega.T, 2, 1) * (problem.accept - problem.refuse)[:, :2].T
         before = casadi.horzcat(problem.initial[:2], p[:, :-1])
@@ -181,15 +182,15 @@ class CasadiRoute:
         if not solver.stats()["success"]:
             return constants.failed()
         relaxed = np.clip(np.asarray(solution["x"]).ravel()[2 * stages : 3 * stages], 0.0, 1.0)
-        return choose(problem, (problem.evaluate(sum_up_rounding(relaxed)), constants.accept, constants.refuse))
+        return cheapest(problem, (problem.evaluate(sum_up_rounding(relaxed)), constants.accept, constants.refuse))
 
 
 class ScipRoute:
     """The convexified problem with one binary per stage, SCIP through cvxpy."""
 
-    def decide(self, problem: Problem) -> Decision:
+    def solve(self, problem: Problem) -> Solution:
         """Build and solve, up to the time limit."""
-        constants = Constants.of(problem)
+        constants = ConstantPlans.of(problem)
         normals = normals_along(problem, constants.better.positions)
         omega, u = cvxpy.Variable((problem.stages, 1), boolean=True), cvxpy.Variable(problem.stages, nonneg=True)
         velocity = problem.refuse + cvxpy.multiply(omega, problem.accept - problem.refuse)
@@ -208,12 +209,14 @@ class ScipRoute:
         if model.status != "optimal" or omega.value is None:
             return constants.failed()
         plan = problem.evaluate((omega.value[:, 0] > 0.5).astype(float))
-        return choose(problem, (plan, constants.accept, constants.refuse))
+        return cheapest(problem, (plan, constants.accept, constants.refuse))
 
 
 def contestants() -> dict[str, Callable[[], Any]]:
     """Every route, and the references that are installed."""
-    routes: dict[str, Callable[[], Any]] = {n: make for n, make in diagram.ROUTES.items() if n != "rollout"}
+    routes: dict[str, Callable[[], Any]] = {
+        name: ROUTES.load(name, of=Route) for name in ROUTES.own if name != "rollout"
+    }
     routes["nonlinear_ipopt"] = lambda: NonlinearRoute("ipopt")
     for name, module, make in (("casadi+ipopt", "casadi", CasadiRoute), ("cvxpy+scip", "pyscipopt", ScipRoute)):
         if find_spec(module) is None:
@@ -226,16 +229,16 @@ def contestants() -> dict[str, Callable[[], Any]]:
 # --- measurement -------------------------------------------------------------------------------------------------
 
 
-def measure(route: Any, samples: list[Sample]) -> tuple[np.ndarray, list[list[Decision]]]:
-    """CPU time of each decision, ms, and what was decided; the first sample is solved once before."""
+def measure(route: Any, samples: list[Sample]) -> tuple[np.ndarray, list[list[Solution]]]:
+    """CPU time of each solution, ms, and what was decided; the first sample is solved once before."""
     for problem in samples[0]:
-        route.decide(problem)
-    times, decisions = [], []
+        route.solve(problem)
+    times, solutions = [], []
     for sample in samples:
         started = time.process_time()
-        decisions.append([route.decide(problem) for problem in sample])
+        solutions.append([route.solve(problem) for problem in sample])
         times.append(1e3 * (time.process_time() - started))
-    return np.array(times), decisions
+    return np.array(times), solutions
 
 
 @dataclass(frozen=True)
@@ -247,21 +250,21 @@ class Known:
     scale: float
 
     @classmethod
-    def of(cls, problem: Problem, decisions: list[Decision]) -> Known:
-        """By `best_known`, and by every plan of `decisions`."""
-        plans = [d.plan for d in decisions if d.status in DECIDED and d.plan is not None]
+    def of(cls, problem: Problem, solutions: list[Solution]) -> Known:
+        """By `best_known`, and by every plan of `solutions`."""
+        plans = [d.plan for d in solutions if d.has_plan and d.plan is not None]
         refuse, accept = best_known(problem, 4096 if problem.stages <= 60 else 1024, plans)
-        constant = Constants.of(problem).better.objective
+        constant = ConstantPlans.of(problem).better.objective
         return cls(refuse, accept, max(refuse if refuse < accept else accept, 0.01 * constant, 1e-12))
 
-    def excess(self, decision: Decision) -> float:
+    def excess(self, solution: Solution) -> float:
         """Relative."""
-        return (decision.objective - min(self.refuse, self.accept)) / self.scale
+        return (solution.objective - min(self.refuse, self.accept)) / self.scale
 
-    def differs(self, decision: Decision) -> bool:
+    def differs(self, solution: Solution) -> bool:
         """Whether the first stage is another, where it matters."""
         matters = abs(self.refuse - self.accept) > RULE * self.scale
-        return matters and decision.accept != (self.accept < self.refuse)
+        return matters and solution.accept_first != (self.accept < self.refuse)
 
 
 @dataclass(frozen=True)
@@ -270,19 +273,19 @@ class Result:
 
     step: int
     times: np.ndarray
-    decisions: list[list[Decision]]
+    solutions: list[list[Solution]]
 
 
 def row(name: str, result: Result, known: list[list[Known]], default: Result | None) -> list[Any]:
     """The columns from `route` on."""
-    pairs = [(d, k) for i, ds in enumerate(result.decisions) for d, k in zip(ds, known[i * result.step], strict=True)]
-    decided = [(d, k) for d, k in pairs if d.status in DECIDED]
+    pairs = [(d, k) for i, ds in enumerate(result.solutions) for d, k in zip(ds, known[i * result.step], strict=True)]
+    decided = [(d, k) for d, k in pairs if d.has_plan]
     excess = 100.0 * np.array([k.excess(d) for d, k in decided] or [np.nan])
     return [
         name, len(result.times),
         *(f"{t:.2f}" for t in (*np.percentile(result.times, [50, 99]), result.times.max())),
         f"{excess.mean():.3f}", f"{excess.max():.3f}", int((excess > 100.0 * RULE).sum()),
-        sum(d.accept for d, _ in pairs), sum(k.differs(d) for d, k in decided), len(pairs) - len(decided),
+        sum(d.accept_first for d, _ in pairs), sum(k.differs(d) for d, k in decided), len(pairs) - len(decided),
         f"{np.median(result.times) / np.median(default.times):.1f}" if default else "",
     ]  # fmt: skip
 
@@ -290,12 +293,12 @@ def row(name: str, result: Result, known: list[list[Known]], default: Result | N
 def exceptions(title: str, result: Result, known: list[list[Known]]) -> list[str]:
     """Problems where the default route misses the best known by more than the rule allows."""
     lines = []
-    for i, ds in enumerate(result.decisions):
+    for i, ds in enumerate(result.solutions):
         for j, (d, k) in enumerate(zip(ds, known[i * result.step], strict=True)):
-            if d.status not in DECIDED or k.excess(d) > RULE or k.differs(d):
+            if not d.has_plan or k.excess(d) > RULE or k.differs(d):
                 lines.append(
                     f"{title}, sample {i}, UGV {j + 1}: {d.status}, cost {d.objective:.6g} "
-                    f"({'accept' if d.accept else 'refuse'}), best known accepting {k.accept:.6g}, refusing "
+                    f"({'accept' if d.accept_first else 'refuse'}), best known accepting {k.accept:.6g}, refusing "
                     f"{k.refuse:.6g}, excess {100.0 * k.excess(d):.2f} %, gap in half-planes {100.0 * d.gap:.2f} %"
                     + (", other first stage" if k.differs(d) else "")
                 )
@@ -325,7 +328,7 @@ def main() -> None:
                 results[name] = Result(step, *measure(route, samples[::step]))
         known = [
             [
-                Known.of(p, [r.decisions[i // r.step][j] for r in results.values() if i % r.step == 0])
+                Known.of(p, [r.solutions[i // r.step][j] for r in results.values() if i % r.step == 0])
                 for j, p in enumerate(sample)
             ]
             for i, sample in enumerate(samples)
@@ -336,7 +339,7 @@ def main() -> None:
         if DEFAULT in results:
             label = f"{title}, {ugvs} UGVs, {points} points, {stages} stages"
             missed += exceptions(label, results[DEFAULT], known)
-            solved += sum(len(ds) for ds in results[DEFAULT].decisions)
+            solved += sum(len(ds) for ds in results[DEFAULT].solutions)
     print(f"\n{DEFAULT}: {len(missed)} of {solved} problems miss the best known by more than {100.0 * RULE} %")
     print("\n".join(missed))
     if arguments.output:

@@ -2,7 +2,7 @@
 
     python benchmarks/hostile.py --proposals 10000 --runs 300
 
-Decision level: UGVs at random safe places among obstacles, many exactly at the safe distance, with proposals of
+Solution level: UGVs at random safe places among obstacles, many exactly at the safe distance, with proposals of
 random position, speed, direction and course, a third of them aimed at what is nearest. Under method (d) each one
 is executed whether accepted or not; under (c) only if its gatekeeper accepts. Whole runs: case A with the
 policies `hostile`, `towards` and `noisy` of random parameters, a gatekeeper that accepts nearly anything, and
@@ -21,7 +21,7 @@ import numpy as np
 from airground_drake.arrays import Array
 from airground_drake.diagram import make_presets, make_team
 from airground_drake.gatekeeper.prediction import Horizon, Scene, UgvLaw, predicted_problem
-from airground_drake.gatekeeper.relaxed import RelaxedRoute
+from airground_drake.gatekeeper.routes.relaxed import RelaxedRoute
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.motion import Motion
@@ -66,7 +66,7 @@ def at_decision_level(seed: int, proposals: int) -> tuple[float, int, int]:
             law = UgvLaw(avoidance, 2.0, 1.5, intervention_on_top=on_top)
             if on_top:
                 scene = Scene(t, start, presets[0], centres, np.zeros((4, 3)), np.full(4, d), np.ones(4), 3.0)
-                if not route.decide(predicted_problem(scene, law, proposal, horizon)).accept:
+                if not route.solve(predicted_problem(scene, law, proposal, horizon)).accept_first:
                     continue
                 accepted += 1
             controller = UgvController(

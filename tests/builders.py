@@ -25,11 +25,11 @@ import pandas as pd
 from scipy.optimize import brentq, minimize
 
 from airground_drake.arrays import Array
-from airground_drake.gatekeeper import problem as gatekeeper_problem
+from airground_drake.gatekeeper.answer import Rules, settle
+from airground_drake.gatekeeper.solution import Solution
 from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT
 from airground_drake.nsbc.avoidance import Avoidance, Surroundings
 from airground_drake.scenarios.schema import Decision, Gatekeeper, Obstacle, Preset, Run, Scenario, Uav, Ugv
-from airground_drake.systems.gatekeeper import Rules, settle
 from airground_drake.trace import DECISION_COLUMNS, PROBLEM_ARRAYS, PROBLEM_SCALARS, SCHEMA, Trace
 
 Drive = Callable[[float], list[list[float]]]
@@ -440,7 +440,7 @@ def gate_data_at(trace: Trace, t: float) -> GateData:
     return GateData(round(1000 * t), trace.position("ugv1")[k], reference, centres, distances)
 
 
-def decide_as_documented(data: GateData, route: str) -> gatekeeper_problem.Decision:
+def solve_as_documented(data: GateData, route: str) -> Solution:
     """As the route's documentation has it."""
     relaxed, optimum = data.relaxed()
     rounded = sum_up_rounding(relaxed)
@@ -455,8 +455,8 @@ def decide_as_documented(data: GateData, route: str) -> gatekeeper_problem.Decis
         bound = 0.99 * min(data.plan_cost(plan, along=True) for plan in ALL_PLANS)
         least = min(data.plan_cost(plan, along=True) for plan in (best, np.ones(STAGES), np.zeros(STAGES)))
     rounds, solves = route in ("relaxed", "nonlinear"), route in ("relaxed", "enumeration", "branch_and_bound")
-    return gatekeeper_problem.Decision(
-        accept=best[0] == 1.0,
+    return Solution(
+        accept_first=best[0] == 1.0,
         status="optimal",
         objective=data.cost(positions),
         lower_bound=bound,
@@ -483,7 +483,7 @@ def decided_run(route: str = "relaxed") -> Trace:
     for k in range(1, 7):
         t = k * STAGE_S
         data = gate_data_at(base, t)
-        found = decide_as_documented(data, route)
+        found = solve_as_documented(data, route)
         throughout = data.plan_cost(np.ones(STAGES)), data.plan_cost(np.zeros(STAGES))
         accepted, reason = settle(found, throughout, 0.1, standing, t - since, rules)
         answer = ACCEPT if accepted else REFUSE

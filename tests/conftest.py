@@ -13,11 +13,11 @@ from filelock import FileLock
 from hypothesis import HealthCheck, settings
 
 from airground_drake import trace
+from airground_drake.gatekeeper import sample
 from airground_drake.report.__main__ import main as write_report
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.simulation import simulate
-from airground_drake.systems import gatekeeper
 from airground_drake.trace import Trace
 
 # The first call compiles, and nothing here asserts on time: no deadlines. The default profile draws the same examples
@@ -60,7 +60,7 @@ def _steady_clock() -> Iterator[None]:
     """Every decision of a gatekeeper takes 1 ms by the clock: no verdict depends on what else the machine does."""
     ticks = itertools.count()
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(gatekeeper, "thread_time", lambda: 1e-3 * next(ticks))
+        patch.setattr(sample, "thread_time", lambda: 1e-3 * next(ticks))
         yield
 
 

@@ -1,16 +1,17 @@
-"""The optimal control problem (21)-(26) of one UGV, discretised, and what a binary plan costs."""
+"""The optimal control problem (21)-(26) of one UGV, discretised."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from airground_drake.arrays import Array
 from airground_drake.gatekeeper.closed_loop import ClosedLoop
+from airground_drake.gatekeeper.cost import Terms, half_plane_cost, plan_cost
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +56,17 @@ class Problem:
         """N."""
         return len(self.accept)
 
+    @cached_property
+    def terms(self) -> Terms:
+        """What (25) is made of, for compiled code."""
+        weights = float(self.error_weight), float(self.slack_weight)
+        return Terms(float(self.dt), self.reference, self.centres, self.distances, *weights)
+
+    @cached_property
+    def kinematics(self) -> Kinematics:
+        """(23), for compiled code."""
+        return Kinematics(float(self.dt), self.initial, np.stack([self.refuse, self.accept]))
+
     def is_finite(self) -> bool:
         """Whether all data are finite numbers."""
         data = (self.initial, self.accept, self.refuse, self.reference, self.centres, self.distances)
@@ -67,58 +79,38 @@ class Problem:
         return self.initial + self.dt * np.cumsum(velocity, axis=0)
 
     def evaluate(self, omega: Array) -> Evaluation:
-        """Cost (25) of a plan with the exact distances of (26d), by the right-hand rectangle rule."""
+        """Cost (25) of a plan, (N,), by the mode velocities of (23), with the exact distances of (26d)."""
         positions = self.positions(omega)
-        clearances = _clearances(positions, self.centres, self.distances)
-        objective = self.cost(positions, clearances)
-        return Evaluation(omega, positions, objective, float(clearances.min(initial=np.inf)))
+        return Evaluation(omega, positions, *plan_cost(self.terms, positions))
+
+    def evaluate_closed_loop(self, omega: Array) -> Evaluation:
+        """Cost (25) of a plan, (N,) of 0 and 1, rolled out on the closed loop, with the exact distances of (26d).
+
+        Raises:
+            ValueError: if the problem has no closed loop, or the plan is not one of its plans.
+        """
+        if self.loop is None:
+            raise ValueError("a problem that is given by mode velocities has no closed loop")
+        positions = self.loop.positions(omega)
+        return Evaluation(omega, positions, *plan_cost(self.terms, positions))
 
     def evaluate_half_planes(self, positions: Array, normals: Array) -> float:
         """Cost (25) through positions (N, 3) m when distances are measured along unit normals (N, m, 3)."""
-        return self.cost(positions, _reaches(positions, self.centres, self.distances, normals))
-
-    def cost(self, positions: Array, clearances: Array) -> float:
-        """(25) for positions (N, 3), m, and the least clearance of each stage (N,), m: slack is its negative part."""
-        return _cost(positions, self.reference, clearances, self.error_weight, self.slack_weight, self.dt)
+        return half_plane_cost(self.terms, positions, normals)
 
 
-@njit(cache=True)
-def _clearances(positions: Array, centres: Array, distances: Array) -> Array:
-    """Least distance minus safe distance at each stage, (N,), m; inf without points."""
-    least = np.full(len(positions), np.inf)
-    for k in range(len(positions)):
-        for m in range(len(distances)):
-            squared = 0.0
-            for a in range(3):
-                squared += (positions[k, a] - centres[k, m, a]) ** 2
-            least[k] = min(least[k], np.sqrt(squared) - distances[m])
-    return least
+class Kinematics(NamedTuple):
+    """(23) as numba takes it.
 
+    Attributes:
+        dt: length of a stage, s.
+        initial: (3,), m.
+        velocities: of the modes, (2, N, 3), m/s, in the order of `closed_loop.REFUSED` and `ACCEPTED`.
+    """
 
-@njit(cache=True)
-def _reaches(positions: Array, centres: Array, distances: Array, normals: Array) -> Array:
-    """Least n.(p - o) - d at each stage, (N,), m: never more than the clearance."""
-    least = np.full(len(positions), np.inf)
-    for k in range(len(positions)):
-        for m in range(len(distances)):
-            reach = 0.0
-            for a in range(3):
-                reach += normals[k, m, a] * (positions[k, a] - centres[k, m, a])
-            least[k] = min(least[k], reach - distances[m])
-    return least
-
-
-@njit(cache=True)
-def _cost(
-    positions: Array, reference: Array, clearances: Array, error_weight: float, slack_weight: float, dt: float
-) -> float:
-    total = 0.0
-    for k in range(len(positions)):
-        slack = max(0.0, -clearances[k])
-        total += slack_weight * slack * slack
-        for a in range(3):
-            total += error_weight * (reference[k, a] - positions[k, a]) ** 2
-    return dt * total
+    dt: float
+    initial: Array
+    velocities: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,49 +121,3 @@ class Evaluation:
     positions: Array
     objective: float
     clearance: float
-
-
-Status = Literal["optimal", "budget_spent", "refused_budget_spent", "refused_solver_failed", "refused_not_finite"]
-DECIDED: tuple[Status, ...] = ("optimal", "budget_spent")
-"""Statuses of a decision that rests on a plan; every other one is a refusal for want of one."""
-
-
-@dataclass(frozen=True, eq=False)
-class Decision:
-    """What a route decided, with its evidence. Numbers that do not apply are -1, arrays None.
-
-    Attributes:
-        accept: the first stage of the plan.
-        status: 'optimal': the route did all that it does; 'budget_spent': the best plan known when the budget
-            was spent, with its gap; else why the proposal was refused without a plan.
-        objective: cost (25) of the plan returned.
-        lower_bound: of the problem that the route solves: relaxed or branched, for the same supporting
-            half-planes; enumerated, for the same dwell. A local optimum has none.
-        gap: (objective - lower_bound) / objective, the objective being that of the same problem.
-        objective_accept: lowest cost found of a plan that starts by accepting.
-        objective_refuse: lowest cost found of a plan that starts by refusing.
-        relaxed_first_stage: omega_0 of the relaxation.
-        rounding_deviation: largest integrated difference of sum-up rounding, s.
-        clearance: smallest predicted distance minus d of the plan, m.
-        plan: omega of the plan returned, (N,), 0 or 1.
-        positions: where that leads, (N, 3), m.
-        relaxed: omega of the relaxation, (N,), in [0, 1].
-        rounded: `relaxed` after sum-up rounding, (N,), 0 or 1.
-        normals: of the half-planes that `lower_bound` and `gap` are about, (N, m, 3).
-    """
-
-    accept: bool
-    status: Status
-    objective: float = -1.0
-    lower_bound: float = -1.0
-    gap: float = -1.0
-    objective_accept: float = -1.0
-    objective_refuse: float = -1.0
-    relaxed_first_stage: float = -1.0
-    rounding_deviation: float = -1.0
-    clearance: float = -1.0
-    plan: Array | None = None
-    positions: Array | None = None
-    relaxed: Array | None = None
-    rounded: Array | None = None
-    normals: Array | None = None

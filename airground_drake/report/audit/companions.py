@@ -8,7 +8,8 @@ import numpy as np
 from pydrake.solvers import ClarabelSolver, MathematicalProgram
 
 from airground_drake.gatekeeper.budget import Budget
-from airground_drake.gatekeeper.problem import Decision, Problem
+from airground_drake.gatekeeper.problem import Problem
+from airground_drake.gatekeeper.solution import Solution
 from airground_drake.report.audit.item import Item
 from airground_drake.report.metrics import closest_obstacle
 from airground_drake.report.reproduction import MEASURES
@@ -29,9 +30,9 @@ def _run(name: str, run: str, changes: tuple[str, ...] = ()) -> Trace:
 class Credulous:
     """A route that calls every proposal a great gain."""
 
-    def decide(self, problem: Problem, budget: Budget) -> Decision:
+    def solve(self, problem: Problem, budget: Budget) -> Solution:
         """Accept."""
-        return Decision(True, "optimal", objective=0.0)
+        return Solution(True, "optimal", objective=0.0)
 
 
 def _accepting(name: str, run: str) -> Trace:

@@ -31,9 +31,9 @@ from verify.runs.cases import (
     wrong_reason,
 )
 
-from airground_drake.gatekeeper.problem import Decision
+from airground_drake.gatekeeper.answer import Rules, settle
+from airground_drake.gatekeeper.solution import Solution
 from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT
-from airground_drake.systems.gatekeeper import Rules, settle
 from airground_drake.trace import Trace
 from airground_drake.verify.runs import gate_feas
 from airground_drake.verify.runs.gate_record import Row, rows_of
@@ -186,7 +186,7 @@ def test_the_rules_are_those_of_the_running_gatekeeper(
 ) -> None:
     accept, refuse = (costs[0], costs[0]) if equal else costs
     status: Any = "optimal" if planned else "refused_not_finite"
-    decision = Decision(accept <= refuse, status, objective=min(costs))
+    decision = Solution(accept <= refuse, status, objective=min(costs))
     kept = throughout
     plan = np.array([float(accept <= refuse)]) if planned else None
     given = {"objective": min(costs), "accept_throughout": kept[0], "refuse_throughout": kept[1], "bend": bend}

@@ -18,10 +18,11 @@ from pydrake.solvers import (
 
 from airground_drake.arrays import Array
 from airground_drake.gatekeeper.budget import Budget
-from airground_drake.gatekeeper.candidates import Constants, choose, cut_short, remaining_cost
-from airground_drake.gatekeeper.half_planes import reachable
-from airground_drake.gatekeeper.problem import Decision, Evaluation, Problem
+from airground_drake.gatekeeper.problem import Evaluation, Problem
+from airground_drake.gatekeeper.reachable_box import within_reach
 from airground_drake.gatekeeper.rounding import sum_up_rounding
+from airground_drake.gatekeeper.routes.guard import guarded, unavoidable_cost, without_optimum
+from airground_drake.gatekeeper.solution import ConstantPlans, Solution, cheapest, cut_short
 
 NlpSolver = Literal["snopt", "ipopt"]
 
@@ -77,28 +78,21 @@ class NonlinearRoute:
         self._name = solver
         self._id = self._solver.solver_id()
 
-    def decide(self, problem: Problem, budget: Budget = Budget()) -> Decision:  # noqa: B008 (immutable)
-        """Accept or refuse: never raises for a hard or broken problem, but refuses and says why."""
-        if not problem.is_finite():
-            return Decision(False, "refused_not_finite")
-        if budget.spent():
-            return Decision(False, "refused_budget_spent")
-        constants = Constants.of(problem)
-        if not constants.are_finite():
-            return Decision(False, "refused_not_finite")
-        plans = [constants.accept, constants.refuse]
-        if budget.spent():
-            return cut_short(problem, plans, remaining_cost(problem))
-        relaxed, finished = self._solve(problem, constants.better, budget)
-        if relaxed is None:
-            return cut_short(problem, plans, remaining_cost(problem)) if budget.spent() else constants.failed()
-        rounded = sum_up_rounding(relaxed)
-        plans.insert(0, problem.evaluate(rounded))
-        if not finished:
-            return cut_short(problem, plans, remaining_cost(problem), relaxed=relaxed, rounded=rounded)
-        return choose(problem, plans, relaxed=relaxed, rounded=rounded)
+    def solve(self, problem: Problem, budget: Budget = Budget()) -> Solution:  # noqa: B008 (immutable)
+        """See `Route`."""
+        return guarded(problem, budget, self._solve)
 
-    def _solve(self, problem: Problem, start: Evaluation, budget: Budget) -> tuple[Array | None, bool]:
+    def _solve(self, problem: Problem, constants: ConstantPlans, budget: Budget) -> Solution:
+        relaxed, finished = self._relax(problem, constants.better, budget)
+        if relaxed is None:
+            return without_optimum(problem, constants, budget)
+        rounded = sum_up_rounding(relaxed)
+        plans = (problem.evaluate(rounded), *constants.both)
+        if not finished:
+            return cut_short(problem, plans, unavoidable_cost(problem), relaxed=relaxed, rounded=rounded)
+        return cheapest(problem, plans, relaxed=relaxed, rounded=rounded)
+
+    def _relax(self, problem: Problem, start: Evaluation, budget: Budget) -> tuple[Array | None, bool]:
         """Omega (N,), None where the solver failed, and whether it is a local optimum."""
         nlp = relaxation(problem, start)
         try:
@@ -142,7 +136,7 @@ def relaxation(problem: Problem, start: Evaluation) -> Relaxation:
     """
     stages, dt = problem.stages, problem.dt
     size = _AXES * stages
-    stage, point = np.nonzero(reachable(problem))
+    stage, point = np.nonzero(within_reach(problem))
     program = MathematicalProgram()
     e = program.NewContinuousVariables(size, "e")
     omega = program.NewContinuousVariables(stages, "omega")

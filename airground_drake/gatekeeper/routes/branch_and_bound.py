@@ -17,11 +17,13 @@ from pydrake.solvers import (
 )
 
 from airground_drake.arrays import Array
+from airground_drake.gatekeeper.blocks import check_blocks
 from airground_drake.gatekeeper.budget import Budget
-from airground_drake.gatekeeper.candidates import Constants, choose, cut_short, remaining_cost
+from airground_drake.gatekeeper.convex_program import TeamProgram, team_program
 from airground_drake.gatekeeper.half_planes import normals_along
-from airground_drake.gatekeeper.problem import Decision, Problem
-from airground_drake.gatekeeper.program import TeamProgram, team_program
+from airground_drake.gatekeeper.problem import Problem
+from airground_drake.gatekeeper.routes.guard import guarded, unavoidable_cost
+from airground_drake.gatekeeper.solution import ConstantPlans, Solution, cheapest, cut_short
 
 _SCALE = 10.0
 """Cost of the cheaper constant plan in the program: Drake's absolute tolerance is then 0.1 % of it.
@@ -66,23 +68,14 @@ class BranchAndBoundRoute:
         Raises:
             ValueError: if `blocks` is not from 1 to 20.
         """
-        if not 1 <= blocks <= 20:
-            raise ValueError(f"blocks: {blocks}, allowed: 1 to 20")
-        self._blocks = blocks
+        self._blocks = check_blocks(blocks)
         self._licensed = licensed_solver()
 
-    def decide(self, problem: Problem, budget: Budget = Budget()) -> Decision:  # noqa: B008 (immutable)
-        """Accept or refuse: never raises for a hard or broken problem, but refuses and says why."""
-        if not problem.is_finite():
-            return Decision(False, "refused_not_finite")
-        if budget.spent():
-            return Decision(False, "refused_budget_spent")
-        constants = Constants.of(problem)
-        if not constants.are_finite():
-            return Decision(False, "refused_not_finite")
-        plans = [constants.accept, constants.refuse]
-        if budget.spent():
-            return cut_short(problem, plans, remaining_cost(problem))
+    def solve(self, problem: Problem, budget: Budget = Budget()) -> Solution:  # noqa: B008 (immutable)
+        """See `Route`."""
+        return guarded(problem, budget, self._solve)
+
+    def _solve(self, problem: Problem, constants: ConstantPlans, budget: Budget) -> Solution:
         normals = normals_along(problem, constants.better.positions)
         scale = max(problem.evaluate_half_planes(constants.better.positions, normals), 1e-9) / _SCALE
         blocks = self._blocks if self._licensed is None else None
@@ -93,13 +86,12 @@ class BranchAndBoundRoute:
             return constants.failed()
         if found is None:
             return constants.failed()
-        if found.binaries is not None:
-            if not np.isfinite(found.binaries).all() or not np.isfinite(found.bound):
-                return constants.failed()
-            plans.insert(0, problem.evaluate((team.ugvs[0].plan(found.binaries) > 0.5).astype(float)))
-        if not found.finished:
-            return cut_short(problem, plans, remaining_cost(problem))
-        return choose(problem, plans, lower_bound=max(0.0, scale * found.bound), normals=normals)
+        if found.binaries is None:
+            return cut_short(problem, constants.both, unavoidable_cost(problem))
+        if not np.isfinite(found.binaries).all() or not np.isfinite(found.bound):
+            return constants.failed()
+        plan = problem.evaluate((team.ugvs[0].plan(found.binaries) > 0.5).astype(float))
+        return cheapest(problem, (plan, *constants.both), lower_bound=max(0.0, scale * found.bound), normals=normals)
 
 
 def licensed_solver() -> Any:
@@ -112,11 +104,13 @@ def licensed_solver() -> Any:
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """What a search gave: binaries (B,) if it has a plan, a lower bound in the program's unit, if it finished."""
+    """What a search gave: binaries (B,), None if its nodes were spent; and a lower bound in the program's unit."""
 
     binaries: Array | None
     bound: float
-    finished: bool
+
+
+_SPENT = Found(None, -1.0)
 
 
 def _branch(team: TeamProgram, budget: Budget) -> Found | None:
@@ -128,12 +122,12 @@ def _branch(team: TeamProgram, budget: Budget) -> Found | None:
     search = MixedIntegerBranchAndBound(team.program, ClarabelSolver.id(), options)
     status = search.Solve()
     if status == SolutionResult.kIterationLimit:
-        return Found(None, -1.0, False)
+        return _SPENT
     if status != SolutionResult.kSolutionFound:
         return None
     optimum = float(search.GetOptimalCost())
     binaries = np.asarray(search.GetSolution(team.ugvs[0].omega), dtype=float)
-    return Found(binaries, optimum - _GAP * max(1.0, abs(optimum)), True)
+    return Found(binaries, optimum - _GAP * max(1.0, abs(optimum)))
 
 
 def _delegate(solver: Any, team: TeamProgram, budget: Budget) -> Found | None:
@@ -141,9 +135,9 @@ def _delegate(solver: Any, team: TeamProgram, budget: Budget) -> Found | None:
     result = solver.Solve(team.program, None, _limits(solver, budget))
     if not result.is_success():
         stopped = budget.spent() or result.get_solution_result() == SolutionResult.kIterationLimit
-        return Found(None, -1.0, False) if stopped else None
+        return _SPENT if stopped else None
     optimum = float(result.get_optimal_cost())
-    return Found(np.asarray(result.GetSolution(team.ugvs[0].omega), dtype=float), optimum - 1e-4 * abs(optimum), True)
+    return Found(np.asarray(result.GetSolution(team.ugvs[0].omega), dtype=float), optimum - 1e-4 * abs(optimum))
 
 
 def _limits(solver: Any, budget: Budget) -> SolverOptions:

@@ -9,12 +9,15 @@ from pydrake.solvers import ClarabelSolver, MathematicalProgramResult, SolutionR
 
 from airground_drake.arrays import Array
 from airground_drake.gatekeeper.budget import Budget
-from airground_drake.gatekeeper.candidates import Constants, choose, cut_short, remaining_cost
-from airground_drake.gatekeeper.half_planes import Outlook, multipliers_at, normals_along, outlook
-from airground_drake.gatekeeper.polish import EVERYWHERE, Polish
-from airground_drake.gatekeeper.problem import Decision, Problem
-from airground_drake.gatekeeper.program import Shape, TeamProgram, empty_program
+from airground_drake.gatekeeper.convex_program import Shape, TeamProgram, empty_program
+from airground_drake.gatekeeper.dual_bound import DualBound, dual_bound, multipliers_at
+from airground_drake.gatekeeper.half_planes import normals_along
+from airground_drake.gatekeeper.local_search import EVERYWHERE, LocalSearch
+from airground_drake.gatekeeper.problem import Problem
+from airground_drake.gatekeeper.reachable_box import remaining_cost
 from airground_drake.gatekeeper.rounding import sum_up_rounding
+from airground_drake.gatekeeper.routes.guard import guarded, without_optimum
+from airground_drake.gatekeeper.solution import ConstantPlans, Solution, cheapest
 
 _TOLERANCE = 1e-6
 
@@ -37,7 +40,7 @@ _NEAR = 0.005
 _GUIDED = ((128, EVERYWHERE, 0.02),)
 _BLIND = ((128, EVERYWHERE, math.inf),)
 _WIDE = ((2048, EVERYWHERE, 0.0), (512, 0.3, math.inf), (512, 0.1, 0.02))
-"""Searches, see `Polish.labels`: labels per stage, radius of the tube (m), relative slackness.
+"""Searches, see `LocalSearch.label_setting`: labels per stage, radius of the tube (m), relative slackness.
 
 Those of infinite slackness do without the outlook, for the sides of obstacles that the half-planes hide. All
 were chosen on recorded and random problems: see `benchmarks/gatekeeper.py` for how near the plans come to the best
@@ -46,18 +49,18 @@ known.
 
 
 class RelaxedRoute:
-    """Relax, solve, round, improve; every decision carries its optimality gap.
+    """Relax, solve, round, improve; every solution carries its optimality gap.
 
     The obstacle constraint (26d) is replaced by supporting half-planes n_k.(p_k - o) >= d - u_k with unit n_k.
     As ||p_k - o|| >= n_k.(p_k - o), they imply (26d) for any n_k: conservative, never optimistic. The n_k are
     taken along the better of the two constant plans. Taking them along the best plan found and solving again
     was tried: it costs half as much again and brought the plans no nearer to the best known.
 
-    The rounded plan is the start of a search with the exact distances (`Polish`), which the multipliers of the
+    The rounded plan is the start of a search with the exact distances (`LocalSearch`), which the multipliers of the
     relaxation guide: for the best plan that accepts first and for the best that refuses first. Wider searches
     follow where the gap is open or the two cost nearly the same. The cheaper plan is returned.
 
-    `lower_bound` is computed from the multipliers by weak duality (`outlook`), so that it is a bound whatever
+    `lower_bound` is computed from the multipliers by weak duality (`dual_bound`), so that it is a bound whatever
     the solver's tolerances, and also when its iterations ran out.
 
     Budget: iterations and the time left go to the solver, nodes to each search; the clock is asked in between, so
@@ -72,29 +75,21 @@ class RelaxedRoute:
         self._programs: dict[Shape, TeamProgram] = {}
         self._solver = ClarabelSolver()
 
-    def decide(self, problem: Problem, budget: Budget = Budget()) -> Decision:  # noqa: B008 (immutable)
-        """Accept or refuse: never raises for a hard or broken problem, but refuses and says why."""
-        if not problem.is_finite():
-            return Decision(False, "refused_not_finite")
-        if budget.spent():
-            return Decision(False, "refused_budget_spent")
-        constants = Constants.of(problem)
-        if not constants.are_finite():
-            return Decision(False, "refused_not_finite")
-        tail = remaining_cost(problem)
-        if budget.spent():
-            return cut_short(problem, (constants.accept, constants.refuse), tail)
+    def solve(self, problem: Problem, budget: Budget = Budget()) -> Solution:  # noqa: B008 (immutable)
+        """See `Route`."""
+        return guarded(problem, budget, self._solve)
+
+    def _solve(self, problem: Problem, constants: ConstantPlans, budget: Budget) -> Solution:
         normals = normals_along(problem, constants.better.positions)
-        relaxed, ahead, finished = self._solve(problem, normals, constants.better.objective, budget)
+        relaxed, ahead, finished = self._relax(problem, normals, constants.better.objective, budget)
         if relaxed is None or ahead is None:
-            plans = (constants.accept, constants.refuse)
-            return cut_short(problem, plans, tail) if budget.spent() else constants.failed()
-        rounded = sum_up_rounding(relaxed)
-        polish = Polish(problem, constants, tail, budget, ahead)
-        polish.offer_both(rounded)
-        finished = _improve(polish, ahead, budget) and finished
-        refuse, accept = polish.plans
-        return choose(
+            return without_optimum(problem, constants, budget)
+        rounded, tail = sum_up_rounding(relaxed), remaining_cost(problem)
+        search = LocalSearch(problem, constants, tail, budget, ahead)
+        search.offer_both(rounded)
+        finished = _improve(search, ahead, budget) and finished
+        refuse, accept = search.plans
+        return cheapest(
             problem,
             (accept, refuse),
             status="optimal" if finished else "budget_spent",
@@ -104,9 +99,9 @@ class RelaxedRoute:
             rounded=rounded,
         )
 
-    def _solve(
+    def _relax(
         self, problem: Problem, normals: Array, cost: float, budget: Budget
-    ) -> tuple[Array | None, Outlook | None, bool]:
+    ) -> tuple[Array | None, DualBound | None, bool]:
         """Omega (N,), the bounds that follow, and whether it is an optimum; None where the solver failed."""
         scale = _scale(cost)
         shape = Shape.of(problem, scale=scale)
@@ -122,11 +117,11 @@ class RelaxedRoute:
         if not usable or not (finished or _stopped(result, budget)):
             del self._programs[shape]  # a fresh workspace after a failure
             return None, None, False
-        ahead = outlook(problem, normals, omega, multipliers_at(problem, normals, problem.positions(omega)))
+        ahead = dual_bound(problem, normals, omega, multipliers_at(problem, normals, problem.positions(omega)))
         if ahead.bound < (1.0 - 2.0 * _TOLERANCE) * scale * result.get_optimal_cost() and rows.any():
             multipliers = np.zeros(rows.shape)
             multipliers[rows] = scale * result.GetDualSolution(ugv.avoidance)
-            with_ties = outlook(problem, normals, omega, multipliers)
+            with_ties = dual_bound(problem, normals, omega, multipliers)
             if with_ties.bound > ahead.bound:
                 ahead = with_ties
         return omega, ahead, finished
@@ -137,7 +132,7 @@ def _stopped(result: MathematicalProgramResult, budget: Budget) -> bool:
     return budget.spent() or result.get_solution_result() == SolutionResult.kIterationLimit
 
 
-def _improve(polish: Polish, ahead: Outlook, budget: Budget) -> bool:
+def _improve(search: LocalSearch, ahead: DualBound, budget: Budget) -> bool:
     """Search for cheaper plans until the gap is closed; whether the budget lasted for that.
 
     Where a half-plane has a multiplier, the bound is one of the half-planes' problem only, and a plan on the other
@@ -147,17 +142,17 @@ def _improve(polish: Polish, ahead: Outlook, budget: Budget) -> bool:
         for width, radius, slackness in searches:
             if budget.spent():
                 return False
-            polish.labels(width, radius, slackness)
+            search.label_setting(width, radius, slackness)
         if budget.spent():
             return False
         if reach:
-            polish.exchanges(reach)
-        best = polish.best.objective
-        apart = abs(polish.plans[0].objective - polish.plans[1].objective)
+            search.exchanges(reach)
+        best = search.best.objective
+        apart = abs(search.plans[0].objective - search.plans[1].objective)
         closed = (1.0 - _SETTLED) * best <= ahead.bound <= (1.0 + 1e-9) * best
         if closed and apart >= _NEAR * best and (trusts_half_planes or not ahead.pressed):
             break
-    return polish.complete
+    return search.complete
 
 
 def _scale(cost: float) -> float:

@@ -9,17 +9,20 @@ import numpy.typing as npt
 from numba import njit
 
 from airground_drake.arrays import Array
+from airground_drake.gatekeeper.blocks import block_of_stage, block_starts, check_blocks
 from airground_drake.gatekeeper.budget import Budget
-from airground_drake.gatekeeper.candidates import block_of_stage
-from airground_drake.gatekeeper.closed_loop import ACCEPTED, REFUSED, ClosedLoop, velocity_of, workspace
-from airground_drake.gatekeeper.enumeration import EnumerationRoute
-from airground_drake.gatekeeper.problem import Decision, Evaluation, Problem
+from airground_drake.gatekeeper.closed_loop import ClosedLoop, velocity_of, workspace
+from airground_drake.gatekeeper.cost import Terms, stage_cost
+from airground_drake.gatekeeper.problem import Problem
+from airground_drake.gatekeeper.routes.enumeration import EnumerationRoute
+from airground_drake.gatekeeper.routes.guard import guarded
+from airground_drake.gatekeeper.solution import ConstantPlans, Solution, cheapest, relative_gap
 
 _CHUNK = 64
 """Blocks rolled out between two looks at the clock; it takes them about 0.1 ms if they have six stages."""
 
 
-class RolloutRoute:
+class ClosedLoopEnumerationRoute:
     """Exact minimum of (25) over the plans that are constant on blocks of N / `blocks` stages.
 
     Not with the mode velocities of (23), which hold along the two constant plans only: every plan is rolled out on
@@ -45,76 +48,38 @@ class RolloutRoute:
         Raises:
             ValueError: if `blocks` is not from 1 to 20.
         """
-        if not 1 <= blocks <= 20:
-            raise ValueError(f"blocks: {blocks}, allowed: 1 to 20")
-        self._blocks = blocks
+        self._blocks = check_blocks(blocks)
         self._by_velocities = EnumerationRoute(blocks)
-        self.decide(_smallest())
+        self.solve(_smallest())
 
-    def decide(self, problem: Problem, budget: Budget = Budget()) -> Decision:  # noqa: B008 (immutable)
-        """Accept or refuse; a tie accepts. Never raises for a broken problem, but refuses and says why."""
+    def solve(self, problem: Problem, budget: Budget = Budget()) -> Solution:  # noqa: B008 (immutable)
+        """See `Route`; a tie accepts."""
         if problem.loop is None:
-            return self._by_velocities.decide(problem, budget)
-        if not problem.is_finite():
-            return Decision(False, "refused_not_finite")
-        if budget.spent():
-            return Decision(False, "refused_budget_spent")
-        best = [evaluate(problem, np.full(problem.stages, float(mode))) for mode in (REFUSED, ACCEPTED)]
-        if not all(np.isfinite(plan.objective) for plan in best):  # finite data overflow in the cost
-            return Decision(False, "refused_not_finite")
+            return self._by_velocities.solve(problem, budget)
+        return guarded(problem, budget, self._solve, closed_loop=True)
+
+    def _solve(self, problem: Problem, constants: ConstantPlans, budget: Budget) -> Solution:
         block = block_of_stage(problem.stages, self._blocks)
-        halves = [_Half(problem, problem.loop, block, mode, best[mode].objective) for mode in (REFUSED, ACCEPTED)]
+        halves = [_Half(problem, block, int(plan.omega[0]), plan.objective) for plan in constants.both[::-1]]
         nodes = budget.nodes
-        while nodes > 0 and any(half.open for half in halves) and not budget.spent():
+        while True:
             for half in halves:
                 nodes -= half.search(min(_CHUNK, nodes))
+            if nodes <= 0 or not any(half.open for half in halves) or budget.spent():
+                break
         refuse, accept = (
-            min(plan, evaluate(problem, half.plan[block]), key=lambda found: found.objective)
-            for plan, half in zip(best, halves, strict=True)
+            min(known, problem.evaluate_closed_loop(half.plan[block]), key=lambda plan: plan.objective)
+            for known, half in zip(constants.both[::-1], halves, strict=True)
         )
-        chosen = accept if accept.objective <= refuse.objective else refuse
-        bound = min(chosen.objective, *(half.bound() for half in halves))
-        return Decision(
-            accept=chosen is accept,
+        best = min(refuse.objective, accept.objective)
+        bound = min(best, *(half.bound() for half in halves))
+        return cheapest(
+            problem,
+            (accept, refuse),
             status="budget_spent" if any(half.open for half in halves) else "optimal",
-            objective=chosen.objective,
             lower_bound=bound,
-            gap=(chosen.objective - bound) / max(chosen.objective, 1e-12),
-            objective_accept=accept.objective,
-            objective_refuse=refuse.objective,
-            clearance=min(chosen.clearance, 1e9),
-            plan=chosen.omega,
-            positions=chosen.positions,
+            gap=relative_gap(best, bound),
         )
-
-
-def evaluate(problem: Problem, omega: Array) -> Evaluation:
-    """Cost (25) of a plan, (N,) of 0 and 1, with the exact distances of (26d), on the closed loop.
-
-    Raises:
-        ValueError: if the problem has no closed loop, or the plan is not one of its plans.
-    """
-    if problem.loop is None:
-        raise ValueError("a problem that is given by mode velocities has no closed loop")
-    positions = problem.loop.positions(omega)
-    objective, clearance = _evaluate(_Cost.of(problem), positions)
-    return Evaluation(omega, positions, objective, clearance)
-
-
-class _Cost(NamedTuple):
-    """What (25) is made of, see `Problem`."""
-
-    dt: float
-    reference: Array
-    centres: Array
-    distances: Array
-    error_weight: float
-    slack_weight: float
-
-    @classmethod
-    def of(cls, problem: Problem) -> _Cost:
-        weights = float(problem.error_weight), float(problem.slack_weight)
-        return cls(float(problem.dt), problem.reference, problem.centres, problem.distances, *weights)
 
 
 class _Tree(NamedTuple):
@@ -144,14 +109,13 @@ class _Tree(NamedTuple):
 class _Half:
     """The plans whose first block has one of the modes; `known` is the cost of the constant one."""
 
-    def __init__(
-        self, problem: Problem, loop: ClosedLoop, block: npt.NDArray[np.int64], first: int, known: float
-    ) -> None:
-        blocks = int(block[-1]) + 1
-        starts = np.searchsorted(block, np.arange(blocks + 1)).astype(np.int64)
-        self._loop, self._cost = loop, _Cost.of(problem)
+    def __init__(self, problem: Problem, block: npt.NDArray[np.int64], first: int, known: float) -> None:
+        starts = block_starts(block)
+        blocks = len(starts) - 1
+        self._loop: ClosedLoop = problem.loop  # type: ignore[assignment]  # the route sees to that
+        self._terms = problem.terms
         mode, tried = np.full(blocks, first, dtype=np.int64), np.zeros(blocks, dtype=np.int64)
-        at, cost = np.tile(loop.start, (blocks, 1)), np.zeros(blocks)
+        at, cost = np.tile(self._loop.start, (blocks, 1)), np.zeros(blocks)
         self._tree = _Tree(starts, np.zeros(1, dtype=np.int64), np.array([known]), mode.copy(), at, cost, mode, tried)
 
     @property
@@ -166,17 +130,17 @@ class _Half:
 
     def search(self, nodes: int) -> int:
         """Visit that many blocks at most; how many it were."""
-        return int(_search(self._loop, self._cost, self._tree, nodes))
+        return int(_search(self._loop, self._terms, self._tree, nodes))
 
     def bound(self) -> float:
-        """Lower bound of the cost of all plans of this half: the best known, and every branch left open."""
+        """Lower bound of the cost of all plans of this half that were neither visited nor cut; inf without any."""
         tree = self._tree
         reached = range(tree.depth[0] + 1)
-        return float(min([tree.known[0], *(tree.cost[b] for b in reached if tree.tried[b] < _modes(b))]))
+        return min((float(tree.cost[b]) for b in reached if tree.tried[b] < _modes(b)), default=np.inf)
 
 
 @njit(cache=True)
-def _search(loop: ClosedLoop, cost: _Cost, tree: _Tree, nodes: int) -> int:
+def _search(loop: ClosedLoop, terms: Terms, tree: _Tree, nodes: int) -> int:
     """Go on with the search for that many nodes (blocks rolled out) at most; how many it were."""
     blocks = len(tree.mode)
     position, work = np.empty(3), workspace(loop)
@@ -195,7 +159,7 @@ def _search(loop: ClosedLoop, cost: _Cost, tree: _Tree, nodes: int) -> int:
                 velocity = velocity_of(loop, tree.mode[b], k, position, work)
                 for a in range(3):
                     position[a] += loop.period * velocity[a]
-            total += _stage_cost(cost, stage, position, _clearance(cost, stage, position))
+            total += stage_cost(terms, stage, position[0], position[1], position[2])
             if total >= tree.known[0]:
                 break
         if total < tree.known[0]:
@@ -217,38 +181,6 @@ def _search(loop: ClosedLoop, cost: _Cost, tree: _Tree, nodes: int) -> int:
 def _modes(block: int) -> int:
     """How many modes a block may have: the first one has that of its half."""
     return 1 if block == 0 else 2
-
-
-@njit(cache=True)
-def _evaluate(cost: _Cost, positions: Array) -> tuple[float, float]:
-    """Cost (25) and least clearance, m, through positions (N, 3), m."""
-    total, least = 0.0, np.inf
-    for stage in range(len(positions)):
-        clearance = _clearance(cost, stage, positions[stage])
-        total += _stage_cost(cost, stage, positions[stage], clearance)
-        least = min(least, clearance)
-    return total, least
-
-
-@njit(cache=True)
-def _clearance(cost: _Cost, stage: int, position: Array) -> float:
-    """Least distance minus safe distance at the end of a stage, m; inf without points."""
-    least = np.inf
-    for m in range(len(cost.distances)):
-        squared = 0.0
-        for a in range(3):
-            squared += (position[a] - cost.centres[stage, m, a]) ** 2
-        least = min(least, np.sqrt(squared) - cost.distances[m])
-    return least
-
-
-@njit(cache=True)
-def _stage_cost(cost: _Cost, stage: int, position: Array, clearance: float) -> float:
-    """What a stage adds to (25); the slack is the negative part of the clearance."""
-    slack, error = max(0.0, -clearance), 0.0
-    for a in range(3):
-        error += (cost.reference[stage, a] - position[a]) ** 2
-    return cost.dt * (cost.error_weight * error + cost.slack_weight * slack * slack)
 
 
 def _smallest() -> Problem:

@@ -13,9 +13,10 @@ from pydrake.solvers import MathematicalProgram
 from scipy.sparse import csc_matrix
 
 from airground_drake.arrays import Array
-from airground_drake.gatekeeper.candidates import block_of_stage
-from airground_drake.gatekeeper.half_planes import offsets, reachable
+from airground_drake.gatekeeper.blocks import block_of_stage
+from airground_drake.gatekeeper.half_planes import offsets
 from airground_drake.gatekeeper.problem import Problem
+from airground_drake.gatekeeper.reachable_box import within_reach
 
 AXES = 2  # UGVs move in their plane
 
@@ -112,7 +113,7 @@ class UgvProgram:
         drift[1:] += problem.reference[:-1]
         matrix = csc_matrix((self._data, self._indices, self._indptr), shape=(size, self._width))
         self._dynamics.evaluator().UpdateCoefficients(matrix, drift[:, :AXES].ravel())
-        within = reachable(problem)
+        within = within_reach(problem)
         data, indices, indptr = _rows(within, normals)
         lower = offsets(problem, normals)[within]
         if len(lower) == 0:

@@ -7,10 +7,13 @@ import numpy.typing as npt
 from numba import njit
 
 from airground_drake.arrays import Array
+from airground_drake.gatekeeper.blocks import block_of_stage, block_starts, check_blocks
 from airground_drake.gatekeeper.budget import Budget
-from airground_drake.gatekeeper.candidates import Constants, block_of_stage, choose, cut_short, remaining_cost
-from airground_drake.gatekeeper.polish import stage_cost
-from airground_drake.gatekeeper.problem import Decision, Evaluation, Problem
+from airground_drake.gatekeeper.cost import Terms, stage_cost
+from airground_drake.gatekeeper.problem import Kinematics, Problem
+from airground_drake.gatekeeper.reachable_box import remaining_cost
+from airground_drake.gatekeeper.routes.guard import guarded
+from airground_drake.gatekeeper.solution import ConstantPlans, Solution, cheapest, cut_short
 
 
 class EnumerationRoute:
@@ -35,83 +38,62 @@ class EnumerationRoute:
         Raises:
             ValueError: if `blocks` is not from 1 to 20.
         """
-        if not 1 <= blocks <= 20:
-            raise ValueError(f"blocks: {blocks}, allowed: 1 to 20")
-        self._blocks = blocks
+        self._blocks = check_blocks(blocks)
         none = np.zeros((1, 0, 3))
         row = np.zeros((1, 3))
-        self.decide(Problem(1.0, np.zeros(3), row, row, row, none, np.zeros(0), 1.0, 1.0))
+        self.solve(Problem(1.0, np.zeros(3), row, row, row, none, np.zeros(0), 1.0, 1.0))
 
-    def decide(self, problem: Problem, budget: Budget = Budget()) -> Decision:  # noqa: B008 (immutable)
-        """Accept or refuse; a tie accepts. Never raises for a broken problem, but refuses and says why."""
-        if not problem.is_finite():
-            return Decision(False, "refused_not_finite")
-        if budget.spent():
-            return Decision(False, "refused_budget_spent")
-        constants = Constants.of(problem)
-        if not constants.are_finite():
-            return Decision(False, "refused_not_finite")
+    def solve(self, problem: Problem, budget: Budget = Budget()) -> Solution:  # noqa: B008 (immutable)
+        """See `Route`; a tie accepts."""
+        return guarded(problem, budget, self._solve)
+
+    def _solve(self, problem: Problem, constants: ConstantPlans, budget: Budget) -> Solution:
         block = block_of_stage(problem.stages, self._blocks)
-        starts = np.searchsorted(block, np.arange(block[-1] + 2)).astype(np.int64)
-        modes = np.stack([problem.refuse, problem.accept])
         tail = remaining_cost(problem)
-        plans: list[Evaluation] = [constants.refuse, constants.accept]
+        plans = [constants.refuse, constants.accept]
         bounds, finished = [float(tail[0])] * 2, True
-        for first, plan in enumerate(tuple(plans)):
-            if budget.spent():
-                return cut_short(problem, plans[::-1], tail, bound=min(bounds))
-            chosen, bound = _search(
-                first, plan.objective, budget.nodes, starts, problem.dt, problem.initial, modes, problem.reference,
-                problem.centres, problem.distances, problem.error_weight, problem.slack_weight, tail,
-            )  # fmt: skip
-            found = problem.evaluate(chosen[block])
-            plans[first] = found if found.objective <= plan.objective else plan
+        for first, known in enumerate(constants.both[::-1]):
+            if first and budget.spent():
+                return cut_short(problem, plans[::-1], max(float(tail[0]), min(bounds)))
+            modes, bound = _search(
+                problem.kinematics, problem.terms, block_starts(block), tail, first, known.objective, budget.nodes
+            )
+            found = problem.evaluate(modes[block])
+            plans[first] = found if found.objective <= known.objective else known
             bounds[first] = min(bound, plans[first].objective)
             finished = finished and bound == np.inf
         if not finished:
-            return cut_short(problem, plans[::-1], tail, bound=min(bounds))
-        return choose(problem, plans[::-1], lower_bound=min(bounds), gap=0.0)
+            return cut_short(problem, plans[::-1], max(float(tail[0]), min(bounds)))
+        return cheapest(problem, plans[::-1], lower_bound=min(bounds), gap=0.0)
 
 
 @njit(cache=True)
 def _search(
+    motion: Kinematics,
+    terms: Terms,
+    starts: npt.NDArray[np.int64],
+    tail: Array,
     first: int,
     known: float,
     nodes: int,
-    starts: npt.NDArray[np.int64],
-    dt: float,
-    initial: Array,
-    modes: Array,
-    reference: Array,
-    centres: Array,
-    distances: Array,
-    error_weight: float,
-    slack_weight: float,
-    tail: Array,
 ) -> tuple[Array, float]:
     """Modes (B,) of the cheapest plan whose first block has mode `first`; constant if none is below `known`.
 
     With them a lower bound of all plans that were not visited; inf if the search finished.
 
     Args:
+        motion: (23).
+        terms: (25).
+        starts: first stage of each block and N, (B + 1,).
+        tail: lower bound of the cost from stage k on, (N + 1,).
         first: 0 or 1.
         known: cost of the constant plan.
         nodes: most blocks to visit.
-        starts: first stage of each block and N, (B + 1,).
-        dt: s.
-        initial: (3,), m.
-        modes: velocities of the modes, (2, N, 3), m/s.
-        reference: (N, 3), m.
-        centres: (N, m, 3), m.
-        distances: (m,), m.
-        error_weight: a of (25).
-        slack_weight: b of (25).
-        tail: lower bound of the cost from stage k on, (N + 1,).
     """
     depth = len(starts) - 1
     best = np.full(depth, float(first))
     at = np.empty((depth + 1, 3))
-    at[0] = initial
+    at[0] = motion.initial
     cost = np.zeros(depth + 1)
     mode = np.zeros(depth, dtype=np.int64)
     tried = np.zeros(depth, dtype=np.int64)
@@ -135,10 +117,10 @@ def _search(
         total, limit = cost[b], known - tail[starts[b + 1]]
         x, y, z = at[b, 0], at[b, 1], at[b, 2]
         for k in range(starts[b], starts[b + 1]):
-            x += dt * modes[mode[b], k, 0]
-            y += dt * modes[mode[b], k, 1]
-            z += dt * modes[mode[b], k, 2]
-            total += dt * stage_cost(x, y, z, k, reference, centres, distances, error_weight, slack_weight)
+            x += motion.dt * motion.velocities[mode[b], k, 0]
+            y += motion.dt * motion.velocities[mode[b], k, 1]
+            z += motion.dt * motion.velocities[mode[b], k, 2]
+            total += stage_cost(terms, k, x, y, z)
             if total >= limit:
                 break
         if total >= limit:

@@ -1,0 +1,94 @@
+"""Cost (25) of one UGV with the soft constraint (26d)-(26e): the one place where its form is written.
+
+Everything that evaluates a plan, a stage or a branch of a search does so by `add_stage`. What reasons about (25)
+without evaluating it stands on the same form, and changes with it: the quadratic costs of `convex_program` and
+`routes.nonlinear`, weak duality in `dual_bound`, and the task error that cannot be avoided in `reachable_box`.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from airground_drake.arrays import Array
+
+
+class Terms(NamedTuple):
+    """The data of (25)-(26e) over N stages with m points; numba takes it as one argument.
+
+    Attributes:
+        dt: length of a stage, s.
+        reference: preset trajectory at the ends of the stages, (N, 3), m.
+        centres: points to keep away from at the ends of the stages, (N, m, 3), m.
+        distances: safe distances d of (26d), (m,), m.
+        error_weight: a_i of (25), 1/(m^2 s).
+        slack_weight: b_i of (25), 1/(m^2 s).
+    """
+
+    dt: float
+    reference: Array
+    centres: Array
+    distances: Array
+    error_weight: float
+    slack_weight: float
+
+
+@njit(cache=True)
+def add_stage(total: float, terms: Terms, k: int, x: float, y: float, z: float, slack: float) -> float:
+    """`total` plus the integrand of (25), 1/s, at the end of stage k in (x, y, z), m, with slack u of (26e), m."""
+    total += terms.slack_weight * slack * slack
+    total += terms.error_weight * (terms.reference[k, 0] - x) ** 2
+    total += terms.error_weight * (terms.reference[k, 1] - y) ** 2
+    total += terms.error_weight * (terms.reference[k, 2] - z) ** 2
+    return total
+
+
+@njit(cache=True)
+def stage_cost(terms: Terms, k: int, x: float, y: float, z: float) -> float:
+    """What stage k adds to (25) if it ends in (x, y, z), m; roots are drawn only within a safe distance."""
+    slack = 0.0
+    for m in range(len(terms.distances)):
+        squared = _squared_distance(terms, k, m, x, y, z)
+        if squared < terms.distances[m] ** 2:
+            slack = max(slack, terms.distances[m] - np.sqrt(squared))
+    return terms.dt * add_stage(0.0, terms, k, x, y, z, slack)
+
+
+@njit(cache=True)
+def plan_cost(terms: Terms, positions: Array) -> tuple[float, float]:
+    """(25) by the right-hand rectangle rule through positions (N, 3), m, and the least distance minus d, m.
+
+    The latter is inf without points.
+    """
+    total, least = 0.0, np.inf
+    for k in range(len(positions)):
+        x, y, z = positions[k, 0], positions[k, 1], positions[k, 2]
+        clearance = np.inf
+        for m in range(len(terms.distances)):
+            clearance = min(clearance, np.sqrt(_squared_distance(terms, k, m, x, y, z)) - terms.distances[m])
+        total = add_stage(total, terms, k, x, y, z, max(0.0, -clearance))
+        least = min(least, clearance)
+    return terms.dt * total, least
+
+
+@njit(cache=True)
+def half_plane_cost(terms: Terms, positions: Array, normals: Array) -> float:
+    """(25) as `plan_cost`, with distances measured along unit normals (N, m, 3): never less than with the true ones."""
+    total = 0.0
+    for k in range(len(positions)):
+        clearance = np.inf
+        for m in range(len(terms.distances)):
+            reach = 0.0
+            for a in range(3):
+                reach += normals[k, m, a] * (positions[k, a] - terms.centres[k, m, a])
+            clearance = min(clearance, reach - terms.distances[m])
+        total = add_stage(total, terms, k, positions[k, 0], positions[k, 1], positions[k, 2], max(0.0, -clearance))
+    return terms.dt * total
+
+
+@njit(cache=True)
+def _squared_distance(terms: Terms, k: int, m: int, x: float, y: float, z: float) -> float:
+    c = terms.centres
+    return (x - c[k, m, 0]) ** 2 + (y - c[k, m, 1]) ** 2 + (z - c[k, m, 2]) ** 2

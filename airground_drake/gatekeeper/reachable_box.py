@@ -1,0 +1,66 @@
+"""The box that every plan stays in, per stage and axis, and what follows: idle half-planes, unavoidable cost.
+
+At the end of a stage any plan, relaxed or not, is between the running sums of the smaller and of the larger mode
+velocity.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from airground_drake.arrays import Array
+from airground_drake.gatekeeper.cost import Terms
+from airground_drake.gatekeeper.problem import Kinematics, Problem
+
+
+def within_reach(problem: Problem) -> npt.NDArray[np.bool_]:
+    """(N, m): False where no relaxed plan can come within the safe distance, so that the row cannot bind."""
+    within: npt.NDArray[np.bool_] = _within_reach(problem.kinematics, problem.terms)
+    return within
+
+
+def remaining_cost(problem: Problem) -> Array:
+    """Lower bound of (25) over the stages from k on, for k = 0..N, (N + 1,): task error from the box."""
+    tail: Array = _remaining_cost(problem.kinematics, problem.terms)
+    return tail
+
+
+@njit(cache=True)
+def _grow(motion: Kinematics, k: int, low: Array, high: Array) -> None:
+    """From the box (low, high), (3,) each, m, at the beginning of stage k to that at its end, in place."""
+    for a in range(3):
+        low[a] += motion.dt * min(motion.velocities[1, k, a], motion.velocities[0, k, a])
+        high[a] += motion.dt * max(motion.velocities[1, k, a], motion.velocities[0, k, a])
+
+
+@njit(cache=True)
+def _within_reach(motion: Kinematics, terms: Terms) -> npt.NDArray[np.bool_]:
+    stages, points = len(terms.reference), len(terms.distances)
+    within = np.zeros((stages, points), dtype=np.bool_)
+    low, high = motion.initial.copy(), motion.initial.copy()
+    for k in range(stages):
+        _grow(motion, k, low, high)
+        for m in range(points):
+            squared = 0.0
+            for a in range(3):
+                squared += max(0.0, low[a] - terms.centres[k, m, a], terms.centres[k, m, a] - high[a]) ** 2
+            within[k, m] = squared < terms.distances[m] ** 2
+    return within
+
+
+@njit(cache=True)
+def _remaining_cost(motion: Kinematics, terms: Terms) -> Array:
+    stages = len(terms.reference)
+    tail = np.zeros(stages + 1)
+    low, high = motion.initial.copy(), motion.initial.copy()
+    for k in range(stages):
+        _grow(motion, k, low, high)
+        squared = 0.0
+        for a in range(3):
+            squared += max(0.0, low[a] - terms.reference[k, a], terms.reference[k, a] - high[a]) ** 2
+        tail[k] = terms.dt * terms.error_weight * squared
+    for k in range(stages - 1, -1, -1):
+        tail[k] += tail[k + 1]
+    return (1.0 - 1e-9) * tail  # the last digits of the running sums must not cut an optimum

@@ -1,0 +1,1 @@
+"""Ways to solve (26), one file per route."""

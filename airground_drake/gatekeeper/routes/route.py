@@ -1,0 +1,35 @@
+"""What a solution route is: the contract for those here and for any from elsewhere."""
+
+from __future__ import annotations
+
+from typing import Protocol, runtime_checkable
+
+from airground_drake.gatekeeper.budget import Budget
+from airground_drake.gatekeeper.problem import Problem
+from airground_drake.gatekeeper.solution import Solution
+
+
+@runtime_checkable
+class Route(Protocol):
+    """A way to solve (26): any object with this method, whose class can be constructed without arguments.
+
+    A gatekeeper keeps one object for all its UGVs and samples, so that a route may keep programs or workspaces
+    between calls. What it owes:
+
+    - It never raises, whatever the problem. Without a plan it returns a `Solution` whose status says why
+      ('refused_...') and whose `accept_first` is False. `guard.guarded` does this for data that are not finite,
+      for costs that overflow, and for a budget that is already spent.
+    - It keeps the budget: the counts, and the deadline but for one step of its own. At the end of the budget it
+      returns the best plan known, with status 'budget_spent'. Counts alone give the same solution on every machine
+      and at every call.
+    - `plan` is binary, `positions` is where it leads, `objective` its cost (25), both by `Problem.evaluate` or
+      by `Problem.evaluate_closed_loop`; no constant plan is cheaper.
+    - `objective_accept` and `objective_refuse` are costs of plans as well; `objective` is the lower of the two, and
+      `accept_first` says whose.
+    - `lower_bound`, `gap`: a valid bound of what `Solution` says that it bounds, or -1. Never a guess: the
+      verifier computes it again.
+    - `relaxed`, `rounded`: both or none, `rounded` by `rounding.sum_up_rounding`.
+    """
+
+    def solve(self, problem: Problem, budget: Budget, /) -> Solution:
+        """Solve (26) for one UGV within the budget; never raises."""

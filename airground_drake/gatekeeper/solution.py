@@ -1,0 +1,176 @@
+"""What a route returns: the plan that it found for problem (26), and the evidence."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from airground_drake.arrays import Array
+from airground_drake.gatekeeper.problem import Evaluation, Problem
+from airground_drake.gatekeeper.rounding import rounding_deviation
+
+Status = Literal["optimal", "budget_spent", "refused_budget_spent", "refused_solver_failed", "refused_not_finite"]
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """A solution of (26), with its evidence. Numbers that do not apply are -1, arrays None.
+
+    Attributes:
+        accept_first: the first stage of the plan; False without one.
+        status: 'optimal': the route did all that it does; 'budget_spent': the best plan known when the budget
+            was spent, with its gap; else why there is none, so that the proposal is refused.
+        objective: cost (25) of the plan returned.
+        lower_bound: of the problem that the route solves: relaxed or branched, for the same supporting
+            half-planes; enumerated, for the same dwell. A local optimum has none.
+        gap: (objective - lower_bound) / objective, the objective being that of the same problem.
+        objective_accept: lowest cost found of a plan that starts by accepting.
+        objective_refuse: lowest cost found of a plan that starts by refusing.
+        relaxed_first_stage: omega_0 of the relaxation.
+        rounding_deviation: largest integrated difference of sum-up rounding, s.
+        clearance: smallest predicted distance minus d of the plan, m.
+        plan: omega of the plan returned, (N,), 0 or 1.
+        positions: where that leads, (N, 3), m.
+        relaxed: omega of the relaxation, (N,), in [0, 1].
+        rounded: `relaxed` after sum-up rounding, (N,), 0 or 1.
+        normals: of the half-planes that `lower_bound` and `gap` are about, (N, m, 3).
+    """
+
+    accept_first: bool
+    status: Status
+    objective: float = -1.0
+    lower_bound: float = -1.0
+    gap: float = -1.0
+    objective_accept: float = -1.0
+    objective_refuse: float = -1.0
+    relaxed_first_stage: float = -1.0
+    rounding_deviation: float = -1.0
+    clearance: float = -1.0
+    plan: Array | None = None
+    positions: Array | None = None
+    relaxed: Array | None = None
+    rounded: Array | None = None
+    normals: Array | None = None
+
+    @property
+    def has_plan(self) -> bool:
+        """Whether it rests on a plan, by its status."""
+        return self.status in ("optimal", "budget_spent")
+
+
+@dataclass(frozen=True, eq=False)
+class ConstantPlans:
+    """The two constant plans, evaluated: accept throughout, refuse throughout."""
+
+    accept: Evaluation
+    refuse: Evaluation
+
+    @classmethod
+    def of(cls, problem: Problem) -> ConstantPlans:
+        """Evaluate them by the mode velocities, which are exact for them up to rounding."""
+        stages = problem.stages
+        return cls(problem.evaluate(np.ones(stages)), problem.evaluate(np.zeros(stages)))
+
+    @classmethod
+    def of_closed_loop(cls, problem: Problem) -> ConstantPlans:
+        """Evaluate them on the closed loop."""
+        stages = problem.stages
+        return cls(problem.evaluate_closed_loop(np.ones(stages)), problem.evaluate_closed_loop(np.zeros(stages)))
+
+    @property
+    def both(self) -> tuple[Evaluation, Evaluation]:
+        """Accepting, refusing: in the order in which ties are broken."""
+        return self.accept, self.refuse
+
+    @property
+    def better(self) -> Evaluation:
+        """The cheaper of the two; refusing on a tie."""
+        return self.accept if self.accept.objective < self.refuse.objective else self.refuse
+
+    def are_finite(self) -> bool:
+        """False where finite data overflow in the cost."""
+        return bool(np.isfinite(self.accept.objective) and np.isfinite(self.refuse.objective))
+
+    def failed(self) -> Solution:
+        """No solution, because the solver gave no optimum; the costs of the constant plans are the evidence."""
+        accept, refuse = self.accept.objective, self.refuse.objective
+        return Solution(False, "refused_solver_failed", objective_accept=accept, objective_refuse=refuse)
+
+
+def cheapest(
+    problem: Problem,
+    plans: Sequence[Evaluation],
+    *,
+    status: Status = "optimal",
+    lower_bound: float = -1.0,
+    gap: float = -1.0,
+    normals: Array | None = None,
+    relaxed: Array | None = None,
+    rounded: Array | None = None,
+) -> Solution:
+    """The cheapest of some evaluated plans, among them both constant ones; the first on a tie.
+
+    Args:
+        problem: what they are plans of.
+        plans: at least one that starts by accepting and one that starts by refusing.
+        status: 'optimal' or 'budget_spent'.
+        lower_bound: of the cost (25), with distances measured along `normals` if there are any.
+        gap: of the plans to that bound; with `normals` it is computed.
+        normals: of half-planes, (N, m, 3).
+        relaxed: omega of the relaxation, (N,), if it was solved.
+        rounded: the same after sum-up rounding, (N,).
+    """
+    best = min(plans, key=lambda plan: plan.objective)
+    if normals is not None:
+        convexified = min(problem.evaluate_half_planes(plan.positions, normals) for plan in plans)
+        gap = relative_gap(convexified, lower_bound)
+    return Solution(
+        accept_first=bool(best.omega[0] == 1.0),
+        status=status,
+        objective=best.objective,
+        lower_bound=lower_bound,
+        gap=gap,
+        relaxed_first_stage=-1.0 if relaxed is None else float(relaxed[0]),
+        rounding_deviation=(
+            -1.0 if relaxed is None or rounded is None else rounding_deviation(relaxed, rounded, problem.dt)
+        ),
+        clearance=min(best.clearance, 1e9),
+        objective_accept=min(plan.objective for plan in plans if plan.omega[0] == 1.0),
+        objective_refuse=min(plan.objective for plan in plans if plan.omega[0] == 0.0),
+        plan=best.omega,
+        positions=best.positions,
+        relaxed=relaxed,
+        rounded=rounded,
+        normals=normals,
+    )
+
+
+def cut_short(
+    problem: Problem,
+    plans: Sequence[Evaluation],
+    bound: float,
+    *,
+    relaxed: Array | None = None,
+    rounded: Array | None = None,
+) -> Solution:
+    """The solution when the budget is spent: the best plan so far, and a bound for which no solver is needed.
+
+    Args:
+        problem: what they are plans of.
+        plans: as for `cheapest`.
+        bound: lower bound of every plan.
+        relaxed: as for `cheapest`.
+        rounded: as for `cheapest`.
+    """
+    best = min(plan.objective for plan in plans)
+    bound = min(bound, best)
+    gap = relative_gap(best, bound)
+    return cheapest(problem, plans, status="budget_spent", lower_bound=bound, gap=gap, relaxed=relaxed, rounded=rounded)
+
+
+def relative_gap(objective: float, lower_bound: float) -> float:
+    """(objective - lower_bound) / objective; 0 / 0 is 0."""
+    return (objective - lower_bound) / max(objective, 1e-12)

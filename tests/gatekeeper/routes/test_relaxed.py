@@ -1,0 +1,110 @@
+"""The default route."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import cvxpy
+import numpy as np
+import pytest
+from builders_gatekeeper import case_a_proposal, random_problem
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from airground_drake.gatekeeper.half_planes import normals_along
+from airground_drake.gatekeeper.prediction import predicted_problem
+from airground_drake.gatekeeper.routes.relaxed import RelaxedRoute
+
+
+@settings(max_examples=15)
+@given(st.integers(0, 10**6))
+def test_relaxation_agrees_with_an_independent_model(seed: int) -> None:
+    """cvxpy builds (27) from the formulas, with the same half-planes; the optima agree."""
+    problem = random_problem(seed, 20)
+    accept, refuse = problem.evaluate(np.ones(20)), problem.evaluate(np.zeros(20))
+    guide = accept if accept.objective < refuse.objective else refuse
+    normals = normals_along(problem, guide.positions)
+    omega, u = cvxpy.Variable((20, 1)), cvxpy.Variable(20)
+    velocity = problem.refuse + cvxpy.multiply(omega, problem.accept - problem.refuse)
+    p = problem.initial[None] + problem.dt * cvxpy.cumsum(velocity, axis=0)
+    constraints = [omega >= 0, omega <= 1, u >= 0]
+    for m in range(2):
+        reach = cvxpy.sum(cvxpy.multiply(normals[:, m], p - problem.centres[:, m]), axis=1)
+        constraints.append(reach >= problem.distances[m] - u)
+    cost = problem.dt * (cvxpy.sum_squares(problem.reference - p) + 200.0 * cvxpy.sum_squares(u))
+    best = cvxpy.Problem(cvxpy.Minimize(cost), constraints).solve(solver="CLARABEL")
+    solution = RelaxedRoute().solve(problem)
+    assert solution.status == "optimal"
+    assert solution.lower_bound == pytest.approx(best, rel=1e-5, abs=1e-6)
+
+
+@settings(max_examples=50)
+@given(st.integers(0, 10**6))
+def test_every_decision_carries_its_evidence(seed: int) -> None:
+    problem = random_problem(seed, 20)
+    solution = RelaxedRoute().solve(problem)
+    assert solution.objective == min(solution.objective_accept, solution.objective_refuse)
+    assert solution.accept_first == (solution.objective_accept <= solution.objective_refuse)
+    assert solution.gap >= -1e-6
+    assert solution.rounding_deviation <= problem.dt / 2 + 1e-9
+    constant = [problem.evaluate(np.full(20, w)).objective for w in (0.0, 1.0)]
+    assert solution.objective <= min(constant)
+
+
+def test_pruned_rows_do_not_change_the_optimum() -> None:
+    """A far obstacle that no plan can reach leaves every number of the solution as it was."""
+    problem = random_problem(3, 20)
+    far = np.concatenate([problem.centres, np.full((20, 1, 3), [50.0, 0.0, 0.0])], axis=1)
+    larger = replace(problem, centres=far, distances=np.append(problem.distances, 1.0))
+    solution, more = (RelaxedRoute().solve(p) for p in (problem, larger))
+    assert more.lower_bound == pytest.approx(solution.lower_bound, rel=1e-6)
+    assert more.accept_first == solution.accept_first
+
+
+def test_no_obstacle_at_all() -> None:
+    solution = RelaxedRoute().solve(random_problem(1, points=0))
+    assert solution.status == "optimal"
+    assert np.isfinite(solution.clearance)
+
+
+@pytest.mark.parametrize("field", ["accept", "refuse", "reference", "initial", "centres"])
+def test_numbers_that_are_not_finite_are_refused(field: str) -> None:
+    problem = random_problem(0)
+    broken = getattr(problem, field).copy()
+    broken.flat[1] = np.nan
+    solution = RelaxedRoute().solve(replace(problem, **{field: broken}))
+    assert not solution.accept_first
+    assert solution.status == "refused_not_finite"
+
+
+def test_a_failing_solver_refuses(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Failed:
+        def is_success(self) -> bool:
+            return False
+
+        def GetSolution(self, variables: np.ndarray) -> np.ndarray:
+            return np.full(len(variables), np.nan)
+
+        def get_optimal_cost(self) -> float:
+            return float("inf")
+
+    class Solver:
+        def Solve(self, *arguments: object) -> Failed:
+            return Failed()
+
+    route = RelaxedRoute()
+    monkeypatch.setattr(route, "_solver", Solver())
+    solution = route.solve(random_problem(0))
+    assert not solution.accept_first
+    assert solution.status == "refused_solver_failed"
+    assert RelaxedRoute().solve(random_problem(0)).status == "optimal"
+
+
+def test_the_detour_of_case_a_is_accepted() -> None:
+    scene, law, proposal, horizon = case_a_proposal()
+    for on_top in (True, False):
+        solution = RelaxedRoute().solve(
+            predicted_problem(scene, replace(law, intervention_on_top=on_top), proposal, horizon)
+        )
+        assert solution.accept_first
+        assert solution.objective_accept < 0.85 * solution.objective_refuse  # to wait one block and then accept

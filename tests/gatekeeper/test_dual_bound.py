@@ -1,0 +1,72 @@
+"""Weak duality: bounds for any multipliers, tight at the optimum."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from builders_gatekeeper import PLANS, half_plane_cost, random_problem, rolled_out, used
+from hypothesis import given
+from hypothesis import strategies as st
+from pydrake.solvers import ClarabelSolver, SolverOptions
+
+from airground_drake.gatekeeper.convex_program import team_program
+from airground_drake.gatekeeper.dual_bound import dual_bound
+from airground_drake.gatekeeper.half_planes import normals_along
+from airground_drake.gatekeeper.problem import Problem
+
+
+def check_bounds(
+    problem: Problem, seed: int, at: np.ndarray, omega: np.ndarray, *, twist: float = 1.0, loaded: bool = True
+) -> None:
+    """ConstantPlans and slopes bound the cost to come, in half-planes, of any plan from any stage on."""
+    rng = np.random.default_rng(seed)
+    normals = normals_along(problem, problem.positions(rng.random(problem.stages)))
+    multipliers = rng.exponential(3.0, normals.shape[:2]) * (rng.random(normals.shape[:2]) < 0.3) * loaded
+    ahead = dual_bound(problem, normals, at, multipliers)
+    positions = problem.positions(omega)
+    stages = [
+        half_plane_cost(
+            replace(
+                problem, initial=positions[k - 1] if k else problem.initial, accept=problem.accept[k:],
+                refuse=problem.refuse[k:], reference=problem.reference[k:], centres=problem.centres[k:],
+            ), omega[k:], normals[k:],
+        )
+        for k in range(problem.stages)
+    ]  # fmt: skip
+    moved = positions[:-1] - ahead.at[:-1]
+    bounds = ahead.constants[:-1].copy()
+    bounds[1:] += twist * np.sum(ahead.slopes[1:-1] * moved, axis=1)
+    assert (bounds <= np.array(stages) + 1e-9 * (1.0 + np.abs(bounds))).all()
+    assert ahead.bound == ahead.constants[0]
+
+
+@given(st.integers(0, 10**6), PLANS, PLANS)
+def test_the_dual_bound_holds_for_any_multipliers(seed: int, at: np.ndarray, omega: np.ndarray) -> None:
+    check_bounds(random_problem(seed), seed, at, omega)
+
+
+def test_a_wrong_slope_is_refuted() -> None:
+    rng = np.random.default_rng(0)
+    for seed in range(5):
+        problem = random_problem(seed)
+        at = used("relaxed").solve(problem).relaxed
+        assert at is not None
+        omega = np.clip(at + 0.2 * rng.normal(size=24), 0.0, 1.0)  # near the optimum, where bounds are tight
+        check_bounds(problem, seed, at, omega, loaded=False)
+        with pytest.raises(AssertionError):
+            check_bounds(problem, seed, at, omega, twist=-1.0, loaded=False)
+
+
+def test_the_bound_of_the_relaxation_is_tight() -> None:
+    """The optimum of the same program, solved to a tenth of the route's tolerance, is not above the bound."""
+    options = SolverOptions()
+    for name in ("tol_gap_abs", "tol_gap_rel", "tol_feas"):
+        options.SetOption(ClarabelSolver.id(), name, 1e-9)
+    for problem in [*(random_problem(s, 24, 1 + s % 3) for s in range(8)), *(rolled_out(s) for s in range(8))]:
+        solution = used("relaxed").solve(problem)
+        program = team_program([problem], [solution.normals], relaxed=True).program
+        optimum = ClarabelSolver().Solve(program, None, options).get_optimal_cost()
+        assert solution.lower_bound == pytest.approx(optimum, rel=2e-5, abs=1e-8)
+        assert solution.lower_bound <= optimum * (1.0 + 1e-7) + 1e-9

@@ -1,0 +1,19 @@
+"""What no plan can avoid."""
+
+from __future__ import annotations
+
+import numpy as np
+from builders_gatekeeper import PLANS, random_problem
+from hypothesis import given
+from hypothesis import strategies as st
+
+from airground_drake.gatekeeper.reachable_box import remaining_cost
+
+
+@given(st.integers(0, 10**6), PLANS)
+def test_no_plan_costs_less_than_what_remains(seed: int, omega: np.ndarray) -> None:
+    problem = random_problem(seed)
+    positions = problem.positions(omega)
+    stage = problem.dt * np.square(problem.reference - positions).sum(axis=1)  # no slack is cheapest
+    to_come = np.append(np.cumsum(stage[::-1])[::-1], 0.0)
+    assert (remaining_cost(problem) <= to_come + 1e-9).all()

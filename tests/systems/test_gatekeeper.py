@@ -1,0 +1,120 @@
+"""The gatekeeper in a diagram: dwell, bend, budget by counts and by an injected clock."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import pytest
+
+from airground_drake import components
+from airground_drake.gatekeeper.answer import Rules
+from airground_drake.gatekeeper.budget import Budget
+from airground_drake.gatekeeper.problem import Problem
+from airground_drake.gatekeeper.solution import ConstantPlans, Solution
+from airground_drake.registry import ROUTES
+from airground_drake.scenarios.load import load
+from airground_drake.scenarios.schema import Scenario
+from airground_drake.simulation import Recorder, simulate
+
+
+@dataclass
+class Alternating:
+    """A route whose preference changes at every decision, by a wide margin."""
+
+    calls: int = 0
+
+    def solve(self, problem: Problem, budget: Budget) -> Solution:
+        self.calls += 1
+        throughout = ConstantPlans.of(problem)
+        least = 0.1 * min(throughout.accept.objective, throughout.refuse.objective)
+        return Solution(bool(self.calls % 2), "optimal", objective=least)
+
+
+@pytest.mark.parametrize("dwell", [0.0, 0.2, 1.0])
+def test_opposite_answers_of_a_run_are_a_dwell_apart(case_a: Scenario, dwell: float) -> None:
+    case_a.gatekeeper.min_dwell_s, case_a.gatekeeper.route = dwell, "alternating"
+    with ROUTES.adding("alternating", Alternating):
+        decisions = simulate(case_a, "d").decisions
+    for _, of_one in decisions.groupby(["robot", "issued_s"]):
+        changes = of_one["t_s"][of_one["decision"] != of_one["decision"].shift()].to_numpy()
+        assert (changes[1:] - changes[:-1] >= dwell - 1e-9).all()
+    assert ("dwell" in set(decisions["reason"])) == (dwell > 0.05)
+
+
+def test_a_proposal_into_an_obstacle_is_refused_as_bent(case_a: Scenario) -> None:
+    """Method (d), with a gatekeeper that would accept anything that helps a little."""
+    scenario, _ = load("case_b", ["intervention.policies.0.name=towards", "gatekeeper.max_bend=0.0"])
+    refused = simulate(scenario, "d").decisions
+    assert refused["bend"].max() > 0.9
+    assert (refused.loc[refused["bend"] > 0.0, "decision"] == "refuse").all()
+
+
+@dataclass
+class Clock:
+    """Advances by `tick` s at each reading."""
+
+    tick: float
+    now: float = 0.0
+
+    def __call__(self) -> float:
+        self.now += self.tick
+        return self.now
+
+
+class Watching:
+    """A route that keeps the budgets that it was given."""
+
+    given: ClassVar[list[Budget]] = []
+
+    def solve(self, problem: Problem, budget: Budget) -> Solution:
+        self.given.append(budget)
+        return ConstantPlans.of(problem).failed()
+
+
+def recorded_budgets(scenario: Scenario, monkeypatch: pytest.MonkeyPatch, clock: Clock | None) -> list[Budget]:
+    Watching.given.clear()
+    scenario.gatekeeper.route = "watching"
+    if clock is not None:
+        make = components.make_rules
+        monkeypatch.setattr(components, "make_rules", lambda s: Rules(**{**make(s).__dict__, "clock": clock}))
+    with ROUTES.adding("watching", Watching):
+        Recorder(scenario, "d").simulate(duration=16.0)
+    return Watching.given
+
+
+def test_in_simulation_a_decision_has_counts_and_no_deadline(case_a: Scenario, monkeypatch: pytest.MonkeyPatch) -> None:
+    case_a.gatekeeper.budget_iterations, case_a.gatekeeper.budget_nodes = 7, 11
+    budgets = recorded_budgets(case_a, monkeypatch, None)
+    assert budgets
+    assert {(b.iterations, b.nodes, b.deadline_s) for b in budgets} == {(7, 11, math.inf)}
+    assert not any(b.spent() for b in budgets)
+
+
+def test_in_real_time_a_decision_has_half_the_sampling_period(
+    case_a: Scenario, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    case_a.gatekeeper.budget = "wall_clock"
+    clock = Clock(tick=0.001)
+    budgets = recorded_budgets(case_a, monkeypatch, clock)
+    begins = [0.001 * (k + 1) for k in range(len(budgets))]  # read once a sample: one proposal each
+    assert [b.deadline_s for b in budgets] == pytest.approx([begin + 0.025 for begin in begins])
+    assert budgets[0].left_s() < 0.025
+    clock.now = 10.0
+    assert all(b.spent() and b.left_s() == 0.0 for b in budgets)
+
+
+@pytest.mark.parametrize("route", ROUTES.own)
+def test_with_no_time_left_every_proposal_is_refused(
+    case_a: Scenario, monkeypatch: pytest.MonkeyPatch, route: str
+) -> None:
+    """A clock that jumps a whole sampling period at each reading: nothing is ever evaluated in time."""
+    case_a.gatekeeper.budget, case_a.gatekeeper.route = "wall_clock", route
+    make = components.make_rules
+    monkeypatch.setattr(components, "make_rules", lambda s: Rules(**{**make(s).__dict__, "clock": Clock(tick=0.05)}))
+    decisions = simulate(case_a, "d").decisions
+    assert len(decisions)
+    assert set(decisions["decision"]) == {"refuse"}
+    assert set(decisions["status"]) == {"refused_budget_spent"}
+    assert set(decisions["reason"]) == {"no_plan"}
