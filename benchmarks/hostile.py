@@ -19,11 +19,12 @@ from functools import partial
 import numpy as np
 
 from airground_drake.arrays import Array
-from airground_drake.diagram import make_presets, make_team
-from airground_drake.gatekeeper.prediction import Horizon, Scene, UgvLaw, predicted_problem
+from airground_drake.components import make_presets, make_team
+from airground_drake.gatekeeper.prediction import Horizon, Scene, predicted_problem
 from airground_drake.gatekeeper.routes.relaxed import RelaxedRoute
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
+from airground_drake.nsbc.law import UgvLaw
 from airground_drake.nsbc.motion import Motion
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Policy, Run
@@ -69,9 +70,7 @@ def at_decision_level(seed: int, proposals: int) -> tuple[float, int, int]:
                 if not route.solve(predicted_problem(scene, law, proposal, horizon)).accept_first:
                     continue
                 accepted += 1
-            controller = UgvController(
-                team, avoidance, motion_gain=2.0, intervention_gain=1.5, intervention_on_top=on_top
-            )
+            controller = UgvController(team, law)
             margin = execute(controller, presets[0], proposal, start, t, h, centres) - d
             if on_top:
                 below += margin < -1e-9

@@ -176,10 +176,7 @@ class Instance:
 
     @property
     def controller(self) -> UgvController:
-        return UgvController(
-            self.team, AVOIDANCE, motion_gain=2.0, intervention_gain=1.5,
-            intervention_on_top=self.law.intervention_on_top,
-        )  # fmt: skip
+        return UgvController(self.team, self.law)
 
     def problem(self, stages: int, substeps: int = 1, error_weight: float = 1.0) -> Problem:
         return predicted_problem(self.scene, self.law, self.proposal, Horizon(stages, substeps, error_weight, 200.0))
@@ -191,9 +188,7 @@ class Instance:
 def run_controller(case: Instance, sensed: np.ndarray, answers: np.ndarray, substeps: int) -> np.ndarray:
     """Positions at the ends of the stages by calling the running controller's law step by step."""
     team = replace(case.team, obstacles=case.team.obstacles[sensed[:-2]])
-    controller = UgvController(
-        team, AVOIDANCE, motion_gain=2.0, intervention_gain=1.5, intervention_on_top=case.law.intervention_on_top
-    )
+    controller = UgvController(team, case.law)
     position, ends = np.zeros(3), []
     for k in range(len(answers) * substeps):
         t = k * H

@@ -11,9 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from airground_drake.components import make_presets, make_team
-from airground_drake.gatekeeper.prediction import Horizon, Scene, UgvLaw, closed_loop, predicted_problem
+from airground_drake.gatekeeper.prediction import Horizon, Scene, closed_loop, predicted_problem
 from airground_drake.gatekeeper.problem import Problem
 from airground_drake.intervention.policy import Proposal
+from airground_drake.nsbc.law import UgvLaw
 from airground_drake.nsbc.motion import Motion
 from airground_drake.scenarios.load import load
 from airground_drake.systems.controllers import UgvController
@@ -28,7 +29,7 @@ def test_prediction_is_the_running_controller(on_top: bool, selection: np.ndarra
     law = replace(law, intervention_on_top=on_top)
     proposal = replace(proposal, selection=selection)
     team, presets = make_team(scenario), make_presets(scenario)
-    controller = UgvController(team, law.avoidance, motion_gain=2.0, intervention_gain=1.5, intervention_on_top=on_top)
+    controller = UgvController(team, law)
     h = law.avoidance.period
     loop = closed_loop(scene, law, proposal, 60, 1)
     for accepted, predicted in zip((True, False), loop.constant_plans()[:2], strict=True):

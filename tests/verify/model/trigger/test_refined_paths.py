@@ -17,8 +17,8 @@ from pydrake.systems.primitives import (
 from pydrake.trajectories import PiecewisePolynomial
 from verify.model.trigger.cases import REFINE, simulate, trigger_times
 
+from airground_drake.components import integrated_noise
 from airground_drake.decision.trigger import Trigger
-from airground_drake.diagram import integrated_noise
 from airground_drake.systems.decision import DecisionVariable, EventTrigger
 from airground_drake.verify.engines.segments import NormSignal
 from airground_drake.verify.model.trigger import refined_paths
