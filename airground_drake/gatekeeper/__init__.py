@@ -1,1 +1,1 @@
-"""The accept/refuse decision, eqs (21)-(29): prediction, problem, solution routes."""
+"""Accepting or refusing an intervention, eqs (21)-(29): prediction, problem, solution routes, answer."""

@@ -1,4 +1,4 @@
-"""What one decision may spend: counted work in simulation, a clock in real time."""
+"""What solving one problem may spend: counted work in simulation, a clock in real time."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ Clock = Callable[[], float]
 
 @dataclass(frozen=True)
 class Budget:
-    """Limits of one decision. Counts make a run reproducible; a deadline keeps a real robot's pace.
+    """Limits of one call of a route. Counts make a run reproducible; a deadline keeps a real robot's pace.
 
     A route asks `spent()` between its steps and hands the counts, and `left_s()`, to the solvers that it calls.
 
     Attributes:
         iterations: of each call of a convex or nonlinear solver.
         nodes: of each tree search.
-        deadline_s: time on `clock` at which the decision must stand, s; inf: counted work only.
+        deadline_s: time on `clock` at which the solution must stand, s; inf: counted work only.
         clock: what `deadline_s` refers to.
     """
 

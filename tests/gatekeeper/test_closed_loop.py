@@ -14,7 +14,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource, Integrator, Multiplexer, TrajectorySource
 
-from airground_drake import diagram
+from airground_drake import components
 from airground_drake.intervention.messages import ACCEPT, REFUSE
 from airground_drake.nsbc.motion import Motion
 
@@ -36,7 +36,7 @@ def test_switching_plans_are_those_of_the_running_controller_in_a_diagram(seed: 
     reference = builder.AddNamedSystem(
         "reference",
         TrajectorySource(
-            diagram.stack_presets([case.preset, Motion(np.zeros(1), case.other[None])]), output_derivative_order=1
+            components.stack_presets([case.preset, Motion(np.zeros(1), case.other[None])]), output_derivative_order=1
         ),
     )
     builder.Connect(reference.get_output_port(), controller.GetInputPort("reference"))

@@ -42,7 +42,7 @@ _BLIND = ((128, EVERYWHERE, math.inf),)
 _WIDE = ((2048, EVERYWHERE, 0.0), (512, 0.3, math.inf), (512, 0.1, 0.02))
 """Searches, see `LocalSearch.label_setting`: labels per stage, radius of the tube (m), relative slackness.
 
-Those of infinite slackness do without the outlook, for the sides of obstacles that the half-planes hide. All
+Those of infinite slackness do without the dual bound, for the sides of obstacles that the half-planes hide. All
 were chosen on recorded and random problems: see `benchmarks/gatekeeper.py` for how near the plans come to the best
 known.
 """
