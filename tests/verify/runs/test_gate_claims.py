@@ -11,9 +11,7 @@ import pandas as pd
 import pytest
 from builders import decided_run, with_decision
 from verify.judging import FEAS, OPT, SUR
-from verify.runs.cases import (
-    refused_for_want_of_a_plan,
-)
+from verify.runs.cases import refused_for_want_of_a_plan
 
 from airground_drake.trace import Trace
 

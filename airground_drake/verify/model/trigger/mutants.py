@@ -9,9 +9,7 @@ from typing import Any
 from airground_drake.decision.trigger import Mode, Trigger, TriggerState
 from airground_drake.verify.claim import Mutant
 from airground_drake.verify.finding import Finding
-from airground_drake.verify.model.trigger.refined_paths import (
-    experiment,
-)
+from airground_drake.verify.model.trigger.refined_paths import experiment
 from airground_drake.verify.model.trigger.zeno_proof import prove
 from airground_drake.verify.model.trigger.zeno_refine import judge_experiment
 

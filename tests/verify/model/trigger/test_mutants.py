@@ -7,9 +7,7 @@ from itertools import pairwise
 from typing import Any
 
 import pytest
-from pydrake.systems.primitives import (
-    TrajectorySource,
-)
+from pydrake.systems.primitives import TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 from verify.model.trigger.cases import KINDS, REFINE, ZENO, simulate, trigger_times
 

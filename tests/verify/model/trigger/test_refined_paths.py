@@ -67,6 +67,29 @@ def test_fast_triggers_are_those_of_the_independent_checker(values: list[float],
     assert refined_paths.triggers(trigger, x, dt) == pytest.approx(expected, abs=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("trigger", "x", "times"),
+    [
+        (Trigger.bare(3.0), [0.0, 3.0, 0.0, 4.0, 0.0], [1.0, 2.75]),
+        (Trigger.bare(3.0), [4.0, 3.0, 4.0, 0.0, 4.0], [0.0, 3.75]),
+        (Trigger(3.0, 2.0, 0.0), [0.0, 3.0, 2.5, 3.0, 1.0, 3.0], [1.0, 5.0]),
+        (Trigger(3.0, 2.0, 0.0), [4.0, 2.0, 4.0], [0.0, 1.5]),
+        (Trigger(3.0, 2.0, 1.5), [4.0, 0.0, 4.0, 4.0], [0.0, 1.75]),
+        (Trigger(3.0, 2.0, 2.0), [4.0, 0.0, 4.0, 4.0], [0.0, 2.0]),
+    ],
+    ids=[
+        "a touch from below triggers",
+        "a bare trigger stays above at a touch from above",
+        "touches from below, and above the release level in between",
+        "a touch of the release level releases",
+        "below at the end of the dwell: at the next crossing",
+        "above at the end of the dwell: at once",
+    ],
+)
+def test_triggers_by_hand(trigger: Trigger, x: list[float], times: list[float]) -> None:
+    assert refined_paths.triggers(trigger, np.array(x), 1.0) == times
+
+
 @pytest.mark.parametrize("kind", ["automaton", "bare"])
 def test_fast_triggers_are_those_of_the_running_systems(kind: str) -> None:
     """DecisionVariable and EventTrigger in a Drake diagram on six of the experiment's paths."""
