@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from .files import Json
-from .rules import SMALL, Array, Found, agrees, holds, same
+from .rules import SMALL, Array, Found, holds, same
 from .run import Run
 
 AT_REST_S = 1.0
@@ -16,12 +16,12 @@ AT_REST_M = 1e-3
 """Standing still: no farther than this from the end."""
 
 
-def live_goal(run: Run, claim: Json) -> Found:
+def live_goal(run: Run, _: Json) -> Found:
     """LIVE-GOAL: every robot ended at its target, or standing where the scenario declares that it stalls."""
-    conditions = [{"robot": robot, "condition": what, "margin_m": margin} for robot, what, margin in _ends(run)]
-    agrees("conditions at the end", claim["evidence"]["conditions"], conditions, within=SMALL, t_s=float(run.t_s[-1]))
-    margin = min(float(each["margin_m"]) for each in conditions)
-    return Found.with_margin("holds" if margin >= 0.0 else "refuted", margin)
+    ends = [*_ends(run)]
+    margin = min(margin for _, _, margin in ends)
+    conditions = [{"robot": robot, "condition": what, "margin_m": margin} for robot, what, margin in ends]
+    return Found.with_margin("holds" if margin >= 0.0 else "refuted", margin, conditions=conditions)
 
 
 def _ends(run: Run) -> Iterator[tuple[str, str, float]]:
@@ -53,7 +53,7 @@ def _moved_at_the_end_m(run: Run, robot: str) -> float:
     return float(np.linalg.norm(places - places[-1], axis=1).max())
 
 
-def comm(run: Run, claim: Json) -> Found:
+def comm(run: Run, _: Json) -> Found:
     """COMM: proposals and decisions only while a UGV is intervened on, and no more than an always-on scheme has.
 
     The UAV withdraws its proposal at its next planning instant after a release, and the gatekeeper notices at its next
@@ -74,11 +74,9 @@ def comm(run: Run, claim: Json) -> Found:
     duration, n = run.scenario["duration_s"] + SMALL, len(run.ugvs)
     spent = {"proposal": proposals, "decision": len(run.decisions)}
     always_on = {"proposal": n * int(duration / planning_s), "decision": n * int(duration / gating_s) if gated else 0}
-    agrees("messages spent", claim["evidence"]["spent"], spent, within=0.0)
-    agrees("messages of an always-on scheme", claim["evidence"]["always_on"], always_on, within=0.0)
     saved = [1.0 - spent[kind] / most for kind, most in always_on.items() if most]
     status = "holds" if all(spent[kind] <= most for kind, most in always_on.items()) else "refuted"
-    return Found.with_margin(status, min(saved)) if saved else Found(status)
+    return Found.with_margin(status, min(saved), spent=spent, always_on=always_on) if saved else Found(status)
 
 
 def decided_s(run: Run, ugv: str) -> Array:
@@ -106,7 +104,7 @@ def _no_strays(run: Run, ugv: str, kind: str, times_s: Array, allowance_s: float
     holds(f"a {kind} only during interventions", inside, times_s, "during one", about=ugv, t_s=times_s)
 
 
-def gate_time(run: Run, claim: Json) -> Found:
+def gate_time(run: Run, _: Json) -> Found:
     """GATE-TIME: the 99th percentile of the CPU times, rounded up to an order statistic, is below the period."""
     times, period = np.array(run.decision_times_s, dtype=np.float64), float(run.scenario["gatekeeper"]["period_s"])
     if not len(run.decisions):
@@ -115,5 +113,4 @@ def gate_time(run: Run, claim: Json) -> Found:
     holds("times are not negative", times >= 0.0, times, "0 or more")
     p50, p99 = (float(np.quantile(times, level, method="higher")) for level in (0.5, 0.99))
     facts = {"p50_s": p50, "p99_s": p99, "max_s": float(times.max()), "period_s": period, "count": len(times)}
-    agrees("times of decisions", claim["evidence"], facts, within=SMALL)
-    return Found.with_margin("holds" if p99 < period else "refuted", period - p99)
+    return Found.with_margin("holds" if p99 < period else "refuted", period - p99, **facts)

@@ -7,7 +7,7 @@ should be third. So nothing is rejected without saying why.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -62,16 +62,20 @@ class Found:
         status: the verdict.
         least: least margin that is possible; None: no margin.
         most: largest one; differs from `least` only where rounding or a solver decides.
+        facts: what the recorded evidence must contain.
+        within: by which a recorded margin may differ.
     """
 
     status: str
     least: float | None = None
     most: float | None = None
+    facts: Mapping[str, Any] = field(default_factory=dict)
+    within: float = SMALL
 
     @classmethod
-    def with_margin(cls, status: str, margin: float) -> Found:
+    def with_margin(cls, status: str, margin: float, *, within: float = SMALL, **facts: Any) -> Found:
         """With a margin that is known."""
-        return cls(status, float(margin), float(margin))
+        return cls(status, float(margin), float(margin), facts, within)
 
 
 def same(rule: str, recorded: Any, recomputed: Any, *, about: str = "", t_s: float | None = None) -> None:

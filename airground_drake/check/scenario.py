@@ -129,3 +129,31 @@ def bayes_threshold_m(drift_m_s: float, noise_m_sqrt_s: float, ratio_s: float) -
         above = middle > 700.0 or math.sinh(middle) + middle > level
         low, high = (low, middle) if above else (middle, high)
     return high * noise_m_sqrt_s**2 / (2.0 * drift_m_s)
+
+
+class Kind(NamedTuple):
+    """A kind of pairs, of which the scenario has at least one: its fastest members, and the names of obligations."""
+
+    name: str
+    safe_m: float
+    closing_m_s: float
+    share: float
+
+
+def kinds_of(scenario: Json) -> list[Kind]:
+    """The kinds of pairs of a scenario, in the order of the report."""
+    safe, uav = scenario["safe_distance"], float(scenario["uav"]["max_speed_m_s"])
+    ugvs = sorted((float(ugv["max_speed_m_s"]) for ugv in scenario["ugvs"].values()), reverse=True)
+    found = [Kind("uav_ugv", safe["air_ground_m"], uav + ugvs[0], 0.5)]
+    if scenario["obstacles"]:
+        found.insert(0, Kind("obstacle", safe["obstacle_m"], max(uav, ugvs[0]), 1.0))
+    if len(ugvs) > 1:
+        found.append(Kind("ugv_ugv", safe["ugv_m"], ugvs[0] + ugvs[1], 0.5))
+    return found
+
+
+def disturbance_m_s(scenario: Json) -> float:
+    """The disturbance that SAFE-DIST is about: 10 % of the largest speed limit, at most A/4 of the least distance."""
+    tenth = 0.1 * max(float(robot["max_speed_m_s"]) for robot in robots_of(scenario).values())
+    least = min(kind.safe_m for kind in kinds_of(scenario))
+    return min(tenth, scenario["control"]["avoidance_gain_1_s"] * least / 4.0)
