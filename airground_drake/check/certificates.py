@@ -29,10 +29,11 @@ from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
-from .files import Json, parse_json, read_bytes, read_json
+from .files import Files, Json, content_of, parse_json, read_json
 from .polynomials import Polynomial, number, parse
 from .rules import SMALL, Disagreement, Found, NotEstablished, agrees, close, holds, same
 from .scenario import Kind, disturbance_m_s, kinds_of, levels_of
+from .triggers import refuted_zeno_proof
 
 GROUPS = {"hypotheses": "nonnegative", "strict": "positive", "equations": "zero"}
 """Kinds of premises: in a certificate, and in obligations.json."""
@@ -48,11 +49,14 @@ SHORTEST_S = 1e-3
 ROUNDOFF = 2.0**-53
 
 
-def prove(claim: Json, folder: Path, scenario: Json) -> Found:
+def prove(claim: Json, files: Files, scenario: Json) -> Found:
     """A proof: its certificates prove their goals, the goals are the claim's, and the record of it is consistent."""
     if claim["status"] == "refuted":
-        raise NotEstablished("a refutation is established again", "only proofs are known here, no counterexamples")
-    content = read_bytes(folder / "obligations.json")
+        if claim["id"] == "ZENO-PROOF":
+            bound = scenario["decision"]["min_inter_event_s"] or SHORTEST_S
+            return refuted_zeno_proof(claim, levels_of(scenario), bound)
+        raise NotEstablished("a refutation is established again", "no way is known here")
+    content = content_of(files, "obligations.json")
     obligations = _expanded(content)
     _consists_of_the_claim(claim["id"], obligations, scenario)
     recorded = claim["evidence"]["obligations"]
@@ -60,7 +64,7 @@ def prove(claim: Json, folder: Path, scenario: Json) -> Found:
     for entry in recorded:
         same("an obligation is proved", entry["status"], "proved", about=entry["name"])
     if claim["id"] == "SAFE-LEMMA":
-        _gram_matrix(read_json(folder / "gram.json"))
+        _gram_matrix(parse_json(content_of(files, "gram.json"), "gram.json"))
         return Found("proved")
     return _RECORDED[claim["id"]](claim, scenario)
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -113,6 +112,7 @@ class Decision:
         return max(LEAST_COST, float(self.constant_cost.min()))
 
 
+@lru_cache(maxsize=8)
 def decisions_of(run: Run) -> list[Decision]:
     """All decisions of a run, with their problems.
 
@@ -120,43 +120,58 @@ def decisions_of(run: Run) -> list[Decision]:
         Disagreement: if the tables do not belong together, a number is not finite or has no place.
     """
     same("a problem for each decision", len(run.problems), len(run.decisions))
-    return [*_decisions(run)]
-
-
-def _decisions(run: Run) -> Iterator[Decision]:
-    n = int(run.scenario["gatekeeper"]["stages"])
+    stages = int(run.scenario["gatekeeper"]["stages"])
     rows, problems = run.decisions.to_dict("records"), run.problems.to_dict("records")
-    for row, problem in zip(rows, problems, strict=True):
-        about, when = f"decision of {row['robot']}", float(row["t_s"])
-        flat = {name: np.asarray(problem[name], dtype=np.float64).ravel() for name in ARRAYS}
-        scalars = [value for value in (*row.values(), *problem.values()) if isinstance(value, float)]
-        numbers = np.concatenate([scalars, *flat.values()])
-        holds("numbers of a decision are finite", np.isfinite(numbers), numbers, "a number", about=about, t_s=when)
-        planned, m = row["status"] in PLANNED, len(flat["distances_m"])
-        sizes = {"initial_m": [3], "distances_m": [m], "centres_m": [3 * m * n]}
-        sizes |= dict.fromkeys(("accept_m_s", "refuse_m_s", "reference_m"), [3 * n])
-        sizes |= {"plan": [n] if planned else [0], "positions_m": [3 * n] if planned else [0]}
-        sizes |= {"relaxed": [0, n], "rounded": [0, n], "normals": [0, 3 * m * n]}
-        for name, allowed in sizes.items():
-            holds(f"size of {name}", len(flat[name]) in allowed, len(flat[name]), str(allowed), about=about, t_s=when)
-        for name in ("accept_m_s", "refuse_m_s", "reference_m", "positions_m"):
-            flat[name] = flat[name].reshape(-1, 3)
-        flat["centres_m"] = flat["centres_m"].reshape(n, m, 3)
-        bounded = len(flat["normals"]) == 3 * m * n and (m > 0 or len(flat["relaxed"]) > 0)
-        normals = flat.pop("normals").reshape(n, m, 3) if bounded else None
-        yield Decision(
-            {str(name): value for name, value in row.items()},
-            float(problem["dt_s"]),
-            float(problem["error_weight_1_m2_s"]),
-            float(problem["slack_weight_1_m2_s"]),
-            **{name: flat[name] for name in ARRAYS if name != "normals"},
-            normals=normals,
-        )
+    return [_decision(row, problem, stages) for row, problem in zip(rows, problems, strict=True)]
+
+
+def _decision(row: dict[Any, Any], problem: dict[Any, Any], stages: int) -> Decision:
+    """A row of both tables, arrays in shape."""
+    flat: dict[str, Array] = {name: np.asarray(problem[name], dtype=np.float64).ravel() for name in ARRAYS}
+    about, when = f"decision of {row['robot']}", float(row["t_s"])
+    scalars = [value for value in (*row.values(), *problem.values()) if isinstance(value, float)]
+    numbers = np.concatenate([scalars, *flat.values()])
+    holds("numbers of a decision are finite", np.isfinite(numbers), numbers, "a number", about=about, t_s=when)
+    points = len(flat["distances_m"])
+    for name, allowed in _sizes(stages, points, planned=row["status"] in PLANNED).items():
+        holds(f"size of {name}", len(flat[name]) in allowed, len(flat[name]), str(allowed), about=about, t_s=when)
+    normals = flat["normals"] if len(flat["normals"]) == 3 * stages * points else None
+    return Decision(
+        row={str(name): value for name, value in row.items()},
+        dt_s=float(problem["dt_s"]),
+        error_weight_1_m2_s=float(problem["error_weight_1_m2_s"]),
+        slack_weight_1_m2_s=float(problem["slack_weight_1_m2_s"]),
+        initial_m=flat["initial_m"],
+        accept_m_s=flat["accept_m_s"].reshape(stages, 3),
+        refuse_m_s=flat["refuse_m_s"].reshape(stages, 3),
+        reference_m=flat["reference_m"].reshape(stages, 3),
+        centres_m=flat["centres_m"].reshape(stages, points, 3),
+        distances_m=flat["distances_m"],
+        plan=flat["plan"],
+        positions_m=flat["positions_m"].reshape(-1, 3),
+        relaxed=flat["relaxed"],
+        rounded=flat["rounded"],
+        normals=None if normals is None else normals.reshape(stages, points, 3),
+    )
+
+
+def _sizes(stages: int, points: int, *, planned: bool) -> dict[str, tuple[int, ...]]:
+    """How many numbers each array of a problem may have."""
+    return {
+        "initial_m": (3,),
+        "accept_m_s": (3 * stages,),
+        "refuse_m_s": (3 * stages,),
+        "reference_m": (3 * stages,),
+        "centres_m": (3 * stages * points,),
+        "plan": (stages,) if planned else (0,),
+        "positions_m": (3 * stages,) if planned else (0,),
+        "relaxed": (0, stages),
+        "rounded": (0, stages),
+        "normals": (0, 3 * stages * points),
+    }
 
 
 def silent_ugvs(run: Run) -> list[str]:
     """UGVs that needed a decision, for they were intervened on or executed an intervention, and made none."""
     decided = {*run.decisions["robot"]}
     return [ugv for ugv in run.ugvs if ugv not in decided and (run.executed(ugv).any() or run.talk_is_due(ugv))]
-
-

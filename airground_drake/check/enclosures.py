@@ -18,11 +18,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from decimal import Decimal, localcontext
 from fractions import Fraction
-from pathlib import Path
 from typing import Any
 
 from .certificates import rational
-from .files import Json, read_json
+from .files import Files, Json, content_of, parse_json
 from .polynomials import number
 from .rules import SMALL, Disagreement, Found, NotEstablished, holds, same
 
@@ -77,11 +76,11 @@ def decimal(value: Fraction) -> Decimal:
     return Decimal(value.numerator) / value.denominator
 
 
-def root(claim: Json, folder: Path, scenario: Json) -> Found:
+def root(claim: Json, files: Files, scenario: Json) -> Found:
     """THR-ROOT and THR-OPT."""
     if claim["status"] == "refuted":
-        raise NotEstablished("a refutation is established again", "only proofs are known here, no counterexamples")
-    saved, rule = read_json(folder / "statements.json"), Rule.of(scenario)
+        raise NotEstablished("a refutation is established again", "no way is known here")
+    saved, rule = parse_json(content_of(files, "statements.json"), "statements.json"), Rule.of(scenario)
     with localcontext(prec=DIGITS):
         same("constants", saved["constants"], {name: str(value) for name, value in rule.constants.items()})
         ends = _enclosure(rule, saved["enclosures"], "u", "zeta_m", rule.c2 / rule.c1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import lru_cache
 from itertools import pairwise, zip_longest
 from typing import NamedTuple
 
@@ -30,6 +31,7 @@ class Event(NamedTuple):
         return cls(float(recorded["t_s"]), recorded["robot"], recorded["kind"], recorded.get("policy", ""))
 
 
+@lru_cache(maxsize=8)
 def check_events(run: Run) -> str:
     """Apply the rules about events.
 
@@ -58,8 +60,7 @@ def _events_follow_from_signals_and_decisions(run: Run) -> None:
     for theirs, ours in zip_longest(recorded, found):
         if theirs != ours:
             first = min(event for event in (theirs, ours) if event is not None)
-            both = (None if event is None else list(event) for event in (theirs, ours))
-            raise Disagreement("events follow from signals and decisions", *both, about=first.robot, t_s=first.t_s)
+            raise Disagreement("events follow from signals and decisions", theirs, ours, first.robot, first.t_s)
 
 
 def _crossings(run: Run) -> Iterator[Event]:
@@ -74,11 +75,11 @@ def _crossings(run: Run) -> Iterator[Event]:
 def _answers(run: Run) -> Iterator[Event]:
     """An event whenever the answer to a proposal is new or has changed."""
     known: dict[tuple[str, float], str] = {}
-    for row in run.decisions.itertuples():
-        proposal = (str(row.robot), float(row.issued_s))
-        if known.get(proposal) != row.decision:
-            known[proposal] = str(row.decision)
-            yield Event(float(row.t_s), str(row.robot), str(row.decision), str(row.policy))
+    for row in run.decisions.to_dict("records"):
+        proposal = (row["robot"], row["issued_s"])
+        if known.get(proposal) != row["decision"]:
+            known[proposal] = row["decision"]
+            yield Event(row["t_s"], row["robot"], row["decision"], row["policy"])
 
 
 def _arrivals(run: Run) -> Iterator[Event]:

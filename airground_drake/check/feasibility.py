@@ -1,4 +1,4 @@
-"""GATE-FEAS: every decision is about the UGV's situation, its plan satisfies (26b)-(26e), its answer follows the rules."""
+"""GATE-FEAS: a decision is about the UGV's situation, its plan satisfies (26b)-(26e), its answer follows the rules."""
 
 from __future__ import annotations
 
@@ -54,9 +54,7 @@ def _at(decision: Decision, what: str = "") -> Json:
 
 def _on_a_proposal(run: Run, decision: Decision) -> None:
     """It is on a proposal that was sent, by the policy that it names, and by the scenario's route."""
-    sent = [
-        [event["robot"], event["t_s"], event["policy"]] for event in run.events if event["kind"] == "proposal"
-    ]
+    sent = [[event["robot"], event["t_s"], event["policy"]] for event in run.events if event["kind"] == "proposal"]
     named = [decision.ugv, decision.row["issued_s"], decision.row["policy"]]
     holds("the decision is on a proposal", named in sent, named, str(sent), **_at(decision))
     same("route of the decision", decision.row["route"], run.scenario["gatekeeper"]["route"], **_at(decision))

@@ -19,6 +19,8 @@ import pandas as pd
 from .rules import Disagreement, NotEstablished
 
 Json = dict[str, Any]
+Files = tuple[tuple[str, bytes], ...]
+"""Names and contents."""
 
 
 def read_bytes(path: Path) -> bytes:
@@ -38,9 +40,26 @@ def sha256(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
 
 
-def digests(folder: Path) -> dict[str, str]:
-    """SHA-256 of every file in a folder, by name; nothing if there is no such folder."""
-    return {path.name: sha256(read_bytes(path)) for path in sorted(folder.glob("*"))}
+def read_folder(folder: Path) -> Files:
+    """The content of every file in a folder, by name; nothing if there is no such folder."""
+    return tuple((path.name, read_bytes(path)) for path in sorted(folder.glob("*")))
+
+
+def content_of(files: Files, name: str) -> bytes:
+    """The content of one file.
+
+    Raises:
+        NotEstablished: if it is not there.
+    """
+    for known, content in files:
+        if known == name:
+            return content
+    raise NotEstablished("the file can be read", "it is not there", name)
+
+
+def canonical(value: Any) -> str:
+    """The text of a JSON value."""
+    return json.dumps(value, allow_nan=False)
 
 
 def read_json(path: Path) -> Any:

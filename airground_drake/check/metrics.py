@@ -46,9 +46,7 @@ def _least_distance(run: Run, pair: Pair, recorded: Json) -> None:
 
 
 def _least_margin_of_robots(run: Run, views: dict[str, Pair], nearest: str) -> None:
-    margins = {
-        other: least_distance_m(run, pair) - pair.safe_m for other, pair in views.items() if pair.share < 1.0
-    }
+    margins = {other: least_distance_m(run, pair) - pair.safe_m for other, pair in views.items() if pair.share < 1.0}
     about = f"{views[nearest].robot}, {nearest}"
     at_most("robot of least margin", margins[nearest], min(margins.values()), within=SMALL, about=about)
 

@@ -111,8 +111,9 @@ def gate_opt(run: Run, _: Json) -> Found:
         return Found("holds", LARGEST_GAP - float(most), LARGEST_GAP - float(least), {"bounded": len(planned)})
     if least <= LARGEST_GAP:
         raise NotEstablished("the largest gap", f"it is between {least:.9g} and {most:.9g}, allowed {LARGEST_GAP}")
-    for decision in planned:
-        _no_plan_of_blocks_is_much_cheaper(decision)
+    for decision, (_lowest, highest) in zip(planned, gaps, strict=True):
+        if highest > LARGEST_GAP:
+            _no_plan_of_blocks_is_much_cheaper(decision)
     return Found("inconclusive")
 
 
@@ -138,9 +139,13 @@ def _bound_and_gap_are_not_overstated(decision: Decision, found: Enclosure, norm
     known = [*decision.constant_m, *([decision.positions_of(decision.rounded)] if len(decision.rounded) else [])]
     loser = max(row["objective_accept"], row["objective_refuse"])  # along normals it costs that or more
     best = min(own, loser, *(float(decision.cost(positions, normals)) for positions in known))
-    at_least, at_best = ((cost - bound) / max(cost, 1e-12) for cost in (best, own))
-    at_most("recorded gap", row["gap"], at_best, within=GAP, **at)
-    at_most("least gap that is possible", at_least, row["gap"], within=GAP, **at)
+    at_most("recorded gap", row["gap"], _gap(own, bound), within=GAP, **at)
+    at_most("least gap that is possible", _gap(best, bound), row["gap"], within=GAP, **at)
+
+
+def _gap(cost: float, bound: float) -> float:
+    """As the routes record it."""
+    return (cost - bound) / max(cost, 1e-12)
 
 
 def _cheapest_of_blocks(decision: Decision, normals: Array | None) -> Enclosure:
@@ -219,8 +224,11 @@ def _shares_at_ties(decision: Decision, positions_m: Array, lacking_m: Array) ->
     assert decision.normals is not None
     omega, n = decision.relaxed, decision.stages
     slack = lacking_m.max(axis=1)
-    tied = (lacking_m >= slack[:, None] - TIED_M) & (slack > 0.0)[:, None]
+    tied = (lacking_m >= slack[:, None] - TIED_M) & (lacking_m > 0.0)
     stage, point = np.nonzero(tied)
+    shares = np.eye(lacking_m.shape[1])[lacking_m.argmax(axis=1)]
+    if not len(stage):
+        return shares
     error = positions_m - decision.reference_m
     columns = []
     for k, j in zip(stage, point, strict=True):
@@ -234,7 +242,6 @@ def _shares_at_ties(decision: Decision, positions_m: Array, lacking_m: Array) ->
     involved = np.unique(stage)
     sums = np.hstack([(stage == involved[:, None]) * heavy, np.zeros((len(involved), at_0.shape[1] + at_1.shape[1]))])
     found = least_squares(np.vstack([of_slopes, sums]), np.concatenate([-own, np.full(len(involved), heavy)]))
-    shares = np.eye(lacking_m.shape[1])[lacking_m.argmax(axis=1)]
     shares[involved] = 0.0
     shares[stage, point] = found[: len(stage)]
     return np.asarray(shares / np.maximum(shares.sum(axis=1, keepdims=True), 1e-12))

@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
+import json
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from .certificates import prove
 from .enclosures import root
 from .events import check_events
 from .feasibility import gate_feas
-from .files import Json, digests, read_json
+from .files import Files, Json, canonical, read_folder, read_json, sha256
 from .inputs import inputs_of
 from .metrics import check_metrics
 from .optimality import gate_opt, gate_sur
 from .outcome import comm, gate_time, live_goal
-from .rules import SMALL, Disagreement, Found, NotEstablished, agrees, at_most, holds, same
+from .rules import Disagreement, Found, NotEstablished, agrees, at_most, holds, same
 from .run import Run, read_run
 from .safety import safe_hyp, safe_trace
 from .statistics import ddm, refine
@@ -33,7 +32,7 @@ UNDECIDED = ("inconclusive", "error", "not_run")
 EXIT_CODES = {"as_expected": 0, "not_as_expected": 1, "inconclusive": 3}
 
 OfRun = Callable[[Run, Json], Found]
-OfModel = Callable[[Json, Path, Json], Found]
+OfModel = Callable[[Json, Files, Json], Found]
 
 EVERY_RUN: Mapping[str, OfRun] = {
     "SAFE-TRACE": safe_trace,
@@ -133,17 +132,25 @@ def _lines(folder: Path, report: Json) -> Iterator[Line]:
             raise NotEstablished("the trace is one of the run", "it was refused")
         return runs[name]
 
+    def events(name: str) -> str:
+        return check_events(loaded(name))
+
+    def metrics(name: str) -> str:
+        return check_metrics(loaded(name), report["runs"][name]["metrics"])
+
     for name in scenario["runs"]:
         yield _attempt("trace", name, partial(load, name))
-        yield _attempt("events", name, lambda name=name: check_events(loaded(name)))
-        yield _attempt("metrics", name, lambda name=name: check_metrics(loaded(name), report["runs"][name]["metrics"]))
+        yield _attempt("events", name, partial(events, name))
+        yield _attempt("metrics", name, partial(metrics, name))
+    scenario_text = canonical(scenario)
+
+    def decide(claim: Json) -> Found:
+        if claim["run"]:
+            return _decide_of_run(loaded(claim["run"]), canonical(claim))
+        return _decide_of_model(canonical(claim), read_folder(folder / "certificates" / claim["id"]), scenario_text)
+
     for claim in report["claims"]:
-        run = claim["run"]
-        if run:
-            decide = lambda claim=claim, run=run: _decide_of_run(claim, loaded(run))  # noqa: E731
-        else:
-            decide = lambda claim=claim: _decide_of_model(claim, folder, scenario)  # noqa: E731
-        yield _attempt(claim["id"], run, partial(_judge, claim, scenario, decide))
+        yield _attempt(claim["id"], claim["run"], partial(_judge, claim, scenario, decide))
 
 
 def _attempt(claim: str, run: str, check: Callable[[], str]) -> Line:
@@ -162,7 +169,9 @@ def _attempt(claim: str, run: str, check: Callable[[], str]) -> Line:
         return Line(str(claim), str(run), OPEN, f"{error.rule}{about}: {error.why}", error.rule, error.about)
     except Exception as error:  # files can be wrong in more ways than can be listed
         why = f"{type(error).__name__}: {error}".splitlines()[0]
-        return Line(str(claim), str(run), OPEN, f"the files are well formed: {_short(why)}", "the files are well formed")
+        return Line(
+            str(claim), str(run), OPEN, f"the files are well formed: {_short(why)}", "the files are well formed"
+        )
 
 
 def _short(value: Any, most: int = 120) -> str:
@@ -192,7 +201,7 @@ def expectations(scenario: Json) -> dict[tuple[str, str], str]:
     return wanted
 
 
-def _judge(claim: Json, scenario: Json, decide: Callable[[], Found]) -> str:
+def _judge(claim: Json, scenario: Json, decide: Callable[[Json], Found]) -> str:
     """Compare a recorded verdict with what the claim's own formula gives."""
     wanted, status = expectations(scenario), claim["status"]
     expected = wanted.get((claim["run"], claim["id"]))
@@ -200,7 +209,7 @@ def _judge(claim: Json, scenario: Json, decide: Callable[[], Found]) -> str:
     same("as expected", claim["as_expected"], status == expected)
     same("a counterexample comes with a refutation", bool(claim["counterexample"]), status == "refuted")
     try:
-        found = decide()
+        found = decide(claim)
     except Disagreement as broken:
         if status != "refuted" or claim["id"] not in REFUTED_BY_RULES:
             raise
@@ -222,21 +231,25 @@ def _judge(claim: Json, scenario: Json, decide: Callable[[], Found]) -> str:
     return f"{status}{remark}" if margin is None else f"{status}{remark}, margin {margin:.6g} {claim['unit']}".rstrip()
 
 
-def _decide_of_run(claim: Json, run: Run) -> Found:
-    known = claims_of(run.method, run.scenario["gatekeeper"]["route"])
+@lru_cache(maxsize=256)
+def _decide_of_run(run: Run, claim_text: str) -> Found:
+    """What a claim's formula gives; the same for the same run and the same recorded claim."""
+    claim, known = json.loads(claim_text), claims_of(run.method, run.scenario["gatekeeper"]["route"])
     if claim["id"] not in known:
         raise NotEstablished("the claim is known", f"known on this run: {', '.join(known)}", claim["id"])
     return known[claim["id"]](run, claim)
 
 
-def _decide_of_model(claim: Json, folder: Path, scenario: Json) -> Found:
+@lru_cache(maxsize=64)
+def _decide_of_model(claim_text: str, files: Files, scenario_text: str) -> Found:
+    """What a claim's formula gives; the same for the same certificates, scenario and recorded claim."""
+    claim, scenario = json.loads(claim_text), json.loads(scenario_text)
     if claim["id"] not in OF_MODEL:
         raise NotEstablished("the claim is known", f"known: {', '.join(OF_MODEL)}", claim["id"])
-    place = folder / "certificates" / claim["id"]
-    same("SHA-256 of certificates", claim["certificates"], digests(place))
+    same("SHA-256 of certificates", claim["certificates"], {name: sha256(content) for name, content in files})
     same("inputs", sorted(claim["inputs"]), sorted(inputs_of(claim["id"], scenario)))
     agrees("inputs", claim["inputs"], inputs_of(claim["id"], scenario), within=1e-12)
-    return OF_MODEL[claim["id"]](claim, place, scenario)
+    return OF_MODEL[claim["id"]](claim, files, scenario)
 
 
 def _check_overall(folder: Path, report: Json) -> str:

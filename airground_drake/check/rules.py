@@ -1,7 +1,7 @@
 """What a rule says when it is broken: the rule, where, when, and the values on both sides.
 
-A rule is a call of `same`, `agrees`, `close`, `at_most` or `holds`, with its name first, what is recorded second and what it
-should be third. So nothing is rejected without saying why.
+A rule is a call of `same`, `agrees`, `close`, `at_most` or `holds`, with its name first, what is recorded second and
+what it should be third. So nothing is rejected without saying why.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 
 SMALL = 1e-9
-"""Tolerance of the claims on times (s), lengths (m) and velocities (m/s): sums of thousands of roundings err by less."""
+"""Tolerance of the claims on times (s), lengths (m) and velocities (m/s): thousands of roundings err by less."""
 
 
 @dataclass(eq=False)

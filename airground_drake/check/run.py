@@ -2,25 +2,30 @@
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 import pandas as pd
 
-from .files import Json, parse_table, read_bytes, read_json, sha256
+from .files import Json, canonical, parse_json, parse_table, read_bytes, sha256
 from .rules import SMALL, Array, Flags, NotEstablished, close, holds, same
 from .scenario import Levels, Pair, Preset, levels_of, pairs_of, preset_of, robots_of
 
+Rows = npt.NDArray[np.intp]
 SCHEMA = "airground_drake.trace/2"
 TABLES = ("signals.parquet", "decisions.parquet", "problems.parquet")
+SHARED = ("method", "composition", "seed", "zeta_m", "events", "faults")
+"""What meta.json and the run's entry in report.json both say."""
 INTERVENING = 1.0
 """The mode in which the UAV intervenes."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Run:
     """One run; T rows, each of which ends a segment on which every robot moves straight.
 
@@ -104,12 +109,12 @@ class Run:
         return period * np.arange(math.ceil((self.t_s[-1] - SMALL) / period))
 
     @cached_property
-    def sample_row(self) -> Array:
+    def sample_row(self) -> Rows:
         """Row of each control sample, (S,); rows closer than 1e-9 s are one instant."""
         return np.searchsorted(self.t_s, self.sample_s - SMALL)
 
     @cached_property
-    def chosen_row(self) -> Array:
+    def chosen_row(self) -> Rows:
         """Row that has the command chosen at each control sample, (S,): the next one."""
         return np.searchsorted(self.t_s, self.sample_s + SMALL, side="right")
 
@@ -123,7 +128,6 @@ class Run:
         if name not in self.signals:
             raise NotEstablished("the signals have the column", "it is missing", name)
         values = self.signals[name].to_numpy(dtype=np.float64)
-        finite = np.isfinite(values).astype(np.float64)
         holds("numbers are finite", np.isfinite(values), values, "a finite number", about=name)
         return values
 
@@ -157,7 +161,7 @@ class Run:
 
 
 def read_run(folder: Path, name: str, report: Json) -> Run:
-    """Read a trace and apply every rule that any claim about it rests on.
+    """Read a trace and apply every rule that any claim about it rests on; equal files give the same Run.
 
     Args:
         folder: of the trace.
@@ -168,16 +172,22 @@ def read_run(folder: Path, name: str, report: Json) -> Run:
         Disagreement: if a rule is broken.
         NotEstablished: if a file cannot be read.
     """
-    meta, timings = read_json(folder / "meta.json"), read_json(folder / "timings.json")
-    tables = {}
+    contents = tuple(read_bytes(folder / file) for file in ("meta.json", "timings.json", *TABLES))
+    entry = {key: report["runs"][name][key] for key in SHARED}
+    return _run(name, canonical(report["scenario"]["resolved"]), canonical(entry), contents)
+
+
+@lru_cache(maxsize=8)
+def _run(name: str, scenario_text: str, entry_text: str, contents: tuple[bytes, ...]) -> Run:
+    scenario, entry = json.loads(scenario_text), json.loads(entry_text)
+    meta, timings = parse_json(contents[0], "meta.json"), parse_json(contents[1], "timings.json")
     same("files of the trace", sorted(meta["files"]), sorted(TABLES))
-    for file in TABLES:
-        content = read_bytes(folder / file)
+    tables = []
+    for file, content in zip(TABLES, contents[2:], strict=True):
         same("SHA-256 of a table", meta["files"][file], sha256(content), about=file)
-        tables[file] = parse_table(content, file)
-    scenario = report["scenario"]["resolved"]
-    _is_of_the_run(meta, report["runs"][name], scenario, name)
-    run = Run(name, scenario, meta["events"], timings["decision_times_s"], timings["wall_s"], *tables.values())
+        tables.append(parse_table(content, file))
+    _is_of_the_run(meta, entry, scenario, name)
+    run = Run(name, scenario, meta["events"], timings["decision_times_s"], timings["wall_s"], *tables)
     _rows_cover_the_run(run)
     _a_row_at_every_control_sample(run)
     _robots_start_where_declared(run)
@@ -197,7 +207,7 @@ def _is_of_the_run(meta: Json, entry: Json, scenario: Json, name: str) -> None:
     same("UGVs of the run", meta["ugvs"], list(scenario["ugvs"]))
     same("robots of the run", meta["robots"], list(robots_of(scenario)))
     close("threshold in force", meta["zeta_m"], levels_of(scenario).zeta_m, within=SMALL)
-    for key in ("method", "composition", "seed", "zeta_m", "events", "faults"):
+    for key in SHARED:
         same(f"{key} in report.json", entry[key], meta[key])
 
 

@@ -5,14 +5,13 @@ from __future__ import annotations
 import io
 import math
 from functools import lru_cache
-from pathlib import Path
 from statistics import NormalDist
 from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
-from .files import Json, read_bytes, read_json
+from .files import Files, Json, content_of, parse_json
 from .rules import SMALL, Array, Found, NotEstablished, agrees, close, holds, same
 from .scenario import bayes_threshold_m, levels_of
 
@@ -80,9 +79,9 @@ def experiments_of(scenario: Json) -> list[Experiment]:
     ]
 
 
-def ddm(claim: Json, folder: Path, scenario: Json) -> Found:
+def ddm(claim: Json, files: Files, scenario: Json) -> Found:
     """THR-DDM: (17)-(18) are in intervals of 99 % for all comparisons together, which follow from the counts."""
-    saved = read_json(folder / "paths.json")
+    saved = parse_json(content_of(files, "paths.json"), "paths.json")
     rows, experiments = saved["comparisons"], experiments_of(scenario)
     same("comparisons in the evidence", claim["evidence"]["comparisons"], rows)
     same("number of comparisons", len(rows), 2 * len(experiments))
@@ -131,7 +130,7 @@ def _time_interval(row: Json, experiment: Experiment, tail: float) -> None:
 
 
 def _error_interval(row: Json, experiment: Experiment, tail: float) -> None:
-    """Clopper and Pearson's, widened by the bias: at its ends the counts, or more extreme ones, have probability tail."""
+    """Clopper and Pearson's, widened by the bias: at an end the counts, or more extreme ones, have probability tail."""
     n, wrong = experiment.paths, row["wrong_decisions"]
     low, high = row["interval"][0] + ERROR_ALLOWANCE, row["interval"][1] - ERROR_ALLOWANCE
     agrees("estimate", row["estimate"], wrong / n, within=SMALL, about=experiment.name)
@@ -162,7 +161,7 @@ SERIES = ("bare", "automaton", "automaton_at_scenario_noise")
 DIVERGES_BELOW, FLAT_WITHIN, STANDARD_ERRORS = -0.25, 0.1, 5.0
 
 
-def refine(claim: Json, folder: Path, scenario: Json) -> Found:
+def refine(claim: Json, files: Files, scenario: Json) -> Found:
     """ZENO-REFINE: the bare threshold's mean count grows like dt^(-1/2), the automaton's tends to a limit.
 
     ln(mean) = c + p ln(dt) + b sqrt(dt); intervals of p by bootstrap over the paths. Supported if the bare p's
@@ -170,7 +169,7 @@ def refine(claim: Json, folder: Path, scenario: Json) -> Found:
     automaton's contains 0 and is within 1/10 of it, and no path exceeds duration / dwell + 1.
     """
     dt, duration, intensity = _steps_of(scenario)
-    counts = _counts(read_bytes(folder / "counts.csv"))
+    counts = _counts(content_of(files, "counts.csv"))
     close("noise steps", np.sort(counts.dt_s)[::-1], dt, within=1e-12)
     levels, leak = levels_of(scenario), scenario["decision"]["leak_1_s"]
     expected = np.array([expected_bare(float(step), duration, leak, float(dt[0])) for step in dt])
@@ -238,7 +237,9 @@ def _counts(content: bytes) -> Counts:
     for name in SERIES:
         values = table.pivot_table(name, "path", "dt_s").to_numpy(dtype=np.float64)[:, ::-1]
         same("counts of every path at every step", list(values.shape), [PATHS, HALVINGS + 1], about=name)
-        holds("counts are whole numbers", (values >= 0.0) & (values == np.round(values)), values, "0, 1, ...", about=name)
+        holds(
+            "counts are whole numbers", (values >= 0.0) & (values == np.round(values)), values, "0, 1, ...", about=name
+        )
         found[name] = values
     return Counts(dt, found)
 

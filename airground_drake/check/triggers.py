@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .files import Json
-from .rules import SMALL, Array, Disagreement, Found, close, holds
+from .rules import SMALL, Array, Disagreement, Found, at_most, close, holds, same
 from .run import Run
 from .scenario import Levels
 
@@ -18,6 +18,7 @@ EVENT_S = 1e-5
 VARIABLE_M = 1e-6
 """Recorded and recomputed decision variables may differ by this: x moves less within the event isolation."""
 SUPERVISING, INTERVENING, REFRACTORY = 0.0, 1.0, 2.0
+MODE_NAMES = ("SUPERVISING", "INTERVENING", "REFRACTORY")
 
 
 class Step(NamedTuple):
@@ -118,6 +119,29 @@ def automaton(x: Variable, levels: Levels) -> list[Step]:
             still_above = x.at(rested) >= levels.zeta_m
             trigger = rested if still_above else x.reaches(levels.zeta_m, rested, above=True)
     return found
+
+
+def refuted_zeno_proof(claim: Json, levels: Levels, bound_s: float) -> Found:
+    """ZENO-PROOF refuted: the recorded run is one of the automaton, and has two triggers closer than the bound."""
+    recorded = claim["counterexample"]["run"]
+    triggers = []
+    mode, rested = SUPERVISING, -np.inf
+    for row in recorded:
+        when, x = row["t_s"], row["x_m"]
+        before = mode
+        if mode == REFRACTORY and when >= rested:
+            mode = SUPERVISING
+        if mode == SUPERVISING and x >= levels.zeta_m:
+            mode, rested = INTERVENING, when + levels.dwell_s
+            triggers.append(when)
+        elif before == INTERVENING and x <= levels.release_m and x < levels.zeta_m:
+            mode = SUPERVISING if when >= rested else REFRACTORY
+        same("mode of the automaton", row["mode"], MODE_NAMES[int(mode)], t_s=when)
+        same("trigger of the automaton", row["trigger"], mode == INTERVENING and triggers[-1] == when, t_s=when)
+    at_most("two triggers of the automaton", 2 - len(triggers), 0)
+    gap = float(np.diff(triggers).min())
+    at_most("gap of two triggers", gap, bound_s)
+    return Found.with_margin("refuted", gap - bound_s)
 
 
 def thr_trig(run: Run, _: Json) -> Found:
