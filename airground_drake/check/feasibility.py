@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from .decisions import LEAST_COST, Decision, decisions_of, silent_ugvs
@@ -9,7 +11,7 @@ from .files import Json
 from .rules import SMALL, Array, Flags, Found, at_most, close, holds, same
 from .run import Run
 from .safety import avoidance_spare_m_s
-from .scenario import views_of
+from .scenario import Pair
 
 COST = 1e-9
 """Recorded and recomputed costs may differ by this, relative: rounding of 3 N additions errs by 1e-13."""
@@ -79,16 +81,8 @@ def _about_the_situation(run: Run, decision: Decision) -> None:
 
 def _about_what_is_sensed(run: Run, decision: Decision) -> None:
     """The points of (26) are what the UGV senses, moving on straight; what is left out is out of reach of any plan."""
-    after = _stage_ends_s(run)[:, None]
-    here = run.place_m(decision.ugv, decision.t_s)
-    held = min(int(np.searchsorted(run.t_s, decision.t_s - SMALL)), len(run.t_s) - 1)
-    unexplained = [*range(len(decision.distances_m))]
-    for pair in views_of(run.scenario):
-        there = run.place_m(pair.other, decision.t_s)
-        if pair.robot != decision.ugv or np.linalg.norm(there - here) > run.scenario["control"]["sensing_range_m"]:
-            continue
-        velocity = run.command_m_s[pair.other][held] if pair.other in run.robots else np.zeros(3)
-        path = there + after * velocity
+    unexplained, left_out = [*range(len(decision.distances_m))], []
+    for pair, path in _sensed(run, decision):
         same_point = [
             j
             for j in unexplained
@@ -98,11 +92,26 @@ def _about_what_is_sensed(run: Run, decision: Decision) -> None:
         if same_point:
             unexplained.remove(same_point[0])
         else:
-            _out_of_reach(run, decision, pair.other, path, pair.safe_m)
-    holds("points are what the UGV senses", not unexplained, unexplained, "no other points", **_at(decision))
+            left_out.append((pair, path))
+    strange = decision.centres_m[0, unexplained].tolist()
+    holds("points are what the UGV senses", not unexplained, strange, "no other points", **_at(decision))
+    for pair, path in left_out:
+        _out_of_reach(run, decision, pair, path)
 
 
-def _out_of_reach(run: Run, decision: Decision, name: str, path_m: Array, safe_m: float) -> None:
+def _sensed(run: Run, decision: Decision) -> Iterator[tuple[Pair, Array]]:
+    """What is within sensing range, and where it will be at the ends of the stages, (N, 3), m."""
+    here, after = run.place_m(decision.ugv, decision.t_s), _stage_ends_s(run)[:, None]
+    held = min(int(np.searchsorted(run.t_s, decision.t_s - SMALL)), len(run.t_s) - 1)
+    for pair in run.views:
+        if pair.robot == decision.ugv:
+            there = run.place_m(pair.other, decision.t_s)
+            if np.linalg.norm(there - here) <= run.scenario["control"]["sensing_range_m"]:
+                velocity = run.command_m_s[pair.other][held] if pair.other in run.robots else np.zeros(3)
+                yield pair, there + after * velocity
+
+
+def _out_of_reach(run: Run, decision: Decision, pair: Pair, path_m: Array) -> None:
     """No plan comes within the safe distance of what is left out: too far, or above (UGVs keep their height)."""
     modes = np.stack([decision.accept_m_s, decision.refuse_m_s])
     fastest = np.linalg.norm(modes, axis=2).max(axis=0)
@@ -112,10 +121,16 @@ def _out_of_reach(run: Run, decision: Decision, name: str, path_m: Array, safe_m
     apart = np.linalg.norm(path_m - decision.initial_m, axis=1) - reach
     above = np.abs(path_m[:, 2] - decision.initial_m[2])
     spare = np.maximum(apart, above)
-    at_most("what is left out is out of reach", safe_m - spare, 0.0, within=SMALL, **_at(decision, name))
+    at_most("what is left out is out of reach", pair.safe_m - spare, 0.0, within=SMALL, **_at(decision, pair.other))
     if decision.planned:
         clear = np.linalg.norm(decision.positions_m - path_m, axis=1)
-        at_most("the plan stays clear of what is left out", safe_m - clear, 0.0, within=SMALL, **_at(decision, name))
+        at_most(
+            "the plan stays clear of what is left out",
+            pair.safe_m - clear,
+            0.0,
+            within=SMALL,
+            **_at(decision, pair.other),
+        )
 
 
 def _plan_and_its_positions(decision: Decision) -> None:
@@ -264,7 +279,7 @@ def _own_task_while_nothing_is_accepted(run: Run, ugv: str) -> None:
     wanted *= (limit / np.maximum(speed, limit))[:, None]
     free = ~run.executed(ugv)[run.chosen_row]
     free &= (np.abs(preset.corner_s[:, None] - t) > control["period_s"]).all(axis=0)
-    for pair in views_of(run.scenario):
+    for pair in run.views:
         if pair.robot == ugv:
             free &= avoidance_spare_m_s(run, pair, wanted) > COMMAND_M_S
     commanded = run.command_m_s[ugv][run.chosen_row]

@@ -10,7 +10,7 @@ from .files import Json
 from .rules import SMALL, agrees, at_most, close, same
 from .run import Run
 from .safety import least_distance_m
-from .scenario import Pair, views_of
+from .scenario import Pair
 
 
 def check_metrics(run: Run, metrics: Json) -> str:
@@ -23,7 +23,7 @@ def check_metrics(run: Run, metrics: Json) -> str:
         Disagreement: if a rule is broken.
     """
     for robot in run.robots:
-        views = {pair.other: pair for pair in views_of(run.scenario) if pair.robot == robot}
+        views = {pair.other: pair for pair in run.views if pair.robot == robot}
         obstacles = [other for other, pair in views.items() if pair.share == 1.0]
         same("obstacles in the metrics", sorted(metrics["min_distance_m"][robot]), sorted(obstacles), about=robot)
         for other in obstacles:

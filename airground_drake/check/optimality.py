@@ -139,8 +139,8 @@ def _bound_and_gap_are_not_overstated(decision: Decision, found: Enclosure, norm
     known = [*decision.constant_m, *([decision.positions_of(decision.rounded)] if len(decision.rounded) else [])]
     loser = max(row["objective_accept"], row["objective_refuse"])  # along normals it costs that or more
     best = min(own, loser, *(float(decision.cost(positions, normals)) for positions in known))
-    at_most("recorded gap", row["gap"], _gap(own, bound), within=GAP, **at)
-    at_most("least gap that is possible", _gap(best, bound), row["gap"], within=GAP, **at)
+    least, most = _gap(best, bound), _gap(own, bound)
+    holds("recorded gap", least - GAP <= row["gap"] <= most + GAP, row["gap"], f"{least} to {most}", **at)
 
 
 def _gap(cost: float, bound: float) -> float:

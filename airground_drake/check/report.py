@@ -19,7 +19,7 @@ from .inputs import inputs_of
 from .metrics import check_metrics
 from .optimality import gate_opt, gate_sur
 from .outcome import comm, gate_time, live_goal
-from .rules import Disagreement, Found, NotEstablished, agrees, at_most, holds, same
+from .rules import Disagreement, Found, NotEstablished, agrees, holds, same
 from .run import Run, read_run
 from .safety import safe_hyp, safe_trace
 from .statistics import ddm, refine
@@ -225,8 +225,8 @@ def _judge(claim: Json, scenario: Json, decide: Callable[[Json], Found]) -> str:
         same("margin", margin, found.least)
     else:
         slop = found.within + 1e-6 * abs(margin)
-        at_most("margin", margin, found.most, within=slop)
-        at_most("least margin that is possible", found.least, margin, within=slop)
+        possible = found.least if found.least == found.most else f"{found.least} to {found.most}"
+        holds("margin", found.least - slop <= margin <= found.most + slop, margin, possible)
     agrees("evidence", claim["evidence"], found.facts, within=1e-8)
     return f"{status}{remark}" if margin is None else f"{status}{remark}, margin {margin:.6g} {claim['unit']}".rstrip()
 

@@ -14,7 +14,7 @@ import pandas as pd
 
 from .files import Json, canonical, parse_json, parse_table, read_bytes, sha256
 from .rules import SMALL, Array, Flags, NotEstablished, close, holds, same
-from .scenario import Levels, Pair, Preset, levels_of, pairs_of, preset_of, robots_of
+from .scenario import Levels, Pair, Preset, levels_of, pairs_of, preset_of, robots_of, views_of
 
 Rows = npt.NDArray[np.intp]
 SCHEMA = "airground_drake.trace/2"
@@ -73,6 +73,11 @@ class Run:
     def pairs(self) -> list[Pair]:
         """What is to be kept apart."""
         return pairs_of(self.scenario)
+
+    @cached_property
+    def views(self) -> list[Pair]:
+        """The same, as each robot sees it."""
+        return views_of(self.scenario)
 
     @cached_property
     def presets(self) -> dict[str, Preset]:

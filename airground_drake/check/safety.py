@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
 from .files import Json
-from .rules import SMALL, Array, Found, agrees, close, holds, same
+from .rules import SMALL, Array, Disagreement, Found, agrees, close, holds, same
 from .run import Run
-from .scenario import Pair, views_of
+from .scenario import Pair
 
 
+@lru_cache(maxsize=4096)
 def least_distance_m(run: Run, pair: Pair) -> float:
     """Least distance of a pair over continuous time.
 
@@ -65,12 +67,16 @@ def safe_hyp(run: Run, claim: Json) -> Found:
     """
     found = [*_constants(run), *_velocities(run), *_inequalities(run)]
     in_range = sum(len(each.margin) for each in found if each.name == "avoidance")
-    broken = [(each.t_s[k], each.name) for each in found for k in np.flatnonzero(~(each.margin >= -SMALL))[:1]]
+    broken = [(each, k) for each in found for k in np.flatnonzero(~(each.margin >= -SMALL))[:1]]
     leading = "avoidance"
     if broken:
-        leading, first = claim["where"]["hypothesis"], min(broken)[0]
-        earliest = sorted({name for when, name in broken if when <= first + SMALL})
-        holds("hypothesis broken first", leading in earliest, leading, " or ".join(earliest), t_s=float(first))
+        first, k = min(broken, key=lambda one: float(one[0].t_s[one[1]]))
+        when = float(first.t_s[k])
+        if claim["status"] == "holds":
+            raise Disagreement("the hypotheses held", "held", float(first.margin[k]), first.name, when)
+        leading = claim["where"]["hypothesis"]
+        earliest = sorted({each.name for each, j in broken if each.t_s[j] <= when + SMALL})
+        holds("hypothesis broken first", leading in earliest, leading, " or ".join(earliest), t_s=when)
     margins = [float(each.margin.min()) for each in found if each.name == leading and len(each.margin)]
     status = "refuted" if broken else "holds"
     margin = min(margins, default=None)
@@ -105,7 +111,7 @@ def _velocities(run: Run) -> Iterator[Hypothesis]:
 
 def _inequalities(run: Run) -> Iterator[Hypothesis]:
     """n.v >= share A (d - D) where D <= d, else n.v >= -share (D - d) / h, for what is within sensing range."""
-    for pair in views_of(run.scenario):
+    for pair in run.views:
         if pair.robot in run.robots:
             spare = avoidance_spare_m_s(run, pair, run.command_m_s[pair.robot][run.chosen_row])
             seen = np.isfinite(spare)

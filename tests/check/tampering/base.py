@@ -11,8 +11,6 @@ import hashlib
 import io
 import json
 import os
-import shutil
-import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -94,7 +92,7 @@ def edited_json(path: Path) -> Iterator[Any]:
     """The value of a JSON file, to be changed in place."""
     value = read_json(path)
     yield value
-    write(path, (json.dumps(value, indent=1, ensure_ascii=False) + "\n").encode())
+    write(path, json.dumps(value, ensure_ascii=False).encode())
 
 
 @contextlib.contextmanager
@@ -228,17 +226,27 @@ class Outcome:
 
 
 def copy(report: Path, folder: Path) -> Path:
-    """A copy of a report, to be tampered with."""
-    return Path(shutil.copytree(report, folder, copy_function=os.link))
+    """A copy of a report, to be tampered with; what is there of a copy that was is mended."""
+    originals = {path.relative_to(report): path for path in report.rglob("*")}
+    for path in sorted(folder.rglob("*"), reverse=True):
+        if path.relative_to(folder) not in originals:
+            path.rmdir() if path.is_dir() else path.unlink()
+    for name, original in sorted(originals.items()):
+        target = folder / name
+        if original.is_dir():
+            target.mkdir(parents=True, exist_ok=True)
+        elif not (target.exists() and target.samefile(original)):
+            target.unlink(missing_ok=True)
+            os.link(original, target)
+    return folder
 
 
 def attempt(report: Path, edit: Edit) -> Outcome:
-    """Tamper with a copy of a report, and check it."""
-    with tempfile.TemporaryDirectory(dir=report.parent) as scratch:
-        folder = copy(report, Path(scratch) / "report")
-        edit(folder)
-        said, complained = io.StringIO(), io.StringIO()
-        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(complained):
-            code = check.main(["--json", str(folder)])
+    """Tamper with a copy of a report, beside it, and check it."""
+    folder = copy(report, report.with_name(f"tampered_{os.getpid()}"))
+    edit(folder)
+    said, complained = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(said), contextlib.redirect_stderr(complained):
+        code = check.main(["--json", str(folder)])
     checks = json.loads(said.getvalue())["checks"] if said.getvalue() else []
     return Outcome(code, [entry for entry in checks if entry["outcome"] != "agrees"], complained.getvalue())

@@ -163,7 +163,7 @@ def lower_bound_lowered_with_its_gap(folder: Path) -> None:
         frame["gap"] = 1.0 - frame["lower_bound"] / frame["objective"]
 
 
-@refused_by("GATE-OPT", "least gap that is possible")
+@refused_by("GATE-OPT", "recorded gap")
 def gap_hidden(folder: Path) -> None:
     with edited_table(folder, "decisions") as frame:
         frame["gap"] -= 0.01
@@ -298,7 +298,7 @@ def relaxations_removed(folder: Path) -> None:
         edit_arrays(folder, name, lambda omega: omega[:0])
 
 
-@refused_by("GATE-TIME", "least margin that is possible")
+@refused_by("GATE-TIME", "margin")
 def decision_times_lowered(folder: Path) -> None:
     with edited_timings(folder) as timings:
         timings["decision_times_s"] = [0.1 * value for value in timings["decision_times_s"]]

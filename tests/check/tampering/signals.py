@@ -56,7 +56,7 @@ def command_changed(folder: Path) -> None:
         frame.loc[middle(frame), f"{UGV}.vy_m_s"] += 1e-3
 
 
-@refused_by("SAFE-HYP", "verdict")
+@refused_by("SAFE-HYP", "the hypotheses held")
 def faster_than_the_limit(folder: Path) -> None:
     """The UAV jumps by 1 m and back, by commands that lead there."""
     with edited_table(folder) as frame:
@@ -67,7 +67,7 @@ def faster_than_the_limit(folder: Path) -> None:
         frame.loc[row + 1, "uav.vz_m_s"] -= 1.0 / dt[row]
 
 
-@refused_by("trace", "a row at every control sample")
+@refused_by("trace", "the rows cover the run")
 def times_stretched(folder: Path) -> None:
     with edited_table(folder) as frame:
         frame["t_s"] *= 1.0 + 1e-6
