@@ -140,7 +140,7 @@ def _lines(folder: Path, report: Json) -> Iterator[Line]:
         return check_events(loaded(name))
 
     def metrics(name: str) -> str:
-        return check_metrics(loaded(name), report["runs"][name]["metrics"])
+        return _check_metrics(loaded(name), canonical(report["runs"][name]["metrics"]))
 
     for name in scenario["runs"]:
         yield _attempt("trace", name, partial(load, name))
@@ -233,6 +233,11 @@ def _judge(claim: Json, scenario: Json, decide: Callable[[Json], Found]) -> str:
         holds("margin", found.least - slop <= margin <= found.most + slop, margin, possible)
     agrees("evidence", claim["evidence"], found.facts, within=1e-8)
     return f"{status}{remark}" if margin is None else f"{status}{remark}, margin {margin:.6g} {claim['unit']}".rstrip()
+
+
+@lru_cache(maxsize=16)
+def _check_metrics(run: Run, metrics_text: str) -> str:
+    return check_metrics(run, json.loads(metrics_text))
 
 
 @lru_cache(maxsize=256)

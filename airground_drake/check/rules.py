@@ -117,7 +117,8 @@ def close(
         Disagreement: with the first entry along the first axis that differs.
     """
     theirs, ours = np.asarray(recorded, dtype=np.float64), np.asarray(recomputed, dtype=np.float64)
-    same(f"{rule}: number of values", list(theirs.shape), list(ours.shape), about=about)
+    if theirs.shape != ours.shape:
+        raise Disagreement(f"{rule}: number of values", list(theirs.shape), list(ours.shape), about)
     with np.errstate(invalid="ignore"):
         holds(rule, np.abs(theirs - ours) <= within, theirs, ours, about=about, t_s=t_s)
 

@@ -28,7 +28,6 @@ def test_an_untouched_report_agrees_everywhere(report: Path, capsys: pytest.Capt
         (["duration_s=8"], set()),  # nothing triggers: no decisions at all
         (["duration_s=10.56"], set()),  # the run ends before a decision is due
         (["decision.trigger=bare", "duration_s=11"], {"not_cheaper"}),  # ZENO-PROOF is refuted by a run
-        (["gatekeeper.route=enumeration", "duration_s=11"], {"not_cheaper"}),
     ],
 )
 def test_reports_of_changed_scenarios_agree(

@@ -13,6 +13,7 @@ import json
 import os
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -225,19 +226,33 @@ class Outcome:
         )
 
 
+@cache
+def _contents(report: Path) -> tuple[set[str], dict[str, int]]:
+    """Folders of a report, and the inode of each of its files, by relative path."""
+    folders, files = set(), {}
+    for place, _, names in os.walk(report):
+        folders.add(os.path.relpath(place, report))
+        for name in names:
+            path = os.path.join(place, name)
+            files[os.path.relpath(path, report)] = os.stat(path).st_ino
+    return folders, files
+
+
 def copy(report: Path, folder: Path) -> Path:
     """A copy of a report, to be tampered with; what is there of a copy that was is mended."""
-    originals = {path.relative_to(report): path for path in report.rglob("*")}
-    for path in sorted(folder.rglob("*"), reverse=True):
-        if path.relative_to(folder) not in originals:
-            path.rmdir() if path.is_dir() else path.unlink()
-    for name, original in sorted(originals.items()):
-        target = folder / name
-        if original.is_dir():
-            target.mkdir(parents=True, exist_ok=True)
-        elif not (target.exists() and target.samefile(original)):
-            target.unlink(missing_ok=True)
-            os.link(original, target)
+    folders, files = _contents(report)
+    for place, _, names in os.walk(folder, topdown=False):
+        for name in names:
+            path = os.path.join(place, name)
+            if files.get(os.path.relpath(path, folder)) != os.stat(path).st_ino:
+                os.unlink(path)
+        if os.path.relpath(place, folder) not in folders:
+            os.rmdir(place)
+    for name in folders:
+        (folder / name).mkdir(parents=True, exist_ok=True)
+    for name in files:
+        if not os.path.exists(folder / name):
+            os.link(report / name, folder / name)
     return folder
 
 
