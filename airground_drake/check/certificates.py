@@ -14,10 +14,10 @@ An identity may prove something else than the claim. What a claim consists of is
     {"goal": polynomial, "nonnegative": [...], "positive": [...], "zero": [...]},
 
 the goal to be shown and the premises that may be used, no others: hypotheses, strict ones and equations. Names in
-capitals (DWELL, BOUND) are numbers of the scenario. That these obligations together make the claim is the argument in
-the claim's own text. Some are there again with the scenario's numbers, `inside_obstacle` for `inside` between robots
-and obstacles and so on: then the numbers are put into goal and premises, and a premise that has become a number must be
-a true one.
+capitals (DWELL, BOUND, GAIN, PERIOD) are numbers of the scenario. That these obligations together make the claim is the
+argument in the claim's own text. Some are there again with the scenario's numbers, `inside_obstacle` for `inside`
+between robots and obstacles and so on: then the numbers are put into goal and premises, and a premise that has become a
+number must be a true one.
 """
 
 from __future__ import annotations
@@ -39,11 +39,13 @@ GROUPS = {"hypotheses": "nonnegative", "strict": "positive", "equations": "zero"
 """Kinds of premises: in a certificate, and in obligations.json."""
 NUMBERED = {
     "SAFE-INV": ("outside", "inside", "unseen"),
-    "SAFE-DIST": ("outside_bound", "inside_bound", "unseen_bound"),
+    "SAFE-DIST": ("outside_bound", "inside_bound", "unseen_bound", "positive"),
 }
 """Obligations that are there again for each kind of pairs."""
-ONE_FORM = ("unseen", "unseen_bound")
+ONE_FORM = ("unseen", "unseen_bound", "positive")
 """Those that have the same form for obstacles and for robots; of the others, robots have the one named `pair_...`."""
+ONLY_NUMBERED = "positive"
+"""The one that is there with numbers only."""
 SHORTEST_S = 1e-3
 """Bound that ZENO-PROOF tries where the scenario has none."""
 ROUNDOFF = 2.0**-53
@@ -131,25 +133,26 @@ def listed() -> Json:
 
 def _consists_of_the_claim(claim: str, obligations: Mapping[str, Json], scenario: Json) -> None:
     """Every obligation of the claim is there, with its goal and no premise besides; also with numbers."""
-    decision = scenario["decision"]
-    numbers = {
+    for name, (form, numbers) in _wanted(claim, scenario).items():
+        holds("the obligation is there", name in obligations, "nothing", form["goal"], about=name)
+        _is_the_listed_one(obligations[name], form, numbers)
+
+
+def _wanted(claim: str, scenario: Json) -> dict[str, tuple[Json, dict[str, Fraction]]]:
+    """What a claim consists of, by name: an entry of obligations.json, and the numbers to be put into it."""
+    forms, control = listed()[claim], scenario["control"]
+    constants = {
         "DWELL": rational(levels_of(scenario).dwell_s),
-        "BOUND": rational(decision["min_inter_event_s"] or SHORTEST_S),
+        "BOUND": rational(scenario["decision"]["min_inter_event_s"] or SHORTEST_S),
+        "GAIN": rational(control["avoidance_gain_1_s"]),
+        "PERIOD": rational(control["period_s"]),
     }
-    wanted = {name: (form, numbers) for name, form in listed()[claim].items()}
+    found = {name: (form, constants) for name, form in forms.items() if name != ONLY_NUMBERED}
     for kind in kinds_of(scenario):
-        values = numbers_of(kind, scenario)
         for name in NUMBERED.get(claim, ()):
             base = name if kind.share == 1.0 or name in ONE_FORM else f"pair_{name}"
-            wanted[f"{base}_{kind.name}"] = (listed()[claim][base], values)
-        if claim == "SAFE-DIST":
-            wanted[f"positive_{kind.name}"] = (listed()[claim]["positive"], values)
-        if claim == "SAFE-INV":
-            wanted["stable"] = (listed()[claim]["stable"], values)
-    wanted.pop("positive", None)
-    for name, (form, values) in wanted.items():
-        holds("the obligation is there", name in obligations, "nothing", form["goal"], about=name)
-        _is_the_listed_one(obligations[name], form, values)
+            found[f"{base}_{kind.name}"] = (forms[base], numbers_of(kind, scenario))
+    return found
 
 
 def rational(value: float) -> Fraction:

@@ -187,12 +187,12 @@ def enclose(decision: Decision) -> Enclosure:
     shares = np.eye(lacking.shape[1])[lacking.argmax(axis=1)]
     lower = _lower_bound(decision, positions, lacking, shares)
     if upper - lower > NARROW * decision.scale:
-        shares = _shares_at_ties(decision, positions, lacking)
+        shares = _shares_at_ties(decision, positions, lacking, normals)
         lower = max(lower, _lower_bound(decision, positions, lacking, shares))
     return Enclosure(lower, upper)
 
 
-def _slopes(decision: Decision, positions_m: Array, forces: Array) -> Array:
+def _slopes(decision: Decision, forces: Array) -> Array:
     """Slopes by omega, (N,), of a function of the positions with derivatives `forces`, (N, 3).
 
     omega_k moves all positions from stage k on by dt (a_k - b_k).
@@ -210,18 +210,17 @@ def _lower_bound(decision: Decision, positions_m: Array, lacking_m: Array, share
     of_slack = decision.slack_weight_1_m2_s * (2.0 * slack * shared - slack**2).sum()
     away = np.zeros_like(error) if decision.normals is None else (shares[..., None] * decision.normals).sum(axis=1)
     forces = decision.error_weight_1_m2_s * error - decision.slack_weight_1_m2_s * slack[:, None] * away
-    slopes = _slopes(decision, positions_m, 2.0 * dt * forces)
+    slopes = _slopes(decision, 2.0 * dt * forces)
     corner = np.minimum(-slopes * omega, slopes * (1.0 - omega)).sum()
     return float(dt * (of_error + of_slack) + corner)
 
 
-def _shares_at_ties(decision: Decision, positions_m: Array, lacking_m: Array) -> Array:
+def _shares_at_ties(decision: Decision, positions_m: Array, lacking_m: Array, normals: Array) -> Array:
     """Shares (N, m) under which omega* is as nearly optimal as can be, by least squares.
 
     Optimal is: slope 0 where 0 < omega*_k < 1, not negative at 0, not positive at 1. Unknown are the shares of the
     points that lack the most, and what the slopes at 0 and 1 are off 0: none of them negative.
     """
-    assert decision.normals is not None
     omega, n = decision.relaxed, decision.stages
     slack = lacking_m.max(axis=1)
     tied = (lacking_m >= slack[:, None] - TIED_M) & (lacking_m > 0.0)
@@ -233,9 +232,9 @@ def _shares_at_ties(decision: Decision, positions_m: Array, lacking_m: Array) ->
     columns = []
     for k, j in zip(stage, point, strict=True):
         force = np.zeros((n, 3))
-        force[k] = -2.0 * decision.dt_s * decision.slack_weight_1_m2_s * slack[k] * decision.normals[k, j]
-        columns.append(_slopes(decision, positions_m, force))
-    own = _slopes(decision, positions_m, 2.0 * decision.dt_s * decision.error_weight_1_m2_s * error)
+        force[k] = -2.0 * decision.dt_s * decision.slack_weight_1_m2_s * slack[k] * normals[k, j]
+        columns.append(_slopes(decision, force))
+    own = _slopes(decision, 2.0 * decision.dt_s * decision.error_weight_1_m2_s * error)
     at_0, at_1 = np.eye(n)[:, omega <= EDGE], np.eye(n)[:, omega >= 1.0 - EDGE]
     of_slopes = np.hstack([np.stack(columns, axis=1), -at_0, at_1])
     heavy = 10.0 * max(1.0, float(np.abs(of_slopes).max()))
