@@ -1,0 +1,25 @@
+"""An independent check of a report: `python -m airground_drake.check DIR`.
+
+Every verdict in DIR/report.json is established again from DIR/trace/ and DIR/certificates/, by formulas that are
+written here from the statements of the claims; proofs in exact rational arithmetic. Only the standard library, numpy
+and pandas are used: no Drake, no solver, nothing else of this package. docs/checker.md says what each rule establishes.
+
+    files, rules, scenario     strict reading; what a broken rule says; what a scenario declares
+    run, events, metrics       a trace that is of its run and obeys its law of motion; what follows from it
+    safety                     SAFE-TRACE, SAFE-HYP
+    triggers                   ZENO-TRACE, THR-TRIG
+    outcome                    LIVE-GOAL, COMM, GATE-TIME
+    decisions                  a recorded decision, its problem (26), predictions (23) and costs (25)
+    feasibility                GATE-FEAS
+    optimality                 GATE-SUR, GATE-OPT
+    polynomials, certificates  SAFE-LEMMA, SAFE-INV, SAFE-GATE, SAFE-DIST, ZENO-PROOF; obligations.json
+    enclosures                 THR-ROOT, THR-OPT
+    statistics                 THR-DDM, ZENO-REFINE
+    inputs                     the constants that a claim about the model must be about
+    report                     verdicts, their expectations, and the verdict over all of them
+    command                    the command line
+"""
+
+from .command import main
+
+__all__ = ["main"]

@@ -1,0 +1,110 @@
+"""The command line of the checker."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, NoReturn
+
+from .report import AGREES, DISAGREES, OPEN, Line, check_report
+from .rules import Disagreement, NotEstablished
+
+SCHEMA = "airground_drake.check/1"
+EPILOG = """\
+Each line says what was checked, on which run, and
+  agrees                     established again, with the recorded verdict, margin and evidence
+  DISAGREES                  files contradict the verdict or each other: the rule, the time, both values
+  cannot be re-established   a file cannot be read, or no way is known here to decide the claim
+Exit codes: 0 all agree; 1 not all; 2 usage, or no report."""
+
+
+class UsageError(Exception):
+    """The arguments cannot be used."""
+
+
+class _Parser(argparse.ArgumentParser):
+    """Raises in place of printing and exiting."""
+
+    def error(self, message: str) -> NoReturn:
+        raise UsageError(message)
+
+
+def _parser() -> _Parser:
+    parser = _Parser(
+        prog="python -m airground_drake.check",
+        description="Establish every verdict of a report again, from its files alone.",
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("report", metavar="DIR", type=Path, help="folder with report.json, trace/ and certificates/")
+    parser.add_argument("--json", action="store_true", help="write strict JSON to standard output")
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Check a report and print what was found.
+
+    Args:
+        arguments: of the command line; default: those of the process.
+
+    Returns:
+        The exit code: 0 all agree, 1 not all, 2 usage or no report.
+    """
+    try:
+        options = _parser().parse_args(arguments)
+    except UsageError as error:
+        return _refuse(f"{error}; usage: python -m airground_drake.check [--json] DIR")
+    except SystemExit:  # --help has been printed
+        return 0
+    try:
+        lines = check_report(options.report)
+    except Disagreement as broken:
+        return _refuse(f"{options.report} is no report: {broken.rule}: {broken.about} is {broken.recorded}")
+    except NotEstablished as error:
+        return _refuse(f"{options.report} is no report: {error.rule}: {error.about}: {error.why}")
+    if options.json:
+        print(json.dumps(_document(options.report, lines), indent=1, allow_nan=False))
+    else:
+        _print(lines)
+    return int(any(line.outcome != AGREES for line in lines))
+
+
+def _refuse(why: str) -> int:
+    print("error:", " ".join(why.split()), file=sys.stderr)
+    return 2
+
+
+def _print(lines: Sequence[Line]) -> None:
+    for line in lines:
+        print(f"{line.claim:<12}{line.run or '-':<8} {line.outcome}: {line.text}")
+    counts = _counts(lines)
+    print(f"{len(lines)} checks: {', '.join(f'{count} {outcome}' for outcome, count in counts.items())}")
+
+
+def _counts(lines: Sequence[Line]) -> dict[str, int]:
+    found = Counter(line.outcome for line in lines)
+    return {outcome: found[outcome] for outcome in (AGREES, DISAGREES, OPEN)}
+
+
+def _document(folder: Path, lines: Sequence[Line]) -> dict[str, Any]:
+    checks = [_strict(asdict(line)) for line in lines]
+    return {"schema": SCHEMA, "report": str(folder), "checks": checks, "summary": _counts(lines)}
+
+
+def _strict(value: Any) -> Any:
+    """Plain JSON: a number that is not finite, and whatever else JSON has no word for, as text."""
+    if isinstance(value, dict):
+        return {str(key): _strict(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_strict(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)
+    if value is None or isinstance(value, (str, int, float)):
+        return value
+    return str(value)

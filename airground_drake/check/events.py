@@ -1,0 +1,118 @@
+"""The events of a run: all but proposals follow from its signals and its decisions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import lru_cache
+from itertools import pairwise, zip_longest
+from typing import NamedTuple
+
+import numpy as np
+
+from .files import Json
+from .rules import SMALL, Disagreement, close, holds
+from .run import Run
+
+FREE = ("proposal",)
+"""Kinds of events of which there is no other record."""
+
+
+class Event(NamedTuple):
+    """An event that follows from the rest of a trace."""
+
+    t_s: float
+    robot: str
+    kind: str
+    policy: str = ""
+
+    @classmethod
+    def of(cls, recorded: Json) -> Event:
+        """A recorded one."""
+        return cls(float(recorded["t_s"]), recorded["robot"], recorded["kind"], recorded.get("policy", ""))
+
+
+@lru_cache(maxsize=8)
+def check_events(run: Run) -> str:
+    """Apply the rules about events.
+
+    Returns:
+        What was found, in words.
+
+    Raises:
+        Disagreement: if a rule is broken.
+    """
+    _events_are_in_order(run)
+    _events_follow_from_signals_and_decisions(run)
+    _events_are_where_their_robots_were(run)
+    _nothing_is_executed_before_it_was_proposed(run)
+    return f"{len(run.events)} events"
+
+
+def _events_are_in_order(run: Run) -> None:
+    for before, after in pairwise(run.events):
+        later = f"not before {before['t_s']}"
+        holds("events are in order", after["t_s"] >= before["t_s"], after["t_s"], later, t_s=after["t_s"])
+
+
+def _events_follow_from_signals_and_decisions(run: Run) -> None:
+    found = sorted([*_crossings(run), *_answers(run), *_arrivals(run), *_collisions(run)])
+    recorded = sorted(Event.of(event) for event in run.events if event["kind"] not in FREE)
+    for theirs, ours in zip_longest(recorded, found):
+        if theirs != ours:
+            first = min(event for event in (theirs, ours) if event is not None)
+            raise Disagreement("events follow from signals and decisions", theirs, ours, first.robot, first.t_s)
+
+
+def _crossings(run: Run) -> Iterator[Event]:
+    """Triggers and releases: every time that the signals have had as the last one."""
+    for ugv in run.ugvs:
+        for kind, name in (("trigger", "triggered_at_s"), ("release", "released_at_s")):
+            for when in np.unique(run.column(f"{ugv}.{name}")):
+                if when >= 0.0:
+                    yield Event(float(when), ugv, kind)
+
+
+def _answers(run: Run) -> Iterator[Event]:
+    """An event whenever the answer to a proposal is new or has changed."""
+    known: dict[tuple[str, float], str] = {}
+    for row in run.decisions.to_dict("records"):
+        proposal = (row["robot"], row["issued_s"])
+        if known.get(proposal) != row["decision"]:
+            known[proposal] = row["decision"]
+            yield Event(row["t_s"], row["robot"], row["decision"], row["policy"])
+
+
+def _arrivals(run: Run) -> Iterator[Event]:
+    """The row from which on a robot stays within the arrival tolerance of its target."""
+    for robot, spec in run.robots.items():
+        away = np.linalg.norm(run.position_m[robot] - np.array(spec["target_m"]), axis=1)
+        outside = np.flatnonzero(away > run.scenario["arrival_tolerance_m"])
+        first = int(outside[-1]) + 1 if len(outside) else 0
+        if first < len(away):
+            yield Event(float(run.t_s[first]), robot, "arrival")
+
+
+def _collisions(run: Run) -> Iterator[Event]:
+    """The first row of each visit within collision distance of an obstacle."""
+    for robot in run.robots:
+        for obstacle in run.scenario["obstacles"]:
+            distance = np.linalg.norm(run.position_m[robot] - run.position_m[obstacle], axis=1)
+            hit = distance < run.scenario["safe_distance"]["collision_m"]
+            begins = hit & ~np.append(False, hit[:-1])
+            yield from (Event(float(when), robot, "collision") for when in run.t_s[begins])
+
+
+def _events_are_where_their_robots_were(run: Run) -> None:
+    for event in run.events:
+        here = run.place_m(event["robot"], event["t_s"])
+        about = f"{event['kind']} of {event['robot']}"
+        close("place of an event", event["position_m"], here, within=SMALL, about=about, t_s=event["t_s"])
+
+
+def _nothing_is_executed_before_it_was_proposed(run: Run) -> None:
+    for ugv in run.ugvs:
+        sent = run.times_s(ugv, "proposal")
+        earliest = sent[0] if len(sent) else np.inf
+        executed = run.t_s[run.executed(ugv)]
+        what = "an intervention is executed after it was proposed"
+        holds(what, executed >= earliest, executed, f"not before {earliest} s", about=ugv, t_s=executed)

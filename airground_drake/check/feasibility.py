@@ -1,0 +1,287 @@
+"""GATE-FEAS: a decision is about the UGV's situation, its plan satisfies (26b)-(26e), its answer follows the rules."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from .decisions import LEAST_COST, Decision, decisions_of, silent_ugvs
+from .files import Json
+from .rules import SMALL, Array, Flags, Found, at_most, close, holds, same
+from .run import Run
+from .safety import avoidance_spare_m_s
+from .scenario import Pair
+
+COST = 1e-9
+"""Recorded and recomputed costs may differ by this, relative: rounding of 3 N additions errs by 1e-13."""
+SPEED = 1e-4
+"""A step may be longer than the speed limit allows by this, relative."""
+COMMAND_M_S = 1e-6
+"""A command may differ from the UGV's own task by this: positions enter with the motion gain."""
+INSIDE_M = 1e-6
+"""Closer than the safe distance by more than this, avoidance may ask for more speed than the limit."""
+NO_DIFFERENCE = 1e-6
+"""Relative gain from which on a new proposal makes a difference."""
+CHOICES = ("refuse", "accept")
+
+
+def gate_feas(run: Run, _: Json) -> Found:
+    """GATE-FEAS: situation, plan, answer and obedience; the margin is the part of a tolerance that rounding leaves."""
+    if silent_ugvs(run):
+        return Found("not_run")
+    decisions = decisions_of(run)
+    for decision in decisions:
+        _on_a_proposal(run, decision)
+        _about_the_situation(run, decision)
+        _about_what_is_sensed(run, decision)
+        if decision.planned:
+            _plan_and_its_positions(decision)
+            _costs_and_clearance(decision)
+        _no_faster_than_the_limit(run, decision)
+    for ugv in run.ugvs:
+        mine = [decision for decision in decisions if decision.ugv == ugv]
+        _answers_follow_the_rules(run, mine)
+        _every_proposal_is_decided_on(run, ugv, mine)
+        _nothing_is_executed_without_acceptance(run, ugv, mine)
+        if decisions:
+            _own_task_while_nothing_is_accepted(run, ugv)
+    return Found("holds", 0.0, 1.0, {"decisions": len(decisions)}) if decisions else Found("holds")
+
+
+def _at(decision: Decision, what: str = "") -> Json:
+    """Arguments of a rule: of which UGV's decision, when."""
+    return {"about": f"decision of {decision.ugv}{what and ', '}{what}", "t_s": decision.t_s}
+
+
+def _on_a_proposal(run: Run, decision: Decision) -> None:
+    """It is on a proposal that was sent, by the policy that it names, and by the scenario's route."""
+    sent = [[event["robot"], event["t_s"], event["policy"]] for event in run.events if event["kind"] == "proposal"]
+    named = [decision.ugv, decision.row["issued_s"], decision.row["policy"]]
+    holds("the decision is on a proposal", named in sent, named, str(sent), **_at(decision))
+    same("route of the decision", decision.row["route"], run.scenario["gatekeeper"]["route"], **_at(decision))
+
+
+def _stage_ends_s(run: Run) -> Array:
+    """Ends of the stages after the time of a decision, (N,)."""
+    gate = run.scenario["gatekeeper"]
+    return gate["horizon_s"] / gate["stages"] * np.arange(1.0, gate["stages"] + 1.0)
+
+
+def _about_the_situation(run: Run, decision: Decision) -> None:
+    """Stages, weights, position and reference are the scenario's and the signals'."""
+    gate, at, after = run.scenario["gatekeeper"], _at(decision), _stage_ends_s(run)
+    close("length of a stage", decision.dt_s, after[0], within=SMALL, **at)
+    same("weight of errors", decision.error_weight_1_m2_s, gate["error_weight_1_m2_s"], **at)
+    same("weight of slack", decision.slack_weight_1_m2_s, gate["slack_weight_1_m2_s"], **at)
+    close("initial position", decision.initial_m, run.place_m(decision.ugv, decision.t_s), within=SMALL, **at)
+    reference = run.presets[decision.ugv].position_m(decision.t_s + after)
+    close("reference", decision.reference_m, reference, within=SMALL, **at)
+
+
+def _about_what_is_sensed(run: Run, decision: Decision) -> None:
+    """The points of (26) are what the UGV senses, moving on straight; what is left out is out of reach of any plan."""
+    unexplained, left_out = [*range(len(decision.distances_m))], []
+    for pair, path in _sensed(run, decision):
+        same_point = [
+            j
+            for j in unexplained
+            if abs(decision.distances_m[j] - pair.safe_m) <= SMALL
+            and np.abs(decision.centres_m[:, j] - path).max() <= SMALL
+        ]
+        if same_point:
+            unexplained.remove(same_point[0])
+        else:
+            left_out.append((pair, path))
+    strange = decision.centres_m[0, unexplained].tolist()
+    holds("points are what the UGV senses", not unexplained, strange, "no other points", **_at(decision))
+    for pair, path in left_out:
+        _out_of_reach(run, decision, pair, path)
+
+
+def _sensed(run: Run, decision: Decision) -> Iterator[tuple[Pair, Array]]:
+    """What is within sensing range, and where it will be at the ends of the stages, (N, 3), m."""
+    here, after = run.place_m(decision.ugv, decision.t_s), _stage_ends_s(run)[:, None]
+    held = min(int(np.searchsorted(run.t_s, decision.t_s - SMALL)), len(run.t_s) - 1)
+    for pair in run.views:
+        if pair.robot == decision.ugv:
+            there = run.place_m(pair.other, decision.t_s)
+            if np.linalg.norm(there - here) <= run.scenario["control"]["sensing_range_m"]:
+                velocity = run.command_m_s[pair.other][held] if pair.other in run.robots else np.zeros(3)
+                yield pair, there + after * velocity
+
+
+def _out_of_reach(run: Run, decision: Decision, pair: Pair, path_m: Array) -> None:
+    """No plan comes within the safe distance of what is left out: too far, or above (UGVs keep their height)."""
+    modes = np.stack([decision.accept_m_s, decision.refuse_m_s])
+    fastest = np.linalg.norm(modes, axis=2).max(axis=0)
+    if decision.row["route"] == "rollout":  # between two changes of mode a plan may be as fast as any
+        fastest = np.maximum(fastest, run.robots[decision.ugv]["max_speed_m_s"])
+    reach = decision.dt_s * np.cumsum(fastest)
+    apart = np.linalg.norm(path_m - decision.initial_m, axis=1) - reach
+    above = np.abs(path_m[:, 2] - decision.initial_m[2])
+    spare = np.maximum(apart, above)
+    at_most("what is left out is out of reach", pair.safe_m - spare, 0.0, within=SMALL, **_at(decision, pair.other))
+    if decision.planned:
+        clear = np.linalg.norm(decision.positions_m - path_m, axis=1)
+        at_most(
+            "the plan stays clear of what is left out",
+            pair.safe_m - clear,
+            0.0,
+            within=SMALL,
+            **_at(decision, pair.other),
+        )
+
+
+def _plan_and_its_positions(decision: Decision) -> None:
+    """Omega is 0 or 1; positions are those of (23), for route 'rollout' up to the first change of mode."""
+    plan, at = decision.plan, _at(decision)
+    holds("omega is 0 or 1", (plan == 0.0) | (plan == 1.0), plan, "0 or 1", **at)
+    follows = np.full(decision.stages, True)
+    if decision.row["route"] == "rollout":
+        follows = np.logical_and.accumulate(plan == plan[0])
+    predicted = decision.positions_of(plan)[follows]
+    close("positions of the plan, (23)", decision.positions_m[follows], predicted, within=SMALL, **at)
+    same("first stage", decision.row["first_stage"], CHOICES[int(plan[0])], **at)
+
+
+def _costs_and_clearance(decision: Decision) -> None:
+    """Costs are those of (25), and the plan is no dearer than the best of the other choice."""
+    row, at = decision.row, _at(decision)
+    cost = float(decision.cost(decision.positions_m))
+    slop = COST * max(cost, LEAST_COST)
+    close("objective, (25)", row["objective"], cost, within=slop, **at)
+    close("objective of the first stage's choice", row[f"objective_{row['first_stage']}"], cost, within=slop, **at)
+    at_most("objective", row["objective"], min(row["objective_accept"], row["objective_refuse"]), within=slop, **at)
+    for choice, constant in zip(CHOICES, decision.constant_cost, strict=True):
+        slop = COST * max(constant, LEAST_COST)
+        close(f"cost of {choice} throughout", row[f"{choice}_throughout"], constant, within=slop, **at)
+    clearance = min(float(decision.gaps_m(decision.positions_m).min(initial=np.inf)), 1e9)
+    close("predicted clearance", row["predicted_clearance_m"], clearance, within=SMALL, **at)
+
+
+def _no_faster_than_the_limit(run: Run, decision: Decision) -> None:
+    """No step of the plan, or of a constant one, is longer than the speed limit allows, unless it begins inside."""
+    limit = run.robots[decision.ugv]["max_speed_m_s"]
+    ways = dict(zip(("refusing throughout", "accepting throughout"), decision.constant_m, strict=True))
+    if decision.planned:
+        ways["the plan"] = decision.positions_m
+    for name, positions in ways.items():
+        steps = np.linalg.norm(np.diff(positions, axis=0, prepend=decision.initial_m[None]), axis=1)
+        clear = _clear_of_safe_distances(run, decision, positions)
+        longest = limit * decision.dt_s * (1.0 + SPEED)
+        at_most("length of a step", steps[clear], longest, **_at(decision, name))
+
+
+def _clear_of_safe_distances(run: Run, decision: Decision, positions_m: Array) -> Flags:
+    """Stages (N,) in which no control sample is within a safe distance by more than rounding."""
+    centres = decision.centres_m
+    before = 2.0 * centres[0] - centres[min(1, decision.stages - 1)]
+    start = np.linalg.norm(decision.initial_m - before, axis=1) - decision.distances_m
+    gaps = decision.gaps_m(positions_m).min(axis=1, initial=np.inf)
+    inside = np.append(start.min(initial=np.inf), gaps) < -INSIDE_M
+    several_samples = decision.dt_s > run.scenario["control"]["period_s"] + SMALL
+    return np.asarray(~(inside[:-1] | (inside[1:] & several_samples)))
+
+
+def _answers_follow_the_rules(run: Run, decisions: list[Decision]) -> None:
+    """While a proposal stands a decision follows every period, and each answer has its reason."""
+    gate = run.scenario["gatekeeper"]
+    period = gate["period_s"]
+    last: Decision | None = None
+    since = 0.0
+    for decision in decisions:
+        row, at = decision.row, _at(decision)
+        if last is not None and last.row["issued_s"] != row["issued_s"]:
+            last = None
+        if last is None:
+            at_most("the first decision on a proposal comes within a period", row["t_s"], row["issued_s"] + period,
+                    within=SMALL, **at)  # fmt: skip
+            at_most("a decision comes after its proposal", row["issued_s"], row["t_s"], within=SMALL, **at)
+        else:
+            close("decisions follow each other by a period", row["t_s"], last.t_s + period, within=SMALL, **at)
+        standing = None if last is None else last.row["decision"]
+        answer = _answer(decision, standing, decision.t_s - since, gate)
+        same("answer and its reason", [row["decision"], row["reason"]], list(answer), **at)
+        if row["decision"] != standing:
+            since = decision.t_s
+        last = decision
+
+
+def _answer(decision: Decision, standing: str | None, stood_s: float, gate: Json) -> tuple[str, str]:
+    """Answer and reason by the rules, from the recorded costs and bend.
+
+    Args:
+        decision: the decision.
+        standing: the answer to this proposal so far, or None.
+        stood_s: for how long it has been that.
+        gate: the scenario's margins.
+    """
+    row, bent = decision.row, decision.row["bend"] > gate["max_bend"]
+    if not decision.planned:
+        return "refuse", "no_plan"
+    first = CHOICES[int(decision.plan[0])]
+    if standing is None:
+        if first == "refuse":
+            return "refuse", "not_cheaper"
+        if row["objective"] >= (1.0 - NO_DIFFERENCE) * row["refuse_throughout"]:
+            return "refuse", "no_difference"
+        return ("refuse", "bent") if bent else ("accept", "cheaper")
+    enough = (1.0 - gate["switching_margin"]) * row[f"{standing}_throughout"]
+    cheaper = first != standing and row["objective"] < enough
+    turn = cheaper or bent if standing == "accept" else cheaper and not bent
+    if not turn:
+        return standing, "kept"
+    if stood_s < gate["min_dwell_s"] - SMALL:
+        return standing, "dwell"
+    return ("refuse" if standing == "accept" else "accept"), "reversed"
+
+
+def _every_proposal_is_decided_on(run: Run, ugv: str, decisions: list[Decision]) -> None:
+    """A proposal that stands for a period, the UGV being intervened on all the time, is decided on."""
+    allowed_s = run.scenario["gatekeeper"]["period_s"] + run.scenario["intervention"]["period_s"] + SMALL
+    answered = {decision.row["issued_s"] for decision in decisions}
+    sent, stays = run.times_s(ugv, "proposal"), run.interventions_s(ugv)
+    for k, issued in enumerate(sent):
+        replaced = k + 1 < len(sent) and sent[k + 1] <= issued + allowed_s
+        stands = ((stays[:, 0] <= issued + SMALL) & (stays[:, 1] > issued + allowed_s)).any()
+        if stands and not replaced:
+            holds("a proposal is decided on", issued in answered, "no decision", "a decision", about=ugv, t_s=issued)
+
+
+def _nothing_is_executed_without_acceptance(run: Run, ugv: str, decisions: list[Decision]) -> None:
+    """What a row executes was set at the last control sample before it, by an acceptance not older than a period."""
+    executed = run.executed(ugv)
+    executed[0] = False  # nothing is executed before the first row
+    rows = np.flatnonzero(executed)
+    control_s, gate_s = run.scenario["control"]["period_s"], run.scenario["gatekeeper"]["period_s"]
+    set_at = control_s * (np.ceil(run.t_s[rows] / control_s - 1e-6) - 1.0)
+    decided = np.array([decision.t_s for decision in decisions])
+    last = np.searchsorted(decided, set_at + SMALL) - 1
+    for row, when, k in zip(rows, set_at, last, strict=True):
+        in_force = k >= 0 and decisions[k].row["decision"] == "accept" and when - decided[k] <= gate_s + SMALL
+        what = "an intervention is executed only while accepted"
+        holds(what, in_force, "executed", "no acceptance in force", about=ugv, t_s=float(run.t_s[row]))
+
+
+def _own_task_while_nothing_is_accepted(run: Run, ugv: str) -> None:
+    """Where nothing is accepted and avoidance does not interfere, the command is the UGV's own task (6).
+
+    That is v = d rho_rd/dt + B (rho_rd - rho), shortened to the speed limit; corners of the preset are left out.
+    """
+    control, preset, t = run.scenario["control"], run.presets[ugv], run.sample_s
+    step = 1e-3 * control["period_s"]
+    here, later = preset.position_m(t), preset.position_m(t + step)
+    wanted = (later - here) / step + control["motion_gain_1_s"] * (here - run.position_m[ugv][run.sample_row])
+    wanted[:, 2] = 0.0
+    speed = np.linalg.norm(wanted, axis=1)
+    limit = run.robots[ugv]["max_speed_m_s"]
+    wanted *= (limit / np.maximum(speed, limit))[:, None]
+    free = ~run.executed(ugv)[run.chosen_row]
+    free &= (np.abs(preset.corner_s[:, None] - t) > control["period_s"]).all(axis=0)
+    for pair in run.views:
+        if pair.robot == ugv:
+            free &= avoidance_spare_m_s(run, pair, wanted) > COMMAND_M_S
+    commanded = run.command_m_s[ugv][run.chosen_row]
+    what = "the command is the own task while nothing is accepted"
+    close(what, commanded[free], wanted[free], within=COMMAND_M_S, about=ugv, t_s=t[free])

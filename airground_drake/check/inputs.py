@@ -1,0 +1,70 @@
+"""The constants that a claim about the model must be about: those of the scenario."""
+
+from __future__ import annotations
+
+from .files import Json
+from .scenario import disturbance_m_s, levels_of, robots_of, threshold_m
+
+
+def inputs_of(claim: str, scenario: Json) -> Json:
+    """The inputs of a claim about the model."""
+    match claim:
+        case "SAFE-INV":
+            return _avoidance(scenario)
+        case "SAFE-GATE":
+            return {**_avoidance(scenario), "method_d": _method_d(scenario)}
+        case "SAFE-DIST":
+            return {**_avoidance(scenario), "disturbance_m_s": disturbance_m_s(scenario)}
+        case "ZENO-PROOF":
+            bound = float(scenario["decision"]["min_inter_event_s"])
+            return {**_trigger(scenario), "min_inter_event_s": bound, "duration_s": float(scenario["duration_s"])}
+        case "ZENO-REFINE":
+            noise = {key: scenario["decision"][key] for key in ("noise_m_sqrt_s", "leak_1_s", "noise_period_s")}
+            return {**_trigger(scenario), **noise, "duration_s": float(scenario["duration_s"])}
+        case "THR-ROOT" | "THR-OPT":
+            rule = scenario["decision"]["threshold"]["rule"]
+            return {**_threshold(scenario), "rule": rule, "zeta_m": threshold_m(scenario)}
+        case "THR-DDM":
+            return _threshold(scenario)
+    return {}
+
+
+def _avoidance(scenario: Json) -> Json:
+    """Constants of the avoidance layer and of the team; the extent bounds every coordinate of the run."""
+    control, safe, robots = scenario["control"], scenario["safe_distance"], robots_of(scenario)
+    names = ("avoidance_gain_1_s", "period_s", "sensing_range_m", "motion_gain_1_s", "intervention_gain_1_s")
+    speeds = [float(robot["max_speed_m_s"]) for robot in robots.values()]
+    points = [scenario["uav"]["start_m"], *(obstacle["position_m"] for obstacle in scenario["obstacles"].values())]
+    for ugv in scenario["ugvs"].values():
+        points += [ugv["start_m"], ugv["target_m"], *ugv["preset"]["waypoints_m"]]
+    farthest = max(abs(coordinate) for point in points for coordinate in point)
+    return {
+        **{name: control[name] for name in names},
+        "duration_s": scenario["duration_s"],
+        "extent_m": farthest + max(speeds) * scenario["duration_s"],
+        "team": {
+            "ugvs": list(scenario["ugvs"]),
+            "uav": scenario["uav"]["name"],
+            "obstacles": [obstacle["position_m"] for obstacle in scenario["obstacles"].values()],
+            "obstacle_distance": safe["obstacle_m"],
+            "ugv_distance": safe["ugv_m"],
+            "air_ground_distance": safe["air_ground_m"],
+            "max_speed": speeds,
+        },
+    }
+
+
+def _method_d(scenario: Json) -> Json:
+    """Method (d) never puts an intervention above the avoidance inequalities."""
+    found = {run["composition"] for run in scenario["runs"].values() if run["method"] == "d"}
+    return {"intervention_on_top": False, "compositions": sorted(found) or ["augmented"]}
+
+
+def _trigger(scenario: Json) -> Json:
+    levels = levels_of(scenario)
+    return {"zeta_m": levels.zeta_m, "released_below_m": levels.release_m, "dwell_s": levels.dwell_s}
+
+
+def _threshold(scenario: Json) -> Json:
+    rule = scenario["decision"]["threshold"]
+    return {name: rule[name] for name in ("drift_m_s", "noise_m_sqrt_s", "c1_1_s", "c2")}

@@ -1,0 +1,72 @@
+"""The metrics of a run in report.json."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+
+from .files import Json
+from .rules import SMALL, agrees, at_most, close, same
+from .run import Run
+from .safety import least_distance_m
+from .scenario import Pair
+
+
+def check_metrics(run: Run, metrics: Json) -> str:
+    """Apply the rules about metrics.
+
+    Returns:
+        What was found, in words.
+
+    Raises:
+        Disagreement: if a rule is broken.
+    """
+    for robot in run.robots:
+        views = {pair.other: pair for pair in run.views if pair.robot == robot}
+        obstacles = [other for other, pair in views.items() if pair.share == 1.0]
+        same("obstacles in the metrics", sorted(metrics["min_distance_m"][robot]), sorted(obstacles), about=robot)
+        for other in obstacles:
+            _least_distance(run, views[other], metrics["min_distance_m"][robot][other])
+        for other, recorded in metrics["min_robot_distance_m"][robot].items():
+            _least_distance(run, views[other], recorded)
+            _least_margin_of_robots(run, views, other)
+    _ends_and_counts(run, metrics)
+    if len(run.decisions):
+        _gatekeeper(run, metrics["gatekeeper"])
+    return "distances, ends, counts of events and of decisions"
+
+
+def _least_distance(run: Run, pair: Pair, recorded: Json) -> None:
+    about, when = f"{pair.robot}, {pair.other}", recorded["t_s"]
+    there = np.linalg.norm(run.place_m(pair.robot, when) - run.place_m(pair.other, when))
+    close("least distance", recorded["value"], least_distance_m(run, pair), within=SMALL, about=about, t_s=when)
+    close("distance at the recorded time", there, recorded["value"], within=SMALL, about=about, t_s=when)
+    same("safe distance", recorded["safe_distance_m"], pair.safe_m, about=about)
+
+
+def _least_margin_of_robots(run: Run, views: dict[str, Pair], nearest: str) -> None:
+    margins = {other: least_distance_m(run, pair) - pair.safe_m for other, pair in views.items() if pair.share < 1.0}
+    about = f"{views[nearest].robot}, {nearest}"
+    at_most("robot of least margin", margins[nearest], min(margins.values()), within=SMALL, about=about)
+
+
+def _ends_and_counts(run: Run, metrics: Json) -> None:
+    for robot in run.robots:
+        end = run.position_m[robot][-1]
+        counts = dict(Counter(event["kind"] for event in run.events if event["robot"] == robot))
+        close("final position", metrics["final_position_m"][robot], end, within=SMALL, about=robot)
+        same("counts of events", metrics["event_counts"][robot], counts, about=robot)
+    close("duration", metrics["duration_s"], run.t_s[-1] - run.t_s[0], within=SMALL)
+    agrees("wall-clock time", metrics["wall_s"], run.wall_s, within=0.0)
+
+
+def _gatekeeper(run: Run, recorded: Json) -> None:
+    same("number of decisions", recorded["calls"], len(run.decisions))
+    same("counts of answers", recorded["decisions"], dict(Counter(map(str, run.decisions["decision"]))))
+    known = run.decisions["gap"][run.decisions["gap"] >= 0.0]
+    agrees("largest recorded gap", recorded["max_gap"], float(known.max()) if len(known) else None, within=SMALL)
+    times = np.array(run.decision_times_s, dtype=np.float64)
+    if len(times):
+        quantiles = {"p50": float(np.quantile(times, 0.5)), "p99": float(np.quantile(times, 0.99))}
+        agrees("decision times", recorded["time_s"], {**quantiles, "max": float(times.max())}, within=SMALL)

@@ -1,0 +1,274 @@
+"""GATE-SUR and GATE-OPT: how every decision was rounded, and how good its plan is."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .decisions import Decision, decisions_of, silent_ugvs
+from .files import Json
+from .rules import SMALL, Array, Flags, Found, NotEstablished, at_most, close, holds
+from .run import Run
+
+TIE = 1e-9
+"""Deficits of sum-up rounding closer to 1/2 than this are a tie: either mode may follow."""
+LARGEST_GAP = 0.05
+"""Gap that a decision may have."""
+OVERSTATED = 1e-5
+"""A recorded lower bound may be above the optimum by this, relative: a solver's cost errs by 1e-6 or less."""
+UNDERSTATED = 1e-3
+"""It may be below it by this, relative."""
+GAP = 1e-6
+"""Recorded and recomputed gaps may differ by this."""
+COST = 1e-9
+"""Recorded and recomputed costs may differ by this, relative."""
+BLOCKS = 10
+"""Blocks of stages, for each of which some routes choose one mode."""
+HALF_PLANE_ROUTES = ("relaxed", "branch_and_bound")
+"""Routes whose lower bound is about distances along recorded normals."""
+BLOCK_ROUTES = ("enumeration", "branch_and_bound")
+"""Routes that choose one mode for each block."""
+NARROW = 1e-5
+"""Width of an enclosure, relative, from which on better shares are looked for at ties."""
+TIED_M = 1e-5
+"""Points that lack the same to within this are tied."""
+EDGE = 1e-6
+"""omega closer to 0 or 1 than this is there."""
+
+
+def gate_sur(run: Run, _: Json) -> Found:
+    """GATE-SUR: (28)-(29), and an integrated rounding error of half a stage at most."""
+    if silent_ugvs(run):
+        return Found("not_run")
+    decisions = decisions_of(run)
+    rounded = [decision for decision in decisions if len(decision.relaxed)]
+    for decision in rounded:
+        _rounded_by_the_rule(decision)
+    if not rounded:
+        return Found("not_run" if decisions else "holds")
+    margin = max(0.0, min(decision.dt_s / 2.0 - rounding_error_s(decision) for decision in rounded))
+    return Found.with_margin("holds", margin, decisions=len(decisions))
+
+
+def rounding_error_s(decision: Decision) -> float:
+    """max_k |dt sum_(r <= k) (relaxed_r - rounded_r)|."""
+    return float(decision.dt_s * np.abs(np.cumsum(decision.relaxed - decision.rounded)).max())
+
+
+def _rounded_by_the_rule(decision: Decision) -> None:
+    """rounded_k = 1 where D_k >= 1/2, D_k = sum_(r <= k) relaxed_r - sum_(r < k) rounded_r."""
+    relaxed, rounded, at = decision.relaxed, decision.rounded, _at(decision)
+    close("relaxed omega is in [0, 1]", relaxed, np.clip(relaxed, 0.0, 1.0), within=0.0, **at)
+    holds("rounded omega is 0 or 1", (rounded == 0.0) | (rounded == 1.0), rounded, "0 or 1", **at)
+    deficit = np.cumsum(relaxed) - (np.cumsum(rounded) - rounded)
+    tie = np.abs(deficit - 0.5) <= TIE
+    holds("sum-up rounding", (rounded == (deficit >= 0.5)) | tie, rounded, (deficit >= 0.5) * 1.0, **at)
+    error = rounding_error_s(decision)
+    at_most("integrated rounding error", error, decision.dt_s / 2.0, within=TIE * decision.dt_s, **at)
+    close("recorded rounding error", decision.row["rounding_deviation_s"], error, within=TIE, **at)
+    close("relaxed first stage", decision.row["relaxed_first_stage"], relaxed[0], within=TIE, **at)
+
+
+def _at(decision: Decision) -> Json:
+    return {"about": f"decision of {decision.ugv}", "t_s": decision.t_s}
+
+
+class Enclosure(NamedTuple):
+    """Bounds of the least cost of the plans that a route chooses from."""
+
+    lower: float
+    upper: float
+
+
+def gate_opt(run: Run, _: Json) -> Found:
+    """GATE-OPT: no plan costs more than 5 % of the cheaper constant plan's cost above the optimum of its problem.
+
+    A gap is negative where the plan, by exact distances, costs less than the optimum along half-planes.
+    """
+    if silent_ugvs(run):
+        return Found("not_run")
+    decisions, route = decisions_of(run), run.scenario["gatekeeper"]["route"]
+    planned = [decision for decision in decisions if decision.planned]
+    for decision in planned:
+        _no_dearer_than_constant_plans(decision)
+    if route not in (*HALF_PLANE_ROUTES, *BLOCK_ROUTES):
+        return Found("inconclusive" if decisions else "holds")
+    if not decisions:
+        return Found("holds")
+    halfplanes = route in HALF_PLANE_ROUTES
+    if not planned or any(halfplanes and decision.normals is None for decision in planned):
+        return Found("inconclusive")
+    gaps = []
+    for decision in planned:
+        normals = decision.normals if halfplanes else None
+        found = _cheapest_of_blocks(decision, normals) if route in BLOCK_ROUTES else enclose(decision)
+        _bound_and_gap_are_not_overstated(decision, found, normals)
+        own = float(decision.cost(decision.positions_m))
+        gaps.append([(own - found.upper) / decision.scale, (own - found.lower) / decision.scale])
+    least, most = np.max(gaps, axis=0)
+    if most <= LARGEST_GAP:
+        return Found("holds", LARGEST_GAP - float(most), LARGEST_GAP - float(least), {"bounded": len(planned)})
+    if least <= LARGEST_GAP:
+        raise NotEstablished("the largest gap", f"it is between {least:.9g} and {most:.9g}, allowed {LARGEST_GAP}")
+    for decision, (_lowest, highest) in zip(planned, gaps, strict=True):
+        if highest > LARGEST_GAP:
+            _no_plan_of_blocks_is_much_cheaper(decision)
+    return Found("inconclusive")
+
+
+def _no_dearer_than_constant_plans(decision: Decision) -> None:
+    for choice, constant in zip(("refuse", "accept"), decision.constant_cost, strict=True):
+        slop = COST * max(float(constant), 1e-6)
+        for name in ("objective", f"objective_{choice}"):
+            at_most(f"{name} against {choice} throughout", decision.row[name], constant, within=slop, **_at(decision))
+
+
+def _bound_and_gap_are_not_overstated(decision: Decision, found: Enclosure, normals: Array | None) -> None:
+    """Normals are unit vectors; the recorded lower bound is one; the gap is between its cost and what is best known."""
+    row, scale, at = decision.row, decision.scale, _at(decision)
+    bound, own = row["lower_bound"], float(decision.cost(decision.positions_m, normals))
+    if normals is not None:
+        lengths = np.linalg.norm(normals, axis=2)
+        close("normals are unit vectors", lengths, np.ones_like(lengths), within=SMALL, **at)
+    at_most("lower bound against the plan's cost", bound, own, within=OVERSTATED * scale, **at)
+    at_most("lower bound against the optimum", bound, found.upper, within=OVERSTATED * scale, **at)
+    if row["status"] == "optimal" and row["route"] != "branch_and_bound":
+        allowed = (UNDERSTATED + OVERSTATED) * scale
+        at_most("optimum against the lower bound", found.lower, bound, within=allowed, **at)
+    known = [*decision.constant_m, *([decision.positions_of(decision.rounded)] if len(decision.rounded) else [])]
+    loser = max(row["objective_accept"], row["objective_refuse"])  # along normals it costs that or more
+    best = min(own, loser, *(float(decision.cost(positions, normals)) for positions in known))
+    least, most = _gap(best, bound), _gap(own, bound)
+    holds("recorded gap", least - GAP <= row["gap"] <= most + GAP, row["gap"], f"{least} to {most}", **at)
+
+
+def _gap(cost: float, bound: float) -> float:
+    """As the routes record it."""
+    return (cost - bound) / max(cost, 1e-12)
+
+
+def _cheapest_of_blocks(decision: Decision, normals: Array | None) -> Enclosure:
+    """The least cost of all plans that are constant on each of ten blocks, by evaluating each."""
+    blocks = min(BLOCKS, decision.stages)
+    modes = (np.arange(2**blocks)[:, None] >> np.arange(blocks)) % 2
+    omega = modes[:, np.arange(decision.stages) * blocks // decision.stages].astype(np.float64)
+    least = float(decision.cost(decision.positions_of(omega), normals).min())
+    return Enclosure(least, least)
+
+
+def _no_plan_of_blocks_is_much_cheaper(decision: Decision) -> None:
+    own = float(decision.cost(decision.positions_m))
+    shown = (own - _cheapest_of_blocks(decision, None).lower) / decision.scale
+    at_most("gap to a plan of blocks", shown, LARGEST_GAP, **_at(decision))
+
+
+def enclose(decision: Decision) -> Enclosure:
+    """Bounds of the least cost of a relaxed plan, omega in [0, 1]^N, with distances along the recorded normals.
+
+    That cost J is convex. Above: its value at the recorded relaxation omega*. Below: slack u_k, the most that a point
+    lacks at stage k, is at least w_k = sum_j l_kj (what point j lacks) for any shares l_kj >= 0 with sum 1, and
+    u_k^2 >= 2 u*_k w_k - (u*_k)^2 for any u*_k >= 0. With that in place of u_k^2, J has become a smooth convex function
+    that is below it; it is nowhere below its tangent at omega*, which is least at a corner of the box:
+
+        J(omega) >= value + sum_k min(-s_k omega*_k, s_k (1 - omega*_k)),    s: slopes.
+
+    Good shares leave nothing to be gained at omega*: all on the point that lacks most, or, where several lack the
+    same, as `_shares_at_ties` finds them.
+    """
+    normals, omega = decision.normals, decision.relaxed
+    if normals is None or not len(omega):
+        raise NotEstablished("the optimum is bounded", "no relaxation is recorded", f"decision at {decision.t_s} s")
+    positions = decision.positions_of(omega)
+    upper = float(decision.cost(positions, normals))
+    lacking = -decision.gaps_m(positions, normals)
+    if not lacking.shape[1]:
+        return Enclosure(_lower_bound(decision, positions, lacking, lacking), upper)
+    shares = np.eye(lacking.shape[1])[lacking.argmax(axis=1)]
+    lower = _lower_bound(decision, positions, lacking, shares)
+    if upper - lower > NARROW * decision.scale:
+        shares = _shares_at_ties(decision, positions, lacking, normals)
+        lower = max(lower, _lower_bound(decision, positions, lacking, shares))
+    return Enclosure(lower, upper)
+
+
+def _slopes(decision: Decision, forces: Array) -> Array:
+    """Slopes by omega, (N,), of a function of the positions with derivatives `forces`, (N, 3).
+
+    omega_k moves all positions from stage k on by dt (a_k - b_k).
+    """
+    moved = decision.dt_s * (decision.accept_m_s - decision.refuse_m_s)
+    return np.asarray((moved * np.cumsum(forces[::-1], axis=0)[::-1]).sum(axis=1))
+
+
+def _lower_bound(decision: Decision, positions_m: Array, lacking_m: Array, shares: Array) -> float:
+    """The bound of `enclose` for shares (N, m) of the points in what is lacking, (N, m)."""
+    dt, omega = decision.dt_s, decision.relaxed
+    error, slack = positions_m - decision.reference_m, lacking_m.max(axis=1, initial=0.0)
+    shared = (shares * lacking_m).sum(axis=1)
+    of_error = decision.error_weight_1_m2_s * (error**2).sum()
+    of_slack = decision.slack_weight_1_m2_s * (2.0 * slack * shared - slack**2).sum()
+    away = np.zeros_like(error) if decision.normals is None else (shares[..., None] * decision.normals).sum(axis=1)
+    forces = decision.error_weight_1_m2_s * error - decision.slack_weight_1_m2_s * slack[:, None] * away
+    slopes = _slopes(decision, 2.0 * dt * forces)
+    corner = np.minimum(-slopes * omega, slopes * (1.0 - omega)).sum()
+    return float(dt * (of_error + of_slack) + corner)
+
+
+def _shares_at_ties(decision: Decision, positions_m: Array, lacking_m: Array, normals: Array) -> Array:
+    """Shares (N, m) under which omega* is as nearly optimal as can be, by least squares.
+
+    Optimal is: slope 0 where 0 < omega*_k < 1, not negative at 0, not positive at 1. Unknown are the shares of the
+    points that lack the most, and what the slopes at 0 and 1 are off 0: none of them negative.
+    """
+    omega, n = decision.relaxed, decision.stages
+    slack = lacking_m.max(axis=1)
+    tied = (lacking_m >= slack[:, None] - TIED_M) & (lacking_m > 0.0)
+    stage, point = np.nonzero(tied)
+    shares = np.eye(lacking_m.shape[1])[lacking_m.argmax(axis=1)]
+    if not len(stage):
+        return shares
+    error = positions_m - decision.reference_m
+    columns = []
+    for k, j in zip(stage, point, strict=True):
+        force = np.zeros((n, 3))
+        force[k] = -2.0 * decision.dt_s * decision.slack_weight_1_m2_s * slack[k] * normals[k, j]
+        columns.append(_slopes(decision, force))
+    own = _slopes(decision, 2.0 * decision.dt_s * decision.error_weight_1_m2_s * error)
+    at_0, at_1 = np.eye(n)[:, omega <= EDGE], np.eye(n)[:, omega >= 1.0 - EDGE]
+    of_slopes = np.hstack([np.stack(columns, axis=1), -at_0, at_1])
+    heavy = 10.0 * max(1.0, float(np.abs(of_slopes).max()))
+    involved = np.unique(stage)
+    sums = np.hstack([(stage == involved[:, None]) * heavy, np.zeros((len(involved), at_0.shape[1] + at_1.shape[1]))])
+    found = least_squares(np.vstack([of_slopes, sums]), np.concatenate([-own, np.full(len(involved), heavy)]))
+    shares[involved] = 0.0
+    shares[stage, point] = found[: len(stage)]
+    return np.asarray(shares / np.maximum(shares.sum(axis=1, keepdims=True), 1e-12))
+
+
+def least_squares(matrix: Array, right: Array) -> Array:
+    """x >= 0 with the least ||matrix x - right||, by Lawson and Hanson's active sets."""
+    gram, moment = matrix.T @ matrix, matrix.T @ right
+    gram += 1e-12 * float(gram.diagonal().max(initial=0.0)) * np.eye(len(gram))  # columns may depend on each other
+    x = np.zeros(len(gram))
+    free = np.zeros(len(x), dtype=bool)
+    for _ in range(3 * len(x)):
+        gain = np.where(free, 0.0, moment - gram @ x)
+        if gain.max(initial=0.0) <= 1e-9 * np.abs(moment).max():
+            break
+        free[gain.argmax()] = True
+        solved = _solved(gram, moment, free)
+        while (solved[free] <= 0.0).any():
+            falling = free & (solved <= 0.0)
+            step = (x[falling] / np.maximum(x[falling] - solved[falling], 1e-300)).min()
+            x = x + step * (solved - x)
+            free &= x > 1e-12
+            solved = _solved(gram, moment, free)
+        x = solved
+    return x
+
+
+def _solved(gram: Array, moment: Array, free: Flags) -> Array:
+    x = np.zeros(len(gram))
+    x[free] = np.linalg.solve(gram[np.ix_(free, free)], moment[free])
+    return x

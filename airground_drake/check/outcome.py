@@ -1,0 +1,116 @@
+"""LIVE-GOAL, COMM and GATE-TIME: what a run achieved, and what it spent on messages and computation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from .files import Json
+from .rules import SMALL, Array, Found, holds, same
+from .run import Run
+
+AT_REST_S = 1.0
+"""A stalled UGV must have stood still for this long at the end."""
+AT_REST_M = 1e-3
+"""Standing still: no farther than this from the end."""
+
+
+def live_goal(run: Run, _: Json) -> Found:
+    """LIVE-GOAL: every robot ended at its target, or standing where the scenario declares that it stalls."""
+    ends = [*_ends(run)]
+    margin = min(margin for _, _, margin in ends)
+    conditions = [{"robot": robot, "condition": what, "margin_m": margin} for robot, what, margin in ends]
+    return Found.with_margin("holds" if margin >= 0.0 else "refuted", margin, conditions=conditions)
+
+
+def _ends(run: Run) -> Iterator[tuple[str, str, float]]:
+    """Robot, condition and margin in m, in the order of the report."""
+    scenario = run.scenario
+    stalls, arrival = scenario["runs"][run.name]["stalls_m"], scenario["arrival_tolerance_m"]
+    end = {robot: run.position_m[robot][-1] for robot in run.robots}
+    for ugv in run.ugvs:
+        short = float(np.linalg.norm(end[ugv] - scenario["ugvs"][ugv]["target_m"]))
+        if ugv in stalls:
+            off = float(np.linalg.norm(end[ugv] - stalls[ugv]))
+            yield ugv, "at its stall point", scenario["stall_tolerance_m"] - off
+            yield ugv, "stands", AT_REST_M - _moved_at_the_end_m(run, ugv)
+            yield ugv, "short of its target", short - arrival
+        else:
+            yield ugv, "at its target", arrival - short
+    if stalls:
+        centroid = np.mean([end[ugv] for ugv in run.ugvs], axis=0)
+        above = centroid + np.array([0.0, 0.0, scenario["uav"]["altitude_m"]])
+        yield run.uav, "over the centroid of the UGVs", arrival - float(np.linalg.norm(end[run.uav] - above))
+    else:
+        yield run.uav, "at its target", arrival - float(np.linalg.norm(end[run.uav] - scenario["uav"]["target_m"]))
+
+
+def _moved_at_the_end_m(run: Run, robot: str) -> float:
+    """Largest distance from the end during the last second; it is convex between rows."""
+    begin = max(float(run.t_s[-1]) - AT_REST_S, float(run.t_s[0]))
+    places = np.vstack([run.place_m(robot, begin), run.position_m[robot][run.t_s >= begin]])
+    return float(np.linalg.norm(places - places[-1], axis=1).max())
+
+
+def comm(run: Run, _: Json) -> Found:
+    """COMM: proposals and decisions only while a UGV is intervened on, and no more than an always-on scheme has.
+
+    The UAV withdraws its proposal at its next planning instant after a release, and the gatekeeper notices at its next
+    sample: hence the allowance of one period each.
+    """
+    planning_s, gating_s = run.scenario["intervention"]["period_s"], run.scenario["gatekeeper"]["period_s"]
+    gated = run.method in ("c", "d")
+    _messages_are_to_ugvs(run)
+    for ugv in run.ugvs:
+        decided = decided_s(run, ugv)
+        _decisions_are_on_proposals(run, ugv)
+        _no_strays(run, ugv, "proposal", run.times_s(ugv, "proposal"), planning_s + gating_s)
+        _no_strays(run, ugv, "decision", decided, planning_s + gating_s)
+        silent = not len(run.times_s(ugv, "proposal")) or (gated and not len(decided))
+        if silent and run.talk_is_due(ugv):
+            return Found("not_run")
+    proposals = sum(event["kind"] == "proposal" for event in run.events)
+    duration, n = run.scenario["duration_s"] + SMALL, len(run.ugvs)
+    spent = {"proposal": proposals, "decision": len(run.decisions)}
+    always_on = {"proposal": n * int(duration / planning_s), "decision": n * int(duration / gating_s) if gated else 0}
+    saved = [1.0 - spent[kind] / most for kind, most in always_on.items() if most]
+    status = "holds" if all(spent[kind] <= most for kind, most in always_on.items()) else "refuted"
+    return Found.with_margin(status, min(saved), spent=spent, always_on=always_on) if saved else Found(status)
+
+
+def decided_s(run: Run, ugv: str) -> Array:
+    """Times of the decisions on a UGV's proposals."""
+    return run.decisions.loc[run.decisions["robot"] == ugv, "t_s"].to_numpy(dtype=np.float64)
+
+
+def _messages_are_to_ugvs(run: Run) -> None:
+    named = {event["robot"] for event in run.events if event["kind"] == "proposal"} | {*run.decisions["robot"]}
+    same("messages are to UGVs", sorted(named - {*run.ugvs}), [])
+
+
+def _decisions_are_on_proposals(run: Run, ugv: str) -> None:
+    mine = run.decisions[run.decisions["robot"] == ugv]
+    issued, when = mine["issued_s"].to_numpy(dtype=np.float64), mine["t_s"].to_numpy(dtype=np.float64)
+    known = np.isin(issued, run.times_s(ugv, "proposal"))
+    holds("decisions are on proposals", known, issued, "the time of a proposal", about=ugv, t_s=when)
+
+
+def _no_strays(run: Run, ugv: str, kind: str, times_s: Array, allowance_s: float) -> None:
+    stays = run.interventions_s(ugv)
+    begun = times_s[:, None] >= stays[:, 0] - SMALL
+    not_over = times_s[:, None] <= stays[:, 1] + allowance_s + SMALL
+    inside = (begun & not_over).any(axis=1)
+    holds(f"a {kind} only during interventions", inside, times_s, "during one", about=ugv, t_s=times_s)
+
+
+def gate_time(run: Run, _: Json) -> Found:
+    """GATE-TIME: the 99th percentile of the CPU times, rounded up to an order statistic, is below the period."""
+    times, period = np.array(run.decision_times_s, dtype=np.float64), float(run.scenario["gatekeeper"]["period_s"])
+    if not len(run.decisions):
+        return Found("not_run" if any(map(run.talk_is_due, run.ugvs)) else "holds")
+    same("one time for each decision", len(times), len(run.decisions))
+    holds("times are not negative", times >= 0.0, times, "0 or more")
+    p50, p99 = (float(np.quantile(times, level, method="higher")) for level in (0.5, 0.99))
+    facts = {"p50_s": p50, "p99_s": p99, "max_s": float(times.max()), "period_s": period, "count": len(times)}
+    return Found.with_margin("holds" if p99 < period else "refuted", period - p99, **facts)

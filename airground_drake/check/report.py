@@ -1,0 +1,318 @@
+"""A report: its verdicts one by one, and the verdict over all of them."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import lru_cache, partial
+from pathlib import Path
+from typing import Any
+
+from .certificates import prove
+from .enclosures import root
+from .events import check_events
+from .feasibility import gate_feas
+from .files import Files, Json, canonical, read_folder, read_json, sha256
+from .inputs import inputs_of
+from .metrics import check_metrics
+from .optimality import gate_opt, gate_sur
+from .outcome import comm, gate_time, live_goal
+from .rules import Disagreement, Found, NotEstablished, agrees, holds, same
+from .run import Run, read_run
+from .safety import safe_hyp, safe_trace
+from .statistics import ddm, refine
+from .triggers import thr_trig, zeno_trace
+
+SCHEMA = "airground_drake.report/1"
+AGREES, DISAGREES, OPEN = "agrees", "DISAGREES", "cannot be re-established"
+UNDECIDED = ("inconclusive", "error", "not_run")
+"""Statuses that say nothing about a claim."""
+EXIT_CODES = {"as_expected": 0, "not_as_expected": 1, "inconclusive": 3}
+
+OfRun = Callable[[Run, Json], Found]
+OfModel = Callable[[Json, Files, Json], Found]
+
+EVERY_RUN: Mapping[str, OfRun] = {
+    "SAFE-TRACE": safe_trace,
+    "SAFE-HYP": safe_hyp,
+    "ZENO-TRACE": zeno_trace,
+    "THR-TRIG": thr_trig,
+    "LIVE-GOAL": live_goal,
+}
+WITH_MESSAGES: Mapping[str, OfRun] = {"COMM": comm}
+WITH_GATEKEEPER: Mapping[str, OfRun] = {
+    "GATE-OPT": gate_opt,
+    "GATE-SUR": gate_sur,
+    "GATE-FEAS": gate_feas,
+    "GATE-TIME": gate_time,
+}
+ROUNDING_ROUTES = ("relaxed", "nonlinear")
+"""Routes that GATE-SUR is about."""
+REFUTED_BY_RULES = ("THR-TRIG", "COMM", "GATE-OPT", "GATE-SUR", "GATE-FEAS")
+"""Claims that any broken rule of theirs refutes; the others are refuted by their margin."""
+OF_MODEL: Mapping[str, OfModel] = {
+    **dict.fromkeys(("SAFE-LEMMA", "SAFE-INV", "SAFE-GATE", "SAFE-DIST", "ZENO-PROOF"), prove),
+    "THR-ROOT": root,
+    "THR-OPT": root,
+    "THR-DDM": ddm,
+    "ZENO-REFINE": refine,
+}
+STATISTICAL = ("THR-DDM", "ZENO-REFINE")
+"""Claims that are supported; the others about the model are proved."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """One check.
+
+    Attributes:
+        claim: identifier of the claim, or what else was checked: report, trace, events, metrics.
+        run: on which run; '' for the report and the model.
+        outcome: AGREES, DISAGREES or OPEN.
+        text: what was found, or why nothing was.
+        rule: the rule that is broken or cannot be applied; '' if all agrees.
+        about: of which robot, pair, event, decision or obligation.
+        t_s: when in the run; None where there is no time.
+        recorded: what the files say, of a broken rule.
+        recomputed: what follows from them.
+    """
+
+    claim: str
+    run: str
+    outcome: str
+    text: str
+    rule: str = ""
+    about: str = ""
+    t_s: float | None = None
+    recorded: Any = None
+    recomputed: Any = None
+
+
+def check_report(folder: Path) -> list[Line]:
+    """All checks of a report.
+
+    Args:
+        folder: with report.json, trace/ and certificates/.
+
+    Raises:
+        Disagreement, NotEstablished: if report.json is not strict JSON, or is not of the shape of a report.
+    """
+    report = read_json(folder / "report.json")
+    _is_shaped_like_a_report(report)
+    return [*_lines(folder, report)]
+
+
+def _is_shaped_like_a_report(report: Any) -> None:
+    """Objects are objects, lists are lists of objects."""
+    if not isinstance(report, dict):
+        raise NotEstablished("it is a report", f"it is a {type(report).__name__}", "report.json")
+    for key in ("scenario", "provenance", "overall", "runs"):
+        if not isinstance(report.get(key), dict):
+            raise NotEstablished("it is a report", f"its {key!r} is missing or is no object", "report.json")
+    for key in ("claims", "audit", "mutants", "choices"):
+        listed = report.get(key)
+        if not isinstance(listed, list) or not all(isinstance(entry, dict) for entry in listed):
+            raise NotEstablished("it is a report", f"its {key!r} is missing or is no list of objects", "report.json")
+    scenario = report["scenario"].get("resolved")
+    if not isinstance(scenario, dict) or not isinstance(scenario.get("runs"), dict):
+        raise NotEstablished("it is a report", "it has no resolved scenario with runs", "report.json")
+    if not all({"id", "run"} <= {*claim} for claim in report["claims"]):
+        raise NotEstablished("it is a report", "a claim has no id or no run", "report.json")
+
+
+def _lines(folder: Path, report: Json) -> Iterator[Line]:
+    scenario = report["scenario"]["resolved"]
+    yield _attempt("report", "", lambda: _check_overall(folder, report))
+    runs: dict[str, Run] = {}
+
+    def load(name: str) -> str:
+        runs[name] = read_run(folder / "trace" / name, name, report)
+        return f"{len(runs[name].t_s)} rows"
+
+    def loaded(name: str) -> Run:
+        if name not in runs:
+            raise NotEstablished("the trace is one of the run", "it was refused")
+        return runs[name]
+
+    def events(name: str) -> str:
+        return check_events(loaded(name))
+
+    def metrics(name: str) -> str:
+        return _check_metrics(loaded(name), canonical(report["runs"][name]["metrics"]))
+
+    for name in scenario["runs"]:
+        yield _attempt("trace", name, partial(load, name))
+        yield _attempt("events", name, partial(events, name))
+        yield _attempt("metrics", name, partial(metrics, name))
+    scenario_text = canonical(scenario)
+
+    def decide(claim: Json) -> Found:
+        if claim["run"]:
+            return _decide_of_run(loaded(claim["run"]), canonical(claim))
+        return _decide_of_model(canonical(claim), read_folder(folder / "certificates" / claim["id"]), scenario_text)
+
+    for claim in report["claims"]:
+        yield _attempt(claim["id"], claim["run"], partial(_judge, claim, scenario, decide))
+
+
+def _attempt(claim: str, run: str, check: Callable[[], str]) -> Line:
+    """What a check says, as a line; whatever goes wrong in it is not agreement."""
+    try:
+        return Line(str(claim), str(run), AGREES, check())
+    except Disagreement as broken:
+        when = "" if broken.t_s is None else f" at t = {broken.t_s:.9g} s"
+        about = f" ({broken.about})" if broken.about else ""
+        values = f"recorded {_short(broken.recorded)}, recomputed {_short(broken.recomputed)}"
+        text = f"{broken.rule}{about}{when}: {values}"
+        both = broken.recorded, broken.recomputed
+        return Line(str(claim), str(run), DISAGREES, text, broken.rule, broken.about, broken.t_s, *both)
+    except NotEstablished as error:
+        about = f" ({error.about})" if error.about else ""
+        return Line(str(claim), str(run), OPEN, f"{error.rule}{about}: {error.why}", error.rule, error.about)
+    except Exception as error:  # files can be wrong in more ways than can be listed
+        why = f"{type(error).__name__}: {error}".splitlines()[0]
+        return Line(
+            str(claim), str(run), OPEN, f"the files are well formed: {_short(why)}", "the files are well formed"
+        )
+
+
+def _short(value: Any, most: int = 120) -> str:
+    text = value if isinstance(value, str) else repr(value)
+    return text if len(text) <= most else f"{text[:most]}..."
+
+
+def claims_of(method: str, route: str) -> dict[str, OfRun]:
+    """The claims about a run of a method, with a route of the gatekeeper."""
+    found = dict(EVERY_RUN)
+    if method != "a":
+        found |= WITH_MESSAGES
+    if method in ("c", "d"):
+        found |= WITH_GATEKEEPER
+        if route not in ROUNDING_ROUTES:
+            del found["GATE-SUR"]
+    return found
+
+
+def expectations(scenario: Json) -> dict[tuple[str, str], str]:
+    """The verdict that a scenario declares, by run ('': about the model) and claim, of all claims that there are."""
+    wanted = {("", name): "supported" if name in STATISTICAL else "proved" for name in OF_MODEL}
+    wanted |= {("", name): status for name, status in scenario["expected"].items()}
+    for run, about in scenario["runs"].items():
+        for name in claims_of(about["method"], scenario["gatekeeper"]["route"]):
+            wanted[run, name] = about["expected"].get(name, "holds")
+    return wanted
+
+
+def _judge(claim: Json, scenario: Json, decide: Callable[[Json], Found]) -> str:
+    """Compare a recorded verdict with what the claim's own formula gives."""
+    wanted, status = expectations(scenario), claim["status"]
+    expected = wanted.get((claim["run"], claim["id"]))
+    same("expected verdict", claim["expected"], expected)
+    same("as expected", claim["as_expected"], status == expected)
+    same("a counterexample comes with a refutation", bool(claim["counterexample"]), status == "refuted")
+    try:
+        found = decide(claim)
+    except Disagreement as broken:
+        if status != "refuted" or claim["id"] not in REFUTED_BY_RULES:
+            raise
+        found = Found("refuted")
+        remark = f" (broken: {broken.rule})"
+    else:
+        remark = ""
+    if status in UNDECIDED and found.status != status:
+        raise NotEstablished("verdict", f"recorded {status!r}, which decides nothing; here it is {found.status!r}")
+    same("verdict", status, found.status)
+    margin = claim["margin"]
+    if found.least is None or found.most is None or margin is None:
+        same("margin", margin, found.least)
+    else:
+        slop = found.within + 1e-6 * abs(margin)
+        possible = found.least if found.least == found.most else f"{found.least} to {found.most}"
+        holds("margin", found.least - slop <= margin <= found.most + slop, margin, possible)
+    agrees("evidence", claim["evidence"], found.facts, within=1e-8)
+    return f"{status}{remark}" if margin is None else f"{status}{remark}, margin {margin:.6g} {claim['unit']}".rstrip()
+
+
+@lru_cache(maxsize=16)
+def _check_metrics(run: Run, metrics_text: str) -> str:
+    return check_metrics(run, json.loads(metrics_text))
+
+
+@lru_cache(maxsize=256)
+def _decide_of_run(run: Run, claim_text: str) -> Found:
+    """What a claim's formula gives; the same for the same run and the same recorded claim."""
+    claim, known = json.loads(claim_text), claims_of(run.method, run.scenario["gatekeeper"]["route"])
+    if claim["id"] not in known:
+        raise NotEstablished("the claim is known", f"known on this run: {', '.join(known)}", claim["id"])
+    return known[claim["id"]](run, claim)
+
+
+@lru_cache(maxsize=64)
+def _decide_of_model(claim_text: str, files: Files, scenario_text: str) -> Found:
+    """What a claim's formula gives; the same for the same certificates, scenario and recorded claim."""
+    claim, scenario = json.loads(claim_text), json.loads(scenario_text)
+    if claim["id"] not in OF_MODEL:
+        raise NotEstablished("the claim is known", f"known: {', '.join(OF_MODEL)}", claim["id"])
+    same("SHA-256 of certificates", claim["certificates"], {name: sha256(content) for name, content in files})
+    same("inputs", sorted(claim["inputs"]), sorted(inputs_of(claim["id"], scenario)))
+    agrees("inputs", claim["inputs"], inputs_of(claim["id"], scenario), within=1e-12)
+    return OF_MODEL[claim["id"]](claim, files, scenario)
+
+
+def _check_overall(folder: Path, report: Json) -> str:
+    """The claims and runs are those of the scenario, and the verdict over all claims follows from them."""
+    scenario, claims = report["scenario"]["resolved"], report["claims"]
+    same("schema", report["schema"], SCHEMA)
+    for name, run in scenario["runs"].items():
+        holds("the method is known", run["method"] in ("a", "b", "c", "d"), run["method"], "a, b, c or d", about=name)
+    recorded = sorted([claim["run"], claim["id"]] for claim in claims)
+    same("claims that there are", recorded, sorted(map(list, expectations(scenario))))
+    same("runs", sorted(report["runs"]), sorted(scenario["runs"]))
+    same("folders of traces", sorted(path.name for path in folder.glob("trace/*")), sorted(scenario["runs"]))
+    same("seed", report["provenance"]["seed"], scenario["seed"])
+    same("name of the scenario", report["scenario"]["name"], scenario["name"])
+    _choices_are_the_scenarios(report["choices"], scenario)
+    overall = _overall(report)
+    agrees("verdict over all", report["overall"], overall, within=0.0)
+    same("counts of verdicts", report["overall"]["counts"], overall["counts"])
+    return f"{overall['status']}, exit code {overall['exit_code']}"
+
+
+def _overall(report: Json) -> Json:
+    """The verdict over all claims, and what stands in its way; findings about the paper count where all were made."""
+    claims, audited = report["claims"], bool(report["mutants"])
+    keys = ("id", "run", "status", "expected")
+    unexpected = [{key: claim[key] for key in keys} for claim in claims if claim["status"] != claim["expected"]]
+    undecided = [entry for entry in unexpected if entry["status"] in UNDECIDED]
+    differs = [entry for entry in unexpected if entry["status"] not in UNDECIDED]
+    undemonstrated = [item["id"] for item in report["audit"] if not item["demonstrated"]] if audited else []
+    surviving = [f"{each['claim']}: {each['mutant']}" for each in report["mutants"] if not each["refuted"]]
+    status = "as_expected"
+    if differs or undemonstrated or surviving:
+        status = "not_as_expected"
+    elif undecided:
+        status = "inconclusive"
+    return {
+        "status": status,
+        "exit_code": EXIT_CODES[status],
+        "checks": len(claims),
+        "as_expected": len(claims) - len(unexpected),
+        "counts": dict(Counter(claim["status"] for claim in claims)),
+        "differs": differs,
+        "undecided": undecided,
+        "missing": [],
+        "undemonstrated": undemonstrated,
+        "surviving_mutants": surviving,
+    }
+
+
+def _choices_are_the_scenarios(recorded: list[Json], scenario: Json) -> None:
+    """Every value that is not the paper's is quoted as the scenario has it."""
+    same("number of choices", len(recorded), len(scenario["choices"]))
+    for entry, choice in zip(recorded, scenario["choices"], strict=True):
+        value: Any = scenario
+        for key in choice["key"].split("."):
+            value = value.get(key) if isinstance(value, dict) else None
+        agrees("choice", entry, {**choice, "ours": value}, within=0.0, about=choice["key"])

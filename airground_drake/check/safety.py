@@ -1,0 +1,137 @@
+"""SAFE-TRACE and SAFE-HYP: the distances of a run, and the hypotheses of the invariance proof along it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from .files import Json
+from .rules import SMALL, Array, Disagreement, Found, agrees, close, holds, same
+from .run import Run
+from .scenario import Pair
+
+
+@lru_cache(maxsize=4096)
+def least_distance_m(run: Run, pair: Pair) -> float:
+    """Least distance of a pair over continuous time.
+
+    On a segment the relative position is r + s w, 0 <= s <= 1; |r + s w|^2 is least at s = -r.w / w.w.
+    """
+    relative = run.position_m[pair.robot] - run.position_m[pair.other]
+    r, w = relative[:-1], np.diff(relative, axis=0)
+    ww = (w * w).sum(axis=1)
+    s = np.clip(-(r * w).sum(axis=1) / np.where(ww > 0.0, ww, 1.0), 0.0, 1.0)
+    return float(np.linalg.norm(r + s[:, None] * w, axis=1).min())
+
+
+def safe_trace(run: Run, claim: Json) -> Found:
+    """SAFE-TRACE: min over t of ||p_i(t) - q_j(t)|| >= d_ij for every pair."""
+    recorded = claim["evidence"]["pairs"]
+    same("pairs", sorted([p["first"], p["second"]] for p in recorded), sorted([p.robot, p.other] for p in run.pairs))
+    by_names = {(entry["first"], entry["second"]): entry for entry in recorded}
+    margins = {}
+    for pair in run.pairs:
+        least = least_distance_m(run, pair)
+        margins[pair.robot, pair.other] = least - pair.safe_m
+        _evidence_on_a_pair(run, pair, least, by_names[pair.robot, pair.other])
+    margin = min(margins.values())
+    worst = claim["where"]["first"], claim["where"]["second"]
+    close("pair of least margin", margins[worst], margin, within=SMALL, about=", ".join(worst))
+    return Found.with_margin("holds" if margin >= -SMALL else "refuted", margin)
+
+
+def _evidence_on_a_pair(run: Run, pair: Pair, least_m: float, recorded: Json) -> None:
+    about, when = f"{pair.robot}, {pair.other}", recorded["t_s"]
+    there = np.linalg.norm(run.place_m(pair.robot, when) - run.place_m(pair.other, when))
+    close("least distance", recorded["min_distance_m"], least_m, within=SMALL, about=about, t_s=when)
+    close("margin of a pair", recorded["margin_m"], least_m - pair.safe_m, within=SMALL, about=about, t_s=when)
+    close("distance at the recorded time", recorded["min_distance_m"], there, within=SMALL, about=about, t_s=when)
+    agrees("safe distance", recorded["safe_distance_m"], pair.safe_m, within=0.0, about=about)
+
+
+class Hypothesis(NamedTuple):
+    """A hypothesis of SAFE-INV at some instants: it holds where its margin is not negative."""
+
+    name: str
+    t_s: Array
+    margin: Array
+
+
+def safe_hyp(run: Run, claim: Json) -> Found:
+    """SAFE-HYP: at every control sample the hypotheses of the invariance proof held.
+
+    The margin is that of the avoidance inequalities, or of the hypothesis that was broken first.
+    """
+    found = [*_constants(run), *_velocities(run), *_inequalities(run)]
+    in_range = sum(len(each.margin) for each in found if each.name == "avoidance")
+    broken = [(each, k) for each in found for k in np.flatnonzero(~(each.margin >= -SMALL))[:1]]
+    leading = "avoidance"
+    if broken:
+        first, k = min(broken, key=lambda one: float(one[0].t_s[one[1]]))
+        when = float(first.t_s[k])
+        if claim["status"] == "holds":
+            raise Disagreement("the hypotheses held", "held", float(first.margin[k]), first.name, when)
+        leading = claim["where"]["hypothesis"]
+        earliest = sorted({each.name for each, j in broken if each.t_s[j] <= when + SMALL})
+        holds("hypothesis broken first", leading in earliest, leading, " or ".join(earliest), t_s=when)
+    margins = [float(each.margin.min()) for each in found if each.name == leading and len(each.margin)]
+    status = "refuted" if broken else "holds"
+    margin = min(margins, default=None)
+    return Found(status, margin, margin, {"inequalities_in_range": in_range})
+
+
+def _constants(run: Run) -> Iterator[Hypothesis]:
+    """A h <= 1; every pair starts at its safe distance; the sensing range covers d + (closing speed) h."""
+    control, start = run.scenario["control"], run.t_s[:1]
+    h = control["period_s"]
+    yield Hypothesis("gain: A h <= 1", start, np.array([1.0 - control["avoidance_gain_1_s"] * h]))
+    for pair in run.pairs:
+        distance = np.linalg.norm(run.position_m[pair.robot][0] - run.position_m[pair.other][0])
+        yield Hypothesis("safe start", start, np.array([distance - pair.safe_m]))
+        spare = control["sensing_range_m"] - pair.safe_m - pair.closing_m_s * h
+        yield Hypothesis("sensing range", start, np.array([spare]))
+
+
+def _velocities(run: Run) -> Iterator[Hypothesis]:
+    """||v|| <= v_max; v_z = 0 for a UGV; v is held from sample to sample. Rows within 1e-9 s are one instant."""
+    begins = run.t_s[:-1]
+    segment = np.flatnonzero(np.diff(run.t_s) >= SMALL)
+    sample = np.searchsorted(run.sample_s, begins[segment] + SMALL, side="right") - 1
+    for robot, spec in run.robots.items():
+        v = run.command_m_s[robot]
+        drift = np.linalg.norm(v[segment + 1] - v[run.chosen_row][sample], axis=1)
+        yield Hypothesis("zero-order hold", begins[segment], -drift)
+        yield Hypothesis("speed limit", begins, spec["max_speed_m_s"] - np.linalg.norm(v[1:], axis=1))
+        if robot != run.uav:
+            yield Hypothesis("planar motion", begins, -np.abs(v[1:, 2]))
+
+
+def _inequalities(run: Run) -> Iterator[Hypothesis]:
+    """n.v >= share A (d - D) where D <= d, else n.v >= -share (D - d) / h, for what is within sensing range."""
+    for pair in run.views:
+        if pair.robot in run.robots:
+            spare = avoidance_spare_m_s(run, pair, run.command_m_s[pair.robot][run.chosen_row])
+            seen = np.isfinite(spare)
+            yield Hypothesis("avoidance", run.sample_s[seen], spare[seen])
+
+
+def avoidance_spare_m_s(run: Run, pair: Pair, v_m_s: Array) -> Array:
+    """n.v less its bound at every control sample, (S,); infinite beyond the sensing range.
+
+    Args:
+        run: the run.
+        pair: the robot that moves, and what it avoids.
+        v_m_s: velocity of the robot at the samples, (S, 3); a UGV cannot use the z component of n.
+    """
+    control = run.scenario["control"]
+    offset = run.position_m[pair.robot][run.sample_row] - run.position_m[pair.other][run.sample_row]
+    distance = np.linalg.norm(offset, axis=1)
+    normal = offset / np.where(distance > 0.0, distance, 1.0)[:, None]
+    if pair.robot != run.uav:
+        normal = normal * [1.0, 1.0, 0.0]
+    steepness = np.where(distance <= pair.safe_m, control["avoidance_gain_1_s"], 1.0 / control["period_s"])
+    bound = pair.share * steepness * (pair.safe_m - distance)
+    return np.where(distance <= control["sensing_range_m"], (normal * v_m_s).sum(axis=1) - bound, np.inf)

@@ -1,0 +1,159 @@
+"""What a resolved scenario declares: pairs to keep apart, presets, the trigger and its threshold."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+
+from .files import Json
+from .rules import Array
+
+
+class Pair(NamedTuple):
+    """A robot, and an obstacle or another robot.
+
+    Attributes:
+        robot: name.
+        other: name.
+        safe_m: safe distance d.
+        closing_m_s: largest speed at which they can approach each other.
+        share: part of the inequality that each robot takes: 1 beside an obstacle, 1/2 beside a robot.
+    """
+
+    robot: str
+    other: str
+    safe_m: float
+    closing_m_s: float
+    share: float
+
+    def turned(self) -> Pair:
+        """The same pair, seen from the other robot."""
+        return self._replace(robot=self.other, other=self.robot)
+
+
+class Levels(NamedTuple):
+    """The trigger: it triggers at `zeta_m`, releases below `release_m`, and rests until `dwell_s` after a trigger."""
+
+    zeta_m: float
+    release_m: float
+    dwell_s: float
+
+
+@dataclass(frozen=True)
+class Preset:
+    """Preset trajectory: a polyline travelled at constant speed from t = 0, then held.
+
+    Attributes:
+        corners_m: (m, 3).
+        length_m: of the way to each corner, (m,).
+        speed_m_s: constant.
+    """
+
+    corners_m: Array
+    length_m: Array
+    speed_m_s: float
+
+    @property
+    def corner_s(self) -> Array:
+        """When corners are passed and the end is reached, (m - 1,); at standstill none is."""
+        return self.length_m[1:] / self.speed_m_s if self.speed_m_s > 0.0 else np.empty(0)
+
+    def position_m(self, t_s: Array) -> Array:
+        """At times (K,): (K, 3)."""
+        travelled = self.speed_m_s * np.asarray(t_s)
+        return np.stack([np.interp(travelled, self.length_m, axis) for axis in self.corners_m.T], axis=-1)
+
+
+def robots_of(scenario: Json) -> dict[str, Json]:
+    """Each robot's part of the scenario by name, the UGVs first, the UAV last."""
+    return {**scenario["ugvs"], scenario["uav"]["name"]: scenario["uav"]}
+
+
+def pairs_of(scenario: Json) -> list[Pair]:
+    """Every robot with every obstacle, and every two robots once."""
+    safe, uav, robots = scenario["safe_distance"], scenario["uav"]["name"], robots_of(scenario)
+    limit = {name: float(robot["max_speed_m_s"]) for name, robot in robots.items()}
+    beside_obstacles = [
+        Pair(robot, obstacle, safe["obstacle_m"], limit[robot], 1.0)
+        for robot in robots
+        for obstacle in scenario["obstacles"]
+    ]
+    beside_robots = [
+        Pair(one, other, safe["air_ground_m" if other == uav else "ugv_m"], limit[one] + limit[other], 0.5)
+        for one, other in combinations(robots, 2)
+    ]
+    return beside_obstacles + beside_robots
+
+
+def views_of(scenario: Json) -> list[Pair]:
+    """The pairs as each robot sees them: those of two robots from both sides."""
+    pairs = pairs_of(scenario)
+    return pairs + [pair.turned() for pair in pairs if pair.share < 1.0]
+
+
+def preset_of(scenario: Json, ugv: str) -> Preset:
+    """The preset trajectory of a UGV."""
+    given = scenario["ugvs"][ugv]["preset"]
+    corners = np.array(given["waypoints_m"], dtype=np.float64)
+    legs = np.linalg.norm(np.diff(corners, axis=0), axis=1)
+    return Preset(corners, np.append(0.0, np.cumsum(legs)), given["speed_m_s"])
+
+
+def levels_of(scenario: Json) -> Levels:
+    """The trigger of a scenario; the paper's bare one releases at the threshold and never rests."""
+    decision = scenario["decision"]
+    zeta = threshold_m(scenario)
+    if decision["trigger"] == "bare":
+        return Levels(zeta, zeta, 0.0)
+    return Levels(zeta, decision["release_m"], decision["min_inter_event_s"])
+
+
+def threshold_m(scenario: Json) -> float:
+    """The threshold in force: the fixed one, or the Bayes-optimal one."""
+    rule = scenario["decision"]["threshold"]
+    if rule["rule"] == "fixed":
+        return float(rule["zeta_m"])
+    return bayes_threshold_m(rule["drift_m_s"], rule["noise_m_sqrt_s"], rule["c2"] / rule["c1_1_s"])
+
+
+def bayes_threshold_m(drift_m_s: float, noise_m_sqrt_s: float, ratio_s: float) -> float:
+    """Root of noise^2/drift^2 (sinh u + u) = ratio, with u = 2 zeta drift / noise^2, by bisection: (19) with c2/c1."""
+    level = ratio_s * (drift_m_s / noise_m_sqrt_s) ** 2
+    low, high = 0.0, 1.0 + level
+    for _ in range(200):
+        middle = (low + high) / 2.0
+        above = middle > 700.0 or math.sinh(middle) + middle > level
+        low, high = (low, middle) if above else (middle, high)
+    return high * noise_m_sqrt_s**2 / (2.0 * drift_m_s)
+
+
+class Kind(NamedTuple):
+    """A kind of pairs, of which the scenario has at least one: its fastest members, and the names of obligations."""
+
+    name: str
+    safe_m: float
+    closing_m_s: float
+    share: float
+
+
+def kinds_of(scenario: Json) -> list[Kind]:
+    """The kinds of pairs of a scenario, in the order of the report."""
+    safe, uav = scenario["safe_distance"], float(scenario["uav"]["max_speed_m_s"])
+    ugvs = sorted((float(ugv["max_speed_m_s"]) for ugv in scenario["ugvs"].values()), reverse=True)
+    found = [Kind("uav_ugv", safe["air_ground_m"], uav + ugvs[0], 0.5)]
+    if scenario["obstacles"]:
+        found.insert(0, Kind("obstacle", safe["obstacle_m"], max(uav, ugvs[0]), 1.0))
+    if len(ugvs) > 1:
+        found.append(Kind("ugv_ugv", safe["ugv_m"], ugvs[0] + ugvs[1], 0.5))
+    return found
+
+
+def disturbance_m_s(scenario: Json) -> float:
+    """The disturbance that SAFE-DIST is about: 10 % of the largest speed limit, at most A/4 of the least distance."""
+    tenth = 0.1 * max(float(robot["max_speed_m_s"]) for robot in robots_of(scenario).values())
+    least = min(kind.safe_m for kind in kinds_of(scenario))
+    return min(tenth, scenario["control"]["avoidance_gain_1_s"] * least / 4.0)

@@ -1,0 +1,286 @@
+"""THR-DDM and ZENO-REFINE: what follows from the recorded counts. The paths themselves are not simulated again."""
+
+from __future__ import annotations
+
+import io
+import math
+from functools import lru_cache
+from statistics import NormalDist
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from .files import Files, Json, content_of, parse_json
+from .rules import SMALL, Array, Found, NotEstablished, agrees, close, holds, same
+from .scenario import bayes_threshold_m, levels_of
+
+LEVEL = 0.99
+ERROR_ALLOWANCE = 2e-4
+"""Bias that the correction for sampling leaves in the error rate."""
+TIME_ALLOWANCE = 0.05
+"""Bias that it leaves in the decision time, in noise periods."""
+OVERSHOOT = 0.5825971579390107
+"""Mean overshoot of a sampled Wiener path beyond a far barrier, in standard deviations of a step."""
+
+
+class Experiment(NamedTuple):
+    """Paths of (15) between +-zeta that THR-DDM simulates."""
+
+    name: str
+    drift: float
+    noise: float
+    zeta: float
+    deviation: float
+    paths: int
+
+    @property
+    def period_s(self) -> float:
+        """Noise period: a fifth of the threshold per step, but no more than 2 % of it by the drift."""
+        return min((0.2 * self.zeta / self.noise) ** 2, 0.02 * self.zeta / self.drift)
+
+    @property
+    def constants(self) -> Json:
+        """As recorded."""
+        barrier = self.zeta - OVERSHOOT * self.noise * math.sqrt(self.period_s)
+        return {**self._asdict(), "noise_period_s": self.period_s, "barrier_m": barrier}
+
+    def decision_time_s(self) -> float:
+        """(17): T = zeta/drift tanh(u/2) + 2 zeta/drift b - y0/drift, b = (1 - exp(-w))/(2 sinh u)."""
+        u, bias = self._u(), self._bias()
+        return self.zeta / self.drift * (math.tanh(u / 2.0) + 2.0 * bias) - self.deviation / self.drift
+
+    def error_rate(self) -> float:
+        """(18): E = 1/(1 + exp u) - b."""
+        return 1.0 / (1.0 + math.exp(self._u())) - self._bias()
+
+    def _u(self) -> float:
+        return 2.0 * self.zeta * self.drift / self.noise**2
+
+    def _bias(self) -> float:
+        w = 2.0 * self.deviation * self.drift / self.noise**2
+        return (1.0 - math.exp(-w)) / (2.0 * math.sinh(self._u()))
+
+
+def experiments_of(scenario: Json) -> list[Experiment]:
+    """The six experiments of THR-DDM for the numbers of the threshold rule."""
+    rule = scenario["decision"]["threshold"]
+    drift, noise, ratio = float(rule["drift_m_s"]), float(rule["noise_m_sqrt_s"]), rule["c2"] / rule["c1_1_s"]
+    zeta = bayes_threshold_m(drift, noise, ratio)
+    clear = noise * math.sqrt((math.sinh(1.0) + 1.0) / ratio)  # here the Bayes threshold is at u = 1
+    bayes, printed = bayes_threshold_m(clear, noise, ratio), bayes_threshold_m(clear, noise, 1.0 / ratio)
+    return [
+        Experiment("no deviation", drift, noise, zeta, 0.0, 10000),
+        Experiment("deviation ahead", drift, noise, zeta, 0.4 * zeta, 5000),
+        Experiment("deviation behind", drift, noise, zeta, -0.4 * zeta, 5000),
+        Experiment("other drift and noise", 4.0 * noise**2 / zeta, 2.0 * noise, zeta, -0.4 * zeta, 4000),
+        Experiment("Bayes threshold at u = 1", clear, noise, bayes, 0.0, 6000),
+        Experiment("printed threshold instead", clear, noise, printed, 0.0, 6000),
+    ]
+
+
+def ddm(claim: Json, files: Files, scenario: Json) -> Found:
+    """THR-DDM: (17)-(18) are in intervals of 99 % for all comparisons together, which follow from the counts."""
+    saved = parse_json(content_of(files, "paths.json"), "paths.json")
+    rows, experiments = saved["comparisons"], experiments_of(scenario)
+    same("comparisons in the evidence", claim["evidence"]["comparisons"], rows)
+    same("number of comparisons", len(rows), 2 * len(experiments))
+    tail = (1.0 - LEVEL) / len(rows) / 2.0
+    margins = []
+    for k, experiment in enumerate(experiments):
+        time, error = rows[2 * k], rows[2 * k + 1]
+        for row in (time, error):
+            agrees("constants of an experiment", row["constants"], experiment.constants, within=SMALL)
+            counts = ("wrong_decisions", "periods_sum", "periods_sum_of_squares")
+            same("counts of an experiment", [row[key] for key in counts], [time[key] for key in counts])
+            same("experiment", row["experiment"], experiment.name)
+            _counts_are_possible(row, experiment)
+        same("quantities", [time["quantity"], error["quantity"]], ["mean decision time", "error rate"])
+        _time_interval(time, experiment, tail)
+        _error_interval(error, experiment, tail)
+        close("(17)", time["formula"], experiment.decision_time_s(), within=SMALL, about=experiment.name)
+        close("(18)", error["formula"], experiment.error_rate(), within=SMALL, about=experiment.name)
+        margins += [_margin(time, experiment.decision_time_s()), _margin(error, experiment.error_rate())]
+    return Found.with_margin("supported" if min(margins) >= 0.0 else "refuted", min(margins))
+
+
+def _counts_are_possible(row: Json, experiment: Experiment) -> None:
+    n, total, squares = experiment.paths, row["periods_sum"], row["periods_sum_of_squares"]
+    wrong = row["wrong_decisions"]
+    holds("wrong decisions", 0 <= wrong <= n, wrong, f"0 to {n}", about=experiment.name)
+    holds("sum of periods", total >= n, total, f"at least one in each of {n} paths", about=experiment.name)
+    holds("sum of squares", squares * n >= total**2, squares, f"at least {total**2 / n}", about=experiment.name)
+
+
+def _margin(row: Json, formula: float) -> float:
+    """Half-widths by which the formula is inside the interval."""
+    low, high = row["interval"]
+    return 2.0 * min(formula - low, high - formula) / (high - low)
+
+
+def _time_interval(row: Json, experiment: Experiment, tail: float) -> None:
+    """Normal, widened by the bias of the correction; the sampled time is a quarter of a period late."""
+    n, period = experiment.paths, experiment.period_s
+    mean = row["periods_sum"] / n
+    spread = math.sqrt((row["periods_sum_of_squares"] - row["periods_sum"] * mean) / (n - 1.0) / n)
+    half = NormalDist().inv_cdf(1.0 - tail) * spread + TIME_ALLOWANCE
+    interval = [(mean - 0.25 - half) * period, (mean - 0.25 + half) * period]
+    agrees("interval of the decision time", row["interval"], interval, within=1e-7, about=experiment.name)
+    agrees("estimate", row["estimate"], (mean - 0.25) * period, within=SMALL, about=experiment.name)
+
+
+def _error_interval(row: Json, experiment: Experiment, tail: float) -> None:
+    """Clopper and Pearson's, widened by the bias: at an end the counts, or more extreme ones, have probability tail."""
+    n, wrong = experiment.paths, row["wrong_decisions"]
+    low, high = row["interval"][0] + ERROR_ALLOWANCE, row["interval"][1] - ERROR_ALLOWANCE
+    agrees("estimate", row["estimate"], wrong / n, within=SMALL, about=experiment.name)
+    what = "interval of the error rate: probability of the counts at its end"
+    if wrong:
+        close(what, _probability(n, wrong, n, low), tail, within=1e-5 * tail, about=f"{experiment.name}, low end")
+    else:
+        close("interval of the error rate", low, 0.0, within=SMALL, about=experiment.name)
+    if wrong < n:
+        close(what, _probability(n, 0, wrong, high), tail, within=1e-5 * tail, about=f"{experiment.name}, high end")
+    else:
+        close("interval of the error rate", high, 1.0, within=SMALL, about=experiment.name)
+
+
+def _probability(n: int, least: int, most: int, p: float) -> float:
+    """That a binomial number of n trials, each a success with probability p, is between `least` and `most`."""
+    if not 0.0 < p < 1.0:
+        return math.nan
+    log_factorial = np.append(0.0, np.cumsum(np.log(np.arange(1.0, n + 1.0))))
+    j = np.arange(least, most + 1)
+    chosen = log_factorial[n] - log_factorial[j] - log_factorial[n - j]
+    return float(np.exp(chosen + j * math.log(p) + (n - j) * math.log1p(-p)).sum())
+
+
+PATHS, SEED, RESAMPLES, HALVINGS = 96, 5, 4000, 8
+"""Paths of ZENO-REFINE, seed and number of its bootstrap samples, and how often its noise step is halved."""
+SERIES = ("bare", "automaton", "automaton_at_scenario_noise")
+DIVERGES_BELOW, FLAT_WITHIN, STANDARD_ERRORS = -0.25, 0.1, 5.0
+
+
+def refine(claim: Json, files: Files, scenario: Json) -> Found:
+    """ZENO-REFINE: the bare threshold's mean count grows like dt^(-1/2), the automaton's tends to a limit.
+
+    ln(mean) = c + p ln(dt) + b sqrt(dt); intervals of p by bootstrap over the paths. Supported if the bare p's
+    interval, widened by the bias of that fit for the known expectation, contains -1/2 and is below -1/4, the
+    automaton's contains 0 and is within 1/10 of it, and no path exceeds duration / dwell + 1.
+    """
+    dt, duration, intensity = _steps_of(scenario)
+    counts = _counts(content_of(files, "counts.csv"))
+    close("noise steps", np.sort(counts.dt_s)[::-1], dt, within=1e-12)
+    levels, leak = levels_of(scenario), scenario["decision"]["leak_1_s"]
+    expected = np.array([expected_bare(float(step), duration, leak, float(dt[0])) for step in dt])
+    exponent = {name: float(_fit(dt, counts.of[name].mean(axis=0))[1]) for name in SERIES[:2]}
+    intervals = {name: _interval(dt, counts.of[name]) for name in SERIES[:2]}
+    bias = float(_fit(dt, expected)[1]) + 0.5
+    most = int(duration / levels.dwell_s + SMALL) + 1 if levels.dwell_s > 0.0 else None
+    facts = {
+        **{name: _series(values) for name, values in counts.of.items()},
+        "dt_s": dt.tolist(),
+        "expected_bare": expected.tolist(),
+        "fit": {name: {"exponent": exponent[name], "interval": list(intervals[name])} for name in exponent},
+        "bias": bias,
+        "most_triggers": most,
+        "duration_s": duration,
+        "noise_m_sqrt_s": intensity,
+        "leak_1_s": leak,
+        "paths": PATHS,
+    }
+    (low, high), (ours_low, ours_high) = intervals["bare"], intervals["automaton"]
+    bare_slack = min(-0.5 - low + abs(bias), high + abs(bias) + 0.5, DIVERGES_BELOW - high)
+    automaton_slack = min(-ours_low, ours_high, FLAT_WITHIN - max(-ours_low, ours_high))
+    slack = min(bare_slack, automaton_slack)
+    spread = counts.of["bare"].std(axis=0, ddof=1) / math.sqrt(PATHS)
+    as_expected = bool((np.abs(counts.of["bare"].mean(axis=0) - expected) <= STANDARD_ERRORS * spread).all())
+    status = "supported" if as_expected else "inconclusive"
+    if most is not None and counts.of["automaton"].max() > most:
+        status = "refuted"
+    elif max(high - low, ours_high - ours_low) > 2.0 * FLAT_WITHIN:
+        status = "inconclusive"
+    elif slack < -SMALL:
+        status = "refuted"
+    return Found.with_margin(status, slack, **facts)
+
+
+def _steps_of(scenario: Json) -> tuple[Array, float, float]:
+    """Noise steps, coarsest first, duration of a path, s, and intensity of the noise, m/sqrt(s)."""
+    decision, levels, whole = scenario["decision"], levels_of(scenario), scenario["duration_s"]
+    rest = levels.dwell_s or 1.0
+    coarse = min(decision["noise_period_s"], whole / 64, rest / 10)
+    count = min(int(whole / coarse + SMALL), 640)
+    crossing = (levels.zeta_m - levels.release_m) / math.sqrt(rest)
+    intensity = max(decision["noise_m_sqrt_s"], crossing) or 1.0
+    return coarse / 2.0 ** np.arange(HALVINGS + 1), count * coarse, intensity
+
+
+class Counts(NamedTuple):
+    """Trigger counts by series, (paths, steps) each, and the steps."""
+
+    dt_s: Array
+    of: dict[str, Array]
+
+
+@lru_cache(maxsize=8)
+def _counts(content: bytes) -> Counts:
+    """The table of counts, coarsest step first: one count for each path and step."""
+    try:
+        table = pd.read_csv(io.BytesIO(content))
+    except ValueError as error:
+        raise NotEstablished("the counts are a table", str(error), "counts.csv") from error
+    dt = np.sort(table["dt_s"].unique())[::-1]
+    same("counts of every path at every step", len(table), PATHS * (HALVINGS + 1), about="counts.csv")
+    same("noise steps", len(dt), HALVINGS + 1, about="counts.csv")
+    found = {}
+    for name in SERIES:
+        values = table.pivot_table(name, "path", "dt_s").to_numpy(dtype=np.float64)[:, ::-1]
+        same("counts of every path at every step", list(values.shape), [PATHS, HALVINGS + 1], about=name)
+        holds(
+            "counts are whole numbers", (values >= 0.0) & (values == np.round(values)), values, "0, 1, ...", about=name
+        )
+        found[name] = values
+    return Counts(dt, found)
+
+
+def _series(values: Array) -> Json:
+    error = values.std(axis=0, ddof=1) / math.sqrt(PATHS)
+    return {
+        "mean": values.mean(axis=0).tolist(),
+        "standard_error": error.tolist(),
+        "largest": values.max(axis=0).tolist(),
+    }
+
+
+def _fit(dt_s: Array, mean: Array) -> Any:
+    """c, p and b of ln(mean) = c + p ln(dt) + b sqrt(dt), (3,); of means (m, dt): (3, m)."""
+    design = np.column_stack([np.ones_like(dt_s), np.log(dt_s), np.sqrt(dt_s)])
+    return np.linalg.lstsq(design, np.log(mean).T, rcond=None)[0]
+
+
+def _interval(dt_s: Array, counts: Array) -> tuple[float, float]:
+    """Percentile bootstrap of the exponent over the paths."""
+    exponents = _fit(dt_s, _weights() @ counts)[1]
+    low, high = np.quantile(exponents, [(1.0 - LEVEL) / 2.0, (1.0 + LEVEL) / 2.0])
+    return float(low), float(high)
+
+
+@lru_cache(maxsize=1)
+def _weights() -> Array:
+    """Weights of the paths in each bootstrap sample."""
+    rng = np.random.default_rng([SEED, PATHS])
+    return rng.multinomial(PATHS, np.full(PATHS, 1.0 / PATHS), RESAMPLES) / PATHS
+
+
+@lru_cache(maxsize=64)
+def expected_bare(dt_s: float, duration_s: float, leak_1_s: float, coarsest_s: float) -> float:
+    """Expected number of triggers of the bare threshold: 1/2 + sum_k arccos(rho_k) / (2 pi).
+
+    rho_k is the correlation of n at the ends of step k: n' = (1 - leak dt) n + dW, and n(0) is one coarsest step old.
+    """
+    keep, k = 1.0 - leak_1_s * dt_s, np.arange(round(duration_s / dt_s) + 1)
+    grown = k * dt_s if leak_1_s == 0.0 else dt_s * (1.0 - keep ** (2.0 * k)) / (1.0 - keep**2)
+    variance = keep ** (2.0 * k) * coarsest_s + grown
+    rho = keep * np.sqrt(variance[:-1] / variance[1:])
+    return 0.5 + float(np.arccos(np.minimum(rho, 1.0)).sum()) / (2.0 * math.pi)

@@ -1,0 +1,225 @@
+"""ZENO-TRACE and THR-TRIG: the trigger (20), run again on the decision variable of (15)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import zip_longest
+from typing import NamedTuple
+
+import numpy as np
+
+from .files import Json
+from .rules import SMALL, Array, Disagreement, Found, at_most, close, holds, same
+from .run import Run
+from .scenario import Levels
+
+EVENT_S = 1e-5
+"""Recorded and recomputed events may differ by this: ten times the accuracy of the simulator's event isolation."""
+VARIABLE_M = 1e-6
+"""Recorded and recomputed decision variables may differ by this: x moves less within the event isolation."""
+SUPERVISING, INTERVENING, REFRACTORY = 0.0, 1.0, 2.0
+MODE_NAMES = ("SUPERVISING", "INTERVENING", "REFRACTORY")
+
+
+class Step(NamedTuple):
+    """A change of the trigger's mode; `event` is what the trace has for it: trigger, release or nothing."""
+
+    t_s: float
+    event: str
+    mode: float
+
+
+@dataclass(frozen=True)
+class Variable:
+    """x(t) = ||rho_rd(t) - rho(t)|| + n(t), where both are linear in time between knots; x is monotone there.
+
+    Attributes:
+        t_s: knots, (K,).
+        parts_m: rho_rd - rho and n at the knots, (K, 4).
+        x_m: x at the knots, (K,).
+    """
+
+    t_s: Array
+    parts_m: Array
+    x_m: Array
+
+    def at(self, t_s: float) -> float:
+        """X at a time, m."""
+        parts = np.array([np.interp(t_s, self.t_s, part) for part in self.parts_m.T])
+        return float(np.linalg.norm(parts[:3]) + parts[3])
+
+    def reaches(self, level_m: float, after_s: float, *, above: bool) -> float | None:
+        """First time after `after_s` at which x comes to be >= the level (above) or < it; by bisection."""
+        later = np.flatnonzero(((self.x_m >= level_m) == above) & (self.t_s > after_s))
+        if not len(later):
+            return None
+        low, high = max(after_s, float(self.t_s[later[0] - 1])), float(self.t_s[later[0]])
+        for _ in range(60):
+            middle = (low + high) / 2.0
+            there = (self.at(middle) >= level_m) == above
+            low, high = (low, middle) if there else (middle, high)
+        return high
+
+
+def decision_variable(run: Run, ugv: str) -> Variable:
+    """X from positions, preset and noise; cut at corners of the preset and at turning points of x."""
+    corners = run.presets[ugv].corner_s
+    t = np.union1d(run.t_s, corners[(corners > run.t_s[0]) & (corners < run.t_s[-1])])
+    moving = np.column_stack([run.position_m[ugv], run.column(f"{ugv}.noise_m")])
+    parts = _interpolated(run.t_s, moving, t)
+    parts[:, :3] = run.presets[ugv].position_m(t) - parts[:, :3]
+    knots = np.union1d(t, _turning_points_s(t, parts))
+    at_knots = _interpolated(t, parts, knots)
+    return Variable(knots, at_knots, np.linalg.norm(at_knots[:, :3], axis=1) + at_knots[:, 3])
+
+
+def _interpolated(t_s: Array, values: Array, at_s: Array) -> Array:
+    return np.stack([np.interp(at_s, t_s, column) for column in values.T], axis=1)
+
+
+def _turning_points_s(t_s: Array, parts_m: Array) -> Array:
+    """Times at which x has a minimum within a segment.
+
+    On a segment x(u) = ||r + u w|| + n + u m, 0 <= u <= 1. With L = ||w||, the point u0 = -r.w / L^2 of least norm c,
+    and v = L (u - u0): ||r + u w|| = sqrt(c^2 + v^2). So x' = L v / sqrt(c^2 + v^2) + m is 0 at
+    v = -m c / sqrt(L^2 - m^2) if |m| < L, and nowhere else.
+    """
+    step = np.diff(parts_m, axis=0)
+    turns = np.linalg.norm(step[:, :3], axis=1) > np.abs(step[:, 3])
+    r, w, m = parts_m[:-1][turns, :3], step[turns, :3], step[turns, 3]
+    length = np.linalg.norm(w, axis=1)
+    u0 = -(r * w).sum(axis=1) / length**2
+    c = np.linalg.norm(r + u0[:, None] * w, axis=1)
+    u = u0 - m * c / np.sqrt(length**2 - m**2) / length
+    inside = (u > 0.0) & (u < 1.0)
+    return np.asarray((t_s[:-1][turns] + u * np.diff(t_s)[turns])[inside])
+
+
+def automaton(x: Variable, levels: Levels) -> list[Step]:
+    """Run the trigger on x.
+
+    It triggers when x reaches zeta while supervising, also at t = 0; it releases when x falls below the release level.
+    A release before the dwell after the trigger is over leads to a rest until then, and a trigger at its end if x is
+    still at zeta or above.
+    """
+    found: list[Step] = []
+    trigger = float(x.t_s[0]) if x.x_m[0] >= levels.zeta_m else x.reaches(levels.zeta_m, float(x.t_s[0]), above=True)
+    while trigger is not None:
+        found.append(Step(trigger, "trigger", INTERVENING))
+        release, rested = x.reaches(levels.release_m, trigger, above=False), trigger + levels.dwell_s
+        if release is None:
+            break
+        found.append(Step(release, "release", REFRACTORY if release < rested else SUPERVISING))
+        if release >= rested:
+            trigger = x.reaches(levels.zeta_m, release, above=True)
+        elif rested > x.t_s[-1]:
+            break
+        else:
+            found.append(Step(rested, "", SUPERVISING))
+            still_above = x.at(rested) >= levels.zeta_m
+            trigger = rested if still_above else x.reaches(levels.zeta_m, rested, above=True)
+    return found
+
+
+def refuted_zeno_proof(claim: Json, levels: Levels, bound_s: float) -> Found:
+    """ZENO-PROOF refuted: the recorded run is one of the automaton, and has two triggers closer than the bound."""
+    recorded = claim["counterexample"]["run"]
+    triggers = []
+    mode, rested = SUPERVISING, -np.inf
+    for row in recorded:
+        when, x = row["t_s"], row["x_m"]
+        before = mode
+        if mode == REFRACTORY and when >= rested:
+            mode = SUPERVISING
+        if mode == SUPERVISING and x >= levels.zeta_m:
+            mode, rested = INTERVENING, when + levels.dwell_s
+            triggers.append(when)
+        elif before == INTERVENING and x <= levels.release_m and x < levels.zeta_m:
+            mode = SUPERVISING if when >= rested else REFRACTORY
+        same("mode of the automaton", row["mode"], MODE_NAMES[int(mode)], t_s=when)
+        same("trigger of the automaton", row["trigger"], mode == INTERVENING and triggers[-1] == when, t_s=when)
+    at_most("two triggers of the automaton", 2 - len(triggers), 0)
+    gap = float(np.diff(triggers).min())
+    at_most("gap of two triggers", gap, bound_s)
+    return Found.with_margin("refuted", gap - bound_s)
+
+
+def thr_trig(run: Run, _: Json) -> Found:
+    """THR-TRIG: the recorded triggers and releases are those of the automaton run on x."""
+    _only_ugvs_are_triggered_on(run)
+    lags_s: list[float] = []
+    for ugv in run.ugvs:
+        x = decision_variable(run, ugv)
+        steps = automaton(x, run.levels)
+        at_rows = np.interp(run.t_s, x.t_s, x.x_m)  # rows are knots
+        recorded = run.column(f"{ugv}.decision_variable_m")
+        close("decision variable", recorded, at_rows, within=VARIABLE_M, about=ugv, t_s=run.t_s)
+        lags_s += _events_are_the_automatons(run, ugv, steps)
+        _modes_are_the_automatons(run, ugv, steps)
+    facts = run.levels._asdict()
+    return Found.with_margin("holds", EVENT_S - max(lags_s), **facts) if lags_s else Found("holds", facts=facts)
+
+
+def _only_ugvs_are_triggered_on(run: Run) -> None:
+    for event in run.events:
+        known = event["kind"] not in ("trigger", "release") or event["robot"] in run.ugvs
+        holds("only UGVs are triggered on", known, event["robot"], "a UGV", t_s=event["t_s"])
+
+
+def _events_are_the_automatons(run: Run, ugv: str, steps: list[Step]) -> list[float]:
+    """Compare one by one; those in the last 1e-5 s may be on either side of the end. Returns the differences, s."""
+    ours = [(step.t_s, step.event) for step in steps if step.event]
+    theirs = sorted((float(when), kind) for kind in ("trigger", "release") for when in run.times_s(ugv, kind))
+    lags: list[float] = []
+    for recomputed, recorded in zip_longest(ours, theirs):
+        first = min(event for event in (recomputed, recorded) if event is not None)
+        if recomputed is None or recorded is None:
+            if first[0] < run.t_s[-1] - EVENT_S:
+                raise Disagreement("triggers and releases", recorded, recomputed, ugv, first[0])
+            continue
+        lags.append(abs(recomputed[0] - recorded[0]))
+        if recomputed[1] != recorded[1] or lags[-1] > EVENT_S:
+            raise Disagreement("triggers and releases", recorded, recomputed, ugv, first[0])
+    return lags
+
+
+def _modes_are_the_automatons(run: Run, ugv: str, steps: list[Step]) -> None:
+    """The mode at a row is the automaton's just before or just after it."""
+    times = np.array([step.t_s for step in steps])
+    modes = np.array([SUPERVISING, *(step.mode for step in steps)])
+    before = modes[np.searchsorted(times, run.t_s - EVENT_S)]
+    after = modes[np.searchsorted(times, run.t_s + EVENT_S)]
+    recorded = run.column(f"{ugv}.mode")
+    holds("mode", (recorded == before) | (recorded == after), recorded, after, about=ugv, t_s=run.t_s)
+
+
+def zeno_trace(run: Run, _: Json) -> Found:
+    """ZENO-TRACE: t_(k+1) - t_k >= min_inter_event_s for consecutive triggers of each UGV."""
+    bound = float(run.scenario["decision"]["min_inter_event_s"])
+    if bound <= 0.0:
+        return Found("not_run")
+    listed: Json = {}
+    gaps: list[float] = []
+    for ugv in run.ugvs:
+        _columns_follow_the_events(run, ugv)
+        triggers = run.times_s(ugv, "trigger")
+        listed[ugv] = {"count": len(triggers), "t_s": triggers.tolist()}
+        gaps += np.diff(triggers).tolist()
+    if not gaps:
+        return Found("holds", facts={"triggers": listed})
+    status = "holds" if min(gaps) >= bound - SMALL else "refuted"
+    return Found.with_margin(status, min(gaps) - bound, triggers=listed)
+
+
+def _columns_follow_the_events(run: Run, ugv: str) -> None:
+    """The columns on the last trigger, the last release and the count are those of the events before each row."""
+    for kind, name in (("trigger", "triggered_at_s"), ("release", "released_at_s")):
+        times = run.times_s(ugv, kind)
+        last = np.append(-1.0, times)
+        before, after = (np.searchsorted(times, run.t_s + shift) for shift in (-SMALL, SMALL))
+        recorded = run.column(f"{ugv}.{name}")
+        fits = (np.abs(recorded - last[before]) <= SMALL) | (np.abs(recorded - last[after]) <= SMALL)
+        holds(f"column {name}", fits, recorded, last[after], about=ugv, t_s=run.t_s)
+        if kind == "trigger":
+            count = run.column(f"{ugv}.triggers")
+            holds("column triggers", (count == before) | (count == after), count, after, about=ugv, t_s=run.t_s)

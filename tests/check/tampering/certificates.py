@@ -1,0 +1,549 @@
+"""Tampering with certificates."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from check.tampering.base import (
+    claim_of,
+    edited_certificate,
+    edited_claim,
+    edited_obligation,
+    edited_report,
+    ignored,
+    refused_by,
+    seal_certificate,
+    write,
+)
+
+EXPANDS = "the certificate expands to its goal"
+
+
+@refused_by("SAFE-INV", "SHA-256 of certificates", run="")
+def certificate_missing(folder: Path) -> None:
+    (folder / "certificates" / "SAFE-INV" / "obligations.json").unlink()
+
+
+@refused_by("SAFE-INV", "the file can be read", run="")
+def certificate_missing_and_not_listed(folder: Path) -> None:
+    certificate_missing(folder)
+    with edited_claim(folder, "SAFE-INV", "") as claim:
+        del claim["certificates"]["obligations.json"]
+
+
+@refused_by("SAFE-INV", "SHA-256 of certificates", run="")
+def certificate_added(folder: Path) -> None:
+    write(folder / "certificates" / "SAFE-INV" / "more.json", b"{}")
+
+
+@refused_by("SAFE-INV", "SHA-256 of certificates", run="")
+def certificate_changed_digest_left(folder: Path) -> None:
+    path = folder / "certificates" / "SAFE-INV" / "obligations.json"
+    write(path, path.read_bytes() + b"\n")
+
+
+@refused_by("SAFE-INV", EXPANDS, run="")
+def coefficient_changed(folder: Path) -> None:
+    with edited_obligation(folder, "SAFE-INV", "pair_outside") as one:
+        one["certificate"][2]["coefficient"] = "1"
+
+
+@refused_by("SAFE-INV", "coefficients are not negative", run="")
+def coefficient_negative(folder: Path) -> None:
+    with edited_obligation(folder, "SAFE-INV", "outside") as one:
+        one["goal"] = "d - D - s*r"
+        for term in one["certificate"]:
+            term["coefficient"] = "-1"
+
+
+@refused_by("SAFE-INV", "a number is an integer or a fraction", run="")
+def coefficient_without_a_sign(folder: Path) -> None:
+    with edited_obligation(folder, "SAFE-INV", "outside") as one:
+        one["goal"] = "h*d"
+        one.update(multiplier=[], certificate=[{"coefficient": "h*d", "factors": [], "square": "1"}])
+
+
+@refused_by("SAFE-INV", "the multiplier is positive", run="")
+def multiplier_not_positive(folder: Path) -> None:
+    with edited_obligation(folder, "SAFE-INV", "outside") as one:
+        one.update(multiplier=[{"coefficient": "0", "factors": ["h"], "square": "1"}], certificate=[])
+
+
+@refused_by("SAFE-INV", "the multiplier is positive", run="")
+def multiplier_that_may_be_zero(folder: Path) -> None:
+    """Anything times 0: s may be 0."""
+    with edited_obligation(folder, "SAFE-INV", "outside") as one:
+        one["multiplier"] = [{"coefficient": "1", "factors": ["s"], "square": "1"}]
+
+
+@refused_by("SAFE-INV", "the goal is the claim's", run="")
+def goal_weakened(folder: Path) -> None:
+    with edited_obligation(folder, "SAFE-INV", "outside") as one:
+        one["goal"] = "D + s*r - d + 1"
+        one["certificate"].append({"coefficient": "1", "factors": ["h"], "square": "1"})
+
+
+@refused_by("SAFE-INV", "the goal is the claim's", run="")
+def goal_with_numbers_weakened(folder: Path) -> None:
+    with edited_obligation(folder, "SAFE-INV", "inside_obstacle") as one:
+        one["goal"] = "r*s + 1"
+        one["certificate"].append({"coefficient": "1", "factors": [], "square": "1"})
+
+
+@refused_by("SAFE-DIST", "no further premise", run="")
+def hypothesis_added(folder: Path) -> None:
+    with edited_obligation(folder, "SAFE-DIST", "inside_bound") as one:
+        one["hypotheses"]["begged"] = one["goal"]
+        one["certificate"] = [{"coefficient": "1", "factors": ["begged"], "square": "1"}]
+
+
+@refused_by("SAFE-INV", "no further premise", run="")
+def false_number_assumed(folder: Path) -> None:
+    """From -1 >= 0 everything follows."""
+    with edited_obligation(folder, "SAFE-INV", "unseen_obstacle") as one:
+        one["hypotheses"]["false"] = "-1"
+
+
+@refused_by("SAFE-GATE", "no further premise", run="")
+def equation_added(folder: Path) -> None:
+    with edited_obligation(folder, "SAFE-GATE", "zero_outside") as one:
+        one.update(equations={"begged": "b"}, equation_multipliers={"begged": "-1"}, multiplier=[], certificate=[])
+
+
+@refused_by("SAFE-INV", EXPANDS, run="")
+def number_in_a_certificate_changed(folder: Path) -> None:
+    with edited_obligation(folder, "SAFE-INV", "outside_obstacle") as one:
+        one["hypotheses"]["rest"] = one["hypotheses"]["rest"].replace("1/20", "1/40")
+
+
+@refused_by("SAFE-INV", "an obligation is there once", run="")
+def name_twice(folder: Path) -> None:
+    with edited_certificate(folder, "SAFE-INV") as obligations:
+        true = next(entry for entry in obligations if entry["name"] == "outside")
+        obligations.insert(0, {**true, "says": "the same again"})
+
+
+@refused_by("SAFE-LEMMA", "no further premise", run="")
+def hypotheses_made_strict(folder: Path) -> None:
+    with edited_certificate(folder, "SAFE-LEMMA") as obligations:
+        for one in obligations:
+            one["strict"] = {**one["hypotheses"], **one["strict"]}
+            one["hypotheses"] = {}
+
+
+@refused_by("ZENO-PROOF", "the obligation is there", run="")
+def invariant_of_the_automaton_not_shown(folder: Path) -> None:
+    with edited_certificate(folder, "ZENO-PROOF") as obligations:
+        obligations[:] = [one for one in obligations if one["name"].endswith("_claim")]
+
+
+@refused_by("SAFE-DIST", "the obligation is there", run="")
+def only_half_of_the_claim_shown(folder: Path) -> None:
+    with edited_certificate(folder, "SAFE-DIST") as obligations:
+        obligations[:] = [one for one in obligations if one["name"].endswith("_bound")]
+
+
+def without_obligation(folder: Path, claim: str, name: str) -> None:
+    """Remove an obligation from a certificate and from the evidence."""
+    with edited_certificate(folder, claim) as obligations:
+        obligations[:] = [one for one in obligations if one["name"] != name]
+    with edited_claim(folder, claim, "") as entry:
+        listed = entry["evidence"]["obligations"]
+        listed[:] = [one for one in listed if one["name"] != name]
+
+
+@refused_by("SAFE-INV", "the obligation is there", run="")
+def key_obligation_removed(folder: Path) -> None:
+    without_obligation(folder, "SAFE-INV", "pair_inside")
+
+
+@refused_by("SAFE-INV", "the obligation is there", run="")
+def obligation_with_numbers_removed(folder: Path) -> None:
+    without_obligation(folder, "SAFE-INV", "pair_inside_uav_ugv")
+
+
+@refused_by("SAFE-DIST", "the obligation is there", run="")
+def positive_distance_not_shown(folder: Path) -> None:
+    without_obligation(folder, "SAFE-DIST", "positive_obstacle")
+
+
+@refused_by("ZENO-PROOF", "the obligation is there", run="")
+def obligations_all_removed(folder: Path) -> None:
+    with edited_certificate(folder, "ZENO-PROOF") as obligations:
+        obligations.clear()
+
+
+@refused_by("SAFE-LEMMA", "a polynomial is a sum of products", run="")
+def code_in_a_certificate(folder: Path) -> None:
+    with edited_certificate(folder, "SAFE-LEMMA") as obligations:
+        obligations[0]["goal"] = "__import__('os').getcwd()"
+
+
+@refused_by("SAFE-LEMMA", "a number is an integer or a fraction", run="")
+def number_for_ever(folder: Path) -> None:
+    with edited_certificate(folder, "SAFE-LEMMA") as obligations:
+        obligations[0]["certificate"][0]["coefficient"] = "1e999999999"
+
+
+@refused_by("SAFE-LEMMA", "a polynomial is a sum of products", run="")
+def power_for_ever(folder: Path) -> None:
+    with edited_certificate(folder, "SAFE-LEMMA") as obligations:
+        obligations[0]["goal"] = "(" * 9 + "9" + "**12)" * 9
+
+
+@refused_by("SAFE-LEMMA", "a polynomial is small enough", run="")
+def product_for_ever(folder: Path) -> None:
+    with edited_certificate(folder, "SAFE-LEMMA") as obligations:
+        sum_of_names = " + ".join(f"x{i}" for i in range(500))
+        obligations[0]["certificate"][0]["square"] = sum_of_names
+
+
+@refused_by("SAFE-LEMMA", "G = L D L^T", run="")
+def gram_matrix_changed(folder: Path) -> None:
+    with edited_certificate(folder, "SAFE-LEMMA", "gram.json") as gram:
+        gram["gram"][0][0] = "1"
+
+
+@refused_by("SAFE-LEMMA", "the diagonal is not negative", run="")
+def gram_matrix_indefinite(folder: Path) -> None:
+    with edited_certificate(folder, "SAFE-LEMMA", "gram.json") as gram:
+        gram["diagonal"][1] = "-1"
+
+
+@refused_by("SAFE-LEMMA", "z.G z is Lagrange's difference", run="")
+def monomials_exchanged(folder: Path) -> None:
+    with edited_certificate(folder, "SAFE-LEMMA", "gram.json") as gram:
+        gram["monomials"][1] = "x1*v1"
+
+
+@refused_by("ZENO-PROOF", "no further premise", run="")
+def dwell_of_the_proof_changed(folder: Path) -> None:
+    with edited_obligation(folder, "ZENO-PROOF", "dwell_is_the_bound") as one:
+        one["equations"].update(dwell="dwell - 1/4", bound="bound - 1/4")
+
+
+@refused_by("ZENO-PROOF", "rounding of the dwell", run="")
+def rounding_of_the_dwell_hidden(folder: Path) -> None:
+    with edited_claim(folder, "ZENO-PROOF", "") as claim:
+        claim["evidence"]["rounding_s"] = 0.0
+        claim["margin"] = 1e-9
+
+
+@refused_by("SAFE-INV", "an obligation is proved", run="")
+def obligation_left_open(folder: Path) -> None:
+    with edited_claim(folder, "SAFE-INV", "") as claim:
+        claim["evidence"]["obligations"][0]["status"] = "inconclusive"
+
+
+@refused_by("SAFE-INV", "the running code conforms", run="")
+def disagreement_of_the_running_code_recorded(folder: Path) -> None:
+    with edited_claim(folder, "SAFE-INV", "") as claim:
+        claim["evidence"]["conformance"]["agrees"] = False
+
+
+@refused_by("SAFE-GATE", "the running layer met its inequalities", run="")
+def missed_inequality_recorded(folder: Path) -> None:
+    with edited_claim(folder, "SAFE-GATE", "") as claim:
+        claim["evidence"]["layer"][0]["missed"] = 1
+
+
+@refused_by("SAFE-DIST", "bounds broken by a disturbed run", run="")
+def broken_bound_recorded(folder: Path) -> None:
+    with edited_claim(folder, "SAFE-DIST", "") as claim:
+        claim["evidence"]["runs"][0]["broken"] = 1
+
+
+@refused_by("SAFE-DIST", "least distances", run="")
+def bound_of_a_disturbed_run_changed(folder: Path) -> None:
+    with edited_claim(folder, "SAFE-DIST", "") as claim:
+        claim["evidence"]["least_distances_m"]["obstacle"] = 1.9
+
+
+@refused_by("SAFE-GATE", "inputs", run="")
+def interventions_put_on_top(folder: Path) -> None:
+    with edited_claim(folder, "SAFE-GATE", "") as claim:
+        claim["inputs"]["method_d"]["intervention_on_top"] = True
+
+
+@refused_by("SAFE-INV", "inputs", run="")
+def obstacle_left_out_of_a_proof(folder: Path) -> None:
+    with edited_claim(folder, "SAFE-INV", "") as claim:
+        del claim["inputs"]["team"]["obstacles"][0]
+
+
+@refused_by("SAFE-DIST", "inputs", run="")
+def disturbance_lowered(folder: Path) -> None:
+    with edited_claim(folder, "SAFE-DIST", "") as claim:
+        claim["inputs"]["disturbance_m_s"] = 0.01
+
+
+@refused_by("SAFE-INV", "margin", run="")
+def margin_of_a_proof_changed(folder: Path) -> None:
+    with edited_claim(folder, "SAFE-INV", "") as claim:
+        claim["margin"] = 2.0
+
+
+@refused_by("SAFE-DIST", "margin", run="")
+def margin_of_the_disturbed_runs_changed(folder: Path) -> None:
+    with edited_claim(folder, "SAFE-DIST", "") as claim:
+        claim["margin"] = 0.1
+
+
+@refused_by("THR-OPT", "margin", run="")
+def margin_of_the_risk_changed(folder: Path) -> None:
+    with edited_claim(folder, "THR-OPT", "") as claim:
+        claim["margin"] *= 1.1
+
+
+# ------------------------------------------------------------------------------------- threshold
+
+
+def statements(folder: Path, claim: str) -> Any:
+    """statements.json of a claim, to be changed in place."""
+    return edited_certificate(folder, claim, "statements.json")
+
+
+@refused_by("THR-ROOT", "f changes its sign in the enclosure", run="")
+def enclosure_moved(folder: Path) -> None:
+    with statements(folder, "THR-ROOT") as saved:
+        end = saved["enclosures"]["u"][1]
+        saved["enclosures"]["u"] = [end, str(Fraction(end) * (1 + Fraction(1, 10**13)))]
+
+
+@refused_by("THR-ROOT", "the enclosure is narrow", run="")
+def enclosure_widened(folder: Path) -> None:
+    with statements(folder, "THR-ROOT") as saved:
+        saved["enclosures"]["u"] = ["1/10", "1"]
+
+
+@refused_by("THR-ROOT", "thresholds of the enclosure", run="")
+def threshold_of_the_enclosure_changed(folder: Path) -> None:
+    with statements(folder, "THR-ROOT") as saved:
+        saved["enclosures"]["zeta_m"] = ["29/10", "29/10"]
+
+
+@refused_by("THR-OPT", "the root is enclosed", run="")
+def printed_root_missing(folder: Path) -> None:
+    with statements(folder, "THR-OPT") as saved:
+        del saved["enclosures"]["printed_u"]
+
+
+@refused_by("THR-OPT", "f changes its sign in the enclosure", run="")
+def printed_root_moved(folder: Path) -> None:
+    with statements(folder, "THR-OPT") as saved:
+        saved["enclosures"]["printed_u"] = saved["enclosures"]["u"]
+
+
+@refused_by("THR-ROOT", "constants", run="")
+def constants_of_the_root_changed(folder: Path) -> None:
+    with statements(folder, "THR-ROOT") as saved:
+        saved["constants"]["r"] = "3"
+
+
+def statement(saved: Any, name: str) -> Any:
+    """A statement by name."""
+    return next(one for one in saved["statements"] if one["name"] == name)
+
+
+@refused_by("THR-OPT", "a sign is right", run="")
+def sign_turned(folder: Path) -> None:
+    with statements(folder, "THR-OPT") as saved:
+        statement(saved, "printed_risk")["sign"] = "<"
+
+
+@refused_by("THR-OPT", "a derivative is right", run="")
+def derivative_changed(folder: Path) -> None:
+    with statements(folder, "THR-OPT") as saved:
+        one = statement(saved, "factorisation")
+        one["derivative"] = one["derivative"].replace("+u)", "-u)")
+
+
+@refused_by("THR-OPT", "an expression has + - * / **, integers, names and exp", run="")
+def code_in_a_statement(folder: Path) -> None:
+    with statements(folder, "THR-OPT") as saved:
+        statement(saved, "printed_risk")["expression"] = "open('x')"
+
+
+@refused_by("THR-OPT", "statements in the evidence", run="")
+def statement_removed(folder: Path) -> None:
+    with statements(folder, "THR-OPT") as saved:
+        saved["statements"].remove(statement(saved, "printed_risk"))
+
+
+@refused_by("THR-ROOT", "the code's threshold is the root", run="")
+def running_threshold_changed(folder: Path) -> None:
+    with edited_claim(folder, "THR-ROOT", "") as claim:
+        claim["evidence"]["running_threshold_m"] = 2.9
+
+
+# ------------------------------------------------------------------------------------- experiments
+
+
+def edit_comparisons(folder: Path, edit: Any) -> None:
+    """Change the comparisons of THR-DDM in the evidence and in the certificate."""
+    with edited_certificate(folder, "THR-DDM", "paths.json") as paths:
+        edit(paths["comparisons"])
+    with edited_claim(folder, "THR-DDM", "") as claim:
+        edit(claim["evidence"]["comparisons"])
+
+
+@refused_by("THR-DDM", "interval of the error rate", run="")
+def counts_of_paths_changed(folder: Path) -> None:
+    def edit(rows: list[Any]) -> None:
+        for row in rows:
+            row["wrong_decisions"] += 50
+            if row["quantity"] == "error rate":
+                row["estimate"] = row["wrong_decisions"] / row["constants"]["paths"]
+
+    edit_comparisons(folder, edit)
+
+
+@refused_by("THR-DDM", "comparisons in the evidence", run="")
+def experiments_removed(folder: Path) -> None:
+    with edited_certificate(folder, "THR-DDM", "paths.json") as paths:
+        del paths["comparisons"][1:]
+
+
+@refused_by("THR-DDM", "number of comparisons", run="")
+def experiments_removed_everywhere(folder: Path) -> None:
+    def edit(rows: list[Any]) -> None:
+        del rows[2:]
+
+    edit_comparisons(folder, edit)
+
+
+@refused_by("THR-DDM", "constants of an experiment", run="")
+def experiment_made_easy(folder: Path) -> None:
+    def edit(rows: list[Any]) -> None:
+        for row in rows:
+            row["constants"]["drift"] = 1.0
+
+    edit_comparisons(folder, edit)
+
+
+@refused_by("THR-DDM", "interval of the decision time", run="")
+def interval_widened(folder: Path) -> None:
+    def edit(rows: list[Any]) -> None:
+        rows[0]["interval"] = [0.0, 1.0]
+
+    edit_comparisons(folder, edit)
+
+
+@refused_by("THR-DDM", "(18)", run="")
+def formula_fitted(folder: Path) -> None:
+    def edit(rows: list[Any]) -> None:
+        rows[1]["formula"] = rows[1]["estimate"]
+
+    edit_comparisons(folder, edit)
+
+
+@refused_by("THR-DDM", "sum of squares", run="")
+def variance_negative(folder: Path) -> None:
+    def edit(rows: list[Any]) -> None:
+        for row in rows[:2]:
+            row["periods_sum_of_squares"] = 1
+
+    edit_comparisons(folder, edit)
+
+
+def counts(folder: Path) -> pd.DataFrame:
+    """The trigger counts of ZENO-REFINE."""
+    return pd.read_csv(folder / "certificates" / "ZENO-REFINE" / "counts.csv")
+
+
+def write_counts(folder: Path, frame: pd.DataFrame) -> None:
+    """Put other counts in their place."""
+    write(folder / "certificates" / "ZENO-REFINE" / "counts.csv", frame.to_csv(index=False).encode())
+    seal_certificate(folder, "ZENO-REFINE", "counts.csv")
+
+
+@refused_by("ZENO-REFINE", "verdict", run="")
+def counts_of_triggers_raised(folder: Path) -> None:
+    frame = counts(folder)
+    frame["automaton"] *= 1000
+    write_counts(folder, frame)
+
+
+@refused_by("ZENO-REFINE", "margin", run="")
+def counts_of_triggers_lowered(folder: Path) -> None:
+    frame = counts(folder)
+    frame["automaton"] = frame["automaton"].clip(upper=1)
+    write_counts(folder, frame)
+
+
+@refused_by("ZENO-REFINE", "evidence", run="")
+def counts_of_the_quiet_series_changed(folder: Path) -> None:
+    """No verdict follows from this series, but its mean is in the evidence."""
+    frame = counts(folder)
+    frame["automaton_at_scenario_noise"] += 1
+    write_counts(folder, frame)
+
+
+@refused_by("ZENO-REFINE", "inputs", run="")
+def counts_of_triggers_raised_with_another_dwell(folder: Path) -> None:
+    counts_of_triggers_raised(folder)
+    with edited_claim(folder, "ZENO-REFINE", "") as claim:
+        claim["inputs"]["dwell_s"] = 1e-6
+
+
+@refused_by("ZENO-REFINE", "counts of every path at every step", run="")
+def counts_of_a_path_missing(folder: Path) -> None:
+    frame = counts(folder)
+    write_counts(folder, frame[frame["path"] > 0])
+
+
+@refused_by("ZENO-REFINE", "noise steps", run="")
+def noise_steps_changed(folder: Path) -> None:
+    frame = counts(folder)
+    frame["dt_s"] *= 2.0
+    write_counts(folder, frame)
+
+
+@refused_by("ZENO-REFINE", "counts are whole numbers", run="")
+def half_a_trigger_counted(folder: Path) -> None:
+    frame = counts(folder)
+    frame["bare"] = frame["bare"] + 0.5
+    write_counts(folder, frame)
+
+
+@refused_by("ZENO-REFINE", "evidence", run="")
+def interval_of_the_exponent_moved(folder: Path) -> None:
+    with edited_claim(folder, "ZENO-REFINE", "") as claim:
+        claim["evidence"]["fit"]["automaton"]["interval"] = [-0.001, 0.001]
+
+
+@refused_by("ZENO-REFINE", "evidence", run="")
+def theory_of_the_bare_count_changed(folder: Path) -> None:
+    with edited_claim(folder, "ZENO-REFINE", "") as claim:
+        claim["evidence"]["expected_bare"][-1] *= 1.1
+
+
+# ------------------------------------------------------------------------------------- not noticed
+
+
+@ignored("the scripts for solvers are for solvers: the checker expands the certificates, which need none")
+def script_for_solvers_replaced(folder: Path) -> None:
+    path = folder / "certificates" / "SAFE-INV" / "outside.smt2"
+    write(path, b"(assert false)\n(check-sat)\n")
+    seal_certificate(folder, "SAFE-INV", "outside.smt2")
+
+
+@ignored("the relation as read off the running trigger: whether it is the trigger's takes the trigger; see ZENO-PROOF")
+def relation_of_the_automaton_changed(folder: Path) -> None:
+    with edited_certificate(folder, "ZENO-PROOF", "relation.json") as relation:
+        relation["transitions"][0]["after"]["n"] = "2"
+
+
+@ignored("answers of solvers: they are not needed where a certificate expands, and are not taken on trust either")
+def answer_of_a_solver_changed(folder: Path) -> None:
+    with edited_report(folder) as report:
+        claim_of(report, "SAFE-INV", "")["evidence"]["obligations"][0]["z3"] = "unknown"
+
+
+@ignored("states and points with which the running code was compared are a sample that is not recorded")
+def sample_of_the_running_code_enlarged(folder: Path) -> None:
+    with edited_claim(folder, "SAFE-INV", "") as claim:
+        claim["evidence"]["conformance"]["points"] = 10**9

@@ -1,0 +1,204 @@
+"""Tampering with the signals of a run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from check.tampering.base import UGV, edited_entries, edited_table, middle, read_table, refused_by, write_table
+
+
+def shift(frame: pd.DataFrame, row: int, offset_m: float) -> None:
+    """Move the UGV at one row, with commands that lead there and back."""
+    dt = np.diff(frame["t_s"])
+    frame.loc[row, f"{UGV}.x_m"] += offset_m
+    frame.loc[row, f"{UGV}.vx_m_s"] += offset_m / dt[row - 1]
+    frame.loc[row + 1, f"{UGV}.vx_m_s"] -= offset_m / dt[row]
+
+
+@refused_by("trace", "law of motion")
+def position_changed(folder: Path) -> None:
+    with edited_table(folder) as frame:
+        frame.loc[middle(frame), f"{UGV}.x_m"] += 1e-6
+
+
+@refused_by("THR-TRIG", "decision variable")
+def position_and_commands_changed(folder: Path) -> None:
+    with edited_table(folder) as frame:
+        shift(frame, middle(frame), 1e-4)
+
+
+@refused_by("GATE-FEAS", "initial position")
+def position_commands_and_decision_variable_changed(folder: Path) -> None:
+    with edited_table(folder) as frame:
+        shift(frame, middle(frame), 1e-3)
+        error = [frame[f"{UGV}.ref_{axis}_m"] - frame[f"{UGV}.{axis}_m"] for axis in "xyz"]
+        frame[f"{UGV}.decision_variable_m"] = np.linalg.norm(error, axis=0) + frame[f"{UGV}.noise_m"]
+
+
+@refused_by("trace", "start of a robot")
+def whole_team_moved(folder: Path) -> None:
+    with edited_table(folder) as frame:
+        for robot in ("ugv1", "ugv2", "uav"):
+            frame[f"{robot}.x_m"] += 0.5
+
+
+@refused_by("trace", "start of a robot", run="b")
+def crash_hidden(folder: Path) -> None:
+    with edited_table(folder, run="b") as frame:
+        frame[f"{UGV}.x_m"] += 5.0
+
+
+@refused_by("trace", "law of motion")
+def command_changed(folder: Path) -> None:
+    with edited_table(folder) as frame:
+        frame.loc[middle(frame), f"{UGV}.vy_m_s"] += 1e-3
+
+
+@refused_by("SAFE-HYP", "the hypotheses held")
+def faster_than_the_limit(folder: Path) -> None:
+    """The UAV jumps by 1 m and back, by commands that lead there."""
+    with edited_table(folder) as frame:
+        row = middle(frame)
+        dt = np.diff(frame["t_s"])
+        frame.loc[row, "uav.z_m"] += 1.0
+        frame.loc[row, "uav.vz_m_s"] += 1.0 / dt[row - 1]
+        frame.loc[row + 1, "uav.vz_m_s"] -= 1.0 / dt[row]
+
+
+@refused_by("trace", "the rows cover the run")
+def times_stretched(folder: Path) -> None:
+    with edited_table(folder) as frame:
+        frame["t_s"] *= 1.0 + 1e-6
+
+
+@refused_by("trace", "a row at every control sample")
+def one_time_changed(folder: Path) -> None:
+    with edited_table(folder) as frame:
+        frame.loc[middle(frame), "t_s"] += 1e-4
+
+
+@refused_by("trace", "the rows cover the run")
+def last_rows_dropped(folder: Path) -> None:
+    write_table(folder, read_table(folder).iloc[:-20])
+
+
+@refused_by("trace", "the rows cover the run")
+def first_rows_dropped(folder: Path) -> None:
+    write_table(folder, read_table(folder).iloc[5:])
+
+
+@refused_by("trace", "a row at every control sample")
+def middle_row_dropped(folder: Path) -> None:
+    frame = read_table(folder)
+    write_table(folder, frame.drop(index=middle(frame)))
+
+
+@refused_by("trace", "a row at every control sample")
+def standing_row_dropped(folder: Path) -> None:
+    frame = read_table(folder)
+    write_table(folder, frame.drop(index=len(frame) - 3))
+
+
+@refused_by("trace", "time increases from row to row")
+def row_duplicated(folder: Path) -> None:
+    frame = read_table(folder)
+    write_table(folder, pd.concat([frame.iloc[:50], frame.iloc[49:]]))
+
+
+@refused_by("trace", "time increases from row to row")
+def rows_in_another_order(folder: Path) -> None:
+    frame = read_table(folder)
+    write_table(folder, frame.iloc[[*range(50), 51, 50, *range(52, len(frame))]])
+
+
+@refused_by("trace", "the rows cover the run")
+def signals_empty(folder: Path) -> None:
+    write_table(folder, read_table(folder).iloc[:0])
+
+
+@refused_by("trace", "numbers are finite")
+def position_is_nan(folder: Path) -> None:
+    with edited_table(folder) as frame:
+        frame.loc[100, "uav.z_m"] = np.nan
+
+
+@refused_by("trace", "start of a robot")
+def robots_exchanged(folder: Path) -> None:
+    other = {"ugv1": "ugv2", "ugv2": "ugv1"}
+    frame = read_table(folder)
+    names = {name: f"{other.get(name[:4], name[:4])}{name[4:]}" for name in frame if name.startswith("ugv")}
+    write_table(folder, frame.rename(columns=names))
+
+
+@refused_by("THR-TRIG", "decision variable")
+def decision_variable_changed(folder: Path) -> None:
+    with edited_table(folder) as frame:
+        frame[f"{UGV}.decision_variable_m"] -= 1e-4
+
+
+@refused_by("THR-TRIG", "triggers and releases")
+def noise_and_decision_variable_changed(folder: Path) -> None:
+    with edited_table(folder) as frame:
+        frame[f"{UGV}.decision_variable_m"] += 0.01
+        frame[f"{UGV}.noise_m"] += 0.01
+
+
+@refused_by("trace", "preset trajectory")
+def preset_changed(folder: Path) -> None:
+    with edited_table(folder) as frame:
+        frame[f"{UGV}.ref_x_m"] += 0.01
+
+
+@refused_by("THR-TRIG", "mode")
+def mode_changed(folder: Path) -> None:
+    with edited_table(folder) as frame:
+        frame.loc[middle(frame), f"{UGV}.mode"] = 0.0
+
+
+@refused_by("ZENO-TRACE", "column triggers")
+def trigger_count_changed(folder: Path) -> None:
+    with edited_table(folder) as frame:
+        frame.loc[len(frame) - 1, f"{UGV}.triggers"] += 1.0
+
+
+@refused_by("ZENO-TRACE", "column released_at_s")
+def release_forgotten(folder: Path) -> None:
+    """At one row the last release is none yet; no event is added or lost by that."""
+    with edited_table(folder) as frame:
+        frame.loc[len(frame) - 1, f"{UGV}.released_at_s"] = -1.0
+
+
+@refused_by("GATE-FEAS", "an intervention is executed only while accepted")
+def executed_without_acceptance(folder: Path) -> None:
+    with edited_table(folder) as frame:
+        frame.loc[50, f"{UGV}.accepted"] = 1.0
+
+
+@refused_by("events", "an intervention is executed after it was proposed", run="b")
+def executed_without_a_proposal(folder: Path) -> None:
+    with edited_table(folder, run="b") as frame:
+        frame.loc[50, f"{UGV}.accepted"] = 1.0
+
+
+@refused_by("GATE-FEAS", "the command is the own task while nothing is accepted")
+def acceptance_hidden(folder: Path) -> None:
+    """What was executed by an acceptance looks as if the UGV had done it of its own accord."""
+    with edited_table(folder) as frame:
+        frame[f"{UGV}.accepted"] = 0.0
+
+
+@refused_by("THR-TRIG", "triggers and releases")
+def trigger_late(folder: Path) -> None:
+    """The row of the trigger is left out, and the event put to the next one."""
+    frame = read_table(folder)
+    row = int(np.flatnonzero(np.diff(frame[f"{UGV}.mode"]) == 1.0)[0])
+    late = float(frame["t_s"].iloc[row + 1])
+    triggered = f"{UGV}.triggered_at_s"
+    frame.loc[frame[triggered] >= 0.0, triggered] = late
+    write_table(folder, frame.drop(index=row))
+    with edited_entries(folder) as entries:
+        for entry in entries:
+            trigger = next(event for event in entry["events"] if event["kind"] == "trigger")
+            trigger["t_s"] = late

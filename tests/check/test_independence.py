@@ -1,0 +1,51 @@
+"""The checker shares no code with what it checks, and needs nothing but numpy and pandas."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from airground_drake import check
+
+MODULES = sorted(Path(check.__file__).parent.glob("*.py"))
+PRELUDE = """
+import runpy, sys
+
+ALLOWED = "airground_drake.check"
+REFUSED = {
+    "pydrake", "scipy", "sympy", "flint", "z3", "cvc5", "cvxpy", "clarabel", "osqp", "numba", "matplotlib", "jinja2",
+    "pygraphviz", "rtamt", "pyddm", "yaml",
+}
+
+class Refuses:
+    def find_spec(self, name, path=None, target=None):
+        other = name.startswith("airground_drake.") and name != ALLOWED and not name.startswith(ALLOWED + ".")
+        if name.split(".")[0] in REFUSED or other:
+            raise ModuleNotFoundError(f"{name} is not installed here")
+
+sys.meta_path.insert(0, Refuses())
+sys.argv = ["check", sys.argv[1]]
+runpy.run_module(ALLOWED, run_name="__main__")
+"""
+
+
+@pytest.mark.parametrize("module", MODULES, ids=lambda path: path.stem)
+def test_it_imports_nothing_but_itself_the_standard_library_numpy_and_pandas(module: Path) -> None:
+    allowed = {*sys.stdlib_module_names, "numpy", "pandas"}
+    for node in ast.walk(ast.parse(module.read_text())):
+        if isinstance(node, ast.Import):
+            assert {alias.name.split(".")[0] for alias in node.names} <= allowed
+        if isinstance(node, ast.ImportFrom):
+            own = node.level == 1 and f"{node.module}.py" in {path.name for path in MODULES}
+            assert own or (not node.level and (node.module or "").split(".")[0] in allowed)
+        assert not (isinstance(node, ast.Name) and node.id in ("eval", "exec", "compile", "__import__"))
+
+
+def test_it_runs_where_no_drake_no_solver_and_nothing_else_of_the_package_is_installed(report: Path) -> None:
+    done = subprocess.run([sys.executable, "-c", PRELUDE, str(report)], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "0 DISAGREES, 0 cannot be re-established" in done.stdout

@@ -1,0 +1,66 @@
+"""The lower bound of a relaxed plan, also where several points lack the same."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from airground_drake.check.decisions import Decision
+from airground_drake.check.optimality import enclose, least_squares
+
+
+def decision(relaxed: np.ndarray, centres_m: list[list[float]]) -> Decision:
+    """Accepting leads along x at 1 m/s, towards the reference and between the points; refusing stays."""
+    n = len(relaxed)
+    offset = np.array([0.0, 0.0, 0.0]) - centres_m
+    normals = np.tile(offset / np.linalg.norm(offset, axis=1)[:, None], (n, 1, 1))
+    return Decision(
+        row={"t_s": 0.0, "robot": "ugv1", "status": "optimal"},
+        dt_s=0.1,
+        error_weight_1_m2_s=1.0,
+        slack_weight_1_m2_s=50.0,
+        initial_m=np.zeros(3),
+        accept_m_s=np.tile([1.0, 0.0, 0.0], (n, 1)),
+        refuse_m_s=np.zeros((n, 3)),
+        reference_m=np.tile([3.0, 0.0, 0.0], (n, 1)),
+        centres_m=np.tile(np.array(centres_m), (n, 1, 1)),
+        distances_m=np.full(len(centres_m), 1.0),
+        plan=np.ones(n),
+        positions_m=np.zeros((n, 3)),
+        relaxed=relaxed,
+        rounded=relaxed,
+        normals=normals,
+    )
+
+
+def least_cost(problem: Decision, steps: int = 20000) -> float:
+    """By projected gradient with the gradient by differences of the exact cost: slow and independent."""
+    omega, best = problem.relaxed.copy(), np.inf
+    for k in range(steps // 100):
+        values = problem.cost(
+            problem.positions_of(np.clip(omega + 1e-6 * np.eye(len(omega)), 0.0, 1.0)), problem.normals
+        )
+        here = float(problem.cost(problem.positions_of(omega), problem.normals))
+        best = min(best, here)
+        omega = np.clip(omega - 0.05 / np.sqrt(k + 1.0) * (values - here) / 1e-6, 0.0, 1.0)
+    return best
+
+
+@pytest.mark.parametrize("centres", [[[1.5, 0.3, 0.0]], [[1.5, 0.3, 0.0], [1.5, -0.3, 0.0]]])
+def test_the_bound_is_below_what_can_be_had_and_close_to_it(centres: list[list[float]]) -> None:
+    rng = np.random.default_rng(1)
+    start = decision(np.full(12, 0.5), centres)
+    for _ in range(20):
+        found = enclose(decision(rng.uniform(0.0, 1.0, 12), centres))
+        assert found.lower <= least_cost(start) + 1e-9 <= found.upper + 1e-9
+
+
+def test_least_squares_are_not_negative() -> None:
+    rng = np.random.default_rng(2)
+    for _ in range(20):
+        matrix, right = rng.normal(size=(8, 12)), rng.normal(size=8)
+        x = least_squares(matrix, right)
+        assert (x >= 0.0).all()
+        gradient = matrix.T @ (matrix @ x - right)
+        assert (gradient >= -1e-6).all()
+        assert abs(gradient @ x) <= 1e-6
