@@ -53,7 +53,7 @@ ROUNDING_ROUTES = ("relaxed", "nonlinear")
 REFUTED_BY_RULES = ("THR-TRIG", "COMM", "GATE-OPT", "GATE-SUR", "GATE-FEAS")
 """Claims that any broken rule of theirs refutes; the others are refuted by their margin."""
 OF_MODEL: Mapping[str, OfModel] = {
-    **dict.fromkeys(("SAFE-LEMMA", "SAFE-INV", "SAFE-GATE", "SAFE-DIST", "ZENO-PROOF"), prove),
+    **dict.fromkeys(("SAFE-LEMMA", "SAFE-INV", "SAFE-GATE", "SAFE-DIST", "ZENO-PROOF", "THR-ISO"), prove),
     "THR-ROOT": root,
     "THR-OPT": root,
     "THR-DDM": ddm,
