@@ -225,3 +225,8 @@ Status = Literal["proved", "holds", "supported", "refuted", "inconclusive", "err
 STATUSES: tuple[Status, ...] = get_args(Status)
 PASSING: tuple[Status, ...] = ("proved", "holds", "supported")
 """Statuses in which the claim was established, each in its way."""
+
+
+def alternatives(expected: str) -> tuple[str, ...]:
+    """The statuses that an expectation admits: "holds", or "holds or refuted" where there is no guarantee."""
+    return tuple(expected.split(" or "))
