@@ -14,8 +14,9 @@ from typing import Any
 
 import pytest
 import yaml
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from properties import examples
 
 from airground_drake.errors import ScenarioError
 from airground_drake.nsbc.avoidance import COMPOSITIONS
@@ -25,7 +26,6 @@ from airground_drake.scenarios.load import MAX_BYTES, load, resolved, shipped
 CASE_A = Path(schema.__file__).with_name("case_a.yaml")
 DATA: dict[str, Any] = yaml.safe_load(CASE_A.read_text(encoding="utf-8"))
 DELETE = object()
-FUZZ = settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 
 # A small valid scenario on which one thing at a time is broken.
 SMALL = """\
@@ -495,7 +495,7 @@ def loads_or_explains(path: Path, content: bytes) -> None:
         assert load(str(path))[0] == scenario
 
 
-@FUZZ
+@examples(40)
 @given(data=st.data())
 def test_mutated_data(tmp_path_factory: pytest.TempPathFactory, data: st.DataObject) -> None:
     mutated = copy.deepcopy(SMALL_DATA)
@@ -516,7 +516,7 @@ def test_mutated_data(tmp_path_factory: pytest.TempPathFactory, data: st.DataObj
     loads_or_explains(tmp_path_factory.getbasetemp() / "mutated.yaml", text.encode("utf-8", "surrogatepass"))
 
 
-@FUZZ
+@examples(40)
 @given(data=st.data())
 def test_mutated_text(tmp_path_factory: pytest.TempPathFactory, data: st.DataObject) -> None:
     content = SMALL.encode()
@@ -527,7 +527,7 @@ def test_mutated_text(tmp_path_factory: pytest.TempPathFactory, data: st.DataObj
     loads_or_explains(tmp_path_factory.getbasetemp() / "mutated.yaml", content[:begin] + new + content[end:])
 
 
-@FUZZ
+@examples(40)
 @given(
     key=st.one_of(st.sampled_from([".".join(map(str, path)) for path in leaves(SMALL_DATA)]), st.text()),
     value=st.one_of(JUNK.map(str), st.text(max_size=8)),

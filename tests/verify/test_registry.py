@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from builders import run_of
+from builders.runs import run_of
 
 import airground_drake.registry
 import airground_drake.verify
