@@ -270,7 +270,7 @@ halves = st.integers(0, 8).map(lambda n: n / 2.0)
 grid_scene = st.lists(st.tuples(halves, halves, st.sampled_from([0.5, 1.0, 1.5])), max_size=7)
 
 
-@examples(30)
+@examples(30, fuzz=2000)
 @given(point, point, scene)
 def test_random_scene_against_the_oracle(start: Point, goal: Point, discs: list[Disc]) -> None:
     assume(start != goal and clearance(np.array((start, goal)), discs) > 0.05)

@@ -80,7 +80,7 @@ def attack(seed: int, steps: int, avoidance: Avoidance, *, share: float | None =
     return worst
 
 
-@examples(40)
+@examples(40, fuzz=2000)
 @given(SEEDS, st.sampled_from([0.01, 0.05, 0.2]))
 def test_no_velocity_breaks_the_safe_distance_in_continuous_time(seed: int, h: float) -> None:
     assert attack(seed, 60, Avoidance(gain=3.0, period=h)) >= -1e-12

@@ -495,7 +495,7 @@ def loads_or_explains(path: Path, content: bytes) -> None:
         assert load(str(path))[0] == scenario
 
 
-@examples(40)
+@examples(40, fuzz=3000)
 @given(data=st.data())
 def test_mutated_data(tmp_path_factory: pytest.TempPathFactory, data: st.DataObject) -> None:
     mutated = copy.deepcopy(SMALL_DATA)
@@ -516,7 +516,7 @@ def test_mutated_data(tmp_path_factory: pytest.TempPathFactory, data: st.DataObj
     loads_or_explains(tmp_path_factory.getbasetemp() / "mutated.yaml", text.encode("utf-8", "surrogatepass"))
 
 
-@examples(40)
+@examples(40, fuzz=3000)
 @given(data=st.data())
 def test_mutated_text(tmp_path_factory: pytest.TempPathFactory, data: st.DataObject) -> None:
     content = SMALL.encode()

@@ -45,7 +45,7 @@ def brute_force(case: Instance, problem: Problem, substeps: int, blocks: int) ->
     return best
 
 
-@examples(60)
+@examples(60, fuzz=3000)
 @given(st.integers(0, 10**6), st.booleans(), st.integers(1, 2), st.integers(1, 5), st.sampled_from([1.0, 100.0]))
 def test_the_search_finds_the_optimum_of_all_plans(
     seed: int, on_top: bool, substeps: int, blocks: int, error_weight: float

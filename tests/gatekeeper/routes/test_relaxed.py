@@ -17,7 +17,7 @@ from airground_drake.gatekeeper.prediction import predicted_problem
 from airground_drake.gatekeeper.routes.relaxed import RelaxedRoute
 
 
-@examples(15)
+@examples(15, fuzz=1500)
 @given(st.integers(0, 10**6))
 def test_relaxation_agrees_with_an_independent_model(seed: int) -> None:
     """cvxpy builds (27) from the formulas, with the same half-planes; the optima agree."""

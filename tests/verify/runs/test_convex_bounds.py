@@ -37,7 +37,7 @@ def row_of(data: GateData, plan: Array) -> Row:
     return Row({"robot": "ugv1", "t_s": 0.0}, STAGE_S, data.error_weight, data.slack_weight, dict(arrays))
 
 
-@examples(25)
+@examples(25, fuzz=300)
 @given(st.lists(problems(), min_size=1, max_size=3))
 def test_the_enclosure_contains_the_relaxed_optimum_and_is_below_every_binary_plan(several: list[GateData]) -> None:
     rows = [row_of(data, np.zeros(STAGES)) for data in several]
@@ -53,7 +53,7 @@ def test_the_enclosure_contains_the_relaxed_optimum_and_is_below_every_binary_pl
         assert found.upper <= data.relaxed()[1] + 1e-6 * row.scale
 
 
-@examples(25)
+@examples(25, fuzz=2000)
 @given(problems(), st.integers(0, 10**6))
 def test_the_bound_holds_whatever_the_solver_returns(data: GateData, seed: int) -> None:
     rng = np.random.default_rng(seed)
