@@ -7,12 +7,7 @@ from functools import cache
 import numpy as np
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
-from pydrake.systems.primitives import (
-    ConstantVectorSource,
-    Integrator,
-    LogVectorOutput,
-    ZeroOrderHold,
-)
+from pydrake.systems.primitives import ConstantVectorSource, Integrator, LogVectorOutput, ZeroOrderHold
 
 from airground_drake.decision.trigger import Trigger
 from airground_drake.systems.decision import FIELDS, EventTrigger

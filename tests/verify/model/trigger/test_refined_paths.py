@@ -10,10 +10,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 from pydrake.systems.framework import DiagramBuilder
-from pydrake.systems.primitives import (
-    LogVectorOutput,
-    TrajectorySource,
-)
+from pydrake.systems.primitives import LogVectorOutput, TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 from verify.model.trigger.cases import REFINE, simulate, trigger_times
 
