@@ -86,11 +86,19 @@ def _recursion(wanted_m_s: Array, given: Inequalities, composition: str) -> Arra
 
 
 def _closest(wanted_m_s: Array, given: Inequalities, _: str) -> Array:
-    """The closest velocities; where inequalities contradict each other, the slowest that miss them least."""
+    """The closest velocities; where inequalities contradict each other, the slowest that miss them least.
+
+    The latter are shortened until the inequalities hold that standing still meets.
+    """
     found, lacking = _by_active_sets(wanted_m_s, given)
     torn = lacking > CONTRADICTION_M_S
     if torn.any():
-        found[torn] = _least_missing(given.rows(torn))
+        contradicting = given.rows(torn)
+        slowest = _least_missing(contradicting)
+        rate = (contradicting.normal * slowest[:, None]).sum(axis=2)
+        late = (rate < contradicting.bound) & (contradicting.bound <= 0.0)
+        factor = np.where(late, contradicting.bound / np.where(late, rate, 1.0), 1.0).min(axis=1)
+        found[torn] = slowest * factor[:, None]
     return found
 
 

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from airground_drake.arrays import Array
-from airground_drake.verify.runs.projection import closest, least_violation
+from airground_drake.verify.runs.projection import closest, least_violation, shortened
 
 PLANE = np.array([1.0, 1.0, 0.0])
 """Directions in which a UGV can move."""
@@ -78,7 +78,8 @@ def avoiding(below: Array, given: Inequalities, composition: str, *, planar: boo
     axes = 2 if planar else 3
     found, met = closest(below[missed, :axes], normal[:, :, :axes], bound)
     if not met.all():
-        found[~met] = least_violation(normal[~met, :, :axes], bound[~met])
+        torn = normal[~met, :, :axes], bound[~met]
+        found[~met] = shortened(least_violation(*torn), *torn)
     velocity[missed, :axes] = found
     return velocity
 

@@ -82,6 +82,14 @@ def _in_interval(wanted: Array, sign: Array, level: Array) -> tuple[Array, Flags
     return np.where(over, middle, np.clip(wanted, low, np.maximum(low, high))), ~(low > high + CONTRADICTION_M_S)
 
 
+def shortened(velocity: Array, normal: Array, bound: Array) -> Array:
+    """Velocities (B, d) times the largest factor up to 1 with which those inequalities hold that standing still meets."""
+    rate = np.einsum("bkd,bd->bk", normal, velocity)
+    broken = (rate < bound) & (bound <= 0.0)
+    factor = np.where(broken, bound / np.where(broken, rate, 1.0), 1.0).min(axis=1, initial=1.0)
+    return np.asarray(velocity * factor[:, None])
+
+
 def least_violation(normal: Array, bound: Array) -> Array:
     """The slowest of the velocities that miss inequalities by as little as possible, (B, d), m/s; by bisection."""
     still = np.zeros((normal.shape[0], normal.shape[2]))
