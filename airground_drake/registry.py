@@ -190,6 +190,7 @@ RUN_CLAIMS = Registry(
     {
         "SAFE-TRACE": "airground_drake.verify.runs.safe_trace:SafeTrace",
         "SAFE-HYP": "airground_drake.verify.runs.safe_hyp:SafeHyp",
+        "EXEC": "airground_drake.verify.runs.exec:Exec",
         "ZENO-TRACE": "airground_drake.verify.runs.zeno_trace:ZenoTrace",
         "THR-TRIG": "airground_drake.verify.runs.thr_trig:ThrTrig",
         "GATE-OPT": "airground_drake.verify.runs.gate_opt:GateOpt",

@@ -36,7 +36,14 @@ from airground_drake.nsbc.team import Team
 from airground_drake.scenarios.load import resolved, validated
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.systems.decision import FIELDS
-from airground_drake.trace import DECISION_COLUMNS, PROBLEM_ARRAYS, PROBLEM_SCALARS, SCHEMA, Trace
+from airground_drake.trace import (
+    DECISION_COLUMNS,
+    PROBLEM_ARRAYS,
+    PROBLEM_SCALARS,
+    PROPOSAL_COLUMNS,
+    SCHEMA,
+    Trace,
+)
 
 EVENT_ACCURACY = 1e-6
 """Accuracy of the Context: witness functions are isolated to it (relative to the time scale of 1 s)."""
@@ -159,9 +166,22 @@ class Recorder:
         }
         times = list(gatekeeper.decision_times_s) if gatekeeper is not None else []
         timings = {"wall_s": wall, "decision_times_s": times}
-        trace = Trace(meta, signals, decisions, timings, _problems(decided))
+        proposals = _proposals([(ugvs[i], proposal) for i, proposal in memory.sent])
+        trace = Trace(meta, signals, decisions, timings, _problems(decided), proposals)
         meta["events"] = extract(trace, sent)
         return trace
+
+
+def _proposals(sent: Sequence[tuple[str, Proposal]]) -> pd.DataFrame:
+    """`Trace.proposals` of what was sent to whom."""
+    rows = [
+        (
+            robot, proposal.policy, float(proposal.issued), proposal.motion.times.tolist(),
+            proposal.motion.positions.ravel().tolist(), np.asarray(proposal.selection, dtype=np.float64).ravel().tolist(),
+        )
+        for robot, proposal in sent
+    ]  # fmt: skip
+    return pd.DataFrame(rows, columns=list(PROPOSAL_COLUMNS))
 
 
 def _problems(decided: Sequence[Decision]) -> pd.DataFrame:

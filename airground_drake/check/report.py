@@ -13,6 +13,7 @@ from typing import Any
 from .certificates import prove
 from .enclosures import root
 from .events import check_events
+from .execution import execution
 from .feasibility import gate_feas
 from .files import Files, Json, canonical, read_folder, read_json, sha256
 from .inputs import inputs_of
@@ -37,6 +38,7 @@ OfModel = Callable[[Json, Files, Json], Found]
 EVERY_RUN: Mapping[str, OfRun] = {
     "SAFE-TRACE": safe_trace,
     "SAFE-HYP": safe_hyp,
+    "EXEC": execution,
     "ZENO-TRACE": zeno_trace,
     "THR-TRIG": thr_trig,
     "LIVE-GOAL": live_goal,
