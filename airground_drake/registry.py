@@ -190,6 +190,7 @@ RUN_CLAIMS = Registry(
     {
         "SAFE-TRACE": "airground_drake.verify.runs.safe_trace:SafeTrace",
         "SAFE-HYP": "airground_drake.verify.runs.safe_hyp:SafeHyp",
+        "EXEC": "airground_drake.verify.runs.exec:Exec",
         "ZENO-TRACE": "airground_drake.verify.runs.zeno_trace:ZenoTrace",
         "THR-TRIG": "airground_drake.verify.runs.thr_trig:ThrTrig",
         "GATE-OPT": "airground_drake.verify.runs.gate_opt:GateOpt",
@@ -212,6 +213,7 @@ MODEL_CLAIMS = Registry(
         "SAFE-DIST": "airground_drake.verify.model.avoidance.safe_dist:SafeDist",
         "ZENO-PROOF": "airground_drake.verify.model.trigger.zeno_proof:ZenoProof",
         "ZENO-REFINE": "airground_drake.verify.model.trigger.zeno_refine:ZenoRefine",
+        "THR-ISO": "airground_drake.verify.model.trigger.thr_iso:ThrIso",
         "THR-ROOT": "airground_drake.verify.model.threshold.thr_root:ThrRoot",
         "THR-OPT": "airground_drake.verify.model.threshold.thr_opt:ThrOpt",
         "THR-DDM": "airground_drake.verify.model.threshold.thr_ddm:ThrDdm",
@@ -224,3 +226,8 @@ Status = Literal["proved", "holds", "supported", "refuted", "inconclusive", "err
 STATUSES: tuple[Status, ...] = get_args(Status)
 PASSING: tuple[Status, ...] = ("proved", "holds", "supported")
 """Statuses in which the claim was established, each in its way."""
+
+
+def alternatives(expected: str) -> tuple[str, ...]:
+    """The statuses that an expectation admits: "holds", or "holds or refuted" where there is no guarantee."""
+    return tuple(expected.split(" or "))

@@ -23,7 +23,7 @@ from pydrake.systems.primitives import LogVectorOutput, VectorLogSink
 
 from airground_drake.arrays import Array
 from airground_drake.diagram import RECORDED, Model, build_model
-from airground_drake.errors import AirgroundError, UnknownNameError
+from airground_drake.errors import AirgroundError, SimulationError, UnknownNameError
 from airground_drake.events import extract
 from airground_drake.gatekeeper.answer import Decision
 from airground_drake.gatekeeper.prediction import Horizon, Scene, predicted_problem
@@ -36,7 +36,14 @@ from airground_drake.nsbc.team import Team
 from airground_drake.scenarios.load import resolved, validated
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.systems.decision import FIELDS
-from airground_drake.trace import DECISION_COLUMNS, PROBLEM_ARRAYS, PROBLEM_SCALARS, SCHEMA, Trace
+from airground_drake.trace import (
+    DECISION_COLUMNS,
+    PROBLEM_ARRAYS,
+    PROBLEM_SCALARS,
+    PROPOSAL_COLUMNS,
+    SCHEMA,
+    Trace,
+)
 
 EVENT_ACCURACY = 1e-6
 """Accuracy of the Context: witness functions are isolated to it (relative to the time scale of 1 s)."""
@@ -81,6 +88,9 @@ class Recorder:
         Args:
             seed: of the decision noise; default: the scenario's.
             duration: s; default: the scenario's.
+
+        Raises:
+            SimulationError: if Drake or a system stops; names the run and the time.
         """
         seed = self._scenario.seed if seed is None else seed
         context = self._root.CreateDefaultContext()
@@ -93,8 +103,12 @@ class Recorder:
         if self._model.gatekeeper is not None:
             self._model.gatekeeper.reset_timing()
         started = time.perf_counter()
-        simulator.Initialize()
-        simulator.AdvanceTo(self._scenario.duration_s if duration is None else duration)
+        try:
+            simulator.Initialize()
+            simulator.AdvanceTo(self._scenario.duration_s if duration is None else duration)
+        except (Exception, SystemExit) as error:  # Drake raises many kinds
+            what = f"{type(error).__name__}: {error}".splitlines()[0]
+            raise SimulationError(self._name, context.get_time(), what) from error
         wall = time.perf_counter() - started
         return self._trace(context, seed, wall)
 
@@ -152,9 +166,22 @@ class Recorder:
         }
         times = list(gatekeeper.decision_times_s) if gatekeeper is not None else []
         timings = {"wall_s": wall, "decision_times_s": times}
-        trace = Trace(meta, signals, decisions, timings, _problems(decided))
+        proposals = _proposals([(ugvs[i], proposal) for i, proposal in memory.sent])
+        trace = Trace(meta, signals, decisions, timings, _problems(decided), proposals)
         meta["events"] = extract(trace, sent)
         return trace
+
+
+def _proposals(sent: Sequence[tuple[str, Proposal]]) -> pd.DataFrame:
+    """`Trace.proposals` of what was sent to whom."""
+    rows = [
+        (
+            robot, proposal.policy, float(proposal.issued), proposal.motion.times.tolist(),
+            proposal.motion.positions.ravel().tolist(), np.asarray(proposal.selection, dtype=np.float64).ravel().tolist(),
+        )
+        for robot, proposal in sent
+    ]  # fmt: skip
+    return pd.DataFrame(rows, columns=list(PROPOSAL_COLUMNS))
 
 
 def _problems(decided: Sequence[Decision]) -> pd.DataFrame:

@@ -36,7 +36,7 @@ from airground_drake import files
 from airground_drake.arrays import Array
 from airground_drake.errors import TraceError
 
-SCHEMA = "airground_drake.trace/2"
+SCHEMA = "airground_drake.trace/3"
 
 DECISION_COLUMNS = {
     "t_s": "float64",
@@ -72,6 +72,16 @@ PROBLEM_ARRAYS = (
 (N x m x 3), distances (m), plan, relaxed and rounded omega (N), positions of the plan (N x 3); empty where the route
 has none. Normals are those of the half-planes that `lower_bound` is about."""
 
+PROPOSAL_COLUMNS = ("robot", "policy", "issued_s", "times_s", "positions_m", "selection")
+"""Columns of `Trace.proposals`, one row per proposal sent: for which UGV, by which policy, when; the vertices of the
+motion that it asks for, times (M) and positions (M x 3, flattened in C order), and J_int of (12)-(14), (m x 3, ditto):
+the directions that it concerns."""
+
+
+def no_proposals() -> pd.DataFrame:
+    """The table `proposals` of a run in which nothing was sent."""
+    return pd.DataFrame(columns=list(PROPOSAL_COLUMNS))
+
 
 @dataclass(frozen=True)
 class Trace:
@@ -85,6 +95,7 @@ class Trace:
         signals: see the module's docstring.
         decisions: see DECISION_COLUMNS.
         problems: see PROBLEM_ARRAYS.
+        proposals: see PROPOSAL_COLUMNS.
         timings: wall-clock measurements, kept apart because they differ between identical runs:
             `wall_s`, and `decision_times_s`: CPU time of each row of `decisions`, in order.
     """
@@ -94,6 +105,7 @@ class Trace:
     decisions: pd.DataFrame
     timings: dict[str, Any] = field(default_factory=dict, compare=False)
     problems: pd.DataFrame = field(default_factory=lambda: pd.DataFrame(columns=[*PROBLEM_SCALARS, *PROBLEM_ARRAYS]))
+    proposals: pd.DataFrame = field(default_factory=no_proposals)
 
     @property
     def run(self) -> str:
@@ -157,7 +169,7 @@ class Trace:
 
 
 def save(trace: Trace, folder: Path) -> None:
-    """Write `signals.parquet`, `decisions.parquet`, `problems.parquet`, `timings.json`, then `meta.json` with digests.
+    """Write a Parquet file per table, `timings.json`, then `meta.json` with digests.
 
     Each file is written atomically and `meta.json` last, so that an interrupted save is recognised by `load`.
 
@@ -169,6 +181,7 @@ def save(trace: Trace, folder: Path) -> None:
         "signals.parquet": trace.signals,
         "decisions.parquet": trace.decisions,
         "problems.parquet": trace.problems,
+        "proposals.parquet": trace.proposals,
     }
     digests = {}
     for name, table in tables.items():
@@ -184,10 +197,13 @@ def load(folder: Path) -> Trace:
     """Read a saved trace back.
 
     Raises:
-        TraceError: if a file is missing, unreadable, or differs from the digest in `meta.json`.
+        TraceError: if it is of another schema, or a file is missing, unreadable, or differs from the digest in
+            `meta.json`.
     """
     try:
         meta = json.loads((folder / "meta.json").read_text(encoding="utf-8"))
+        if meta.get("schema") != SCHEMA:
+            raise TraceError(f"{folder}: schema {meta.get('schema')!r}, this version reads {SCHEMA!r}: simulate again")
         timings = json.loads((folder / "timings.json").read_text(encoding="utf-8"))
         tables = {}
         for name, digest in meta.pop("files").items():
@@ -195,8 +211,7 @@ def load(folder: Path) -> Trace:
             if files.sha256(data) != digest:
                 raise TraceError(f"{folder / name}: its SHA-256 is not the one recorded in meta.json")
             tables[name] = pd.read_parquet(io.BytesIO(data))
-        if meta.get("schema") != SCHEMA:
-            raise TraceError(f"{folder}: schema {meta.get('schema')!r}, this version reads {SCHEMA!r}")
-        return Trace(meta, tables["signals.parquet"], tables["decisions.parquet"], timings, tables["problems.parquet"])
+        signals, decisions = tables["signals.parquet"], tables["decisions.parquet"]
+        return Trace(meta, signals, decisions, timings, tables["problems.parquet"], tables["proposals.parquet"])
     except (OSError, KeyError, ValueError, AttributeError) as error:
         raise TraceError(f"{folder}: not a readable trace: {error}") from error

@@ -7,12 +7,13 @@ and pandas are used: no Drake, no solver, nothing else of this package. docs/che
     files, rules, scenario     strict reading; what a broken rule says; what a scenario declares
     run, events, metrics       a trace that is of its run and obeys its law of motion; what follows from it
     safety                     SAFE-TRACE, SAFE-HYP
+    law, proposals, execution  EXEC: the control law, what was accepted when, commands
     triggers                   ZENO-TRACE, THR-TRIG
     outcome                    LIVE-GOAL, COMM, GATE-TIME
     decisions                  a recorded decision, its problem (26), predictions (23) and costs (25)
     feasibility                GATE-FEAS
     optimality                 GATE-SUR, GATE-OPT
-    polynomials, certificates  SAFE-LEMMA, SAFE-INV, SAFE-GATE, SAFE-DIST, ZENO-PROOF; obligations.json
+    polynomials, certificates  SAFE-LEMMA, SAFE-INV, SAFE-GATE, SAFE-DIST, ZENO-PROOF, THR-ISO; obligations.json
     enclosures                 THR-ROOT, THR-OPT
     statistics                 THR-DDM, ZENO-REFINE
     inputs                     the constants that a claim about the model must be about

@@ -1,4 +1,4 @@
-"""SAFE-LEMMA, SAFE-INV, SAFE-GATE, SAFE-DIST and ZENO-PROOF: every certificate expanded, exactly.
+"""SAFE-LEMMA, SAFE-INV, SAFE-GATE, SAFE-DIST, ZENO-PROOF and THR-ISO: every certificate expanded, exactly.
 
 An obligation says: wherever all hypotheses are >= 0, the strict ones > 0 and all equations 0, the goal is >= 0. Its
 certificate is an identity of polynomials with rational coefficients,
@@ -288,9 +288,17 @@ def _recorded_of_zeno(claim: Json, scenario: Json) -> Found:
     return Found.with_margin("proved", SMALL - rounding, within=1e-16)
 
 
+def _recorded_of_iso(claim: Json, scenario: Json) -> Found:
+    """The running trigger missed nothing that was due in a step, and invented nothing."""
+    compared = claim["evidence"]["conformance"]
+    same("crossings missed or invented by the running trigger", [compared["missed"], compared["spurious"]], [0, 0])
+    return Found("proved")
+
+
 _RECORDED: dict[str, Any] = {
     "SAFE-INV": _recorded_of_inv,
     "SAFE-GATE": _recorded_of_gate,
     "SAFE-DIST": _recorded_of_dist,
     "ZENO-PROOF": _recorded_of_zeno,
+    "THR-ISO": _recorded_of_iso,
 }

@@ -1,4 +1,4 @@
-"""The events of a run: all but proposals follow from its signals and its decisions."""
+"""The events of a run: they follow from its signals, its proposals and its decisions."""
 
 from __future__ import annotations
 
@@ -10,11 +10,9 @@ from typing import NamedTuple
 import numpy as np
 
 from .files import Json
+from .proposals import proposals_of
 from .rules import SMALL, Disagreement, close, holds
 from .run import Run
-
-FREE = ("proposal",)
-"""Kinds of events of which there is no other record."""
 
 
 class Event(NamedTuple):
@@ -55,8 +53,8 @@ def _events_are_in_order(run: Run) -> None:
 
 
 def _events_follow_from_signals_and_decisions(run: Run) -> None:
-    found = sorted([*_crossings(run), *_answers(run), *_arrivals(run), *_collisions(run)])
-    recorded = sorted(Event.of(event) for event in run.events if event["kind"] not in FREE)
+    found = sorted([*_crossings(run), *_messages(run), *_answers(run), *_arrivals(run), *_collisions(run)])
+    recorded = sorted(Event.of(event) for event in run.events)
     for theirs, ours in zip_longest(recorded, found):
         if theirs != ours:
             first = min(event for event in (theirs, ours) if event is not None)
@@ -70,6 +68,12 @@ def _crossings(run: Run) -> Iterator[Event]:
             for when in np.unique(run.column(f"{ugv}.{name}")):
                 if when >= 0.0:
                     yield Event(float(when), ugv, kind)
+
+
+def _messages(run: Run) -> Iterator[Event]:
+    """What the UAV has proposed."""
+    for proposal in proposals_of(run):
+        yield Event(proposal.issued_s, proposal.ugv, "proposal", proposal.policy)
 
 
 def _answers(run: Run) -> Iterator[Event]:

@@ -18,6 +18,8 @@ def inputs_of(claim: str, scenario: Json) -> Json:
         case "ZENO-PROOF":
             bound = float(scenario["decision"]["min_inter_event_s"])
             return {**_trigger(scenario), "min_inter_event_s": bound, "duration_s": float(scenario["duration_s"])}
+        case "THR-ISO":
+            return _trigger(scenario)
         case "ZENO-REFINE":
             noise = {key: scenario["decision"][key] for key in ("noise_m_sqrt_s", "leak_1_s", "noise_period_s")}
             return {**_trigger(scenario), **noise, "duration_s": float(scenario["duration_s"])}

@@ -17,8 +17,8 @@ from .rules import SMALL, Array, Flags, NotEstablished, close, holds, same
 from .scenario import Levels, Pair, Preset, levels_of, pairs_of, preset_of, robots_of, views_of
 
 Rows = npt.NDArray[np.intp]
-SCHEMA = "airground_drake.trace/2"
-TABLES = ("signals.parquet", "decisions.parquet", "problems.parquet")
+SCHEMA = "airground_drake.trace/3"
+TABLES = ("signals.parquet", "decisions.parquet", "problems.parquet", "proposals.parquet")
 SHARED = ("method", "composition", "seed", "zeta_m", "events", "faults")
 """What meta.json and the run's entry in report.json both say."""
 INTERVENING = 1.0
@@ -38,6 +38,7 @@ class Run:
         signals: see airground_drake/trace.py for the columns.
         decisions: a row per decision of the gatekeeper.
         problems: the problem (26) of each decision.
+        proposals: a row per proposal of the UAV.
     """
 
     name: str
@@ -48,6 +49,7 @@ class Run:
     signals: pd.DataFrame
     decisions: pd.DataFrame
     problems: pd.DataFrame
+    proposals: pd.DataFrame
 
     @cached_property
     def method(self) -> str:

@@ -67,6 +67,13 @@ class Preset:
         travelled = self.speed_m_s * np.asarray(t_s)
         return np.stack([np.interp(travelled, self.length_m, axis) for axis in self.corners_m.T], axis=-1)
 
+    def rate_m_s(self, t_s: Array) -> Array:
+        """Velocity at times (K,), none at a corner: (K, 3)."""
+        legs, lengths = np.diff(self.corners_m, axis=0), np.diff(self.length_m)[:, None]
+        along = np.divide(self.speed_m_s * legs, lengths, out=np.zeros_like(legs), where=lengths > 0.0)
+        leg = np.searchsorted(self.corner_s, t_s) if len(self.corner_s) else np.full(len(t_s), len(legs))
+        return np.asarray(np.append(along, np.zeros((1, 3)), axis=0)[leg])
+
 
 def robots_of(scenario: Json) -> dict[str, Json]:
     """Each robot's part of the scenario by name, the UGVs first, the UAV last."""

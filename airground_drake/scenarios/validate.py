@@ -27,6 +27,7 @@ from airground_drake.registry import (
     STATUSES,
     UAV_TASKS,
     Registry,
+    alternatives,
     is_plugin,
 )
 from airground_drake.scenarios.rounding import TOLERANCE_M, Rounding
@@ -77,6 +78,12 @@ def _one_of(key: str, value: str, allowed: Iterable[str], what: str = "one of") 
     options = tuple(allowed)
     if value not in options:
         yield key, value, f"{what} {', '.join(options) or '(none)'}"
+
+
+def _expectation(key: str, expected: str) -> Problems:
+    for status in alternatives(expected):
+        if status not in STATUSES:
+            yield key, expected, f"one of {', '.join(STATUSES)}, or several of them: holds or refuted"
 
 
 def _registered(key: str, name: str, registry: Registry) -> Problems:
@@ -162,11 +169,11 @@ def _runs(scenario: Scenario) -> Problems:
         for claim, status in run.expected.items():
             known = (*RUN_CLAIMS, *scenario.claims)
             yield from _one_of(f"runs.{name}.expected.{claim}", claim, known, "one of the claims")
-            yield from _one_of(f"runs.{name}.expected.{claim}", status, STATUSES)
+            yield from _expectation(f"runs.{name}.expected.{claim}", status)
     for claim, status in scenario.expected.items():
         known = (*MODEL_CLAIMS, *scenario.claims)
         yield from _one_of(f"expected.{claim}", claim, known, "one of the claims about the model")
-        yield from _one_of(f"expected.{claim}", status, STATUSES)
+        yield from _expectation(f"expected.{claim}", status)
     for claim, place in scenario.claims.items():
         if claim in (*RUN_CLAIMS, *MODEL_CLAIMS) or not re.fullmatch(r"[A-Z][A-Z0-9-]*", claim):
             yield f"claims.{claim}", claim, "a new identifier of capitals, digits and hyphens, such as MY-CLAIM"

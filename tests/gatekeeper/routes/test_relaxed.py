@@ -7,16 +7,17 @@ from dataclasses import replace
 import cvxpy
 import numpy as np
 import pytest
-from builders_gatekeeper import case_a_proposal, random_problem
-from hypothesis import given, settings
+from builders.problems import case_a_proposal, random_problem
+from hypothesis import given
 from hypothesis import strategies as st
+from properties import examples
 
 from airground_drake.gatekeeper.half_planes import normals_along
 from airground_drake.gatekeeper.prediction import predicted_problem
 from airground_drake.gatekeeper.routes.relaxed import RelaxedRoute
 
 
-@settings(max_examples=15)
+@examples(15, fuzz=1500)
 @given(st.integers(0, 10**6))
 def test_relaxation_agrees_with_an_independent_model(seed: int) -> None:
     """cvxpy builds (27) from the formulas, with the same half-planes; the optima agree."""
@@ -38,7 +39,7 @@ def test_relaxation_agrees_with_an_independent_model(seed: int) -> None:
     assert solution.lower_bound == pytest.approx(best, rel=1e-5, abs=1e-6)
 
 
-@settings(max_examples=50)
+@examples(50)
 @given(st.integers(0, 10**6))
 def test_every_decision_carries_its_evidence(seed: int) -> None:
     problem = random_problem(seed, 20)

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builders import ALL_PLANS, STAGES, DecisionEdit, decided_run, gate_data_at, with_decision
+from builders.decisions import ALL_PLANS, STAGES, decided_run, gate_data_at
+from builders.edits import DecisionEdit, with_decision
 from verify.judging import OPT, SUR, assert_decision_refuted
 from verify.runs.cases import inflate_loser, long_normals, overstate_bound, understate_bound, understate_gap, worst_plan
 

@@ -15,7 +15,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from builders import STILL, case_a, lone, passing_by, run_of, simulate, with_events, with_scenario, with_signals
+from builders.edits import with_events, with_scenario, with_signals
+from builders.runs import passing_by, run_of
+from builders.scenarios import STILL, case_a, lone
+from builders.simulation import simulate
 
 from airground_drake.scenarios.schema import Decision, Threshold
 from airground_drake.trace import Trace

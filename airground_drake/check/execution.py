@@ -1,0 +1,118 @@
+"""EXEC: every command is that of the control law with what was accepted."""
+
+from __future__ import annotations
+
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+
+from .files import Json
+from .law import PLANE, Inequalities, avoiding, inequalities, limited
+from .proposals import Proposal, accepted_at
+from .rules import SMALL, Array, Disagreement, Flags, Found
+from .run import Run
+
+COMMAND_M_S = 1e-6
+"""A command may differ from the law by this: a corner of nearly parallel inequalities enlarges their rounding."""
+ON_TOP = ("b", "c")
+"""Methods that put an accepted intervention above the avoidance inequalities."""
+
+
+class Robot(NamedTuple):
+    """Commands of a robot and the law's, (S, 3) each, and what is executed by the messages and by the signals, (S,)."""
+
+    name: str
+    recorded: Array
+    law: Array
+    executing: Flags
+    said: Flags
+
+    @property
+    def away_m_s(self) -> Array:
+        """By what they differ, (S,)."""
+        return np.asarray(np.linalg.norm(self.recorded - self.law, axis=1))
+
+
+def execution(run: Run, claim: Json) -> Found:
+    """EXEC: commands are the law's to 1e-6 m/s, and what is executed is what was accepted."""
+    robots = [_ugv(run, ugv) for ugv in run.ugvs]
+    if run.scenario["uav"]["task"] == "formation":
+        robots.append(_uav(run))
+    margin = COMMAND_M_S - max(float(robot.away_m_s.max()) for robot in robots)
+    facts = {"samples": len(run.sample_s), "robots": {r.name: {"executing": int(r.executing.sum())} for r in robots}}
+    wrong = [(k, r) for r in robots for k in np.flatnonzero(~(r.away_m_s <= COMMAND_M_S) | (r.executing != r.said))[:1]]
+    if not wrong:
+        return Found("holds", margin, margin, facts, within=1e-8)
+    if claim["status"] == "holds":
+        k, robot = min(wrong, key=lambda one: int(one[0]))
+        when = float(run.sample_s[k])
+        if robot.executing[k] != robot.said[k]:
+            said, due = (("executed" if flag else "not executed") for flag in (robot.said[k], robot.executing[k]))
+            raise Disagreement("what is executed is what was accepted", said, due, robot.name, when)
+        rule = "the command is the law's"
+        raise Disagreement(rule, robot.recorded[k].tolist(), robot.law[k].tolist(), robot.name, when)
+    negative = margin if margin < 0.0 else None
+    return Found("refuted", negative, negative, facts, within=1e-8)
+
+
+def around(run: Run, robot: str) -> Inequalities:
+    """The avoidance inequalities of a robot at the control samples."""
+    views = [pair for pair in run.views if pair.robot == robot]
+    here = run.position_m[robot][run.sample_row]
+    offsets = [here - run.position_m[pair.other][run.sample_row] for pair in views]
+    return inequalities(
+        np.stack(offsets, axis=1) if offsets else np.empty((len(here), 0, 3)),
+        np.array([pair.safe_m for pair in views]),
+        np.array([pair.share for pair in views]),
+        run.scenario["control"],
+        np.ones(3) if robot == run.uav else PLANE,
+    )
+
+
+def _ugv(run: Run, ugv: str) -> Robot:
+    """(6), (14) and (20). At a corner of a motion its rates on both sides are tried."""
+    accepted = accepted_at(run, ugv)
+    recorded = run.command_m_s[ugv][run.chosen_row]
+    law, away = np.zeros_like(recorded), np.full(len(recorded), np.inf)
+    for own_side, asked_side in product((-1.0, 1.0), repeat=2):
+        tried = _law(run, ugv, accepted, own_side, asked_side)
+        off = np.linalg.norm(recorded - tried, axis=1)
+        closer = ~(off >= away)
+        law[closer], away[closer] = tried[closer], off[closer]
+    executing = np.array([proposal is not None for proposal in accepted])
+    return Robot(ugv, recorded, law, executing, run.executed(ugv)[run.chosen_row])
+
+
+def _law(run: Run, ugv: str, accepted: list[Proposal | None], own_side: float, asked_side: float) -> Array:
+    """Commands of a UGV, (S, 3), with the rates before (-1) or after (+1) each sample."""
+    control, limit = run.scenario["control"], run.robots[ugv]["max_speed_m_s"]
+    composition = run.scenario["runs"][run.name]["composition"]
+    given, here, t = around(run, ugv), run.position_m[ugv][run.sample_row], run.sample_s
+    preset = run.presets[ugv]
+    wish = preset.rate_m_s(t + own_side * SMALL) + control["motion_gain_1_s"] * (preset.position_m(t) - here)
+    own = limited(PLANE * wish, limit)
+    law = avoiding(own, given, composition)
+    rows = np.array([proposal is not None for proposal in accepted])
+    if rows.any():
+        with_it = [(proposal, when) for proposal, when in zip(accepted, t, strict=True) if proposal is not None]
+        place = np.stack([proposal.place_m(np.array([when]))[0] for proposal, when in with_it])
+        rate = np.stack([proposal.rate_m_s(float(when), asked_side) for proposal, when in with_it])
+        below = (law if run.method in ON_TOP else own)[rows]
+        asked = PLANE * (rate + control["intervention_gain_1_s"] * (place - here[rows]))
+        projector = np.stack([proposal.projector for proposal, _ in with_it])
+        task = limited(PLANE * (below + np.einsum("bij,bj->bi", projector, asked - below)), limit)
+        law[rows] = task if run.method in ON_TOP else avoiding(task, given.rows(rows), composition)
+    return law
+
+
+def _uav(run: Run) -> Robot:
+    """(9)-(11): over the centroid of the UGVs, whose commands of the sample before are fed forward."""
+    uav, row = run.scenario["uav"], run.sample_row
+    over = np.mean([run.position_m[ugv][row] for ugv in run.ugvs], axis=0) + np.array([0.0, 0.0, uav["altitude_m"]])
+    fed = np.mean([run.command_m_s[ugv][row] for ugv in run.ugvs], axis=0)
+    fed[0] = 0.0  # nothing was commanded before the first sample
+    wish = fed + run.scenario["control"]["formation_gain_1_s"] * (over - run.position_m[run.uav][row])
+    law = avoiding(limited(wish, uav["max_speed_m_s"]), around(run, run.uav), "augmented")
+    never = np.zeros(len(law), dtype=bool)
+    return Robot(run.uav, run.command_m_s[run.uav][run.chosen_row], law, never, never)

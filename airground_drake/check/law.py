@@ -1,0 +1,164 @@
+"""The control law (5)-(11), (14), (20) as the claims state it, for B samples at once."""
+
+from __future__ import annotations
+
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+
+from .files import Json
+from .rules import Array, Flags
+
+PLANE = np.array([1.0, 1.0, 0.0])
+"""Directions in which a UGV can move."""
+MET_M_S = 1e-11
+"""A velocity that misses an inequality by less meets it."""
+CONTRADICTION_M_S = 1e-9
+"""Inequalities that every velocity misses by more contradict each other."""
+SINGULAR = 1e-12
+"""Normals of which the squared volume, relative, is below this are dependent: fewer of them say the same."""
+
+
+class Inequalities(NamedTuple):
+    """normal_k.v >= bound_k: normals (B, K, 3), bounds (B, K), -inf where nothing is asked."""
+
+    normal: Array
+    bound: Array
+
+    def rows(self, chosen: Flags) -> Inequalities:
+        """Those of some samples."""
+        return Inequalities(self.normal[chosen], self.bound[chosen])
+
+
+def inequalities(offset_m: Array, safe_m: Array, share: Array, control: Json, plane: Array) -> Inequalities:
+    """n.v >= share A (d - D) where D <= d, else n.v >= -share (D - d) / h, for what is within sensing range.
+
+    Args:
+        offset_m: from each point to the robot, (B, K, 3).
+        safe_m: distances d, (K,) or (B, K).
+        share: part that the robot takes, (K,) or (B, K).
+        control: of the scenario.
+        plane: 1 in directions in which the robot can move, else 0, (3,).
+    """
+    distance = np.linalg.norm(offset_m, axis=2)
+    normal = plane * offset_m / np.where(distance > 0.0, distance, 1.0)[..., None]
+    steepness = np.where(distance <= safe_m, control["avoidance_gain_1_s"], 1.0 / control["period_s"])
+    bound = share * steepness * (safe_m - distance)
+    return Inequalities(normal, np.where(distance <= control["sensing_range_m"], bound, -np.inf))
+
+
+def limited(v_m_s: Array, limit_m_s: Array | float) -> Array:
+    """Velocities (B, 3) shortened to a speed limit."""
+    speed = np.linalg.norm(v_m_s, axis=1)
+    return np.asarray(v_m_s * (limit_m_s / np.maximum(speed, limit_m_s))[:, None])
+
+
+def avoiding(wanted_m_s: Array, given: Inequalities, composition: str) -> Array:
+    """Velocities (B, 3) under the inequalities: closest to what is wanted, or (5) as printed."""
+    found = wanted_m_s.copy()
+    missed = (_spare(wanted_m_s, given) < 0.0).any(axis=1)
+    if missed.any():
+        change = _closest if composition == "augmented" else _recursion
+        found[missed] = change(wanted_m_s[missed], given.rows(missed), composition)
+    return found
+
+
+def _spare(v_m_s: Array, given: Inequalities) -> Array:
+    return np.asarray((given.normal * v_m_s[:, None]).sum(axis=2) - given.bound)
+
+
+def _recursion(wanted_m_s: Array, given: Inequalities, composition: str) -> Array:
+    """(5): from the lowest priority up, each task corrects what those below it want; all samples side by side.
+
+    The priority is the order in which points are listed, or with `recursion_nearest` that of their demands.
+    """
+    v = wanted_m_s.copy()
+    rank = -given.bound if composition == "recursion_nearest" else np.zeros_like(given.bound)
+    order = np.argsort(rank, axis=1, kind="stable")[:, ::-1]
+    each = np.arange(len(v))
+    for k in order.T:
+        n, bound = given.normal[each, k], given.bound[each, k]
+        squared = (n * n).sum(axis=1)
+        lacking = np.maximum(0.0, bound - (n * v).sum(axis=1))
+        v += n * np.where(squared > 0.0, lacking / np.where(squared > 0.0, squared, 1.0), 0.0)[:, None]
+    return v
+
+
+def _closest(wanted_m_s: Array, given: Inequalities, _: str) -> Array:
+    """The closest velocities; where inequalities contradict each other, the slowest that miss them least.
+
+    The latter are shortened until the inequalities hold that standing still meets.
+    """
+    found, lacking = _by_active_sets(wanted_m_s, given)
+    torn = lacking > CONTRADICTION_M_S
+    if torn.any():
+        contradicting = given.rows(torn)
+        slowest = _least_missing(contradicting)
+        rate = (contradicting.normal * slowest[:, None]).sum(axis=2)
+        late = (rate < contradicting.bound) & (contradicting.bound <= 0.0)
+        factor = np.where(late, contradicting.bound / np.where(late, rate, 1.0), 1.0).min(axis=1)
+        found[torn] = slowest * factor[:, None]
+    return found
+
+
+def _least_missing(given: Inequalities) -> Array:
+    """By bisection of what is missed by everything, from what standing still misses."""
+    low, high = np.zeros(len(given.bound)), np.maximum(0.0, given.bound.max(axis=1))
+    still = np.zeros((len(high), 3))
+    best = still.copy()
+    for _ in range(60):
+        middle = (low + high) / 2.0
+        found, lacking = _by_active_sets(still, Inequalities(given.normal, given.bound - middle[:, None]))
+        met = lacking <= CONTRADICTION_M_S
+        best[met] = found[met]
+        low, high = np.where(met, low, middle), np.where(met, middle, high)
+    return best
+
+
+def _by_active_sets(wanted_m_s: Array, given: Inequalities) -> tuple[Array, Array]:
+    """The closest velocity (B, 3) that meets all inequalities, and what it lacks (B,): one of the candidates is it.
+
+    A candidate is the velocity closest to what is wanted with some inequalities met exactly. At most as many are
+    needed as there are directions. Where no candidate meets all, the one that misses least is returned.
+    """
+    normal, bound = _relevant(wanted_m_s, given)
+    most = 3 if normal[:, :, 2].any() else 2
+    best, lacking = wanted_m_s.copy(), np.maximum(0.0, -_spare(wanted_m_s, given)).max(axis=1)
+    length = np.where(lacking <= MET_M_S, 0.0, np.inf)
+    for size in range(1, most + 1):
+        for active in combinations(range(bound.shape[1]), size):
+            n, b = normal[:, active], bound[:, active]
+            gram = np.einsum("bid,bjd->bij", n, n)
+            scale = np.einsum("bii->bi", gram).prod(axis=1)
+            usable = np.isfinite(b).all(axis=1) & (scale > 0.0)
+            usable &= np.linalg.det(gram) > SINGULAR * scale
+            if not usable.any():
+                continue
+            u, n = wanted_m_s[usable], n[usable]
+            gap = b[usable] - np.einsum("bkd,bd->bk", n, u)
+            step = np.einsum("bkd,bk->bd", n, np.linalg.solve(gram[usable], gap[..., None])[..., 0])
+            lacks = np.maximum(0.0, -_spare(u + step, Inequalities(normal[usable], bound[usable]))).max(axis=1)
+            size_of = np.linalg.norm(step, axis=1)
+            met, before = lacks <= MET_M_S, lacking[usable] <= MET_M_S
+            better = np.where(met & before, size_of < length[usable], met | (~before & (lacks < lacking[usable])))
+            rows = np.flatnonzero(usable)[better]
+            best[rows] = (u + step)[better]
+            lacking[rows], length[rows] = lacks[better], size_of[better]
+    return best, lacking
+
+
+def _relevant(wanted_m_s: Array, given: Inequalities) -> Inequalities:
+    """The inequalities that can be active, as few columns as there are at most in a sample, most demanding first.
+
+    Where standing still meets all, the closest velocity is no faster than what is wanted, and what lets that speed
+    pass in every direction is never active.
+    """
+    reach = np.linalg.norm(wanted_m_s, axis=1) + 1e-6
+    demands = (given.bound.max(axis=1, initial=-np.inf) > 0.0)[:, None]
+    can = np.isfinite(given.bound) & (demands | (given.bound > -reach[:, None]))
+    bound = np.where(can, given.bound, -np.inf)
+    order = np.argsort(-bound, axis=1, kind="stable")[:, : max(1, int(can.sum(axis=1).max(initial=0)))]
+    return Inequalities(
+        np.take_along_axis(given.normal, order[..., None], axis=1), np.take_along_axis(bound, order, axis=1)
+    )

@@ -1,0 +1,114 @@
+"""The robots' control law (6), (8)-(11), (14), (20), written again in numpy for many samples at once: B of them.
+
+Velocities in m/s, positions in m, world frame. Nothing of the running code is used.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from airground_drake.arrays import Array
+from airground_drake.verify.runs.projection import closest, least_violation, shortened
+
+PLANE = np.array([1.0, 1.0, 0.0])
+"""Directions in which a UGV can move."""
+ON_TOP = ("b", "c")
+"""Methods that put an accepted intervention above the avoidance inequalities, as (20) does."""
+
+
+class Inequalities(NamedTuple):
+    """normal_k.v >= bound_k for K points: normals (B, K, 3), bounds (B, K), -inf beyond the sensing range."""
+
+    normal: Array
+    bound: Array
+
+
+class Asked(NamedTuple):
+    """What accepted interventions ask for: places (B, 3), their rates (B, 3), J_int^+ J_int (B, 3, 3)."""
+
+    wanted: Array
+    rate: Array
+    chosen: Array
+
+
+def inequalities(
+    position: Array, centre: Array, safe: Array, share: Array, control: dict[str, Any], *, planar: bool
+) -> Inequalities:
+    """Set-based avoidance (7)-(8), (11): n.v >= share A (d - D) where D <= d, else n.v >= -share (D - d) / h.
+
+    Args:
+        position: (B, 3).
+        centre: points to keep away from, (B, K, 3).
+        safe: distances d, (K,) or (B, K).
+        share: of each inequality, (K,) or (B, K).
+        control: A, h and sensing range of the scenario.
+        planar: whether the robot cannot use the z component of n.
+    """
+    offset = position[:, None] - centre
+    distance = np.sqrt(np.square(offset).sum(axis=2))
+    normal = offset / np.where(distance > 0.0, distance, 1.0)[..., None] * (PLANE if planar else 1.0)
+    excess = distance - safe
+    steepness = np.where(excess <= 0.0, control["avoidance_gain_1_s"], 1.0 / control["period_s"])
+    seen = distance <= control["sensing_range_m"]
+    return Inequalities(normal, np.where(seen, -share * steepness * excess, -np.inf))
+
+
+def limited(velocity: Array, limit: Array | float) -> Array:
+    """Velocities (B, 3) shortened to a speed limit, a number or (B,)."""
+    speed = np.sqrt(np.square(velocity).sum(axis=1))
+    shorter: Array = velocity * np.minimum(1.0, limit / np.maximum(speed, 1e-300))[:, None]
+    return shorter
+
+
+def avoiding(below: Array, given: Inequalities, composition: str, *, planar: bool) -> Array:
+    """The avoidance tasks above velocities (B, 3): the closest ones, or (5) as printed for `recursion_*`."""
+    velocity = below.copy()
+    missed = (np.einsum("bkd,bd->bk", given.normal, below) < given.bound).any(axis=1)
+    if not missed.any():
+        return velocity
+    normal, bound = given.normal[missed], given.bound[missed]
+    if composition != "augmented":
+        velocity[missed] = [
+            _recursion(*one, nearest_first=composition == "recursion_nearest")
+            for one in zip(below[missed], normal, bound, strict=True)
+        ]
+        return velocity
+    axes = 2 if planar else 3
+    found, met = closest(below[missed, :axes], normal[:, :, :axes], bound)
+    if not met.all():
+        torn = normal[~met, :, :axes], bound[~met]
+        found[~met] = shortened(least_violation(*torn), *torn)
+    velocity[missed, :axes] = found
+    return velocity
+
+
+def _recursion(below: Array, normal: Array, bound: Array, *, nearest_first: bool) -> Array:
+    """(5), level by level from the lowest priority: each task corrects what the levels below it want."""
+    order = np.arange(len(bound))[::-1]  # the one listed first has the highest priority
+    if nearest_first:  # the most demanding has it; of two that demand the same, the one listed first
+        order = order[np.argsort(bound[order], kind="stable")]
+    velocity = below.copy()
+    for k in order:
+        lacking, squared = bound[k] - normal[k] @ velocity, normal[k] @ normal[k]
+        if lacking > 0.0 and squared > 0.0:
+            velocity += normal[k] * (lacking / squared)
+    return velocity
+
+
+def tracking(position: Array, preset: Array, rate: Array, gain: float, limit: float) -> Array:
+    """A UGV's own task (6), within its speed limit."""
+    return limited(PLANE * (rate + gain * (preset - position)), limit)
+
+
+def intervened(position: Array, below: Array, asked: Asked, gain: float, limit: float) -> Array:
+    """(14) above what is below it, (20): v_int + (I - J^+ J) v, within the speed limit."""
+    wish = PLANE * (asked.rate + gain * (asked.wanted - position))
+    return limited(PLANE * (below + np.einsum("bij,bj->bi", asked.chosen, wish - below)), limit)
+
+
+def selected(selection: Array) -> Array:
+    """J_int^+ J_int, (3, 3), of J_int given as its numbers in C order."""
+    jacobian = selection.reshape(-1, 3)
+    return np.asarray(np.linalg.pinv(jacobian) @ jacobian)

@@ -1,0 +1,267 @@
+"""EXEC: what a run commanded is the control law with what was accepted, evaluated again from the trace."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import product
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from airground_drake.arrays import Array
+from airground_drake.errors import TraceError
+from airground_drake.trace import Trace
+from airground_drake.verify.claim import TIME_TOLERANCE_S, TraceClaim
+from airground_drake.verify.engines.segments import MERGE_S, corner_times, travelled
+from airground_drake.verify.finding import Finding
+from airground_drake.verify.runs.control_law import (
+    ON_TOP,
+    Asked,
+    Inequalities,
+    avoiding,
+    inequalities,
+    intervened,
+    limited,
+    tracking,
+)
+from airground_drake.verify.runs.control_samples import control_samples
+from airground_drake.verify.runs.pairs import pairs_of, places_of
+from airground_drake.verify.runs.proposals import Sent, accepted_at, proposals_of
+
+COMMAND_TOLERANCE_M_S = 1e-6
+"""A command may differ from the law by this, m/s. Both are evaluated at the same recorded positions and differ by
+rounding (1e-13 m/s), by the 1e-12 m/s that the controller adds to every bound, and by what a corner of two nearly
+parallel inequalities makes of that: at most a millionfold, for the controller treats anything flatter as parallel. In
+100 s it is 0.1 mm."""
+BINDING_M_S = 1e-9
+"""An inequality binds where the law's command has less to spare, m/s."""
+
+
+class Judged(NamedTuple):
+    """The law against the commands of one robot at S control samples.
+
+    Attributes:
+        robot: name.
+        t: (S,), s.
+        away: what they differ by, (S,), m/s.
+        law: commands by the law, (S, 3), m/s.
+        recorded: commands, (S, 3), m/s.
+        executing: whether an accepted proposal is executed, by the messages, (S,).
+        said: the same by the signals, (S,).
+        binding: whether an inequality binds, (S,).
+    """
+
+    robot: str
+    t: Array
+    away: Array
+    law: Array
+    recorded: Array
+    executing: npt.NDArray[np.bool_]
+    said: npt.NDArray[np.bool_]
+    binding: npt.NDArray[np.bool_]
+
+
+class Exec(TraceClaim):
+    """EXEC."""
+
+    id = "EXEC"
+    statement = (
+        "At every control sample of the run each robot was commanded what the control law says: a UGV its own task (6) "
+        "and, from when it accepted a proposal until that was over, the intervention (14), composed with the avoidance "
+        "inequalities as the run's method has it; the UAV its formation task (9)-(10) below avoidance (11)."
+    )
+    formula = (
+        "own = lim(rho_rd' + B (rho_rd - rho)); int(v) = lim(v + J^+ J (rho_int' + Lambda (rho_int - rho) - v)); nothing "
+        "accepted: v = avoid(own); accepted: v = int(avoid(own)) under (b), (c), v = avoid(int(own)) under (d); UAV: v = "
+        "avoid(lim(mean v_j + C (mean rho_j + altitude - rho))); avoid(u) = argmin ||v - u||^2 s.t. n_k.v >= b_k "
+        "(recursion_*: (5) as printed); |recorded - v| <= 1e-6 m/s; accepted = what the messages say"
+    )
+    method = (
+        "Evaluated again in plain numpy at each multiple of the control period, at the recorded positions, from "
+        "the scenario and the table of proposals. The closest velocity is found by another algorithm than the "
+        "controller's (constraints one by one, each reducing the dimension), so also where inequalities bind; where "
+        "they contradict each other it is the slowest of those that miss them least, shortened until those hold that "
+        "standing still meets. What is accepted follows from "
+        "proposals, modes, answers and the periods, not from the signal `accepted`, which has to agree. At a corner of "
+        "a preset or proposed motion either rate counts."
+    )
+    equations = "(5)-(6), (7)-(8), (9)-(10), (11), (12)-(14), (20)"
+    assumptions = (
+        "The command of a row is the velocity applied since the row before (the trace's convention); that it is held "
+        "between samples is SAFE-HYP.",
+        "A proposal stays in force as the planner's rules say: see `verify.runs.proposals.accepted_at`.",
+        "The UAV feeds the UGVs' commands of the sample before forward: controllers of one sample see each other's "
+        "last commands.",
+    )
+    does_not_establish = (
+        "That what was accepted was useful or safe, or that it was right to accept it (GATE-FEAS, SAFE-TRACE). Commands "
+        "that are wrong by less than 1e-6 m/s. Under a disturbance of the motion it is about the commands, not about "
+        "where they led. A UAV with another task than 'formation' is not judged; the evidence says so."
+    )
+
+    def check(self, trace: Trace) -> Finding:
+        """Compare every command with the law; the margin is the tolerance less the largest difference."""
+        proposals = proposals_of(trace)
+        samples = control_samples(trace.t, trace.scenario["control"]["period_s"])
+        judged = [_judge_ugv(trace, ugv, proposals, samples) for ugv in trace.ugvs]
+        formation = trace.scenario["uav"]["task"] == "formation"
+        if formation:
+            judged.append(_judge_uav(trace, samples))
+        wrong = [entry for one in judged if (entry := _first_wrong(one)) is not None]
+        worst = max(judged, key=lambda one: float(one.away.max(initial=0.0)))
+        k = int(np.argmax(worst.away))
+        margin = COMMAND_TOLERANCE_M_S - float(worst.away[k])
+        return Finding(
+            "refuted" if wrong else "holds",
+            margin=margin if margin < 0.0 or not wrong else None,
+            unit="m/s",
+            quantity="tolerance left by which a command may differ from the law's",
+            where={"robot": worst.robot, "t_s": float(worst.t[k])},
+            counterexample=min(wrong, key=lambda entry: float(entry["t_s"]), default=None),
+            evidence={
+                "samples": len(samples),
+                "robots": {
+                    one.robot: {
+                        "largest_difference_m_s": float(one.away.max(initial=0.0)),
+                        "executing": int(one.executing.sum()),
+                        "binding": int(one.binding.sum()),
+                        "executing_and_binding": int((one.executing & one.binding).sum()),
+                    }
+                    for one in judged
+                },
+                "not_judged": [] if formation else [f"{trace.robots[-1]}: task {trace.scenario['uav']['task']}"],
+                "tolerance_m_s": COMMAND_TOLERANCE_M_S,
+            },
+        )
+
+
+def _first_wrong(one: Judged) -> dict[str, Any] | None:
+    """The first sample at which a command, or what is said to be executed, is not that of the law."""
+    found = np.flatnonzero(~(one.away <= COMMAND_TOLERANCE_M_S) | (one.executing != one.said))
+    if not found.size:
+        return None
+    k = int(found[0])
+    return {
+        "robot": one.robot,
+        "t_s": float(one.t[k]),
+        "accepted_by_the_messages": bool(one.executing[k]),
+        "accepted_by_the_signals": bool(one.said[k]),
+        "command_m_s": one.recorded[k].tolist(),
+        "law_m_s": one.law[k].tolist(),
+        "difference_m_s": float(one.away[k]),
+    }
+
+
+def _chosen(trace: Trace, samples: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
+    """Rows that have the command chosen at each control sample: the next ones."""
+    return np.asarray(np.searchsorted(trace.t, trace.t[samples] + MERGE_S))
+
+
+def _around(trace: Trace, robot: str, samples: npt.NDArray[np.intp], *, planar: bool) -> Inequalities:
+    """The avoidance inequalities of a robot at the samples."""
+    places = {name: np.broadcast_to(p, (len(trace.t), 3))[samples] for name, p in places_of(trace).items()}
+    pairs = [pair for pair in pairs_of(trace) if robot in (pair.first, pair.second)]
+    others = [places[pair.second if pair.first == robot else pair.first] for pair in pairs]
+    return inequalities(
+        places[robot],
+        np.stack(others, axis=1) if others else np.empty((len(samples), 0, 3)),
+        np.array([pair.safe_m for pair in pairs]),
+        np.array([pair.share for pair in pairs]),
+        trace.scenario["control"],
+        planar=planar,
+    )
+
+
+def _judge_ugv(trace: Trace, ugv: str, proposals: list[Sent], samples: npt.NDArray[np.intp]) -> Judged:
+    """A UGV's commands against the law, with whatever it has accepted."""
+    scenario, control, t = trace.scenario, trace.scenario["control"], trace.t[samples]
+    spec, chosen = scenario["ugvs"][ugv], _chosen(trace, samples)
+    position, recorded = trace.position(ugv)[samples], trace.command(ugv)[chosen]
+    given = _around(trace, ugv, samples, planar=True)
+    accepted = accepted_at(trace, ugv, proposals, t)
+    waypoints = np.asarray(spec["preset"]["waypoints_m"], dtype=np.float64)
+    speed = float(spec["preset"]["speed_m_s"])
+    preset = travelled(waypoints, speed, t)
+    own_rates = _preset_rates(waypoints, speed, t)
+    asked = _asked(accepted, t)
+    away, law = np.full(len(t), np.inf), np.zeros((len(t), 3))
+    # samples at a corner of a motion are evaluated with the rates on both sides of it, and the closer one counts
+    for own_rate, wish in product(own_rates, asked):
+        own = tracking(position, preset, own_rate, control["motion_gain_1_s"], spec["max_speed_m_s"])
+        ours = _law(trace, own, position, given, accepted, wish, spec["max_speed_m_s"])
+        off = np.linalg.norm(recorded - ours, axis=1)
+        closer = ~(off >= away)
+        away[closer], law[closer] = off[closer], ours[closer]
+    executing = np.array([sent is not None for sent in accepted], dtype=bool)
+    said = trace.column(f"{ugv}.accepted")[chosen] != 0.0
+    return Judged(ugv, t, away, law, recorded, executing, said, _binding(given, law))
+
+
+def _law(
+    trace: Trace,
+    own: Array,
+    position: Array,
+    given: Inequalities,
+    accepted: Sequence[Sent | None],
+    asked: Asked,
+    limit: float,
+) -> Array:
+    """Commands by the law, (S, 3), m/s."""
+    composition, gain = trace.meta["composition"], trace.scenario["control"]["intervention_gain_1_s"]
+    velocity = avoiding(own, given, composition, planar=True)
+    rows = np.array([k for k, sent in enumerate(accepted) if sent is not None], dtype=np.intp)
+    if rows.size:
+        on_top = trace.meta["method"] in ON_TOP
+        below = (velocity if on_top else own)[rows]
+        task = intervened(position[rows], below, Asked(*(part[rows] for part in asked)), gain, limit)
+        bounds = Inequalities(given.normal[rows], given.bound[rows])
+        velocity[rows] = task if on_top else avoiding(task, bounds, composition, planar=True)
+    return velocity
+
+
+def _preset_rates(waypoints: Array, speed: float, t: Array) -> list[Array]:
+    """Velocity of the preset trajectory, (S, 3), m/s, before and after each instant; they differ at corners only."""
+    times = corner_times(waypoints, speed)
+    legs = np.diff(waypoints, axis=0)
+    lengths = np.linalg.norm(legs, axis=1, keepdims=True)
+    slopes = np.concatenate([speed * legs / np.where(lengths > 0.0, lengths, 1.0), np.zeros((1, 3))])
+    if not len(times):
+        slopes = np.zeros((1, 3))
+    return [slopes[np.searchsorted(times, t + shift)] for shift in (-TIME_TOLERANCE_S, TIME_TOLERANCE_S)]
+
+
+def _asked(accepted: Sequence[Sent | None], t: Array) -> list[Asked]:
+    """What the accepted proposals ask for at each sample, with the rates before and after each instant."""
+    wanted, chosen = np.zeros((len(t), 3)), np.zeros((len(t), 3, 3))
+    rates = np.zeros((2, len(t), 3))
+    for k, sent in enumerate(accepted):
+        if sent is not None:
+            wanted[k], chosen[k] = sent.place(float(t[k])), sent.chosen
+            both = sent.rates(float(t[k]))
+            rates[0, k], rates[1, k] = both[0], both[-1]
+    return [Asked(wanted, rate, chosen) for rate in rates]
+
+
+def _judge_uav(trace: Trace, samples: npt.NDArray[np.intp]) -> Judged:
+    """The UAV's commands against (9)-(11)."""
+    uav, control, chosen = trace.scenario["uav"], trace.scenario["control"], _chosen(trace, samples)
+    name = uav["name"]
+    if name != trace.robots[-1]:
+        raise TraceError(f"the last robot is {trace.robots[-1]}, not the UAV {name}")
+    position, recorded = trace.position(name)[samples], trace.command(name)[chosen]
+    centroid = np.mean([trace.position(ugv)[samples] for ugv in trace.ugvs], axis=0)
+    fed = np.mean([trace.command(ugv)[samples] for ugv in trace.ugvs], axis=0)
+    fed[trace.t[samples] <= TIME_TOLERANCE_S] = 0.0  # nothing was commanded before the first sample
+    over = centroid + np.array([0.0, 0.0, uav["altitude_m"]])
+    below = limited(fed + control["formation_gain_1_s"] * (over - position), uav["max_speed_m_s"])
+    given = _around(trace, name, samples, planar=False)
+    law = avoiding(below, given, "augmented", planar=False)
+    away = np.linalg.norm(recorded - law, axis=1)
+    none = np.zeros(len(samples), dtype=bool)
+    return Judged(name, trace.t[samples], away, law, recorded, none, none, _binding(given, law))
+
+
+def _binding(given: Inequalities, velocity: Array) -> npt.NDArray[np.bool_]:
+    spare = np.einsum("bkd,bd->bk", given.normal, velocity) - given.bound
+    return np.asarray((spare <= BINDING_M_S).any(axis=1))

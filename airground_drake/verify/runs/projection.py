@@ -1,0 +1,104 @@
+"""The closest velocity under inequalities, by another algorithm than the controller's, for many samples at once.
+
+Constraints are taken one by one. While the best velocity so far meets the next one nothing changes; otherwise the
+best velocity under it and those before it lies on its boundary, which is the same problem with one dimension less
+(Seidel's algorithm). In one dimension the answer is an interval's closest point.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from airground_drake.arrays import Array
+
+Flags = npt.NDArray[np.bool_]
+
+PARALLEL = 1e-9
+"""A normal this short, in a plane into which it was projected, is that of a parallel plane: its inequality says nothing
+there but how far apart the two are."""
+ROUNDING_M_S = 1e-12
+"""Velocities that miss an inequality by less meet it, m/s."""
+CONTRADICTION_M_S = 1e-9
+"""Inequalities that nothing meets by more contradict each other, m/s; the controller tells them apart by the same."""
+
+
+def closest(wanted: Array, normal: Array, bound: Array) -> tuple[Array, Flags]:
+    """argmin ||v - wanted||^2 with normal_k.v >= bound_k for all k, for B samples, in 1 to 3 dimensions d.
+
+    Args:
+        wanted: (B, d), m/s.
+        normal: (B, K, d), of any length.
+        bound: (B, K), m/s; -inf where nothing is asked.
+
+    Returns:
+        Velocities (B, d), m/s, and whether the inequalities of a sample can be met: (B,). Where they cannot, the
+        velocity means nothing.
+    """
+    length = np.linalg.norm(normal, axis=2)
+    flat = length <= PARALLEL
+    possible = ~(flat & (bound > CONTRADICTION_M_S)).any(axis=1)
+    unit = normal / np.where(flat, 1.0, length)[..., None]
+    level = np.where(flat, -np.inf, bound / np.where(flat, 1.0, length))
+    if wanted.shape[1] == 1:
+        found, met = _in_interval(wanted[:, 0], unit[:, :, 0], level)
+        return found[:, None], possible & met
+    found = wanted.copy()
+    for k in range(bound.shape[1]):
+        rows = np.flatnonzero(((unit[:, k] * found).sum(axis=1) < level[:, k] - ROUNDING_M_S) & possible)
+        if rows.size:
+            found[rows], met = _on_boundary(wanted[rows], unit[rows, : k + 1], level[rows, : k + 1])
+            possible[rows] &= met
+    return found, possible
+
+
+def _on_boundary(wanted: Array, unit: Array, level: Array) -> tuple[Array, Flags]:
+    """The closest velocities on the boundary of the last inequality, under those before it."""
+    facing = unit[:, -1]
+    along = _complement(facing)  # (B, d - 1, d)
+    foot = facing * level[:, -1:]
+    normal = np.einsum("bkd,bed->bke", unit[:, :-1], along)
+    bound = level[:, :-1] - np.einsum("bkd,bd->bk", unit[:, :-1], foot)
+    inner, met = closest(np.einsum("bed,bd->be", along, wanted), normal, bound)
+    return foot + np.einsum("bed,be->bd", along, inner), met
+
+
+def _complement(facing: Array) -> Array:
+    """Orthonormal vectors (B, d - 1, d) orthogonal to unit vectors (B, d)."""
+    if facing.shape[1] == 2:
+        return np.stack([-facing[:, 1], facing[:, 0]], axis=1)[:, None]
+    axis = np.eye(3)[np.argmin(np.abs(facing), axis=1)]
+    first = np.cross(facing, axis)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    return np.stack([first, np.cross(facing, first)], axis=1)
+
+
+def _in_interval(wanted: Array, sign: Array, level: Array) -> tuple[Array, Flags]:
+    """In one dimension: the closest number (B,) with sign_k x >= level_k, signs being 1 or -1 (0: nothing is asked)."""
+    low = np.where(sign > 0.0, level, -np.inf).max(axis=1, initial=-np.inf)
+    high = np.where(sign < 0.0, -level, np.inf).min(axis=1, initial=np.inf)
+    over = low > high
+    middle = np.where(over, 0.5 * (np.where(over, low, 0.0) + np.where(over, high, 0.0)), 0.0)
+    return np.where(over, middle, np.clip(wanted, low, np.maximum(low, high))), ~(low > high + CONTRADICTION_M_S)
+
+
+def shortened(velocity: Array, normal: Array, bound: Array) -> Array:
+    """Velocities (B, d) times the largest factor up to 1 with which those inequalities hold that standing still meets."""
+    rate = np.einsum("bkd,bd->bk", normal, velocity)
+    broken = (rate < bound) & (bound <= 0.0)
+    factor = np.where(broken, bound / np.where(broken, rate, 1.0), 1.0).min(axis=1, initial=1.0)
+    return np.asarray(velocity * factor[:, None])
+
+
+def least_violation(normal: Array, bound: Array) -> Array:
+    """The slowest of the velocities that miss inequalities by as little as possible, (B, d), m/s; by bisection."""
+    still = np.zeros((normal.shape[0], normal.shape[2]))
+    low = np.zeros(len(bound))
+    high = np.maximum(0.0, bound.max(axis=1, initial=0.0)) + ROUNDING_M_S  # standing still misses none by more
+    best = still.copy()
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        found, met = closest(still, normal, bound - middle[:, None])
+        best[met] = found[met]
+        high, low = np.where(met, middle, high), np.where(met, low, middle)
+    return best

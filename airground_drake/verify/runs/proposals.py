@@ -1,0 +1,144 @@
+"""What was proposed to each UGV, and which proposal was accepted at each control sample, by the messages of a run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from airground_drake.arrays import Array
+from airground_drake.errors import TraceError
+from airground_drake.trace import Trace
+from airground_drake.verify.claim import TIME_TOLERANCE_S
+from airground_drake.verify.engines.segments import interpolate
+from airground_drake.verify.runs.control_law import selected
+from airground_drake.verify.runs.interventions import GATED_METHODS
+
+
+@dataclass(frozen=True, eq=False)
+class Sent:
+    """A proposal: a row of `Trace.proposals`.
+
+    Attributes:
+        ugv: to whom.
+        policy: by which.
+        issued_s: when.
+        times_s: vertices of the motion that it asks for, (M,).
+        positions_m: where they are, (M, 3).
+        chosen: J_int^+ J_int, (3, 3).
+    """
+
+    ugv: str
+    policy: str
+    issued_s: float
+    times_s: Array
+    positions_m: Array
+    chosen: Array
+
+    def place(self, t: float | Array) -> Array:
+        """Where the UGV is to be at times: (3,) or (K, 3), m; at rest before the first vertex and after the last."""
+        return interpolate(self.times_s, self.positions_m, t)
+
+    def rates(self, t: float) -> list[Array]:
+        """Velocity of that place at a time, (3,), m/s: one, or two at a vertex, which rounding may put on its side."""
+        begin, end = (int(np.searchsorted(self.times_s, t + shift)) for shift in (-TIME_TOLERANCE_S, TIME_TOLERANCE_S))
+        return [self._slope(leg) for leg in sorted({begin, end})]
+
+    def _slope(self, leg: int) -> Array:
+        """On the way to vertex `leg`."""
+        if not 0 < leg < len(self.times_s):
+            return np.zeros(3)
+        slope: Array = (self.positions_m[leg] - self.positions_m[leg - 1]) / (self.times_s[leg] - self.times_s[leg - 1])
+        return slope
+
+
+def proposals_of(trace: Trace) -> list[Sent]:
+    """All of them, as recorded.
+
+    Raises:
+        TraceError: if one is none, or they are not those of the events.
+    """
+    found = []
+    for row in trace.proposals.to_dict("records"):
+        times, places, selection = (
+            np.asarray(row[name], dtype=np.float64).ravel() for name in ("times_s", "positions_m", "selection")
+        )
+        label = f"proposal to {row['robot']} at t = {row['issued_s']} s"
+        numbers = np.concatenate([times, places, selection, [row["issued_s"]]])
+        if not np.isfinite(numbers).all() or not len(times) or not (np.diff(times) > 0.0).all():
+            raise TraceError(f"{label}: numbers that are not finite, or times that do not increase")
+        if len(places) != 3 * len(times) or not len(selection) or len(selection) % 3 or row["robot"] not in trace.ugvs:
+            raise TraceError(f"{label}: no motion of a UGV of the trace")
+        found.append(
+            Sent(
+                str(row["robot"]), str(row["policy"]), float(row["issued_s"]), times, places.reshape(-1, 3),
+                selected(selection),
+            )
+        )  # fmt: skip
+    recorded = sorted((s.ugv, s.issued_s, s.policy) for s in found)
+    events = sorted((e["robot"], float(e["t_s"]), e["policy"]) for e in trace.events if e["kind"] == "proposal")
+    if recorded != events:
+        raise TraceError(f"the proposals recorded are {recorded}, those of the events {events}")
+    return sorted(found, key=lambda sent: sent.issued_s)
+
+
+def accepted_at(trace: Trace, ugv: str, proposals: list[Sent], t: Array) -> list[Sent | None]:
+    """The proposal that a UGV has accepted, at control samples (S,), s, or None.
+
+    A proposal is in force from when it is sent until, at a planning instant, the UGV is not being intervened on, the
+    motion has run out, the UGV's last answer was a refusal, or another one is sent. Under method (b) it is accepted
+    all the while; under (c) and (d) while the decision of the last sample of the gatekeeper accepts it.
+
+    Args:
+        trace: one run.
+        ugv: name.
+        proposals: as sent, by time.
+        t: increasing.
+    """
+    mine = [sent for sent in proposals if sent.ugv == ugv]
+    if not mine:
+        return [None] * len(t)
+    gated = trace.meta["method"] in GATED_METHODS
+    table = trace.decisions[trace.decisions["robot"] == ugv]
+    answers = [
+        (float(row["t_s"]), float(row["issued_s"]), row["decision"] == "accept") for row in table.to_dict("records")
+    ]
+    answers.sort()
+    times = np.array([answer[0] for answer in answers])
+    gate_s = trace.scenario["gatekeeper"]["period_s"]
+    plan_s = trace.scenario["intervention"]["period_s"]
+    ends = [_withdrawn_s(trace, ugv, sent, mine, answers) for sent in mine]
+    found: list[Sent | None] = []
+    for now in t:
+        planned = plan_s * np.floor(now / plan_s + 1e-6)
+        here = [
+            sent
+            for sent, end in zip(mine, ends, strict=True)
+            if sent.issued_s <= planned + TIME_TOLERANCE_S and end > planned + TIME_TOLERANCE_S
+        ]
+        if here and gated:
+            asked = gate_s * np.floor(now / gate_s + 1e-6)
+            k = int(np.searchsorted(times, asked - TIME_TOLERANCE_S))
+            given = answers[k] if k < len(answers) and abs(times[k] - asked) <= TIME_TOLERANCE_S else None
+            here = [sent for sent in here if given is not None and given[2] and given[1] == sent.issued_s]
+        found.append(here[-1] if here else None)
+    return found
+
+
+def _withdrawn_s(trace: Trace, ugv: str, sent: Sent, mine: list[Sent], answers: list[Any]) -> float:
+    """The planning instant at which a proposal is taken back, s; infinite if it never is."""
+    period = trace.scenario["intervention"]["period_s"]
+    mode, t = trace.column(f"{ugv}.mode"), trace.t
+    later = [other.issued_s for other in mine if other.issued_s > sent.issued_s]
+    refused = [(when, yes) for when, issued, yes in answers if issued == sent.issued_s]
+    first = round(sent.issued_s / period) + 1
+    for k in range(first, int(t[-1] / period + 1e-6) + 1):
+        now = k * period
+        row = min(int(np.searchsorted(t, now - TIME_TOLERANCE_S)), len(t) - 1)
+        before = [yes for when, yes in refused if when < now - TIME_TOLERANCE_S]
+        # whether a motion that ends at this very instant has run out is a matter of the clock's own rounding
+        out = mode[row] != 1.0 or t[row] >= sent.times_s[-1] or (before and not before[-1])
+        if out or (later and later[0] <= now + TIME_TOLERANCE_S):
+            return now
+    return np.inf

@@ -1,0 +1,96 @@
+"""The closest velocity under inequalities: against its optimality conditions and against the running kernel."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from airground_drake.arrays import Array
+from airground_drake.check import law as checker
+from airground_drake.nsbc import kernels
+from airground_drake.verify.runs.control_law import Inequalities, avoiding
+from airground_drake.verify.runs.projection import closest, least_violation
+
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def drawn(seed: int, planar: bool, *, demanding: bool = False) -> tuple[Array, Array, Array]:
+    """Wanted velocities (B, 3) and inequalities of 0 to 7 points; `demanding`: some may contradict each other."""
+    rng = np.random.default_rng(seed)
+    count = int(rng.integers(0, 8))
+    normal = rng.normal(size=(20, count, 3))
+    normal /= np.linalg.norm(normal, axis=2, keepdims=True)
+    wanted = 3.0 * rng.normal(size=(20, 3))
+    if planar:
+        normal[..., 2] = wanted[:, 2] = 0.0
+    bound = rng.normal(size=(20, count)) if demanding else -np.abs(rng.normal(size=(20, count)))
+    bound[rng.random(bound.shape) < 0.2] = -np.inf
+    return wanted, normal, np.where(rng.random(bound.shape) < 0.1, 0.0, bound)
+
+
+@given(SEEDS, st.booleans())
+def test_the_answer_is_feasible_and_no_feasible_direction_leads_closer(seed: int, planar: bool) -> None:
+    wanted, normal, bound = drawn(seed, planar)
+    axes = 2 if planar else 3
+    found, met = closest(wanted[:, :axes], normal[:, :, :axes], bound)
+    assert met.all()
+    found = np.pad(found, ((0, 0), (0, 3 - axes)))
+    spare = np.einsum("bkd,bd->bk", normal, found) - bound
+    assert (spare >= -1e-9).all()
+    # v is the closest point of a convex set iff (v - wanted).(w - v) >= 0 for all its points w; 0 and many others are
+    rng = np.random.default_rng(seed)
+    others, _ = closest(3.0 * rng.normal(size=(20, axes)), normal[:, :, :axes], bound)
+    for w in (np.zeros((20, 3)), np.pad(others, ((0, 0), (0, 3 - axes)))):
+        assert (((found - wanted) * (w - found)).sum(axis=1) >= -1e-7).all()
+
+
+@given(SEEDS, st.booleans(), st.booleans())
+def test_three_algorithms_agree(seed: int, planar: bool, demanding: bool) -> None:
+    wanted, normal, bound = drawn(seed, planar, demanding=demanding)
+    ours = avoiding(wanted, Inequalities(normal, bound), "augmented", planar=planar)
+    again = checker.avoiding(wanted, checker.Inequalities(normal, bound), "augmented")
+    running = kernels.team_avoid(wanted, normal, bound, kernels.AUGMENTED)
+    for k in range(len(wanted)):
+        flat = _flattest(normal[k])  # a corner of nearly parallel inequalities enlarges rounding by this
+        if flat > 1e6:
+            continue
+        assert ours[k] == pytest.approx(running[k], abs=1e-8 * flat)
+        assert again[k] == pytest.approx(running[k], abs=1e-8 * flat)
+
+
+def _flattest(normal: Array) -> float:
+    """1 / the least sine between two normals, or volume of three, squared."""
+    least = 1.0
+    for i in range(len(normal)):
+        for j in range(i):
+            across = np.cross(normal[i], normal[j])
+            least = min(least, float(np.linalg.norm(across)))
+            least = min([least, *(v for k in range(j) if (v := abs(float(across @ normal[k]))) > 0.0)])
+    return 1.0 / max(least, 1e-6) ** 2
+
+
+@pytest.mark.parametrize("composition", ["recursion_nearest", "recursion_listed"])
+@given(SEEDS)
+def test_recursion_as_printed_agrees(composition: str, seed: int) -> None:
+    wanted, normal, bound = drawn(seed, planar=True)
+    code = {"recursion_nearest": kernels.RECURSION_NEAREST, "recursion_listed": kernels.RECURSION_LISTED}[composition]
+    running = kernels.team_avoid(wanted, normal, bound, code)
+    ours = avoiding(wanted, Inequalities(normal, bound), composition, planar=True)
+    assert ours == pytest.approx(running, abs=1e-12)
+    again = checker.avoiding(wanted, checker.Inequalities(normal, bound), composition)
+    assert again == pytest.approx(running, abs=1e-12)
+
+
+def test_parallel_walls_leave_the_way_between_them() -> None:
+    normal = np.array([[[1.0, 0.0], [-1.0, 0.0], [1.0, 0.0]]])
+    found, met = closest(np.array([[3.0, 4.0]]), normal, np.array([[0.0, 0.0, -1.0]]))
+    assert met.all()
+    assert found == pytest.approx(np.array([[0.0, 4.0]]))
+
+
+def test_walls_that_close_in_are_missed_evenly_and_slowly() -> None:
+    normal, bound = np.array([[[1.0, 0.0], [-1.0, 0.0]]]), np.array([[1.0, 0.5]])
+    assert not closest(np.array([[9.0, 9.0]]), normal, bound)[1].any()
+    assert least_violation(normal, bound) == pytest.approx(np.array([[0.25, 0.0]]), abs=1e-8)
