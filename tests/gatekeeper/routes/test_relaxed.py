@@ -36,7 +36,7 @@ def test_relaxation_agrees_with_an_independent_model(seed: int) -> None:
     best = cvxpy.Problem(cvxpy.Minimize(cost), constraints).solve(solver="CLARABEL")
     solution = RelaxedRoute().solve(problem)
     assert solution.status == "optimal"
-    assert solution.lower_bound == pytest.approx(best, rel=1e-5, abs=1e-6)
+    assert solution.route_bound == pytest.approx(best, rel=1e-5, abs=1e-6)
 
 
 @examples(50)
@@ -58,7 +58,7 @@ def test_pruned_rows_do_not_change_the_optimum() -> None:
     far = np.concatenate([problem.centres, np.full((20, 1, 3), [50.0, 0.0, 0.0])], axis=1)
     larger = replace(problem, centres=far, distances=np.append(problem.distances, 1.0))
     solution, more = (RelaxedRoute().solve(p) for p in (problem, larger))
-    assert more.lower_bound == pytest.approx(solution.lower_bound, rel=1e-6)
+    assert more.route_bound == pytest.approx(solution.route_bound, rel=1e-6)
     assert more.accept_first == solution.accept_first
 
 
