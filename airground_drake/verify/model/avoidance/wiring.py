@@ -92,6 +92,11 @@ def compare(inputs: Inputs, composition: Composition = "augmented") -> Inputs:
     rng = np.random.default_rng(SEED)
     probe = _Probe(inputs, views, composition)
     tally = _Tally(views)
+    for name, sampled in probe.sampling().items():
+        if sampled != (inputs["period_s"], 0.0):
+            tally.differ(0.6, f"{name} is sampled otherwise than the scenario says", {
+                "period_s": sampled[0], "offset_s": sampled[1], "wanted_period_s": inputs["period_s"],
+            })  # fmt: skip
     for state in states(inputs, views, rng):
         asked = hostile(inputs, views, state, rng)
         commands, executed, driven = probe.commands(state.positions, asked)
@@ -99,13 +104,13 @@ def compare(inputs: Inputs, composition: Composition = "augmented") -> Inputs:
         tally.executed += int(asked.executed.sum())
         tally.answers.update(asked.how)
         for i in np.flatnonzero(executed != asked.executed).tolist():
-            tally.differ(0.5, "a proposal is executed without leave, or not with it", i, state, {
+            tally.differ(0.5, "a proposal is executed without leave, or not with it", {
                 "proposal": asked.how[i], "recorded_as_accepted": bool(executed[i]),
-            })  # fmt: skip
+            }, i, state)  # fmt: skip
         for i in np.flatnonzero((driven != commands).any(axis=1)).tolist():
-            tally.differ(0.5, "a plant is not driven by its robot's command", i, state, {
+            tally.differ(0.5, "a plant does not move as its robot is commanded", {
                 "command_m_s": commands[i].tolist(), "plant_m_s": driven[i].tolist(),
-            })  # fmt: skip
+            }, i, state)  # fmt: skip
         _judge(inputs, views, state, asked, commands, composition == "augmented", tally)
     return tally.to_json(composition)
 
@@ -161,24 +166,24 @@ def _judge(
         tally.slack = min(tally.slack, float((rate - bound)[seen & safe].min()))
     for i, k in np.argwhere(missed).tolist():
         short = float(bound[i, k] - rate[i, k])
-        tally.differ(1.0 + short, "an inequality of the scenario is missed", i, state, {
+        tally.differ(1.0 + short, "an inequality of the scenario is missed", {
             "avoided": views.name_of(i, k), "avoided_m": views.centres(state.positions)[i, k].tolist(),
             "distance_m": float(distance[i, k]), "safe_distance_m": float(views.safe[i, k]),
             "share": float(views.share[i, k]), "bound_m_s": float(bound[i, k]), "rate_m_s": float(rate[i, k]),
             "missed_by_m_s": short, "missed_by_m": short * h, "command_m_s": commands[i].tolist(),
-        })  # fmt: skip
+        }, i, state)  # fmt: skip
     for i in np.flatnonzero(off_plane).tolist():
-        tally.differ(0.9, "a UGV leaves its plane", i, state, {"command_m_s": commands[i].tolist()})
+        tally.differ(0.9, "a UGV leaves its plane", {"command_m_s": commands[i].tolist()}, i, state)
     for i in np.flatnonzero(other & ~missed.any(axis=1)).tolist():
         held = [int(k) for k in np.flatnonzero(binding[i])]
-        tally.differ(0.0, "a command is not the closest velocity that the scenario allows", i, state, {
+        tally.differ(0.0, "a command is not the closest velocity that the scenario allows", {
             "command_m_s": commands[i].tolist(), "expected_m_s": expected[i].tolist(),
             "wanted_m_s": asked.wanted[i].tolist(), "proposal": [*asked.how, "none"][i],
             "binding": [
                 {"avoided": views.name_of(i, k), "distance_m": float(distance[i, k]),
                  "safe_distance_m": float(views.safe[i, k]), "share": float(views.share[i, k])} for k in held
             ],
-        })  # fmt: skip
+        }, i, state)  # fmt: skip
 
 
 def closest_velocity(
@@ -379,11 +384,19 @@ class _Probe:
         self._plants = [diagram.GetSubsystemByName(f"{robot}_plant") for robot in views.robots]
         self._ugvs, self._uav = (diagram.GetSubsystemByName(f"{each}_controller") for each in ("ugv", "uav"))
 
+    def sampling(self) -> dict[str, tuple[float, float]]:
+        """Period and offset of each controller's updates, s."""
+        found = {}
+        for system in (self._ugvs, self._uav):
+            timing = system.GetUniquePeriodicDiscreteUpdateAttribute()
+            found[system.get_name()] = (timing.period_sec(), timing.offset_sec())
+        return found
+
     def commands(self, positions: Array, asked: Asked) -> tuple[Array, npt.NDArray[np.bool_], Array]:
         """What the team is commanded at positions (n + 1, 3), m.
 
         Returns:
-            Commands, (n + 1, 3), m/s; whether each UGV executes a proposal, (n,); what the plants get, (n + 1, 3), m/s.
+            Commands, (n + 1, 3), m/s; whether each UGV executes a proposal, (n,); how the plants move, (n + 1, 3), m/s.
         """
         for plant, position in zip(self._plants, positions, strict=True):
             context = plant.GetMyMutableContextFromRoot(self._root)
@@ -400,7 +413,7 @@ class _Probe:
             if system is self._ugvs:
                 executed = np.asarray(updated.value(1)) > 0.5
             context.get_mutable_discrete_state().SetFrom(updated)
-        driven = [p.get_input_port(0).Eval(p.GetMyContextFromRoot(self._root)) for p in self._plants]
+        driven = [p.EvalTimeDerivatives(p.GetMyContextFromRoot(self._root)).CopyToVector() for p in self._plants]
         return np.vstack(found), executed, np.array(driven)
 
 
@@ -423,13 +436,16 @@ class _Tally:
         """Count from 0."""
         self.bound_of: npt.NDArray[np.intp] = np.zeros(self.views.safe.shape, dtype=np.intp)
 
-    def differ(self, size: float, what: str, robot: int, state: State, more: Inputs) -> None:
+    def differ(
+        self, size: float, what: str, more: Inputs, robot: int | None = None, state: State | None = None
+    ) -> None:
         """A difference; the largest `size` is kept."""
         self.differences += 1
         if size > self.worst:
             self.worst = size
-            named = {"what": what, "robot": self.views.robots[robot], **more}
-            self.first = {**named, "positions_m": state.positions.tolist()}
+            named = {} if robot is None else {"robot": self.views.robots[robot]}
+            where = {} if state is None else {"positions_m": state.positions.tolist()}
+            self.first = {"what": what, **named, **more, **where}
 
     def to_json(self, composition: str) -> Inputs:
         """As `compare` returns it."""

@@ -7,8 +7,9 @@ import re
 
 import pytest
 
+from airground_drake.check.scenario import kinds_of, rounding_m
 from airground_drake.errors import ScenarioError
-from airground_drake.scenarios.load import load, validated
+from airground_drake.scenarios.load import load, resolved, shipped, validated
 from airground_drake.scenarios.rounding import TOLERANCE_M
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.model.avoidance.conformance import rounding_leaves, rounding_margins
@@ -22,13 +23,21 @@ def test_one_tolerance() -> None:
     assert TOLERANCE_M == DISTANCE_TOLERANCE_M
 
 
+@pytest.mark.parametrize("name", shipped())
+def test_the_independent_checker_has_the_same_bound(name: str) -> None:
+    scenario = load(name)[0]
+    ours = rounding_margins(constants(scenario))
+    data = resolved(scenario)
+    theirs = {kind.name: rounding_m(data, kind) for kind in kinds_of(data)}
+    assert theirs == pytest.approx({key: each["margin_with_restoring_m"] for key, each in ours.items()}, rel=1e-12)
+
+
 def moved(scenario: Scenario, by: float) -> Scenario:
     for ugv in scenario.ugvs.values():
         for point in (ugv.start_m, ugv.target_m, *ugv.preset.waypoints_m):
             point[0] += by
     for place in (scenario.uav.start_m, scenario.uav.target_m, *(o.position_m for o in scenario.obstacles.values())):
         place[0] += by
-    scenario.runs["d"].stalls_m = {}
     for run in scenario.runs.values():
         for stall in run.stalls_m.values():
             stall[0] += by

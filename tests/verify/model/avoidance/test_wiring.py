@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pydrake.systems.primitives import LinearSystem
 from verify.test_layers import imported, within
 
-from airground_drake import components
+from airground_drake import components, diagram
 from airground_drake.arrays import Array
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc import team as team_module
@@ -141,6 +142,31 @@ def swapped(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(UgvLaw, "velocity", wrong)
 
 
+def half_rate(patch: pytest.MonkeyPatch) -> None:
+    """The UGVs sampled at half the rate."""
+
+    class Slow(controllers.UgvController):
+        def __init__(self, team: Team, law: UgvLaw) -> None:
+            period = law.avoidance.period
+            super().__init__(team, replace(law, avoidance=replace(law.avoidance, period=2.0 * period)))
+            self.avoidance = law.avoidance
+            self.law = law
+
+    patch.setattr("airground_drake.diagram.UgvController", Slow)
+
+
+def fast_plants(patch: pytest.MonkeyPatch) -> None:
+    eye, zero = np.eye(3), np.zeros((3, 3))
+
+    def plant(robot: str, start: Array) -> LinearSystem:
+        found = LinearSystem(A=zero, B=1.1 * eye, C=eye, D=zero)
+        found.configure_default_state(start)
+        return found
+
+    right = diagram.build_model
+    patch.setattr(wiring, "build_model", lambda *args: right(*args, plants=plant))
+
+
 def first_half_space_dropped(patch: pytest.MonkeyPatch) -> None:
     right = Avoidance.half_spaces
 
@@ -176,6 +202,8 @@ MUTANTS: dict[str, Patch] = {
     "UAV without its layer": unlayered,
     "speed limits times 1.5": speeding,
     "commands swapped": swapped,
+    "UGVs at half the rate": half_rate,
+    "plants faster than commanded": fast_plants,
     "one inequality dropped": first_half_space_dropped,
 }
 
