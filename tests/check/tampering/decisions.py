@@ -316,11 +316,6 @@ def decision_before_it_began(folder: Path) -> None:
         timings["decision_times_s"][0] = -1.0
 
 
-@ignored("the bend is taken as recorded: it follows from the avoidance layer on a predicted state that is not recorded")
-def bend_halved(folder: Path) -> None:
-    scale_decisions(folder, "bend", 0.999)
-
-
 @ignored("of the times of decisions only the quantiles enter a verdict; each is measured once")
 def a_middling_time_changed(folder: Path) -> None:
     with edited_timings(folder) as timings:
