@@ -25,6 +25,8 @@ from airground_drake.systems import (
     EventTrigger,
     Gatekeeper,
     InterventionPlanner,
+    Laws,
+    Monitor,
     UavController,
     UgvController,
     VelocityDisturbance,
@@ -68,6 +70,7 @@ def build_diagram(
     method: str | None = None,
     composition: Composition = "augmented",
     plants: PlantFactory = components.first_order_plant,
+    monitor: Monitor | None = None,
 ) -> Diagram:
     """The diagram of a scenario, for inspection, simulation or embedding.
 
@@ -76,17 +79,19 @@ def build_diagram(
         method: default: that of the scenario's last run.
         composition: of the UGVs' avoidance tasks.
         plants: makes the plant of each robot. The claims are about the default, `first_order_plant`.
+        monitor: watches the diagram while it runs; see `make_monitor`.
 
     Returns:
         A Diagram whose default context has every robot at its start. Outputs: RECORDED. Inputs:
-        `disturbance_<robot>` (3), m/s, added to the robot's velocity; 0 where not connected.
+        `disturbance_<robot>` (3), m/s, added to the robot's velocity; 0 where not connected. With a monitor, its
+        output `violation`, too.
 
     Raises:
         ScenarioError: if the scenario is not valid.
         UnknownNameError: if there is no such method or composition.
         PluginError: if it names a policy, route or task that cannot be made, or a plant has other ports.
     """
-    return build_model(scenario, method, composition, plants).diagram
+    return build_model(scenario, method, composition, plants, monitor).diagram
 
 
 def build_model(
@@ -94,6 +99,7 @@ def build_model(
     method: str | None = None,
     composition: Composition = "augmented",
     plants: PlantFactory = components.first_order_plant,
+    monitor: Monitor | None = None,
 ) -> Model:
     """Build and wire all components of one method; arguments and errors are those of `build_diagram`."""
     scenario = validated(scenario)
@@ -132,16 +138,7 @@ def build_model(
     trigger = add("event_trigger", EventTrigger(n, components.make_trigger(scenario, zeta), presets))
     planner = add("intervention_planner", InterventionPlanner(components.make_planner(scenario, chosen)))
     ugv_controller = add("ugv_controller", UgvController(team, law))
-    uav_controller = add(
-        "uav_controller",
-        UavController(
-            team,
-            components.make_avoidance(scenario),
-            task=UAV_TASKS.load(scenario.uav.task, of=Task),
-            gain=scenario.control.formation_gain_1_s,
-            altitude=scenario.uav.altitude_m,
-        ),
-    )
+    uav_controller = add("uav_controller", _uav_controller(scenario, team))
     gatekeeper = None
     if chosen.gated:
         gatekeeper = Gatekeeper(
@@ -193,6 +190,13 @@ def build_model(
         "status": trigger.GetOutputPort("status"),
         "accepted": ugv_controller.GetOutputPort("accepted"),
     }
+    if monitor is not None:
+        add("monitor", monitor)
+        for name in ("team_position", "team_command", "reference"):
+            builder.Connect(sources[name], monitor.GetInputPort(name))
+        connect(planner, "proposals", monitor, "proposals")
+        connect(gate, "answers", monitor, "answers")
+        builder.ExportOutput(monitor.GetOutputPort("violation"), "violation")
     for name in RECORDED:
         builder.ExportOutput(sources[name], name)
     for robot in team.robots:
@@ -200,6 +204,38 @@ def build_model(
     diagram = builder.Build()
     diagram.set_name(f"{scenario.name}_method_{chosen.id}")
     return Model(diagram, chosen, team, zeta, planner, gatekeeper)
+
+
+def make_monitor(
+    scenario: Scenario, method: str | None = None, composition: Composition = "augmented", *, terminate: bool = False
+) -> Monitor:
+    """A monitor of a diagram of the scenario, with laws of its own.
+
+    Args:
+        scenario: what is to hold, whatever the diagram was built from.
+        method: default: that of the scenario's last run.
+        composition: of the UGVs' avoidance tasks.
+        terminate: end the simulation at the first violation.
+
+    Raises:
+        ScenarioError, UnknownNameError, PluginError: as `build_diagram`.
+    """
+    scenario = validated(scenario)
+    chosen = method_of(next(reversed(scenario.runs.values())).method if method is None else method)
+    team = components.make_team(scenario)
+    ugvs = UgvController(team, components.make_law(scenario, chosen, composition))
+    laws = Laws(ugvs.velocity, _uav_controller(scenario, team).velocity)
+    return Monitor(team, components.make_avoidance(scenario), laws, terminate=terminate)
+
+
+def _uav_controller(scenario: Scenario, team: Team) -> UavController:
+    return UavController(
+        team,
+        components.make_avoidance(scenario),
+        task=UAV_TASKS.load(scenario.uav.task, of=Task),
+        gain=scenario.control.formation_gain_1_s,
+        altitude=scenario.uav.altitude_m,
+    )
 
 
 def _checked(robot: str, plant: System) -> System:

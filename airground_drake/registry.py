@@ -196,6 +196,7 @@ RUN_CLAIMS = Registry(
         "GATE-OPT": "airground_drake.verify.runs.gate_opt:GateOpt",
         "GATE-SUR": "airground_drake.verify.runs.gate_sur:GateSur",
         "GATE-FEAS": "airground_drake.verify.runs.gate_feas:GateFeas",
+        "GATE-MODEL": "airground_drake.verify.runs.gate_model:GateModel",
         "GATE-TIME": "airground_drake.verify.runs.gate_time:GateTime",
         "LIVE-GOAL": "airground_drake.verify.runs.live_goal:LiveGoal",
         "COMM": "airground_drake.verify.runs.comm:Comm",

@@ -136,7 +136,7 @@ class Recorder:
                     "first_stage": "accept" if r.solution.accept_first else "refuse",
                     "relaxed_first_stage": r.solution.relaxed_first_stage,
                     "objective": r.solution.objective,
-                    "lower_bound": r.solution.lower_bound,
+                    "route_bound": r.solution.route_bound,
                     "gap": r.solution.gap,
                     "objective_accept": r.solution.objective_accept,
                     "objective_refuse": r.solution.objective_refuse,
@@ -177,7 +177,8 @@ def _proposals(sent: Sequence[tuple[str, Proposal]]) -> pd.DataFrame:
     rows = [
         (
             robot, proposal.policy, float(proposal.issued), proposal.motion.times.tolist(),
-            proposal.motion.positions.ravel().tolist(), np.asarray(proposal.selection, dtype=np.float64).ravel().tolist(),
+            proposal.motion.positions.ravel().tolist(),
+            np.asarray(proposal.selection, dtype=np.float64).ravel().tolist(),
         )
         for robot, proposal in sent
     ]  # fmt: skip

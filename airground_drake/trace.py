@@ -50,7 +50,7 @@ DECISION_COLUMNS = {
     "first_stage": "str",
     "relaxed_first_stage": "float64",
     "objective": "float64",
-    "lower_bound": "float64",
+    "route_bound": "float64",
     "gap": "float64",
     "objective_accept": "float64",
     "objective_refuse": "float64",
@@ -70,7 +70,7 @@ PROBLEM_ARRAYS = (
 """Columns of `Trace.problems`: the data of (26) as each decision saw it, and what the route found, row by row as in
 `decisions`. Arrays are flattened in C order: initial (3), accept, refuse and reference (N x 3), centres and normals
 (N x m x 3), distances (m), plan, relaxed and rounded omega (N), positions of the plan (N x 3); empty where the route
-has none. Normals are those of the half-planes that `lower_bound` is about."""
+has none. Normals are those of the half-planes that `route_bound` is about."""
 
 PROPOSAL_COLUMNS = ("robot", "policy", "issued_s", "times_s", "positions_m", "selection")
 """Columns of `Trace.proposals`, one row per proposal sent: for which UGV, by which policy, when; the vertices of the

@@ -12,6 +12,7 @@ and pandas are used: no Drake, no solver, nothing else of this package. docs/che
     outcome                    LIVE-GOAL, COMM, GATE-TIME
     decisions                  a recorded decision, its problem (26), predictions (23) and costs (25)
     feasibility                GATE-FEAS
+    prediction                 GATE-MODEL
     optimality                 GATE-SUR, GATE-OPT
     polynomials, certificates  SAFE-LEMMA, SAFE-INV, SAFE-GATE, SAFE-DIST, ZENO-PROOF, THR-ISO; obligations.json
     enclosures                 THR-ROOT, THR-OPT

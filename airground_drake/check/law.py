@@ -57,7 +57,7 @@ def limited(v_m_s: Array, limit_m_s: Array | float) -> Array:
 def avoiding(wanted_m_s: Array, given: Inequalities, composition: str) -> Array:
     """Velocities (B, 3) under the inequalities: closest to what is wanted, or (5) as printed."""
     found = wanted_m_s.copy()
-    missed = (_spare(wanted_m_s, given) < 0.0).any(axis=1)
+    missed: Flags = np.asarray((_spare(wanted_m_s, given) < 0.0).any(axis=1))
     if missed.any():
         change = _closest if composition == "augmented" else _recursion
         found[missed] = change(wanted_m_s[missed], given.rows(missed), composition)

@@ -127,7 +127,7 @@ def _no_dearer_than_constant_plans(decision: Decision) -> None:
 def _bound_and_gap_are_not_overstated(decision: Decision, found: Enclosure, normals: Array | None) -> None:
     """Normals are unit vectors; the recorded lower bound is one; the gap is between its cost and what is best known."""
     row, scale, at = decision.row, decision.scale, _at(decision)
-    bound, own = row["lower_bound"], float(decision.cost(decision.positions_m, normals))
+    bound, own = row["route_bound"], float(decision.cost(decision.positions_m, normals))
     if normals is not None:
         lengths = np.linalg.norm(normals, axis=2)
         close("normals are unit vectors", lengths, np.ones_like(lengths), within=SMALL, **at)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from .files import Json
 from .rules import SMALL, Array, holds
 from .run import INTERVENING, Run
 
@@ -67,7 +68,7 @@ def _proposal(run: Run, row: dict[Any, Any]) -> Proposal:
     times, places, jacobian = (
         np.asarray(row[name], dtype=np.float64).ravel() for name in ("times_s", "positions_m", "selection")
     )
-    at = {"about": f"proposal to {row['robot']}", "t_s": float(row["issued_s"])}
+    at: Json = {"about": f"proposal to {row['robot']}", "t_s": float(row["issued_s"])}
     numbers = np.concatenate([times, places, jacobian, [row["issued_s"]]])
     holds("numbers of a proposal are finite", np.isfinite(numbers), numbers, "a number", **at)
     holds("a proposal is to a UGV", row["robot"] in run.ugvs, row["robot"], "a UGV of the run", **at)
@@ -112,9 +113,11 @@ def _answers(run: Run, ugv: str) -> list[tuple[float, float, bool]]:
 def _taken_back_s(
     run: Run, proposal: Proposal, mine: list[Proposal], answers: list[tuple[float, float, bool]]
 ) -> float:
-    """First planning instant at which another is sent, the UGV is not intervened on, the motion is over, or the last
-    answer was a refusal; a little later than that, infinite if there is none.
-    """  # fmt: skip
+    """A little later than the planning instant at which a proposal is taken back, infinite if it never is.
+
+    That is the first at which another is sent, the UGV is not intervened on, the motion is over, or the last answer was
+    a refusal.
+    """
     plan_s, mode = run.scenario["intervention"]["period_s"], run.column(f"{proposal.ugv}.mode")
     k = round(proposal.issued_s / plan_s)
     while (k := k + 1) * plan_s <= run.t_s[-1] + SMALL:

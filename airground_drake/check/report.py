@@ -20,6 +20,7 @@ from .inputs import inputs_of
 from .metrics import check_metrics
 from .optimality import gate_opt, gate_sur
 from .outcome import comm, gate_time, live_goal
+from .prediction import gate_model
 from .rules import Disagreement, Found, NotEstablished, agrees, holds, same
 from .run import Run, read_run
 from .safety import safe_hyp, safe_trace
@@ -48,11 +49,12 @@ WITH_GATEKEEPER: Mapping[str, OfRun] = {
     "GATE-OPT": gate_opt,
     "GATE-SUR": gate_sur,
     "GATE-FEAS": gate_feas,
+    "GATE-MODEL": gate_model,
     "GATE-TIME": gate_time,
 }
 ROUNDING_ROUTES = ("relaxed", "nonlinear")
 """Routes that GATE-SUR is about."""
-REFUTED_BY_RULES = ("THR-TRIG", "COMM", "GATE-OPT", "GATE-SUR", "GATE-FEAS")
+REFUTED_BY_RULES = ("THR-TRIG", "COMM", "GATE-OPT", "GATE-SUR", "GATE-FEAS", "GATE-MODEL")
 """Claims that any broken rule of theirs refutes; the others are refuted by their margin."""
 OF_MODEL: Mapping[str, OfModel] = {
     **dict.fromkeys(("SAFE-LEMMA", "SAFE-INV", "SAFE-GATE", "SAFE-DIST", "ZENO-PROOF", "THR-ISO"), prove),

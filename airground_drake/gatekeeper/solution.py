@@ -24,9 +24,10 @@ class Solution:
         status: 'optimal': the route did all that it does; 'budget_spent': the best plan known when the budget
             was spent, with its gap; else why there is none, so that the proposal is refused.
         objective: cost (25) of the plan returned.
-        lower_bound: of the problem that the route solves: relaxed or branched, for the same supporting
+        route_bound: lower bound of the problem that the route solves, which is not (26) with the exact distances of
+            (26d), whose optimum may be lower: relaxed or branched, for the same supporting
             half-planes; enumerated, for the same dwell. A local optimum has none.
-        gap: (objective - lower_bound) / objective, the objective being that of the same problem.
+        gap: (objective - route_bound) / objective, the objective being that of the same problem.
         objective_accept: lowest cost found of a plan that starts by accepting.
         objective_refuse: lowest cost found of a plan that starts by refusing.
         relaxed_first_stage: omega_0 of the relaxation.
@@ -36,13 +37,13 @@ class Solution:
         positions: where that leads, (N, 3), m.
         relaxed: omega of the relaxation, (N,), in [0, 1].
         rounded: `relaxed` after sum-up rounding, (N,), 0 or 1.
-        normals: of the half-planes that `lower_bound` and `gap` are about, (N, m, 3).
+        normals: of the half-planes that `route_bound` and `gap` are about, (N, m, 3).
     """
 
     accept_first: bool
     status: Status
     objective: float = -1.0
-    lower_bound: float = -1.0
+    route_bound: float = -1.0
     gap: float = -1.0
     objective_accept: float = -1.0
     objective_refuse: float = -1.0
@@ -105,7 +106,7 @@ def cheapest(
     plans: Sequence[Evaluation],
     *,
     status: Status = "optimal",
-    lower_bound: float = -1.0,
+    route_bound: float = -1.0,
     gap: float = -1.0,
     normals: Array | None = None,
     relaxed: Array | None = None,
@@ -117,7 +118,7 @@ def cheapest(
         problem: what they are plans of.
         plans: at least one that starts by accepting and one that starts by refusing.
         status: 'optimal' or 'budget_spent'.
-        lower_bound: of the cost (25), with distances measured along `normals` if there are any.
+        route_bound: of the cost (25), with distances measured along `normals` if there are any.
         gap: of the plans to that bound; with `normals` it is computed.
         normals: of half-planes, (N, m, 3).
         relaxed: omega of the relaxation, (N,), if it was solved.
@@ -126,12 +127,12 @@ def cheapest(
     best = min(plans, key=lambda plan: plan.objective)
     if normals is not None:
         convexified = min(problem.evaluate_half_planes(plan.positions, normals) for plan in plans)
-        gap = relative_gap(convexified, lower_bound)
+        gap = relative_gap(convexified, route_bound)
     return Solution(
         accept_first=bool(best.omega[0] == 1.0),
         status=status,
         objective=best.objective,
-        lower_bound=lower_bound,
+        route_bound=route_bound,
         gap=gap,
         relaxed_first_stage=-1.0 if relaxed is None else float(relaxed[0]),
         rounding_deviation=(
@@ -168,9 +169,9 @@ def cut_short(
     best = min(plan.objective for plan in plans)
     bound = min(bound, best)
     gap = relative_gap(best, bound)
-    return cheapest(problem, plans, status="budget_spent", lower_bound=bound, gap=gap, relaxed=relaxed, rounded=rounded)
+    return cheapest(problem, plans, status="budget_spent", route_bound=bound, gap=gap, relaxed=relaxed, rounded=rounded)
 
 
-def relative_gap(objective: float, lower_bound: float) -> float:
-    """(objective - lower_bound) / objective; 0 / 0 is 0."""
-    return (objective - lower_bound) / max(objective, 1e-12)
+def relative_gap(objective: float, route_bound: float) -> float:
+    """(objective - route_bound) / objective; 0 / 0 is 0."""
+    return (objective - route_bound) / max(objective, 1e-12)

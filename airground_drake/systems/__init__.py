@@ -4,6 +4,7 @@ from airground_drake.systems.controllers import UavController, UgvController
 from airground_drake.systems.decision import DecisionVariable, EventTrigger
 from airground_drake.systems.gatekeeper import DirectAcceptance, Gatekeeper
 from airground_drake.systems.intervention import InterventionPlanner
+from airground_drake.systems.monitor import Laws, Monitor, Rule, Violation
 from airground_drake.systems.plant import VelocityDisturbance
 
 __all__ = [
@@ -12,7 +13,11 @@ __all__ = [
     "EventTrigger",
     "Gatekeeper",
     "InterventionPlanner",
+    "Laws",
+    "Monitor",
+    "Rule",
     "UavController",
     "UgvController",
     "VelocityDisturbance",
+    "Violation",
 ]

@@ -130,7 +130,17 @@ class UavController(LeafSystem):
     def _update(self, context: Context, discrete: DiscreteValues) -> None:
         positions = self._position.Eval(context).reshape(-1, 3)
         commands = self._ugv_command.Eval(context).reshape(-1, 3)
-        task = self._task(positions[:-1], commands, self._altitude, self._gain)
+        discrete.set_value(0, self.velocity(positions, commands))
+
+    def velocity(self, positions: Array, ugv_commands: Array) -> Array:
+        """What the law commands, (3,), m/s.
+
+        Args:
+            positions: of all robots, (n + 1, 3), m.
+            ugv_commands: of the UGVs, at the sample before, (n, 3), m/s.
+        """
+        task = self._task(positions[:-1], ugv_commands, self._altitude, self._gain)
         lower = limit_speed(task.velocity(positions[-1:]), self._max_speed)
         spaces = self.avoidance.half_spaces(positions[-1:], self._mobility, self._neighbourhood.around(positions))
-        discrete.set_value(0, self.avoidance.apply(lower, spaces)[0])
+        velocity: Array = self.avoidance.apply(lower, spaces)[0]
+        return velocity

@@ -102,9 +102,9 @@ def check_arrays(solution: Solution, problem: Problem) -> None:
         witnesses += [solution.relaxed, solution.rounded] if solution.normals is not None else [solution.rounded]
     if solution.normals is None:
         # of the plans with a dwell, or of all plans: in both cases of the one returned
-        assert solution.lower_bound <= solution.objective * (1.0 + 1e-12)
+        assert solution.route_bound <= solution.objective * (1.0 + 1e-12)
         return
     assert solution.normals.shape == problem.centres.shape
     np.testing.assert_allclose(np.linalg.norm(solution.normals, axis=2), 1.0, atol=1e-12)
     for omega in witnesses:
-        assert solution.lower_bound <= half_plane_cost(problem, omega, solution.normals) * (1.0 + 1e-9) + 1e-12
+        assert solution.route_bound <= half_plane_cost(problem, omega, solution.normals) * (1.0 + 1e-9) + 1e-12

@@ -70,5 +70,5 @@ def test_the_bound_of_the_relaxation_is_tight() -> None:
         solution = used("relaxed").solve(problem)
         program = team_program([problem], [solution.normals], relaxed=True).program
         optimum = ClarabelSolver().Solve(program, None, options).get_optimal_cost()
-        assert solution.lower_bound == pytest.approx(optimum, rel=2e-5, abs=1e-8)
-        assert solution.lower_bound <= optimum * (1.0 + 1e-7) + 1e-9
+        assert solution.route_bound == pytest.approx(optimum, rel=2e-5, abs=1e-8)
+        assert solution.route_bound <= optimum * (1.0 + 1e-7) + 1e-9

@@ -52,8 +52,8 @@ def test_case_b_meets_its_targets_too(report: Report) -> None:
 
 
 def test_an_unexpected_verdict_is_exit_code_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    wrong = ["--set", "runs.a.expected={SAFE-TRACE: refuted}", "--format", "json"]
-    assert main(["case_a", "-o", str(tmp_path), *wrong]) == 1
+    one = ["--set", "runs={a: {method: a, expected: {SAFE-TRACE: refuted}}}", "--set", "reproduction=[]"]
+    assert main(["case_a", "-o", str(tmp_path), *one, "--format", "json"]) == 1
     assert "SAFE-TRACE" in capsys.readouterr().out
     assert not (tmp_path / "report.html").exists()
 
@@ -124,6 +124,6 @@ def test_what_cannot_be_judged_is_exit_code_2(
 
 
 def test_a_refuted_claim_that_is_not_expected_is_exit_code_1(tmp_path: Path) -> None:
-    changes = ["--set", "decision.trigger=bare", "--format", "json"]
-    assert main(["case_a", "-o", str(tmp_path), *changes]) == 1
-    assert judge.main([str(tmp_path / "trace" / "a"), "ZENO-PROOF"]) == 1
+    changes = ["--set", "decision.trigger=bare", "--set", "runs={b: {method: b}}", "--set", "reproduction=[]"]
+    assert main(["case_b", "-o", str(tmp_path), *changes, "--format", "json"]) == 1
+    assert judge.main([str(tmp_path / "trace" / "b"), "ZENO-PROOF"]) == 1

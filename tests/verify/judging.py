@@ -20,8 +20,11 @@ Judged = Callable[[ModelClaim | Mutant, dict[str, Any]], Finding]
 
 CLAIMS = {claim.id: claim for claim in TRACE_CLAIMS}
 
-GATE = {"GATE-OPT", "GATE-SUR", "GATE-FEAS"}
+GATE = {"GATE-OPT", "GATE-SUR", "GATE-FEAS", "GATE-MODEL"}
 """Claims about recorded problems, which the synthetic runs do not have: see runs/test_gate_claims.py."""
+
+LAW = {"EXEC"}
+"""Claims about the control law, which the synthetic runs do not follow to the letter: see runs/test_exec.py."""
 
 
 def judge(claim: str, trace: Trace) -> Finding:

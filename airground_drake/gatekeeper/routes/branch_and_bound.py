@@ -49,7 +49,7 @@ class BranchAndBoundRoute:
     With Gurobi or Mosek licensed for Drake, one binary per stage (their default gap 1e-4; not tested here,
     for want of a licence). Else `MixedIntegerBranchAndBound` with one binary per block of N / `blocks` stages
     and Clarabel for the relaxations. Drake's bound is not exposed in Python, but it stops within 1 % of the
-    optimum, or 0.1 % of the cheaper constant plan's cost: `lower_bound` is the optimum found less that, for
+    optimum, or 0.1 % of the cheaper constant plan's cost: `route_bound` is the optimum found less that, for
     the same half-planes and dwell. Its "binaries" are binary to a tolerance only, so that the plan is rounded
     and evaluated exactly, and the cheapest of it and the constant plans is returned.
 
@@ -91,7 +91,7 @@ class BranchAndBoundRoute:
         if not np.isfinite(found.binaries).all() or not np.isfinite(found.bound):
             return constants.failed()
         plan = problem.evaluate((team.ugvs[0].plan(found.binaries) > 0.5).astype(float))
-        return cheapest(problem, (plan, *constants.both), lower_bound=max(0.0, scale * found.bound), normals=normals)
+        return cheapest(problem, (plan, *constants.both), route_bound=max(0.0, scale * found.bound), normals=normals)
 
 
 def licensed_solver() -> Any:

@@ -32,7 +32,7 @@ class ClosedLoopEnumerationRoute:
     well, but that cuts one block in ten and takes as long.)
 
     Both halves of the tree (plans that start by accepting, by refusing) are searched separately, in turns, so that
-    both `objective_accept` and `objective_refuse` are exact. `lower_bound` equals `objective` and the gap is 0:
+    both `objective_accept` and `objective_refuse` are exact. `route_bound` equals `objective` and the gap is 0:
     among the plans with this dwell, not among all binary plans. Without any cut it rolls 2^(blocks + 1) - 2 blocks
     out. Each of them counts as a node of the budget. When that ends before, the best plans found so far decide
     (the constant ones are always among them), with the gap to the least bound of all branches left open; a
@@ -77,7 +77,7 @@ class ClosedLoopEnumerationRoute:
             problem,
             (accept, refuse),
             status="budget_spent" if any(half.open for half in halves) else "optimal",
-            lower_bound=bound,
+            route_bound=bound,
             gap=relative_gap(best, bound),
         )
 

@@ -25,7 +25,7 @@ class EnumerationRoute:
     from the box that any plan stays in (see `remaining_cost`). Distances are exact: no half-planes, no relaxation.
 
     Both halves of the tree (plans that start by accepting, by refusing) are searched separately, so that both
-    `objective_accept` and `objective_refuse` are exact. `lower_bound` equals `objective` and the gap is 0:
+    `objective_accept` and `objective_refuse` are exact. `route_bound` equals `objective` and the gap is 0:
     among the plans with this dwell, not among all binary plans.
 
     Budget: each half visits at most `nodes` blocks, of at most 2^blocks that there are, and the clock is asked
@@ -64,7 +64,7 @@ class EnumerationRoute:
             finished = finished and bound == np.inf
         if not finished:
             return cut_short(problem, plans[::-1], max(float(tail[0]), min(bounds)))
-        return cheapest(problem, plans[::-1], lower_bound=min(bounds), gap=0.0)
+        return cheapest(problem, plans[::-1], route_bound=min(bounds), gap=0.0)
 
 
 @njit(cache=True)

@@ -58,7 +58,7 @@ class NonlinearRoute:
     p = o. Only pairs that some plan can bring within d are in the program.
 
     The start is the cheaper constant plan. The plan returned is the cheapest, by the exact cost (25), of the
-    rounded one and the two constant ones. A local optimum bounds nothing: `lower_bound` and `gap` are -1.
+    rounded one and the two constant ones. A local optimum bounds nothing: `route_bound` and `gap` are -1.
 
     Budget: iterations (SNOPT: major ones) and the time left go to the solver. An iterate that it stops at is
     rounded like an optimum; the status is 'budget_spent' and the bound then that of `remaining_cost`.

@@ -60,7 +60,7 @@ class RelaxedRoute:
     relaxation guide: for the best plan that accepts first and for the best that refuses first. Wider searches
     follow where the gap is open or the two cost nearly the same. The cheaper plan is returned.
 
-    `lower_bound` is computed from the multipliers by weak duality (`dual_bound`), so that it is a bound whatever
+    `route_bound` is computed from the multipliers by weak duality (`dual_bound`), so that it is a bound whatever
     the solver's tolerances, and also when its iterations ran out.
 
     Budget: iterations and the time left go to the solver, nodes to each search; the clock is asked in between, so
@@ -93,7 +93,7 @@ class RelaxedRoute:
             problem,
             (accept, refuse),
             status="optimal" if finished else "budget_spent",
-            lower_bound=max(ahead.bound, float(tail[0])),
+            route_bound=max(ahead.bound, float(tail[0])),
             normals=normals,
             relaxed=relaxed,
             rounded=rounded,

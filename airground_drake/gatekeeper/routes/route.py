@@ -26,7 +26,7 @@ class Route(Protocol):
       by `Problem.evaluate_closed_loop`; no constant plan is cheaper.
     - `objective_accept` and `objective_refuse` are costs of plans as well; `objective` is the lower of the two, and
       `accept_first` says whose.
-    - `lower_bound`, `gap`: a valid bound of what `Solution` says that it bounds, or -1. Never a guess: the
+    - `route_bound`, `gap`: a valid bound of what `Solution` says that it bounds, or -1. Never a guess: the
       verifier computes it again.
     - `relaxed`, `rounded`: both or none, `rounded` by `rounding.sum_up_rounding`.
     """

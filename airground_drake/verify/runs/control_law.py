@@ -97,12 +97,12 @@ def _recursion(below: Array, normal: Array, bound: Array, *, nearest_first: bool
     return velocity
 
 
-def tracking(position: Array, preset: Array, rate: Array, gain: float, limit: float) -> Array:
+def tracking(position: Array, preset: Array, rate: Array, gain: float, limit: Array | float) -> Array:
     """A UGV's own task (6), within its speed limit."""
     return limited(PLANE * (rate + gain * (preset - position)), limit)
 
 
-def intervened(position: Array, below: Array, asked: Asked, gain: float, limit: float) -> Array:
+def intervened(position: Array, below: Array, asked: Asked, gain: float, limit: Array | float) -> Array:
     """(14) above what is below it, (20): v_int + (I - J^+ J) v, within the speed limit."""
     wish = PLANE * (asked.rate + gain * (asked.wanted - position))
     return limited(PLANE * (below + np.einsum("bij,bj->bi", asked.chosen, wish - below)), limit)

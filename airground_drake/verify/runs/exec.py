@@ -72,10 +72,10 @@ class Exec(TraceClaim):
         "inequalities as the run's method has it; the UAV its formation task (9)-(10) below avoidance (11)."
     )
     formula = (
-        "own = lim(rho_rd' + B (rho_rd - rho)); int(v) = lim(v + J^+ J (rho_int' + Lambda (rho_int - rho) - v)); nothing "
-        "accepted: v = avoid(own); accepted: v = int(avoid(own)) under (b), (c), v = avoid(int(own)) under (d); UAV: v = "
-        "avoid(lim(mean v_j + C (mean rho_j + altitude - rho))); avoid(u) = argmin ||v - u||^2 s.t. n_k.v >= b_k "
-        "(recursion_*: (5) as printed); |recorded - v| <= 1e-6 m/s; accepted = what the messages say"
+        "own = lim(rho_rd' + B (rho_rd - rho)); int(v) = lim(v + J^+ J (rho_int' + Lambda (rho_int - rho) - v)); "
+        "nothing accepted: v = avoid(own); accepted: v = int(avoid(own)) under (b), (c), v = avoid(int(own)) under "
+        "(d); UAV: v = avoid(lim(mean v_j + C (mean rho_j + altitude - rho))); avoid(u) = argmin ||v - u||^2 s.t. "
+        "n_k.v >= b_k (recursion_*: (5) as printed); |recorded - v| <= 1e-6 m/s; accepted = what the messages say"
     )
     method = (
         "Evaluated again in plain numpy at each multiple of the control period, at the recorded positions, from "
@@ -95,9 +95,9 @@ class Exec(TraceClaim):
         "last commands.",
     )
     does_not_establish = (
-        "That what was accepted was useful or safe, or that it was right to accept it (GATE-FEAS, SAFE-TRACE). Commands "
-        "that are wrong by less than 1e-6 m/s. Under a disturbance of the motion it is about the commands, not about "
-        "where they led. A UAV with another task than 'formation' is not judged; the evidence says so."
+        "That what was accepted was useful or safe, or that it was right to accept it (GATE-FEAS, SAFE-TRACE). "
+        "Commands that are wrong by less than 1e-6 m/s. Under a disturbance of the motion it is about the commands, "
+        "not about where they led. A UAV with another task than 'formation' is not judged; the evidence says so."
     )
 
     def check(self, trace: Trace) -> Finding:

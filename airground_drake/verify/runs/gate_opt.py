@@ -53,7 +53,7 @@ class GateOpt(GateClaim):
         "better than it is."
     )
     formula = (
-        "L <= min J_n <= U, U - L <= 1e-5 C; lower_bound <= U + 1e-5 C; lower_bound >= L - 1e-3 C (relaxed); "
+        "L <= min J_n <= U, U - L <= 1e-5 C; route_bound <= U + 1e-5 C; route_bound >= L - 1e-3 C (relaxed); "
         "(J(plan) - L) / C <= 0.05; J(plan) <= J(0), J(1); C = min(J(0), J(1)); J is (25), J_n >= J with distances "
         "along unit normals n"
     )
@@ -71,7 +71,10 @@ class GateOpt(GateClaim):
         "Route 'enumeration' and 'branch_and_bound' choose one mode for each of 10 blocks of stages.",
     )
     does_not_establish = (
-        "Optimality for the exact distances of (26d) (half-planes are conservative: another choice of normals may "
+        "It is about the route's own problem, of which mode velocities and half-planes are data: no plan of that "
+        "problem is much cheaper; it does not mean that none is on the closed loop, or with the exact distances of "
+        "(26d), whose optimum may be below the bound (GATE-MODEL says what the data are worth). Not established: "
+        "optimality for the exact distances of (26d) (half-planes are conservative: another choice of normals may "
         "allow a cheaper plan), for another dwell, or for the nonlinear closed loop; nor that the first stage is the "
         "optimal one, unless counted as certified. Where the plan is the better by exact distances, it may cost less "
         "than the bound, and the gap is negative. Refusals for want of a plan are only listed."
@@ -183,7 +186,7 @@ def compare_with_constant_plans(row: Row) -> Iterator[Off]:
 def compare_bounds(row: Row, found: Enclosure, normals: Array | None) -> Iterator[Off]:
     """The recorded normals, lower bound and gap."""
     given = row.given
-    lower = float(row.given["lower_bound"])
+    lower = float(row.given["route_bound"])
     scale = row.scale
     own = float(row.cost(row["positions_m"], normals))
     known = [*row.constant, *([row.positions(row["rounded"])] if row.data["rounded"] is not None else [])]
@@ -192,7 +195,7 @@ def compare_bounds(row: Row, found: Enclosure, normals: Array | None) -> Iterato
     best = min(own, loser, *(float(row.cost(positions, normals)) for positions in known))
     if normals is not None:
         yield Off(row, "length of a normal, minus 1", np.linalg.norm(normals, axis=2) - 1.0, POSITION_TOLERANCE_M)
-    more = {"lower_bound": lower, "optimum_at_least": found.lower, "optimum_at_most": found.upper}
+    more = {"route_bound": lower, "optimum_at_least": found.lower, "optimum_at_most": found.upper}
     yield Off(row, "lower bound above the plan's cost", max(0.0, lower - own) / scale, OVERSTATED, cost=own)
     yield Off(row, "lower bound overstated", max(0.0, lower - found.upper) / scale, OVERSTATED, **more)
     if given["status"] == "optimal" and given["route"] != "branch_and_bound":

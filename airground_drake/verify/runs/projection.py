@@ -83,7 +83,7 @@ def _in_interval(wanted: Array, sign: Array, level: Array) -> tuple[Array, Flags
 
 
 def shortened(velocity: Array, normal: Array, bound: Array) -> Array:
-    """Velocities (B, d) times the largest factor up to 1 with which those inequalities hold that standing still meets."""
+    """Velocities (B, d), shortened until those inequalities hold that standing still meets."""
     rate = np.einsum("bkd,bd->bk", normal, velocity)
     broken = (rate < bound) & (bound <= 0.0)
     factor = np.where(broken, bound / np.where(broken, rate, 1.0), 1.0).min(axis=1, initial=1.0)

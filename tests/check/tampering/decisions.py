@@ -152,15 +152,15 @@ def cost_of_accepting_throughout_raised(folder: Path) -> None:
 @refused_by("GATE-OPT", "lower bound against the optimum")
 def lower_bound_raised(folder: Path) -> None:
     with edited_table(folder, "decisions") as frame:
-        frame["lower_bound"] = frame["objective"]
+        frame["route_bound"] = frame["objective"]
 
 
 @refused_by("GATE-OPT", "optimum against the lower bound")
 def lower_bound_lowered_with_its_gap(folder: Path) -> None:
     """A bound that is far from the best one, with the gap that follows from it."""
     with edited_table(folder, "decisions") as frame:
-        frame["lower_bound"] *= 0.98
-        frame["gap"] = 1.0 - frame["lower_bound"] / frame["objective"]
+        frame["route_bound"] *= 0.98
+        frame["gap"] = 1.0 - frame["route_bound"] / frame["objective"]
 
 
 @refused_by("GATE-OPT", "recorded gap")
@@ -314,11 +314,6 @@ def decision_time_removed(folder: Path) -> None:
 def decision_before_it_began(folder: Path) -> None:
     with edited_timings(folder) as timings:
         timings["decision_times_s"][0] = -1.0
-
-
-@ignored("the bend is taken as recorded: it follows from the avoidance layer on a predicted state that is not recorded")
-def bend_halved(folder: Path) -> None:
-    scale_decisions(folder, "bend", 0.999)
 
 
 @ignored("of the times of decisions only the quantiles enter a verdict; each is measured once")

@@ -23,7 +23,7 @@ def test_branch_and_bound_bounds_the_convexified_problem() -> None:
         normals = normals_along(problem, ConstantPlans.of(problem).better.positions)
         best = min(problem.evaluate_half_planes(problem.positions(w), normals) for w in blocked(24, 8))
         solution = BranchAndBoundRoute(8).solve(problem)
-        assert 0.975 * best <= solution.lower_bound <= best * (1.0 + 1e-6)
+        assert 0.975 * best <= solution.route_bound <= best * (1.0 + 1e-6)
         assert solution.gap <= 0.0105
 
 

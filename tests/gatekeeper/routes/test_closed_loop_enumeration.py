@@ -78,7 +78,7 @@ def test_every_decision_carries_its_evidence(seed: int, on_top: bool, stages: in
     assert solution.positions is not None
     assert solution.accept_first == (solution.plan[0] == 1.0)
     assert solution.objective == min(solution.objective_accept, solution.objective_refuse)
-    assert solution.lower_bound == pytest.approx(solution.objective, rel=1e-12)
+    assert solution.route_bound == pytest.approx(solution.objective, rel=1e-12)
     assert solution.gap == pytest.approx(0.0, abs=1e-12)
     again = problem.evaluate_closed_loop(solution.plan)
     np.testing.assert_array_equal(solution.positions, again.positions)
@@ -149,10 +149,10 @@ def test_a_spent_budget_leaves_valid_bounds(seed: int, nodes: int) -> None:
     problem = Instance(seed).problem(24)
     best, solution = BY_BLOCKS[6].solve(problem, UNLIMITED), BY_BLOCKS[6].solve(problem, Budget(nodes=nodes))
     assert solution.has_plan
-    assert solution.lower_bound <= best.objective * (1.0 + 1e-12)
+    assert solution.route_bound <= best.objective * (1.0 + 1e-12)
     assert solution.objective >= best.objective
     assert 0.0 <= solution.gap <= 1.0
-    assert solution.lower_bound == pytest.approx(solution.objective * (1.0 - solution.gap), rel=1e-9, abs=1e-9)
+    assert solution.route_bound == pytest.approx(solution.objective * (1.0 - solution.gap), rel=1e-9, abs=1e-9)
     for half, mode in (("objective_accept", 1.0), ("objective_refuse", 0.0)):
         constant = problem.evaluate_closed_loop(np.full(24, mode)).objective
         assert getattr(best, half) <= getattr(solution, half) <= constant

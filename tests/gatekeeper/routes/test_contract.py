@@ -81,11 +81,11 @@ def test_a_deadline_leaves_the_best_plan_so_far(name: str, instance: str) -> Non
         elif ticks == 1:
             assert solution.status == "budget_spent"
             assert solution.objective == ConstantPlans.of(problem).better.objective
-            assert solution.lower_bound == min(remaining_cost(problem)[0], solution.objective)
+            assert solution.route_bound == min(remaining_cost(problem)[0], solution.objective)
         elif ticks == 1000:
             assert solution.status == "optimal"
         if solution.status == "budget_spent":
-            assert solution.lower_bound >= 0.0
+            assert solution.route_bound >= 0.0
             assert solution.gap <= 1.0
 
 
@@ -115,7 +115,7 @@ class ChoosesWithoutSlack:
         solution = EnumerationRoute(8).solve(wrong)
         plan = next(plan.omega for plan in wrong.plans if plan.objective == solution.objective)
         true = problem.evaluate(plan).objective
-        return replace(solution, objective=true, lower_bound=true)
+        return replace(solution, objective=true, route_bound=true)
 
 
 def test_the_contract_and_the_oracle_refute_mutants() -> None:

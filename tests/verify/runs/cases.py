@@ -103,12 +103,12 @@ def understate_rounding(row: dict[str, Any], problem: dict[str, Any]) -> None:
 
 
 def overstate_bound(row: dict[str, Any], problem: dict[str, Any]) -> None:
-    row["lower_bound"] *= 1.001
+    row["route_bound"] *= 1.001
     row["gap"] = 1.0 - (1.0 - row["gap"]) * 1.001
 
 
 def understate_bound(row: dict[str, Any], problem: dict[str, Any]) -> None:
-    row["lower_bound"] *= 0.99
+    row["route_bound"] *= 0.99
     row["gap"] = 1.0 - (1.0 - row["gap"]) * 0.99
 
 

@@ -49,8 +49,9 @@ def test_the_enclosure_contains_the_relaxed_optimum_and_is_below_every_binary_pl
         assert found.lower <= costs.min() + 1e-12
         assert found.other_first <= costs[ALL_PLANS[:, 0] == 1.0].min() + 1e-12
         assert 0.0 <= found.upper - found.lower + 1e-12 <= 1e-6 * row.scale
-        assert found.lower <= data.relaxed()[1] + 1e-12  # any feasible plan's cost is above
-        assert found.upper <= data.relaxed()[1] + 1e-6 * row.scale
+        optimum = data.relaxed()[1]
+        assert found.lower <= optimum + 1e-12  # any feasible plan's cost is above
+        assert found.upper <= optimum + 1e-6 * row.scale
 
 
 @examples(25, fuzz=2000)

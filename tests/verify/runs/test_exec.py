@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builders import moved, run_of, with_signals
+from builders.edits import moved, with_signals
+from builders.runs import run_of
 from verify.judging import judge
 
 from airground_drake import components, diagram
@@ -22,9 +23,8 @@ from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Obstacle, Policy, Scenario
 from airground_drake.simulation import simulate
 from airground_drake.systems import controllers
-from airground_drake.trace import Trace
+from airground_drake.trace import Trace, save
 from airground_drake.trace import load as load_trace
-from airground_drake.trace import save
 
 Patch = Callable[[pytest.MonkeyPatch], None]
 
@@ -251,13 +251,15 @@ def test_an_acceptance_that_nothing_says_is_refuted(run: Callable[[str, str], Tr
         signals.loc[100, f"{robot}.accepted"] = 1.0
 
     found = refuted(with_signals(run("case_b", "d"), edit))
-    assert found["accepted_by_the_signals"] and not found["accepted_by_the_messages"]
+    assert found["accepted_by_the_signals"]
+    assert not found["accepted_by_the_messages"]
 
 
 def test_an_acceptance_that_is_hidden_is_refuted(run: Callable[[str, str], Trace]) -> None:
     trace = run("case_b", "d")
     found = refuted(replace(trace, signals=trace.signals.assign(**{"ugv1.accepted": 0.0})))
-    assert found["accepted_by_the_messages"] and not found["accepted_by_the_signals"]
+    assert found["accepted_by_the_messages"]
+    assert not found["accepted_by_the_signals"]
 
 
 @pytest.mark.parametrize("column", ["times_s", "positions_m", "selection"])

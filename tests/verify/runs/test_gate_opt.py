@@ -84,7 +84,7 @@ def test_blocks_are_enumerated_exactly() -> None:
         assert gate_opt.cheapest_of_blocks(row, None).lower == pytest.approx(best, rel=1e-12)
 
     def second_best(row: dict[str, Any], problem: dict[str, Any]) -> None:
-        row["lower_bound"] *= 1.01
+        row["route_bound"] *= 1.01
         row["gap"] = 0.0
 
     assert OPT.judge(with_decision(trace, second_best)).status == "refuted"

@@ -1,0 +1,191 @@
+"""What a run must never break, watched while it runs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+from pydrake.common.value import Value
+from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSystem, State
+
+from airground_drake.arrays import Array
+from airground_drake.intervention.messages import accepted_proposals
+from airground_drake.intervention.policy import Proposal
+from airground_drake.nsbc.avoidance import Avoidance
+from airground_drake.nsbc.team import Team
+
+INEQUALITY_TOLERANCE_M_S = 1e-9
+"""By this much a velocity may miss an inequality or a limit, m/s, as in SAFE-HYP: rounding errs by 1e-13 m/s."""
+LAW_TOLERANCE_M_S = 1e-6
+"""By this much a command may differ from the law, m/s, as in EXEC."""
+
+
+class Rule(IntEnum):
+    """What can be broken."""
+
+    AVOIDANCE = 0
+    SPEED_LIMIT = 1
+    PLANAR_MOTION = 2
+    LAW = 3
+
+
+class Violation(NamedTuple):
+    """The first violation of a run.
+
+    Attributes:
+        t_s: control sample at which the command was chosen.
+        robot: index in team order.
+        rule: what it breaks.
+        amount_m_s: by how much.
+    """
+
+    t_s: float
+    robot: int
+    rule: Rule
+    amount_m_s: float
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """What the controllers saw at a control sample."""
+
+    t: float
+    positions: Array
+    reference: Array | None
+    commands_before: Array
+
+
+@dataclass(frozen=True)
+class Memory:
+    """What the monitor remembers."""
+
+    sample: Sample | None = None
+    violation: Violation | None = None
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        """Immutable: the copy is the object itself."""
+        return self
+
+
+@dataclass(frozen=True)
+class Laws:
+    """The laws that commands are compared with, made anew by whoever makes the monitor.
+
+    Attributes:
+        ugvs: commands (n, 3), m/s, from the time, positions (n + 1, 3), preset positions and velocities (n, 3) each,
+            and per UGV the accepted proposal or None.
+        uav: command (3,), m/s, from positions (n + 1, 3), m, and the UGVs' commands (n, 3), m/s, of the sample before.
+    """
+
+    ugvs: Callable[[float, Array, Array, Array, Sequence[Proposal | None]], Array]
+    uav: Callable[[Array, Array], Array]
+
+
+class Monitor(LeafSystem):
+    """Holds the first command that breaks what SAFE-HYP and EXEC are about, (6)-(11), (14), (20), for any diagram.
+
+    The avoidance inequalities, speed limits and planar motion of all robots are watched; with laws, and where their
+    inputs are connected, the commands, too.
+
+    Ports (n UGVs, world frame):
+        in  `team_position` (3(n+1)) m; `team_command` (3(n+1)) m/s; for the laws: `reference` (6n): preset positions m,
+            then velocities m/s; `proposals` abstract, n of Proposal or None; `answers` (2n), see `messages`.
+        out `violation` (5): 1 from the first violation on, else 0; then its control sample, s, the robot's index in
+            team order, the `Rule`, the amount, m/s (-1 each where there is none).
+    State: abstract, a `Memory`.
+    Rate: one update per control period, from t = 0. What is chosen at a tick is judged at the next one, when it can be
+    seen; so the last command of a simulation is not judged.
+
+    It shares the compiled kernels with the controllers: what it notices are wrong parameters, wiring, timing and
+    composition. Claims that share nothing with the controllers judge the trace afterwards.
+    """
+
+    def __init__(self, team: Team, avoidance: Avoidance, laws: Laws | None = None, *, terminate: bool = False) -> None:
+        """Declare ports, state and the periodic update.
+
+        Args:
+            team: names, safe distances, speed limits.
+            avoidance: the set-based layer.
+            laws: None: inequalities and limits only.
+            terminate: end the simulation at the first violation.
+        """
+        super().__init__()
+        n = len(team.ugvs)
+        self._robots, self._max_speed, self._mobility = team.robots, team.max_speed, team.mobility
+        self._neighbourhood = team.neighbourhood(slice(0, n + 1))
+        self._avoidance, self._laws, self._terminate = avoidance, laws, terminate
+        self._position = self.DeclareVectorInputPort("team_position", 3 * (n + 1))
+        self._command = self.DeclareVectorInputPort("team_command", 3 * (n + 1))
+        self._reference = self.DeclareVectorInputPort("reference", 6 * n)
+        self._proposals = self.DeclareAbstractInputPort("proposals", Value(object()))
+        self._answers = self.DeclareVectorInputPort("answers", 2 * n)
+        self._memory = self.DeclareAbstractState(Value(Memory()))
+        self.DeclareVectorOutputPort(
+            "violation", 5, self._calc, prerequisites_of_calc={self.abstract_state_ticket(self._memory)}
+        )
+        self.DeclarePeriodicUnrestrictedUpdateEvent(avoidance.period, 0.0, self._update)
+
+    def violation(self, context: Context) -> Violation | None:
+        """The first one up to the context's time."""
+        return self._remembered(context).violation
+
+    def _remembered(self, context: Context) -> Memory:
+        memory: Memory = context.get_abstract_state(int(self._memory)).get_value()
+        return memory
+
+    def _calc(self, context: Context, output: BasicVector) -> None:
+        found = self.violation(context)
+        output.SetFromVector(np.array([0.0, -1.0, -1.0, -1.0, -1.0] if found is None else [1.0, *map(float, found)]))
+
+    def _update(self, context: Context, state: State) -> EventStatus:
+        memory = self._remembered(context)
+        if memory.violation is not None:
+            return EventStatus.DidNothing()
+        found = None if memory.sample is None else self._first(context, memory.sample)
+        reference = self._reference.Eval(context).copy() if self._reference.HasValue(context) else None
+        positions, commands = (port.Eval(context).reshape(-1, 3).copy() for port in (self._position, self._command))
+        sample = Sample(context.get_time(), positions, reference, commands)
+        state.get_mutable_abstract_state(int(self._memory)).set_value(Memory(sample, found))
+        if found is not None and self._terminate:
+            what = f"{self._robots[found.robot]} breaks {found.rule.name} by {found.amount_m_s:.3g} m/s"
+            return EventStatus.ReachedTermination(self, f"{what} at t = {found.t_s:.9g} s")
+        return EventStatus.Succeeded()
+
+    def _first(self, context: Context, sample: Sample) -> Violation | None:
+        """What the commands chosen at the last sample, held until now, break the most, if anything."""
+        commands = self._command.Eval(context).reshape(-1, 3)
+        spaces = self._avoidance.half_spaces(
+            sample.positions, self._mobility, self._neighbourhood.around(sample.positions)
+        )
+        speed = np.linalg.norm(commands, axis=1)
+        missed: dict[Rule, Array] = {
+            Rule.AVOIDANCE: -spaces.slack(commands).min(axis=1, initial=np.inf),
+            Rule.SPEED_LIMIT: speed - self._max_speed,
+            Rule.PLANAR_MOTION: np.where(self._mobility[:, 2] == 0.0, np.abs(commands[:, 2]), 0.0),
+        }
+        for rule, amount in missed.items():
+            robot = int(np.argmax(amount))
+            if not amount[robot] <= INEQUALITY_TOLERANCE_M_S:
+                return Violation(sample.t, robot, rule, float(amount[robot]))
+        if self._laws is None:
+            return None
+        away = np.linalg.norm(commands - self._by_the_laws(context, sample, self._laws, commands), axis=1)
+        robot = int(np.argmax(away))
+        return Violation(sample.t, robot, Rule.LAW, float(away[robot])) if away[robot] > LAW_TOLERANCE_M_S else None
+
+    def _by_the_laws(self, context: Context, sample: Sample, laws: Laws, commands: Array) -> Array:
+        """Commands by the laws, (n + 1, 3), m/s; those given for the UGVs where their inputs are not connected.
+
+        Until this tick's own updates are made, proposals and answers are those that the controllers saw at the last.
+        """
+        due = commands.copy()
+        ports = (self._reference, self._proposals, self._answers)
+        if sample.reference is not None and all(port.HasValue(context) for port in ports):
+            accepted = accepted_proposals(self._proposals.Eval(context), self._answers.Eval(context))
+            reference, rate = sample.reference.reshape(2, -1, 3)
+            due[:-1] = laws.ugvs(sample.t, sample.positions, reference, rate, accepted)
+        due[-1] = laws.uav(sample.positions, sample.commands_before[:-1])
+        return due

@@ -1,0 +1,274 @@
+"""GATE-MODEL: what the data of the gatekeeper's problems are worth: predictions rolled out again, what came of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from airground_drake.arrays import Array
+from airground_drake.errors import TraceError
+from airground_drake.trace import Trace
+from airground_drake.verify.claim import TIME_TOLERANCE_S
+from airground_drake.verify.engines.segments import interpolate, travelled
+from airground_drake.verify.finding import Finding
+from airground_drake.verify.runs.control_law import (
+    ON_TOP,
+    Asked,
+    Inequalities,
+    avoiding,
+    inequalities,
+    intervened,
+    tracking,
+)
+from airground_drake.verify.runs.control_samples import control_samples
+from airground_drake.verify.runs.gate_record import GateClaim, Off, Row, conclude
+from airground_drake.verify.runs.pairs import pairs_of
+from airground_drake.verify.runs.proposals import Sent, accepted_at, proposals_of
+
+VELOCITY_TOLERANCE_M_S = 1e-6
+"""Recorded and recomputed mode velocities may differ by this, m/s: rounding of two algorithms, 1e-12 m/s at a corner of
+two inequalities, which the closed loop damps; a corner of nearly parallel ones enlarges it."""
+BEND_TOLERANCE = 1e-6
+"""Recorded and recomputed bends may differ by this: they are ratios of sums of such velocities."""
+BLOCKS = 6
+"""Of stages, for each of which the plans that a decision's plan is compared with choose a mode."""
+MOST_REGRETS = 12
+"""Decisions of a run whose plans are compared with all of these on the closed loop."""
+FAR_M = 1e9
+"""Where the points of no meaning are that make all scenes have as many."""
+
+
+class Scenes(NamedTuple):
+    """What B decisions predict from: their closed loops, over S control periods, with K points each.
+
+    Attributes:
+        start: (B, 3), m.
+        preset: at the control samples, (B, S + 1, 3), m.
+        wanted: the proposed motion, the same.
+        chosen: J_int^+ J_int, (B, 3, 3).
+        centres: points to keep away from at the beginning, (B, K, 3), m.
+        velocities: of those points, (B, K, 3), m/s.
+        safe: distances d, (B, K), m.
+        share: of the inequalities, (B, K).
+        limit: speed limits, (B,), m/s.
+    """
+
+    start: Array
+    preset: Array
+    wanted: Array
+    chosen: Array
+    centres: Array
+    velocities: Array
+    safe: Array
+    share: Array
+    limit: Array
+
+    def repeated(self, rows: npt.NDArray[np.intp]) -> Scenes:
+        """Those of some decisions, in that order."""
+        return Scenes(*(part[rows] for part in self))
+
+
+class Ways(NamedTuple):
+    """Where B closed loops lead: positions at the ends of N stages, their mean velocities (B, N, 3), bends (B,)."""
+
+    positions: Array
+    velocities: Array
+    bend: Array
+
+
+class GateModel(GateClaim):
+    """GATE-MODEL."""
+
+    id = "GATE-MODEL"
+    statement = (
+        "The mode velocities and the bend that every gatekeeper decision rests on are those of the UGV's closed loop, "
+        "with the proposal accepted throughout and refused throughout, rolled out again from what it sensed."
+    )
+    formula = (
+        "a_k, b_k = mean velocity over stage k of rho+ = rho + h law(rho; accepted | refused), rho(0) = p(t), others "
+        "at their velocities at t; |recorded - recomputed| <= 1e-6 m/s; bend = sum ||v - v_below|| / sum ||v_below|| "
+        "along a_k, to 1e-6"
+    )
+    method = (
+        "The control law in numpy as for EXEC, with code of its own, from the signals, the scenario and the table of "
+        "proposals, all decisions side by side. Reported besides, and never a reason to refute: by how much a UGV was "
+        "elsewhere than predicted while its answer stood; and the regret of chosen plans, "
+        "rolled out on the closed loop, against the constant plans and all plans of 6 blocks, for at most 12 decisions "
+        "(the first on each proposal, reversals, then evenly spaced), in units of the cheaper constant plan's cost."
+    )
+    equations = "(23), (25)"
+    assumptions = (
+        "A UGV predicts with what is within sensing range when it decides, moving on as it does then.",
+        "In a prediction the rates of preset and proposed motion are those of the motion sampled every control period.",
+    )
+    does_not_establish = (
+        "That the run went as predicted: others turn, and what is out of sight is left out; the largest difference is "
+        "reported. For plans that change their mode (23) adds velocities of two different ways and is an "
+        "approximation: the regret says how good its plans are on the closed loop, among few others, not against all "
+        "2^N."
+    )
+
+    def judge_rows(self, trace: Trace, rows: list[Row]) -> Finding:
+        """Roll out both choices of every decision; the margin is the tolerance less the largest difference."""
+        sent = proposals_of(trace)
+        scenes = scenes_of(trace, rows, sent)
+        stages = len(rows[0]["reference_m"])
+        compared = []
+        largest = 0.0
+        ways = [roll_out(trace, scenes, np.full((len(rows), stages), mode)) for mode in (0.0, 1.0)]
+        for k, row in enumerate(rows):
+            for name, way in zip(("refuse", "accept"), ways, strict=True):
+                off = row[f"{name}_m_s"] - way.velocities[k]
+                largest = max(largest, float(np.abs(off).max()))
+                compared.append(Off(row, f"velocity of mode {name}, m/s", off, VELOCITY_TOLERANCE_M_S))
+            bend = float(ways[1].bend[k])
+            compared.append(Off(row, "bend", row.given["bend"] - bend, BEND_TOLERANCE, recomputed=bend))
+        evidence = {"decisions": len(rows), "largest_difference_m_s": largest}
+        finding = Finding(
+            "holds",
+            margin=VELOCITY_TOLERANCE_M_S - largest,
+            unit="m/s",
+            evidence={**evidence, **_realised(trace, rows, sent), **_regrets(trace, rows, scenes)},
+        )
+        return conclude(finding, compared)
+
+
+def scenes_of(trace: Trace, rows: Sequence[Row], sent: Sequence[Sent]) -> Scenes:
+    """What each decision predicts from, by the signals at its time.
+
+    Raises:
+        TraceError: if a decision is on a proposal that is not among those sent.
+    """
+    scenario, control = trace.scenario, trace.scenario["control"]
+    stages = len(rows[0]["reference_m"])
+    steps = stages * round(scenario["gatekeeper"]["horizon_s"] / stages / control["period_s"])
+    known = {(one.ugv, one.issued_s): one for one in sent}
+    pairs = list(pairs_of(trace))
+    parts: list[list[Array]] = []
+    for row in rows:
+        t, robot = float(row.given["t_s"]), str(row.given["robot"])
+        if (robot, float(row.given["issued_s"])) not in known:
+            raise TraceError(f"{row.label}: it is on no proposal that was sent")
+        proposal = known[robot, float(row.given["issued_s"])]
+        spec = scenario["ugvs"][robot]
+        after = t + control["period_s"] * np.arange(steps + 1.0)
+        here = interpolate(trace.t, trace.position(robot), t)
+        around = [pair for pair in pairs if robot in (pair.first, pair.second)]
+        things = [_thing(trace, pair.second if pair.first == robot else pair.first, t) for pair in around]
+        centres, velocities = (np.array([thing[k] for thing in things]).reshape(-1, 3) for k in (0, 1))
+        unseen = np.linalg.norm(centres - here, axis=1) > control["sensing_range_m"]
+        centres[unseen], velocities[unseen] = FAR_M, 0.0
+        corners = np.asarray(spec["preset"]["waypoints_m"], dtype=np.float64)
+        parts.append([
+            here, travelled(corners, spec["preset"]["speed_m_s"], after), proposal.place(after), proposal.chosen,
+            centres, velocities, np.array([pair.safe_m for pair in around]), np.array([pair.share for pair in around]),
+            np.array(spec["max_speed_m_s"]),
+        ])  # fmt: skip
+    return Scenes(*(np.stack(part) for part in zip(*parts, strict=True)))
+
+
+def _thing(trace: Trace, name: str, t: float) -> tuple[Array, Array]:
+    """Where an obstacle or a robot is at a time, (3,), m, and its velocity up to then, (3,), m/s."""
+    if name not in trace.robots:
+        return np.asarray(trace.scenario["obstacles"][name]["position_m"], dtype=np.float64), np.zeros(3)
+    row = min(int(np.searchsorted(trace.t, t - TIME_TOLERANCE_S)), len(trace.t) - 1)
+    return interpolate(trace.t, trace.position(name), t), trace.command(name)[row]
+
+
+def roll_out(trace: Trace, scenes: Scenes, plans: Array) -> Ways:
+    """Closed loops under plans (B, N) of 0 (refused) and 1 (accepted)."""
+    control, composition = trace.scenario["control"], trace.meta["composition"]
+    on_top, h = trace.meta["method"] in ON_TOP, control["period_s"]
+    steps, stages = scenes.preset.shape[1] - 1, plans.shape[1]
+    each = steps // stages
+    position = scenes.start.copy()
+    positions, velocities = np.empty((len(plans), stages, 3)), np.zeros((len(plans), stages, 3))
+    bent, wanted = np.zeros(len(plans)), np.zeros(len(plans))
+    for k in range(steps):
+        accepted = plans[:, k // each] == 1.0
+        centres = scenes.centres + k * h * scenes.velocities
+        given = inequalities(position, centres, scenes.safe, scenes.share, control, planar=True)
+        rate = (scenes.preset[:, k + 1] - scenes.preset[:, k]) / h
+        own = tracking(position, scenes.preset[:, k], rate, control["motion_gain_1_s"], scenes.limit)
+        below, velocity = own.copy(), avoiding(own, given, composition, planar=True)
+        if accepted.any():
+            asked = Asked(
+                scenes.wanted[accepted, k],
+                (scenes.wanted[accepted, k + 1] - scenes.wanted[accepted, k]) / h,
+                scenes.chosen[accepted],
+            )
+            lower = (velocity if on_top else own)[accepted]
+            gain = control["intervention_gain_1_s"]
+            below[accepted] = intervened(position[accepted], lower, asked, gain, scenes.limit[accepted])
+            bounds = Inequalities(given.normal[accepted], given.bound[accepted])
+            task = below[accepted]
+            velocity[accepted] = task if on_top else avoiding(task, bounds, composition, planar=True)
+        bent += np.linalg.norm(velocity - below, axis=1)
+        wanted += np.linalg.norm(below, axis=1)
+        position = position + h * velocity
+        velocities[:, k // each] += velocity / each
+        positions[:, k // each] = position
+    return Ways(positions, velocities, np.where(wanted > 0.0, bent / np.where(wanted > 0.0, wanted, 1.0), 0.0))
+
+
+def _realised(trace: Trace, rows: Sequence[Row], sent: list[Sent]) -> dict[str, Any]:
+    """By how much UGVs were elsewhere than predicted while the answer stood."""
+    t = trace.t[control_samples(trace.t, trace.scenario["control"]["period_s"])]
+    accepted = {ugv: accepted_at(trace, ugv, sent, t) for ugv in trace.ugvs}
+    farthest: dict[str, Any] = {}
+    stood = 0
+    for row in rows:
+        begin, ugv = float(row.given["t_s"]), str(row.given["robot"])
+        yes = row.given["decision"] == "accept"
+        due = float(row.given["issued_s"]) if yes else None
+        first = int(np.searchsorted(t, begin - TIME_TOLERANCE_S))
+        issued = [None if one is None else one.issued_s for one in accepted[ugv][first:]]
+        other = next((k for k, found in enumerate(issued) if found != due), None)
+        until = min(float(trace.t[-1]), float(t[first + other]) if other is not None else np.inf)
+        ends = begin + row.dt * np.arange(1.0, len(row["reference_m"]) + 1.0)
+        stood += bool(ends[-1] <= until + TIME_TOLERANCE_S)
+        ends = ends[ends <= until + TIME_TOLERANCE_S]
+        went = interpolate(trace.t, trace.position(ugv), ends)
+        away = np.linalg.norm(went - row.constant[int(yes)][: len(ends)], axis=1)
+        if away.max(initial=0.0) >= farthest.get("away_m", 0.0) and len(ends):
+            k = int(np.argmax(away))
+            farthest = {"robot": ugv, "t_s": begin, "decision": str(row.given["decision"])}
+            farthest |= {"away_m": float(away[k]), "after_s": float(ends[k] - begin)}
+    return {"answers_that_stood_to_the_horizon": stood, "farthest_from_predicted": farthest}
+
+
+def _regrets(trace: Trace, rows: Sequence[Row], scenes: Scenes) -> dict[str, Any]:
+    """What chosen plans cost on the closed loop above the cheapest constant one, and of the plans of few blocks."""
+    planned = [k for k, row in enumerate(rows) if row.planned]
+    seen: set[Any] = set()
+    telling = []
+    for k in planned:
+        key = rows[k].given["robot"], rows[k].given["issued_s"]
+        if key not in seen or rows[k].given["reason"] == "reversed":
+            telling.append(k)
+        seen.add(key)
+    rest = [k for k in planned if k not in telling]
+    spare = max(0, MOST_REGRETS - len(telling))
+    spaced = np.linspace(0, len(rest) - 1, min(spare, len(rest))).round().astype(int) if rest and spare else ()
+    chosen = [*telling[:MOST_REGRETS], *(rest[k] for k in dict.fromkeys(spaced))]
+    if not chosen:
+        return {"regrets": 0}
+    stages = len(rows[0]["reference_m"])
+    modes = (np.arange(2**BLOCKS)[:, None] >> np.arange(BLOCKS)) % 2
+    few = modes[:, np.arange(stages) * BLOCKS // stages].astype(np.float64)  # the first is all 0, the last all 1
+    plans = np.concatenate([np.concatenate([rows[k]["plan"][None], few]) for k in chosen])
+    ways = roll_out(trace, scenes.repeated(np.repeat(np.array(chosen), len(few) + 1)), plans)
+    found: list[dict[str, Any]] = []
+    for row, positions in zip((rows[k] for k in chosen), np.split(ways.positions, len(chosen)), strict=True):
+        cost = row.cost(positions) / row.scale
+        at = {"robot": str(row.given["robot"]), "t_s": float(row.given["t_s"])}
+        constant = float(cost[0] - min(cost[1], cost[-1]))
+        found.append({**at, "against_constant_plans": constant, "against_blocks": float(cost[0] - cost[1:].min())})
+    return {
+        "regrets": len(found),
+        "largest_regret_against_constant_plans": max(found, key=lambda one: one["against_constant_plans"]),
+        "largest_regret_against_blocks": max(found, key=lambda one: one["against_blocks"]),
+    }

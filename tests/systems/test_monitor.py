@@ -1,0 +1,123 @@
+"""The monitor: silent on honest runs, and where SAFE-HYP and EXEC find their first violation it finds the same."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from pydrake.common import RandomGenerator
+from pydrake.systems.analysis import Simulator, SimulatorStatus
+from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.primitives import ConstantVectorSource
+
+from airground_drake import components
+from airground_drake.diagram import build_diagram, make_monitor
+from airground_drake.scenarios.load import load
+from airground_drake.scenarios.schema import Scenario
+from airground_drake.simulation import EVENT_ACCURACY
+from airground_drake.systems import Monitor, Rule, Violation
+from airground_drake.trace import Trace
+from airground_drake.verify import verify
+
+
+def watched(
+    scenario: Scenario,
+    method: str,
+    honest: Scenario | None = None,
+    *,
+    terminate: bool = False,
+    composition: str = "augmented",
+) -> tuple[Violation | None, SimulatorStatus]:
+    """Run a monitored diagram; the monitor is made from another scenario if one is given."""
+    monitor = make_monitor(honest or scenario, method, composition, terminate=terminate)  # type: ignore[arg-type]
+    diagram = build_diagram(scenario, method, composition, monitor=monitor)  # type: ignore[arg-type]
+    context = diagram.CreateDefaultContext()
+    diagram.SetRandomContext(context, RandomGenerator(scenario.seed))
+    context.SetAccuracy(EVENT_ACCURACY)
+    simulator = Simulator(diagram, context)
+    simulator.Initialize()
+    status = simulator.AdvanceTo(scenario.duration_s)
+    found = monitor.violation(monitor.GetMyContextFromRoot(context))
+    port = diagram.GetOutputPort("violation").Eval(context)
+    assert port.tolist() == ([0.0, -1.0, -1.0, -1.0, -1.0] if found is None else [1.0, *map(float, found)])
+    return found, status
+
+
+@pytest.mark.parametrize(
+    ("name", "method", "composition"),
+    [
+        ("case_a", "a", "augmented"),
+        ("case_a", "d", "augmented"),
+        ("case_b", "d", "augmented"),
+        ("case_b", "c", "augmented"),
+    ],
+)
+def test_it_is_silent_on_honest_runs(name: str, method: str, composition: str) -> None:
+    assert watched(load(name)[0], method, composition=composition)[0] is None
+
+
+@pytest.mark.parametrize(("name", "method"), [("case_b", "b"), ("soft_gate", "c")])
+def test_it_finds_what_safe_hyp_finds(run: Callable[[str, str], Trace], name: str, method: str) -> None:
+    found, _ = watched(load(name)[0], method)
+    finding = verify(run(name, method), ["SAFE-HYP"])[0].finding
+    assert finding.status == "refuted"
+    assert finding.counterexample is not None
+    assert found is not None
+    assert found.rule == Rule.AVOIDANCE
+    assert found.t_s == pytest.approx(finding.counterexample["t_s"], abs=1e-9)
+    assert run(name, method).robots[found.robot] == finding.counterexample["robot"]
+    assert -found.amount_m_s == pytest.approx(finding.counterexample["margin"], abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("key", "factor", "robot"),
+    [("motion_gain_1_s", 0.9, 0), ("formation_gain_1_s", 0.5, 2), ("intervention_gain_1_s", 1.2, 0)],
+)
+def test_another_gain_than_the_scenarios_breaks_the_law(key: str, factor: float, robot: int) -> None:
+    honest, built = load("case_b")[0], load("case_b")[0]
+    setattr(built.control, key, factor * getattr(built.control, key))
+    found, _ = watched(built, "d", honest)
+    assert found is not None
+    assert (found.rule, found.robot) == (Rule.LAW, robot)
+
+
+def test_smaller_safe_distances_than_the_scenarios_break_avoidance() -> None:
+    honest, built = load("case_a")[0], load("case_a")[0]
+    built.safe_distance.obstacle_m = 1.8
+    found, _ = watched(built, "a", honest)
+    assert found is not None
+    assert found.rule == Rule.AVOIDANCE
+
+
+def test_it_can_end_the_simulation() -> None:
+    found, status = watched(load("case_b")[0], "b", terminate=True)
+    assert found is not None
+    period = load("case_b")[0].control.period_s
+    assert status.reason() == SimulatorStatus.ReturnReason.kReachedTerminationCondition
+    assert status.return_time() == pytest.approx(found.t_s + period)
+    assert "ugv1 breaks AVOIDANCE" in status.message()
+
+
+@pytest.mark.parametrize(
+    ("command", "rule", "robot"),
+    [
+        ([0, 0, 0, 0, 0, 0, 0, 0, 0], None, -1),
+        ([9, 0, 0, 0, 0, 0, 0, 0, 0], Rule.SPEED_LIMIT, 0),
+        ([0, 0, 0, 0, 0, 0.1, 0, 0, 0], Rule.PLANAR_MOTION, 1),
+        ([0, 0, 0, 0, 0, 0, 0, np.nan, 0], Rule.AVOIDANCE, 2),
+    ],
+)
+def test_it_can_be_wired_into_any_diagram(command: list[float], rule: Rule | None, robot: int) -> None:
+    """Without laws, with only positions and commands connected."""
+    scenario = load("case_a")[0]
+    builder = DiagramBuilder()
+    monitor = builder.AddSystem(Monitor(components.make_team(scenario), components.make_avoidance(scenario)))
+    for name, values in (("team_position", components.make_starts(scenario).ravel()), ("team_command", command)):
+        source = builder.AddSystem(ConstantVectorSource(np.array(values, dtype=float)))
+        builder.Connect(source.get_output_port(), monitor.GetInputPort(name))
+    simulator = Simulator(builder.Build())
+    simulator.AdvanceTo(0.2)
+    found = monitor.violation(monitor.GetMyContextFromRoot(simulator.get_context()))
+    assert (None if found is None else found.rule) == rule
+    assert found is None or (found.t_s, found.robot) == (0.0, robot)
