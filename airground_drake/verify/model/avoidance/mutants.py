@@ -11,7 +11,7 @@ import numpy as np
 from airground_drake.arrays import Array
 from airground_drake.nsbc import kernels
 from airground_drake.nsbc.avoidance import Avoidance, Composition, HalfSpaces, Surroundings
-from airground_drake.verify.claim import Mutant
+from airground_drake.verify.claim import ModelClaim, Mutant
 from airground_drake.verify.engines.obligation import Obligation
 from airground_drake.verify.engines.prover import discharge, finding
 from airground_drake.verify.engines.rewriting import with_hypotheses, with_numbers, without
@@ -29,6 +29,7 @@ from airground_drake.verify.model.avoidance.obligations import (
     with_scenario,
 )
 from airground_drake.verify.model.avoidance.safe_gate import SafeGate
+from airground_drake.verify.model.avoidance.safe_inv import SafeInv
 
 
 def broken(obligation: Obligation, replay: Inputs) -> Finding:
@@ -194,6 +195,13 @@ def _built(inputs: Inputs, **changed: Any) -> Finding:
     return SafeGate().check(inputs | {"method_d": inputs["method_d"] | changed})
 
 
+def _other_diagram(claim: ModelClaim, inputs: Inputs, group: str, **factors: float) -> Finding:
+    """A claim whose diagram is built from a scenario in which numbers of one group are others."""
+    scenario = inputs["scenario"]
+    changed = {name: factor * scenario[group][name] for name, factor in factors.items()}
+    return claim.check(inputs | {"scenario": scenario | {group: scenario[group] | changed}})
+
+
 def _disturbed_bound(inputs: Inputs, name: str, goal: str | None = None, **hypotheses: str) -> Obligation:
     """An obligation of `disturbed` with the numbers of a kind of pair that it is about, changed as `named` does."""
     kind = next(k for k in (*kinds(inputs), kinds(inputs)[0]) if (k.share < 1.0) == name.startswith("pair_"))
@@ -252,7 +260,19 @@ MUTANTS: tuple[Mutant, ...] = (
     Mutant("SAFE-INV", "gain too large, A h = 1.8", _large_gain),
     Mutant("SAFE-INV", "prioritised equality tasks, two active obstacles", _equality_tasks),
     Mutant("SAFE-INV", "sensing range too short", _short_range),
+    Mutant(
+        "SAFE-INV", "diagram built with 0.9 of the distance between UAV and UGVs",
+        lambda inputs: _other_diagram(SafeInv(), inputs, "safe_distance", air_ground_m=0.9),
+    ),
+    Mutant(
+        "SAFE-INV", "diagram built with half the gain",
+        lambda inputs: _other_diagram(SafeInv(), inputs, "control", avoidance_gain_1_s=0.5),
+    ),
     Mutant("SAFE-GATE", "scaling omitted", _unscaled),
+    Mutant(
+        "SAFE-GATE", "diagram built with 0.9 of the distance to obstacles",
+        lambda inputs: _other_diagram(SafeGate(), inputs, "safe_distance", obstacle_m=0.9),
+    ),
     Mutant("SAFE-GATE", "intervention on top", lambda inputs: _built(inputs, intervention_on_top=True)),
     Mutant("SAFE-GATE", "recursion (5) as printed", lambda inputs: _built(inputs, compositions=["recursion_nearest"])),
     Mutant("SAFE-DIST", "sign of the inequality flipped", _disturbed_flipped),
@@ -260,5 +280,5 @@ MUTANTS: tuple[Mutant, ...] = (
     Mutant("SAFE-DIST", "one inequality dropped", _disturbed_dropped),
     Mutant("SAFE-DIST", "only one robot of a pair counted as disturbed", _disturbed_one_of_two),
     Mutant("SAFE-DIST", "disturbance twice the bound", _disturbed_stronger),
-)
+)  # fmt: skip
 """Broken variants, in the order of the report."""
