@@ -7,3 +7,6 @@ import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 """Numbers in binary64; every docstring gives the shape and the unit."""
+
+ROUNDOFF = 2.0**-53
+"""Unit roundoff u of binary64: every operation returns its exact result times 1 + e, |e| <= u."""

@@ -135,7 +135,7 @@ def build_model(
         components.integrated_noise(n, decision.noise_m_sqrt_s, decision.leak_1_s, decision.noise_period_s),
     )
     decision_variable = add("decision_variable", DecisionVariable(n))
-    trigger = add("event_trigger", EventTrigger(n, components.make_trigger(scenario, zeta)))
+    trigger = add("event_trigger", EventTrigger(n, components.make_trigger(scenario, zeta), presets))
     planner = add("intervention_planner", InterventionPlanner(components.make_planner(scenario, chosen)))
     ugv_controller = add("ugv_controller", UgvController(team, law))
     uav_controller = add("uav_controller", _uav_controller(scenario, team))
@@ -163,13 +163,13 @@ def build_model(
     builder.Connect(team_command.get_output_port(), disturbance.GetInputPort("command"))
     builder.Connect(disturbance.GetOutputPort("velocity"), velocities.get_input_port())
     builder.Connect(noise_source.get_output_port(), noise.get_input_port())
-    for target in (decision_variable, ugv_controller, uav_controller, planner, gatekeeper):
+    for target in (decision_variable, trigger, ugv_controller, uav_controller, planner, gatekeeper):
         if target is not None:
             builder.Connect(team_position.get_output_port(), target.GetInputPort("team_position"))
-    for target in (decision_variable, ugv_controller):
+    for target in (decision_variable, trigger, ugv_controller):
         builder.Connect(reference.get_output_port(), target.GetInputPort("reference"))
-    builder.Connect(noise.get_output_port(), decision_variable.GetInputPort("noise"))
-    connect(decision_variable, "decision_variable", trigger, "decision_variable")
+    for target in (decision_variable, trigger):
+        builder.Connect(noise.get_output_port(), target.GetInputPort("noise"))
     connect(trigger, "status", planner, "status")
     connect(planner, "proposals", ugv_controller, "proposals")
     connect(planner, "proposals", gate, "proposals")

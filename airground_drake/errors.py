@@ -54,6 +54,25 @@ class PluginError(AirgroundError):
     """A class named in a scenario that cannot be imported, is of another kind, or does not take its parameters."""
 
 
+class SimulationError(AirgroundError):
+    """A simulation that stopped before its end.
+
+    Attributes:
+        run: which run of the scenario.
+        t: when, s.
+        what: the first line of what was raised.
+    """
+
+    def __init__(self, run: str, t: float, what: str) -> None:
+        """Build the one-line message from its parts."""
+        super().__init__(run, t, what)
+        self.run, self.t, self.what = run, t, what
+
+    def __str__(self) -> str:
+        """One line."""
+        return _one_line(f"run {self.run} stopped at t = {self.t:.6g} s: {self.what}")
+
+
 class TraceError(AirgroundError):
     """A trace that is missing, truncated, tampered with or not finite."""
 

@@ -214,6 +214,7 @@ MODEL_CLAIMS = Registry(
         "SAFE-DIST": "airground_drake.verify.model.avoidance.safe_dist:SafeDist",
         "ZENO-PROOF": "airground_drake.verify.model.trigger.zeno_proof:ZenoProof",
         "ZENO-REFINE": "airground_drake.verify.model.trigger.zeno_refine:ZenoRefine",
+        "THR-ISO": "airground_drake.verify.model.trigger.thr_iso:ThrIso",
         "THR-ROOT": "airground_drake.verify.model.threshold.thr_root:ThrRoot",
         "THR-OPT": "airground_drake.verify.model.threshold.thr_opt:ThrOpt",
         "THR-DDM": "airground_drake.verify.model.threshold.thr_ddm:ThrDdm",
@@ -226,3 +227,8 @@ Status = Literal["proved", "holds", "supported", "refuted", "inconclusive", "err
 STATUSES: tuple[Status, ...] = get_args(Status)
 PASSING: tuple[Status, ...] = ("proved", "holds", "supported")
 """Statuses in which the claim was established, each in its way."""
+
+
+def alternatives(expected: str) -> tuple[str, ...]:
+    """The statuses that an expectation admits: "holds", or "holds or refuted" where there is no guarantee."""
+    return tuple(expected.split(" or "))

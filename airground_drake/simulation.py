@@ -23,7 +23,7 @@ from pydrake.systems.primitives import LogVectorOutput, VectorLogSink
 
 from airground_drake.arrays import Array
 from airground_drake.diagram import RECORDED, Model, build_model
-from airground_drake.errors import AirgroundError, UnknownNameError
+from airground_drake.errors import AirgroundError, SimulationError, UnknownNameError
 from airground_drake.events import extract
 from airground_drake.gatekeeper.answer import Decision
 from airground_drake.gatekeeper.prediction import Horizon, Scene, predicted_problem
@@ -88,6 +88,9 @@ class Recorder:
         Args:
             seed: of the decision noise; default: the scenario's.
             duration: s; default: the scenario's.
+
+        Raises:
+            SimulationError: if Drake or a system stops; names the run and the time.
         """
         seed = self._scenario.seed if seed is None else seed
         context = self._root.CreateDefaultContext()
@@ -100,8 +103,12 @@ class Recorder:
         if self._model.gatekeeper is not None:
             self._model.gatekeeper.reset_timing()
         started = time.perf_counter()
-        simulator.Initialize()
-        simulator.AdvanceTo(self._scenario.duration_s if duration is None else duration)
+        try:
+            simulator.Initialize()
+            simulator.AdvanceTo(self._scenario.duration_s if duration is None else duration)
+        except (Exception, SystemExit) as error:  # Drake raises many kinds
+            what = f"{type(error).__name__}: {error}".splitlines()[0]
+            raise SimulationError(self._name, context.get_time(), what) from error
         wall = time.perf_counter() - started
         return self._trace(context, seed, wall)
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import itertools
 import os
-import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from filelock import FileLock
 from hypothesis import HealthCheck, settings
+from hypothesis.internal.conjecture import providers
+from sharing import once
 
 from airground_drake import trace
 from airground_drake.gatekeeper import sample
@@ -20,9 +20,12 @@ from airground_drake.scenarios.schema import Scenario
 from airground_drake.simulation import simulate
 from airground_drake.trace import Trace
 
-# The first call compiles, and nothing here asserts on time: no deadlines. The default profile draws the same examples
-# each time, so that a green suite stays green; `pytest --hypothesis-profile=fuzz` looks for new ones.
-settings.register_profile("suite", deadline=None, derandomize=True, database=None)
+# The first call compiles, and nothing here asserts on time: no deadlines, no complaints of slowness. The default
+# profile draws the same examples each time, so that a green suite stays green; `pytest --hypothesis-profile=fuzz` looks
+# for new ones.
+settings.register_profile(
+    "suite", deadline=None, derandomize=True, database=None, suppress_health_check=[HealthCheck.too_slow]
+)
 settings.register_profile("fuzz", deadline=None, max_examples=5000, suppress_health_check=list(HealthCheck))
 settings.load_profile("suite")
 
@@ -36,17 +39,6 @@ def shared(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def once(folder: Path, make: Callable[[Path], None]) -> Path:
-    """The folder, made by the first worker that wants it; the others wait."""
-    with FileLock(f"{folder}.lock"):
-        if not folder.exists():
-            unfinished = folder.with_name(f".{folder.name}")
-            shutil.rmtree(unfinished, ignore_errors=True)
-            make(unfinished)
-            unfinished.rename(folder)
-    return folder
-
-
 @pytest.fixture(scope="session", autouse=True)
 def _cache(shared: Path) -> Iterator[None]:
     """Findings are kept in a folder of the session, not in the user's."""
@@ -57,10 +49,20 @@ def _cache(shared: Path) -> Iterator[None]:
 
 @pytest.fixture(scope="session", autouse=True)
 def _steady_clock() -> Iterator[None]:
-    """Every decision of a gatekeeper takes 1 ms by the clock: no verdict depends on what else the machine does."""
+    """Every decision of a gatekeeper takes 1/1024 s by the clock: no verdict depends on what else the machine does."""
     ticks = itertools.count()
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sample, "thread_time", lambda: 1e-3 * next(ticks))
+        patch.setattr(sample, "thread_time", lambda: next(ticks) / 1024)
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _no_constants_of_modules() -> Iterator[None]:
+    """The same examples whatever was imported before: Hypothesis also draws constants of loaded modules."""
+    with pytest.MonkeyPatch.context() as patch:
+        if settings.default.derandomize and hasattr(providers, "_get_local_constants"):
+            nothing = providers.Constants()
+            patch.setattr(providers, "_get_local_constants", lambda: nothing)
         yield
 
 

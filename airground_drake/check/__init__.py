@@ -14,7 +14,7 @@ and pandas are used: no Drake, no solver, nothing else of this package. docs/che
     feasibility                GATE-FEAS
     prediction                 GATE-MODEL
     optimality                 GATE-SUR, GATE-OPT
-    polynomials, certificates  SAFE-LEMMA, SAFE-INV, SAFE-GATE, SAFE-DIST, ZENO-PROOF; obligations.json
+    polynomials, certificates  SAFE-LEMMA, SAFE-INV, SAFE-GATE, SAFE-DIST, ZENO-PROOF, THR-ISO; obligations.json
     enclosures                 THR-ROOT, THR-OPT
     statistics                 THR-DDM, ZENO-REFINE
     inputs                     the constants that a claim about the model must be about

@@ -1,4 +1,4 @@
-"""SAFE-LEMMA, SAFE-INV, SAFE-GATE, SAFE-DIST and ZENO-PROOF: every certificate expanded, exactly.
+"""SAFE-LEMMA, SAFE-INV, SAFE-GATE, SAFE-DIST, ZENO-PROOF and THR-ISO: every certificate expanded, exactly.
 
 An obligation says: wherever all hypotheses are >= 0, the strict ones > 0 and all equations 0, the goal is >= 0. Its
 certificate is an identity of polynomials with rational coefficients,
@@ -23,6 +23,7 @@ number must be a true one.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping
 from fractions import Fraction
 from functools import cache, lru_cache
@@ -32,7 +33,7 @@ from typing import Any
 from .files import Files, Json, content_of, parse_json, read_json
 from .polynomials import Polynomial, number, parse
 from .rules import SMALL, Disagreement, Found, NotEstablished, agrees, close, holds, same
-from .scenario import Kind, disturbance_m_s, kinds_of, levels_of
+from .scenario import Kind, disturbance_m_s, kinds_of, levels_of, rounding_m, views_of
 from .triggers import refuted_zeno_proof
 
 GROUPS = {"hypotheses": "nonnegative", "strict": "positive", "equations": "zero"}
@@ -214,14 +215,35 @@ def _gram_matrix(gram: Json) -> None:
 
 
 def _recorded_of_inv(claim: Json, scenario: Json) -> Found:
-    """The margin is what the sensing range has to spare; the running code was found to conform."""
+    """The margin is what rounding leaves of the tolerance; the running code and its wiring were found to conform."""
     evidence = claim["evidence"]
     same("the running code conforms", evidence["conformance"]["agrees"], True)
     same("the running composition met its inequalities", evidence["composition"]["met"], True)
     same("inequalities missed by the composition", evidence["composition"]["missed"], 0)
+    _wiring(evidence["wiring"], scenario)
     h, reach = rational(scenario["control"]["period_s"]), rational(scenario["control"]["sensing_range_m"])
-    spare = [reach - rational(kind.safe_m) - rational(kind.closing_m_s) * h for kind in kinds_of(scenario)]
-    return Found.with_margin("proved", float(min(spare)))
+    spare = {
+        kind.name: float(reach - rational(kind.safe_m) - rational(kind.closing_m_s) * h) for kind in kinds_of(scenario)
+    }
+    agrees("spare of the sensing range", evidence["sensing_range_spare_m"], spare, within=SMALL)
+    left = SMALL - max(rounding_m(scenario, kind) for kind in kinds_of(scenario))
+    status = "proved" if left >= 0.0 else "inconclusive"
+    return Found.with_margin(status, left, within=1e-15) if math.isfinite(left) else Found(status)
+
+
+def _wiring(recorded: Json, scenario: Json) -> None:
+    """The built diagram was compared for every robot and all that it must avoid, and did not differ."""
+    same("the built diagram agrees with the scenario", [recorded["agrees"], recorded["differences"]], [True, 0])
+    uav = scenario["uav"]["name"]
+    counts = Counter(
+        "obstacle" if view.share == 1.0 else "uav_ugv" if uav in (view.robot, view.other) else "ugv_ugv"
+        for view in views_of(scenario)
+    )
+    same("robots and what they avoid", recorded["views"], dict(counts))
+    for kind in counts:
+        if kind != "obstacle":
+            bound = recorded["least_times_bound"][kind]
+            holds("an inequality of every two robots was seen to bind", bound > 0, bound, "1 or more", about=kind)
 
 
 def _recorded_of_gate(claim: Json, scenario: Json) -> Found:
@@ -232,6 +254,9 @@ def _recorded_of_gate(claim: Json, scenario: Json) -> Found:
     same("compositions attacked", [layer["composition"] for layer in evidence["layer"]], compositions)
     for layer in evidence["layer"]:
         same("the running layer met its inequalities", [layer["met"], layer["missed"]], [True, 0])
+    same("compositions wired", [each["composition"] for each in evidence["wiring"]], compositions)
+    for wired in evidence["wiring"]:
+        _wiring(wired, scenario)
     for team in evidence["controller"]:
         same("inequalities missed by the running controller", team["missed"], 0)
     return Found.with_margin("proved", min(layer["worst_slack_m_s"] for layer in evidence["layer"]), within=0.0)
@@ -263,9 +288,17 @@ def _recorded_of_zeno(claim: Json, scenario: Json) -> Found:
     return Found.with_margin("proved", SMALL - rounding, within=1e-16)
 
 
+def _recorded_of_iso(claim: Json, scenario: Json) -> Found:
+    """The running trigger missed nothing that was due in a step, and invented nothing."""
+    compared = claim["evidence"]["conformance"]
+    same("crossings missed or invented by the running trigger", [compared["missed"], compared["spurious"]], [0, 0])
+    return Found("proved")
+
+
 _RECORDED: dict[str, Any] = {
     "SAFE-INV": _recorded_of_inv,
     "SAFE-GATE": _recorded_of_gate,
     "SAFE-DIST": _recorded_of_dist,
     "ZENO-PROOF": _recorded_of_zeno,
+    "THR-ISO": _recorded_of_iso,
 }

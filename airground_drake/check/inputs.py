@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 from .files import Json
-from .scenario import disturbance_m_s, levels_of, robots_of, threshold_m
+from .scenario import disturbance_m_s, extent_m, levels_of, robots_of, threshold_m
 
 
 def inputs_of(claim: str, scenario: Json) -> Json:
     """The inputs of a claim about the model."""
     match claim:
         case "SAFE-INV":
-            return _avoidance(scenario)
+            return {**_avoidance(scenario), "scenario": _built_from(scenario)}
         case "SAFE-GATE":
-            return {**_avoidance(scenario), "method_d": _method_d(scenario)}
+            return {**_avoidance(scenario), "method_d": _method_d(scenario), "scenario": _built_from(scenario)}
         case "SAFE-DIST":
             return {**_avoidance(scenario), "disturbance_m_s": disturbance_m_s(scenario)}
         case "ZENO-PROOF":
             bound = float(scenario["decision"]["min_inter_event_s"])
             return {**_trigger(scenario), "min_inter_event_s": bound, "duration_s": float(scenario["duration_s"])}
+        case "THR-ISO":
+            return _trigger(scenario)
         case "ZENO-REFINE":
             noise = {key: scenario["decision"][key] for key in ("noise_m_sqrt_s", "leak_1_s", "noise_period_s")}
             return {**_trigger(scenario), **noise, "duration_s": float(scenario["duration_s"])}
@@ -32,16 +34,14 @@ def inputs_of(claim: str, scenario: Json) -> Json:
 def _avoidance(scenario: Json) -> Json:
     """Constants of the avoidance layer and of the team; the extent bounds every coordinate of the run."""
     control, safe, robots = scenario["control"], scenario["safe_distance"], robots_of(scenario)
-    names = ("avoidance_gain_1_s", "period_s", "sensing_range_m", "motion_gain_1_s", "intervention_gain_1_s")
+    names = ("avoidance_gain_1_s", "period_s", "sensing_range_m")
+    gains = ("motion_gain_1_s", "formation_gain_1_s", "intervention_gain_1_s")
     speeds = [float(robot["max_speed_m_s"]) for robot in robots.values()]
-    points = [scenario["uav"]["start_m"], *(obstacle["position_m"] for obstacle in scenario["obstacles"].values())]
-    for ugv in scenario["ugvs"].values():
-        points += [ugv["start_m"], ugv["target_m"], *ugv["preset"]["waypoints_m"]]
-    farthest = max(abs(coordinate) for point in points for coordinate in point)
     return {
-        **{name: control[name] for name in names},
+        **{name: control[name] for name in names + gains},
+        "altitude_m": scenario["uav"]["altitude_m"],
         "duration_s": scenario["duration_s"],
-        "extent_m": farthest + max(speeds) * scenario["duration_s"],
+        "extent_m": extent_m(scenario),
         "team": {
             "ugvs": list(scenario["ugvs"]),
             "uav": scenario["uav"]["name"],
@@ -52,6 +52,12 @@ def _avoidance(scenario: Json) -> Json:
             "max_speed": speeds,
         },
     }
+
+
+def _built_from(scenario: Json) -> Json:
+    """What the diagram that is compared is built from: all that says who must keep which distance and how fast."""
+    uav = {**scenario["uav"], "task": "formation"}
+    return {**{name: scenario[name] for name in ("ugvs", "obstacles", "safe_distance", "control")}, "uav": uav}
 
 
 def _method_d(scenario: Json) -> Json:

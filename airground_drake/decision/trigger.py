@@ -70,7 +70,7 @@ class Trigger:
         """State after an event at time t, s, with the decision variable x, m: the transition that is due, if any."""
         if state.mode is Mode.SUPERVISING and x >= self.zeta:
             return self.rise(state, t)
-        if state.mode is Mode.INTERVENING and x <= self.release:
+        if state.mode is Mode.INTERVENING and x <= self.release and x < self.zeta:  # bare: while x >= zeta
             return self.fall(state, t)
         if state.mode is Mode.REFRACTORY and t >= self.dwell_end(state):
             return self.recover(state, t, x)

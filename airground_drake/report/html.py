@@ -31,6 +31,7 @@ CHIPS = {
     "not_run": ("○", "not run", "open"),
     "reproduced": ("✓", "reproduced", "good"),
     "calibrated": ("≈", "calibrated", "tuned"),
+    "ambiguous": ("?", "ambiguous", "open"),
     "not_reproduced": ("✗", "not reproduced", "bad"),
     "demonstrated": ("✓", "demonstrated", "good"),
     "not_demonstrated": ("✗", "not demonstrated", "bad"),

@@ -50,7 +50,9 @@ def _outcome(case: ET.Element, claim: Mapping[str, Any]) -> None:
     if claim["as_expected"]:
         return
     kind = {"error": "error", "not_run": "skipped"}.get(claim["status"], "failure")
-    margin = "" if claim["margin"] is None else f", margin {claim['margin']:.4g} {claim['unit']}"
+    margin = "" if claim["margin"] is None else f", margin {claim['margin']:.4g} {claim['unit']}".rstrip()
+    if margin and claim["quantity"]:
+        margin += f" ({claim['quantity']})"
     message = f"{claim['status']}, expected {claim['expected']}{margin}: {claim['statement']}"
     outcome = ET.SubElement(case, kind, {"message": _text(message)})
     if kind != "skipped":

@@ -162,7 +162,7 @@ def rows(scenario: Scenario, traces: Mapping[str, Trace]) -> list[dict[str, Any]
     Returns:
         For each row `id`, `quantity`, `measure`, `run`, `robot`, `paper`, `ours` (scalars if of one component,
         `ours` is None without a value), `difference` (largest over the components), `unit`, `tolerance`,
-        `status` (reproduced, calibrated or not_reproduced) and `why`.
+        `status` (reproduced, calibrated, ambiguous or not_reproduced) and `why`.
     """
     return [_row(row, traces) for row in scenario.reproduction]
 
@@ -187,9 +187,15 @@ def _row(row: Reproduction, traces: Mapping[str, Trace]) -> dict[str, Any]:
         "difference": difference,
         "unit": row.unit,
         "tolerance": tolerance,
-        "status": ("calibrated" if row.calibrated else "reproduced") if within else "not_reproduced",
-        "why": row.why if within else "; ".join(filter(None, (reason, row.why))),
+        "status": _status(row, within),
+        "why": row.why if within else "; ".join(filter(None, (reason, row.ambiguous, row.why))),
     }
+
+
+def _status(row: Reproduction, within: bool) -> str:
+    if within:
+        return "calibrated" if row.calibrated else "reproduced"
+    return "ambiguous" if row.ambiguous else "not_reproduced"
 
 
 def _evaluate(row: Reproduction, traces: Mapping[str, Trace]) -> tuple[list[float], str]:

@@ -159,7 +159,8 @@ class Run:
     """One simulation: a method (see `registry.METHODS`) and what is expected of it.
 
     `stalls_m` names the UGVs that must end (to within `stall_tolerance_m`) at that point short of their
-    target. `expected` maps claim identifiers to the expected verdict; a claim not named must hold.
+    target. `expected` maps claim identifiers to the expected verdict; a claim not named must hold. Where
+    there is no guarantee, "holds or refuted" admits either.
     """
 
     method: str = field(default_factory=str, metadata=REQUIRED)
@@ -170,7 +171,11 @@ class Run:
 
 @dataclass
 class Reproduction:
-    """One row of the reproduction table: a measure of a run against the paper's value."""
+    """One row of the reproduction table: a measure of a run against the paper's value.
+
+    `calibrated`: something that the paper leaves open was chosen so that the value comes out. `ambiguous` is another
+    way to read the paper: the row is then neither reproduced nor not.
+    """
 
     id: str = field(default_factory=str, metadata=REQUIRED)
     quantity: str = field(default_factory=str, metadata=REQUIRED)
@@ -181,6 +186,7 @@ class Reproduction:
     unit: str = ""
     tolerance: float = field(default=0.0, metadata=FROM_ZERO)
     calibrated: bool = False
+    ambiguous: str = ""
     why: str = ""
 
 

@@ -27,8 +27,10 @@ from airground_drake.registry import (
     STATUSES,
     UAV_TASKS,
     Registry,
+    alternatives,
     is_plugin,
 )
+from airground_drake.scenarios.rounding import TOLERANCE_M, Rounding
 from airground_drake.scenarios.schema import Scenario, Vector
 
 TRIGGERS: tuple[str, ...] = ("automaton", "bare")
@@ -39,6 +41,7 @@ BUDGETS: tuple[str, ...] = ("counted", "wall_clock")
 MAX_UGVS, MAX_STAGES, MAX_SEED = 100, 1000, 2**31 - 1
 LARGEST, SMALLEST = 1e9, 1e-9  # of any number; of a positive number: products and quotients stay finite
 TOLERANCE = 1e-9  # m between points; relative between periods
+_SHORT = 1.0 - 1e-5  # of a limit that is printed with six digits, so that what a message allows is allowed
 
 # Unit by the suffix of a key, the longest suffix first.
 _UNITS = {"m_sqrt_s": "m/sqrt(s)", "1_m2_s": "1/(m^2 s)", "m_s": "m/s", "1_s": "1/s", "m": "m", "s": "s"}
@@ -75,6 +78,12 @@ def _one_of(key: str, value: str, allowed: Iterable[str], what: str = "one of") 
     options = tuple(allowed)
     if value not in options:
         yield key, value, f"{what} {', '.join(options) or '(none)'}"
+
+
+def _expectation(key: str, expected: str) -> Problems:
+    for status in alternatives(expected):
+        if status not in STATUSES:
+            yield key, expected, f"one of {', '.join(STATUSES)}, or several of them: holds or refuted"
 
 
 def _registered(key: str, name: str, registry: Registry) -> Problems:
@@ -160,11 +169,11 @@ def _runs(scenario: Scenario) -> Problems:
         for claim, status in run.expected.items():
             known = (*RUN_CLAIMS, *scenario.claims)
             yield from _one_of(f"runs.{name}.expected.{claim}", claim, known, "one of the claims")
-            yield from _one_of(f"runs.{name}.expected.{claim}", status, STATUSES)
+            yield from _expectation(f"runs.{name}.expected.{claim}", status)
     for claim, status in scenario.expected.items():
         known = (*MODEL_CLAIMS, *scenario.claims)
         yield from _one_of(f"expected.{claim}", claim, known, "one of the claims about the model")
-        yield from _one_of(f"expected.{claim}", status, STATUSES)
+        yield from _expectation(f"expected.{claim}", status)
     for claim, place in scenario.claims.items():
         if claim in (*RUN_CLAIMS, *MODEL_CLAIMS) or not re.fullmatch(r"[A-Z][A-Z0-9-]*", claim):
             yield f"claims.{claim}", claim, "a new identifier of capitals, digits and hyphens, such as MY-CLAIM"
@@ -256,21 +265,63 @@ def _distances(scenario: Scenario) -> Problems:
         yield "uav.altitude_m", altitude, allowed
 
 
-def _sensing(scenario: Scenario) -> Problems:
-    """What is farther than the sensing range must not come within the safe distance in one control period."""
-    safe, period = scenario.safe_distance, scenario.control.period_s
+def _fastest_pairs(scenario: Scenario) -> list[tuple[float, str, float, str, str]]:
+    """Of each kind of pairs the fastest: safe distance m, its key, closing speed m/s, and the two."""
+    safe = scenario.safe_distance
     ugvs = sorted(((ugv.max_speed_m_s, name) for name, ugv in scenario.ugvs.items()), reverse=True)
     uav = (scenario.uav.max_speed_m_s, scenario.uav.name)
     pairs = [(safe.air_ground_m, "air_ground_m", uav, ugvs[0])]
     pairs += [(safe.ugv_m, "ugv_m", one, other) for one, other in pairwise(ugvs[:2])]
     pairs += [(safe.obstacle_m, "obstacle_m", max(uav, ugvs[0]), (0.0, name)) for name in scenario.obstacles]
+    return [(d, kind, v + w, one, other) for d, kind, (v, one), (w, other) in pairs]
+
+
+def _sensing(scenario: Scenario) -> Problems:
+    """What is farther than the sensing range must not come within the safe distance in one control period."""
+    period = scenario.control.period_s
     needed, distance, closing, kind, one, other = max(
-        (d + (v + w) * period, d, v + w, kind, one, other) for d, kind, (v, one), (w, other) in pairs
+        (d + v * period, d, v, kind, one, other) for d, kind, v, one, other in _fastest_pairs(scenario)
     )
     if scenario.control.sensing_range_m < needed - TOLERANCE:
         total = f"safe_distance.{kind} {distance:.9g} m + closing {closing:.9g} m/s * control.period_s {period:.9g} s"
         allowed = f"at least {needed:.9g} m for {one} and {other}: {total}"
         yield "control.sensing_range_m", scenario.control.sensing_range_m, allowed
+
+
+def _extent(scenario: Scenario) -> Problems:
+    """Rounding must not take more from a safe distance than SAFE-TRACE tolerates; without a gain nothing is restored.
+
+    Then (A = 0) there is nothing that an extent could be accepted by, and SAFE-INV says so.
+    """
+    control, duration = scenario.control, scenario.duration_s
+    if control.avoidance_gain_1_s == 0.0:
+        return
+    pairs = [
+        Rounding(max(control.sensing_range_m, safe), closing, control.period_s, control.avoidance_gain_1_s)
+        for safe, _, closing, _, _ in _fastest_pairs(scenario)
+    ]
+    points = [each for each in _ugv_points(scenario) if each[0].startswith("ugvs.")]
+    points.append(("uav.start_m", scenario.uav.start_m))
+    points += [(f"obstacles.{name}.position_m", each.position_m) for name, each in scenario.obstacles.items()]
+    key, point = max(points, key=lambda entry: max(map(abs, entry[1])))
+    farthest = max(map(abs, point))
+    speed = max(scenario.uav.max_speed_m_s, *(ugv.max_speed_m_s for ugv in scenario.ugvs.values()))
+    allowed = min(pair.largest_extent(duration) for pair in pairs) - speed * duration
+    if farthest <= allowed:
+        return
+    why = f"for rounding to take less than {TOLERANCE_M:g} m from a safe distance"
+    longest = min(pair.longest(farthest, speed) for pair in pairs)
+    if allowed > 0.0 and farthest > speed * duration:
+        yield (
+            key,
+            point,
+            f"coordinates of at most {allowed * _SHORT:.6g} m in size, {why} within duration_s = {duration:.9g} s",
+        )
+    elif longest > 0.0:
+        yield "duration_s", duration, f"at most {longest * _SHORT:.6g} s at {speed:.9g} m/s, {why}"
+    else:
+        gain = max(pair.least_gain(farthest + speed * duration, duration) for pair in pairs)
+        yield "control.avoidance_gain_1_s", control.avoidance_gain_1_s, f"0, or at least {gain / _SHORT:.6g} 1/s, {why}"
 
 
 def _clearances(scenario: Scenario) -> Problems:
@@ -312,6 +363,6 @@ def _choices(scenario: Scenario) -> Problems:
 
 CHECKS: tuple[Callable[[Scenario], Problems], ...] = (
     _finite, _bounds, _counts, _names, _options, _runs, _points, _presets, _gains, _periods, _release,
-    _distances, _sensing, _clearances, _reproduction, _choices,
+    _distances, _sensing, _extent, _clearances, _reproduction, _choices,
 )  # fmt: skip
 """Every rule; later ones rely on earlier ones (finite numbers, three coordinates)."""

@@ -3,24 +3,32 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Sequence
 
 import numpy as np
+import numpy.typing as npt
 from pydrake.systems.framework import (
     BasicVector,
     Context,
+    DiscreteValues,
     EventStatus,
     LeafSystem,
     State,
-    UnrestrictedUpdateEvent,
     WitnessFunction,
     WitnessFunctionDirection,
 )
 
+from airground_drake.arrays import Array
+from airground_drake.decision.excursion import extremes
 from airground_drake.decision.trigger import Mode, Trigger, TriggerState
+from airground_drake.nsbc.motion import Motion
 
 FIELDS = 4
 """Numbers of the trigger's state per UGV: mode, triggers, triggered_at, released_at."""
+
+SHORTEST_S = 1e-9
+"""Steps shorter than this are not looked into, s; what is due in one happens at its end. Ticks of different periods can
+be one unit in the last place apart, and Drake cannot isolate anything in such a step: it stops instead."""
 
 
 class DecisionVariable(LeafSystem):
@@ -55,90 +63,132 @@ class DecisionVariable(LeafSystem):
 
 
 class EventTrigger(LeafSystem):
-    """The automaton of `decision.trigger` for every UGV, its events isolated by witness functions.
+    """The automaton of `decision.trigger` for every UGV, its events isolated by a witness function.
 
-    Between the simulator's steps positions, references and noise are linear in time, so x is convex there: it
-    cannot rise above the threshold and fall back within a step, and no trigger is missed. The initial time is
-    an event of its own: a UGV that starts at or above the threshold triggers at once. The Context needs an
-    accuracy (`Context.SetAccuracy`), or events come at the ends of steps.
+    The witness looks at the whole step so far, not at its end: between the simulator's steps positions, references
+    and noise are linear in time (but for corners of a preset), so that the least and the largest x since the step
+    began are known exactly (`decision.excursion`). It changes its sign once a transition has become due anywhere in
+    the step, and cannot change it back before the step ends: a dip below the release level and back within a step is
+    isolated like any other crossing, and nothing is missed. At the isolated time the step ends, and the per-step
+    update makes the transition; what is due at the beginning of a run, at once. The Context needs an accuracy
+    (`Context.SetAccuracy`), or events come at the ends of steps.
 
     Ports (n UGVs):
-        in  `decision_variable` (n) m.
+        in  `team_position` (3(n+1)) m; `reference` (6n), positions first; `noise` (n) m.
         out `status` (4n): per UGV mode (see Mode), number of triggers, time of the last trigger, s, and of
             the last release, s (-1 before the first).
+    State: the status; the beginning of the step: time, s, positions and references (3n each), m, and noise (n), m.
+    Rate: one update per step of the simulator.
     """
 
-    def __init__(self, count: int, trigger: Trigger) -> None:
-        """Declare ports, state and events for `count` UGVs."""
+    def __init__(self, count: int, trigger: Trigger, presets: Sequence[Motion] = ()) -> None:
+        """Declare ports, state and events for `count` UGVs; the presets (default: none) tell where references bend."""
         super().__init__()
         self._trigger = trigger
         self._count = count
-        self._x = self.DeclareVectorInputPort("decision_variable", count)
+        self._presets = tuple(presets)
+        corners = [(t, j) for j, preset in enumerate(self._presets) for t in preset.times.tolist()]
+        self._corners = sorted(corners)
+        self._corner_times = np.array([t for t, _ in self._corners])
+        self._position = self.DeclareVectorInputPort("team_position", 3 * (count + 1))
+        self._reference = self.DeclareVectorInputPort("reference", 6 * count)
+        self._noise = self.DeclareVectorInputPort("noise", count)
         status = self.DeclareDiscreteState(_pack([TriggerState()] * count))
+        self.DeclareDiscreteState(1 + 7 * count)
         self.DeclareStateOutputPort("status", status)
         self.DeclareInitializationUnrestrictedUpdateEvent(self._start)
-        self._witnesses = self._make_witnesses()
-
-    def _make_witnesses(self) -> dict[Mode, WitnessFunction]:
-        """One witness per mode, over all UGVs in it: the first of them to leave it."""
-
-        def below_threshold(context: Context) -> float:
-            return self._trigger.zeta - max(self._in_mode(context, Mode.SUPERVISING))
-
-        def above_release(context: Context) -> float:
-            return min(self._in_mode(context, Mode.INTERVENING)) - self._trigger.release
-
-        def before_dwell_end(context: Context) -> float:
-            values = context.get_discrete_state_vector().value()
-            states = [_unpack(values, j) for j in range(self._count)]
-            ends = [self._trigger.dwell_end(state) for state in states if state.mode is Mode.REFRACTORY]
-            return min(ends) - context.get_time()
-
-        def make(mode: Mode, calc: Callable[[Context], float]) -> WitnessFunction:
-            def update(context: Context, _: UnrestrictedUpdateEvent, state: State) -> EventStatus:
-                self._leave(mode, context, state)
-                return EventStatus.Succeeded()
-
-            direction = WitnessFunctionDirection.kPositiveThenNonPositive
-            return self.MakeWitnessFunction(f"leaves {mode.name}", direction, calc, UnrestrictedUpdateEvent(update))
-
-        return {
-            Mode.SUPERVISING: make(Mode.SUPERVISING, below_threshold),
-            Mode.INTERVENING: make(Mode.INTERVENING, above_release),
-            Mode.REFRACTORY: make(Mode.REFRACTORY, before_dwell_end),
-        }
-
-    def _in_mode(self, context: Context, mode: Mode) -> list[float]:
-        """Decision variables of the UGVs in a mode, m."""
-        status, x = context.get_discrete_state_vector().value().tolist(), self._x.Eval(context).tolist()
-        return [x[j] for j in range(self._count) if status[FIELDS * j] == mode]
+        self.DeclarePerStepDiscreteUpdateEvent(self.update)
+        direction = WitnessFunctionDirection.kPositiveThenNonPositive
+        self._witness = self.MakeWitnessFunction("a transition is due", direction, self.nothing_due)
 
     def DoGetWitnessFunctions(self, context: Context) -> list[WitnessFunction]:
-        """The witnesses of the modes that some UGV is in."""
-        modes = context.get_discrete_state_vector().value()[::FIELDS].tolist()
-        return [witness for mode, witness in self._witnesses.items() if mode in modes]
+        """The one witness."""
+        return [self._witness]
+
+    def _signals(self, context: Context) -> Array:
+        """Time, s, positions and references, m, and noise, m, of the UGVs now, (1 + 7n,)."""
+        n = 3 * self._count
+        position, reference = self._position.Eval(context)[:n], self._reference.Eval(context)[:n]
+        return np.concatenate([[context.get_time()], position, reference, self._noise.Eval(context)])
 
     def _start(self, context: Context, state: State) -> EventStatus:
-        x = self._x.Eval(context)
-        t = context.get_time()
-        packed = _pack([self._trigger.start(t, float(x[j])) for j in range(self._count)])
-        state.get_mutable_discrete_state().set_value(0, packed)
+        signals = self._signals(context)
+        t, x = float(signals[0]), _norms(self._parts(signals))
+        discrete = state.get_mutable_discrete_state()
+        discrete.set_value(0, _pack([self._trigger.start(t, float(x[j])) for j in range(self._count)]))
+        discrete.set_value(1, signals)
         return EventStatus.Succeeded()
 
-    def _leave(self, mode: Mode, context: Context, state: State) -> None:
-        """Move every UGV whose time in the mode is over at this event; its witness has just crossed zero."""
-        t, x = context.get_time(), self._x.Eval(context)
-        values = state.get_mutable_discrete_state().get_mutable_value(0)
-        for j in range(self._count):
-            before = _unpack(values, j)
-            if before.mode is mode:
-                values[FIELDS * j : FIELDS * (j + 1)] = _pack([self._trigger.step(before, t, float(x[j]))])
+    def nothing_due(self, context: Context) -> float:
+        """The witness: 1 at the beginning of a step and until a transition is due in it, then -1."""
+        begun = context.get_discrete_state(1).value()
+        if context.get_time() - begun[0] < SHORTEST_S:
+            return 1.0
+        status = context.get_discrete_state(0).value().reshape(-1, FIELDS)
+        now = self._signals(context)
+        return -1.0 if self._due(status, now[0], *self._excursions(begun, now)).any() else 1.0
+
+    def update(self, context: Context, discrete: DiscreteValues) -> EventStatus:
+        """Make the transitions that have become due in the step that ends, and begin another: the per-step update."""
+        now = self._signals(context)
+        least, most = self._excursions(context.get_discrete_state(1).value(), now)
+        status = context.get_discrete_state(0).value().reshape(-1, FIELDS).copy()
+        due = np.flatnonzero(self._due(status, now[0], least, most))
+        if len(due):
+            t, x = float(now[0]), _norms(self._parts(now))
+            for j in due:
+                before = _unpack(status[j])
+                seen = {Mode.SUPERVISING: most[j], Mode.INTERVENING: least[j], Mode.REFRACTORY: x[j]}[before.mode]
+                after = self._trigger.step(before, t, float(seen))
+                if after.mode is not before.mode:  # x may have come back already
+                    after = self._trigger.step(after, t, float(x[j]))
+                status[j] = _pack([after])
+            discrete.set_value(0, status.ravel())
+        discrete.set_value(1, now)
+        return EventStatus.Succeeded()
+
+    def _due(self, status: Array, t: float, least: Array, most: Array) -> npt.NDArray[np.bool_]:
+        """For which UGVs a transition is due at time t, s, given how far x went in this step, (n,)."""
+        mode, trigger = status[:, 0], self._trigger
+        due = (mode == Mode.SUPERVISING) & (most >= trigger.zeta)
+        due |= (mode == Mode.INTERVENING) & (least <= trigger.release) & (least < trigger.zeta)
+        for j in np.flatnonzero(mode == Mode.REFRACTORY):
+            due[j] = t >= trigger.dwell_end(_unpack(status[j]))
+        return due
+
+    def _parts(self, signals: Array) -> Array:
+        """Task error and noise of every UGV, (n, 4), m."""
+        n = 3 * self._count
+        error = (signals[1 + n : 1 + 2 * n] - signals[1 : 1 + n]).reshape(-1, 3)
+        return np.column_stack([error, signals[1 + 2 * n :]])
+
+    def _excursions(self, begun: Array, now: Array) -> tuple[Array, Array]:
+        """Least and largest x since the step began, (n,) each, m."""
+        before, after = self._parts(begun), self._parts(now)
+        least, most = extremes(before, after)
+        first, last = np.searchsorted(self._corner_times, [begun[0], now[0]], side="right")
+        for j in {robot for _, robot in self._corners[first:last]}:
+            times = [t for t, robot in self._corners[first:last] if robot == j and t < now[0]]
+            share = (np.array(times) - begun[0]) / (now[0] - begun[0])
+            own = slice(1 + 3 * j, 4 + 3 * j)
+            position = begun[own] + share[:, None] * (now[own] - begun[own])
+            noise = before[j, 3] + share * (after[j, 3] - before[j, 3])
+            bends = np.column_stack([self._presets[j].sample(np.array(times)) - position, noise])
+            way = np.vstack([before[j], bends, after[j]])
+            low, high = extremes(way[:-1], way[1:])
+            least[j], most[j] = low.min(), high.max()
+        return least, most
 
 
-def _pack(states: list[TriggerState]) -> np.ndarray:
+def _norms(parts: Array) -> Array:
+    """x of every UGV, (n,), m, from task errors and noise, (n, 4)."""
+    return extremes(parts, parts)[0]
+
+
+def _pack(states: Sequence[TriggerState]) -> Array:
     return np.array([[s.mode, s.triggers, s.triggered_at, s.released_at] for s in states], dtype=float).ravel()
 
 
-def _unpack(values: np.ndarray, j: int) -> TriggerState:
-    mode, triggers, triggered_at, released_at = values[FIELDS * j : FIELDS * (j + 1)]
-    return TriggerState(Mode(int(mode)), int(triggers), float(triggered_at), float(released_at))
+def _unpack(values: Array) -> TriggerState:
+    mode, triggers, triggered_at, released_at = values.tolist()
+    return TriggerState(Mode(int(mode)), int(triggers), triggered_at, released_at)

@@ -50,9 +50,10 @@ def _line(verdict: Verdict) -> str:
     """A verdict in one line."""
     finding = verdict.finding
     name = f"{verdict.claim.id} {verdict.run}" if verdict.run else verdict.claim.id
-    margin = "" if finding.margin is None else f", margin {finding.margin:.6g} {finding.unit}"
+    margin = "" if finding.margin is None else f", margin {finding.margin:.6g} {finding.unit}".rstrip()
+    of = f" ({finding.quantity})" if margin and finding.quantity else ""
     expected = "" if verdict.as_expected else f", expected {verdict.expected}"
-    return f"{name}: {finding.status}{margin}{expected}"
+    return f"{name}: {finding.status}{margin}{of}{expected}"
 
 
 def _judge(target: str, wanted: Sequence[str]) -> list[Verdict]:

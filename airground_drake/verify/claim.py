@@ -12,7 +12,7 @@ import numpy as np
 
 from airground_drake import files
 from airground_drake.errors import TraceError
-from airground_drake.registry import PASSING, Status
+from airground_drake.registry import PASSING, Status, alternatives
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.trace import Trace
 from airground_drake.verify.finding import Finding
@@ -151,20 +151,20 @@ class Verdict:
         claim: the claim.
         run: on which run; '' for a claim about the model.
         finding: what was found.
-        expected: the status that the scenario expects.
+        expected: the status that the scenario expects; "holds or refuted" admits either.
         inputs: the constants that a claim about the model is about.
     """
 
     claim: Claim
     run: str
     finding: Finding
-    expected: Status
+    expected: str
     inputs: dict[str, Any] = field(default_factory=dict)
 
     @property
     def as_expected(self) -> bool:
         """Whether the status is the expected one."""
-        return self.finding.status == self.expected
+        return self.finding.status in alternatives(self.expected)
 
     def to_json(self) -> dict[str, Any]:
         """The entry of `claims` in report.json; of certificates, their names and SHA-256."""

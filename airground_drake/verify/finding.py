@@ -20,6 +20,7 @@ class Finding:
         counterexample: for `refuted`: enough to reproduce it by hand.
         evidence: numbers behind the verdict, strict JSON.
         certificates: texts that others can check, by file name.
+        quantity: what the margin is of, in a few words.
     """
 
     status: Status
@@ -29,3 +30,4 @@ class Finding:
     counterexample: dict[str, Any] | None = None
     evidence: dict[str, Any] = field(default_factory=dict)
     certificates: dict[str, str] = field(default_factory=dict)
+    quantity: str = ""

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from pathlib import Path
-from typing import cast
 
-from airground_drake.registry import Status
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.trace import Trace
 from airground_drake.verify.cache import find
@@ -61,6 +59,6 @@ def verify_model(
     inputs = [claim.judge_inputs(scenario) for claim in chosen]
     findings = find(chosen, inputs, folder=kept)
     return [
-        Verdict(claim, "", finding, cast("Status", scenario.expected.get(claim.id, claim.expected)), given)
+        Verdict(claim, "", finding, scenario.expected.get(claim.id, claim.expected), given)
         for claim, given, finding in zip(chosen, inputs, findings, strict=True)
     ]

@@ -43,8 +43,10 @@ def test_json_is_strict_and_says_the_same(report: Path, capsys: pytest.CaptureFi
     assert {"claim", "run", "outcome", "text", "rule", "t_s", "recorded", "recomputed"} <= set(said["checks"][0])
 
 
-def test_a_rejection_names_rule_time_and_both_values(report: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    folder = copy(report, report.with_name("rejected"))
+def test_a_rejection_names_rule_time_and_both_values(
+    report: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = copy(report, tmp_path)
     TAMPERINGS["decision_variable_changed"].edit(folder)
     assert check.main(["--json", str(folder)]) == 1
     checks = json.loads(capsys.readouterr().out, parse_constant=no_constants)["checks"]
@@ -62,8 +64,10 @@ def test_a_rejection_names_rule_time_and_both_values(report: Path, capsys: pytes
     assert "decision variable (ugv1) at t = 0 s: recorded" in line
 
 
-def test_numbers_that_are_not_finite_stay_strict_json(report: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    folder = copy(report, report.with_name("rejected"))
+def test_numbers_that_are_not_finite_stay_strict_json(
+    report: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = copy(report, tmp_path)
     TAMPERINGS["position_is_nan"].edit(folder)
     assert check.main(["--json", str(folder)]) == 1
     checks = json.loads(capsys.readouterr().out, parse_constant=no_constants)["checks"]

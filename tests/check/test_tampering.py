@@ -33,7 +33,7 @@ def test_there_are_many_tamperings_with_every_claim() -> None:
 
 
 def test_a_copy_that_was_tampered_with_is_mended(report: Path, tmp_path: Path) -> None:
-    folder = copy(report, report.with_name("mended"))
+    folder = copy(report, tmp_path)
     TAMPERINGS["position_changed"].edit(folder)
     TAMPERINGS["trace_folder_added"].edit(folder)
     TAMPERINGS["timings_missing"].edit(folder)

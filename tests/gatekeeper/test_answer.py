@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from builders_gatekeeper import STALL_POSITION, case_a_proposal
+from builders.problems import STALL_POSITION, case_a_proposal
 from hypothesis import given
 from hypothesis import strategies as st
 

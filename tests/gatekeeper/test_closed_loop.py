@@ -6,9 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from builders_gatekeeper import FAR, H, Instance, run_controller
-from hypothesis import given, settings
+from builders.closed_loop import FAR, H, Instance, run_controller
+from hypothesis import given
 from hypothesis import strategies as st
+from properties import examples
 from pydrake.common.value import Value
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
@@ -63,7 +64,7 @@ def test_switching_plans_are_those_of_the_running_controller_in_a_diagram(seed: 
         np.testing.assert_allclose(loop.positions(omega), driven, atol=1e-9)
 
 
-@settings(max_examples=40)
+@examples(40)
 @given(st.integers(0, 10**6), st.booleans(), st.integers(1, 3))
 def test_switching_plans_among_moving_robots_and_with_long_stages(seed: int, on_top: bool, substeps: int) -> None:
     case = Instance(seed, on_top=on_top)
@@ -73,7 +74,7 @@ def test_switching_plans_among_moving_robots_and_with_long_stages(seed: int, on_
     np.testing.assert_allclose(case.loop(12, substeps).positions(omega), expected, atol=1e-9)
 
 
-@settings(max_examples=40)
+@examples(40)
 @given(st.integers(0, 10**6), st.booleans(), st.integers(1, 3))
 def test_the_constant_plans_are_those_of_the_mode_velocities(seed: int, on_top: bool, substeps: int) -> None:
     problem = Instance(seed, on_top=on_top).problem(12, substeps)

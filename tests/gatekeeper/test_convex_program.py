@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builders_gatekeeper import blocked, half_plane_cost, random_problem, rolled_out, total
+from builders.problems import random_problem, rolled_out
+from gatekeeper.formulas import blocked, half_plane_cost, total
 from pydrake.solvers import ClarabelSolver, MixedIntegerBranchAndBound, SolutionResult
 
 from airground_drake.gatekeeper.convex_program import team_program

@@ -6,7 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from builders_gatekeeper import PLANS, half_plane_cost, random_problem, rolled_out, used
+from builders.problems import PLANS, random_problem, rolled_out
+from gatekeeper.contract import used
+from gatekeeper.formulas import half_plane_cost
 from hypothesis import given
 from hypothesis import strategies as st
 from pydrake.solvers import ClarabelSolver, SolverOptions

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from builders_gatekeeper import blocked, cost, random_problem, rolled_out
-from hypothesis import given, settings
+from builders.problems import random_problem, rolled_out
+from gatekeeper.formulas import blocked, cost
+from hypothesis import given
 from hypothesis import strategies as st
+from properties import examples
 
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.local_search import LocalSearch, best_known
@@ -25,7 +27,7 @@ def test_the_search_finds_what_brute_force_finds() -> None:
 
 
 @given(st.integers(0, 10**6), st.integers(2, 40), st.integers(0, 3), st.integers(1, 5000))
-@settings(max_examples=50)
+@examples(50)
 def test_the_search_never_makes_a_plan_dearer(seed: int, width: int, reach: int, nodes: int) -> None:
     problem = random_problem(seed)
     constants = ConstantPlans.of(problem)

@@ -6,9 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from builders_gatekeeper import AVOIDANCE, STALL_POSITION, H, Instance, case_a_proposal
-from hypothesis import given, settings
+from builders.closed_loop import AVOIDANCE, H, Instance
+from builders.problems import STALL_POSITION, case_a_proposal
+from hypothesis import given
 from hypothesis import strategies as st
+from properties import examples
 
 from airground_drake.components import make_presets, make_team
 from airground_drake.gatekeeper.prediction import Horizon, Scene, closed_loop, predicted_problem
@@ -75,7 +77,7 @@ def bend(case: Instance, problem: Problem) -> float:
     return float(bent / wanted)
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(st.integers(0, 10**6))
 def test_bend_follows_its_formula(seed: int) -> None:
     case = Instance(seed)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from builders_gatekeeper import PLANS, random_problem
+from builders.problems import PLANS, random_problem
 from hypothesis import given
 from hypothesis import strategies as st
 

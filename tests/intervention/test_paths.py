@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from properties import examples
 from scipy.sparse.csgraph import dijkstra
 
 from airground_drake.intervention.paths import TOL, NoPath, Path, shortest_path
@@ -18,7 +19,6 @@ from airground_drake.intervention.paths import TOL, NoPath, Path, shortest_path
 Array = NDArray[np.float64]
 Point = tuple[float, float]
 Disc = tuple[float, float, float]
-FAST = settings(max_examples=50, deadline=None, derandomize=True, database=None)
 RING = [(2.0 * math.cos(a), 2.0 * math.sin(a)) for a in np.arange(8) * math.pi / 4]
 
 
@@ -270,7 +270,7 @@ halves = st.integers(0, 8).map(lambda n: n / 2.0)
 grid_scene = st.lists(st.tuples(halves, halves, st.sampled_from([0.5, 1.0, 1.5])), max_size=7)
 
 
-@settings(FAST, max_examples=30)
+@examples(30, fuzz=2000)
 @given(point, point, scene)
 def test_random_scene_against_the_oracle(start: Point, goal: Point, discs: list[Disc]) -> None:
     assume(start != goal and clearance(np.array((start, goal)), discs) > 0.05)
@@ -288,7 +288,7 @@ def test_random_scene_against_the_oracle(start: Point, goal: Point, discs: list[
     assert clearance(sample(path)[1], discs) >= -TOL
 
 
-@FAST
+@examples(50)
 @given(st.tuples(halves, halves), st.tuples(halves, halves), grid_scene)
 def test_degenerate_scene_on_a_grid(start: Point, goal: Point, discs: list[Disc]) -> None:
     """Touching, equal, concentric and aligned circles; ends on circles and on their crossings."""
@@ -303,7 +303,7 @@ def test_degenerate_scene_on_a_grid(start: Point, goal: Point, discs: list[Disc]
         assert clearance(sample(path)[1], discs) >= -TOL
 
 
-@FAST
+@examples(50)
 @given(st.floats(0.0, 6.3), st.floats(0.0, 0.999), point, scene.filter(len))
 def test_start_inside_discs(angle: float, depth: float, goal: Point, discs: list[Disc]) -> None:
     x, y, r = discs[0]

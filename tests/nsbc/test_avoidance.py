@@ -7,8 +7,9 @@ from dataclasses import replace
 import cvxpy
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from properties import examples
 from scipy.optimize import linprog
 
 from airground_drake.nsbc.avoidance import Avoidance, HalfSpaces, Surroundings, limit_speed
@@ -79,7 +80,7 @@ def attack(seed: int, steps: int, avoidance: Avoidance, *, share: float | None =
     return worst
 
 
-@settings(max_examples=40)
+@examples(40, fuzz=2000)
 @given(SEEDS, st.sampled_from([0.01, 0.05, 0.2]))
 def test_no_velocity_breaks_the_safe_distance_in_continuous_time(seed: int, h: float) -> None:
     assert attack(seed, 60, Avoidance(gain=3.0, period=h)) >= -1e-12
@@ -105,7 +106,7 @@ def test_inequalities_hold_in_floating_point_from_any_safe_state(seed: int) -> N
     assert (slack >= -1e-9).all()
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(SEEDS, st.booleans())
 def test_projection_is_the_exact_minimiser(seed: int, planar: bool) -> None:
     """Against an interior-point solver, which shares nothing with the enumeration of active sets."""

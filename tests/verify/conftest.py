@@ -1,4 +1,4 @@
-"""Findings about the model, made once in a session however many modules look at them."""
+"""Findings about the model, made once in a session however many modules and workers look at them."""
 
 from __future__ import annotations
 
@@ -8,8 +8,10 @@ from typing import Any
 import pytest
 from verify.judging import Judged
 
+from airground_drake.verify.cache import cache_folder, find
 from airground_drake.verify.claim import ModelClaim, Mutant
 from airground_drake.verify.finding import Finding
+from airground_drake.verify.mutants import MutantClaim
 
 
 @pytest.fixture(scope="session")
@@ -18,10 +20,10 @@ def judged() -> Judged:
     made: dict[tuple[str, str], Finding] = {}
 
     def get(claim: ModelClaim | Mutant, inputs: dict[str, Any]) -> Finding:
-        mutant = isinstance(claim, Mutant)
-        key = f"{claim.claim}: {claim.says}" if mutant else claim.id, json.dumps(inputs, sort_keys=True)
+        asked = MutantClaim(claim) if isinstance(claim, Mutant) else claim
+        key = asked.id, json.dumps(inputs, sort_keys=True)
         if key not in made:
-            made[key] = claim.check(inputs) if mutant else claim.judge(inputs)
+            (made[key],) = find([asked], [inputs], folder=cache_folder())
         return made[key]
 
     return get

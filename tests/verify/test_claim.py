@@ -8,17 +8,8 @@ from typing import Any
 
 import pandas as pd
 import pytest
-from builders import (
-    bumped,
-    dropped,
-    passing_by,
-    rows,
-    run_of,
-    set_nan,
-    with_meta,
-    with_scenario,
-    with_signals,
-)
+from builders.edits import bumped, dropped, rows, set_nan, with_meta, with_scenario, with_signals
+from builders.runs import passing_by, run_of
 from verify.judging import CLAIMS, GATE, LAW, judge
 
 from airground_drake.errors import TraceError

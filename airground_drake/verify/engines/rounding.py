@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from airground_drake.arrays import ROUNDOFF as ROUNDOFF
 from airground_drake.arrays import Array
 
 SEED = 20211209
-ROUNDOFF = 2.0**-53
-"""Unit roundoff u of binary64: every operation returns its exact result times 1 + e, |e| <= u."""
 
 
 def unit(rng: np.random.Generator, count: int) -> Array:

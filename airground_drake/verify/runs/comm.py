@@ -83,6 +83,7 @@ class Comm(TraceClaim):
             "refuted" if strays or over else "holds",
             margin=None if strays else min(saved.values(), default=None),
             unit="fraction saved",
+            quantity="messages or decisions saved against always-on",
             counterexample=min(strays, key=lambda stray: float(stray["t_s"])) if strays else over,
             evidence={
                 "spent": spent,

@@ -116,6 +116,7 @@ class Exec(TraceClaim):
             "refuted" if wrong else "holds",
             margin=margin if margin < 0.0 or not wrong else None,
             unit="m/s",
+            quantity="tolerance left by which a command may differ from the law's",
             where={"robot": worst.robot, "t_s": float(worst.t[k])},
             counterexample=min(wrong, key=lambda entry: float(entry["t_s"]), default=None),
             evidence={

@@ -70,6 +70,7 @@ class GateFeas(GateClaim):
             "holds",
             margin=min((1.0 - one.off / one.allowed for one in compared if one.allowed > 0.0), default=None),
             unit="of the tolerance",
+            quantity="part left of the tolerance of a recorded number",
             evidence={
                 "decisions": len(rows),
                 "without_a_plan": [row.label for row in rows if not row.planned],

@@ -112,6 +112,7 @@ class GateOpt(GateClaim):
             "holds" if decided else "inconclusive",
             margin=self.largest_gap - worst[0]["gap"] if decided else None,
             unit="of the cheaper constant plan's cost",
+            quantity="largest gap allowed less the largest gap",
             where={name: worst[0][name] for name in ("robot", "t_s")} if worst else {},
             evidence={
                 "bounded": len(bounded),

@@ -60,6 +60,7 @@ class GateSur(GateClaim):
             "holds",
             margin=max(0.0, bound - error),
             unit="s",
+            quantity="half a stage less the integrated rounding error",
             where={name: worst.given[name] for name in ("robot", "t_s")},
             evidence={**skipped, "largest_error_s": error, "bound_s": bound},
         )

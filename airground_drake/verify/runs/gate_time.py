@@ -55,4 +55,12 @@ class GateTime(TraceClaim):
         }
         in_time = p99 < period
         counterexample = None if in_time else {"decision": int(times.argmax()), "time_s": float(times.max())}
-        return Finding("holds" if in_time else "refuted", period - p99, "s", {}, counterexample, evidence)
+        quantity = "sampling period less the 99th percentile of decision times"
+        return Finding(
+            "holds" if in_time else "refuted",
+            margin=period - p99,
+            unit="s",
+            quantity=quantity,
+            counterexample=counterexample,
+            evidence=evidence,
+        )

@@ -76,6 +76,7 @@ class LiveGoal(TraceClaim):
             "holds" if live else "refuted",
             margin=worst["margin_m"],
             unit="m",
+            quantity="tolerance left about where a robot must end",
             where={"robot": worst["robot"], "condition": worst["condition"]},
             counterexample=None if live else worst,
             evidence={"conditions": conditions},

@@ -86,6 +86,7 @@ class SafeHyp(TraceClaim):
             "refuted" if first else "holds",
             margin=leading.get("margin"),
             unit=leading.get("unit", ""),
+            quantity=f"least slack of the hypothesis {name!r}",
             where={key: leading[key] for key in leading if key not in ("margin", "unit")},
             counterexample=first | snapshot(trace, first.values(), first["t_s"]) if first else None,
             evidence={

@@ -56,6 +56,7 @@ class SafeTrace(TraceClaim):
             "holds" if safe else "refuted",
             margin=worst["margin_m"],
             unit="m",
+            quantity="least distance of a pair less its safe distance",
             where={key: worst[key] for key in ("first", "second", "t_s")},
             counterexample=None if safe else worst | snapshot(trace, (worst["first"], worst["second"]), worst["t_s"]),
             evidence={"pairs": pairs, "tolerance_m": DISTANCE_TOLERANCE_M},

@@ -103,6 +103,7 @@ class ThrTrig(TraceClaim):
             "refuted" if wrong else "holds",
             margin=EVENT_TOLERANCE_S - worst[0] if worst else None,
             unit="s",
+            quantity="time left by which an event may differ from the crossing",
             where={"robot": worst[1]} if worst else {},
             counterexample=min(wrong, key=lambda conflict: float(conflict["t_s"])) if wrong else None,
             evidence={"ugvs": evidence, "zeta_m": zeta, "release_m": release, "dwell_s": dwell},

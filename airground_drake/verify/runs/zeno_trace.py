@@ -57,6 +57,7 @@ class ZenoTrace(TraceClaim):
             "holds" if held else "refuted",
             margin=gap - bound,
             unit="s",
+            quantity="smallest gap between two triggers less the bound",
             where={"robot": ugv, "t_s": after},
             counterexample=None if held else smallest,
             evidence=evidence | {"smallest_gap": smallest},

@@ -286,6 +286,42 @@ def margin_of_a_proof_changed(folder: Path) -> None:
         claim["margin"] = 2.0
 
 
+@refused_by("SAFE-INV", "margin", run="")
+def margin_of_a_proof_that_leaves_out_the_extent(folder: Path) -> None:
+    with edited_claim(folder, "SAFE-INV", "") as claim:
+        claim["margin"] = 9.99e-10
+
+
+@refused_by("SAFE-INV", "inputs", run="")
+def diagram_of_another_scenario_compared(folder: Path) -> None:
+    with edited_claim(folder, "SAFE-INV", "") as claim:
+        claim["inputs"]["scenario"]["safe_distance"]["air_ground_m"] *= 0.9
+
+
+@refused_by("SAFE-INV", "the built diagram agrees with the scenario", run="")
+def wiring_that_differs(folder: Path) -> None:
+    with edited_claim(folder, "SAFE-INV", "") as claim:
+        claim["evidence"]["wiring"].update(agrees=False, differences=1)
+
+
+@refused_by("SAFE-GATE", "the built diagram agrees with the scenario", run="")
+def wiring_that_differs_under_method_d(folder: Path) -> None:
+    with edited_claim(folder, "SAFE-GATE", "") as claim:
+        claim["evidence"]["wiring"][0]["differences"] = 1
+
+
+@refused_by("SAFE-GATE", "robots and what they avoid", run="")
+def wiring_of_fewer_pairs(folder: Path) -> None:
+    with edited_claim(folder, "SAFE-GATE", "") as claim:
+        claim["evidence"]["wiring"][0]["views"]["uav_ugv"] -= 1
+
+
+@refused_by("SAFE-INV", "an inequality of every two robots was seen to bind", run="")
+def wiring_never_seen_to_bind(folder: Path) -> None:
+    with edited_claim(folder, "SAFE-INV", "") as claim:
+        claim["evidence"]["wiring"]["least_times_bound"]["ugv_ugv"] = 0
+
+
 @refused_by("SAFE-DIST", "margin", run="")
 def margin_of_the_disturbed_runs_changed(folder: Path) -> None:
     with edited_claim(folder, "SAFE-DIST", "") as claim:

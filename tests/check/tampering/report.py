@@ -316,7 +316,10 @@ def gain_changed_everywhere_and_in_the_inputs(folder: Path) -> None:
     gain_changed_everywhere(folder)
     with edited_report(folder) as report:
         for claim in ("SAFE-INV", "SAFE-GATE", "SAFE-DIST"):
-            claim_of(report, claim, "")["inputs"]["avoidance_gain_1_s"] = 5.0
+            inputs = claim_of(report, claim, "")["inputs"]
+            inputs["avoidance_gain_1_s"] = 5.0
+            if "scenario" in inputs:
+                inputs["scenario"]["control"]["avoidance_gain_1_s"] = 5.0
 
 
 @refused_by("THR-ROOT", "constants", run="")

@@ -6,7 +6,9 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from builders_gatekeeper import blocked, check_contract, random_problem
+from builders.problems import random_problem
+from gatekeeper.contract import check_contract
+from gatekeeper.formulas import blocked
 from pydrake.solvers import ClarabelSolver, MixedIntegerBranchAndBound, SolutionResult, SolverOptions
 
 from airground_drake.gatekeeper.half_planes import normals_along

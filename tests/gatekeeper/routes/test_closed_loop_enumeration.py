@@ -8,9 +8,11 @@ from itertools import product
 
 import numpy as np
 import pytest
-from builders_gatekeeper import AVOIDANCE, H, Instance, cost_through, run_controller
-from hypothesis import given, settings
+from builders.closed_loop import AVOIDANCE, H, Instance, run_controller
+from gatekeeper.formulas import cost_through
+from hypothesis import given
 from hypothesis import strategies as st
+from properties import examples
 
 from airground_drake.gatekeeper.blocks import block_of_stage
 from airground_drake.gatekeeper.budget import UNLIMITED, Budget
@@ -43,7 +45,7 @@ def brute_force(case: Instance, problem: Problem, substeps: int, blocks: int) ->
     return best
 
 
-@settings(max_examples=60)
+@examples(60, fuzz=3000)
 @given(st.integers(0, 10**6), st.booleans(), st.integers(1, 2), st.integers(1, 5), st.sampled_from([1.0, 100.0]))
 def test_the_search_finds_the_optimum_of_all_plans(
     seed: int, on_top: bool, substeps: int, blocks: int, error_weight: float
@@ -66,7 +68,7 @@ def test_what_is_predicted_runs_the_search_that_was_compiled(proposals_of_case_b
         assert len(kernel.signatures) == 1
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(st.integers(0, 10**6), st.booleans(), st.integers(1, 70))
 def test_every_decision_carries_its_evidence(seed: int, on_top: bool, stages: int) -> None:
     problem = Instance(seed, on_top=on_top).problem(stages)
@@ -141,7 +143,7 @@ def visited(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     return counts
 
 
-@settings(max_examples=30)
+@examples(30)
 @given(st.integers(0, 10**6), st.integers(1, 200))
 def test_a_spent_budget_leaves_valid_bounds(seed: int, nodes: int) -> None:
     problem = Instance(seed).problem(24)

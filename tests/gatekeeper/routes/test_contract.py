@@ -7,19 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builders_gatekeeper import (
-    DEFAULT,
-    INSTANCES,
-    MAKERS,
-    Recording,
-    blocked,
-    check_contract,
-    cost,
-    random_problem,
-    rolled_out,
-    same,
-    used,
-)
+from builders.problems import INSTANCES, random_problem, rolled_out
+from gatekeeper.contract import DEFAULT, MAKERS, Recording, check_contract, same, used
+from gatekeeper.formulas import blocked, cost
 from pydrake.solvers import SolutionResult
 
 from airground_drake.gatekeeper.budget import Budget

@@ -6,7 +6,9 @@ from itertools import pairwise
 from typing import Any
 
 import pytest
-from builders_gatekeeper import blocked, cost, random_problem, rolled_out, used
+from builders.problems import random_problem, rolled_out
+from gatekeeper.contract import used
+from gatekeeper.formulas import blocked, cost
 
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.routes.enumeration import EnumerationRoute

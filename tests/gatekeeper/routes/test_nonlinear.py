@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from builders_gatekeeper import INSTANCES, cost, total
+from builders.problems import INSTANCES
+from gatekeeper.formulas import cost, total
 from pydrake.solvers import SnoptSolver
 
 from airground_drake.gatekeeper.routes import nonlinear

@@ -86,3 +86,12 @@ def test_a_certified_implication_is_true_everywhere(values: tuple[Fraction, ...]
 def test_rational_is_the_decimal_that_is_printed(x: float) -> None:
     assert float(Fraction(rational(x))) == x
     assert Fraction(rational(0.05)) == Fraction(1, 20)
+
+
+def test_premises_that_were_not_seen_to_be_satisfiable_prove_nothing() -> None:
+    (proof,) = prover.discharge([STEP])
+    assert (proof.certified, proof.premises.answer, proof.status) == (True, "sat", "proved")
+    for answer in ("unknown", "timeout", "error"):
+        assert replace(proof, premises=Result(answer)).status == "inconclusive"
+    assert replace(proof, premises=Result("unsat")).status == "error"
+    assert prover.finding([replace(proof, premises=Result("unknown"))]).status == "inconclusive"

@@ -6,9 +6,10 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from properties import examples
 
 from airground_drake.verify.engines.segments import NormSignal, closest_approach, corner_times, interpolate, travelled
 
@@ -17,7 +18,7 @@ COORDINATES = st.floats(-10.0, 10.0, allow_subnormal=False)
 PATHS = st.integers(2, 6).flatmap(lambda n: st.tuples(*[arrays(np.float64, (n, 3), elements=COORDINATES)] * 2))
 
 
-@settings(max_examples=150, deadline=None)
+@examples(150)
 @given(PATHS, st.booleans())
 def test_closest_approach_against_sampling(paths: tuple[np.ndarray, np.ndarray], at_rest: bool) -> None:
     first, second = paths[0], paths[1][0] if at_rest else paths[1]
@@ -50,7 +51,7 @@ def test_travelled_holds_its_last_point() -> None:
     assert corner_times(corners[:1], 0.5).size == corner_times(corners, 0.0).size == 0
 
 
-@settings(max_examples=100, deadline=None)
+@examples(100)
 @given(arrays(np.float64, (4, 4), elements=st.floats(-2.0, 2.0, allow_subnormal=False)), st.floats(-1.0, 3.0))
 @example(np.array([[0.0] * 4, [2.4e-161, 0.0, 0.0, 0.0], [0.0] * 4, [0.0] * 4]), 0.0)  # squares are 0
 def test_norm_signal_against_sampling(parts: np.ndarray, level: float) -> None:

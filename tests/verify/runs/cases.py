@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from builders import ALL_PLANS, STAGE_S, STAGES, DecisionEdit
+from builders.decisions import ALL_PLANS, STAGE_S, STAGES
+from builders.edits import DecisionEdit
 
 from airground_drake.arrays import Array
 

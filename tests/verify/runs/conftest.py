@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from builders import decided_run
+from builders.decisions import decided_run
 
 from airground_drake.trace import Trace
 from airground_drake.verify.runs import gate_feas

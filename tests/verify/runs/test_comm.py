@@ -9,12 +9,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from builders import (
-    first_of,
-    run_of,
-    with_meta,
-    with_signals,
-)
+from builders.edits import first_of, with_meta, with_signals
+from builders.runs import run_of
 from verify.judging import judge
 
 from airground_drake.trace import Trace

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builders import moved, run_of, with_signals
+from builders.edits import moved, with_signals
+from builders.runs import run_of
 from verify.judging import judge
 
 from airground_drake import components, diagram

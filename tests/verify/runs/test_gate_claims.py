@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-import builders
 import numpy as np
 import pandas as pd
 import pytest
-from builders import decided_run, with_decision
+from builders.decisions import decided_run
+from builders.edits import with_decision, with_meta, with_signals
 from verify.judging import FEAS, OPT, SUR
 from verify.runs.cases import refused_for_want_of_a_plan
 
@@ -94,7 +94,7 @@ def test_no_decision_at_all() -> None:
 
     for claim in (FEAS, SUR, OPT):
         assert claim.judge(none).status == "holds"
-        assert claim.judge(builders.with_signals(none, intervening)).status == "not_run"
-        assert claim.judge(builders.with_signals(trace, intervening)).status == "not_run"
+        assert claim.judge(with_signals(none, intervening)).status == "not_run"
+        assert claim.judge(with_signals(trace, intervening)).status == "not_run"
         assert claim.judge(replace(trace, problems=trace.problems.iloc[:0])).status == "not_run"
-        assert not claim.applies(builders.with_meta(trace, method="b"))
+        assert not claim.applies(with_meta(trace, method="b"))

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from builders import with_decision
+from builders.edits import with_decision
 from verify.judging import FEAS, OPT, SUR
 from verify.runs.cases import (
     contrary_answer,

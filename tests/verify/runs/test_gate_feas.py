@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-import builders
 import numpy as np
 import pandas as pd
 import pytest
-from builders import STAGE_S, STAGES, DecisionEdit, decided_run, with_decision
+from builders.decisions import STAGE_S, STAGES, decided_run
+from builders.edits import DecisionEdit, with_decision, with_signals
 from hypothesis import given
 from hypothesis import strategies as st
 from verify.judging import FEAS, assert_decision_refuted, comparisons
@@ -153,7 +153,7 @@ def test_an_execution_needs_an_acceptance(relaxed: Trace) -> None:
     def executed(signals: pd.DataFrame) -> None:
         signals.loc[signals["t_s"] > 0.42, "ugv1.accepted"] = 1.0
 
-    trace = builders.with_signals(relaxed, executed)
+    trace = with_signals(relaxed, executed)
     finding = FEAS.judge(trace)
     assert finding.status == "refuted"
     assert finding.counterexample is not None

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builders import with_decision, with_scenario
+from builders.edits import with_decision, with_scenario
 from verify.judging import judge
 
 from airground_drake.gatekeeper import prediction

@@ -6,11 +6,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builders import ALL_PLANS, STAGES, DecisionEdit, decided_run, gate_data_at, with_decision
+from builders.decisions import ALL_PLANS, STAGES, decided_run, gate_data_at
+from builders.edits import DecisionEdit, with_decision
 from verify.judging import OPT, SUR, assert_decision_refuted
 from verify.runs.cases import inflate_loser, long_normals, overstate_bound, understate_bound, understate_gap, worst_plan
 
 from airground_drake.arrays import Array
+from airground_drake.check.optimality import LARGEST_GAP
 from airground_drake.trace import Trace
 from airground_drake.verify.runs import convex_bounds, gate_opt
 from airground_drake.verify.runs.gate_record import Row, rows_of
@@ -86,3 +88,19 @@ def test_blocks_are_enumerated_exactly() -> None:
         row["gap"] = 0.0
 
     assert OPT.judge(with_decision(trace, second_best)).status == "refuted"
+
+
+@pytest.mark.parametrize(("gap", "status"), [(0.0499, "holds"), (0.0501, "inconclusive"), (0.4, "inconclusive")])
+def test_a_gap_is_too_wide_from_five_per_cent_on(
+    relaxed: Trace, gap: float, status: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On either side of what the statement says, and what the independent checker allows."""
+    assert "at most 5 %" in OPT.statement
+    assert OPT.largest_gap == LARGEST_GAP == 0.05
+    bounded = gate_opt.bound(rows_of(relaxed), "relaxed")
+    assert max(each.gap for each in bounded) < 0.0499
+    bounded[1].__dict__["gap"] = gap  # a cached property
+    assert OPT._finding(bounded, []).status == status
+    # and through the claim, with nothing else wrong: blocks of stages show no cheaper plan
+    monkeypatch.setattr(gate_opt, "bound", lambda rows, route: bounded)
+    assert OPT.judge(relaxed).status == status

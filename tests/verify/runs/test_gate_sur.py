@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from builders import DecisionEdit, with_decision
+from builders.edits import DecisionEdit, with_decision
 from verify.judging import SUR, assert_decision_refuted
 from verify.runs.cases import fractional_rounding, relaxed_outside, round_otherwise, understate_rounding
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from builders import run_of
+from builders.runs import run_of
 from verify.judging import judge
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pytest
-from builders import moved, run_of, with_scenario
+from builders.edits import moved, with_scenario
+from builders.runs import run_of
 from verify.judging import counterexample, judge
 
 from airground_drake.trace import Trace

@@ -6,18 +6,10 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from builders import (
-    STILL,
-    at_rest,
-    case_a,
-    lone,
-    moved,
-    passing_by,
-    rows,
-    run_of,
-    simulate,
-    with_scenario,
-)
+from builders.edits import moved, rows, with_scenario
+from builders.runs import at_rest, passing_by, run_of
+from builders.scenarios import STILL, case_a, lone
+from builders.simulation import simulate
 from verify.judging import counterexample, judge
 
 from airground_drake.nsbc.avoidance import Avoidance, Surroundings

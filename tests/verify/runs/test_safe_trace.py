@@ -4,12 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from builders import (
-    moved,
-    passing_by,
-    run_of,
-    with_scenario,
-)
+from builders.edits import moved, with_scenario
+from builders.runs import passing_by, run_of
 from verify.judging import counterexample, judge
 
 

@@ -7,22 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builders import (
-    STILL,
-    Drive,
-    at_rest,
-    bumped,
-    changed,
-    dropped,
-    first_of,
-    lone,
-    refractory,
-    run_of,
-    set_nan,
-    simulate,
-    with_meta,
-    with_scenario,
-)
+from builders.edits import bumped, dropped, first_of, set_nan, with_meta, with_scenario
+from builders.runs import at_rest, refractory, run_of
+from builders.scenarios import STILL, changed, lone
+from builders.simulation import Drive, simulate
 from verify.judging import counterexample, judge
 
 from airground_drake.scenarios.schema import Decision, Preset, Threshold

@@ -3,12 +3,8 @@
 from __future__ import annotations
 
 import pytest
-from builders import (
-    chattering,
-    refractory,
-    run_of,
-    with_scenario,
-)
+from builders.edits import with_scenario
+from builders.runs import chattering, refractory, run_of
 from verify.judging import counterexample, judge
 
 

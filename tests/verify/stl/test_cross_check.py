@@ -4,18 +4,23 @@ from __future__ import annotations
 
 import itertools
 import json
+import pickle
 import subprocess
 import sys
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
-from builders import STILL, case_a, lone, passing_by, run_of, simulate, with_events, with_scenario, with_signals
+from builders.edits import with_events, with_scenario, with_signals
+from builders.runs import passing_by, run_of
+from builders.scenarios import STILL, case_a, lone
+from builders.simulation import simulate
+from sharing import once
 
 from airground_drake.scenarios.schema import Decision, Threshold
 from airground_drake.trace import Trace
@@ -26,6 +31,9 @@ from airground_drake.verify.stl.cross_check import FORMULAS, StlFormula, cross_c
 from airground_drake.verify.stl.signals import Signals
 
 pytest.importorskip("rtamt")
+
+Judgement = tuple[list[Verdict], list[dict[str, Any]]]
+"""Our verdicts on a run, and rtamt's."""
 
 CLAIMS = {"SAFE-TRACE", "SAFE-HYP", "ZENO-TRACE", "THR-TRIG", "LIVE-GOAL", "COMM"}
 
@@ -136,19 +144,32 @@ def disturbed(trace: Trace, rng: np.random.Generator) -> Trace:
     return trace
 
 
-@cache
-def judged(seed: int) -> tuple[list[Verdict], list[dict[str, Any]]]:
+def judged(seed: int) -> Judgement:
     """Our verdicts on a random trace, and rtamt's."""
     trace = random_trace(seed)
     return verify(trace, CLAIMS), cross_check(trace)
 
 
-@cache
-def outcomes() -> Counter[tuple[str, str, str, Any]]:
-    """(claim, our status, joint verdict of rtamt, agreement) on 200 random traces."""
+@pytest.fixture(scope="session")
+def judgements(shared: Path) -> list[Judgement]:
+    """`judged` of 200 random traces."""
+
+    def make(folder: Path) -> None:
+        folder.mkdir()
+        (folder / "pickled").write_bytes(pickle.dumps([judged(seed) for seed in range(200)]))
+
+    made: list[Judgement]
+    made = pickle.loads((once(shared / "random_traces", make) / "pickled").read_bytes())
+    return made
+
+
+@pytest.fixture(scope="session")
+def outcomes(
+    judgements: list[Judgement],
+) -> Counter[tuple[str, str, str, Any]]:
+    """(claim, our status, joint verdict of rtamt, agreement) on the random traces."""
     found: Counter[tuple[str, str, str, Any]] = Counter()
-    for seed in range(200):
-        verdicts, checks = judged(seed)
+    for verdicts, checks in judgements:
         for ours, verdict in zip(verdicts, merge(verdicts, checks), strict=True):
             stl = verdict.finding.evidence["stl"]
             said = "violated" if any(check["verdict"] == "violated" for check in stl["checks"]) else "satisfied"
@@ -157,8 +178,8 @@ def outcomes() -> Counter[tuple[str, str, str, Any]]:
 
 
 @pytest.mark.parametrize("claim", sorted(CLAIMS))
-def test_agreement_on_random_traces(claim: str) -> None:
-    mine = {key[1:]: n for key, n in outcomes().items() if key[0] == claim}
+def test_agreement_on_random_traces(claim: str, outcomes: Counter[tuple[str, str, str, Any]]) -> None:
+    mine = {key[1:]: n for key, n in outcomes.items() if key[0] == claim}
     compared = {key: n for key, n in mine.items() if key[0] in ("holds", "refuted")}
     assert all(agrees is True for _, _, agrees in compared), compared
     for verdict in ("satisfied", "violated"):
@@ -258,11 +279,10 @@ def test_wrong_formulas_are_noticed(name: str) -> None:
 
 
 @pytest.mark.parametrize("claim", sorted(CLAIMS))
-def test_a_checker_that_passes_everything_is_noticed(claim: str) -> None:
+def test_a_checker_that_passes_everything_is_noticed(claim: str, judgements: list[Judgement]) -> None:
     """Where a formula is violated, a finding that holds becomes an error, whatever its margin."""
     seen = 0
-    for seed in range(200):
-        verdicts, checks = judged(seed)
+    for verdicts, checks in judgements:
         verdict = next(v for v in verdicts if v.claim.id == claim)
         lying = merge([replace(verdict, finding=Finding("holds"))], checks)[0].finding
         violated = any(check["verdict"] == "violated" for check in checks if check["claim"] == claim)

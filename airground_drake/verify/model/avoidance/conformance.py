@@ -4,22 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from fractions import Fraction
-from math import isqrt
+from math import isfinite, isqrt
 from typing import Any
 
 import numpy as np
 
-from airground_drake.arrays import Array
+from airground_drake.arrays import ROUNDOFF
 from airground_drake.nsbc.avoidance import Surroundings
+from airground_drake.scenarios.rounding import TOLERANCE_M, Rounding
 from airground_drake.verify.engines.obligation import rational
-from airground_drake.verify.engines.rounding import ROUNDOFF, SEED, unit
+from airground_drake.verify.engines.rounding import SEED, unit
 from airground_drake.verify.model.avoidance.constants import Inputs, kinds, running_avoidance
 
 POINTS = 600
 """Points compared, from inside the safe distance to beyond the sensing range, many at D = d."""
-STEPS_PER_PERIOD = 64
-"""Integration steps into which events may cut a control period, for the bound on rounding; 13 have been seen, where
-a witness function was isolated."""
 Relation = Callable[[Fraction, Fraction, Fraction, Fraction, Fraction], Fraction]
 
 
@@ -85,33 +83,26 @@ def root(square: Fraction) -> Fraction:
     return Fraction(isqrt(square.numerator * square.denominator * scale * scale), square.denominator * scale)
 
 
-def loss_of_inequality(distance: Array | float, speed: Array | float, period: float) -> Array:
-    """What rounding in kernels may cost in one period, m: u (7 D + 9 V h) for an inequality that floats meet.
-
-    The bound is computed from D (1 + 3.5u) and errs by (4 D + 3 |D - d|) u / h, |D - d| <= D as D >= d; each term of
-    n.v errs by (5.5 + 3)u of itself.
-    """
-    return ROUNDOFF * (7.0 * np.asarray(distance) + 9.0 * np.asarray(speed) * period)
-
-
 def rounding_margins(inputs: Inputs) -> Inputs:
-    """What rounding can take from the safe distance, m, by kind of pair.
+    """What rounding can take from the safe distance, m, by kind of pair: see `scenarios/rounding.py`.
 
-    One step loses what the kernels lose (`loss_of_inequality`, both robots), u (P + h V) per coordinate, integration
-    step and robot in the positions (P: largest coordinate), and u T V per integration step because multiples of h
-    are rounded (T: duration). A deficit calls in the lower branch, which leaves (1 - A h) of it per period; so
-    alone it never exceeds (loss of a step) / (A h). Several deficits whose inequalities contradict each other are
-    not restored: then only (loss of a step) * (number of steps) would be certain while v = 0 is kept.
+    Without a gain nothing is restored, and the losses of all steps add up. So they would where the inequalities of
+    several deficits contradict each other, as v = 0 is kept then.
     """
     found = {}
-    h = inputs["period_s"]
-    extent = inputs["extent_m"]
-    duration = inputs["duration_s"]
     for kind in kinds(inputs):
-        kernel = float(loss_of_inequality(max(inputs["sensing_range_m"], kind.safe), kind.closing, h))
-        moves = 2.0 * np.sqrt(3.0) * STEPS_PER_PERIOD * (extent + kind.closing * h) * ROUNDOFF
-        clock = (STEPS_PER_PERIOD + 2.0) * duration * kind.closing * ROUNDOFF
-        one = float(1.01 * (kernel + moves + clock))
-        restored = inputs["avoidance_gain_1_s"] * h
-        found[kind.name] = {"margin_of_a_step_m": one, "margin_with_restoring_m": one / restored if restored else None}
+        reach = max(inputs["sensing_range_m"], kind.safe)
+        loss = Rounding(reach, kind.closing, inputs["period_s"], inputs["avoidance_gain_1_s"])
+        one = loss.of_a_step(inputs["extent_m"], inputs["duration_s"])
+        alone = loss.restored(inputs["extent_m"], inputs["duration_s"])
+        found[kind.name] = {"margin_of_a_step_m": one, "margin_with_restoring_m": alone if isfinite(alone) else None}
     return found
+
+
+def rounding_leaves(margins: Inputs) -> tuple[str, float | None]:
+    """The kind of pair that rounding takes most from, and what it leaves of `TOLERANCE_M`, m; None with no bound."""
+    unbounded = [name for name, each in margins.items() if each["margin_with_restoring_m"] is None]
+    if unbounded:
+        return unbounded[0], None
+    name = max(margins, key=lambda each: float(margins[each]["margin_with_restoring_m"]))
+    return name, TOLERANCE_M - margins[name]["margin_with_restoring_m"]

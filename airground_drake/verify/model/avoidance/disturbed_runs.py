@@ -10,10 +10,10 @@ import numpy as np
 import numpy.typing as npt
 
 from airground_drake.arrays import Array
-from airground_drake.nsbc.avoidance import HalfSpaces, limit_speed
-from airground_drake.nsbc.team import Team
+from airground_drake.nsbc.avoidance import HalfSpaces, Surroundings, limit_speed
 from airground_drake.verify.engines.rounding import SEED, nearest, rates, unit
-from airground_drake.verify.model.avoidance.constants import Inputs, running_avoidance, running_team
+from airground_drake.verify.model.avoidance.constants import Inputs, running_avoidance
+from airground_drake.verify.model.avoidance.scenario_pairs import WHOLE, Views
 
 TOLERANCE = 1e-9
 """For distances, m, and inequalities, m/s, of the disturbed runs: thousands of rounded steps err by 1e-12."""
@@ -25,10 +25,10 @@ Edit = Callable[[HalfSpaces], HalfSpaces]
 
 @dataclass(frozen=True)
 class SafeStart:
-    """A safe start of a team of the running code; `positions` (n + 1, 3), m."""
+    """A safe start of a team; `positions` (n + 1, 3), m."""
 
     name: str
-    team: Team
+    team: Views
     positions: Array
 
 
@@ -37,7 +37,7 @@ def scenes(inputs: Inputs) -> list[SafeStart]:
 
     In `squeezed` a UGV has no room between another and an obstacle: there the inequalities contradict each other.
     """
-    team, far = running_team(inputs, ugvs=2), np.array([0.0, 0.0, 1e3])
+    team, far = Views.of(inputs["team"], ugvs=2), np.array([0.0, 0.0, 1e3])
     d = team.obstacle_distance
     dd = team.ugv_distance
     low = team.air_ground_distance
@@ -96,18 +96,17 @@ def attack(
     team = scene.team
     positions = scene.positions.copy()
     avoidance = running_avoidance(inputs)
-    neighbourhood = team.neighbourhood(slice(None))
     mobility = team.mobility
     robots = np.arange(len(team.robots))
     w = inputs["disturbance_m_s"]
     h = avoidance.period
-    added = np.where(neighbourhood.share < 1.0, pairs, 1.0) * w
-    bound = neighbourhood.distance - added / avoidance.gain
+    added = np.where(team.share < WHOLE, pairs, 1.0) * w
+    bound = team.safe - added / avoidance.gain
     met = np.ones(bound.shape, dtype=bool)  # all inequalities of this robot against this point so far
     tally = _Tally()
     target = rng.integers(bound.shape[1], size=len(robots))
     for k in range(STEPS):
-        around = neighbourhood.around(positions)
+        around = Surroundings(team.centres(positions), team.safe, team.share)
         x = positions[:, None] - around.centre
         reach = np.linalg.norm(x, axis=-1)
         if how != "switching":
@@ -126,9 +125,9 @@ def attack(
         met &= short <= TOLERANCE
         moved = velocity + force * w * push * mobility
         others = np.zeros(x.shape)
-        others[:, len(team.obstacles) :] = moved[neighbourhood.others]
+        others[:, len(team.obstacles) :] = moved[team.others]
         least = nearest(x, moved[:, None] - others, h)
-        if tally.add(short, least - bound, _both(met, neighbourhood.others)):
+        if tally.add(short, least - bound, _both(met, team.others)):
             i, j = divmod(int(np.argmin(least - bound)), bound.shape[1])
             tally.where = {
                 "scene": scene.name, "attack": how, "robot": team.robots[i], "t_s": k * h,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -14,10 +14,11 @@ from airground_drake.nsbc.avoidance import Avoidance, Composition, HalfSpaces, S
 from airground_drake.nsbc.law import UgvLaw
 from airground_drake.nsbc.motion import Motion
 from airground_drake.nsbc.team import Team
+from airground_drake.scenarios.rounding import loss_of_inequality
 from airground_drake.systems.controllers import UavController, UgvController
 from airground_drake.verify.engines.rounding import ROUNDOFF, SEED, nearest, rates, unit
-from airground_drake.verify.model.avoidance.conformance import loss_of_inequality
-from airground_drake.verify.model.avoidance.constants import Inputs, kinds, running_avoidance, running_team
+from airground_drake.verify.model.avoidance.constants import Inputs, kinds, running_avoidance
+from airground_drake.verify.model.avoidance.scenario_pairs import Views
 
 
 @dataclass(frozen=True)
@@ -127,45 +128,48 @@ def hostile_team(inputs: Inputs, count: int, composition: Composition, on_top: b
         Evidence: number of missed inequalities (compared as floats), and for the worst a replay.
     """
     rng = np.random.default_rng(SEED)
-    team = running_team(inputs, ugvs=3)
+    team = Views.of(inputs["team"], ugvs=3)
     if not len(team.obstacles):
         team = replace(team, obstacles=np.zeros((1, 3)))
     n, avoidance = len(team.ugvs), running_avoidance(inputs, composition)
-    neighbourhood, mobility = team.neighbourhood(slice(0, n)), team.mobility[:n]
+    mobility = team.mobility[:n]
     law = UgvLaw(avoidance, inputs["motion_gain_1_s"], inputs["intervention_gain_1_s"], on_top)
-    controller = UgvController(team, law)
+    controller = UgvController(_team(team), law)
 
     def command(positions: Array, wanted: Array, asked: npt.NDArray[np.bool_]) -> tuple[Array, HalfSpaces]:
         accepted: list[Proposal | None] = [
             Proposal("hostile", 0.0, Motion(np.array([0.0, 1.0]), np.array([here, there]))) if agreed else None
             for here, there, agreed in zip(positions[:n], wanted, asked, strict=True)
         ]
-        spaces = avoidance.half_spaces(positions[:n], mobility, neighbourhood.around(positions))
+        spaces = avoidance.half_spaces(positions[:n], mobility, _around(team, positions, slice(0, n)))
         return controller.velocity(1.0, positions, wanted, np.zeros((n, 3)), accepted), spaces
 
     flier = _Flier(team, running_avoidance(inputs))
     missed = 0
     worst = 0.0
+    worst_flown = 0.0
     state = None
     for _ in range(count):
         positions = _safe_team(team, rng)
-        around = neighbourhood.around(positions)
+        around = _around(team, positions, slice(0, n))
         x = positions[:n, None] - around.centre
         k = np.argmin(np.linalg.norm(x, axis=-1) - around.distance, axis=1)
         wanted = positions[:n] - 100.0 * x[np.arange(n), k] * mobility
         asked = rng.random(n) < 0.75
         velocity, spaces = command(positions, wanted, asked)
         short = spaces.bound - rates(spaces.normal, velocity)
-        missed += flier.missed(positions)
+        flown = flier.short(positions)
+        missed += int((flown > 0.0).sum())
+        worst_flown = max(worst_flown, float(flown.max()))
         missed += int((short > 0.0).sum()) + int((velocity[:, 2] != 0.0).sum())
         if short.max() > worst:
             worst = float(short.max())
             state = (positions, wanted, asked, divmod(int(np.argmax(short)), short.shape[1]))
-    found: Inputs = {"states": count, "ugvs": n, "missed": missed, "worst_missed_by_m_s": worst}
+    found: Inputs = {"states": count, "ugvs": n, "missed": missed, "worst_missed_by_m_s": max(worst, worst_flown)}
     if state is None:
         return found
     positions, wanted, asked, (i, k) = state
-    around = neighbourhood.around(positions)
+    around = _around(team, positions, slice(0, n))
     described = {
         "positions_m": positions.tolist(),
         "robot": team.ugvs[i],
@@ -208,26 +212,37 @@ class _Approach:
 class _Flier:
     """The running UAV controller, asked for a place below the UGVs."""
 
-    def __init__(self, team: Team, avoidance: Avoidance) -> None:
+    def __init__(self, team: Views, avoidance: Avoidance) -> None:
         self._avoidance = avoidance
-        self._neighbourhood = team.neighbourhood(slice(len(team.ugvs), None))
-        self._system = UavController(team, avoidance, gain=1.0 / avoidance.period, altitude=-100.0)
+        self._team = team
+        self._system = UavController(_team(team), avoidance, gain=1.0 / avoidance.period, altitude=-100.0)
         self._context = self._system.CreateDefaultContext()
 
-    def missed(self, positions: Array) -> int:
-        """How many inequalities of the UAV its command misses, from the positions of a team, (n + 1, 3), m."""
+    def short(self, positions: Array) -> Array:
+        """By what the UAV's command misses its inequalities, (1, K), m/s, from the positions of a team, (n + 1, 3)."""
         self._system.GetInputPort("team_position").FixValue(self._context, positions.ravel())
         self._system.GetInputPort("ugv_command").FixValue(self._context, np.zeros(3 * (len(positions) - 1)))
         updates = self._system.EvalUniquePeriodicDiscreteUpdate(self._context)
         velocity = updates.value(0).reshape(1, 3)
-        spaces = self._avoidance.half_spaces(positions[-1:], np.ones((1, 3)), self._neighbourhood.around(positions))
-        return int((rates(spaces.normal, velocity) < spaces.bound).sum())
+        around = _around(self._team, positions, slice(len(positions) - 1, None))
+        spaces = self._avoidance.half_spaces(positions[-1:], np.ones((1, 3)), around)
+        found: Array = spaces.bound - rates(spaces.normal, velocity)
+        return found
 
 
-def _safe_team(team: Team, rng: np.random.Generator) -> Array:
+def _team(views: Views) -> Team:
+    """The same as the controllers take it."""
+    return Team(**{each.name: getattr(views, each.name) for each in fields(Views)})
+
+
+def _around(team: Views, positions: Array, rows: slice) -> Surroundings:
+    """What the robots in `rows` must keep away from, by the scenario."""
+    return Surroundings(team.centres(positions)[rows], team.safe[rows], team.share[rows])
+
+
+def _safe_team(team: Views, rng: np.random.Generator) -> Array:
     """A random safe state of a team, (n + 1, 3), m: UGVs close to obstacles, the UAV above one of them."""
     n = len(team.ugvs)
-    pairs = team.pair_distance()
     spread = 3.0
     placed: list[Array] = []
     while len(placed) <= n:
@@ -241,7 +256,8 @@ def _safe_team(team: Team, rng: np.random.Generator) -> Array:
             trial = placed[0] + np.array([*rng.uniform(-1.0, 1.0, 2), team.air_ground_distance + rng.random()])
             trial[2] += rng.choice([0.0, spread / 3.0]) * team.obstacle_distance
         clear = [np.linalg.norm(trial - o) >= team.obstacle_distance for o in team.obstacles]
-        clear += [np.linalg.norm(trial - other) >= pairs[i, j] for j, other in enumerate(placed)]
+        apart = team.ugv_distance if i < n else team.air_ground_distance
+        clear += [np.linalg.norm(trial - other) >= apart for other in placed]
         if all(clear):
             placed.append(trial)
         elif i == n and rng.random() < 0.05:

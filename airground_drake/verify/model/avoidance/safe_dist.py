@@ -24,8 +24,10 @@ from airground_drake.verify.finding import Finding
 from airground_drake.verify.model.avoidance.conformance import conformance
 from airground_drake.verify.model.avoidance.constants import Inputs, constants, kinds
 from airground_drake.verify.model.avoidance.disturbed_obligations import disturbed, disturbed_with_scenario, pushed
-from airground_drake.verify.model.avoidance.disturbed_runs import campaign
+from airground_drake.verify.model.avoidance.disturbed_runs import TOLERANCE, campaign
 from airground_drake.verify.model.avoidance.obligations import LIMIT_S
+
+QUANTITY = "least distance above d - W/A in the disturbed runs whose inequalities were all met"
 
 
 class SafeDist(ModelClaim):
@@ -55,7 +57,8 @@ class SafeDist(ModelClaim):
         "UAV never can, but there its disturbance does not count either, and the UAV's half does (`overhead_bound`).",
         "w is 10 % of the largest speed limit, but at most A/4 times the smallest safe distance, so that at least half "
         "of it is left. It is a choice, not a property of a robot.",
-        "Positions are measured exactly and without delay.",
+        "Positions are measured exactly and without delay. The inequalities are the scenario's: that the built diagram "
+        "has them is for SAFE-INV to compare.",
         "While two of them are out of sensing range, robots ask for no more than their speed limits, to which w comes "
         "on top. The layer itself may ask for more within a safe distance of something else.",
     )
@@ -91,10 +94,10 @@ class SafeDist(ModelClaim):
             return replace(found, status="inconclusive", evidence={**found.evidence, "reason": reason})
         worst = min(covered, key=lambda row: float(row["worst_margin_m"]))
         where: dict[str, Any] = {name: worst["where"][name] for name in ("scene", "attack", "robot", "t_s")}
-        found = replace(found, margin=worst["worst_margin_m"], unit="m", where=where)
+        found = replace(found, margin=worst["worst_margin_m"], unit="m", quantity=QUANTITY, where=where)
         if found.status == "proved" and any(row["broken"] for row in rows):
             return replace(found, status="refuted", counterexample=next(row for row in rows if row["broken"]))
-        if found.status == "proved" and worst["worst_margin_m"] < -1e-9:
+        if found.status == "proved" and worst["worst_margin_m"] < -TOLERANCE:
             return replace(found, status="refuted", counterexample=worst)
         if found.status == "proved" and not compared["agrees"]:
             return replace(found, status="refuted", counterexample=compared["first_difference"] or compared)

@@ -9,13 +9,17 @@ from __future__ import annotations
 from dataclasses import replace
 
 from airground_drake.diagram import build_model
+from airground_drake.scenarios.load import from_data
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.engines.prover import discharge, finding
 from airground_drake.verify.finding import Finding
-from airground_drake.verify.model.avoidance.constants import Inputs, constants
+from airground_drake.verify.model.avoidance.constants import Inputs, built_from, compositions_of, constants
 from airground_drake.verify.model.avoidance.hostile_inputs import hostile_team, non_finite, postcondition
 from airground_drake.verify.model.avoidance.obligations import LIMIT_S, gate
+from airground_drake.verify.model.avoidance.wiring import compare, difference
+
+QUANTITY = "least slack n.v - b of an avoidance inequality over all hostile inputs to the layer"
 
 
 class SafeGate(ModelClaim):
@@ -35,8 +39,9 @@ class SafeGate(ModelClaim):
         "postcondition itself (polynomial certificates show that one pass suffices but for rounding; every further one "
         "shortens v). The running layer is evaluated on hostile inputs from a deterministic sample of safe states, the "
         "running UGV controller with hostile interventions, accepted or not, and the running UAV controller; the order "
-        "of priorities is read from the built "
-        "diagram of method (d)."
+        "of priorities is read from the built diagram of method (d). The controllers of that diagram are driven "
+        "through their ports, too, by hostile presets, proposals and answers: their commands must meet every "
+        "inequality of the scenario, and execute a proposal only where that very proposal was accepted."
     )
     equations = "(20) against the priorities of method (d); (5), (7)-(8), (14)"
     assumptions = (
@@ -51,27 +56,32 @@ class SafeGate(ModelClaim):
 
     def inputs(self, scenario: Scenario) -> Inputs:
         """Those of SAFE-INV, and what the diagram of method (d) was built with."""
-        controller = build_model(scenario, "d").diagram.GetSubsystemByName("ugv_controller")
-        compositions = sorted({run.composition for run in scenario.runs.values() if run.method == "d"})
+        given = built_from(scenario)
+        controller = build_model(from_data(given, "the scenario"), "d").diagram.GetSubsystemByName("ugv_controller")
         built = {
             "intervention_on_top": bool(controller.law.intervention_on_top),
-            "compositions": compositions or ["augmented"],
+            "compositions": compositions_of(scenario),
         }
-        return constants(scenario) | {"method_d": built}
+        return constants(scenario) | {"method_d": built, "scenario": given}
 
     def check(self, inputs: Inputs) -> Finding:
         """Discharge the obligations and attack the running code; margin: the worst slack of the sample, m/s."""
         built = inputs["method_d"]
         layers = [postcondition(inputs, 2400, composition) for composition in built["compositions"]]
         teams = [hostile_team(inputs, 150, each, built["intervention_on_top"]) for each in built["compositions"]]
+        wired = [compare(inputs, each) for each in built["compositions"]]
         found = finding(
-            discharge(gate(), LIMIT_S), layer=layers, controller=teams, method_d=built, non_finite=non_finite(inputs)
-        )
+            discharge(gate(), LIMIT_S), layer=layers, controller=teams, wiring=wired, method_d=built,
+            non_finite=non_finite(inputs),
+        )  # fmt: skip
         worst = min(layers, key=lambda layer: float(layer["worst_slack_m_s"]))
-        found = replace(found, margin=worst["worst_slack_m_s"], unit="m/s", where={"composition": worst["composition"]})
+        where = {"composition": worst["composition"]}
+        found = replace(found, margin=worst["worst_slack_m_s"], unit="m/s", quantity=QUANTITY, where=where)
         attacks = [(-team["worst_missed_by_m_s"], team) for team in teams if team["missed"]]
         attacks += [(layer["worst_slack_m_s"], layer) for layer in layers if not layer["met"]]
         if found.status == "proved" and attacks:
             slack, attack = min(attacks, key=lambda each: float(each[0]))
-            return replace(found, status="refuted", margin=slack, counterexample=attack)
-        return found
+            differs = next((each["first_difference"] for each in wired if not each["agrees"]), None)
+            shown = attack if differs is None else attack | {"wiring": differs}
+            return replace(found, status="refuted", margin=slack, counterexample=shown)
+        return difference(found, wired)

@@ -2,9 +2,10 @@
 
 The way through the proof: `lemma.py` (SAFE-LEMMA) turns motion in space into statements about one number, the
 distance; `obligations.py` has those statements, each with its certificate; `constants.py` the numbers of the running
-team that they are repeated with; `conformance.py` compares the relation that they encode with the compiled kernels;
-`hostile_inputs.py` drives the running layer from safe states by hostile velocities; `mutants.py` has the broken
-variants that must be refuted. SAFE-GATE (`safe_gate.py`) and SAFE-DIST (`safe_dist.py`) build on it.
+scenario that they are repeated with, `scenario_pairs.py` who must keep which distance from whom; `conformance.py`
+compares the relation that they encode with the compiled kernels, `wiring.py` the controllers of the built diagram with
+the scenario; `hostile_inputs.py` drives the running layer from safe states by hostile velocities; `mutants.py` has the
+broken variants that must be refuted. SAFE-GATE (`safe_gate.py`) and SAFE-DIST (`safe_dist.py`) build on it.
 
 Symbols, in proofs and in their texts: a robot at x relative to what it avoids, at distance D = ||x||, with unit
 vector n = x/D and velocity v, has the radial speed r = n.v; E = ||x + s v|| is the distance after s, 0 <= s <= h; d is
@@ -18,14 +19,18 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from airground_drake.scenarios.rounding import TOLERANCE_M
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.engines.prover import discharge, finding
 from airground_drake.verify.finding import Finding
-from airground_drake.verify.model.avoidance.conformance import conformance, rounding_margins
-from airground_drake.verify.model.avoidance.constants import Inputs, constants, kinds, range_spare
+from airground_drake.verify.model.avoidance.conformance import conformance, rounding_leaves, rounding_margins
+from airground_drake.verify.model.avoidance.constants import Inputs, built_from, constants, kinds, range_spare
 from airground_drake.verify.model.avoidance.hostile_inputs import postcondition
 from airground_drake.verify.model.avoidance.obligations import LIMIT_S, rest, scaling, step, with_scenario
+from airground_drake.verify.model.avoidance.wiring import compare, difference
+
+QUANTITY = "what rounding leaves of the 1e-9 m by which a distance may fall short of d"
 
 
 class SafeInv(ModelClaim):
@@ -49,7 +54,10 @@ class SafeInv(ModelClaim):
     method = (
         "In D, r = n.v and s through SAFE-LEMMA: polynomial certificates, symbolic in A, h, d and again with the "
         "scenario's numbers; z3 and cvc5 on the negations. The encoded relation is compared in exact arithmetic with "
-        "what the running kernel computes, and the running composition is sampled with up to 12 points."
+        "what the running kernel computes, and the running composition is sampled with up to 12 points. Pairs, "
+        "distances, shares and limits are the scenario's; the controllers of the built diagram are compared with "
+        "them: beside everything that they must avoid, driven to it through their ports, every command must meet every "
+        "inequality of the scenario, and be the closest velocity that they allow where one binds."
     )
     equations = "(7)-(8), (11) in the inequality form of the package (set-based avoidance)"
     assumptions = (
@@ -60,29 +68,56 @@ class SafeInv(ModelClaim):
     )
     does_not_establish = (
         "That the inequalities hold in a run (SAFE-HYP), nor under disturbance (SAFE-DIST). In floating point the "
-        "distance is kept up to the margins in the evidence: what one step loses is restored while D < d by the lower "
-        "branch, one deficit at a time; contradictory deficits of several points are not restored, and then losses may "
-        "add up over the steps. Inside two safe distances at once there may be no velocity that meets both."
+        "distance is kept up to the margins in the evidence, below the tolerance of SAFE-TRACE: what one step loses is "
+        "restored while D < d by the lower branch, one deficit at a time; contradictory deficits of several points are "
+        "not restored, and then losses may add up over the steps. Inside two safe distances at once there may be no "
+        "velocity that meets both. The diagram is compared in a sample of states, not in all."
     )
 
     def inputs(self, scenario: Scenario) -> Inputs:
-        """Gain, period, sensing range and the team."""
-        return constants(scenario)
+        """Gain, period, sensing range and the team; and what the diagram is built from."""
+        return constants(scenario) | {"scenario": built_from(scenario)}
 
     def check(self, inputs: Inputs) -> Finding:
-        """Discharge the obligations, compare with the kernels; margin: spare of the sensing range."""
-        compared, sampled = conformance(inputs), postcondition(inputs, 500)
+        """Discharge the obligations, compare with the running code; margin: what rounding leaves of 1e-9 m."""
+        compared, sampled, wired = conformance(inputs), postcondition(inputs, 500), compare(inputs)
+        spare = {kind.name: float(range_spare(inputs, kind)) for kind in kinds(inputs)}
+        lost = rounding_margins(inputs)
         found = finding(
             discharge([*step(), *rest(), *scaling(), *with_scenario(inputs)], LIMIT_S),
-            conformance=compared, composition=sampled, rounding=rounding_margins(inputs),
+            conformance=compared, composition=sampled, wiring=wired, rounding=lost, sensing_range_spare_m=spare,
         )  # fmt: skip
-        spare = {kind.name: float(range_spare(inputs, kind)) for kind in kinds(inputs)}
-        kind = min(spare, key=lambda name: spare[name])
-        where = {"quantity": "sensing range - d - c h", "pair": kind}
-        found = replace(found, margin=spare[kind], unit="m", where=where)
+        kind, left = rounding_leaves(lost)
+        found = replace(found, margin=left, unit="m", quantity=QUANTITY, where={"pair": kind})
+        if (short := min(spare, key=lambda name: spare[name])) and spare[short] < 0.0:
+            found = replace(found, margin=spare[short], quantity="sensing range - d - c h", where={"pair": short})
         if found.status == "proved" and not compared["agrees"]:
-            return replace(found, status="refuted", counterexample=compared["first_difference"] or compared)
-        lost = sampled["worst_loss_over_rounding"] > 1.0
-        if found.status == "proved" and (lost or not sampled["met"]):
-            return replace(found, status="refuted", counterexample=sampled["first_missed"] or sampled)
+            return _refuted(found, compared["first_difference"] or compared)
+        beyond = sampled["worst_loss_over_rounding"] > 1.0
+        if found.status == "proved" and (beyond or not sampled["met"]):
+            return _refuted(found, sampled["first_missed"] or sampled)
+        found = difference(found, [wired])
+        if found.status == "proved" and (reason := _open(inputs, lost, left)):
+            return replace(found, status="inconclusive", evidence={**found.evidence, "reason": reason})
         return found
+
+
+def _refuted(found: Finding, counterexample: Inputs) -> Finding:
+    """By the running code: what rounding leaves says nothing then."""
+    return replace(found, status="refuted", margin=None, where={}, counterexample=counterexample)
+
+
+def _open(inputs: Inputs, lost: Inputs, left: float | None) -> str:
+    """What keeps a proof in real arithmetic from holding for floating point; '' if nothing does."""
+    if left is None:
+        steps = inputs["duration_s"] / inputs["period_s"]
+        most = max(float(each["margin_of_a_step_m"]) for each in lost.values()) * steps
+        return (
+            "A = 0: a deficit shrinks by the factor 1 - A h = 1 per period, that is not at all; nothing restores what "
+            f"rounding takes, which may add up to {most:.3g} m within the run"
+        )
+    if left < 0.0:
+        return (
+            f"rounding may take {TOLERANCE_M - left:.3g} m from a safe distance; SAFE-TRACE tolerates {TOLERANCE_M:g} m"
+        )
+    return ""

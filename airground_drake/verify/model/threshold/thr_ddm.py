@@ -105,6 +105,7 @@ def compare(chosen: tuple[PassageExperiment, ...], formulas: Formulas) -> Findin
         "supported" if supported else "refuted",
         margin=worst["margin"],
         unit="interval half-widths",
+        quantity="what a simulated mean leaves of its confidence interval about the formula",
         where={key: worst[key] for key in ("experiment", "quantity")},
         counterexample=None if supported else worst,
         evidence=evidence,

@@ -110,6 +110,7 @@ def judge_optimum(
         unit="" if gap is None else "risk",
         evidence=_replay(inputs, running, float(zeta[0])),
     )
+    finding = replace(finding, quantity="risk at the printed form's root above that at the minimiser")
     if finding.status == "proved" and finding.evidence["risk_difference_to_the_running_code"] > RISK_TOLERANCE:
         return replace(finding, status="error")
     if finding.counterexample is not None:

@@ -99,6 +99,8 @@ def judge_root(inputs: dict[str, Any], rule: Rule, shift: int = 0) -> Finding:
         evidence=evidence,
         scripts={"two_roots.smt2": UNIQUE_SMT2},
     )
+    quantity = "what the running threshold leaves of the distance by which it may be outside of the enclosure"
+    finding = replace(finding, quantity=quantity)
     if cvc5.answer == "sat":
         return replace(finding, status="error")
     if finding.status == "proved" and outside > FLOAT_TOLERANCE * zeta[1]:

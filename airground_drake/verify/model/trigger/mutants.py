@@ -5,11 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
+from unittest import mock
 
+import numpy as np
+
+from airground_drake.arrays import Array
 from airground_drake.decision.trigger import Mode, Trigger, TriggerState
+from airground_drake.systems import decision
 from airground_drake.verify.claim import Mutant
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.model.trigger.refined_paths import experiment
+from airground_drake.verify.model.trigger.thr_iso import judge
 from airground_drake.verify.model.trigger.zeno_proof import prove
 from airground_drake.verify.model.trigger.zeno_refine import judge_experiment
 
@@ -58,7 +64,19 @@ def _smooth_does_not_diverge(inputs: dict[str, Any]) -> Finding:
     return judge_experiment(replace(experiment(inputs), smooth=True))
 
 
+def _ends_only(inputs: dict[str, Any]) -> Finding:
+    """The running system looks at the ends of its steps only."""
+
+    def of_ends(before: Array, after: Array) -> tuple[Array, Array]:
+        x = [np.linalg.norm(parts[:, :3], axis=1) + parts[:, 3] for parts in (before, after)]
+        return np.minimum(*x), np.maximum(*x)
+
+    with mock.patch.object(decision, "extremes", of_ends):
+        return judge(Trigger(inputs["zeta_m"], inputs["released_below_m"], inputs["dwell_s"]))
+
+
 MUTANTS: tuple[Mutant, ...] = (
+    Mutant("THR-ISO", "the running system looks at the ends of steps only", _ends_only),
     Mutant("ZENO-PROOF", "no dwell", _mutant(NoDwell)),
     Mutant("ZENO-PROOF", "no refractory mode", _mutant(NoRefractory)),
     Mutant("ZENO-PROOF", "recovers at once", _mutant(RecoversAtOnce)),

@@ -171,16 +171,17 @@ def _random_states(trigger: Trigger, now: float, rng: np.random.Generator) -> tu
 
 def _left(system: EventTrigger, now: float, before: Array, x: Array) -> Array:
     """The states (UGVS, FIELDS) after the running system's event at time `now`, s, for the mode of each."""
-    context = system.CreateDefaultContext()
+    context, count = system.CreateDefaultContext(), len(x)
     context.SetTime(now)
-    system.GetInputPort("decision_variable").FixValue(context, x)
-    after = np.empty_like(before)
-    for mode in Mode:
-        context.SetDiscreteState(before.ravel())
-        system._leave(mode, context, context.get_mutable_state())
-        chosen = before[:, 0] == mode
-        after[chosen] = context.get_discrete_state_vector().value().reshape(before.shape)[chosen]
-    return after
+    for name, size in (("team_position", 3 * count + 3), ("reference", 6 * count)):
+        system.GetInputPort(name).FixValue(context, np.zeros(size))  # no task error: x is the noise
+    system.GetInputPort("noise").FixValue(context, x)
+    context.SetDiscreteState(0, before.ravel())
+    context.SetDiscreteState(1, np.concatenate([[now], np.zeros(6 * count), x]))  # a step that has just begun
+    updated = system.AllocateDiscreteVariables()
+    updated.SetFrom(context.get_discrete_state())
+    system.update(context, updated)
+    return np.array(updated.value(0).reshape(before.shape))
 
 
 def _predict(transitions: Sequence[Transition], mode: Mode, point: dict[str, Fraction]) -> tuple[list[Fraction], str]:

@@ -108,7 +108,7 @@ def prove(trigger: Trigger, inputs: dict[str, Any]) -> Finding:
         broken = counterexample(numeric, trigger, bound)
         status: Status = "refuted" if broken else "error"
         margin = broken["gap_s"] - bound if broken else None
-        return Finding(status, margin, "s", {}, broken, evidence, saved)
+        return Finding(status, margin, "s", {}, broken, evidence, saved, "a gap between triggers less the bound")
     cvc5 = solve(list(files.values())[1:], "cvc5", LIMIT_S)
     general = read_off(lambda path: type(trigger)(*map(path.symbol, ("zeta", "release", "dwell"))))
     found = finding(discharge([*obligations(general), *remarks(trigger, bound)]))
@@ -120,5 +120,6 @@ def prove(trigger: Trigger, inputs: dict[str, Any]) -> Finding:
         status = "inconclusive"
     return replace(
         found, status=status, margin=TIME_TOLERANCE_S - evidence["rounding_s"], unit="s", where={"bound_s": bound},
+        quantity="what rounding leaves of the 1e-9 s by which a gap between triggers may fall short of the bound",
         evidence={**evidence, "invariant": ours, **found.evidence}, certificates={**saved, **found.certificates},
     )  # fmt: skip

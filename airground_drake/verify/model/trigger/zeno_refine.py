@@ -200,4 +200,7 @@ def judge_experiment(setting: Refinement) -> Finding:
         for j, dt in enumerate(setting.dt_s)
     ]
     table = "\n".join([f"path,dt_s,{','.join(SERIES)}", *rows]) + "\n"
-    return Finding(status, slack[condition], "", {"condition": condition}, broken, evidence, {"counts.csv": table})
+    quantity = "what the confidence interval of an exponent, or a count, leaves of the condition"
+    return Finding(
+        status, slack[condition], "", {"condition": condition}, broken, evidence, {"counts.csv": table}, quantity
+    )

@@ -48,3 +48,30 @@ def test_a_kernel_that_differs_refutes_safe_inv(monkeypatch: pytest.MonkeyPatch,
     finding = SafeInv().judge(inputs)
     assert finding.status == "refuted"
     assert finding.counterexample is not None
+
+
+STEEP = 20  # max(A, 1/h) of case A
+
+
+@pytest.mark.parametrize(("units", "agrees"), [(4, True), (24, False), (-24, False), (800, False)])
+def test_the_tolerance_of_the_bound_is_that_of_rounding(units: int, agrees: bool, inputs: dict[str, Any]) -> None:
+    """8 units of what rounding may do are allowed: half of them beside its own 1 or 2 are, three times as many not."""
+    u = Fraction(1, 2**53)
+    off = conformance(inputs, lambda D, d, q, A, h: relation(D, d, q, A, h) + units * u * q * STEEP * max(D, d))
+    assert off["agrees"] == agrees
+
+
+@pytest.mark.parametrize(("units", "agrees"), [(1, True), (24, False), (5000, False)])
+def test_the_tolerance_of_a_normal_is_that_of_rounding(
+    units: int, agrees: bool, monkeypatch: pytest.MonkeyPatch, inputs: dict[str, Any]
+) -> None:
+    right = Avoidance.half_spaces
+
+    def wrong(self: Avoidance, *args: Any) -> Any:
+        spaces = right(self, *args)
+        return replace(spaces, normal=spaces.normal * (1.0 + units * 2.0**-52))
+
+    monkeypatch.setattr(Avoidance, "half_spaces", wrong)
+    compared = conformance(inputs)
+    assert compared["agrees"] == agrees
+    assert SafeInv().judge(inputs).status == ("proved" if agrees else "refuted")

@@ -41,6 +41,7 @@ def test_every_shipped_scenario(name: str, judged: Judged) -> None:
 def test_one_ugv_and_no_obstacle(case_a: Scenario) -> None:
     case_a.obstacles = {}
     case_a.ugvs = {"ugv1": case_a.ugvs["ugv1"]}
+    case_a.reproduction = case_a.choices = []
     given_ = SafeDist().inputs(case_a) | SafeGate().inputs(case_a)
     assert [kind.name for kind in kinds(given_)] == ["uav_ugv"]
     assert [claim.judge(given_).status for claim in CLAIMS] == ["proved"] * 4

@@ -45,4 +45,7 @@ def test_contradictory_inequalities_are_counted_and_not_covered(found: dict[str,
 def test_without_gain_nothing_is_restored(case_a: Scenario) -> None:
     case_a.control.avoidance_gain_1_s = 0.0
     assert SafeDist().judge(SafeDist().inputs(case_a)).status == "inconclusive"
-    assert SafeInv().judge(SafeInv().inputs(case_a)).status == "proved"
+    finding = SafeInv().judge(SafeInv().inputs(case_a))
+    assert finding.status == "inconclusive"
+    assert finding.margin is None
+    assert "A = 0" in finding.evidence["reason"]

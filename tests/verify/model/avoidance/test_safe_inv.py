@@ -5,15 +5,16 @@ from __future__ import annotations
 from fractions import Fraction
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from properties import examples
 
 from airground_drake.nsbc.avoidance import Avoidance, Surroundings
 from airground_drake.verify.engines.rounding import unit
 from airground_drake.verify.model.avoidance.conformance import loss_of_inequality
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(st.integers(0, 2**31), st.integers(1, 12), st.sampled_from([0.01, 0.05, 0.2]))
 def test_one_step_keeps_the_distance_in_exact_arithmetic(seed: int, count: int, h: float) -> None:
     """Running layer, then exact motion: the least distance falls short of d by no more than the rounding bound."""

@@ -8,8 +8,9 @@ from typing import Any
 
 import mpmath
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from properties import examples
 from verify.judging import Judged
 from verify.model.threshold.cases import INPUTS, OTHERS, TABLE_1
 
@@ -76,7 +77,7 @@ def test_enclosures_contain_roots_found_by_mpmath(found: dict[str, tuple[Finding
             assert mpmath.mpf(low.numerator) / low.denominator < root < mpmath.mpf(high.numerator) / high.denominator
 
 
-@settings(max_examples=40)
+@examples(40)
 @given(*[st.floats(0.05, 20.0)] * 4)
 def test_enclosure_agrees_with_the_running_code(drift: float, noise: float, c1: float, c2: float) -> None:
     constants = ThresholdRule.of({"drift_m_s": drift, "noise_m_sqrt_s": noise, "c1_1_s": c1, "c2": c2})

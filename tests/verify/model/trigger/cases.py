@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
-from pydrake.systems.primitives import (
-    ConstantVectorSource,
-    Integrator,
-    LogVectorOutput,
-    ZeroOrderHold,
-)
+from pydrake.systems.primitives import ConstantVectorSource, Integrator, LogVectorOutput, ZeroOrderHold
 
 from airground_drake.decision.trigger import Trigger
-from airground_drake.systems.decision import FIELDS, DecisionVariable
+from airground_drake.systems.decision import FIELDS, EventTrigger
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.model.trigger import mutants
 from airground_drake.verify.model.trigger.zeno_proof import ZenoProof
@@ -46,29 +40,24 @@ def refined() -> Finding:
     return ZenoRefine().judge(REFINE)
 
 
-def simulate(systems: Sequence[tuple[LeafSystem, str]], source: LeafSystem, until: float, step: float) -> np.ndarray:
-    """Status (4n, rows) of the last of the systems, which are in a row behind a source."""
+def simulate(system: EventTrigger, noise: LeafSystem, until: float, step: float, error_m: float = 0.0) -> np.ndarray:
+    """Status (4n, rows) of a trigger whose UGVs' task errors stand still and whose noise is a source's."""
     builder = DiagramBuilder()
-    builder.AddNamedSystem("source", source)
-    output = source.get_output_port()
-    for system, port in systems:
-        builder.AddNamedSystem(f"{port}_reader", system)
-        builder.Connect(output, system.GetInputPort(port))
-        if isinstance(system, DecisionVariable):
-            count = output.size()
-            for name, value in (("team_position", np.zeros(3 * count + 3)), ("reference", [3.0, 0.0, 0.0] * count)):
-                given = np.zeros(system.GetInputPort(name).size())
-                given[: len(value)] = value
-                constant = builder.AddNamedSystem(name, ConstantVectorSource(given))
-                builder.Connect(constant.get_output_port(), system.GetInputPort(name))
-        output = system.get_output_port()
+    builder.AddNamedSystem("noise", noise)
+    builder.AddNamedSystem("event_trigger", system)
+    count = noise.get_output_port().size()
+    reference = np.concatenate([[error_m, 0.0, 0.0] * count, np.zeros(3 * count)])
+    for name, value in (("team_position", np.zeros(3 * count + 3)), ("reference", reference)):
+        constant = builder.AddNamedSystem(name, ConstantVectorSource(value))
+        builder.Connect(constant.get_output_port(), system.GetInputPort(name))
+    builder.Connect(noise.get_output_port(), system.GetInputPort("noise"))
     # steps end at the multiples of `step`, as they do at the noise samples in the diagram; they need a continuous state
     clock = builder.AddNamedSystem("clock", Integrator(1))
     sampled = builder.AddNamedSystem("sampled", ZeroOrderHold(step, 1))
     rate = builder.AddNamedSystem("rate", ConstantVectorSource([1.0]))
     builder.Connect(rate.get_output_port(), clock.get_input_port())
     builder.Connect(clock.get_output_port(), sampled.get_input_port())
-    log = LogVectorOutput(output, builder)
+    log = LogVectorOutput(system.get_output_port(), builder)
     log.set_name("log")
     simulator = Simulator(builder.Build())
     context = simulator.get_mutable_context()

@@ -34,7 +34,7 @@ def test_mutants_are_refuted_by_a_run(name: str) -> None:
         assert (min((b - a for a, b in pairwise(times)), default=math.inf) < 0.3) == broken
     if name in ("no dwell", "no refractory mode", "no hysteresis, no dwell"):
         source = TrajectorySource(PiecewisePolynomial.FirstOrderHold([*t, t[-1] + 1.0], [[*x, x[-1]]]))
-        status = simulate([(EventTrigger(1, mutant), "decision_variable")], source, t[-1] + 0.5, 1.0 / 256.0)
+        status = simulate(EventTrigger(1, mutant), source, t[-1] + 0.5, 1.0 / 256.0)
         before, after = trigger_times(status, 0)[-2:]
         assert after - before < 0.3
 

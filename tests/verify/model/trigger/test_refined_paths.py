@@ -10,16 +10,13 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 from pydrake.systems.framework import DiagramBuilder
-from pydrake.systems.primitives import (
-    LogVectorOutput,
-    TrajectorySource,
-)
+from pydrake.systems.primitives import LogVectorOutput, TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 from verify.model.trigger.cases import REFINE, simulate, trigger_times
 
 from airground_drake.components import integrated_noise
 from airground_drake.decision.trigger import Trigger
-from airground_drake.systems.decision import DecisionVariable, EventTrigger
+from airground_drake.systems.decision import EventTrigger
 from airground_drake.verify.engines.segments import NormSignal
 from airground_drake.verify.model.trigger import refined_paths
 from airground_drake.verify.model.trigger.refined_paths import experiment
@@ -92,15 +89,13 @@ def test_triggers_by_hand(trigger: Trigger, x: list[float], times: list[float]) 
 
 @pytest.mark.parametrize("kind", ["automaton", "bare"])
 def test_fast_triggers_are_those_of_the_running_systems(kind: str) -> None:
-    """DecisionVariable and EventTrigger in a Drake diagram on six of the experiment's paths."""
+    """EventTrigger in a Drake diagram on six of the experiment's paths, its UGVs 3 m from their references."""
     trigger = Trigger(3.0, 2.0, 0.5) if kind == "automaton" else Trigger.bare(3.0)
     setting = experiment(REFINE | {"duration_s": 8.0})
     dt = setting.dt_s[1]
     noise = np.array([setting.noise_m_sqrt_s * refined_paths.path(setting, i)[1] for i in range(6)])
     source = TrajectorySource(PiecewisePolynomial.FirstOrderHold(dt * np.arange(noise.shape[1]), noise))
-    systems = [(DecisionVariable(6), "noise"), (EventTrigger(6, trigger), "decision_variable")]
-    # every UGV's reference is 3 m away: only its noise moves x
-    status = simulate(systems, source, dt * (noise.shape[1] - 1), dt)
+    status = simulate(EventTrigger(6, trigger), source, dt * (noise.shape[1] - 1), dt, error_m=3.0)
     total = 0
     for j in range(6):
         expected = refined_paths.triggers(trigger, 3.0 + noise[j], dt)

@@ -1,0 +1,47 @@
+"""How far the decision variable goes between two instants, exactly.
+
+Between two updates a task error e moves on a straight line and the noise n is linear, so that x = ||e|| + n is convex:
+it is largest at an end, and smallest at an end or where its slope is 0. With d = e1 - e0 the change of e, u the
+distance along d from the point nearest to the origin, p the distance of that point, and k the change of n over ||d||,
+
+    x = sqrt(u^2 + p^2) + k u + const,   smallest at u = -k p / sqrt(1 - k^2)   if |k| < 1,
+
+because sqrt(u^2 + p^2) >= p sqrt(1 - k^2) - k u (Cauchy). For |k| >= 1 it is monotone. A reference with corners is
+straight between them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from airground_drake.arrays import Array
+
+
+@njit(cache=True)
+def extremes(before: Array, after: Array) -> tuple[Array, Array]:
+    """Least and largest x over a step, (n,) and (n,), m.
+
+    Args:
+        before: task error, m, and noise, m, of n UGVs at the beginning of the step, (n, 4).
+        after: the same at its end, (n, 4); both are linear in between.
+    """
+    least, most = np.empty(len(before)), np.empty(len(before))
+    for j in range(len(before)):
+        x, y, z, n = before[j]
+        dx, dy, dz, dn = after[j, 0] - x, after[j, 1] - y, after[j, 2] - z, after[j, 3] - n
+        start = np.sqrt(x * x + y * y + z * z) + n
+        end = np.sqrt(after[j, 0] ** 2 + after[j, 1] ** 2 + after[j, 2] ** 2) + after[j, 3]
+        least[j], most[j] = min(start, end), max(start, end)
+        length = np.sqrt(dx * dx + dy * dy + dz * dz)
+        if abs(dn) >= length:  # monotone, or at rest
+            continue
+        along = (x * dx + y * dy + z * dz) / length
+        cx, cy, cz = (y * dz - z * dy) / length, (z * dx - x * dz) / length, (x * dy - y * dx) / length
+        slope = dn / length
+        level = np.sqrt(1.0 - slope * slope)
+        aside = np.sqrt(cx * cx + cy * cy + cz * cz)
+        travelled = -slope * aside / level - along
+        if 0.0 < travelled < length:
+            least[j] = min(least[j], aside * level - slope * along + n)
+    return least, most

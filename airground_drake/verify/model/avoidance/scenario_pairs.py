@@ -1,0 +1,148 @@
+"""Who must keep which distance from whom, from the scenario alone, and the inequalities that follow, in plain numpy.
+
+Nothing here is taken from the code that is judged: neither `nsbc` nor the factories nor the diagram. `wiring.py`
+compares the controllers of the built diagram with it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from airground_drake.arrays import Array
+from airground_drake.scenarios.schema import Scenario
+
+Inputs = dict[str, Any]
+
+WHOLE, HALF = 1.0, 0.5
+"""Share of an inequality: beside an obstacle, which stands still; of each robot of a pair."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of pair: safe distance m, largest closing speed m/s, share of the inequality that each robot takes."""
+
+    name: str
+    safe: float
+    closing: float
+    share: float
+
+
+def team_of(scenario: Scenario) -> Inputs:
+    """Names, obstacles m, safe distances m and speed limits m/s of a scenario, strict JSON."""
+    safe, uav = scenario.safe_distance, scenario.uav
+    return {
+        "ugvs": list(scenario.ugvs),
+        "uav": uav.name,
+        "obstacles": [list(obstacle.position_m) for obstacle in scenario.obstacles.values()],
+        "obstacle_distance": safe.obstacle_m,
+        "ugv_distance": safe.ugv_m,
+        "air_ground_distance": safe.air_ground_m,
+        "max_speed": [*(ugv.max_speed_m_s for ugv in scenario.ugvs.values()), uav.max_speed_m_s],
+    }
+
+
+def kinds_of(team: Inputs) -> list[Kind]:
+    """The kinds of pairs in a team (`team_of`), each with its fastest members."""
+    *ugvs, uav = team["max_speed"]
+    ugvs = sorted(ugvs, reverse=True)
+    found = [Kind("uav_ugv", team["air_ground_distance"], uav + ugvs[0], HALF)]
+    if team["obstacles"]:
+        found.insert(0, Kind("obstacle", team["obstacle_distance"], max(uav, ugvs[0]), WHOLE))
+    if len(ugvs) > 1:
+        found.append(Kind("ugv_ugv", team["ugv_distance"], ugvs[0] + ugvs[1], HALF))
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Views:
+    """n UGVs and the UAV, the last: what each must keep away from, the m obstacles first, then the other robots.
+
+    Attributes:
+        ugvs: names.
+        uav: name.
+        obstacles: (m, 3), m.
+        obstacle_distance: safe distance of every robot to every obstacle, m.
+        ugv_distance: safe distance between UGVs, m.
+        air_ground_distance: safe distance between the UAV and each UGV, m.
+        max_speed: (n + 1,), m/s.
+    """
+
+    ugvs: tuple[str, ...]
+    uav: str
+    obstacles: Array
+    obstacle_distance: float
+    ugv_distance: float
+    air_ground_distance: float
+    max_speed: Array
+
+    @classmethod
+    def of(cls, team: Inputs, ugvs: int | None = None) -> Views:
+        """Of a team (`team_of`), or of its first so many UGVs and the UAV."""
+        count = len(team["ugvs"]) if ugvs is None else min(ugvs, len(team["ugvs"]))
+        speed = np.array([*team["max_speed"][:count], team["max_speed"][-1]], dtype=np.float64)
+        obstacles = np.array(team["obstacles"], dtype=np.float64).reshape(-1, 3)
+        changed = {"ugvs": tuple(team["ugvs"][:count]), "obstacles": obstacles, "max_speed": speed}
+        return cls(**(team | changed))
+
+    @property
+    def robots(self) -> tuple[str, ...]:
+        """Names of all robots."""
+        return (*self.ugvs, self.uav)
+
+    @cached_property
+    def mobility(self) -> Array:
+        """(n + 1, 3): 1 where a robot can move; UGVs stay in their plane."""
+        return np.array([[1.0, 1.0, 0.0]] * len(self.ugvs) + [[1.0, 1.0, 1.0]])
+
+    @cached_property
+    def others(self) -> npt.NDArray[np.intp]:
+        """Indices of the robots other than each, (n + 1, n)."""
+        robots = range(len(self.robots))
+        return np.array([[j for j in robots if j != i] for i in robots], dtype=np.intp)
+
+    @cached_property
+    def safe(self) -> Array:
+        """Safe distances, (n + 1, m + n), m."""
+        n = len(self.ugvs)
+        beside_obstacles = np.full((n + 1, len(self.obstacles)), self.obstacle_distance)
+        with_uav = (self.others == n) | (np.arange(n + 1)[:, None] == n)
+        return np.hstack([beside_obstacles, np.where(with_uav, self.air_ground_distance, self.ugv_distance)])
+
+    @cached_property
+    def share(self) -> Array:
+        """Part of each inequality that the robot takes, (n + 1, m + n)."""
+        return np.where(np.arange(self.safe.shape[1]) < len(self.obstacles), WHOLE, HALF) * np.ones_like(self.safe)
+
+    def centres(self, positions: Array) -> Array:
+        """Where what each robot avoids is when the robots are at positions (n + 1, 3): (n + 1, m + n, 3), m."""
+        fixed = np.broadcast_to(self.obstacles, (len(self.robots), *self.obstacles.shape))
+        return np.concatenate([fixed, positions[self.others]], axis=1)
+
+    def inequalities(self, positions: Array, gain: float, period: float, reach: float) -> tuple[Array, Array]:
+        """n (n + 1, m + n, 3) and b (n + 1, m + n), m/s, such that every velocity must satisfy n.v >= b.
+
+        b is -inf beyond the sensing range `reach`, m; z of n is 0 for a UGV.
+        """
+        offset = positions[:, None] - self.centres(positions)
+        distance = np.sqrt((offset**2).sum(axis=-1))
+        normal = offset / np.where(distance > 0.0, distance, 1.0)[..., None]
+        rate = np.where(distance <= self.safe, gain, 1.0 / period)
+        bound = np.where(distance <= reach, self.share * rate * (self.safe - distance), -np.inf)
+        return normal * self.mobility[:, None], bound
+
+    def name_of(self, robot: int, view: int) -> str:
+        """What a robot avoids: a robot's name, or `obstacle` and its number in the scenario's order."""
+        m = len(self.obstacles)
+        return f"obstacle {view}" if view < m else self.robots[self.others[robot, view - m]]
+
+    def kind_of(self, robot: int, view: int) -> str:
+        """Name of the kind of a pair, as `kinds_of` has it."""
+        m, n = len(self.obstacles), len(self.ugvs)
+        if view < m:
+            return "obstacle"
+        return "uav_ugv" if n in (robot, int(self.others[robot, view - m])) else "ugv_ugv"

@@ -1,0 +1,57 @@
+"""Traces along given corners, with any events."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from airground_drake.trace import Trace
+from builders.layout import laid_out, reference_at
+
+Corners = Sequence[tuple[float, ...]]
+"""(t, x, y) or (t, x, y, z): where a robot is when, s and m; straight lines in between."""
+
+
+def along(
+    scenario: dict[str, Any],
+    run: str,
+    corners: Sequence[Corners],
+    events: Sequence[dict[str, Any]] = (),
+    *,
+    step_s: float = 0.1,
+    x: Mapping[float, float] | None = None,
+    intervention_s: tuple[float, float] = (np.inf, np.inf),
+    decisions: Sequence[dict[str, Any]] = (),
+    timings: dict[str, Any] | None = None,
+) -> Trace:
+    """Robots along corners, with their true decision variables.
+
+    Args:
+        scenario: as resolved.
+        run: name of the run.
+        corners: of each robot, UAV last; the first robot's decide when the run ends.
+        events: see `laid_out`, as for `decisions` and `timings`.
+        step_s: between rows.
+        x: decision variable of the first UGV by time instead.
+        intervention_s: between these times every UGV intervenes, and accepts.
+        decisions: as recorded.
+        timings: as measured.
+    """
+    end = corners[0][-1][0]
+    t = np.linspace(0.0, end, round(end / step_s) + 1)
+    position = np.zeros((len(t), len(corners), 3))
+    for i, of_robot in enumerate(corners):
+        times, *axes = zip(*of_robot, strict=True)
+        for k, values in enumerate(axes):
+            position[:, i, k] = np.interp(t, times, values)
+    velocity = np.gradient(position, t, axis=0) if len(t) > 1 else np.zeros_like(position)
+    presets = [ugv["preset"] for ugv in scenario["ugvs"].values()]
+    reference = np.array([[reference_at(preset, time) for preset in presets] for time in t])
+    variable = np.linalg.norm(reference - position[:, :-1], axis=2)
+    if x is not None:
+        variable[:, 0] = np.interp(t, list(x), list(x.values()))
+    intervening = np.repeat(((t > intervention_s[0]) & (t < intervention_s[1]))[:, None].astype(float), len(presets), 1)
+    held = {"decision_variable_m": variable, "mode": intervening, "accepted": intervening}
+    return laid_out(scenario, run, t, position, velocity, held, events, decisions, timings)

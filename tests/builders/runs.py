@@ -1,0 +1,48 @@
+"""Runs that many tests share."""
+
+from __future__ import annotations
+
+from functools import cache
+
+from airground_drake.scenarios.schema import Decision, Obstacle
+from airground_drake.trace import Trace
+from builders.scenarios import STILL, case_a, lone
+from builders.simulation import simulate
+
+
+@cache
+def run_of(method: str) -> Trace:
+    """One run of the synthetic case A by each method."""
+    return simulate(case_a(), method)
+
+
+@cache
+def chattering() -> Trace:
+    """A bare trigger whose decision variable hovers at the threshold: many triggers."""
+    decision = Decision(trigger="bare", noise_m_sqrt_s=0.3, min_inter_event_s=0.5)
+    return simulate(lone([3.01, 0.0, 0.0], [3.0, 0.0, 0.0], STILL, 3.0, decision=decision), drive=at_rest, seed=28)
+
+
+def at_rest(t: float) -> list[list[float]]:
+    """Nobody moves."""
+    return [[0.0] * 3, [0.0] * 3]
+
+
+def there_and_back(t: float) -> list[list[float]]:
+    """Out beyond the threshold, back below the release level, out again and home."""
+    speed = 2.0 if t < 2.0 or 3.5 <= t < 6.0 else -2.0 if t < 8.9 else 0.0
+    return [[speed, 0.0, 0.0], [0.0] * 3]
+
+
+def refractory(noise: float = 0.0) -> Trace:
+    """Triggers at 1.5 s; released at 3.25 s; above again before the dwell of 4 s is over: triggers at 5.5 s."""
+    decision = Decision(min_inter_event_s=4.0, noise_m_sqrt_s=noise)
+    return simulate(lone([0.0] * 3, [0.2, 0.0, 0.0], STILL, 10.0, decision=decision), drive=there_and_back)
+
+
+def passing_by(offset: float) -> Trace:
+    """A UGV passes an obstacle at 2 m + offset, closest in the middle between two rows."""
+    scenario = lone(
+        [-0.5125, 2.0 + offset, 0.0], [0.4875, 2.0 + offset, 0.0], STILL, 1.0, obstacles={"o": Obstacle([0.0] * 3)}
+    )
+    return simulate(scenario, drive=lambda t: [[1.0, 0.0, 0.0], [0.0] * 3])

@@ -1,0 +1,123 @@
+"""Policies in whole runs: what goes wrong in one is reported, and nothing wrong gets past method (d)."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from timeline import kinds
+
+from airground_drake.errors import PluginError, UnknownNameError
+from airground_drake.intervention.database import make_policy
+from airground_drake.intervention.policy import Observation, Policy
+from airground_drake.nsbc.motion import Motion
+from airground_drake.registry import POLICIES
+from airground_drake.scenarios.schema import Policy as PolicyEntry
+from airground_drake.scenarios.schema import Scenario
+from airground_drake.simulation import simulate
+from airground_drake.verify import verify
+
+
+class Raises(Policy):
+    """A policy with a bug."""
+
+    def propose(self, seen: Observation) -> Motion | None:
+        raise RuntimeError("no plan")
+
+
+class Nonsense(Policy):
+    """A policy that returns something else than a motion."""
+
+    def propose(self, seen: Observation) -> Motion | None:
+        return "left"  # type: ignore[return-value]
+
+
+class NotFinite(Policy):
+    """A policy whose numbers are not finite."""
+
+    def propose(self, seen: Observation) -> Motion | None:
+        return Motion(np.array([seen.start]), np.full((1, 3), np.nan))
+
+
+@pytest.mark.parametrize("kind", [Raises, Nonsense, NotFinite])
+def test_a_broken_policy_counts_as_no_intervention_and_is_reported(case_a: Scenario, kind: type[Policy]) -> None:
+    case_a.intervention.policies = [PolicyEntry("broken", {})]
+    case_a.duration_s = 16.0
+    with POLICIES.adding("broken", kind):
+        of_run = simulate(case_a, "d")
+    assert kinds(of_run, "ugv1") == ["trigger"]
+    assert of_run.meta["faults"][0]["policy"] == "broken"
+    assert next(v for v in verify(of_run) if v.claim.id == "SAFE-TRACE").finding.status == "holds"
+
+
+def test_after_a_failure_the_next_policy_is_asked(case_a: Scenario) -> None:
+    case_a.intervention.policies.insert(0, PolicyEntry("broken", {}))
+    with POLICIES.adding("broken", Raises):
+        of_run = simulate(case_a, "d")
+    assert "arrival" in kinds(of_run, "ugv1")
+    assert of_run.meta["faults"][0]["what"] == "RuntimeError: no plan"
+
+
+@pytest.mark.parametrize(
+    ("name", "parameters", "said"),
+    [
+        ("nothing", {}, "allowed: detour"),
+        ("no_such_module:Thing", {}, "cannot be imported"),
+        ("math:pi", {}, "not a subclass"),
+        ("detour", {"speed": 3.0}, "speed"),
+        ("detour", {"speed_m_s": -1.0}, "speed_m_s > 0"),
+    ],
+)
+def test_policies_that_cannot_be_made(name: str, parameters: dict[str, float], said: str) -> None:
+    with pytest.raises((PluginError, UnknownNameError), match=said):
+        make_policy(name, parameters)
+
+
+class Hangs(Policy):
+    """A policy that never answers, and catches what it can."""
+
+    def propose(self, seen: Observation) -> Motion | None:
+        while True:
+            try:
+                sum(range(1000))
+            except Exception:
+                continue
+
+
+def test_a_policy_that_hangs_is_stopped_and_reported(case_a: Scenario) -> None:
+    case_a.intervention.policies.insert(0, PolicyEntry("hangs", {}))
+    case_a.intervention.budget_s = 0.05
+    with POLICIES.adding("hangs", Hangs):
+        of_run = simulate(case_a, "d")
+    assert "arrival" in kinds(of_run, "ugv1")
+    assert "OutOfTime" in of_run.meta["faults"][0]["what"]
+
+
+@pytest.mark.parametrize("ranking", ["listed", "predicted"])
+def test_the_ranking_decides_what_is_proposed_first(case_a: Scenario, ranking: str) -> None:
+    wrong = PolicyEntry("towards", {"x_m": 4.0, "y_m": 7.0, "speed_m_s": 2.0})
+    case_a.intervention.policies.insert(0, wrong)
+    case_a.intervention.ranking = ranking
+    of_run = simulate(case_a, "d")
+    first = next(event for event in of_run.events if event["kind"] == "proposal")
+    assert first["policy"] == ("towards" if ranking == "listed" else "detour")
+    assert "arrival" in kinds(of_run, "ugv1")
+
+
+@pytest.mark.parametrize(
+    ("name", "parameters"),
+    [
+        ("hostile", {"speed_m_s": 3.0}),
+        ("noisy", {"speed_m_s": 2.8, "noise_m": 1.0}),
+        ("stale_map", {"speed_m_s": 2.8}),
+        ("towards", {"x_m": 1.7, "y_m": 4.0, "speed_m_s": 3.0}),
+    ],
+)
+def test_no_wrong_policy_gets_past_method_d(case_a: Scenario, name: str, parameters: dict[str, float]) -> None:
+    case_a.intervention.policies = [PolicyEntry(name, parameters)]
+    case_a.obstacles["obstacle_2"].known_to_uav = False
+    case_a.gatekeeper.error_weight_1_m2_s = 500.0  # accepts nearly anything
+    case_a.duration_s = 20.0
+    of_run = simulate(case_a, "d")
+    assert "proposal" in kinds(of_run, "ugv1")
+    statuses = {v.claim.id: v.finding.status for v in verify(of_run)}
+    assert statuses["SAFE-TRACE"] == statuses["SAFE-HYP"] == "holds"

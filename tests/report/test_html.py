@@ -1,0 +1,182 @@
+"""The page: escaped, self-contained, well-formed, accessible."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import pytest
+from report.cases import FINE, Kept, built, event, make_scenario, make_trace, make_traces, verdict
+
+from airground_drake.registry import STATUSES
+from airground_drake.report import document, html
+from airground_drake.report.figures import draw
+from airground_drake.report.figures.panels import Figure
+from airground_drake.scenarios.schema import Run, Scenario
+from airground_drake.trace import Trace
+from airground_drake.verify.claim import Verdict
+from airground_drake.verify.finding import Finding
+
+HOSTILE = "<script>alert('$x$')</script>"
+
+
+class Page(HTMLParser):
+    """What the tests look at in a page."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.parents: list[tuple[str, str]] = []
+        self.open: list[str] = []
+        self.unbalanced: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+        self.parents.append((tag, self.open[-1] if self.open else ""))
+        if tag not in ("meta", "br", "link", "wbr"):
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+
+    def handle_endtag(self, tag: str) -> None:
+        if not self.open or self.open.pop() != tag:
+            self.unbalanced.append(tag)
+
+    def of(self, tag: str) -> list[dict[str, str | None]]:
+        return [attributes for name, attributes in self.tags if name == tag]
+
+
+DIAGRAM = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9"><text>plant</text></svg>'
+
+
+@pytest.fixture(scope="module")
+def hostile_page() -> str:
+    """Everything that a user can name is hostile."""
+    scenario = make_scenario(HOSTILE)
+    scenario = replace(scenario, name=HOSTILE, title=HOSTILE, description=HOSTILE)
+    scenario.choices[0].reason = scenario.reproduction[0].why = HOSTILE
+    scenario.runs[HOSTILE] = Run("b")
+    traces = make_traces(scenario)
+    traces[HOSTILE] = make_trace(scenario, HOSTILE, events=[event(1.0, HOSTILE, HOSTILE)])
+    traces[HOSTILE].meta["faults"].append({"what": HOSTILE})
+    claim = type(
+        "Hostile", (Kept,), {"id": HOSTILE, "statement": HOSTILE, "formula": HOSTILE, "assumptions": (HOSTILE,)}
+    )
+    finding = Finding("refuted", -1.0, HOSTILE, {HOSTILE: HOSTILE}, {"x": HOSTILE}, {HOSTILE: [HOSTILE]})
+    report = built(scenario, traces, [*FINE, Verdict(claim(), HOSTILE, finding, "holds")])
+    report["provenance"][HOSTILE] = report["provenance"]["command"] = HOSTILE
+    return html.render(report, draw.draw(scenario, traces), DIAGRAM)
+
+
+@pytest.fixture(scope="module")
+def page(scenario: Scenario, traces: dict[str, Trace], drawn: list[Figure]) -> str:
+    return html.render(built(scenario, traces, FINE), drawn, DIAGRAM)
+
+
+@pytest.fixture(params=["page", "hostile_page"])
+def text(request: pytest.FixtureRequest) -> str:
+    return str(request.getfixturevalue(request.param))
+
+
+def test_hostile_names_are_escaped(hostile_page: str) -> None:
+    assert "<script" not in hostile_page
+    assert hostile_page.count("&lt;script&gt;") > 30
+    assert not any(name.startswith("on") for _, attributes in Page(hostile_page).tags for name in attributes)
+
+
+def test_self_contained(text: str) -> None:
+    assert not any(tag in ("script", "link", "iframe", "img", "object", "embed") for tag, _ in Page(text).tags)
+    targets = [a[name] for _, a in Page(text).tags for name in ("href", "src", "data", "action") if name in a]
+    assert targets
+    assert all(target and target.startswith("#") for target in targets)
+    assert "@import" not in text
+    assert "url(http" not in text.replace(" ", "").replace('"', "")
+    assert len(text.encode()) < 1_500_000
+
+
+def test_well_formed_with_unique_ids_and_live_links(text: str) -> None:
+    page = Page(text)
+    assert page.unbalanced == []
+    assert page.open == []
+    ids = [attributes["id"] for _, attributes in page.tags if "id" in attributes]
+    assert len(ids) == len(set(ids))
+
+
+def test_links_lead_somewhere(page: str) -> None:
+    parsed = Page(page)
+    ids = {attributes["id"] for _, attributes in parsed.tags if "id" in attributes}
+    assert {str(a["href"])[1:] for a in parsed.of("a")} <= ids
+
+
+def test_accessible(text: str) -> None:
+    page = Page(text)
+    assert page.of("html")[0]["lang"] == "en"
+    assert len(page.of("h1")) == 1
+    assert page.of("title")
+    assert {a.get("scope") for a in page.of("th")} == {"row", "col"}
+    assert len(page.of("caption")) == len(page.of("table")) > 10
+    assert page.of("a")[0] == {"class": "skip", "href": "#content"}
+    drawings = page.of("svg")
+    assert len(drawings) == sum(a.get("role") == "img" for a in drawings) > 5
+    for tag in ("title", "desc"):
+        assert page.parents.count((tag, "svg")) == len(drawings)
+
+
+def test_a_pass_says_so(page: str) -> None:
+    assert "All 3 checks gave the verdict" in page
+    assert "What needs attention" not in page
+    assert "refuted, as expected" in page
+
+
+def test_an_unexpected_refutation_is_in_the_banner(
+    scenario: Scenario, traces: dict[str, Trace], drawn: list[Figure]
+) -> None:
+    failed = verdict("c", "refuted", margin=-0.25, unit="m", where={"robot": "ugv1"}, counterexample={"t_s": 4.25})
+    report = built(scenario, traces, [FINE[0], failed, FINE[2]])
+    assert document.exit_code(report) == 1
+    text = html.render(report, drawn)
+    banner = text[text.index('class="banner') : text.index("</section>")]
+    assert 'class="banner bad"' in text
+    assert "Not as expected" in banner
+    assert "SAFE-TRACE on run c (refuted, expected holds)" in banner
+    attention = text[text.index("What needs attention") : text.index('aria-label="Contents"')]
+    assert "\N{MINUS SIGN}0.25 m at robot ugv1" in attention
+    assert "4.25" in attention
+
+
+def test_a_row_that_is_not_reproduced_shows(scenario: Scenario, traces: dict[str, Trace]) -> None:
+    changed = replace(scenario.reproduction[1], id="A5", paper=[10.6])
+    text = html.render(built(replace(scenario, reproduction=[changed]), traces, FINE), [])
+    assert "not reproduced: A5" in text
+    assert "differs by 3.9 s, 0.1 s are allowed; speed set" in text
+
+
+def test_an_empty_report_renders(scenario: Scenario) -> None:
+    empty = replace(scenario, runs={}, reproduction=[], choices=[])
+    text = html.render(document.build(empty, "", {}, [], {}), [], "no svg")
+    assert "Inconclusive" in text
+    assert Page(text).unbalanced == []
+
+
+def test_numbers_for_reading() -> None:
+    assert [html.number(x) for x in (None, 3, 14.0, -0.21984, 2.5e-14, "x")] == [
+        "\N{EN DASH}", "3", "14", "\N{MINUS SIGN}0.2198", "2.5e\N{MINUS SIGN}14", "x",
+    ]  # fmt: skip
+    assert html.value([3.3, 5.1], "m") == "(3.3, 5.1) m"
+    assert html.value(1.0, "yes/no") == "yes"
+    assert html.value(None, "m") == "no value"
+
+
+def test_json_for_reading_is_json() -> None:
+    data = {"a": [{"x": 1.5, "long": "y" * 90}, {"x": None}], "b": {}}
+    assert json.loads(html.pretty(data)) == data
+    assert html.pretty(["z" * 9000]).endswith("report.json has all of it")
+
+
+def test_readers_of_many_names_know_every_status() -> None:
+    known: Callable[[str], bool] = html.CHIPS.__contains__
+    assert all(map(known, (*STATUSES, *document.EXIT_CODES, "reproduced", "calibrated", "not_reproduced")))

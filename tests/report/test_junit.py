@@ -1,0 +1,35 @@
+"""The JUnit file."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+
+from report.cases import FINE, built, verdict
+
+from airground_drake.report import junit
+from airground_drake.scenarios.schema import Scenario
+from airground_drake.trace import Trace
+
+
+def test_junit_counts(scenario: Scenario, traces: dict[str, Trace]) -> None:
+    verdicts = [
+        FINE[0],
+        verdict("a", "refuted", margin=-1.0, unit="m", counterexample={"bad": "\x00\x1b"}),
+        verdict("a", "error"),
+        verdict("a", "not_run"),
+        verdict("a", "inconclusive"),
+        FINE[2],
+    ]
+    root = ET.fromstring(junit.render(built(scenario, traces, verdicts)))
+    assert root.tag == "testsuites"
+    assert {key: root.get(key) for key in ("tests", "failures", "errors", "skipped")} == {
+        "tests": "7", "failures": "2", "errors": "2", "skipped": "1",
+    }  # fmt: skip
+    suites = {suite.get("name"): suite for suite in root}
+    assert set(suites) == {"case_a.a", "case_a.c", "case_a.a_printed"}
+    assert suites["case_a.a"].get("tests") == "5"
+    assert [case.get("name") for case in suites["case_a.c"]] == ["run"]
+    failure = suites["case_a.a"].find("testcase/failure")
+    assert failure is not None
+    assert "refuted, expected holds, margin -1 m: Every robot keeps its distance" in str(failure.get("message"))
+    assert not suites["case_a.a_printed"].findall("testcase/*")

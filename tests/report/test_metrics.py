@@ -1,0 +1,33 @@
+"""Metrics of a run."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from report.cases import make_scenario, make_trace
+
+from airground_drake.report import metrics
+from airground_drake.trace import Trace
+
+
+def test_metrics_of_robot_pairs_and_events(traces: dict[str, Trace]) -> None:
+    found = metrics.of_run(traces["c"])
+    assert found["event_counts"]["ugv1"] == {"accept": 1, "proposal": 1, "release": 1, "trigger": 1}
+    ((other, nearest),) = found["min_robot_distance_m"]["uav"].items()
+    assert other in ("ugv1", "ugv2")
+    assert nearest["safe_distance_m"] == 1.0
+    assert found["gatekeeper"]["decisions"] == {"accept": 2}
+    assert metrics.of_run(traces["a"])["gatekeeper"] is None
+
+
+def test_least_pair_margin_is_the_exact_one_not_that_at_the_rows() -> None:
+    trace = make_trace(make_scenario(), "a", [(0, 1.5, 0.5), (30, -8.0, 3.0)], step_s=30.0)
+    found = metrics.of_run(trace)["min_robot_distance_m"]
+    fine = {}
+    for robot in trace.robots:
+        first, last = trace.position(robot)
+        fine[robot] = np.linspace(first, last, 30_001)
+    to_ugv2, to_uav = (np.linalg.norm(fine["ugv1"] - fine[other], axis=1) for other in ("ugv2", "uav"))
+    assert min(to_uav[0], to_uav[-1]) - 1.0 < min(to_ugv2[0], to_ugv2[-1]) - 2.0
+    assert to_uav.min() - 1.0 > to_ugv2.min() - 2.0
+    assert found["ugv1"]["ugv2"]["value"] == pytest.approx(to_ugv2.min(), abs=1e-6)

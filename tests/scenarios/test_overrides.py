@@ -1,0 +1,70 @@
+"""`--set key=value`."""
+
+from __future__ import annotations
+
+import pytest
+from scenarios.cases import SMALL, Write, case_a, edit, message
+
+from airground_drake.scenarios.load import load, resolved
+
+
+@pytest.mark.parametrize(
+    ("override", "value"),
+    [
+        ("seed=7", 7),
+        ("control.sensing_range_m=5", 5.0),
+        ("ugvs.ugv1.preset.speed_m_s=1e-1", 0.1),
+        ("ugvs.ugv1.preset.waypoints_m.1=[3.3, 14, 0]", [3.3, 14.0, 0.0]),
+        ("ugvs.ugv1.start_m.0=1.25", 1.25),
+        ("intervention.policies.0.parameters.speed_m_s=3", 3.0),
+        ("safe_distance.collision_m=0.1", 0.1),
+        ("obstacles.obstacle_3.known_to_uav=false", False),
+        ("title=a = b", "a = b"),
+        ("runs.b.expected={SAFE-TRACE: refuted}", {"SAFE-TRACE": "refuted"}),
+    ],
+)
+def test_override(override: str, value: object) -> None:
+    scenario, digest = load("case_a", [override])
+    base, base_digest = case_a()
+    assert resolved(scenario) == edit(resolved(base), override.partition("=")[0], value)
+    assert digest != base_digest
+
+
+def test_overrides_apply_in_order_and_leave_aliases_alone(write: Write) -> None:
+    first, second = "preset: {waypoints_m: [[0, 0, 0]", "preset: {waypoints_m: [[0, 5, 0], [9, 5, 0]]}"
+    path = write(SMALL.replace(first, first.replace("preset:", "preset: &shared")).replace(second, "preset: *shared"))
+    scenario, _ = load(path, ["ugvs.one.preset.speed_m_s=1.5", "ugvs.one.preset.speed_m_s=2"])
+    assert [ugv.preset.speed_m_s for ugv in scenario.ugvs.values()] == [2.0, 1.0]
+
+
+def test_the_digest_depends_on_how_overrides_are_split(write: Write) -> None:
+    path, splits = write(SMALL), (["title=a", "title=b"], ["title=b"], ["title=atitle=b"])
+    assert len({load(path, overrides)[1] for overrides in splits}) == 3
+
+
+@pytest.mark.parametrize(
+    ("override", "fragments"),
+    [
+        ("seed", ["--set seed", "dotted.key=value"]),
+        ("=1", ["--set =1", "dotted.key=value"]),
+        ("contrl.period_s=1", ["contrl: unknown key", "did you mean control?", "obstacles"]),
+        ("control.period=1", ["control.period: unknown key", "did you mean period_s?", "avoidance_gain_1_s"]),
+        ("ugvs.ugv9.max_speed_m_s=1", ["ugvs.ugv9: unknown key", "ugv1, ugv2"]),
+        ("ugvs..start_m=1", ["ugvs.: unknown key"]),
+        ("intervention.policies.3.name=x", ["intervention.policies.3: unknown key", "allowed: 0"]),
+        ("intervention.policies.0.parameters.sped_m_s=1", ["parameters.sped_m_s", "did you mean speed_m_s?"]),
+        ("seed.x=1", ["seed.x: unknown key", "allowed: none"]),
+        ("control.period_s=5 km", ["--set", "control.period_s: '5 km'", "a number in s"]),
+        ("control.period_s=", ["--set control.period_s=", "empty"]),
+        ("control.period_s=[", ["--set control.period_s=[", "not YAML"]),
+        (
+            "control.period_s=-1",
+            ["--set control.period_s=-1: control.period_s: -1.0", "a number in s, not below 1e-09"],
+        ),
+        ("seed=1\n2", ["--set seed=1\\n2"]),
+        ("ugvs=null", ["--set ugvs=null: ugvs: no value is given", "a mapping"]),
+    ],
+)
+def test_bad_override(override: str, fragments: list[str]) -> None:
+    text = message("case_a", [override])
+    assert all(fragment in text for fragment in fragments), text

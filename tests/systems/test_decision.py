@@ -1,0 +1,145 @@
+"""The event trigger in a Drake diagram: whatever happens between two updates is isolated, or made up for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from properties import examples
+from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
+from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.primitives import Integrator, LogVectorOutput, TrajectorySource, ZeroOrderHold
+from pydrake.trajectories import PiecewisePolynomial
+
+from airground_drake.arrays import Array
+from airground_drake.decision.trigger import Trigger
+from airground_drake.nsbc.motion import Motion
+from airground_drake.systems.decision import FIELDS, EventTrigger
+from airground_drake.verify.engines.segments import NormSignal
+from airground_drake.verify.runs.trigger_replay import transitions
+
+
+@dataclass(frozen=True)
+class Path:
+    """Task errors (T, n, 3), m, and noise (T, n), m, at times (T,), s, linear in between."""
+
+    t: Array
+    error: Array
+    noise: Array
+
+
+def run(trigger: Trigger, path: Path, step: float, presets: Sequence[Motion] = ()) -> Array:
+    """Rows (4n, T) of the running trigger's status; references move by the presets, or stand still."""
+    builder = DiagramBuilder()
+    n = path.noise.shape[1]
+    system = builder.AddNamedSystem("event_trigger", EventTrigger(n, trigger, presets))
+    reference = np.zeros((len(path.t), n, 3))
+    t = path.t
+    if presets:
+        t = np.unique(np.concatenate([path.t, *(preset.times for preset in presets)]))
+        reference = np.stack([preset.sample(t) for preset in presets], axis=1)
+    signals = {
+        "team_position": (path.t, np.vstack([-path.error.reshape(len(path.t), -1).T, np.zeros((3, len(path.t)))])),
+        "reference": (t, np.vstack([reference.reshape(len(t), -1).T, np.zeros((3 * n, len(t)))])),
+        "noise": (path.t, path.noise.T),
+    }
+    for name, (times, samples) in signals.items():
+        source = TrajectorySource(PiecewisePolynomial.FirstOrderHold(times, samples))
+        builder.AddNamedSystem(name, source)
+        builder.Connect(source.get_output_port(), system.GetInputPort(name))
+    # steps end at the multiples of `step`; they need a continuous state
+    clock, hold = builder.AddNamedSystem("clock", Integrator(1)), builder.AddNamedSystem("hold", ZeroOrderHold(step, 1))
+    builder.Connect(hold.get_output_port(), clock.get_input_port())
+    builder.Connect(clock.get_output_port(), hold.get_input_port())
+    log = LogVectorOutput(system.get_output_port(), builder)
+    log.set_name("log")
+    simulator = Simulator(builder.Build())
+    simulator.get_mutable_context().SetAccuracy(1e-6)
+    config = SimulatorConfig(integration_scheme="explicit_euler", max_step_size=step, use_error_control=False)
+    ApplySimulatorConfig(config, simulator)
+    simulator.Initialize()
+    simulator.AdvanceTo(path.t[-1] + step)
+    return np.array(log.FindLog(simulator.get_context()).data())
+
+
+def times(status: Array, field: int, robot: int = 0) -> list[float]:
+    """Trigger (field 2) or release times (field 3) of a UGV."""
+    return [float(t) for t in np.unique(status[FIELDS * robot + field]) if t >= 0.0]
+
+
+TRIGGER = Trigger(zeta=3.0, release=1.0, dwell=0.0)
+
+
+def straight(*ends: Sequence[float]) -> Path:
+    """One UGV whose error is at these places, m, at 0, 1, ... s."""
+    error = np.array(ends, dtype=np.float64)[:, None]
+    return Path(np.arange(len(ends), dtype=np.float64), error, np.zeros((len(ends), 1)))
+
+
+def test_a_dip_below_the_release_level_within_a_step_is_a_release() -> None:
+    """The error passes the origin at 0.5 m between two updates; at both x is above the threshold."""
+    path = straight((4.0, 0.5, 0.0), (-4.0, 0.5, 0.0))
+    reached = (4.0 - np.sqrt(1.0 - 0.25)) / 8.0
+    status = run(TRIGGER, path, 1.0)
+    assert times(status, 3) == [pytest.approx(reached, abs=2e-6)]
+    assert len(times(status, 2)) == 2
+    assert times(status, 2)[1] == pytest.approx((4.0 + np.sqrt(9.0 - 0.25)) / 8.0, abs=2e-6)
+
+
+def test_a_peak_at_a_corner_of_the_reference_is_a_trigger() -> None:
+    """The reference turns back in the middle of a step: x is below the threshold at both updates."""
+    preset = Motion(np.array([0.0, 0.45, 0.9]), np.array([[0.0, 0.0, 0.0], [4.5, 0.0, 0.0], [0.0, 0.0, 0.0]]))
+    path = straight((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    assert times(run(TRIGGER, path, 1.0, [preset]), 2) == [pytest.approx(0.3, abs=2e-6)]
+    assert times(run(TRIGGER, path, 1.0), 2) == []
+
+
+@pytest.mark.parametrize("late", [0.0, 1e-16, 3e-16, 1e-12, 2e-9, 1e-7])
+def test_two_ugvs_at_nearly_the_same_instant(late: float) -> None:
+    noise = np.array([[0.0, -late * 10.0], [10.0, 10.0 - late * 10.0]])
+    path = Path(np.array([0.0, 1.0]), np.zeros((2, 2, 3)), noise)
+    status = run(TRIGGER, path, 0.3)
+    for robot in range(2):
+        assert times(status, 2, robot) == [pytest.approx(0.3, abs=2e-6)]  # at the very end of the first step
+
+
+@pytest.mark.parametrize("start", [3.0, 4.0])
+def test_at_or_above_the_threshold_at_the_start(start: float) -> None:
+    path = straight((start, 0.0, 0.0), (start - 2.5, 0.0, 0.0))
+    status = run(TRIGGER, path, 1.0)
+    assert times(status, 2) == [0.0]
+    assert times(status, 3) == [pytest.approx((start - 1.0) / 2.5, abs=2e-6)] * (start < 3.5)
+
+
+def test_a_bare_trigger_that_starts_at_the_threshold_lasts_while_x_stays_there_and_ends_when_it_falls() -> None:
+    bare = Trigger.bare(3.0)
+    resting = run(bare, straight((3.0, 0.0, 0.0), (3.0, 0.0, 0.0)), 0.25)
+    assert (times(resting, 2), times(resting, 3)) == ([0.0], [])
+    falling = run(bare, straight((3.0, 0.0, 0.0), (2.0, 0.0, 0.0)), 0.25)
+    assert (times(falling, 2), times(falling, 3)) == ([0.0], [pytest.approx(0.0, abs=2e-6)])
+
+
+@examples(25, fuzz=1500)
+@given(
+    seed=st.integers(0, 2**32), zeta=st.floats(0.5, 4.0), share=st.floats(0.05, 0.9), dwell=st.sampled_from([0.0, 0.35])
+)
+def test_events_are_those_of_the_replay(seed: int, zeta: float, share: float, dwell: float) -> None:
+    """Random errors and noise with steps as coarse as their changes, against the exact replay of THR-TRIG."""
+    rng = np.random.default_rng(seed)
+    path = Path(np.arange(9.0), rng.normal(0.0, 2.0, (9, 2, 3)), rng.normal(0.0, 0.7, (9, 2)))
+    trigger = Trigger(zeta, share * zeta, dwell)
+    status = run(trigger, path, 1.0)
+    for j in range(2):
+        signal = NormSignal.of(path.t, np.column_stack([path.error[:, j], path.noise[:, j]]))
+        expected = list(transitions(signal, trigger.zeta, trigger.release, trigger.dwell))
+        starts = [t for t, kind in expected if kind == "trigger"]
+        ends = [t for t, kind in expected if kind in ("release", "refractory")]
+        instants = np.sort([*starts, *ends])
+        if (np.diff(instants) < 1e-4).any() or (instants > 8.0 - 1e-4).any():
+            continue  # closer than what is isolated apart
+        assert times(status, 2, j) == pytest.approx(starts, abs=3e-6)
+        assert times(status, 3, j) == pytest.approx(ends, abs=3e-6)

@@ -1,0 +1,303 @@
+"""The built diagram against the scenario: broken variants of the running code, each refuted by a claim."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from pydrake.systems.primitives import LinearSystem
+from verify.test_layers import imported, within
+
+from airground_drake import components, diagram
+from airground_drake.arrays import Array
+from airground_drake.intervention.policy import Proposal
+from airground_drake.nsbc import team as team_module
+from airground_drake.nsbc.avoidance import Avoidance, HalfSpaces, Surroundings
+from airground_drake.nsbc.law import UgvLaw
+from airground_drake.nsbc.team import Neighbourhood, Team
+from airground_drake.scenarios.load import load
+from airground_drake.scenarios.schema import Scenario
+from airground_drake.systems import controllers
+from airground_drake.verify.claim import ModelClaim
+from airground_drake.verify.model.avoidance import scenario_pairs, wiring
+from airground_drake.verify.model.avoidance.constants import kinds
+from airground_drake.verify.model.avoidance.safe_gate import SafeGate
+from airground_drake.verify.model.avoidance.safe_inv import SafeInv
+from airground_drake.verify.model.avoidance.scenario_pairs import Views
+
+Patch = Callable[[pytest.MonkeyPatch], None]
+
+
+def distance_between(first_uav: bool, factor: float) -> Patch:
+    right = Team.pair_distance
+
+    def wrong(self: Team) -> Array:
+        found = right(self)
+        rows = np.arange(len(found))
+        with_uav = (rows == rows[-1]) | (rows == rows[-1])[:, None]
+        return np.where(with_uav == first_uav, factor * found, found)
+
+    return lambda patch: patch.setattr(Team, "pair_distance", wrong)
+
+
+def neighbourhood(change: Callable[[Team, Neighbourhood], Neighbourhood]) -> Patch:
+    right = Team.neighbourhood
+    return lambda patch: patch.setattr(Team, "neighbourhood", lambda self, rows: change(self, right(self, rows)))
+
+
+def shares(value: float) -> Patch:
+    return neighbourhood(lambda team, given: replace(given, share=np.where(given.share < 1.0, value, given.share)))
+
+
+def obstacle_distance(factor: float) -> Patch:
+    def change(team: Team, given: Neighbourhood) -> Neighbourhood:
+        obstacle = np.arange(given.distance.shape[1]) < len(team.obstacles)
+        return replace(given, distance=np.where(obstacle, factor * given.distance, given.distance))
+
+    return neighbourhood(change)
+
+
+def gathered(change: Callable[[Array, int], Array]) -> Patch:
+    """Another `kernels.gather`: `change(centres, number of obstacles)`."""
+    right = team_module.kernels.gather
+
+    def wrong(self: Neighbourhood, positions: Array) -> Surroundings:
+        centre = change(right(positions, self.obstacles, self.others), len(self.obstacles))
+        return Surroundings(centre, self.distance, self.share)
+
+    return lambda patch: patch.setattr(Neighbourhood, "around", wrong)
+
+
+def far(centre: Array, columns: slice) -> Array:
+    moved = centre.copy()
+    moved[:, columns] += 1e3
+    return moved
+
+
+def layer(**changed: float) -> Patch:
+    right = components.make_avoidance
+
+    def wrong(*args: Any) -> Avoidance:
+        return replace(right(*args), **changed)  # type: ignore[arg-type]
+
+    return lambda patch: patch.setattr(components, "make_avoidance", wrong)
+
+
+def everything_accepted(patch: pytest.MonkeyPatch) -> None:
+    def wrong(proposals: Sequence[Proposal | None], answers: Array) -> list[Proposal | None]:
+        return list(proposals)
+
+    patch.setattr(controllers, "accepted_proposals", wrong)
+
+
+def any_issue_answered(patch: pytest.MonkeyPatch) -> None:
+    def wrong(proposals: Sequence[Proposal | None], answers: Array) -> list[Proposal | None]:
+        return [p if answers[2 * i] == 1.0 else None for i, p in enumerate(proposals)]
+
+    patch.setattr(controllers, "accepted_proposals", wrong)
+
+
+def mobility_lost(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(Team, "mobility", property(lambda self: np.ones((len(self.robots), 3))))
+
+
+def on_top(patch: pytest.MonkeyPatch) -> None:
+    right = components.make_law
+    patch.setattr(components, "make_law", lambda *args: replace(right(*args), intervention_on_top=True))
+
+
+def unlayered(patch: pytest.MonkeyPatch) -> None:
+    """The UAV without its layer."""
+
+    class Blind(controllers.UavController):
+        def __init__(self, team: Team, avoidance: Avoidance, **given: Any) -> None:
+            super().__init__(team, replace(avoidance, sensing_range=0.0), **given)
+
+    patch.setattr("airground_drake.diagram.UavController", Blind)
+
+
+def speeding(patch: pytest.MonkeyPatch) -> None:
+    right = components.make_team
+
+    def wrong(scenario: Scenario) -> Team:
+        found = right(scenario)
+        return replace(found, max_speed=1.5 * found.max_speed)
+
+    patch.setattr(components, "make_team", wrong)
+
+
+def swapped(patch: pytest.MonkeyPatch) -> None:
+    """Two UGVs' commands exchanged on their way."""
+    right = UgvLaw.velocity
+
+    def wrong(self: UgvLaw, *args: Any) -> Array:
+        found: Array = right(self, *args)
+        return found[::-1]
+
+    patch.setattr(UgvLaw, "velocity", wrong)
+
+
+def half_rate(patch: pytest.MonkeyPatch) -> None:
+    """The UGVs sampled at half the rate."""
+
+    class Slow(controllers.UgvController):
+        def __init__(self, team: Team, law: UgvLaw) -> None:
+            period = law.avoidance.period
+            super().__init__(team, replace(law, avoidance=replace(law.avoidance, period=2.0 * period)))
+            self.avoidance = law.avoidance
+            self.law = law
+
+    patch.setattr("airground_drake.diagram.UgvController", Slow)
+
+
+def fast_plants(patch: pytest.MonkeyPatch) -> None:
+    eye, zero = np.eye(3), np.zeros((3, 3))
+
+    def plant(robot: str, start: Array) -> LinearSystem:
+        found = LinearSystem(A=zero, B=1.1 * eye, C=eye, D=zero)
+        found.configure_default_state(start)
+        return found
+
+    right = diagram.build_model
+    patch.setattr(wiring, "build_model", lambda *args: right(*args, plants=plant))
+
+
+def first_half_space_dropped(patch: pytest.MonkeyPatch) -> None:
+    right = Avoidance.half_spaces
+
+    def wrong(self: Avoidance, *args: Any) -> HalfSpaces:
+        found = right(self, *args)
+        bound = found.bound.copy()
+        bound[0, 0] = -np.inf
+        return HalfSpaces(found.normal, bound)
+
+    patch.setattr(Avoidance, "half_spaces", wrong)
+
+
+MUTANTS: dict[str, Patch] = {
+    "distance UAV/UGV times 0.9": distance_between(True, 0.9),
+    "distance UAV/UGV times 0.9999": distance_between(True, 0.9999),
+    "distance UGV/UGV times 0.9": distance_between(False, 0.9),
+    "distance UGV/UGV times 1.1": distance_between(False, 1.1),
+    "distance to obstacles times 0.9": obstacle_distance(0.9),
+    "share 1 for robots": shares(1.0),
+    "share 0 for robots": shares(0.0),
+    "share 0.51 for robots": shares(0.51),
+    "gather leaves out the UAV": gathered(lambda centre, m: far(centre, slice(-1, None))),
+    "gather leaves out an obstacle": gathered(lambda centre, m: far(centre, slice(0, min(m, 1)))),
+    "gather leaves out the UGVs": gathered(lambda centre, m: far(centre, slice(m, -1))),
+    "gather in another order": gathered(lambda centre, m: np.roll(centre, 1, axis=1)),
+    "no gain": layer(gain=0.0),
+    "range cut": layer(sensing_range=2.1),
+    "twice the period": layer(period=0.1),
+    "everything accepted": everything_accepted,
+    "another proposal's answer": any_issue_answered,
+    "planar mobility lost": mobility_lost,
+    "intervention on top": on_top,
+    "UAV without its layer": unlayered,
+    "speed limits times 1.5": speeding,
+    "commands swapped": swapped,
+    "UGVs at half the rate": half_rate,
+    "plants faster than commanded": fast_plants,
+    "one inequality dropped": first_half_space_dropped,
+}
+
+
+@pytest.mark.parametrize("name", MUTANTS)
+def test_running_code_that_differs_from_the_scenario_is_refuted(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    scenario = load("case_a")[0]
+    given = SafeInv().inputs(scenario)
+    MUTANTS[name](monkeypatch)
+    assert SafeInv().inputs(scenario) == given  # nothing that is demanded comes from the code
+    finding = SafeInv().judge(given)
+    assert finding.status == "refuted", finding
+    assert finding.counterexample is not None
+    assert finding.margin is None or finding.margin < 0.0
+    json.dumps(finding.counterexample, allow_nan=False)
+
+
+@pytest.mark.parametrize("name", ["distance UAV/UGV times 0.9", "share 1 for robots", "gather leaves out the UAV"])
+def test_safe_gate_refutes_it_too_and_says_where(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    given = SafeGate().inputs(load("case_a")[0])
+    MUTANTS[name](monkeypatch)
+    finding = SafeGate().judge(given)
+    assert finding.status == "refuted", finding
+    assert finding.counterexample is not None
+    found = finding.counterexample.get("wiring", finding.counterexample)
+    assert {found["robot"], found["avoided"]} <= {"ugv1", "ugv2", "ugv3", "uav"}
+    assert (found["safe_distance_m"], found["share"]) in {(1.0, 0.5), (2.0, 0.5)}
+    assert found["missed_by_m_s"] > 0.01
+    assert finding.margin is not None
+    assert finding.margin < -0.01
+
+
+@pytest.mark.parametrize("claim", [SafeInv(), SafeGate()], ids=lambda claim: claim.id)
+def test_a_diagram_of_another_scenario_is_refuted(claim: ModelClaim, case_a: Scenario) -> None:
+    given = claim.inputs(case_a)
+    case_a.safe_distance.air_ground_m *= 0.9
+    assert claim.judge(given | {"scenario": claim.inputs(case_a)["scenario"]}).status == "refuted"
+
+
+def test_every_pair_binds_and_every_answer_occurs(found: dict[str, Any]) -> None:
+    seen = found["SAFE-INV"].evidence["wiring"]
+    assert seen["agrees"]
+    assert seen["differences"] == seen["never_bound_count"] == 0
+    assert min(seen["least_times_bound"].values()) > 10
+    assert min(seen["proposals"].values()) > 30
+    assert seen["executed"] == seen["proposals"]["accepted"]
+
+
+@pytest.mark.parametrize("factor", [1.0 - 1e-6, 1.0 + 1e-6])
+def test_a_millionth_of_a_distance_is_noticed(
+    factor: float, monkeypatch: pytest.MonkeyPatch, inputs: dict[str, Any]
+) -> None:
+    assert wiring.compare(inputs)["agrees"]
+    distance_between(True, factor)(monkeypatch)
+    assert not wiring.compare(inputs)["agrees"]
+
+
+def test_a_pair_that_was_never_near_is_not_proved(monkeypatch: pytest.MonkeyPatch, inputs: dict[str, Any]) -> None:
+    right = wiring._beside
+
+    def apart(given: Any, views: Views, pairs: Any, *more: Any) -> wiring.State:
+        return right(given, views, [(i, j) for i, j in pairs if j < 0], *more)
+
+    monkeypatch.setattr(wiring, "_beside", apart)
+    monkeypatch.setattr(wiring, "CROWDED", 0)
+    assert SafeInv().judge(inputs).status == "inconclusive"
+
+
+def test_the_scenario_alone_says_what_is_demanded() -> None:
+    judged = {"nsbc", "components", "diagram", "systems", "gatekeeper", "intervention", "simulation", "decision"}
+    path = scenario_pairs.__file__
+    assert path is not None
+    assert not [name for name in imported(Path(path)) if within(name, judged)]
+
+
+def test_demands_agree_with_those_of_the_running_team(inputs: dict[str, Any], case_a: Scenario) -> None:
+    """Today's code; were it to differ, the claim decides, not this test."""
+    views, team = Views.of(inputs["team"]), components.make_team(case_a)
+    around = team.neighbourhood(slice(None))
+    assert np.array_equal(views.safe, around.distance)
+    assert np.array_equal(views.share, around.share)
+    assert np.array_equal(views.others, around.others)
+    assert np.array_equal(views.mobility, team.mobility)
+    assert [kind.name for kind in kinds(inputs)] == ["obstacle", "uav_ugv", "ugv_ugv"]
+
+
+def test_a_projection_onto_one_half_space() -> None:
+    normal = np.array([[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]])
+    for bound, wanted, one, velocity in (
+        ([-1.0, -1.0], [-3.0, 0.0, 0.0], True, [-1.0, 0.0, 0.0]),
+        ([-1.0, -1.0], [-3.0, -3.0, 0.0], False, None),
+        ([-1.0, -np.inf], [2.0, -3.0, 0.0], True, [2.0, -3.0, 0.0]),
+        ([0.5, -1.0], [-1.0, 0.0, 1.0], True, [0.5, 0.0, 1.0]),
+    ):
+        posed, found, _ = wiring.closest_velocity(np.array([wanted]), normal, np.array([bound]))
+        assert posed[0] == one
+        assert velocity is None or np.allclose(found[0], velocity)
