@@ -131,6 +131,7 @@ class GateModel(GateClaim):
             "holds",
             margin=VELOCITY_TOLERANCE_M_S - largest,
             unit="m/s",
+            quantity="tolerance left by which a mode velocity may differ from the closed loop's",
             evidence={**evidence, **_realised(trace, rows, sent), **_regrets(trace, rows, scenes)},
         )
         return conclude(finding, compared)
