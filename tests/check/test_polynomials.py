@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from properties import examples
 
 from airground_drake.check.enclosures import Dual, evaluate
 from airground_drake.check.polynomials import Polynomial, parse
@@ -26,6 +27,7 @@ def value(polynomial: Polynomial, at: dict[str, Fraction]) -> Fraction:
     return sum((k * math.prod(at[name] for name in names) for names, k in polynomial.items()), Fraction())
 
 
+@examples(100, fuzz=2000)
 @given(
     one=PRODUCTS, other=PRODUCTS, at=st.fixed_dictionaries(dict.fromkeys("xyz", st.fractions(-3, 3, max_denominator=4)))
 )
