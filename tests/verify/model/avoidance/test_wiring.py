@@ -313,5 +313,5 @@ def test_in_a_large_team_every_pair_binds(case_a: Scenario) -> None:
         case_a.ugvs[f"more{k}"] = more
     seen = wiring.compare(SafeInv().inputs(case_a))
     assert seen["agrees"]
-    assert seen["views"] == {"obstacle": 24 * 3 - 3, "uav_ugv": 44, "ugv_ugv": 22 * 21}
+    assert seen["views"] == {"obstacle": 23 * 3, "uav_ugv": 44, "ugv_ugv": 22 * 21}
     assert seen["never_bound_count"] == 0
