@@ -34,6 +34,8 @@ STATES = 240
 """Team positions at least; more where there are many pairs."""
 CROWDED = 60
 """Team positions besides, in which robots crowd around one obstacle."""
+AGAIN = 60
+"""Further ones for inequalities that have not bound, as where several robots were beside one obstacle."""
 TRIALS = 24
 """Directions from an obstacle that are tried for one that is clear of the others."""
 RESTORING_TOLERANCE_M_S = 2e-9
@@ -97,7 +99,8 @@ def compare(inputs: Inputs, composition: Composition = "augmented") -> Inputs:
             tally.differ(0.6, f"{name} is sampled otherwise than the scenario says", {
                 "period_s": sampled[0], "offset_s": sampled[1], "wanted_period_s": inputs["period_s"],
             })  # fmt: skip
-    for state in states(inputs, views, rng):
+
+    def look(state: State) -> None:
         asked = hostile(inputs, views, state, rng)
         commands, executed, driven = probe.commands(state.positions, asked)
         tally.states += 1
@@ -112,7 +115,27 @@ def compare(inputs: Inputs, composition: Composition = "augmented") -> Inputs:
                 "command_m_s": commands[i].tolist(), "plant_m_s": driven[i].tolist(),
             }, i, state)  # fmt: skip
         _judge(inputs, views, state, asked, commands, composition == "augmented", tally)
+
+    for state in states(inputs, views, rng):
+        look(state)
+    for r in range(AGAIN):
+        if not (pairs := unbound(views, tally.bound_of)):
+            break
+        look(_beside(inputs, views, pairs, r, rng))
     return tally.to_json(composition)
+
+
+def unbound(views: Views, bound_of: npt.NDArray[np.intp]) -> list[tuple[int, int]]:
+    """Pairs (robot, robot or -1 - obstacle) whose inequality has not bound yet, no robot or obstacle in two of them."""
+    m = len(views.obstacles)
+    found: list[tuple[int, int]] = []
+    taken: set[int] = set()
+    for i, k in np.argwhere(bound_of == 0)[::-1].tolist():
+        j = -1 - k if k < m else int(views.others[i, k - m])
+        if not taken & {i, j}:
+            found.append((i, j))
+            taken |= {i, j}
+    return found
 
 
 def difference(found: Finding, wired: Sequence[Inputs]) -> Finding:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
+from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -301,3 +302,16 @@ def test_a_projection_onto_one_half_space() -> None:
         posed, found, _ = wiring.closest_velocity(np.array([wanted]), normal, np.array([bound]))
         assert posed[0] == one
         assert velocity is None or np.allclose(found[0], velocity)
+
+
+def test_in_a_large_team_every_pair_binds(case_a: Scenario) -> None:
+    first = case_a.ugvs["ugv1"]
+    for k in range(20):
+        more = deepcopy(first)
+        for point in (more.start_m, more.target_m, *more.preset.waypoints_m):
+            point[1] += 100.0 + 5.0 * k
+        case_a.ugvs[f"more{k}"] = more
+    seen = wiring.compare(SafeInv().inputs(case_a))
+    assert seen["agrees"]
+    assert seen["views"] == {"obstacle": 23 * 3, "uav_ugv": 44, "ugv_ugv": 22 * 21}
+    assert seen["never_bound_count"] == 0
