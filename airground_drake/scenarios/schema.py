@@ -186,8 +186,8 @@ class Reproduction:
     unit: str = ""
     tolerance: float = field(default=0.0, metadata=FROM_ZERO)
     calibrated: bool = False
-    ambiguous: str = ""
     why: str = ""
+    ambiguous: str = ""
 
 
 @dataclass

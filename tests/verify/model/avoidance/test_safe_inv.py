@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from properties import examples
 
 from airground_drake.nsbc.avoidance import Avoidance, Surroundings
+from airground_drake.scenarios.rounding import loss_of_inequality
 from airground_drake.verify.engines.rounding import unit
-from airground_drake.verify.model.avoidance.conformance import loss_of_inequality
 
 
 @examples(60)
