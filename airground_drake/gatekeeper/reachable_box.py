@@ -16,7 +16,10 @@ from airground_drake.gatekeeper.problem import Kinematics, Problem
 
 
 def within_reach(problem: Problem) -> npt.NDArray[np.bool_]:
-    """(N, m): False where no relaxed plan can come within the safe distance, so that the row cannot bind."""
+    """(N, m): False where no relaxed plan can come within the safe distance, so that (26d) costs nothing there.
+
+    A half-plane in its place may still bind: it is conservative. Without it the bounds stay valid.
+    """
     within: npt.NDArray[np.bool_] = _within_reach(problem.kinematics, problem.terms)
     return within
 
