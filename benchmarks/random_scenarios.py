@@ -25,8 +25,9 @@ from airground_drake.scenarios.load import from_data, resolved
 from airground_drake.simulation import simulate
 from airground_drake.verify import verify
 
-MUST_HOLD = {"a": (), "b": (), "c": (), "d": ("SAFE-TRACE", "SAFE-HYP")}
 ALWAYS = ("ZENO-TRACE", "THR-TRIG")
+CERTIFIED = ("SAFE-TRACE", "SAFE-HYP")
+"""Claims that must hold in every run (a bare trigger has no dwell to keep), and in those of method (d)."""
 
 
 def draw(number: int) -> dict[str, Any]:
@@ -61,7 +62,7 @@ def draw(number: int) -> dict[str, Any]:
     return {
         "name": f"random_{number}",
         "seed": number,
-        "duration_s": float(round(rng.choice([20, 60]) * h / h, 9)) * (1.0 if h >= 0.05 else 0.25),
+        "duration_s": float(rng.choice([20, 60])) * (1.0 if h >= 0.05 else 0.25),
         "ugvs": ugvs,
         "uav": {
             "start_m": [-3.0 * extent, 0.0, 3.0], "target_m": [0.0, 3.0 * extent, 3.0], "altitude_m": 3.0,
@@ -120,9 +121,8 @@ def judged(number: int) -> tuple[int, str, list[str]]:
     wrong = []
     for verdict in verdicts:
         status, name = verdict.finding.status, verdict.claim.id
-        must = name in (*ALWAYS, *MUST_HOLD[method]) and not (
-            name == "ZENO-TRACE" and scenario.decision.trigger == "bare"
-        )
+        must = name in ALWAYS or (name in CERTIFIED and method == "d")
+        must = must and not (name == "ZENO-TRACE" and scenario.decision.trigger == "bare")
         if status == "error" or (must and status != "holds"):
             wrong.append(f"{name} {status}: {verdict.finding.counterexample or verdict.finding.evidence}"[:300])
     return number, method, wrong
