@@ -106,6 +106,7 @@ class Trace:
     timings: dict[str, Any] = field(default_factory=dict, compare=False)
     problems: pd.DataFrame = field(default_factory=lambda: pd.DataFrame(columns=[*PROBLEM_SCALARS, *PROBLEM_ARRAYS]))
     proposals: pd.DataFrame = field(default_factory=no_proposals)
+    _read: dict[str, Array] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @property
     def run(self) -> str:
@@ -139,16 +140,20 @@ class Trace:
         return self.column("t_s")
 
     def column(self, name: str) -> Array:
-        """One column as float64, (T,).
+        """One column as float64, (T,), read-only: every claim asks for the same few, which are looked at once.
 
         Raises:
             TraceError: if it is missing or not finite.
         """
+        if name in self._read:
+            return self._read[name]
         if name not in self.signals:
             raise TraceError(f"run {self.meta.get('run')}: the trace has no column {name!r}")
-        values = self.signals[name].to_numpy(dtype=np.float64)
+        values = self.signals[name].to_numpy(dtype=np.float64, copy=True)
         if not np.isfinite(values).all():
             raise TraceError(f"run {self.meta.get('run')}: column {name!r} has values that are not finite")
+        values.setflags(write=False)
+        self._read[name] = values
         return values
 
     def vector(self, robot: str, stem: str = "", unit: str = "m") -> Array:
