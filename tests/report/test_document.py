@@ -18,7 +18,7 @@ from airground_drake.verify.finding import Finding
 
 def test_minimum_of_the_schema_in_strict_json(scenario: Scenario, traces: dict[str, Trace]) -> None:
     report = json.loads(json.dumps(built(scenario, traces, FINE), allow_nan=False))
-    assert report["schema"] == "airground_drake.report/1"
+    assert report["schema"] == "airground_drake.report/2"
     assert {"name", "sha256", "resolved"} <= set(report["scenario"])
     run = report["runs"]["c"]
     assert set(run["events"][0]) == {"t_s", "robot", "kind", "position_m"}
