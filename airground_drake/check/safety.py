@@ -35,14 +35,15 @@ def safe_trace(run: Run, claim: Json) -> Found:
     margins, close_by, doubtful = {}, 0, 0
     for pair in run.pairs:
         least = least_distance_m(run, pair)
+        noted = by_names[pair.robot, pair.other]
+        margins[pair.robot, pair.other] = least - pair.safe_m
+        _evidence_on_a_pair(run, pair, least, noted)
         spare = least - pair.safe_m - pair.closing_m_s * run.scenario["control"]["period_s"]
         close_by += spare < -SMALL
         doubtful += abs(spare) <= SMALL
         if abs(spare) > SMALL:
-            noted = by_names[pair.robot, pair.other]["exercised"]
-            same("a period at full speed breaks it", noted, bool(spare < 0.0), about=f"{pair.robot}, {pair.other}")
-        margins[pair.robot, pair.other] = least - pair.safe_m
-        _evidence_on_a_pair(run, pair, least, by_names[pair.robot, pair.other])
+            about = f"{pair.robot}, {pair.other}"
+            same("a period at full speed breaks it", noted["exercised"], bool(spare < 0.0), about=about)
     margin = min(margins.values())
     worst = claim["where"]["first"], claim["where"]["second"]
     close("pair of least margin", margins[worst], margin, within=SMALL, about=", ".join(worst))

@@ -195,11 +195,14 @@ def _checks(count: int) -> str:
 
 
 def _nothing_to_check(idle: Sequence[Mapping[str, Any]]) -> str:
-    """Which claims hold for lack of anything that could have refuted them, by claim."""
+    """Which claims were established for lack of anything that could have refuted them; those of equal runs together."""
     runs: dict[str, list[str]] = {}
     for item in idle:
         runs.setdefault(item["id"], []).append(item["run"])
-    listed = ", ".join(f"{name}{_on(', '.join(filter(None, where)))}" for name, where in runs.items())
+    together: dict[str, list[str]] = {}
+    for name, where in runs.items():
+        together.setdefault(", ".join(filter(None, where)), []).append(name)
+    listed = "; ".join(f"{', '.join(names)}{_on(where)}" for where, names in together.items())
     return f"{len(idle)} of them had nothing to check: {listed}."
 
 
