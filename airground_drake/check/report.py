@@ -244,10 +244,11 @@ def _judge(claim: Json, scenario: Json, decide: Callable[[Json], Found]) -> str:
         remark = f" (broken: {broken.rule})"
     else:
         remark = ""
-        _counted_as_here(claim, found)
     if status in UNDECIDED and found.status != status:
         raise NotEstablished("verdict", f"recorded {status!r}, which decides nothing; here it is {found.status!r}")
     same("verdict", status, found.status)
+    if not remark:
+        _counted_as_here(claim, found)
     margin = claim["margin"]
     if found.least is None or found.most is None or margin is None:
         same("margin", margin, found.least)
