@@ -46,7 +46,8 @@ def gate_feas(run: Run, _: Json) -> Found:
         _nothing_is_executed_without_acceptance(run, ugv, mine)
         if decisions:
             _own_task_while_nothing_is_accepted(run, ugv)
-    return Found("holds", 0.0, 1.0, {"decisions": len(decisions)}) if decisions else Found("holds")
+    found = Found("holds", 0.0, 1.0, {"decisions": len(decisions)}) if decisions else Found("holds")
+    return found.counted(len(decisions))
 
 
 def _at(decision: Decision, what: str = "") -> Json:

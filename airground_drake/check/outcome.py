@@ -21,7 +21,27 @@ def live_goal(run: Run, _: Json) -> Found:
     ends = [*_ends(run)]
     margin = min(margin for _, _, margin in ends)
     conditions = [{"robot": robot, "condition": what, "margin_m": margin} for robot, what, margin in ends]
-    return Found.with_margin("holds" if margin >= 0.0 else "refuted", margin, conditions=conditions)
+    found = Found.with_margin("holds" if margin >= 0.0 else "refuted", margin, conditions=conditions)
+    farther = [float(np.linalg.norm(run.position_m[robot][0] - place)) - near for robot, place, near in _goals(run)]
+    return found.counted(sum(each > SMALL for each in farther), sum(each > -SMALL for each in farther))
+
+
+def _goals(run: Run) -> Iterator[tuple[str, Array, float]]:
+    """Robot, where it must end, and the tolerance, m."""
+    scenario = run.scenario
+    stalls, arrival = scenario["runs"][run.name]["stalls_m"], scenario["arrival_tolerance_m"]
+    for ugv in run.ugvs:
+        if ugv in stalls:
+            yield ugv, np.array(stalls[ugv]), scenario["stall_tolerance_m"]
+        else:
+            yield ugv, np.array(scenario["ugvs"][ugv]["target_m"]), arrival
+    yield run.uav, _above_the_centroid_m(run) if stalls else np.array(scenario["uav"]["target_m"]), arrival
+
+
+def _above_the_centroid_m(run: Run) -> Array:
+    """The place at the flight altitude above the centroid of the UGVs at the end, (3,)."""
+    centroid = np.mean([run.position_m[ugv][-1] for ugv in run.ugvs], axis=0)
+    return np.asarray(centroid + np.array([0.0, 0.0, run.scenario["uav"]["altitude_m"]]))
 
 
 def _ends(run: Run) -> Iterator[tuple[str, str, float]]:
@@ -39,9 +59,8 @@ def _ends(run: Run) -> Iterator[tuple[str, str, float]]:
         else:
             yield ugv, "at its target", arrival - short
     if stalls:
-        centroid = np.mean([end[ugv] for ugv in run.ugvs], axis=0)
-        above = centroid + np.array([0.0, 0.0, scenario["uav"]["altitude_m"]])
-        yield run.uav, "over the centroid of the UGVs", arrival - float(np.linalg.norm(end[run.uav] - above))
+        off = float(np.linalg.norm(end[run.uav] - _above_the_centroid_m(run)))
+        yield run.uav, "over the centroid of the UGVs", arrival - off
     else:
         yield run.uav, "at its target", arrival - float(np.linalg.norm(end[run.uav] - scenario["uav"]["target_m"]))
 
@@ -76,7 +95,8 @@ def comm(run: Run, _: Json) -> Found:
     always_on = {"proposal": n * int(duration / planning_s), "decision": n * int(duration / gating_s) if gated else 0}
     saved = [1.0 - spent[kind] / most for kind, most in always_on.items() if most]
     status = "holds" if all(spent[kind] <= most for kind, most in always_on.items()) else "refuted"
-    return Found.with_margin(status, min(saved), spent=spent, always_on=always_on) if saved else Found(status)
+    found = Found.with_margin(status, min(saved), spent=spent, always_on=always_on) if saved else Found(status)
+    return found.counted(proposals)
 
 
 def decided_s(run: Run, ugv: str) -> Array:
@@ -108,9 +128,9 @@ def gate_time(run: Run, _: Json) -> Found:
     """GATE-TIME: the 99th percentile of the CPU times, rounded up to an order statistic, is below the period."""
     times, period = np.array(run.decision_times_s, dtype=np.float64), float(run.scenario["gatekeeper"]["period_s"])
     if not len(run.decisions):
-        return Found("not_run" if any(map(run.talk_is_due, run.ugvs)) else "holds")
+        return Found("not_run") if any(map(run.talk_is_due, run.ugvs)) else Found("holds").counted(0)
     same("one time for each decision", len(times), len(run.decisions))
     holds("times are not negative", times >= 0.0, times, "0 or more")
     p50, p99 = (float(np.quantile(times, level, method="higher")) for level in (0.5, 0.99))
     facts = {"p50_s": p50, "p99_s": p99, "max_s": float(times.max()), "period_s": period, "count": len(times)}
-    return Found.with_margin("holds" if p99 < period else "refuted", period - p99, **facts)
+    return Found.with_margin("holds" if p99 < period else "refuted", period - p99, **facts).counted(len(times))

@@ -55,7 +55,7 @@ def gate_model(run: Run, _: Json) -> Found:
         return Found("not_run")
     decisions = decisions_of(run)
     if not decisions:
-        return Found("holds")
+        return Found("holds").counted(0)
     loops = Loops(*(np.stack(part) for part in zip(*(_loop(run, each) for each in decisions), strict=True)))
     off = 0.0
     for accepted, choice in enumerate(CHOICES):
@@ -67,7 +67,8 @@ def gate_model(run: Run, _: Json) -> Found:
             off = max(off, float(np.abs(recorded - modes[k]).max()))
             if accepted:
                 close("bend", decision.row["bend"], bend[k], within=BEND, **at)
-    return Found.with_margin("holds", VELOCITY_M_S - off, within=1e-7, decisions=len(decisions))
+    found = Found.with_margin("holds", VELOCITY_M_S - off, within=1e-7, decisions=len(decisions))
+    return found.counted(len(decisions))
 
 
 def _loop(run: Run, decision: Decision) -> tuple[Array, ...]:

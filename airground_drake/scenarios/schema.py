@@ -160,7 +160,7 @@ class Run:
 
     `stalls_m` names the UGVs that must end (to within `stall_tolerance_m`) at that point short of their
     target. `expected` maps claim identifiers to the expected verdict; a claim not named must hold. Where
-    there is no guarantee, "holds or refuted" admits either.
+    there is no guarantee, "holds or refuted" admits either. `exercised` is "holds, and something put it to the test".
     """
 
     method: str = field(default_factory=str, metadata=REQUIRED)

@@ -18,13 +18,13 @@ from airground_drake.errors import Fault, ScenarioError
 from airground_drake.intervention.database import RANKINGS
 from airground_drake.nsbc.avoidance import COMPOSITIONS
 from airground_drake.registry import (
+    EXPECTATIONS,
     METHODS,
     MODEL_CLAIMS,
     PLUGIN,
     POLICIES,
     ROUTES,
     RUN_CLAIMS,
-    STATUSES,
     UAV_TASKS,
     Registry,
     alternatives,
@@ -82,8 +82,9 @@ def _one_of(key: str, value: str, allowed: Iterable[str], what: str = "one of") 
 
 def _expectation(key: str, expected: str) -> Problems:
     for status in alternatives(expected):
-        if status not in STATUSES:
-            yield key, expected, f"one of {', '.join(STATUSES)}, or several of them: holds or refuted"
+        if status not in EXPECTATIONS:
+            allowed = f"one of {', '.join(EXPECTATIONS)}, or several of them, such as: exercised or refuted"
+            yield key, expected, allowed
 
 
 def _registered(key: str, name: str, registry: Registry) -> Problems:

@@ -46,6 +46,8 @@ class Comm(TraceClaim):
         """Method (a) sends nothing by construction."""
         return trace.meta.get("method") != "a"
 
+    exercised_by = "proposals sent"
+
     def check(self, trace: Trace) -> Finding:
         """Count, look for strays, compare with always-on; the margin is the fraction saved of what saves least."""
         scenario = trace.scenario
@@ -92,6 +94,7 @@ class Comm(TraceClaim):
                 "ugvs": per_ugv,
                 "outside_interventions": strays,
             },
+            exercised=spent["proposal"],
         )
 
 

@@ -100,6 +100,8 @@ class Exec(TraceClaim):
         "not about where they led. A UAV with another task than 'formation' is not judged; the evidence says so."
     )
 
+    exercised_by = "commands for which an accepted proposal was executed, or which an avoidance inequality bound"
+
     def check(self, trace: Trace) -> Finding:
         """Compare every command with the law; the margin is the tolerance less the largest difference."""
         proposals = proposals_of(trace)
@@ -133,6 +135,7 @@ class Exec(TraceClaim):
                 "not_judged": [] if formation else [f"{trace.robots[-1]}: task {trace.scenario['uav']['task']}"],
                 "tolerance_m_s": COMMAND_TOLERANCE_M_S,
             },
+            exercised=sum(int((one.executing | one.binding).sum()) for one in judged),
         )
 
 

@@ -61,6 +61,8 @@ class GateFeas(GateClaim):
         "feasible plan may lead inside a safe distance, at the cost of its slack; safety is SAFE-TRACE."
     )
 
+    exercised_by = "decisions"
+
     def judge_rows(self, trace: Trace, rows: list[Row]) -> Finding:
         """Compare everything recorded with what it should be; the margin is the part of a tolerance left."""
         compared = [one for row in rows for one in (*compare_situation(trace, row), *compare_plan(trace, row))]
@@ -80,6 +82,7 @@ class GateFeas(GateClaim):
                 "largest_slack_m": max(slack, default=0.0),
                 "plans_with_slack": sum(value > 0.0 for value in slack),
             },
+            exercised=len(rows),
         )
         return conclude(finding, compared)
 

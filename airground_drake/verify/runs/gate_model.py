@@ -111,6 +111,8 @@ class GateModel(GateClaim):
         "2^N."
     )
 
+    exercised_by = "decisions"
+
     def judge_rows(self, trace: Trace, rows: list[Row]) -> Finding:
         """Roll out both choices of every decision; the margin is the tolerance less the largest difference."""
         sent = proposals_of(trace)
@@ -133,6 +135,7 @@ class GateModel(GateClaim):
             unit="m/s",
             quantity="tolerance left by which a predicted velocity may differ from the closed loop's",
             evidence={**evidence, **_realised(trace, rows, sent), **_regrets(trace, rows, scenes)},
+            exercised=len(rows),
         )
         return conclude(finding, compared)
 

@@ -194,7 +194,8 @@ class GateClaim(TraceClaim):
                 return Finding("not_run", evidence={"reason": reason, "faults": trace.meta["faults"]})
         rows = rows_of(trace)
         if not rows:
-            return Finding("holds", evidence={"decisions": 0, "reason": "no UGV was intervened on: nothing to decide"})
+            reason = "no UGV was intervened on: nothing to decide"
+            return Finding("holds", evidence={"decisions": 0, "reason": reason}, exercised=0)
         return self.judge_rows(trace, rows)
 
     @abc.abstractmethod

@@ -40,6 +40,8 @@ class GateSur(GateClaim):
         "A small integrated error bounds positions, not costs."
     )
 
+    exercised_by = "relaxed plans that were rounded"
+
     def applies(self, trace: Trace) -> bool:
         """Only some routes round; a trace without a scenario is for `judge` to reject."""
         gate = trace.meta.get("scenario", {}).get("gatekeeper", {})
@@ -63,6 +65,7 @@ class GateSur(GateClaim):
             quantity="half a stage less the integrated rounding error",
             where={name: worst.given[name] for name in ("robot", "t_s")},
             evidence={**skipped, "largest_error_s": error, "bound_s": bound},
+            exercised=len(rounded),
         )
         return conclude(finding, (one for row in rounded for one in compare_rounding(row)))
 

@@ -73,6 +73,8 @@ class ThrDdm(ModelClaim):
     )
     expected = "supported"
 
+    exercised_by = "simulated paths"
+
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
         """The numbers of the threshold rule."""
         rule = scenario.decision.threshold
@@ -93,8 +95,9 @@ def compare(chosen: tuple[PassageExperiment, ...], formulas: Formulas) -> Findin
     rows = [row for each in chosen for row in _rows(simulate(each), formulas(each), 2 * len(chosen))]
     worst = min(rows, key=lambda row: float(row["margin"]))
     supported = worst["margin"] >= 0.0
+    paths = sum(each.paths for each in chosen)
     evidence = {
-        "paths": sum(each.paths for each in chosen),
+        "paths": paths,
         "comparisons": rows,
         "family_level": LEVEL,
         "pyddm": {each.name: _pyddm(each) for each in chosen},
@@ -110,6 +113,7 @@ def compare(chosen: tuple[PassageExperiment, ...], formulas: Formulas) -> Findin
         counterexample=None if supported else worst,
         evidence=evidence,
         certificates={"paths.json": json.dumps(certificate, indent=1) + "\n"},
+        exercised=paths,
     )
 
 
