@@ -23,6 +23,7 @@ import time
 from collections import Counter
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -37,7 +38,6 @@ MUTANTS: tuple[Mutant, ...] = (
     *of_code.TEAM, *of_code.KERNELS, *of_code.LAW, *of_code.DECISION, *of_code.INTERVENTION, *of_code.GATEKEEPER,
     *of_checkers.CLAIMS, *of_checkers.CHECKER,
 )  # fmt: skip
-LONGEST_S = 1500.0
 NOT_COMPARED = ("GATE-TIME",)
 """Claims that depend on what else the machine does."""
 
@@ -71,25 +71,40 @@ class Copy:
         """Copy; times of files are kept, because compiled functions are found by them."""
         self.pristine, self.folder = pristine, folder
         shutil.copytree(pristine, folder)
+        paths = os.pathsep.join(map(str, (folder, folder / "tests")))
+        self._environment = os.environ | {"PYTHONPATH": paths, "PYTHONDONTWRITEBYTECODE": "1"}
+        self._environment |= {"AIRGROUND_DRAKE_CACHE": str(folder / "cache")}
+        self._errors = folder / "errors.txt"
+        with self._errors.open("w", encoding="utf-8") as errors:
+            self._server = subprocess.Popen(
+                [sys.executable, "benchmarks/mutation/probe.py"], cwd=folder, env=self._environment, text=True,
+                stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=errors,
+            )  # fmt: skip
+
+    def close(self) -> None:
+        """End the process that answers."""
+        self._server.kill()
+        self._server.wait()
 
     def run(self, *command: str) -> subprocess.CompletedProcess[str]:
         """A command in the copy, on its package."""
-        paths = os.pathsep.join(map(str, (self.folder, self.folder / "tests")))
-        environment = os.environ | {"PYTHONPATH": paths, "PYTHONDONTWRITEBYTECODE": "1"}
-        environment |= {"AIRGROUND_DRAKE_CACHE": str(self.folder / "cache")}
         return subprocess.run(
-            command, cwd=self.folder, env=environment, capture_output=True, text=True, timeout=LONGEST_S, check=False
+            command, cwd=self.folder, env=self._environment, capture_output=True, text=True, check=False
         )
 
     def probe(self, kind: str, *what: str) -> list[list[str]]:
         """Findings of `mutation/probe.py`; one that says so where its process ends otherwise."""
         out = self.folder / "probe.json"
         out.unlink(missing_ok=True)
-        done = self.run(sys.executable, "benchmarks/mutation/probe.py", str(out), kind, *what)
-        if done.returncode == 0 and out.exists():
+        assert self._server.stdin is not None
+        assert self._server.stdout is not None
+        self._server.stdin.write(json.dumps([str(out), kind, what]) + "\n")
+        self._server.stdin.flush()
+        code = self._server.stdout.readline().strip()
+        if code == "0" and out.exists():
             found: list[list[str]] = json.loads(out.read_text(encoding="utf-8"))
             return found
-        last = (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1]
+        last = (self._errors.read_text(encoding="utf-8").strip().splitlines() or [f"exit code {code}"])[-1]
         return [["run", " ".join(what), "stops", last[:160]]]
 
     def compiled_with(self, path: str) -> list[Path]:
@@ -122,8 +137,8 @@ class Copy:
 class Bench:
     """The package as it is, what it gives, and copies to break."""
 
-    def __init__(self, folder: Path, mutants: Sequence[Mutant], jobs: int) -> None:
-        """Copy the package, and run everything once on it.
+    def __init__(self, folder: Path, mutants: Sequence[Mutant], jobs: int, report: Path | None = None) -> None:
+        """Copy the package, and run everything once on it; the report of case B is made unless there is one.
 
         Raises:
             SystemExit: if the package as it is does not pass.
@@ -136,14 +151,13 @@ class Bench:
             else:
                 shutil.copy2(ROOT / name, first / name)
         here = Copy(first, folder / "baseline")
-        self.report = folder / "report"
+        self.report = folder / "report" if report is None else report.resolve()
         probes = sorted({run for mutant in mutants for run in mutant.runs})
-        proofs = sorted({proof for mutant in mutants for proof in mutant.proofs})
-        found = here.probe("runs", *probes) + (here.probe("proofs", *proofs) if proofs else [])
+        found = here.probe("runs", *probes)
         if wrong := [each for each in found if each[2] in ("stops", "disagrees", "error")]:
             sys.exit(f"the package as it is does not pass: {wrong}")
         self.baseline = {(source, where): status for source, where, status, _ in found}
-        if any(mutant.tamperings for mutant in mutants):
+        if report is None and any(mutant.tamperings for mutant in mutants):
             made = here.probe("report", str(self.report))
             if made[0][2] != "0":
                 sys.exit(f"no report of the package as it is: {made}")
@@ -153,6 +167,11 @@ class Bench:
         self.copies: queue.Queue[Copy] = queue.Queue()
         for k in range(jobs):
             self.copies.put(Copy(first, folder / f"copy{k}"))
+
+    def close(self) -> None:
+        """End all processes."""
+        for copy in (self.unbroken, *self.copies.queue):
+            copy.close()
 
     def judge(self, mutant: Mutant) -> Result:
         """Make the edit in a copy that is free, and see what catches it."""
@@ -211,6 +230,7 @@ def main() -> int:
     parser.add_argument("--jobs", type=int, default=1, help="copies that are judged side by side (default: 1)")
     parser.add_argument("--json", type=Path, help="file for the results; those of other mutants in it are kept")
     parser.add_argument("--missing", action="store_true", help="only those that the file of --json does not have")
+    parser.add_argument("--report", type=Path, help="a report of case B to tamper with (default: made)")
     parser.add_argument("--page", type=Path, help="page of the documentation, of all results in the file of --json")
     options = parser.parse_args()
     kept: dict[str, Any] = {}
@@ -220,8 +240,8 @@ def main() -> int:
     wanted = [m for m in wanted if not (options.missing and m.name in kept)]
     if wanted:
         with tempfile.TemporaryDirectory() as name:
-            bench = Bench(Path(name), wanted, options.jobs)
-            with ThreadPoolExecutor(options.jobs) as pool:
+            bench = Bench(Path(name), wanted, options.jobs, options.report)
+            with ThreadPoolExecutor(options.jobs) as pool, closing(bench):
                 for result in pool.map(bench.judge, wanted):
                     print(f"{result.name}: {result.stage}: {'; '.join(result.by) or result.equivalent}", flush=True)
                     kept[result.name] = asdict(result)

@@ -516,7 +516,13 @@ INTERVENTION = (
     ),
 )
 
-ROUTES = ("tests/gatekeeper",)
+ROUTES = (
+    "tests/gatekeeper/test_answer.py",
+    "tests/gatekeeper/test_dual_bound.py",
+    "tests/gatekeeper/test_rounding.py",
+    "tests/gatekeeper/routes/test_relaxed.py",
+    "tests/gatekeeper/routes/test_contract.py",
+)
 GATEKEEPER = (
     Mutant(
         "half-planes along the worse plan",

@@ -1,14 +1,21 @@
-"""What claims and the checker find on short runs of the package that is on the path; run in a process of its own.
+"""What claims and the checker find on short runs of the package that is on the path.
 
-`python probe.py OUT runs|proofs|tamperings|report WHAT...` writes a list of findings as JSON: [source, what] each,
-`source` being a claim, `checker: <claim>` or `run`.
+    python probe.py
+
+reads requests from standard input, a line of JSON each: [file, "runs" | "proofs" | "tamperings" | "report", names].
+Each is answered by a child process, which imports the package as it is then and writes its findings to the file: lists
+of source, where, status and rule, the source being a claim, `checker: <claim>`, `run` or a tampering. A line with the
+child's exit code follows on standard output. Other packages are imported once, before.
 """
 
 from __future__ import annotations
 
 import json
+import os
 import sys
 import tempfile
+import traceback
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -44,7 +51,7 @@ def runs(names: list[str]) -> Findings:
         source, run = PROBES[name]
         scenario = load(source)[0]
         scenario.runs = {run: scenario.runs[run]}
-        scenario.reproduction = []
+        scenario.reproduction, scenario.choices = [], []
         try:
             of_run = simulate(scenario, run)
         except AirgroundError as error:
@@ -63,12 +70,12 @@ def runs(names: list[str]) -> Findings:
 
 
 def proofs(names: list[str]) -> Findings:
-    """Verdicts about the model of case A."""
+    """Verdicts about the model of case A that are not what the scenario expects."""
     from airground_drake.scenarios.load import load
     from airground_drake.verify import verify_model
 
     verdicts = verify_model(load("case_a")[0], claims=names)
-    return [[v.claim.id, "case_a", v.finding.status, ""] for v in verdicts]
+    return [[v.claim.id, "case_a", v.finding.status, ""] for v in verdicts if not v.as_expected]
 
 
 def tamperings(names: list[str]) -> Findings:
@@ -91,6 +98,38 @@ def report(names: list[str]) -> Findings:
     return [["report", names[0], str(main(["case_b", "-o", names[0], "--format", "json"])), ""]]
 
 
+OTHERS = (
+    "cvxpy", "flint", "jinja2", "matplotlib", "numba", "pandas", "pyarrow.parquet", "pydrake.all", "scipy.optimize",
+    "sympy", "yaml", "z3",
+)  # fmt: skip
+"""Packages that every child needs."""
+KINDS = {"runs": runs, "proofs": proofs, "tamperings": tamperings, "report": report}
+
+
+def serve() -> None:
+    """Answer requests until there are no more."""
+    for name in OTHERS:
+        import_module(name)
+    for line in sys.stdin:
+        child = os.fork()
+        if child == 0:
+            _answer(*json.loads(line))
+        print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
+
+
+def _answer(file: str, kind: str, names: list[str]) -> None:
+    """In the child; it does not return."""
+    code = 1
+    try:
+        os.dup2(2, 1)  # what is printed must not be taken for an answer
+        Path(file).write_text(json.dumps(KINDS[kind](names)), encoding="utf-8")
+        code = 0
+    except BaseException:  # whatever a mutant does
+        traceback.print_exc()
+    finally:
+        sys.stderr.flush()
+        os._exit(code)
+
+
 if __name__ == "__main__":
-    kinds = {"runs": runs, "proofs": proofs, "tamperings": tamperings, "report": report}
-    Path(sys.argv[1]).write_text(json.dumps(kinds[sys.argv[2]](sys.argv[3:])), encoding="utf-8")
+    serve()
