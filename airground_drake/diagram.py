@@ -136,7 +136,8 @@ def build_model(
     )
     decision_variable = add("decision_variable", DecisionVariable(n))
     trigger = add("event_trigger", EventTrigger(n, components.make_trigger(scenario, zeta), presets))
-    planner = add("intervention_planner", InterventionPlanner(components.make_planner(scenario, chosen)))
+    planning = components.make_planner(scenario, chosen)
+    planner = add("intervention_planner", InterventionPlanner(planning, scenario.control.period_s))
     ugv_controller = add("ugv_controller", UgvController(team, law))
     uav_controller = add("uav_controller", _uav_controller(scenario, team))
     gatekeeper = None

@@ -16,6 +16,7 @@ from airground_drake.intervention.messages import ACCEPT, SILENT
 from airground_drake.nsbc.law import UgvLaw
 from airground_drake.nsbc.motion import Motion
 from airground_drake.nsbc.team import Team
+from airground_drake.systems.ticks import Ticks
 
 
 class Gatekeeper(LeafSystem):
@@ -58,7 +59,8 @@ class Gatekeeper(LeafSystem):
         self.DeclareAbstractOutputPort(
             "reports", lambda: Value(object()), self._calc_reports, prerequisites_of_calc=held
         )
-        self.DeclarePeriodicUnrestrictedUpdateEvent(period, 0.0, self._update)
+        self._ticks = Ticks(period, law.avoidance.period)
+        self.DeclarePeriodicUnrestrictedUpdateEvent(self._ticks.period, 0.0, self._update)
 
     @property
     def decision_times_s(self) -> list[float]:
@@ -87,6 +89,8 @@ class Gatekeeper(LeafSystem):
         output.set_value(self._memory(context).reports)
 
     def _update(self, context: Context, state: State) -> EventStatus:
+        if not self._ticks.due(context.get_time()):
+            return EventStatus.DidNothing()
         proposals, memory = self._proposals.Eval(context), self._memory(context)
         if not any(proposals) and not any(memory.answers[::2]):
             return EventStatus.DidNothing()
