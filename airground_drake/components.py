@@ -65,9 +65,15 @@ def make_planner(scenario: Scenario, method: Method) -> Planner:
         period=scenario.intervention.period_s,
         presets=tuple(make_presets(scenario)),
         targets=positions([ugv.target_m for ugv in scenario.ugvs.values()]),
-        mapped=positions([each.position_m for each in scenario.obstacles.values() if each.known_to_uav]),
+        mapped=make_map(scenario),
         safe_distance=scenario.safe_distance.obstacle_m,
     )
+
+
+def make_map(scenario: Scenario) -> Array:
+    """The obstacles on the UAV's map, (m, 3), m: those that it knows, and those that are only there."""
+    known = [obstacle.position_m for obstacle in scenario.obstacles.values() if obstacle.known_to_uav]
+    return positions([*known, *scenario.uav.phantoms_m])
 
 
 def make_route(scenario: Scenario) -> Route:

@@ -44,7 +44,7 @@ from airground_drake.verify.engines.segments import closest_approach
 METHODS = ("a", "b", "c", "d", "orca")
 
 CLEARANCE_M = 0.1
-"""What a plan for one robot keeps beyond the safe distance, m: a course with narrower ways only counts as having none."""
+"""What a plan for one robot keeps beyond the safe distance, m: courses with narrower ways only count as having none."""
 
 ARRIVED_M = 0.1
 TOUCHING_M = 0.05

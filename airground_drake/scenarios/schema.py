@@ -39,7 +39,7 @@ class Ugv:
 class Uav:
     """The UAV: a spatial first-order robot whose `task` is to fly over the centroid of the UGVs, eqs (9)-(10).
 
-    Another task is named as `module:Class`.
+    Another task is named as `module:Class`. `phantoms_m` are obstacles on its map that are not there.
     """
 
     name: str = "uav"
@@ -48,6 +48,7 @@ class Uav:
     altitude_m: float = 2.0
     task: str = "formation"
     max_speed_m_s: float = 10.0
+    phantoms_m: list[Vector] = field(default_factory=list)
 
 
 @dataclass

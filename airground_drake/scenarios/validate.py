@@ -195,6 +195,7 @@ def _ugv_points(scenario: Scenario) -> Iterator[tuple[str, Vector]]:
 def _points(scenario: Scenario) -> Problems:
     others = [("uav.start_m", scenario.uav.start_m), ("uav.target_m", scenario.uav.target_m)]
     others += [(f"obstacles.{name}.position_m", each.position_m) for name, each in scenario.obstacles.items()]
+    others += [(f"uav.phantoms_m.{index}", point) for index, point in enumerate(scenario.uav.phantoms_m)]
     for key, point in (*_ugv_points(scenario), *others):
         if len(point) != 3:
             yield key, point, "3 numbers in m: [x, y, z]"
