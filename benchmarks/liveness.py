@@ -372,7 +372,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--first", type=int, default=0, help="seed of the first course drawn (default: %(default)s)")
     parser.add_argument("--most", type=int, default=100_000, help="courses drawn at most (default: %(default)s)")
     parser.add_argument("--density", type=float, default=1.0, help="factor on the number of obstacles")
-    parser.add_argument("--walls", action="store_true", help="close both sides of the field")
+    parser.add_argument("--walls", action="store_true", help="close the field by discs all around")
     parser.add_argument("--clearance", type=float, default=CLEARANCE_M, help="m, of a plan for one robot")
     parser.add_argument("--method", action="append", choices=METHODS, help="default: all of them")
     parser.add_argument("--policies", help="of the UAV, with commas (default: coordinate, or detour without it)")

@@ -75,7 +75,7 @@ def draw(seed: int, ugvs: int, density: float = 1.0, walls: bool = False) -> Cou
         seed: of the course.
         ugvs: 1, 2, 4 or 8.
         density: factor on the number of obstacles.
-        walls: close both sides of the field by rows of discs, so that there is no way round it.
+        walls: discs all around the field and the strips, so that there is no way round.
 
     Raises:
         ValueError: for another number of UGVs.
@@ -101,11 +101,20 @@ def draw(seed: int, ugvs: int, density: float = 1.0, walls: bool = False) -> Cou
             obstacles[kept] = place
             kept += 1
     if walls:
-        along = np.arange(-WALL_SPACING_M, COURSE_M + 1.5 * WALL_SPACING_M, WALL_SPACING_M)
-        for side in (-1.0, 1.0):
-            row = np.column_stack([along, np.full(len(along), side * (width / 2.0 + SAFE_M + ROOM_M))])
-            obstacles = np.concatenate([obstacles, row])
+        obstacles = np.concatenate([obstacles, _walls(width)])
     return Course(seed, density, walls, starts, targets, obstacles)
+
+
+def _walls(width: float) -> Array:
+    """Centres of discs on a rectangle around the field and the strips, (k, 2), m."""
+    low = np.array([-SAFE_M - STRIP_M - ROOM_M, -width / 2.0 - SAFE_M - ROOM_M])
+    high = np.array([COURSE_M - low[0], -low[1]])
+    corners = np.array([low, [high[0], low[1]], high, [low[0], high[1]]])
+    sides = []
+    for corner, following in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        count = int(np.ceil(np.linalg.norm(following - corner) / WALL_SPACING_M))
+        sides.append(corner + np.arange(count)[:, None] / count * (following - corner))
+    return np.concatenate(sides)
 
 
 def _apart(rng: np.random.Generator, strip: Array, width: float) -> Array:
