@@ -24,6 +24,7 @@ class Proposal:
         times_s: vertices of the motion, (M,).
         positions_m: the same, (M, 3).
         jacobian: J_int, (m, 3).
+        mapped_m: obstacles that the UAV says it knows, (k, 3).
     """
 
     ugv: str
@@ -32,6 +33,7 @@ class Proposal:
     times_s: Array
     positions_m: Array
     jacobian: Array
+    mapped_m: Array
 
     @cached_property
     def projector(self) -> Array:
@@ -65,20 +67,22 @@ def proposals_of(run: Run) -> list[Proposal]:
 
 
 def _proposal(run: Run, row: dict[Any, Any]) -> Proposal:
-    times, places, jacobian = (
-        np.asarray(row[name], dtype=np.float64).ravel() for name in ("times_s", "positions_m", "selection")
+    times, places, jacobian, mapped = (
+        np.asarray(row[name], dtype=np.float64).ravel() for name in ("times_s", "positions_m", "selection", "mapped_m")
     )
     at: Json = {"about": f"proposal to {row['robot']}", "t_s": float(row["issued_s"])}
-    numbers = np.concatenate([times, places, jacobian, [row["issued_s"]]])
+    numbers = np.concatenate([times, places, jacobian, mapped, [row["issued_s"]]])
     holds("numbers of a proposal are finite", np.isfinite(numbers), numbers, "a number", **at)
     holds("a proposal is to a UGV", row["robot"] in run.ugvs, row["robot"], "a UGV of the run", **at)
     shaped = len(times) > 0 and len(places) == 3 * len(times) and len(jacobian) > 0 and len(jacobian) % 3 == 0
-    sizes = [len(times), len(places), len(jacobian)]
-    holds("a proposal is a motion", shaped, sizes, "M times, 3 M coordinates, 3 m of J", **at)
+    shaped = shaped and len(mapped) % 3 == 0
+    sizes = [len(times), len(places), len(jacobian), len(mapped)]
+    holds("a proposal is a motion", shaped, sizes, "M times, 3 M coordinates, 3 m of J, 3 k of the map", **at)
     holds("times of a motion increase", (np.diff(times) > 0.0).all(), times, "later than the one before", **at)
     return Proposal(
-        str(row["robot"]), str(row["policy"]), at["t_s"], times, places.reshape(-1, 3), jacobian.reshape(-1, 3)
-    )
+        str(row["robot"]), str(row["policy"]), at["t_s"], times, places.reshape(-1, 3), jacobian.reshape(-1, 3),
+        mapped.reshape(-1, 3),
+    )  # fmt: skip
 
 
 @lru_cache(maxsize=32)

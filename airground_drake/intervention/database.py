@@ -121,7 +121,7 @@ class BehaviourDatabase:
         if not candidates:
             return replace(desk, proposal=None), faults
         turn, name, motion = candidates[0]
-        return replace(desk, proposal=Proposal(name, seen.t, motion), turn=turn), faults
+        return replace(desk, proposal=Proposal(name, seen.t, motion, mapped=seen.obstacles), turn=turn), faults
 
     def _next(self, seen: Observation, desk: Desk) -> tuple[list[Candidate], list[Fault]]:
         """The first policy, from this turn on, that proposes."""

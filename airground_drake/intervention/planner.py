@@ -90,7 +90,7 @@ class Planner:
             reports: what they sensed, see `messages`.
         """
         refused = [answer_to(desk.proposal, answers, i) == REFUSE for i, desk in enumerate(memory.desks)]
-        reported = {point for i, points in enumerate(reports) if refused[i] for point in points}
+        reported = {point for i, report in enumerate(reports) if refused[i] for point in report.sensed}
         fresh = tuple(sorted(reported - set(memory.learnt) - set(map(tuple, self.mapped.tolist()))))
         learnt = memory.learnt + fresh
         obstacles = np.concatenate([self.mapped, np.array(learnt).reshape(-1, 3)])

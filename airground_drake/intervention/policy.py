@@ -55,12 +55,15 @@ class Proposal:
         issued: time of sending, s; identifies the proposal in the UGV's answer.
         motion: desired value of the task over time: where the UGV is to be.
         selection: J_int, (m, 3), directions in which the UAV intervenes (default: all).
+        mapped: obstacles that the UAV knows, (k, 3), m: a UGV judges by them how useful the proposal is, and nothing
+            else rests on them.
     """
 
     policy: str
     issued: float
     motion: Motion
     selection: Array = field(default_factory=lambda: np.eye(3))
+    mapped: Array = field(default_factory=lambda: np.empty((0, 3)))
 
     @cached_property
     def chosen(self) -> Array:

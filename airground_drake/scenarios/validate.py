@@ -138,7 +138,7 @@ def _counts(scenario: Scenario) -> Problems:
         yield "seed", scenario.seed, f"a whole number from 0 to {MAX_SEED}"
     if not 1 <= scenario.gatekeeper.stages <= MAX_STAGES:
         yield "gatekeeper.stages", scenario.gatekeeper.stages, f"a whole number from 1 to {MAX_STAGES}"
-    for name in ("budget_iterations", "budget_nodes"):
+    for name in ("budget_iterations", "budget_nodes", "tries"):
         if not 1 <= getattr(scenario.gatekeeper, name) <= MAX_SEED:
             yield f"gatekeeper.{name}", getattr(scenario.gatekeeper, name), f"a whole number from 1 to {MAX_SEED}"
     if scenario.gatekeeper.budget_share > 1.0:

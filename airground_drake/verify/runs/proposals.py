@@ -27,6 +27,7 @@ class Sent:
         times_s: vertices of the motion that it asks for, (M,).
         positions_m: where they are, (M, 3).
         chosen: J_int^+ J_int, (3, 3).
+        mapped_m: obstacles that the UAV says it knows, (k, 3).
     """
 
     ugv: str
@@ -35,6 +36,7 @@ class Sent:
     times_s: Array
     positions_m: Array
     chosen: Array
+    mapped_m: Array
 
     def place(self, t: float | Array) -> Array:
         """Where the UGV is to be at times: (3,) or (K, 3), m; at rest before the first vertex and after the last."""
@@ -61,19 +63,21 @@ def proposals_of(trace: Trace) -> list[Sent]:
     """
     found = []
     for row in trace.proposals.to_dict("records"):
-        times, places, selection = (
-            np.asarray(row[name], dtype=np.float64).ravel() for name in ("times_s", "positions_m", "selection")
+        times, places, selection, mapped = (
+            np.asarray(row[name], dtype=np.float64).ravel()
+            for name in ("times_s", "positions_m", "selection", "mapped_m")
         )
         label = f"proposal to {row['robot']} at t = {row['issued_s']} s"
-        numbers = np.concatenate([times, places, selection, [row["issued_s"]]])
+        numbers = np.concatenate([times, places, selection, mapped, [row["issued_s"]]])
         if not np.isfinite(numbers).all() or not len(times) or not (np.diff(times) > 0.0).all():
             raise TraceError(f"{label}: numbers that are not finite, or times that do not increase")
-        if len(places) != 3 * len(times) or not len(selection) or len(selection) % 3 or row["robot"] not in trace.ugvs:
+        shaped = len(places) == 3 * len(times) and len(selection) and not len(selection) % 3 and not len(mapped) % 3
+        if not shaped or row["robot"] not in trace.ugvs:
             raise TraceError(f"{label}: no motion of a UGV of the trace")
         found.append(
             Sent(
                 str(row["robot"]), str(row["policy"]), float(row["issued_s"]), times, places.reshape(-1, 3),
-                selected(selection),
+                selected(selection), mapped.reshape(-1, 3),
             )
         )  # fmt: skip
     recorded = sorted((s.ugv, s.issued_s, s.policy) for s in found)
