@@ -67,6 +67,8 @@ def make_planner(scenario: Scenario, method: Method) -> Planner:
         targets=positions([ugv.target_m for ugv in scenario.ugvs.values()]),
         mapped=positions([each.position_m for each in scenario.obstacles.values() if each.known_to_uav]),
         safe_distance=scenario.safe_distance.obstacle_m,
+        robot_distance=scenario.safe_distance.ugv_m,
+        max_speed=np.array([ugv.max_speed_m_s for ugv in scenario.ugvs.values()]),
     )
 
 

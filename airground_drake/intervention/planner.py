@@ -2,17 +2,36 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import numpy as np
 
 from airground_drake.arrays import Array
 from airground_drake.intervention.database import BehaviourDatabase, Desk, Fault
-from airground_drake.intervention.messages import REFUSE, Point, Proposals, Reports, answer_to
-from airground_drake.intervention.policy import Observation, Proposal
+from airground_drake.intervention.messages import ACCEPT, REFUSE, Point, Proposals, Reports, answer_to
+from airground_drake.intervention.policy import Answered, Observation, Proposal, Teammate
 from airground_drake.nsbc.motion import Motion
+
+STANDS_S = 1.0
+"""A UGV stands once it has kept to one place for this long, s."""
+STANDS_M = 0.1
+"""One place: no farther than this from where it came to a halt, m."""
+
+
+@dataclass(frozen=True)
+class Halt:
+    """Where a UGV has been since when.
+
+    Attributes:
+        place: m, world frame.
+        since: s.
+    """
+
+    place: Point
+    since: float
 
 
 @dataclass(frozen=True)
@@ -24,12 +43,14 @@ class PlannerMemory:
         learnt: obstacles that came with refusals and were not on the map.
         sent: (UGV, proposal), in order.
         faults: of policies, in order.
+        halts: of the UGVs, one each; none before the first planning instant.
     """
 
     desks: tuple[Desk, ...]
     learnt: tuple[Point, ...] = ()
     sent: tuple[tuple[int, Proposal], ...] = ()
     faults: tuple[Fault, ...] = ()
+    halts: tuple[Halt, ...] = ()
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
         """Immutable: the copy is the object itself."""
@@ -56,6 +77,8 @@ class Planner:
         targets: (n, 3), m.
         mapped: obstacles on the UAV's map, (m, 3), m.
         safe_distance: d to obstacles, m.
+        robot_distance: d between UGVs, m.
+        max_speed: of the UGVs, (n,), m/s.
     """
 
     ugvs: tuple[str, ...]
@@ -65,10 +88,32 @@ class Planner:
     targets: Array
     mapped: Array
     safe_distance: float
+    robot_distance: float
+    max_speed: Array
 
     def start(self) -> PlannerMemory:
         """What is remembered at the beginning: nothing."""
         return PlannerMemory((Desk(),) * len(self.ugvs))
+
+    def watch(self, memory: PlannerMemory, t: float, positions: Array) -> PlannerMemory:
+        """Notice which UGVs have moved; to be called at every planning instant.
+
+        Args:
+            memory: before.
+            t: time, s.
+            positions: of all robots, (n + 1, 3), m, world frame.
+
+        Returns:
+            The new memory; the same object if none has left its place.
+        """
+        places: list[Point] = [(x, y, z) for x, y, z in positions[: len(self.ugvs)].tolist()]
+        if not memory.halts:
+            return replace(memory, halts=tuple(Halt(place, t) for place in places))
+        moved = [math.dist(halt.place, place) > STANDS_M for halt, place in zip(memory.halts, places, strict=True)]
+        if not any(moved):
+            return memory
+        halts = [Halt(places[i], t) if moved[i] else halt for i, halt in enumerate(memory.halts)]
+        return replace(memory, halts=tuple(halts))
 
     def plan(
         self,
@@ -82,7 +127,7 @@ class Planner:
         """One planning period.
 
         Args:
-            memory: before.
+            memory: before, and watching up to now.
             t: time, s.
             positions: of all robots, (n + 1, 3), m, world frame.
             intervening: per UGV, whether the trigger has it in mode INTERVENING.
@@ -111,10 +156,45 @@ class Planner:
                 others=np.delete(positions, i, axis=0),
                 safe_distance=self.safe_distance,
                 refusals=desks[i].refusals,
+                team=self._team(t, positions, intervening, answers, desks, memory.halts),
+                robot_distance=self.robot_distance,
             )
             desk, failed = self.database.plan(desks[i], seen, refused=refused[i], learnt=bool(fresh))
             faults += failed
             if desk.proposal is not None and desk.proposal is not desks[i].proposal:
                 sent.append((i, desk.proposal))
             desks[i] = desk
-        return PlannerMemory(tuple(desks), learnt, tuple(sent), tuple(faults))
+        return replace(memory, desks=tuple(desks), learnt=learnt, sent=tuple(sent), faults=tuple(faults))
+
+    def _team(
+        self,
+        t: float,
+        positions: Array,
+        intervening: Sequence[bool],
+        answers: Array,
+        desks: Sequence[Desk],
+        halts: Sequence[Halt],
+    ) -> tuple[Teammate, ...]:
+        """Every UGV as it is now."""
+        return tuple(
+            Teammate(
+                name=name,
+                position=positions[i].copy(),
+                target=self.targets[i],
+                preset=self.presets[i],
+                max_speed=float(self.max_speed[i]),
+                triggered=bool(intervening[i]),
+                standing=t - halts[i].since >= STANDS_S if halts else False,
+                proposal=desks[i].proposal,
+                answered=_answered(desks[i].proposal, answers, i),
+                refusals=desks[i].refusals,
+            )
+            for i, name in enumerate(self.ugvs)
+        )
+
+
+def _answered(proposal: Proposal | None, answers: Array, robot: int) -> Answered:
+    answer = answer_to(proposal, answers, robot)
+    if answer == ACCEPT:
+        return "accepted"
+    return "refused" if answer == REFUSE else "silent"

@@ -5,13 +5,45 @@ from __future__ import annotations
 import abc
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Self
+from typing import Any, Literal, Self
 
 import numpy as np
 
 from airground_drake.arrays import Array
 from airground_drake.nsbc.motion import Motion
 from airground_drake.nsbc.task import pseudoinverse
+
+Answered = Literal["silent", "accepted", "refused"]
+"""What has become of a proposal in force."""
+
+
+@dataclass(frozen=True, eq=False)
+class Teammate:
+    """What the UAV knows of one UGV.
+
+    Attributes:
+        name: of the UGV.
+        position: (3,), m, world frame.
+        target: (3,), m.
+        preset: its preset trajectory.
+        max_speed: m/s.
+        triggered: whether its trigger has it in mode INTERVENING.
+        standing: whether it has stood where it is for a while (`planner.STANDS_S`).
+        proposal: the one in force, or None.
+        answered: what the UGV says to it.
+        refusals: proposals that it has refused since what they are about was triggered.
+    """
+
+    name: str
+    position: Array
+    target: Array
+    preset: Motion
+    max_speed: float
+    triggered: bool
+    standing: bool
+    proposal: Proposal | None = None
+    answered: Answered = "silent"
+    refusals: int = 0
 
 
 @dataclass(frozen=True)
@@ -31,6 +63,8 @@ class Observation:
         others: positions of the other robots, (n, 3), m.
         safe_distance: distance d to keep from them, m.
         refusals: number of proposals that the UGV has refused since the trigger.
+        team: every UGV, this one among them, in array order.
+        robot_distance: distance that two UGVs have to keep, m.
     """
 
     t: float
@@ -44,6 +78,8 @@ class Observation:
     others: Array
     safe_distance: float
     refusals: int
+    team: tuple[Teammate, ...] = ()
+    robot_distance: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
