@@ -31,7 +31,7 @@ class Effort:
     Attributes:
         orders: of the robots.
         searches: of single robots, in all orders together.
-        expansions: of safe intervals, in all searches together.
+        expansions: of safe intervals, in all searches together; a quarter of them is kept for a partial plan.
     """
 
     orders: int = MOST_ORDERS
@@ -106,6 +106,7 @@ class _Search:
         self._roadmap, self._space, self._movers, self._fixed = roadmap, space, movers, fixed
         self._follow, self._effort = follow, effort
         self.orders, self.searches, self.spent = 0, 0, 0
+        self._limit = effort.expansions
 
     def in_orders(self) -> list[Way | None] | None:
         """The best of the complete plans found; None without any."""
@@ -114,9 +115,10 @@ class _Search:
         best: list[Way | None] | None = None
         least, left = math.inf, self._effort.orders
         tried = set()
+        self._limit = self._effort.expansions * 3 // 4
         drawn = self._drawn()
         order = next(drawn)
-        while left > 0 and self.spent < self._effort.expansions and self.searches < self._effort.searches:
+        while left > 0 and self.spent < self._limit and self.searches < self._effort.searches:
             tried.add(order)
             self.orders += 1
             left -= 1
@@ -151,7 +153,7 @@ class _Search:
         taken = [*self._fixed, *(at_rest(self._movers[i].errand.start) for i in staying)]
         for k, i in enumerate(order):
             brief = [self._leaving(j) for j in order[k + 1 :]] if considerate else []
-            budget = self._effort.expansions - self.spent
+            budget = self._limit - self.spent
             way, spent = find(self._roadmap, self._space, self._movers[i], taken, self._follow, budget, brief)
             self.searches += 1
             self.spent += spent
@@ -168,6 +170,7 @@ class _Search:
 
     def partly(self) -> list[Way | None]:
         """Ways of as many robots as find one while the others stay, dropped one by one."""
+        self._limit = self._effort.expansions
         staying: list[int] = []
         order = next(self._drawn())
         for _ in self._movers:
