@@ -36,7 +36,7 @@ from airground_drake import files
 from airground_drake.arrays import Array
 from airground_drake.errors import TraceError
 
-SCHEMA = "airground_drake.trace/3"
+SCHEMA = "airground_drake.trace/4"
 
 DECISION_COLUMNS = {
     "t_s": "float64",
@@ -72,10 +72,11 @@ PROBLEM_ARRAYS = (
 (N x m x 3), distances (m), plan, relaxed and rounded omega (N), positions of the plan (N x 3); empty where the route
 has none. Normals are those of the half-planes that `route_bound` is about."""
 
-PROPOSAL_COLUMNS = ("robot", "policy", "issued_s", "times_s", "positions_m", "selection")
+PROPOSAL_COLUMNS = ("robot", "policy", "issued_s", "times_s", "positions_m", "selection", "cause")
 """Columns of `Trace.proposals`, one row per proposal sent: for which UGV, by which policy, when; the vertices of the
 motion that it asks for, times (M) and positions (M x 3, flattened in C order), and J_int of (12)-(14), (m x 3, ditto):
-the directions that it concerns."""
+the directions that it concerns; and the UGV whose trigger it was sent for: this one, or another one that it is to make
+way for."""
 
 
 def no_proposals() -> pd.DataFrame:

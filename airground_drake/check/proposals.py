@@ -24,6 +24,7 @@ class Proposal:
         times_s: vertices of the motion, (M,).
         positions_m: the same, (M, 3).
         jacobian: J_int, (m, 3).
+        cause: UGV whose trigger it is sent for.
     """
 
     ugv: str
@@ -32,6 +33,7 @@ class Proposal:
     times_s: Array
     positions_m: Array
     jacobian: Array
+    cause: str
 
     @cached_property
     def projector(self) -> Array:
@@ -72,12 +74,19 @@ def _proposal(run: Run, row: dict[Any, Any]) -> Proposal:
     numbers = np.concatenate([times, places, jacobian, [row["issued_s"]]])
     holds("numbers of a proposal are finite", np.isfinite(numbers), numbers, "a number", **at)
     holds("a proposal is to a UGV", row["robot"] in run.ugvs, row["robot"], "a UGV of the run", **at)
+    holds("a proposal is for a UGV's trigger", row["cause"] in run.ugvs, row["cause"], "a UGV of the run", **at)
     shaped = len(times) > 0 and len(places) == 3 * len(times) and len(jacobian) > 0 and len(jacobian) % 3 == 0
     sizes = [len(times), len(places), len(jacobian)]
     holds("a proposal is a motion", shaped, sizes, "M times, 3 M coordinates, 3 m of J", **at)
     holds("times of a motion increase", (np.diff(times) > 0.0).all(), times, "later than the one before", **at)
     return Proposal(
-        str(row["robot"]), str(row["policy"]), at["t_s"], times, places.reshape(-1, 3), jacobian.reshape(-1, 3)
+        str(row["robot"]),
+        str(row["policy"]),
+        at["t_s"],
+        times,
+        places.reshape(-1, 3),
+        jacobian.reshape(-1, 3),
+        str(row["cause"]),
     )
 
 
@@ -115,10 +124,15 @@ def _taken_back_s(
 ) -> float:
     """A little later than the planning instant at which a proposal is taken back, infinite if it never is.
 
-    That is the first at which another is sent, the UGV is not intervened on, the motion is over, or the last answer was
-    a refusal.
+    That is the first at which another is sent, neither the UGV nor the one that it is to make way for is intervened
+    on, the motion is over, or the last answer was a refusal. It is taken back at once if neither was when it was sent.
     """
-    plan_s, mode = run.scenario["intervention"]["period_s"], run.column(f"{proposal.ugv}.mode")
+    plan_s = run.scenario["intervention"]["period_s"]
+    modes = np.stack([run.column(f"{ugv}.mode") for ugv in {proposal.ugv, proposal.cause}])
+    wanted = (modes == INTERVENING).any(axis=0)
+    sent = int(np.searchsorted(run.t_s, proposal.issued_s - SMALL))
+    if not wanted[sent : sent + 2].any():  # the next row's mode, too: it may begin at that instant
+        return proposal.issued_s
     k = round(proposal.issued_s / plan_s)
     while (k := k + 1) * plan_s <= run.t_s[-1] + SMALL:
         now = k * plan_s
@@ -126,6 +140,6 @@ def _taken_back_s(
         before = [yes for when, issued, yes in answers if issued == proposal.issued_s and when < now - SMALL]
         replaced = any(proposal.issued_s < other.issued_s <= now + SMALL for other in mine)
         over = run.t_s[row] >= proposal.times_s[-1]
-        if replaced or over or mode[row] != INTERVENING or (before and not before[-1]):
+        if replaced or over or not wanted[row] or (before and not before[-1]):
             return now + SMALL
     return np.inf

@@ -67,7 +67,10 @@ class Planner:
     """The UAV's planner, on its own map, which may miss obstacles.
 
     A refusal moves it to the next behaviour; the obstacles that the UGV senses come with it, and the UAV knows them
-    from then on.
+    from then on. Policies are asked for UGVs that are intervened on. What they propose to others, which are to make
+    way, is a proposal like any other, in force as long as the UGV that it is for is intervened on. If one UGV refuses
+    its part of a joint plan, the policies are asked again for the others, whose parts stay in force if nothing better
+    is found.
 
     Attributes:
         ugvs: names.
@@ -139,10 +142,13 @@ class Planner:
         fresh = tuple(sorted(reported - set(memory.learnt) - set(map(tuple, self.mapped.tolist()))))
         learnt = memory.learnt + fresh
         obstacles = np.concatenate([self.mapped, np.array(learnt).reshape(-1, 3)])
-        desks, sent, faults = list(memory.desks), list(memory.sent), list(memory.faults)
+        let_down = self._let_down(memory.desks, refused)
+        desks = self._after_answers(memory.desks, t, intervening, refused, learnt=bool(fresh))
+        sent, faults = list(memory.sent), list(memory.faults)
         for i, robot in enumerate(self.ugvs):
-            if not intervening[i]:
-                desks[i] = Desk()
+            in_force = desks[i].proposal
+            just_sent = in_force is not None and in_force.issued == t
+            if not intervening[i] or just_sent or not (desks[i].is_due(t) or robot in let_down):
                 continue
             seen = Observation(
                 t=t,
@@ -159,12 +165,42 @@ class Planner:
                 team=self._team(t, positions, intervening, answers, desks, memory.halts),
                 robot_distance=self.robot_distance,
             )
-            desk, failed = self.database.plan(desks[i], seen, refused=refused[i], learnt=bool(fresh))
-            faults += failed
-            if desk.proposal is not None and desk.proposal is not desks[i].proposal:
-                sent.append((i, desk.proposal))
-            desks[i] = desk
+            planned = self.database.plan(desks[i], seen)
+            faults += planned.faults
+            for j, name in enumerate(self.ugvs):
+                desk = planned.desk if j == i else planned.asked.get(name, desks[j])
+                if desk.proposal is not None and desk.proposal is not desks[j].proposal:
+                    sent.append((j, desk.proposal))
+                desks[j] = desk
         return replace(memory, desks=tuple(desks), learnt=learnt, sent=tuple(sent), faults=tuple(faults))
+
+    def _after_answers(
+        self, desks: Sequence[Desk], t: float, intervening: Sequence[bool], refused: Sequence[bool], *, learnt: bool
+    ) -> list[Desk]:
+        """Desks without what is over: refused, run out, or for a UGV that is not intervened on any more."""
+        called = {name for name, one in zip(self.ugvs, intervening, strict=True) if one}
+        found = []
+        for name, desk, no in zip(self.ugvs, desks, refused, strict=True):
+            if name not in called and desk.cause not in called:
+                desk = Desk()
+            elif no:
+                desk = self.database.after_refusal(desk, t, learnt=learnt)
+            elif name not in called and desk.proposal is not None and desk.is_due(t):
+                desk = replace(desk, proposal=None, party=())
+            found.append(desk)
+        return found
+
+    def _let_down(self, desks: Sequence[Desk], refused: Sequence[bool]) -> set[str]:
+        """Names of the UGVs with proposals of joint plans of which another UGV has refused its part."""
+        found = set()
+        for desk, no in zip(desks, refused, strict=True):
+            if no and desk.proposal is not None:
+                issued = desk.proposal.issued
+                for name, other, also in zip(self.ugvs, desks, refused, strict=True):
+                    same = other.proposal is not None and other.proposal.issued == issued
+                    if name in desk.party and same and not also:
+                        found.add(name)
+        return found
 
     def _team(
         self,
@@ -188,6 +224,7 @@ class Planner:
                 proposal=desks[i].proposal,
                 answered=_answered(desks[i].proposal, answers, i),
                 refusals=desks[i].refusals,
+                resting=desks[i].proposal is None and t < desks[i].retry_at,
             )
             for i, name in enumerate(self.ugvs)
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import abc
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Literal, Self
@@ -31,7 +32,8 @@ class Teammate:
         standing: whether it has stood where it is for a while (`planner.STANDS_S`).
         proposal: the one in force, or None.
         answered: what the UGV says to it.
-        refusals: proposals that it has refused since what they are about was triggered.
+        refusals: proposals that it has refused since its trigger, or since that of the UGV that it was asked for.
+        resting: whether it has refused so recently that it gets no proposal now.
     """
 
     name: str
@@ -44,6 +46,7 @@ class Teammate:
     proposal: Proposal | None = None
     answered: Answered = "silent"
     refusals: int = 0
+    resting: bool = False
 
 
 @dataclass(frozen=True)
@@ -91,12 +94,15 @@ class Proposal:
         issued: time of sending, s; identifies the proposal in the UGV's answer.
         motion: desired value of the task over time: where the UGV is to be.
         selection: J_int, (m, 3), directions in which the UAV intervenes (default: all).
+        cause: name of the UGV whose trigger it is sent for: another one's, if this UGV is asked to make way for it;
+            empty: its own.
     """
 
     policy: str
     issued: float
     motion: Motion
     selection: Array = field(default_factory=lambda: np.eye(3))
+    cause: str = ""
 
     @cached_property
     def chosen(self) -> Array:
@@ -111,10 +117,15 @@ class Proposal:
 class Policy(abc.ABC):
     """An intervention behaviour of the UAV. Subclasses take their parameters as keyword numbers.
 
-    A policy may fail: an exception, or anything but a Motion of finite numbers or None, counts as no
+    A policy may fail: an exception, or anything but motions of finite numbers or None, counts as no
     intervention and is reported (see `database.py`). No policy's code runs in a UGV's control loop.
     """
 
     @abc.abstractmethod
-    def propose(self, seen: Observation) -> Motion | None:
-        """The motion that the UGV is asked to make from `seen.start` on, or None for no intervention."""
+    def propose(self, seen: Observation) -> Motion | Mapping[str, Motion] | None:
+        """What is proposed from `seen.start` on, or None for no intervention.
+
+        A Motion is for the UGV that the observation is about. Motions by name are a joint plan, for any UGVs of the
+        team: those that are triggered get proposals of their own, others are asked to make way for this one. Only a
+        UGV that has a proposal of this very instant (`issued == seen.t`) cannot be asked again.
+        """
