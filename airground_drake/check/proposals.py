@@ -79,6 +79,7 @@ def _proposal(run: Run, row: dict[Any, Any]) -> Proposal:
     sizes = [len(times), len(places), len(jacobian)]
     holds("a proposal is a motion", shaped, sizes, "M times, 3 M coordinates, 3 m of J", **at)
     holds("times of a motion increase", (np.diff(times) > 0.0).all(), times, "later than the one before", **at)
+    _is_for_whom_it_says(run, row, at)
     return Proposal(
         str(row["robot"]),
         str(row["policy"]),
@@ -88,6 +89,18 @@ def _proposal(run: Run, row: dict[Any, Any]) -> Proposal:
         jacobian.reshape(-1, 3),
         str(row["cause"]),
     )
+
+
+def _is_for_whom_it_says(run: Run, row: dict[Any, Any], at: Json) -> None:
+    """A proposal is for the trigger of its UGV while that is intervened on, else for that of another one that is.
+
+    Modes of a row hold since the row before; the next row's counts as well, for what begins at that instant.
+    """
+    ugv, cause = str(row["robot"]), str(row["cause"])
+    sent = int(np.searchsorted(run.t_s, at["t_s"] - SMALL))
+    on = {name: run.column(f"{name}.mode")[sent : sent + 2] == INTERVENING for name in (ugv, cause)}
+    right = on[cause].any() and (cause == ugv or not on[ugv].all())
+    holds("a proposal is for a trigger", right, cause, "a UGV that is intervened on, its own first", **at)
 
 
 @lru_cache(maxsize=32)
@@ -125,14 +138,11 @@ def _taken_back_s(
     """A little later than the planning instant at which a proposal is taken back, infinite if it never is.
 
     That is the first at which another is sent, neither the UGV nor the one that it is to make way for is intervened
-    on, the motion is over, or the last answer was a refusal. It is taken back at once if neither was when it was sent.
+    on, the motion is over, or the last answer was a refusal.
     """
     plan_s = run.scenario["intervention"]["period_s"]
     modes = np.stack([run.column(f"{ugv}.mode") for ugv in {proposal.ugv, proposal.cause}])
     wanted = (modes == INTERVENING).any(axis=0)
-    sent = int(np.searchsorted(run.t_s, proposal.issued_s - SMALL))
-    if not wanted[sent : sent + 2].any():  # the next row's mode, too: it may begin at that instant
-        return proposal.issued_s
     k = round(proposal.issued_s / plan_s)
     while (k := k + 1) * plan_s <= run.t_s[-1] + SMALL:
         now = k * plan_s

@@ -72,8 +72,8 @@ def proposals_of(trace: Trace) -> list[Sent]:
             raise TraceError(f"{label}: numbers that are not finite, or times that do not increase")
         if len(places) != 3 * len(times) or not len(selection) or len(selection) % 3 or row["robot"] not in trace.ugvs:
             raise TraceError(f"{label}: no motion of a UGV of the trace")
-        if row["cause"] not in trace.ugvs:
-            raise TraceError(f"{label}: its cause {row['cause']!r} is no UGV of the trace")
+        if row["cause"] not in trace.ugvs or not _is_cause(trace, row["robot"], row["cause"], row["issued_s"]):
+            raise TraceError(f"{label}: its cause {row['cause']!r} is no UGV whose trigger it can have been sent for")
         found.append(
             Sent(
                 str(row["robot"]), str(row["policy"]), float(row["issued_s"]), times, places.reshape(-1, 3),
@@ -87,13 +87,23 @@ def proposals_of(trace: Trace) -> list[Sent]:
     return sorted(found, key=lambda sent: sent.issued_s)
 
 
+def _is_cause(trace: Trace, ugv: str, cause: str, issued_s: float) -> bool:
+    """Whether a UGV's own trigger is the cause if it is intervened on, and that of another one that is if not.
+
+    The mode of a row is in force up to it, so that of the next row counts, too: a trigger may be at that very instant.
+    """
+    row = min(int(np.searchsorted(trace.t, issued_s - TIME_TOLERANCE_S)), len(trace.t) - 1)
+    called = {name: trace.column(f"{name}.mode")[row : row + 2] == 1.0 for name in (ugv, cause)}
+    return bool(called[cause].any()) and (cause == ugv or not called[ugv].all())
+
+
 def accepted_at(trace: Trace, ugv: str, proposals: list[Sent], t: Array) -> list[Sent | None]:
     """The proposal that a UGV has accepted, at control samples (S,), s, or None.
 
     A proposal is in force from when it is sent until, at a planning instant, neither the UGV nor the one that it is to
     make way for is being intervened on, the motion has run out, the UGV's last answer was a refusal, or another one is
-    sent. One that is sent while neither is intervened on is never in force. Under method (b) it is accepted all the
-    while; under (c) and (d) while the decision of the last sample of the gatekeeper accepts it.
+    sent. Under method (b) it is accepted all the while; under (c) and (d) while the decision of the last sample of the
+    gatekeeper accepts it.
 
     Args:
         trace: one run.
@@ -136,9 +146,6 @@ def _withdrawn_s(trace: Trace, ugv: str, sent: Sent, mine: list[Sent], answers: 
     period = trace.scenario["intervention"]["period_s"]
     called = (trace.column(f"{ugv}.mode") == 1.0) | (trace.column(f"{sent.cause}.mode") == 1.0)
     t = trace.t
-    row = min(int(np.searchsorted(t, sent.issued_s - TIME_TOLERANCE_S)), len(t) - 1)
-    if not called[row : row + 2].any():  # the mode of a row is in force up to it: a trigger may be at this very instant
-        return sent.issued_s
     later = [other.issued_s for other in mine if other.issued_s > sent.issued_s]
     refused = [(when, yes) for when, issued, yes in answers if issued == sent.issued_s]
     first = round(sent.issued_s / period) + 1
