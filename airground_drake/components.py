@@ -71,6 +71,8 @@ def make_planner(scenario: Scenario, method: Method) -> Planner:
         targets=positions([ugv.target_m for ugv in scenario.ugvs.values()]),
         mapped=make_map(scenario),
         safe_distance=scenario.safe_distance.obstacle_m,
+        robot_distance=scenario.safe_distance.ugv_m,
+        max_speed=np.array([ugv.max_speed_m_s for ugv in scenario.ugvs.values()]),
     )
 
 

@@ -160,6 +160,7 @@ POLICIES = Registry(
     "policies",
     {
         "detour": "airground_drake.intervention.detour:Detour",
+        "coordinate": "airground_drake.intervention.coordinate:Coordinate",
         "towards": "airground_drake.intervention.wrong:Towards",
         "stale_map": "airground_drake.intervention.wrong:StaleMap",
         "noisy": "airground_drake.intervention.wrong:Noisy",

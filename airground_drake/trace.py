@@ -84,10 +84,11 @@ found, row by row as in `decisions`. Arrays are flattened in C order: initial (3
 centres and normals (N x m x 3), distances (m), plan, relaxed and rounded omega (N), positions of the plan (N x 3);
 empty where the route has none. Normals are those of the half-planes that `route_bound` is about."""
 
-PROPOSAL_COLUMNS = ("robot", "policy", "issued_s", "times_s", "positions_m", "selection", "mapped_m")
+PROPOSAL_COLUMNS = ("robot", "policy", "issued_s", "times_s", "positions_m", "selection", "mapped_m", "cause")
 """Columns of `Trace.proposals`, one row per proposal sent: for which UGV, by which policy, when; the vertices of the
 motion that it asks for, times (M) and positions (M x 3, flattened in C order), and J_int of (12)-(14), (m x 3, ditto):
-the directions that it concerns, and the obstacles that the UAV knows, (k x 3, ditto)."""
+the directions that it concerns, and the obstacles that the UAV knows, (k x 3, ditto); and the UGV
+whose trigger it was sent for: this one, or another one that it is to make way for."""
 
 
 def no_proposals() -> pd.DataFrame:

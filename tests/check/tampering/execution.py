@@ -77,6 +77,18 @@ def proposal_to_nobody(folder: Path) -> None:
         frame["robot"] = "ugv9"
 
 
+@refused_by("EXEC", "a proposal is for a UGV's trigger")
+def proposal_for_nobody(folder: Path) -> None:
+    with edited_table(folder, "proposals") as frame:
+        frame["cause"] = "ugv9"
+
+
+@refused_by("EXEC", "a proposal is for a trigger")
+def proposal_for_another_ugv(folder: Path) -> None:
+    with edited_table(folder, "proposals") as frame:
+        frame["cause"] = [next(ugv for ugv in ("ugv1", "ugv2") if ugv != robot) for robot in frame["robot"]]
+
+
 @refused_by("EXEC", "what is executed is what was accepted")
 def proposals_table_emptied(folder: Path) -> None:
     write_table(folder, read_table(folder, "proposals").iloc[:0], "proposals")
