@@ -37,7 +37,7 @@ def live_prog(run: Run, _: Json) -> Found:
         return Found("not_run")
     rows = rows_of(run)
     if not rows:
-        return Found("holds")
+        return Found("holds").counted(0)
     longest = 0.0
     for ugv in run.ugvs:
         state, last = _Ugv(), None
@@ -46,7 +46,7 @@ def live_prog(run: Run, _: Json) -> Found:
             if row["decision"] == "accept":
                 longest = max(longest, row["t_s"] - state.on_time_s)
             last = row
-    return Found.with_margin("holds", run.scenario["gatekeeper"]["behind_s"] - longest, decisions=len(rows))
+    return Found.with_margin("holds", run.scenario["gatekeeper"]["behind_s"] - longest, decisions=len(rows)).counted(len(rows))
 
 
 def _follow(run: Run, row: dict[str, Any], last: dict[str, Any] | None, state: _Ugv) -> None:
