@@ -136,20 +136,14 @@ def build_model(
     )
     decision_variable = add("decision_variable", DecisionVariable(n))
     trigger = add("event_trigger", EventTrigger(n, components.make_trigger(scenario, zeta), presets))
-    planner = add("intervention_planner", InterventionPlanner(components.make_planner(scenario, chosen)))
+    planning = components.make_planner(scenario, chosen)
+    planner = add("intervention_planner", InterventionPlanner(planning, scenario.control.period_s))
     ugv_controller = add("ugv_controller", UgvController(team, law))
     uav_controller = add("uav_controller", _uav_controller(scenario, team))
     gatekeeper = None
     if chosen.gated:
-        gatekeeper = Gatekeeper(
-            team,
-            law,
-            presets,
-            components.make_route(scenario),
-            components.make_horizon(scenario),
-            period=scenario.gatekeeper.period_s,
-            rules=components.make_rules(scenario),
-        )
+        gatekeepers = components.make_gatekeepers(scenario, law)
+        gatekeeper = Gatekeeper(gatekeepers, n, period=scenario.gatekeeper.period_s, control=scenario.control.period_s)
     gate = add("gatekeeper", gatekeeper if gatekeeper is not None else DirectAcceptance(n))
 
     def connect(source: System, output: str, target: System, port: str) -> None:

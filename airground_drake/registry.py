@@ -160,6 +160,7 @@ POLICIES = Registry(
     "policies",
     {
         "detour": "airground_drake.intervention.detour:Detour",
+        "coordinate": "airground_drake.intervention.coordinate:Coordinate",
         "towards": "airground_drake.intervention.wrong:Towards",
         "stale_map": "airground_drake.intervention.wrong:StaleMap",
         "noisy": "airground_drake.intervention.wrong:Noisy",
@@ -198,6 +199,7 @@ RUN_CLAIMS = Registry(
         "GATE-FEAS": "airground_drake.verify.runs.gate_feas:GateFeas",
         "GATE-MODEL": "airground_drake.verify.runs.gate_model:GateModel",
         "GATE-TIME": "airground_drake.verify.runs.gate_time:GateTime",
+        "LIVE-PROG": "airground_drake.verify.runs.live_prog:LiveProg",
         "LIVE-GOAL": "airground_drake.verify.runs.live_goal:LiveGoal",
         "COMM": "airground_drake.verify.runs.comm:Comm",
     },
@@ -214,6 +216,7 @@ MODEL_CLAIMS = Registry(
         "SAFE-DIST": "airground_drake.verify.model.avoidance.safe_dist:SafeDist",
         "ZENO-PROOF": "airground_drake.verify.model.trigger.zeno_proof:ZenoProof",
         "ZENO-REFINE": "airground_drake.verify.model.trigger.zeno_refine:ZenoRefine",
+        "LIVE-WAIT": "airground_drake.verify.model.patience.live_wait:LiveWait",
         "THR-ISO": "airground_drake.verify.model.trigger.thr_iso:ThrIso",
         "THR-ROOT": "airground_drake.verify.model.threshold.thr_root:ThrRoot",
         "THR-OPT": "airground_drake.verify.model.threshold.thr_opt:ThrOpt",

@@ -1,17 +1,28 @@
-"""Scenarios that nobody tuned: `python benchmarks/random_scenarios.py -n 500 [--only 17] [--keep DIR]`.
+"""Scenarios that nobody tuned: `python benchmarks/random_scenarios.py -n 500 [--only 17] [--keep DIR] [--rows FILE]`.
 
-Draws valid scenarios (1 to 6 UGVs, 0 to 12 obstacles, all methods, periods, triggers, routes and policies), simulates
-each and judges its run: nothing may stop the simulator, no claim may be an `error`, method (d) keeps every safe
-distance to 1e-9 m, no two triggers are closer than the dwell, and every event is where THR-TRIG has it. Prints each
-scenario that breaks one of these, by its number, which draws it again. Exit code 1 if there is one.
+Draws scenarios (1 to 6 UGVs, 0 to 12 obstacles, all methods, compositions, periods, triggers, thresholds, routes and
+policies), simulates those that are valid, and judges each run by its claims (cross-checked as signal temporal logic)
+and by the independent checker, which gets a report folder of the run. Nothing may stop the simulator, no claim may be
+an `error`, the checker must agree with every verdict about the run, method (d) keeps every safe distance to 1e-9 m, no
+two triggers are closer than the dwell, and every trigger and release is where THR-TRIG has it. Prints each scenario
+that breaks one of these, by its number, which draws it again, and what was exercised. Exit code 1 if there is one.
+
+Proofs about the model are not made (they take longer than all the rest): the checker's line about the list of claims,
+which misses them, is left out, all its lines about the run count.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
+import multiprocessing
 import sys
+import tempfile
+import time
 from collections import Counter
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict, dataclass, field
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -19,15 +30,59 @@ from typing import Any
 import numpy as np
 import yaml
 
+from airground_drake import files, trace
+from airground_drake.check.report import AGREES, check_report
+from airground_drake.decision.bayes import optimal_threshold
 from airground_drake.errors import AirgroundError, ScenarioError
 from airground_drake.registry import METHODS, ROUTES
+from airground_drake.report import document
 from airground_drake.scenarios.load import from_data, resolved
+from airground_drake.scenarios.schema import Scenario
 from airground_drake.simulation import simulate
-from airground_drake.verify import verify
+from airground_drake.trace import Trace
+from airground_drake.verify import Verdict, verify
+from airground_drake.verify.stl import cross_check as stl
 
-ALWAYS = ("ZENO-TRACE", "THR-TRIG")
+ALWAYS = ("ZENO-TRACE", "THR-TRIG", "EXEC")
 CERTIFIED = ("SAFE-TRACE", "SAFE-HYP")
-"""Claims that must hold in every run (a bare trigger has no dwell to keep), and in those of method (d)."""
+"""Claims that must hold in every run (with a dwell, for ZENO-TRACE), and in those of method (d)."""
+
+RUNS_PER_PROCESS = 20
+"""Drake's diagrams with Python systems are never freed: processes are replaced."""
+
+
+@dataclass
+class Row:
+    """What came of one scenario.
+
+    Attributes:
+        number: draws it again.
+        method: of its run; '' where the scenario is not valid.
+        invalid: key that validation refused.
+        wrong: what must not be.
+        seconds: wall-clock time.
+        ugvs, obstacles: how many.
+        trigger, route: as in the scenario.
+        triggers, releases, decisions, accepted: how many.
+        margin_m: of SAFE-TRACE.
+        statuses: of the claims.
+    """
+
+    number: int
+    method: str = ""
+    invalid: str = ""
+    wrong: list[str] = field(default_factory=list)
+    seconds: float = 0.0
+    ugvs: int = 0
+    obstacles: int = 0
+    trigger: str = ""
+    route: str = ""
+    triggers: int = 0
+    releases: int = 0
+    decisions: int = 0
+    accepted: int = 0
+    margin_m: float | None = None
+    statuses: dict[str, str] = field(default_factory=dict)
 
 
 def draw(number: int) -> dict[str, Any]:
@@ -40,10 +95,7 @@ def draw(number: int) -> dict[str, Any]:
     extent = 4.0 + 2.0 * (n + m) ** 0.5 * max(d, between)
     points = _apart(rng, n + m, extent, max(d, between))
     method = str(rng.choice(list(METHODS)))
-    zeta, bare = float(rng.choice([0.05, 0.3, 1.0, 3.0])), bool(rng.random() < 0.15)
-    stages = int(rng.choice([2, 6, 20]))
-    noise_ratio = float(rng.choice([0.2, 0.5, 1.0, 2.0]))
-    reach = d + between + 4.0 * speed * h + 2.0 + 20.0 * h
+    decision = _decision(rng, h)
     ugvs = {}
     for i in range(n):
         way = [points[i], *rng.uniform(-extent, extent, (int(rng.integers(1, 4)), 2)).tolist()]
@@ -59,44 +111,70 @@ def draw(number: int) -> dict[str, Any]:
         "noisy": {"speed_m_s": speed, "noise_m": 0.5}, "towards": {"speed_m_s": speed, "x_m": 0.0, "y_m": 0.0},
     }  # fmt: skip
     chosen = rng.choice(kinds, size=int(rng.integers(1, 3)), replace=False).tolist()
+    air_ground = float(rng.choice([0.4, 1.0]))
+    stages, stage = int(rng.choice([2, 6, 20])), h * int(rng.choice([1, 2]))
+    low = bool(rng.random() < 0.5)  # over the middle of the team, so that it comes near the UGVs
+    start = [0.0, 0.0, 1.5 * air_ground] if low else [-3.0 * extent, 0.0, 3.0]
+    reach = max(d, between, air_ground) + 4.0 * speed * h
     return {
         "name": f"random_{number}",
         "seed": number,
         "duration_s": float(rng.choice([20, 60])) * (1.0 if h >= 0.05 else 0.25),
         "ugvs": ugvs,
         "uav": {
-            "start_m": [-3.0 * extent, 0.0, 3.0], "target_m": [0.0, 3.0 * extent, 3.0], "altitude_m": 3.0,
+            "start_m": start, "target_m": [0.0, 3.0 * extent, 3.0], "altitude_m": 1.5 * air_ground if low else 3.0,
             "max_speed_m_s": 2.0 * speed,
         },
         "obstacles": {
             f"o{k}": {"position_m": [*points[n + k], 0.0], "known_to_uav": bool(rng.random() < 0.7)} for k in range(m)
         },
-        "safe_distance": {"obstacle_m": d, "ugv_m": between, "air_ground_m": 0.4},
+        "safe_distance": {"obstacle_m": d, "ugv_m": between, "air_ground_m": air_ground},
         "control": {
             "period_s": h, "avoidance_gain_1_s": float(rng.choice([0.5, 0.9])) / h * float(rng.choice([0.1, 1.0])),
             "motion_gain_1_s": min(2.0, 0.9 / h), "formation_gain_1_s": min(5.0, 0.9 / h),
-            "intervention_gain_1_s": min(1.5, 0.9 / h), "sensing_range_m": reach,
+            "intervention_gain_1_s": min(1.5, 0.9 / h), "sensing_range_m": reach * float(rng.choice([1.0, 2.0])),
         },
-        "decision": {
-            "threshold": {"rule": "fixed", "zeta_m": zeta},
-            "trigger": "bare" if bare else "automaton",
-            "release_m": zeta * float(rng.choice([0.0, 0.5, 0.98])),
-            "min_inter_event_s": float(rng.choice([0.05, 0.5, 3.0])),
-            "noise_m_sqrt_s": float(rng.choice([0.0, 0.01, 0.3])),
-            "leak_1_s": float(rng.choice([0.0, 0.5])),
-            "noise_period_s": h * noise_ratio,
-        },
+        "decision": decision,
         "intervention": {
-            "period_s": h, "retry_s": float(rng.choice([0.0, 1.0])),
+            "period_s": h * int(rng.choice([1, 2, 5])), "retry_s": float(rng.choice([0.0, 1.0])),
             "ranking": str(rng.choice(["listed", "predicted"])),
             "policies": [{"name": name, "parameters": parameters[name]} for name in chosen],
         },
         "gatekeeper": {
-            "route": str(rng.choice(ROUTES.own)), "period_s": h, "horizon_s": stages * h, "stages": stages,
-            "error_weight_1_m2_s": float(rng.choice([1.0, 100.0])),
+            "route": str(rng.choice(ROUTES.own)), "period_s": h * int(rng.choice([1, 2, 3])),
+            "horizon_s": stages * stage, "stages": stages, "error_weight_1_m2_s": float(rng.choice([1.0, 100.0])),
+            "min_dwell_s": float(rng.choice([0.0, 0.2])),
         },
-        "runs": {method: {"method": method}},
+        "runs": {method: {"method": method, "composition": _composition(rng, method)}},
     }  # fmt: skip
+
+
+def _decision(rng: np.random.Generator, h: float) -> dict[str, Any]:
+    """Trigger, threshold, release level, dwell and noise; the noise has a period of its own."""
+    threshold: dict[str, Any] = {"rule": "fixed", "zeta_m": float(rng.choice([0.05, 0.3, 1.0, 3.0]))}
+    zeta = threshold["zeta_m"]
+    if rng.random() < 0.15:
+        rule = {"c1_1_s": 0.5, "c2": 1.0, "drift_m_s": float(rng.choice([0.5, 6.05])), "noise_m_sqrt_s": 1.0}
+        zeta, threshold = optimal_threshold(*(rule[k] for k in _BAYES)), {"rule": "bayes", **rule}
+    return {
+        "threshold": threshold,
+        "trigger": "bare" if rng.random() < 0.15 else "automaton",
+        "release_m": zeta * float(rng.choice([0.0, 0.5, 0.98])),
+        "min_inter_event_s": float(rng.choice([0.0, 0.05, 0.5, 3.0])),
+        "noise_m_sqrt_s": float(rng.choice([0.0, 0.01, 0.3])),
+        "leak_1_s": float(rng.choice([0.0, 0.5])),
+        "noise_period_s": h * float(rng.choice([0.2, 0.5, 1.0, 2.0, 3.0])),
+    }
+
+
+_BAYES = ("drift_m_s", "noise_m_sqrt_s", "c1_1_s", "c2")
+
+
+def _composition(rng: np.random.Generator, method: str) -> str:
+    """Mostly the one that is proved; the recursions have no guarantee."""
+    if method == "d" or rng.random() < 0.8:
+        return "augmented"
+    return str(rng.choice(["recursion_nearest", "recursion_listed"]))
 
 
 def _apart(rng: np.random.Generator, count: int, extent: float, least: float) -> list[list[float]]:
@@ -107,48 +185,125 @@ def _apart(rng: np.random.Generator, count: int, extent: float, least: float) ->
             return [place.tolist() for place in places]
 
 
-def judged(number: int) -> tuple[int, str, list[str]]:
-    """(number, method or 'invalid', what is wrong)."""
+def judged(number: int) -> Row:
+    """Draw, simulate, judge; whatever goes wrong is in the row."""
+    started = time.perf_counter()
+    row = Row(number)
     try:
         scenario = from_data(draw(number), f"random {number}")
     except ScenarioError as error:
-        return number, f"invalid: {error.key.split(chr(46))[0]}", []
-    (method,) = scenario.runs
+        row.invalid = error.key
+        return row
+    (row.method,) = scenario.runs
+    row.ugvs, row.obstacles = len(scenario.ugvs), len(scenario.obstacles)
+    row.trigger, row.route = scenario.decision.trigger, scenario.gatekeeper.route
     try:
-        verdicts = verify(simulate(scenario, method))
+        of_run = simulate(scenario, row.method)
+        verdicts = stl.merge(verify(of_run), stl.cross_check(of_run))
+        row.wrong = [*_claims(scenario, row.method, verdicts), *_checker(scenario, of_run, verdicts)]
     except AirgroundError as error:
-        return number, method, [str(error)]
+        row.wrong = [str(error)]
+        return row
+    finally:
+        row.seconds = time.perf_counter() - started
+    row.triggers, row.releases = (sum(e["kind"] == kind for e in of_run.events) for kind in ("trigger", "release"))
+    row.decisions, row.accepted = len(of_run.decisions), int((of_run.decisions["decision"] == "accept").sum())
+    row.statuses = {verdict.claim.id: verdict.finding.status for verdict in verdicts}
+    row.margin_m = next(verdict.finding.margin for verdict in verdicts if verdict.claim.id == "SAFE-TRACE")
+    return row
+
+
+def _claims(scenario: Scenario, method: str, verdicts: Sequence[Verdict]) -> list[str]:
+    """Claims that are an error, or that must hold and do not."""
     wrong = []
+    dwells = scenario.decision.trigger == "automaton" and scenario.decision.min_inter_event_s > 0.0
     for verdict in verdicts:
         status, name = verdict.finding.status, verdict.claim.id
         must = name in ALWAYS or (name in CERTIFIED and method == "d")
-        must = must and not (name == "ZENO-TRACE" and scenario.decision.trigger == "bare")
+        must = must and not (name == "ZENO-TRACE" and not dwells)
         if status == "error" or (must and status != "holds"):
             wrong.append(f"{name} {status}: {verdict.finding.counterexample or verdict.finding.evidence}"[:300])
-    return number, method, wrong
+    return wrong
+
+
+def _checker(scenario: Scenario, of_run: Trace, verdicts: Sequence[Verdict]) -> list[str]:
+    """What the independent checker does not agree with, from files alone."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        trace.save(of_run, folder / "trace" / of_run.run)
+        report = document.build(scenario, "", {of_run.run: of_run}, verdicts, {"seed": scenario.seed})
+        files.write_json(folder / "report.json", report)
+        lines = [line for line in check_report(folder) if line.run]
+    return [f"checker on {line.claim}: {line.outcome}: {line.text}"[:300] for line in lines if line.outcome != AGREES]
 
 
 def main() -> int:
     """Draw, run, judge."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("-n", "--number", type=int, default=100, help="scenarios 0 to N - 1 (default: %(default)s)")
+    parser.add_argument("-n", "--number", type=int, default=100, help="so many valid ones (default: %(default)s)")
+    parser.add_argument("--first", type=int, default=0, help="number of the first scenario (default: %(default)s)")
     parser.add_argument("--only", type=int, help="this one")
+    parser.add_argument("--jobs", type=int, help="processes (default: one for each processor)")
     parser.add_argument("--keep", type=Path, help="folder for the scenario files of those that fail")
+    parser.add_argument("--rows", type=Path, help="file for a line of JSON per scenario, appended")
     options = parser.parse_args()
-    numbers = range(options.number) if options.only is None else [options.only]
-    seen, failed = Counter[str](), 0
-    with ProcessPoolExecutor() as pool:
-        for number, method, wrong in pool.map(judged, numbers):
-            seen[method] += 1
-            failed += bool(wrong)
-            for line in wrong:
-                print(f"scenario {number}, method ({method}): {line}", flush=True)
-            if wrong and options.keep:
-                options.keep.mkdir(parents=True, exist_ok=True)
-                text = yaml.safe_dump(resolved(from_data(draw(number), "")), sort_keys=False)
-                (options.keep / f"random_{number}.yaml").write_text(text, encoding="utf-8")
-    print(f"{sum(seen.values())} drawn ({dict(seen)}), {failed} failed")
-    return int(failed > 0)
+    rows: list[Row] = []
+
+    def take(row: Row) -> None:
+        rows.append(row)
+        for line in row.wrong:
+            print(f"scenario {row.number}, method ({row.method}): {line}", flush=True)
+        if row.wrong and options.keep:
+            options.keep.mkdir(parents=True, exist_ok=True)
+            text = yaml.safe_dump(resolved(from_data(draw(row.number), "")), sort_keys=False)
+            (options.keep / f"random_{row.number}.yaml").write_text(text, encoding="utf-8")
+        if options.rows:
+            with options.rows.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(asdict(row)) + "\n")
+
+    if options.only is not None:
+        take(judged(options.only))
+    else:
+        _many(options.first, options.number, options.jobs, take)
+    print(summary(rows))
+    return int(any(row.wrong for row in rows))
+
+
+def _many(first: int, wanted: int, jobs: int | None, take: Callable[[Row], None]) -> None:
+    """Scenarios from this number on until so many were valid."""
+    valid, number = 0, first
+    fresh = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(jobs, mp_context=fresh, max_tasks_per_child=RUNS_PER_PROCESS) as pool:
+        while valid < wanted:
+            batch = range(number, number + max(8, (wanted - valid) // 4))
+            number = batch.stop
+            for row in pool.map(judged, batch):
+                if valid < wanted:
+                    take(row)
+                    valid += not row.invalid
+
+
+def summary(rows: Sequence[Row]) -> str:
+    """How many, of what, and what happened in them."""
+    valid = [row for row in rows if not row.invalid]
+    margins = [row.margin_m for row in valid if row.method == "d" and row.margin_m is not None]
+    lines = [
+        f"{len(rows)} drawn, {len(valid)} valid, {sum(bool(row.wrong) for row in valid)} failed",
+        f"refused by validation: {dict(Counter(row.invalid.split(chr(46))[0] for row in rows if row.invalid))}",
+    ]
+    for name in ("method", "ugvs", "obstacles", "trigger", "route"):
+        found = Counter(getattr(row, name) for row in valid)
+        lines += [f"{name}: {dict(sorted(found.items()))}"]
+    for name in ("triggers", "releases", "decisions", "accepted"):
+        counts = [getattr(row, name) for row in valid]
+        lines += [f"{name}: {sum(counts)} in {sum(count > 0 for count in counts)} runs"]
+    if margins:
+        near = sum(margin <= 1e-6 for margin in margins)
+        lines += [f"(d): at least d {min(margins):+.3g} m; {near} of {len(margins)} runs came to within 1e-6 m of d"]
+    for claim in sorted({name for row in valid for name in row.statuses}):
+        found = Counter(row.statuses[claim] for row in valid if claim in row.statuses)
+        lines += [f"{claim}: {dict(found)}"]
+    return "\n".join(lines)
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from .files import Json
+from .proposals import proposals_of
 from .rules import SMALL, Array, Found, holds, same
 from .run import Run
 
@@ -73,7 +74,9 @@ def _moved_at_the_end_m(run: Run, robot: str) -> float:
 
 
 def comm(run: Run, _: Json) -> Found:
-    """COMM: proposals and decisions only while a UGV is intervened on, and no more than an always-on scheme has.
+    """COMM: proposals and decisions only while their UGV or their cause is intervened on, and not too many of them.
+
+    Too many are more than an always-on scheme has.
 
     The UAV withdraws its proposal at its next planning instant after a release, and the gatekeeper notices at its next
     sample: hence the allowance of one period each.
@@ -84,8 +87,10 @@ def comm(run: Run, _: Json) -> Found:
     for ugv in run.ugvs:
         decided = decided_s(run, ugv)
         _decisions_are_on_proposals(run, ugv)
-        _no_strays(run, ugv, "proposal", run.times_s(ugv, "proposal"), planning_s + gating_s)
-        _no_strays(run, ugv, "decision", decided, planning_s + gating_s)
+        sent = run.times_s(ugv, "proposal")
+        _no_strays(run, ugv, "proposal", sent, sent, planning_s + gating_s)
+        issued = run.decisions.loc[run.decisions["robot"] == ugv, "issued_s"].to_numpy(dtype=np.float64)
+        _no_strays(run, ugv, "decision", decided, issued, planning_s + gating_s)
         silent = not len(run.times_s(ugv, "proposal")) or (gated and not len(decided))
         if silent and run.talk_is_due(ugv):
             return Found("not_run")
@@ -116,12 +121,21 @@ def _decisions_are_on_proposals(run: Run, ugv: str) -> None:
     holds("decisions are on proposals", known, issued, "the time of a proposal", about=ugv, t_s=when)
 
 
-def _no_strays(run: Run, ugv: str, kind: str, times_s: Array, allowance_s: float) -> None:
-    stays = run.interventions_s(ugv)
-    begun = times_s[:, None] >= stays[:, 0] - SMALL
-    not_over = times_s[:, None] <= stays[:, 1] + allowance_s + SMALL
-    inside = (begun & not_over).any(axis=1)
-    holds(f"a {kind} only during interventions", inside, times_s, "during one", about=ugv, t_s=times_s)
+def _no_strays(run: Run, ugv: str, kind: str, times_s: Array, issued_s: Array, allowance_s: float) -> None:
+    """Messages on proposals issued at some times are within a stay in mode 'intervening' of the UGV or of a cause."""
+    causes = {(p.ugv, p.issued_s): p.cause for p in proposals_of(run)}
+    stays = {name: run.interventions_s(name) for name in run.ugvs}
+    inside = []
+    for when, issued in zip(times_s.tolist(), issued_s.tolist(), strict=True):
+        concerned = {ugv, causes.get((ugv, issued), ugv)}
+        inside.append(
+            any(
+                begin - SMALL <= when <= end + allowance_s + SMALL
+                for name in concerned
+                for begin, end in stays[name].tolist()
+            )
+        )
+    holds(f"a {kind} only during interventions", np.array(inside, bool), times_s, "during one", about=ugv, t_s=times_s)
 
 
 def gate_time(run: Run, _: Json) -> Found:

@@ -8,6 +8,7 @@ import numpy as np
 
 from .decisions import Decision, decisions_of, silent_ugvs
 from .files import Json
+from .foresight import outcomes
 from .law import PLANE, avoiding, inequalities, limited
 from .proposals import proposals_of
 from .rules import SMALL, Array, Found, close, holds
@@ -53,6 +54,8 @@ def gate_model(run: Run, _: Json) -> Found:
     """GATE-MODEL: both choices of every decision rolled out again; what came of them is evidence, and not checked."""
     if silent_ugvs(run):
         return Found("not_run")
+    if run.method == "d":
+        return outcomes(run) if len(run.decisions) else Found("holds")
     decisions = decisions_of(run)
     if not decisions:
         return Found("holds").counted(0)

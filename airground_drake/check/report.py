@@ -21,6 +21,7 @@ from .metrics import check_metrics
 from .optimality import gate_opt, gate_sur
 from .outcome import comm, gate_time, live_goal
 from .prediction import gate_model
+from .progress import live_prog
 from .rules import Disagreement, Found, NotEstablished, agrees, holds, same
 from .run import Run, read_run
 from .safety import safe_hyp, safe_trace
@@ -60,12 +61,18 @@ WITH_GATEKEEPER: Mapping[str, OfRun] = {
     "GATE-MODEL": gate_model,
     "GATE-TIME": gate_time,
 }
+WITH_OUTCOMES: Mapping[str, OfRun] = {
+    "GATE-FEAS": gate_feas,
+    "GATE-MODEL": gate_model,
+    "GATE-TIME": gate_time,
+    "LIVE-PROG": live_prog,
+}
 ROUNDING_ROUTES = ("relaxed", "nonlinear")
 """Routes that GATE-SUR is about."""
-REFUTED_BY_RULES = ("THR-TRIG", "COMM", "GATE-OPT", "GATE-SUR", "GATE-FEAS", "GATE-MODEL")
+REFUTED_BY_RULES = ("THR-TRIG", "COMM", "GATE-OPT", "GATE-SUR", "GATE-FEAS", "GATE-MODEL", "LIVE-PROG")
 """Claims that any broken rule of theirs refutes; the others are refuted by their margin."""
 OF_MODEL: Mapping[str, OfModel] = {
-    **dict.fromkeys(("SAFE-LEMMA", "SAFE-INV", "SAFE-GATE", "SAFE-DIST", "ZENO-PROOF", "THR-ISO"), prove),
+    **dict.fromkeys(("SAFE-LEMMA", "SAFE-INV", "SAFE-GATE", "SAFE-DIST", "ZENO-PROOF", "LIVE-WAIT", "THR-ISO"), prove),
     "THR-ROOT": root,
     "THR-OPT": root,
     "THR-DDM": ddm,
@@ -201,7 +208,9 @@ def claims_of(method: str, route: str) -> dict[str, OfRun]:
     found = dict(EVERY_RUN)
     if method != "a":
         found |= WITH_MESSAGES
-    if method in ("c", "d"):
+    if method == "d":
+        found |= WITH_OUTCOMES
+    if method == "c":
         found |= WITH_GATEKEEPER
         if route not in ROUNDING_ROUTES:
             del found["GATE-SUR"]

@@ -139,7 +139,7 @@ def _counts(scenario: Scenario) -> Problems:
         yield "seed", scenario.seed, f"a whole number from 0 to {MAX_SEED}"
     if not 1 <= scenario.gatekeeper.stages <= MAX_STAGES:
         yield "gatekeeper.stages", scenario.gatekeeper.stages, f"a whole number from 1 to {MAX_STAGES}"
-    for name in ("budget_iterations", "budget_nodes"):
+    for name in ("budget_iterations", "budget_nodes", "tries"):
         if not 1 <= getattr(scenario.gatekeeper, name) <= MAX_SEED:
             yield f"gatekeeper.{name}", getattr(scenario.gatekeeper, name), f"a whole number from 1 to {MAX_SEED}"
     if scenario.gatekeeper.budget_share > 1.0:
@@ -196,6 +196,7 @@ def _ugv_points(scenario: Scenario) -> Iterator[tuple[str, Vector]]:
 def _points(scenario: Scenario) -> Problems:
     others = [("uav.start_m", scenario.uav.start_m), ("uav.target_m", scenario.uav.target_m)]
     others += [(f"obstacles.{name}.position_m", each.position_m) for name, each in scenario.obstacles.items()]
+    others += [(f"uav.phantoms_m.{index}", point) for index, point in enumerate(scenario.uav.phantoms_m)]
     for key, point in (*_ugv_points(scenario), *others):
         if len(point) != 3:
             yield key, point, "3 numbers in m: [x, y, z]"

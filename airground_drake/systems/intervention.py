@@ -8,6 +8,7 @@ from pydrake.systems.framework import Context, EventStatus, LeafSystem, State
 from airground_drake.decision.trigger import Mode
 from airground_drake.intervention.planner import Planner, PlannerMemory
 from airground_drake.systems.decision import FIELDS
+from airground_drake.systems.ticks import Ticks
 
 
 class InterventionPlanner(LeafSystem):
@@ -20,8 +21,8 @@ class InterventionPlanner(LeafSystem):
     Rate: one update per planning period, from t = 0. A proposal can act one period after it is made.
     """
 
-    def __init__(self, planner: Planner) -> None:
-        """Declare ports, state and the periodic update."""
+    def __init__(self, planner: Planner, control_period: float | None = None) -> None:
+        """Declare ports, state and the periodic update; the controllers' period in s (default: the planner's)."""
         super().__init__()
         self._planner = planner
         n = len(planner.ugvs)
@@ -36,7 +37,8 @@ class InterventionPlanner(LeafSystem):
             self._calc_proposals,
             prerequisites_of_calc={self.abstract_state_ticket(self._memory)},
         )
-        self.DeclarePeriodicUnrestrictedUpdateEvent(planner.period, 0.0, self._update)
+        self._ticks = Ticks(planner.period, planner.period if control_period is None else control_period)
+        self.DeclarePeriodicUnrestrictedUpdateEvent(self._ticks.period, 0.0, self._update)
 
     def memory(self, context: Context) -> PlannerMemory:
         """What was sent and what went wrong, up to the context's time."""
@@ -47,17 +49,15 @@ class InterventionPlanner(LeafSystem):
         output.set_value(self.memory(context).proposals)
 
     def _update(self, context: Context, state: State) -> EventStatus:
-        memory = self.memory(context)
-        intervening = [mode == Mode.INTERVENING for mode in self._status.Eval(context)[::FIELDS]]
-        if not any(intervening) and not any(memory.proposals):
+        if not self._ticks.due(context.get_time()):
             return EventStatus.DidNothing()
-        new = self._planner.plan(
-            memory,
-            context.get_time(),
-            self._position.Eval(context).reshape(-1, 3),
-            intervening,
-            self._answers.Eval(context),
-            self._reports.Eval(context),
-        )
-        state.get_mutable_abstract_state(int(self._memory)).set_value(new)
+        before, positions = self.memory(context), self._position.Eval(context).reshape(-1, 3)
+        memory = self._planner.watch(before, context.get_time(), positions)
+        intervening = [mode == Mode.INTERVENING for mode in self._status.Eval(context)[::FIELDS]]
+        if any(intervening) or any(memory.proposals):
+            answers, reports = self._answers.Eval(context), self._reports.Eval(context)
+            memory = self._planner.plan(memory, context.get_time(), positions, intervening, answers, reports)
+        if memory is before:
+            return EventStatus.DidNothing()
+        state.get_mutable_abstract_state(int(self._memory)).set_value(memory)
         return EventStatus.Succeeded()

@@ -37,6 +37,7 @@ BAD: list[tuple[str, object, list[str]]] = [
     ("ugvs.one.start_m", [0, "0 m", 0], ["ugvs.one.start_m.1: '0 m'", "a number in m"]),
     ("ugvs.one.start_m", 3, ["ugvs.one.start_m: 3", "a list in m"]),
     ("ugvs.one.start_m", [0, 0], ["ugvs.one.start_m: [0.0, 0.0]", "3 numbers in m"]),
+    ("uav.phantoms_m", [[0, 0, 0], [1, 2]], ["uav.phantoms_m.1: [1.0, 2.0]", "3 numbers in m"]),
     ("uav.target_m", [0, 0, 0, 0], ["uav.target_m: [", "3 numbers in m"]),
     ("obstacles.rock.position_m", [], ["obstacles.rock.position_m: []", "3 numbers in m"]),
     ("ugvs.one.preset.waypoints_m.1", [], ["waypoints_m.1: []", "3 numbers in m"]),

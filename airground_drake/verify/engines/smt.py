@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-Solver = Literal["z3", "cvc5"]
+Solver = Literal["z3", "cvc5", "cvc5_proof"]
 Answer = Literal["sat", "unsat", "unknown", "timeout", "error"]
 
 
@@ -29,15 +29,21 @@ class Result:
         answer: 'unknown', 'timeout' and 'error' decide nothing.
         model: for 'sat' (z3 only), values by name: rationals as 'p/q'; an irrational one ends in '?'.
         detail: why nothing was decided.
+        proof: for 'unsat' (cvc5_proof only), cvc5's proof in its calculus CPC.
     """
 
     answer: Answer
     model: dict[str, str] = field(default_factory=dict)
     detail: str = ""
+    proof: str = ""
+
+
+_DECIDED: dict[tuple[Solver, str], Result] = {}
+"""What a solver has said of a script: all that its answer depends on is in the script."""
 
 
 def solve(scripts: Sequence[str], solver: Solver = "z3", limit_s: float = 20.0) -> list[Result]:
-    """Run a solver on each script.
+    """Run a solver on each script; one that it has decided in this process is not asked again.
 
     Args:
         scripts: SMT-LIB 2 texts, each with one `(check-sat)`; logic HORN asks z3's Spacer.
@@ -48,9 +54,12 @@ def solve(scripts: Sequence[str], solver: Solver = "z3", limit_s: float = 20.0) 
         One result per script, in order; never raises for what a solver does.
     """
     results: list[Result] = []
-    while len(results) < len(scripts):
-        results += _attempt(scripts[len(results) :], solver, limit_s)
-    return results
+    open_ones = [script for script in dict.fromkeys(scripts) if (solver, script) not in _DECIDED]
+    while len(results) < len(open_ones):
+        results += _attempt(open_ones[len(results) :], solver, limit_s)
+    found = dict(zip(open_ones, results, strict=True))
+    _DECIDED.update({(solver, script): each for script, each in found.items() if each.answer in ("sat", "unsat")})
+    return [found.get(script) or _DECIDED[solver, script] for script in scripts]
 
 
 def _attempt(scripts: Sequence[str], solver: Solver, limit_s: float) -> list[Result]:
@@ -116,10 +125,32 @@ def _value(value: Any) -> str:
     return str(value.approx(20).as_fraction()) + "?" if z3.is_algebraic_value(value) else str(value)
 
 
+PROOF_OPTIONS = {
+    "produce-proofs": "true",
+    "proof-granularity": "dsl-rewrite",
+    "nl-cov": "false",
+    "nl-ext": "full",
+    "nl-ext-tplanes": "true",
+    "rlimit-per": "200000",
+}
+"""Of cvc5 where a proof is wanted: rewriting in steps, no coverings (they have no rule), and a limit by a count, so
+that it does not depend on the machine what is proved."""
+
+
 def _cvc5(script: str) -> dict[str, Any]:
+    return _by_cvc5(script, {})
+
+
+def _cvc5_proof(script: str) -> dict[str, Any]:
+    return _by_cvc5(script, PROOF_OPTIONS)
+
+
+def _by_cvc5(script: str, options: dict[str, str]) -> dict[str, Any]:
     import cvc5
 
     solver = cvc5.Solver(cvc5.TermManager())
+    for name, value in options.items():
+        solver.setOption(name, value)
     parser = cvc5.InputParser(solver)
     parser.setStringInput(cvc5.InputLanguage.SMT_LIB_2_6, script, "script")
     manager = parser.getSymbolManager()
@@ -127,14 +158,21 @@ def _cvc5(script: str) -> dict[str, Any]:
     while not (command := parser.nextCommand()).isNull():
         said += str(command.invoke(solver, manager))
     answer = said.strip().splitlines()[-1] if said.strip() else ""
+    if answer == "unsat" and options:
+        proof = "".join(_text(solver.proofToString(part, cvc5.ProofFormat.CPC)) for part in solver.getProof())
+        return {"answer": answer, "proof": proof}
     if answer in ("sat", "unsat"):
         return {"answer": answer}
     return {"answer": "unknown", "detail": f"cvc5: {said.strip()[:200]}"}
 
 
+def _text(value: str | bytes) -> str:
+    return value if isinstance(value, str) else value.decode()
+
+
 def main() -> None:
     """Answer the scripts on stdin one by one."""
-    decide = {"z3": _z3, "cvc5": _cvc5}[sys.argv[1]]
+    decide = {"z3": _z3, "cvc5": _cvc5, "cvc5_proof": _cvc5_proof}[sys.argv[1]]
     for script in json.load(sys.stdin):
         try:
             answer = decide(script)

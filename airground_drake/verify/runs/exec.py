@@ -90,7 +90,9 @@ class Exec(TraceClaim):
     assumptions = (
         "The command of a row is the velocity applied since the row before (the trace's convention); that it is held "
         "between samples is SAFE-HYP.",
-        "A proposal stays in force as the planner's rules say: see `verify.runs.proposals.accepted_at`.",
+        "A proposal stays in force as the planner's rules say: see `verify.runs.proposals.accepted_at`. One that asks "
+        "a UGV to make way for another one is in force as long as one of the two is intervened on. The trace's table "
+        "of proposals says for whose trigger each was sent; that has to be the UGV's own while it is intervened on.",
         "The UAV feeds the UGVs' commands of the sample before forward: controllers of one sample see each other's "
         "last commands.",
     )

@@ -17,7 +17,14 @@ from airground_drake.errors import TraceError
 from airground_drake.trace import Trace
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.convex_bounds import Enclosure, enclose
-from airground_drake.verify.runs.gate_record import POSITION_TOLERANCE_M, GateClaim, Off, Row, conclude, cost_tolerance
+from airground_drake.verify.runs.gate_record import (
+    POSITION_TOLERANCE_M,
+    Off,
+    ProblemClaim,
+    Row,
+    conclude,
+    cost_tolerance,
+)
 
 OVERSTATED = 1e-5
 """A recorded lower bound may be above the optimum by this, relative: a solver's primal cost errs by 1e-6 or less."""
@@ -38,7 +45,7 @@ HALF_PLANE_ROUTES = ("relaxed", "branch_and_bound")
 """Routes that bound the cost with distances along recorded normals; the others know no bound, or an exact one."""
 
 
-class GateOpt(GateClaim):
+class GateOpt(ProblemClaim):
     """GATE-OPT."""
 
     largest_gap = 0.05

@@ -9,7 +9,7 @@ import numpy as np
 from airground_drake.errors import TraceError
 from airground_drake.trace import Trace
 from airground_drake.verify.finding import Finding
-from airground_drake.verify.runs.gate_record import GateClaim, Off, Row, conclude
+from airground_drake.verify.runs.gate_record import Off, ProblemClaim, Row, conclude
 
 TIE = 1e-9
 """Accumulated deficits of sum-up rounding closer to 1/2 than this are a tie: either mode may follow."""
@@ -18,7 +18,7 @@ ROUNDED_ROUTES = ("relaxed", "nonlinear")
 """Routes that solve (27) and round by (28)-(29)."""
 
 
-class GateSur(GateClaim):
+class GateSur(ProblemClaim):
     """GATE-SUR."""
 
     id = "GATE-SUR"

@@ -1,0 +1,98 @@
+"""cvc5's own proofs of a report's SMT-LIB certificates, for checkers of others.
+
+    python -m airground_drake.verify.engines.proof_files DIR
+
+reads the scripts `DIR/certificates/<claim>/<name>.smt2` and writes `DIR/proofs/<claim>/<name>.cpc`, cvc5's proof in its
+Cooperating Proof Calculus (CPC), wherever cvc5 finds one all of whose steps have a rule; and `DIR/proofs/index.json`,
+which says for each script what became of it. The proof checker Ethos (C++) checks such a file with the signature of the
+calculus that comes with cvc5, `proofs/eo/cpc/Cpc.eo`; it contains the script's assertions, to be compared with it.
+
+The other format, Alethe, leaves holes in every one of these proofs (cvc5 1.4), and none at all for nonlinear steps.
+cvc5's decision procedure for nonlinear arithmetic, cylindrical algebraic coverings, has no proof rule: its steps would
+be `trust`. It is turned off here, and products are bounded by incremental linearisation alone, which decides less.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+from airground_drake import files
+from airground_drake.verify.engines.smt import Result, solve
+
+LIMIT_S = 30.0
+"""Wall-clock time for a script, s; cvc5 gives up before, by a count (see `smt`)."""
+LARGEST_BYTES = 1_000_000
+"""A larger proof is not kept."""
+
+
+def proofs_of(folder: Path, limit_s: float = LIMIT_S) -> list[dict[str, Any]]:
+    """Write what proofs there are beside the certificates of a report.
+
+    Args:
+        folder: of the report.
+        limit_s: wall-clock time for each script, s.
+
+    Returns:
+        The index: `claim`, `script`, `outcome` ('complete', or why there is none), and of a proof `file`, `bytes`,
+        `sha256`.
+
+    Raises:
+        OSError: if the folder cannot be read or written.
+    """
+    scripts = sorted(folder.glob("certificates/*/*.smt2"))
+    found = solve([script.read_text(encoding="utf-8") for script in scripts], "cvc5_proof", limit_s)
+    index = [_kept(folder, script, result) for script, result in zip(scripts, found, strict=True)]
+    files.write_json(folder / "proofs" / "index.json", index)
+    return index
+
+
+def _kept(folder: Path, script: Path, result: Result) -> dict[str, Any]:
+    claim = script.parent.name
+    entry: dict[str, Any] = {"claim": claim, "script": f"certificates/{claim}/{script.name}"}
+    why = outcome(result)
+    if why == "complete":
+        file = folder / "proofs" / claim / f"{script.stem}.cpc"
+        files.write_text(file, result.proof)
+        content = result.proof.encode()
+        entry |= {"file": f"proofs/{claim}/{file.name}", "bytes": len(content), "sha256": files.sha256(content)}
+    return entry | {"outcome": why}
+
+
+def outcome(result: Result) -> str:
+    """'complete' for a proof that can be checked step by step, else why there is none."""
+    if result.answer != "unsat":
+        return f"no proof: {result.detail or result.answer}"
+    trusted = result.proof.count(":rule trust")
+    if trusted:
+        return f"no proof: {trusted} of its steps have no rule"
+    if not result.proof:
+        return "no proof: cvc5 gives none"
+    size = len(result.proof.encode())
+    return "complete" if size <= LARGEST_BYTES else f"no proof: it has {size} bytes"
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Write the proofs of a report, and say by claim how many there are; 2 if the folder is no report's."""
+    parser = argparse.ArgumentParser(prog="python -m airground_drake.verify.engines.proof_files")
+    parser.add_argument("report", type=Path, metavar="DIR", help="folder with certificates/")
+    folder = parser.parse_args(arguments).report
+    if not (folder / "certificates").is_dir():
+        print(f"error: {folder} has no certificates", file=sys.stderr)
+        return 2
+    index = proofs_of(folder)
+    for claim, count in Counter(entry["claim"] for entry in index).items():
+        mine = [entry for entry in index if entry["claim"] == claim]
+        lacking = [entry for entry in mine if "file" not in entry]
+        print(f"{claim}: {count - len(lacking)} of {count} scripts have a proof")
+        for entry in lacking:
+            print(f"    {Path(entry['script']).stem}: {json.dumps(entry['outcome'])[1:-1]}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,258 @@
+"""Every mutant, and what catches it: `python benchmarks/mutants.py [--only WORD] [--jobs 1] [--json FILE] [--page P]`.
+
+A mutant is one edit of the package (`benchmarks/mutation/of_*.py`), made in a temporary copy; one that does not apply
+is an error. On each copy short runs are simulated, judged by their claims and by the independent checker, until one
+says something else than on the package as it is; only if none does, the proofs that are about the edited code,
+tampered reports (for the checker), and at last the tests that concern the file. Prints a line for each. `--json`
+keeps the results in a file, to which a later call adds; `--page` writes them as a page of the documentation
+(docs/mutants.md). Exit code 1 if a mutant survives that is not known to be equivalent.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import queue
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from mutation import of_checkers, of_code
+from mutation.mutant import PACKAGE, Mutant
+from mutation.page import page
+
+ROOT = Path(__file__).resolve().parents[1]
+COPIED = (PACKAGE, "tests", "benchmarks", "docs", "pyproject.toml", "README.md")
+MUTANTS: tuple[Mutant, ...] = (
+    *of_code.TEAM, *of_code.KERNELS, *of_code.LAW, *of_code.DECISION, *of_code.INTERVENTION, *of_code.GATEKEEPER,
+    *of_checkers.CLAIMS, *of_checkers.CHECKER,
+)  # fmt: skip
+NOT_COMPARED = ("GATE-TIME",)
+"""Claims that depend on what else the machine does."""
+
+
+@dataclass
+class Result:
+    """What became of a mutant.
+
+    Attributes:
+        name, path, old, new: as in the list.
+        stage: what caught it: claim, checker, proof, tampering, test, nothing.
+        by: the claims, rules or tests.
+        equivalent: why nothing can, if nothing did.
+        seconds: that it took.
+    """
+
+    name: str
+    path: str
+    old: str
+    new: str
+    stage: str = "nothing"
+    by: list[str] = field(default_factory=list)
+    equivalent: str = ""
+    seconds: float = 0.0
+
+
+class Copy:
+    """A copy of the package in which one file at a time is edited."""
+
+    def __init__(self, pristine: Path, folder: Path) -> None:
+        """Copy; times of files are kept, because compiled functions are found by them."""
+        self.pristine, self.folder = pristine, folder
+        shutil.copytree(pristine, folder)
+        paths = os.pathsep.join(map(str, (folder, folder / "tests")))
+        self._environment = os.environ | {"PYTHONPATH": paths, "PYTHONDONTWRITEBYTECODE": "1"}
+        self._environment |= {"AIRGROUND_DRAKE_CACHE": str(folder / "cache")}
+        self._errors = folder / "errors.txt"
+        with self._errors.open("w", encoding="utf-8") as errors:
+            self._server = subprocess.Popen(
+                [sys.executable, "benchmarks/mutation/probe.py"], cwd=folder, env=self._environment, text=True,
+                stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=errors,
+            )  # fmt: skip
+
+    def close(self) -> None:
+        """End the process that answers."""
+        self._server.kill()
+        self._server.wait()
+
+    def run(self, *command: str) -> subprocess.CompletedProcess[str]:
+        """A command in the copy, on its package."""
+        return subprocess.run(
+            command, cwd=self.folder, env=self._environment, capture_output=True, text=True, check=False
+        )
+
+    def probe(self, kind: str, *what: str) -> list[list[str]]:
+        """Findings of `mutation/probe.py`; one that says so where its process ends otherwise."""
+        out = self.folder / "probe.json"
+        out.unlink(missing_ok=True)
+        assert self._server.stdin is not None
+        assert self._server.stdout is not None
+        self._server.stdin.write(json.dumps([str(out), kind, what]) + "\n")
+        self._server.stdin.flush()
+        code = self._server.stdout.readline().strip()
+        if code == "0" and out.exists():
+            found: list[list[str]] = json.loads(out.read_text(encoding="utf-8"))
+            return found
+        last = (self._errors.read_text(encoding="utf-8").strip().splitlines() or [f"exit code {code}"])[-1]
+        return [["run", " ".join(what), "stops", last[:160]]]
+
+    def compiled_with(self, path: str) -> list[Path]:
+        """Files whose compiled functions have those of `path` inside, itself first."""
+        found = [self.folder / PACKAGE / path]
+        for file in found:
+            module = ".".join(file.relative_to(self.folder).with_suffix("").parts)
+            for other in (self.folder / PACKAGE).rglob("*.py"):
+                text = other.read_text(encoding="utf-8")
+                if other not in found and "@njit" in text and re.search(rf"from {re.escape(module)} import", text):
+                    found.append(other)
+        return found
+
+    def forget_compiled(self, files: Sequence[Path]) -> None:
+        """Delete what numba keeps of these files."""
+        for file in files:
+            for kept in (file.parent / "__pycache__").glob(f"{file.stem}.*.nb*"):
+                kept.unlink()
+
+    def restore(self, files: Sequence[Path]) -> None:
+        """As they were, compiled functions included."""
+        self.forget_compiled(files)
+        for file in files:
+            original = self.pristine / file.relative_to(self.folder)
+            shutil.copy2(original, file)
+            for kept in (original.parent / "__pycache__").glob(f"{original.stem}.*.nb*"):
+                shutil.copy2(kept, file.parent / "__pycache__" / kept.name)
+
+
+class Bench:
+    """The package as it is, what it gives, and copies to break."""
+
+    def __init__(self, folder: Path, mutants: Sequence[Mutant], jobs: int, report: Path | None = None) -> None:
+        """Copy the package, and run everything once on it; the report of case B is made unless there is one.
+
+        Raises:
+            SystemExit: if the package as it is does not pass.
+        """
+        first = folder / "as_it_is"
+        first.mkdir()
+        for name in COPIED:
+            if (ROOT / name).is_dir():
+                shutil.copytree(ROOT / name, first / name)
+            else:
+                shutil.copy2(ROOT / name, first / name)
+        here = Copy(first, folder / "baseline")
+        self.report = folder / "report" if report is None else report.resolve()
+        probes = sorted({run for mutant in mutants for run in mutant.runs})
+        found = here.probe("runs", *probes)
+        if wrong := [each for each in found if each[2] in ("stops", "disagrees", "error")]:
+            sys.exit(f"the package as it is does not pass: {wrong}")
+        self.baseline = {(source, where): status for source, where, status, _ in found}
+        if report is None and any(mutant.tamperings for mutant in mutants):
+            made = here.probe("report", str(self.report))
+            if made[0][2] != "0":
+                sys.exit(f"no report of the package as it is: {made}")
+        for kept in (here.folder / PACKAGE).rglob("*.nb*"):  # what was compiled meanwhile
+            shutil.copy2(kept, first / kept.relative_to(here.folder))
+        self.unbroken = here
+        self.copies: queue.Queue[Copy] = queue.Queue()
+        for k in range(jobs):
+            self.copies.put(Copy(first, folder / f"copy{k}"))
+
+    def close(self) -> None:
+        """End all processes."""
+        for copy in (self.unbroken, *self.copies.queue):
+            copy.close()
+
+    def judge(self, mutant: Mutant) -> Result:
+        """Make the edit in a copy that is free, and see what catches it."""
+        copy, started = self.copies.get(), time.perf_counter()
+        result = Result(mutant.name, mutant.path, mutant.old, mutant.new)
+        edited = copy.compiled_with(mutant.path)
+        try:
+            if mutant.compiled(copy.folder):
+                copy.forget_compiled(edited)
+            mutant.apply(copy.folder)
+            result.stage, result.by = self._caught(mutant, copy)
+        finally:
+            copy.restore(edited)
+            self.copies.put(copy)
+        if result.stage == "nothing":
+            result.equivalent = mutant.equivalent
+        result.seconds = round(time.perf_counter() - started, 1)
+        return result
+
+    def _caught(self, mutant: Mutant, copy: Copy) -> tuple[str, list[str]]:
+        for name in mutant.runs:
+            if by := self._differences(copy.probe("runs", name)):
+                claims = [each for each in by if not each.startswith("checker")]
+                return ("claim" if claims else "checker"), by
+        if mutant.proofs and (by := self._differences(copy.probe("proofs", *mutant.proofs))):
+            return "proof", by
+        if mutant.tamperings:
+            found = copy.probe("tamperings", str(self.report), *mutant.tamperings)
+            if found:
+                return "tampering", [f"{each[0]}: {each[2]}" for each in found]
+        return ("test", [failed]) if mutant.tests and (failed := self._failing(mutant, copy)) else ("nothing", [])
+
+    def _differences(self, found: list[list[str]]) -> list[str]:
+        """What is not as on the package as it is."""
+        by = []
+        for source, where, status, rule in found:
+            if source not in NOT_COMPARED and status != self.baseline.get((source, where)):
+                by.append(f"{source} ({where}): {status}{f', {rule}' if rule else ''}")
+        return by
+
+    def _failing(self, mutant: Mutant, copy: Copy) -> str:
+        """The first test that fails on the copy and passes on the package as it is; '' if there is none."""
+        options = ("-n", "0", "-x", "-q", "--no-header", "-p", "no:cacheprovider")
+        done = copy.run(sys.executable, "-m", "pytest", *options, *mutant.tests)
+        failed = re.findall(r"^(?:FAILED|ERROR) (\S+)", done.stdout, flags=re.MULTILINE)
+        if done.returncode == 0 or not failed:
+            return ""
+        passes = self.unbroken.run(sys.executable, "-m", "pytest", *options, failed[0]).returncode == 0
+        return failed[0] if passes else ""
+
+
+def main() -> int:
+    """Break, judge, print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--only", action="append", default=[], metavar="WORD", help="mutants with this in name or path")
+    parser.add_argument("--jobs", type=int, default=1, help="copies that are judged side by side (default: 1)")
+    parser.add_argument("--json", type=Path, help="file for the results; those of other mutants in it are kept")
+    parser.add_argument("--missing", action="store_true", help="only those that the file of --json does not have")
+    parser.add_argument("--report", type=Path, help="a report of case B to tamper with (default: made)")
+    parser.add_argument("--page", type=Path, help="page of the documentation, of all results in the file of --json")
+    options = parser.parse_args()
+    kept: dict[str, Any] = {}
+    if options.json and options.json.exists():
+        kept = {each["name"]: each for each in json.loads(options.json.read_text(encoding="utf-8"))}
+    wanted = [m for m in MUTANTS if not options.only or any(w in f"{m.name} {m.path}" for w in options.only)]
+    wanted = [m for m in wanted if not (options.missing and m.name in kept)]
+    if wanted:
+        with tempfile.TemporaryDirectory() as name:
+            bench = Bench(Path(name), wanted, options.jobs, options.report)
+            with ThreadPoolExecutor(options.jobs) as pool, closing(bench):
+                for result in pool.map(bench.judge, wanted):
+                    print(f"{result.name}: {result.stage}: {'; '.join(result.by) or result.equivalent}", flush=True)
+                    kept[result.name] = asdict(result)
+                    if options.json:
+                        options.json.write_text(json.dumps([*kept.values()], indent=1), encoding="utf-8")
+    results = [kept[mutant.name] for mutant in MUTANTS if mutant.name in kept]
+    if options.page:
+        options.page.write_text(page(results), encoding="utf-8")
+    print(dict(Counter(each["stage"] for each in results)))
+    return int(any(each["stage"] == "nothing" and not each["equivalent"] for each in results))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,56 @@
+"""The results as a page of the documentation."""
+
+from __future__ import annotations
+
+import textwrap
+from collections import Counter
+from collections.abc import Sequence
+from typing import Any
+
+WIDTH = 120
+STAGES = {
+    "claim": "by a claim about a run",
+    "checker": "by the independent checker alone",
+    "proof": "by a proof about the model",
+    "tampering": "by a tampered report that is not refused any more",
+    "test": "by a test only",
+    "nothing": "by nothing",
+}
+HEAD = """\
+Made by `python benchmarks/mutants.py --json mutants.json --page docs/mutants.md`: each mutant is one edit of the
+package in a temporary copy. Short runs (scenarios `crowd`, `case_a`, `case_b`, `soft_gate`) are judged by their
+claims and by the independent checker; where they say nothing else than on the package as it is, the proofs that are
+about the edited code, tampered reports (mutants of the checker), and at last the tests of the file. A mutant counts
+for the first of these that catches it. What demands less (mutants of claims and of the checker) says the same on
+honest runs: it takes a run, or a report, that must be refused.
+"""
+ELSEWHERE = """\
+Mutants that the tests make in place, each refuted by the claim named: `tests/verify/model/avoidance/test_wiring.py`
+(SAFE-INV, SAFE-GATE), `tests/verify/runs/test_exec.py` (EXEC), `tests/verify/runs/test_gate_model.py` (GATE-MODEL),
+and broken traces in the other files of `tests/verify/runs`. Broken variants of proofs: [claims](claims.md) lists them
+under each claim, and `python -m airground_drake.report audit` shows the counterexamples. Tampered reports:
+`tests/check/tampering`, see [the checker](checker.md).
+"""
+
+
+def page(results: Sequence[dict[str, Any]]) -> str:
+    """A table by what caught them, and the edits."""
+    lines = ["<!-- Made by: python benchmarks/mutants.py --page -->", "# Mutants", "", *HEAD.splitlines(), ""]
+    count = Counter(each["stage"] for each in results)
+    lines += [
+        f"{len(results)} mutants:",
+        "",
+        *(f"- {count[s]} caught {says}" for s, says in STAGES.items() if count[s]),
+    ]
+    for stage, says in STAGES.items():
+        mine = [each for each in results if each["stage"] == stage]
+        if mine:
+            lines += ["", f"## Caught {says}", ""]
+            for each in mine:
+                by = each["equivalent"] or "; ".join(each["by"][:4]) + ("; ..." if len(each["by"]) > 4 else "")
+                text = f"- **{each['name']}** (`{each['path']}`): {by}"
+                lines += textwrap.wrap(
+                    text, WIDTH, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False
+                )
+    lines += ["", "## Elsewhere", "", *ELSEWHERE.splitlines()]
+    return "\n".join(lines) + "\n"

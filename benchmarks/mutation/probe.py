@@ -1,0 +1,135 @@
+"""What claims and the checker find on short runs of the package that is on the path.
+
+    python probe.py
+
+reads requests from standard input, a line of JSON each: [file, "runs" | "proofs" | "tamperings" | "report", names].
+Each is answered by a child process, which imports the package as it is then and writes its findings to the file: lists
+of source, where, status and rule, the source being a claim, `checker: <claim>`, `run` or a tampering. A line with the
+child's exit code follows on standard output. Other packages are imported once, before.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import tempfile
+import traceback
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+HERE = Path(__file__).parent
+PROBES = {
+    "crowd b": (str(HERE / "crowd.yaml"), "b"),
+    "crowd c": (str(HERE / "crowd.yaml"), "c"),
+    "crowd d": (str(HERE / "crowd.yaml"), "d"),
+    "case_a a": ("case_a", "a"),
+    "case_a nearest": ("case_a", "a_recursion_nearest"),
+    "case_b c": ("case_b", "c"),
+    "case_b d": ("case_b", "d"),
+    "soft_gate c": ("soft_gate", "c"),
+}
+"""Name: scenario, run."""
+
+Findings = list[list[Any]]
+
+
+def runs(names: list[str]) -> Findings:
+    """Every verdict, and every check of the independent checker that does not agree."""
+    from airground_drake import files, trace
+    from airground_drake.check.report import AGREES, check_report
+    from airground_drake.errors import AirgroundError
+    from airground_drake.report import document
+    from airground_drake.scenarios.load import load
+    from airground_drake.simulation import simulate
+    from airground_drake.verify import verify
+    from airground_drake.verify.stl import cross_check as stl
+
+    found: Findings = []
+    for name in names:
+        source, run = PROBES[name]
+        scenario = load(source)[0]
+        scenario.runs = {run: scenario.runs[run]}
+        scenario.reproduction, scenario.choices = [], []
+        try:
+            of_run = simulate(scenario, run)
+        except AirgroundError as error:
+            found.append(["run", name, "stops", str(error)])
+            continue
+        verdicts = stl.merge(verify(of_run), stl.cross_check(of_run))
+        found += [[v.claim.id, name, v.finding.status, ""] for v in verdicts]
+        with tempfile.TemporaryDirectory() as there:
+            folder = Path(there)
+            trace.save(of_run, folder / "trace" / run)
+            report = document.build(scenario, "", {run: of_run}, verdicts, {"seed": scenario.seed})
+            files.write_json(folder / "report.json", report)
+            lines = [line for line in check_report(folder) if line.run]
+        found += [[f"checker: {line.claim}", name, "disagrees", line.rule] for line in lines if line.outcome != AGREES]
+    return found
+
+
+def proofs(names: list[str]) -> Findings:
+    """Verdicts about the model of case A that are not what the scenario expects."""
+    from airground_drake.scenarios.load import load
+    from airground_drake.verify import verify_model
+
+    verdicts = verify_model(load("case_a")[0], claims=names)
+    return [[v.claim.id, "case_a", v.finding.status, ""] for v in verdicts if not v.as_expected]
+
+
+def tamperings(names: list[str]) -> Findings:
+    """Tamperings that are about these claims and are not refused by the rule that must; the first name is a report."""
+    from check.tampering import TAMPERINGS, attempt
+
+    found: Findings = []
+    for name, tampering in TAMPERINGS.items():
+        if tampering.claim in names[1:]:
+            outcome = attempt(Path(names[0]), tampering.edit)
+            if not outcome.is_by(tampering):
+                found.append([f"tampering {name}", "case_b", "accepted" if outcome.code == 0 else "other rule", ""])
+    return found
+
+
+def report(names: list[str]) -> Findings:
+    """Write the report of case B to the folder that is named, for `tamperings`."""
+    from airground_drake.report.__main__ import main
+
+    return [["report", names[0], str(main(["case_b", "-o", names[0], "--format", "json"])), ""]]
+
+
+OTHERS = (
+    "cvxpy", "flint", "jinja2", "matplotlib", "numba", "pandas", "pyarrow.parquet", "pydrake.all", "scipy.optimize",
+    "sympy", "yaml", "z3",
+)  # fmt: skip
+"""Packages that every child needs."""
+KINDS = {"runs": runs, "proofs": proofs, "tamperings": tamperings, "report": report}
+
+
+def serve() -> None:
+    """Answer requests until there are no more."""
+    for name in OTHERS:
+        import_module(name)
+    for line in sys.stdin:
+        child = os.fork()
+        if child == 0:
+            _answer(*json.loads(line))
+        print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
+
+
+def _answer(file: str, kind: str, names: list[str]) -> None:
+    """In the child; it does not return."""
+    code = 1
+    try:
+        os.dup2(2, 1)  # what is printed must not be taken for an answer
+        Path(file).write_text(json.dumps(KINDS[kind](names)), encoding="utf-8")
+        code = 0
+    except BaseException:  # whatever a mutant does
+        traceback.print_exc()
+    finally:
+        sys.stderr.flush()
+        os._exit(code)
+
+
+if __name__ == "__main__":
+    serve()
