@@ -30,6 +30,8 @@ from .triggers import thr_trig, zeno_trace
 
 SCHEMA = "airground_drake.report/2"
 AGREES, DISAGREES, OPEN = "agrees", "DISAGREES", "cannot be re-established"
+DECIDED_FROM = ("id", "status", "where", "evidence", "inputs", "certificates")
+"""What of a recorded claim its formula looks at; the rest is compared with what the formula gives."""
 UNDECIDED = ("inconclusive", "error", "not_run")
 """Statuses that say nothing about a claim."""
 PASSING = ("proved", "holds", "supported")
@@ -166,9 +168,10 @@ def _lines(folder: Path, report: Json) -> Iterator[Line]:
     scenario_text = canonical(scenario)
 
     def decide(claim: Json) -> Found:
+        about = canonical({key: claim[key] for key in DECIDED_FROM if key in claim})
         if claim["run"]:
-            return _decide_of_run(loaded(claim["run"]), canonical(claim))
-        return _decide_of_model(canonical(claim), read_folder(folder / "certificates" / claim["id"]), scenario_text)
+            return _decide_of_run(loaded(claim["run"]), about)
+        return _decide_of_model(about, read_folder(folder / "certificates" / claim["id"]), scenario_text)
 
     for claim in report["claims"]:
         yield _attempt(claim["id"], claim["run"], partial(_judge, claim, scenario, decide))

@@ -116,7 +116,7 @@ class GateModel(GateClaim):
         "2^N."
     )
 
-    exercised_by = "decisions, under method (d) those that compare outcomes"
+    exercised_by = "decisions that were rolled out again"
 
     def judge_rows(self, trace: Trace, rows: list[Row]) -> Finding:
         """Roll out both choices of every decision; the margin is the tolerance less the largest difference."""
