@@ -6,8 +6,7 @@ Problems are those that the gatekeeper of cases A and B was given in a run, and 
 discs (a detour or a straight line proposed), for one to eight UGVs. A solution is one sample: with two UGVs, both
 problems. Times are CPU times of the process.
 
-Plans are compared with the best known: the best of all rows of the same problem, and of a search with 4096 labels
-(`best_known`), which uses no relaxation. `excess` is the cost (25) above it, in per cent of it, or of a hundredth of
+Plans are compared with the best known: the best of all rows of the same problem. `excess` is the cost (25) above it, in per cent of it, or of a hundredth of
 the cheaper constant plan's cost if that is more (relative to a cost of almost 0 it would mean nothing);
 `other_choice` counts the problems where the first stage is not that of the best plan known, although accepting and
 refusing first differ by more than 0.1 %. Every problem where the default route misses either by more than 0.1 % is
@@ -34,7 +33,6 @@ import numpy as np
 
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.half_planes import normals_along
-from airground_drake.gatekeeper.local_search import best_known
 from airground_drake.gatekeeper.outcome import Other, Outlook, outcomes
 from airground_drake.gatekeeper.prediction import Horizon, Scene, predicted_problem
 from airground_drake.gatekeeper.problem import Problem
@@ -289,10 +287,12 @@ class Known:
 
     @classmethod
     def of(cls, problem: Problem, solutions: list[Solution]) -> Known:
-        """By `best_known`, and by every plan of `solutions`."""
-        plans = [d.plan for d in solutions if d.has_plan and d.plan is not None]
-        refuse, accept = best_known(problem, 4096 if problem.stages <= 60 else 1024, plans)
-        constant = ConstantPlans.of(problem).better.objective
+        """By the constant plans and every plan of `solutions`."""
+        constants = ConstantPlans.of(problem)
+        planned = [d for d in solutions if d.has_plan]
+        refuse = min([constants.refuse.objective, *(d.objective_refuse for d in planned)])
+        accept = min([constants.accept.objective, *(d.objective_accept for d in planned)])
+        constant = constants.better.objective
         return cls(refuse, accept, max(refuse if refuse < accept else accept, 0.01 * constant, 1e-12))
 
     def excess(self, solution: Solution) -> float:

@@ -131,7 +131,7 @@ def whole_run(seed: int) -> tuple[float, int, float, float, float]:
     scenario.obstacles["obstacle_2"].known_to_uav = bool(random.integers(2))
     margins, executed, stolen = {}, 0, 0.0
     for method in ("d", "c"):
-        scenario.runs = {method: Run(method=method)}
+        scenario.runs, scenario.reproduction = {method: Run(method=method)}, []
         with mock.patch.object(CertifiedGatekeepers, "foresee", Believing.foresee):
             trace = Recorder(scenario, method).simulate()
         margin = SafeTrace().check(trace).margin

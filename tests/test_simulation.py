@@ -93,20 +93,21 @@ def test_runs_in_several_processes_are_those_in_one(case_a: Scenario, run: Runs)
 
 WARM_UP = """
 from airground_drake import simulation
-from airground_drake.gatekeeper import closed_loop, cost, dual_bound, local_search, reachable_box
+from airground_drake.gatekeeper import closed_loop, cost, dual_bound, outcome, reachable_box
 from airground_drake.nsbc import kernels
 from airground_drake.scenarios.load import load
 
 
 def compiled():
-    modules = (kernels, closed_loop, cost, dual_bound, local_search, reachable_box)
+    modules = (kernels, closed_loop, cost, dual_bound, outcome, reachable_box)
     functions = [(f.__qualname__, f) for module in modules for f in vars(module).values() if hasattr(f, "signatures")]
     return {name: list(map(str, f.signatures)) for name, f in functions}
 
 
 simulation.warm_up()
 before = compiled()
-simulation.simulate(load("case_a")[0], "d")
+for method in "cd":
+    simulation.simulate(load("case_a")[0], method)
 assert before and compiled() == before, (before, compiled())
 """
 

@@ -119,8 +119,8 @@ def test_a_wrong_prediction_model_is_refuted(name: str, monkeypatch: pytest.Monk
 
 
 WRONG: dict[str, Callable[[ClosedLoop], ClosedLoop]] = {
-    "motion gain": lambda loop: loop._replace(motion_gain=1.1 * loop.motion_gain),
-    "intervention gain": lambda loop: loop._replace(intervention_gain=1.1 * loop.intervention_gain),
+    "speed limit": lambda loop: loop._replace(max_speed=0.5 * loop.max_speed),
+    "priorities": lambda loop: loop._replace(intervention_on_top=True),
     "no obstacles": lambda loop: loop._replace(shares=0.0 * loop.shares, distances=0.0 * loop.distances),
     "late": lambda loop: loop._replace(wanted=np.concatenate([loop.wanted[:1], loop.wanted[:-1]])),
 }
