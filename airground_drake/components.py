@@ -13,8 +13,12 @@ from airground_drake.decision.bayes import optimal_threshold
 from airground_drake.decision.trigger import Trigger
 from airground_drake.gatekeeper.answer import Rules
 from airground_drake.gatekeeper.budget import Budget
+from airground_drake.gatekeeper.certified import CertifiedGatekeepers
+from airground_drake.gatekeeper.outcome import Outlook
+from airground_drake.gatekeeper.patience import Patience
 from airground_drake.gatekeeper.prediction import Horizon
 from airground_drake.gatekeeper.routes.route import Route
+from airground_drake.gatekeeper.sample import Gatekeepers, Judging, PaperGatekeepers
 from airground_drake.intervention.database import BehaviourDatabase, make_policy
 from airground_drake.intervention.planner import Planner
 from airground_drake.nsbc.avoidance import Avoidance, Composition
@@ -65,9 +69,17 @@ def make_planner(scenario: Scenario, method: Method) -> Planner:
         period=scenario.intervention.period_s,
         presets=tuple(make_presets(scenario)),
         targets=positions([ugv.target_m for ugv in scenario.ugvs.values()]),
-        mapped=positions([each.position_m for each in scenario.obstacles.values() if each.known_to_uav]),
+        mapped=make_map(scenario),
         safe_distance=scenario.safe_distance.obstacle_m,
+        robot_distance=scenario.safe_distance.ugv_m,
+        max_speed=np.array([ugv.max_speed_m_s for ugv in scenario.ugvs.values()]),
     )
+
+
+def make_map(scenario: Scenario) -> Array:
+    """The obstacles on the UAV's map, (m, 3), m: those that it knows, and those that are only there."""
+    known = [obstacle.position_m for obstacle in scenario.obstacles.values() if obstacle.known_to_uav]
+    return positions([*known, *scenario.uav.phantoms_m])
 
 
 def make_route(scenario: Scenario) -> Route:
@@ -128,6 +140,31 @@ def make_rules(scenario: Scenario) -> Rules:
         budget=Budget(gate.budget_iterations, gate.budget_nodes),
         budget_share=gate.budget_share if gate.budget == "wall_clock" else None,
     )
+
+
+def make_outlook(scenario: Scenario) -> Outlook:
+    """How far outcomes are looked at."""
+    gate = scenario.gatekeeper
+    return Outlook(gate.longest_s, gate.settling_s, gate.horizon_s, scenario.arrival_tolerance_m)
+
+
+def make_patience(scenario: Scenario) -> Patience:
+    """How long UGVs go along with the UAV."""
+    gate = scenario.gatekeeper
+    return Patience(gate.tries, gate.rest_s, gate.longest_s, gate.lag_m, gate.behind_s)
+
+
+def make_gatekeepers(scenario: Scenario, law: UgvLaw) -> Gatekeepers:
+    """How the UGVs judge proposals: by problem (26) where the intervention is on top, else by outcomes.
+
+    Raises:
+        UnknownNameError, PluginError: if the scenario names a route that cannot be made.
+    """
+    team, presets = make_team(scenario), make_presets(scenario)
+    if not law.intervention_on_top:
+        return CertifiedGatekeepers(team, law, presets, make_outlook(scenario), make_patience(scenario))
+    judging = Judging(make_route(scenario), make_horizon(scenario), make_rules(scenario), scenario.gatekeeper.period_s)
+    return PaperGatekeepers(team, law, presets, judging)
 
 
 def make_trigger(scenario: Scenario, zeta: float) -> Trigger:

@@ -142,15 +142,8 @@ def build_model(
     uav_controller = add("uav_controller", _uav_controller(scenario, team))
     gatekeeper = None
     if chosen.gated:
-        gatekeeper = Gatekeeper(
-            team,
-            law,
-            presets,
-            components.make_route(scenario),
-            components.make_horizon(scenario),
-            period=scenario.gatekeeper.period_s,
-            rules=components.make_rules(scenario),
-        )
+        gatekeepers = components.make_gatekeepers(scenario, law)
+        gatekeeper = Gatekeeper(gatekeepers, n, period=scenario.gatekeeper.period_s, control=scenario.control.period_s)
     gate = add("gatekeeper", gatekeeper if gatekeeper is not None else DirectAcceptance(n))
 
     def connect(source: System, output: str, target: System, port: str) -> None:

@@ -160,6 +160,7 @@ POLICIES = Registry(
     "policies",
     {
         "detour": "airground_drake.intervention.detour:Detour",
+        "coordinate": "airground_drake.intervention.coordinate:Coordinate",
         "towards": "airground_drake.intervention.wrong:Towards",
         "stale_map": "airground_drake.intervention.wrong:StaleMap",
         "noisy": "airground_drake.intervention.wrong:Noisy",
@@ -198,6 +199,7 @@ RUN_CLAIMS = Registry(
         "GATE-FEAS": "airground_drake.verify.runs.gate_feas:GateFeas",
         "GATE-MODEL": "airground_drake.verify.runs.gate_model:GateModel",
         "GATE-TIME": "airground_drake.verify.runs.gate_time:GateTime",
+        "LIVE-PROG": "airground_drake.verify.runs.live_prog:LiveProg",
         "LIVE-GOAL": "airground_drake.verify.runs.live_goal:LiveGoal",
         "COMM": "airground_drake.verify.runs.comm:Comm",
     },
@@ -214,6 +216,7 @@ MODEL_CLAIMS = Registry(
         "SAFE-DIST": "airground_drake.verify.model.avoidance.safe_dist:SafeDist",
         "ZENO-PROOF": "airground_drake.verify.model.trigger.zeno_proof:ZenoProof",
         "ZENO-REFINE": "airground_drake.verify.model.trigger.zeno_refine:ZenoRefine",
+        "LIVE-WAIT": "airground_drake.verify.model.patience.live_wait:LiveWait",
         "THR-ISO": "airground_drake.verify.model.trigger.thr_iso:ThrIso",
         "THR-ROOT": "airground_drake.verify.model.threshold.thr_root:ThrRoot",
         "THR-OPT": "airground_drake.verify.model.threshold.thr_opt:ThrOpt",
@@ -229,6 +232,30 @@ PASSING: tuple[Status, ...] = ("proved", "holds", "supported")
 """Statuses in which the claim was established, each in its way."""
 
 
+EXERCISED = "exercised"
+"""What a scenario may expect besides a status: one of `PASSING`, on at least one thing that could have refuted it."""
+NOT_EXERCISED = "not_exercised"
+"""How a claim counts that was established because nothing put it to the test."""
+EXPECTATIONS: tuple[str, ...] = (*STATUSES, EXERCISED)
+"""What an alternative of an expectation may be."""
+
+
 def alternatives(expected: str) -> tuple[str, ...]:
-    """The statuses that an expectation admits: "holds", or "holds or refuted" where there is no guarantee."""
+    """What an expectation admits: "holds"; "exercised"; "exercised or refuted" where there is no guarantee."""
     return tuple(expected.split(" or "))
+
+
+def outcome(status: str, exercised: int | None) -> str:
+    """How a verdict counts: by its status, or as `NOT_EXERCISED` if nothing was there to refute it.
+
+    Args:
+        status: the verdict.
+        exercised: how often the claim was put to the test; None: nobody counted.
+    """
+    return NOT_EXERCISED if status in PASSING and exercised == 0 else status
+
+
+def meets(expected: str, status: str, exercised: int | None) -> bool:
+    """Whether a verdict is one that an expectation admits; a status admits it however often it was exercised."""
+    put_to_the_test = status in PASSING and bool(exercised)
+    return any(status == each or (each == EXERCISED and put_to_the_test) for each in alternatives(expected))

@@ -25,7 +25,8 @@ from airground_drake.arrays import Array
 from airground_drake.diagram import RECORDED, Model, build_model
 from airground_drake.errors import AirgroundError, SimulationError, UnknownNameError
 from airground_drake.events import extract
-from airground_drake.gatekeeper.answer import Decision
+from airground_drake.gatekeeper.answer import Decision, Foreseen, Planned
+from airground_drake.gatekeeper.outcome import Outlook, outcomes
 from airground_drake.gatekeeper.prediction import Horizon, Scene, predicted_problem
 from airground_drake.gatekeeper.routes.relaxed import RelaxedRoute
 from airground_drake.intervention.policy import Proposal
@@ -123,31 +124,7 @@ class Recorder:
         decided = gatekeeper.decisions(gatekeeper.GetMyContextFromRoot(context)) if gatekeeper is not None else ()
         memory = model.planner.memory(model.planner.GetMyContextFromRoot(context))
         decisions = pd.DataFrame(
-            [
-                {
-                    "t_s": r.t,
-                    "robot": ugvs[r.robot],
-                    "policy": r.proposal.policy,
-                    "issued_s": r.proposal.issued,
-                    "decision": "accept" if r.accepted else "refuse",
-                    "reason": r.reason,
-                    "status": r.solution.status,
-                    "route": self._scenario.gatekeeper.route,
-                    "first_stage": "accept" if r.solution.accept_first else "refuse",
-                    "relaxed_first_stage": r.solution.relaxed_first_stage,
-                    "objective": r.solution.objective,
-                    "route_bound": r.solution.route_bound,
-                    "gap": r.solution.gap,
-                    "objective_accept": r.solution.objective_accept,
-                    "objective_refuse": r.solution.objective_refuse,
-                    "accept_throughout": r.throughout[0],
-                    "refuse_throughout": r.throughout[1],
-                    "rounding_deviation_s": r.solution.rounding_deviation,
-                    "predicted_clearance_m": r.solution.clearance,
-                    "bend": r.problem.bend,
-                }
-                for r in decided
-            ],
+            [_decision(r, ugvs[r.robot], self._scenario.gatekeeper.route) for r in decided],
             columns=list(DECISION_COLUMNS),
         ).astype(DECISION_COLUMNS)
         sent = [(ugvs[i], proposal.issued, proposal.policy) for i, proposal in memory.sent]
@@ -172,6 +149,47 @@ class Recorder:
         return trace
 
 
+def _decision(decision: Decision, robot: str, route: str) -> dict[str, Any]:
+    """A row of `Trace.decisions`."""
+    row: dict[str, Any] = {name: "" if kind == "str" else -1.0 for name, kind in DECISION_COLUMNS.items()}
+    row |= {
+        "t_s": decision.t,
+        "robot": robot,
+        "policy": decision.proposal.policy,
+        "issued_s": decision.proposal.issued,
+        "decision": "accept" if decision.accepted else "refuse",
+        "reason": decision.reason,
+    }
+    grounds = decision.grounds
+    if isinstance(grounds, Foreseen):
+        row |= {"lag_m": grounds.lag, "predicted_lag_m": grounds.predicted_lag, "tries": grounds.tries}
+        for choice, outcome in (("refuse", grounds.refuse), ("accept", grounds.accept)):
+            if outcome is not None:
+                row |= {
+                    f"{choice}_outcome_m2_s": outcome.cost,
+                    f"{choice}_stalls": float(outcome.stalls),
+                    f"{choice}_left_m": outcome.left,
+                }
+        return row
+    solution = grounds.solution
+    return row | {
+        "status": solution.status,
+        "route": route,
+        "first_stage": "accept" if solution.accept_first else "refuse",
+        "relaxed_first_stage": solution.relaxed_first_stage,
+        "objective": solution.objective,
+        "route_bound": solution.route_bound,
+        "gap": solution.gap,
+        "objective_accept": solution.objective_accept,
+        "objective_refuse": solution.objective_refuse,
+        "accept_throughout": grounds.throughout[0],
+        "refuse_throughout": grounds.throughout[1],
+        "rounding_deviation_s": solution.rounding_deviation,
+        "predicted_clearance_m": solution.clearance,
+        "bend": grounds.problem.bend,
+    }
+
+
 def _proposals(sent: Sequence[tuple[str, Proposal]]) -> pd.DataFrame:
     """`Trace.proposals` of what was sent to whom."""
     rows = [
@@ -179,6 +197,7 @@ def _proposals(sent: Sequence[tuple[str, Proposal]]) -> pd.DataFrame:
             robot, proposal.policy, float(proposal.issued), proposal.motion.times.tolist(),
             proposal.motion.positions.ravel().tolist(),
             np.asarray(proposal.selection, dtype=np.float64).ravel().tolist(),
+            np.asarray(proposal.mapped, dtype=np.float64).ravel().tolist(), proposal.cause or robot,
         )
         for robot, proposal in sent
     ]  # fmt: skip
@@ -191,16 +210,16 @@ def _problems(decided: Sequence[Decision]) -> pd.DataFrame:
     def flat(array: Array | None) -> list[float]:
         return [] if array is None else array.ravel().tolist()
 
+    planned = [(r.grounds.problem, r.grounds.solution) for r in decided if isinstance(r.grounds, Planned)]
     rows = [
         (
-            r.problem.dt, r.problem.error_weight, r.problem.slack_weight,
+            p.dt, p.error_weight, p.slack_weight,
             *map(flat, (
-                r.problem.initial, r.problem.accept, r.problem.refuse, r.problem.reference, r.problem.centres,
-                r.problem.distances, r.solution.plan, r.solution.positions, r.solution.relaxed, r.solution.rounded,
-                r.solution.normals,
+                p.initial, p.accept, p.refuse, p.reference, p.centres, p.distances,
+                s.plan, s.positions, s.relaxed, s.rounded, s.normals,
             )),
         )
-        for r in decided
+        for p, s in planned
     ]  # fmt: skip
     return pd.DataFrame(rows, columns=[*PROBLEM_SCALARS, *PROBLEM_ARRAYS])
 
@@ -217,6 +236,7 @@ def warm_up() -> None:
     scene = Scene(0.0, one[0], motion, one, one, np.ones(1), np.ones(1), 1.0)
     law, horizon = UgvLaw(avoidance, 1.0, 1.0, False), Horizon(2, 1, 1.0, 1.0)
     RelaxedRoute().solve(predicted_problem(scene, law, Proposal("", 0.0, motion), horizon))
+    outcomes(scene, law, Proposal("", 0.0, motion), one, 1.0, (), Outlook(longest=1.0))
 
 
 def simulate_all(scenario: Scenario, jobs: int | None = None) -> dict[str, Trace]:

@@ -36,7 +36,7 @@ from airground_drake import files
 from airground_drake.arrays import Array
 from airground_drake.errors import TraceError
 
-SCHEMA = "airground_drake.trace/3"
+SCHEMA = "airground_drake.trace/4"
 
 DECISION_COLUMNS = {
     "t_s": "float64",
@@ -59,23 +59,36 @@ DECISION_COLUMNS = {
     "rounding_deviation_s": "float64",
     "predicted_clearance_m": "float64",
     "bend": "float64",
+    "refuse_outcome_m2_s": "float64",
+    "accept_outcome_m2_s": "float64",
+    "refuse_stalls": "float64",
+    "accept_stalls": "float64",
+    "refuse_left_m": "float64",
+    "accept_left_m": "float64",
+    "lag_m": "float64",
+    "predicted_lag_m": "float64",
+    "tries": "float64",
 }
-"""Columns of `Trace.decisions`, one row per robot and gatekeeper call; -1 where a number does not apply."""
+"""Columns of `Trace.decisions`, one row per robot and gatekeeper call; -1 where a number does not apply. Those up to
+`bend` are of decisions by problem (26), the others of decisions by outcomes: what comes of either choice as
+`gatekeeper.outcome` has it (cost, 1 if it comes to rest short of the goal, way left), how far the UGV is behind the
+proposed motion, and how often it has gone along since it last rested."""
 
 PROBLEM_SCALARS = ("dt_s", "error_weight_1_m2_s", "slack_weight_1_m2_s")
 PROBLEM_ARRAYS = (
     "initial_m", "accept_m_s", "refuse_m_s", "reference_m", "centres_m", "distances_m",
     "plan", "positions_m", "relaxed", "rounded", "normals",
 )  # fmt: skip
-"""Columns of `Trace.problems`: the data of (26) as each decision saw it, and what the route found, row by row as in
-`decisions`. Arrays are flattened in C order: initial (3), accept, refuse and reference (N x 3), centres and normals
-(N x m x 3), distances (m), plan, relaxed and rounded omega (N), positions of the plan (N x 3); empty where the route
-has none. Normals are those of the half-planes that `route_bound` is about."""
+"""Columns of `Trace.problems` (empty under method (d)): the data of (26) as each decision saw it, and what the route
+found, row by row as in `decisions`. Arrays are flattened in C order: initial (3), accept, refuse and reference (N x 3),
+centres and normals (N x m x 3), distances (m), plan, relaxed and rounded omega (N), positions of the plan (N x 3);
+empty where the route has none. Normals are those of the half-planes that `route_bound` is about."""
 
-PROPOSAL_COLUMNS = ("robot", "policy", "issued_s", "times_s", "positions_m", "selection")
+PROPOSAL_COLUMNS = ("robot", "policy", "issued_s", "times_s", "positions_m", "selection", "mapped_m", "cause")
 """Columns of `Trace.proposals`, one row per proposal sent: for which UGV, by which policy, when; the vertices of the
 motion that it asks for, times (M) and positions (M x 3, flattened in C order), and J_int of (12)-(14), (m x 3, ditto):
-the directions that it concerns."""
+the directions that it concerns, and the obstacles that the UAV knows, (k x 3, ditto); and the UGV
+whose trigger it was sent for: this one, or another one that it is to make way for."""
 
 
 def no_proposals() -> pd.DataFrame:
@@ -106,6 +119,7 @@ class Trace:
     timings: dict[str, Any] = field(default_factory=dict, compare=False)
     problems: pd.DataFrame = field(default_factory=lambda: pd.DataFrame(columns=[*PROBLEM_SCALARS, *PROBLEM_ARRAYS]))
     proposals: pd.DataFrame = field(default_factory=no_proposals)
+    _read: dict[str, Array] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @property
     def run(self) -> str:
@@ -139,16 +153,20 @@ class Trace:
         return self.column("t_s")
 
     def column(self, name: str) -> Array:
-        """One column as float64, (T,).
+        """One column as float64, (T,), read-only: every claim asks for the same few, which are looked at once.
 
         Raises:
             TraceError: if it is missing or not finite.
         """
+        if name in self._read:
+            return self._read[name]
         if name not in self.signals:
             raise TraceError(f"run {self.meta.get('run')}: the trace has no column {name!r}")
-        values = self.signals[name].to_numpy(dtype=np.float64)
+        values = self.signals[name].to_numpy(dtype=np.float64, copy=True)
         if not np.isfinite(values).all():
             raise TraceError(f"run {self.meta.get('run')}: column {name!r} has values that are not finite")
+        values.setflags(write=False)
+        self._read[name] = values
         return values
 
     def vector(self, robot: str, stem: str = "", unit: str = "m") -> Array:

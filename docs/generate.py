@@ -145,6 +145,8 @@ def claims() -> str:
             "",
             *(f"- {assumption}" for assumption in claim.assumptions),
             "",
+            f"*Exercised by:* {claim.exercised_by}.",
+            "",
             f"*Does not establish:* {claim.does_not_establish}",
             "",
         ]

@@ -13,7 +13,7 @@ from hypothesis.internal.conjecture import providers
 from sharing import once
 
 from airground_drake import trace
-from airground_drake.gatekeeper import sample
+from airground_drake.gatekeeper import certified, sample
 from airground_drake.report.__main__ import main as write_report
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Scenario
@@ -52,7 +52,8 @@ def _steady_clock() -> Iterator[None]:
     """Every decision of a gatekeeper takes 1/1024 s by the clock: no verdict depends on what else the machine does."""
     ticks = itertools.count()
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sample, "thread_time", lambda: next(ticks) / 1024)
+        for module in (sample, certified):
+            patch.setattr(module, "thread_time", lambda: next(ticks) / 1024)
         yield
 
 

@@ -37,7 +37,7 @@ def test_a_policy_that_is_added_for_the_time_being() -> None:
 @pytest.mark.parametrize(
     ("name", "error", "said"),
     [
-        ("detuor", UnknownNameError, "unknown policy 'detuor'; allowed: detour, towards"),
+        ("detuor", UnknownNameError, "unknown policy 'detuor'; allowed: detour, coordinate"),
         ("no_such_module:Thing", PluginError, "cannot be imported"),
         ("math:no_such_thing", PluginError, "cannot be imported"),
         ("math:pi", PluginError, "is not a subclass of airground_drake.intervention.policy.Policy"),

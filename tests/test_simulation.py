@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenarios.cases import DEADLOCKS
 from timeline import kinds, times
 
 from airground_drake import trace
@@ -53,7 +54,7 @@ def test_recursion_as_printed_is_unsafe_and_does_not_stall(run: Runs) -> None:
         assert "arrival" in kinds(of_run, "ugv1")
 
 
-@pytest.mark.parametrize("scenario", shipped())
+@pytest.mark.parametrize("scenario", sorted(set(shipped()) - set(DEADLOCKS)))
 def test_every_run_has_the_verdicts_that_its_scenario_declares(run: Runs, scenario: str) -> None:
     for name in load(scenario)[0].runs:
         for verdict in verify(run(scenario, name)):

@@ -88,8 +88,10 @@ def root(claim: Json, files: Files, scenario: Json) -> Found:
         true = {one["name"]: "true" for one in saved["statements"]}
         same("statements in the evidence", claim["evidence"]["statements"], true)
         if claim["id"] == "THR-ROOT":
-            return _the_code_returns_the_root(claim, rule, ends)
-        return _the_root_is_the_minimum(claim, rule, saved["enclosures"], ends)
+            found = _the_code_returns_the_root(claim, rule, ends)
+        else:
+            found = _the_root_is_the_minimum(claim, rule, saved["enclosures"], ends)
+        return found.counted(len(saved["statements"]))
 
 
 def _enclosure(rule: Rule, saved: Json, name: str, zeta: str, ratio: Fraction) -> tuple[Fraction, Fraction]:

@@ -8,30 +8,41 @@ from typing import NamedTuple
 import numpy as np
 
 from .files import Json
-from .law import PLANE, Inequalities, avoiding, inequalities, limited
+from .law import PLANE, Inequalities, avoiding, inequalities, least_spare, limited
 from .proposals import Proposal, accepted_at
 from .rules import SMALL, Array, Disagreement, Flags, Found
 from .run import Run
 
 COMMAND_M_S = 1e-6
 """A command may differ from the law by this: a corner of nearly parallel inequalities enlarges their rounding."""
+BINDING_M_S, DOUBT_M_S = 1e-9, 1e-10
+"""An inequality binds where the law has the first to spare at most; of one closer to that than the second, rounding
+decides."""
 ON_TOP = ("b", "c")
 """Methods that put an accepted intervention above the avoidance inequalities."""
 
 
 class Robot(NamedTuple):
-    """Commands of a robot and the law's, (S, 3) each, and what is executed by the messages and by the signals, (S,)."""
+    """Commands of a robot and the law's, (S, 3) each, and what is executed by the messages and by the signals, (S,).
+
+    `spare_m_s` is what the law has to spare of the avoidance inequality that leaves the least, (S,).
+    """
 
     name: str
     recorded: Array
     law: Array
     executing: Flags
     said: Flags
+    spare_m_s: Array
 
     @property
     def away_m_s(self) -> Array:
         """By what they differ, (S,)."""
         return np.asarray(np.linalg.norm(self.recorded - self.law, axis=1))
+
+    def tested(self, binding_m_s: float) -> int:
+        """Commands for which a proposal is executed, or which an inequality binds."""
+        return int((self.executing | (self.spare_m_s <= binding_m_s)).sum())
 
 
 def execution(run: Run, claim: Json) -> Found:
@@ -41,9 +52,10 @@ def execution(run: Run, claim: Json) -> Found:
         robots.append(_uav(run))
     margin = COMMAND_M_S - max(float(robot.away_m_s.max()) for robot in robots)
     facts = {"samples": len(run.sample_s), "robots": {r.name: {"executing": int(r.executing.sum())} for r in robots}}
+    least, most = (sum(r.tested(BINDING_M_S + side * DOUBT_M_S) for r in robots) for side in (-1.0, 1.0))
     wrong = [(k, r) for r in robots for k in np.flatnonzero(~(r.away_m_s <= COMMAND_M_S) | (r.executing != r.said))[:1]]
     if not wrong:
-        return Found("holds", margin, margin, facts, within=1e-8)
+        return Found("holds", margin, margin, facts, within=1e-8).counted(least, most)
     if claim["status"] == "holds":
         k, robot = min(wrong, key=lambda one: int(one[0]))
         when = float(run.sample_s[k])
@@ -53,7 +65,7 @@ def execution(run: Run, claim: Json) -> Found:
         rule = "the command is the law's"
         raise Disagreement(rule, robot.recorded[k].tolist(), robot.law[k].tolist(), robot.name, when)
     negative = margin if margin < 0.0 else None
-    return Found("refuted", negative, negative, facts, within=1e-8)
+    return Found("refuted", negative, negative, facts, within=1e-8).counted(least, most)
 
 
 def around(run: Run, robot: str) -> Inequalities:
@@ -81,7 +93,8 @@ def _ugv(run: Run, ugv: str) -> Robot:
         closer = ~(off >= away)
         law[closer], away[closer] = tried[closer], off[closer]
     executing = np.array([proposal is not None for proposal in accepted])
-    return Robot(ugv, recorded, law, executing, run.executed(ugv)[run.chosen_row])
+    spare = least_spare(law, around(run, ugv))
+    return Robot(ugv, recorded, law, executing, run.executed(ugv)[run.chosen_row], spare)
 
 
 def _law(run: Run, ugv: str, accepted: list[Proposal | None], own_side: float, asked_side: float) -> Array:
@@ -113,6 +126,7 @@ def _uav(run: Run) -> Robot:
     fed = np.mean([run.command_m_s[ugv][row] for ugv in run.ugvs], axis=0)
     fed[0] = 0.0  # nothing was commanded before the first sample
     wish = fed + run.scenario["control"]["formation_gain_1_s"] * (over - run.position_m[run.uav][row])
-    law = avoiding(limited(wish, uav["max_speed_m_s"]), around(run, run.uav), "augmented")
+    given = around(run, run.uav)
+    law = avoiding(limited(wish, uav["max_speed_m_s"]), given, "augmented")
     never = np.zeros(len(law), dtype=bool)
-    return Robot(run.uav, run.command_m_s[run.uav][run.chosen_row], law, never, never)
+    return Robot(run.uav, run.command_m_s[run.uav][run.chosen_row], law, never, never, least_spare(law, given))

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from .decisions import LEAST_COST, Decision, decisions_of, silent_ugvs
 from .files import Json
+from .foresight import rows_of
 from .rules import SMALL, Array, Flags, Found, at_most, close, holds, same
 from .run import Run
 from .safety import avoidance_spare_m_s
@@ -30,6 +32,8 @@ def gate_feas(run: Run, _: Json) -> Found:
     """GATE-FEAS: situation, plan, answer and obedience; the margin is the part of a tolerance that rounding leaves."""
     if silent_ugvs(run):
         return Found("not_run")
+    if run.method == "d":
+        return _obedience(run)
     decisions = decisions_of(run)
     for decision in decisions:
         _on_a_proposal(run, decision)
@@ -46,20 +50,68 @@ def gate_feas(run: Run, _: Json) -> Found:
         _nothing_is_executed_without_acceptance(run, ugv, mine)
         if decisions:
             _own_task_while_nothing_is_accepted(run, ugv)
-    return Found("holds", 0.0, 1.0, {"decisions": len(decisions)}) if decisions else Found("holds")
+    found = Found("holds", 0.0, 1.0, {"decisions": len(decisions)}) if decisions else Found("holds")
+    return found.counted(len(decisions))
 
 
-def _at(decision: Decision, what: str = "") -> Json:
+class Answer(NamedTuple):
+    """A decision of method (d), as far as its time and its answer go."""
+
+    row: dict[str, Any]
+
+    @property
+    def t_s(self) -> float:
+        """When."""
+        return float(self.row["t_s"])
+
+    @property
+    def ugv(self) -> str:
+        """Who decides."""
+        return str(self.row["robot"])
+
+
+def _obedience(run: Run) -> Found:
+    """Method (d): decisions come when they are due, and nothing is done without an acceptance."""
+    answers = [Answer(row) for row in rows_of(run)]
+    for answer in answers:
+        _on_a_proposal(run, answer)
+    for ugv in run.ugvs:
+        mine = [answer for answer in answers if answer.ugv == ugv]
+        _decisions_come_when_due(run, mine)
+        _every_proposal_is_decided_on(run, ugv, mine)
+        _nothing_is_executed_without_acceptance(run, ugv, mine)
+        if answers:
+            _own_task_while_nothing_is_accepted(run, ugv)
+    return Found("holds", 0.0, 1.0, {"decisions": len(answers)}) if answers else Found("holds")
+
+
+def _decisions_come_when_due(run: Run, decisions: Sequence[Decision | Answer]) -> None:
+    """The first decision on a proposal within a period of it, the others a period apart."""
+    period = run.scenario["gatekeeper"]["period_s"]
+    last: Decision | Answer | None = None
+    for decision in decisions:
+        row, at = decision.row, _at(decision)
+        if last is None or last.row["issued_s"] != row["issued_s"]:
+            at_most("the first decision on a proposal comes within a period", row["t_s"], row["issued_s"] + period,
+                    within=SMALL, **at)  # fmt: skip
+            at_most("a decision comes after its proposal", row["issued_s"], row["t_s"], within=SMALL, **at)
+        else:
+            close("decisions follow each other by a period", row["t_s"], last.t_s + period, within=SMALL, **at)
+        last = decision
+
+
+def _at(decision: Decision | Answer, what: str = "") -> Json:
     """Arguments of a rule: of which UGV's decision, when."""
     return {"about": f"decision of {decision.ugv}{what and ', '}{what}", "t_s": decision.t_s}
 
 
-def _on_a_proposal(run: Run, decision: Decision) -> None:
+def _on_a_proposal(run: Run, decision: Decision | Answer) -> None:
     """It is on a proposal that was sent, by the policy that it names, and by the scenario's route."""
     sent = [[event["robot"], event["t_s"], event["policy"]] for event in run.events if event["kind"] == "proposal"]
     named = [decision.ugv, decision.row["issued_s"], decision.row["policy"]]
     holds("the decision is on a proposal", named in sent, named, str(sent), **_at(decision))
-    same("route of the decision", decision.row["route"], run.scenario["gatekeeper"]["route"], **_at(decision))
+    route = run.scenario["gatekeeper"]["route"] if run.method != "d" else ""
+    same("route of the decision", decision.row["route"], route, **_at(decision))
 
 
 def _stage_ends_s(run: Run) -> Array:
@@ -187,19 +239,13 @@ def _clear_of_safe_distances(run: Run, decision: Decision, positions_m: Array) -
 def _answers_follow_the_rules(run: Run, decisions: list[Decision]) -> None:
     """While a proposal stands a decision follows every period, and each answer has its reason."""
     gate = run.scenario["gatekeeper"]
-    period = gate["period_s"]
+    _decisions_come_when_due(run, decisions)
     last: Decision | None = None
     since = 0.0
     for decision in decisions:
         row, at = decision.row, _at(decision)
         if last is not None and last.row["issued_s"] != row["issued_s"]:
             last = None
-        if last is None:
-            at_most("the first decision on a proposal comes within a period", row["t_s"], row["issued_s"] + period,
-                    within=SMALL, **at)  # fmt: skip
-            at_most("a decision comes after its proposal", row["issued_s"], row["t_s"], within=SMALL, **at)
-        else:
-            close("decisions follow each other by a period", row["t_s"], last.t_s + period, within=SMALL, **at)
         standing = None if last is None else last.row["decision"]
         answer = _answer(decision, standing, decision.t_s - since, gate)
         same("answer and its reason", [row["decision"], row["reason"]], list(answer), **at)
@@ -237,7 +283,7 @@ def _answer(decision: Decision, standing: str | None, stood_s: float, gate: Json
     return ("refuse" if standing == "accept" else "accept"), "reversed"
 
 
-def _every_proposal_is_decided_on(run: Run, ugv: str, decisions: list[Decision]) -> None:
+def _every_proposal_is_decided_on(run: Run, ugv: str, decisions: Sequence[Decision | Answer]) -> None:
     """A proposal that stands for a period, the UGV being intervened on all the time, is decided on."""
     allowed_s = run.scenario["gatekeeper"]["period_s"] + run.scenario["intervention"]["period_s"] + SMALL
     answered = {decision.row["issued_s"] for decision in decisions}
@@ -249,7 +295,7 @@ def _every_proposal_is_decided_on(run: Run, ugv: str, decisions: list[Decision])
             holds("a proposal is decided on", issued in answered, "no decision", "a decision", about=ugv, t_s=issued)
 
 
-def _nothing_is_executed_without_acceptance(run: Run, ugv: str, decisions: list[Decision]) -> None:
+def _nothing_is_executed_without_acceptance(run: Run, ugv: str, decisions: Sequence[Decision | Answer]) -> None:
     """What a row executes was set at the last control sample before it, by an acceptance not older than a period."""
     executed = run.executed(ugv)
     executed[0] = False  # nothing is executed before the first row

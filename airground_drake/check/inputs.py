@@ -18,6 +18,10 @@ def inputs_of(claim: str, scenario: Json) -> Json:
         case "ZENO-PROOF":
             bound = float(scenario["decision"]["min_inter_event_s"])
             return {**_trigger(scenario), "min_inter_event_s": bound, "duration_s": float(scenario["duration_s"])}
+        case "LIVE-WAIT":
+            gate = scenario["gatekeeper"]
+            names = ("tries", "rest_s", "longest_s", "lag_m", "behind_s", "period_s")
+            return {name: gate[name] for name in names}
         case "THR-ISO":
             return _trigger(scenario)
         case "ZENO-REFINE":

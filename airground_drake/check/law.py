@@ -68,6 +68,11 @@ def _spare(v_m_s: Array, given: Inequalities) -> Array:
     return np.asarray((given.normal * v_m_s[:, None]).sum(axis=2) - given.bound)
 
 
+def least_spare(v_m_s: Array, given: Inequalities) -> Array:
+    """What velocities (B, 3) have to spare of the inequality that leaves the least, (B,); infinite without any."""
+    return np.asarray(_spare(v_m_s, given).min(axis=1, initial=np.inf))
+
+
 def _recursion(wanted_m_s: Array, given: Inequalities, composition: str) -> Array:
     """(5): from the lowest priority up, each task corrects what those below it want; all samples side by side.
 

@@ -46,9 +46,9 @@ def gate_sur(run: Run, _: Json) -> Found:
     for decision in rounded:
         _rounded_by_the_rule(decision)
     if not rounded:
-        return Found("not_run" if decisions else "holds")
+        return Found("not_run") if decisions else Found("holds").counted(0)
     margin = max(0.0, min(decision.dt_s / 2.0 - rounding_error_s(decision) for decision in rounded))
-    return Found.with_margin("holds", margin, decisions=len(decisions))
+    return Found.with_margin("holds", margin, decisions=len(decisions)).counted(len(rounded))
 
 
 def rounding_error_s(decision: Decision) -> float:
@@ -93,28 +93,29 @@ def gate_opt(run: Run, _: Json) -> Found:
     for decision in planned:
         _no_dearer_than_constant_plans(decision)
     if route not in (*HALF_PLANE_ROUTES, *BLOCK_ROUTES):
-        return Found("inconclusive" if decisions else "holds")
+        return Found("inconclusive" if decisions else "holds").counted(len(planned))
     if not decisions:
-        return Found("holds")
+        return Found("holds").counted(0)
     halfplanes = route in HALF_PLANE_ROUTES
     if not planned or any(halfplanes and decision.normals is None for decision in planned):
-        return Found("inconclusive")
+        return Found("inconclusive").counted(len(planned))
     gaps = []
     for decision in planned:
         normals = decision.normals if halfplanes else None
-        found = _cheapest_of_blocks(decision, normals) if route in BLOCK_ROUTES else enclose(decision)
-        _bound_and_gap_are_not_overstated(decision, found, normals)
+        optimum = _cheapest_of_blocks(decision, normals) if route in BLOCK_ROUTES else enclose(decision)
+        _bound_and_gap_are_not_overstated(decision, optimum, normals)
         own = float(decision.cost(decision.positions_m))
-        gaps.append([(own - found.upper) / decision.scale, (own - found.lower) / decision.scale])
+        gaps.append([(own - optimum.upper) / decision.scale, (own - optimum.lower) / decision.scale])
     least, most = np.max(gaps, axis=0)
     if most <= LARGEST_GAP:
-        return Found("holds", LARGEST_GAP - float(most), LARGEST_GAP - float(least), {"bounded": len(planned)})
+        found = Found("holds", LARGEST_GAP - float(most), LARGEST_GAP - float(least), {"bounded": len(planned)})
+        return found.counted(len(planned))
     if least <= LARGEST_GAP:
         raise NotEstablished("the largest gap", f"it is between {least:.9g} and {most:.9g}, allowed {LARGEST_GAP}")
     for decision, (_lowest, highest) in zip(planned, gaps, strict=True):
         if highest > LARGEST_GAP:
             _no_plan_of_blocks_is_much_cheaper(decision)
-    return Found("inconclusive")
+    return Found("inconclusive").counted(len(planned))
 
 
 def _no_dearer_than_constant_plans(decision: Decision) -> None:

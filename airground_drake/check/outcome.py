@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from .files import Json
+from .proposals import proposals_of
 from .rules import SMALL, Array, Found, holds, same
 from .run import Run
 
@@ -21,7 +22,27 @@ def live_goal(run: Run, _: Json) -> Found:
     ends = [*_ends(run)]
     margin = min(margin for _, _, margin in ends)
     conditions = [{"robot": robot, "condition": what, "margin_m": margin} for robot, what, margin in ends]
-    return Found.with_margin("holds" if margin >= 0.0 else "refuted", margin, conditions=conditions)
+    found = Found.with_margin("holds" if margin >= 0.0 else "refuted", margin, conditions=conditions)
+    farther = [float(np.linalg.norm(run.position_m[robot][0] - place)) - near for robot, place, near in _goals(run)]
+    return found.counted(sum(each > SMALL for each in farther), sum(each > -SMALL for each in farther))
+
+
+def _goals(run: Run) -> Iterator[tuple[str, Array, float]]:
+    """Robot, where it must end, and the tolerance, m."""
+    scenario = run.scenario
+    stalls, arrival = scenario["runs"][run.name]["stalls_m"], scenario["arrival_tolerance_m"]
+    for ugv in run.ugvs:
+        if ugv in stalls:
+            yield ugv, np.array(stalls[ugv]), scenario["stall_tolerance_m"]
+        else:
+            yield ugv, np.array(scenario["ugvs"][ugv]["target_m"]), arrival
+    yield run.uav, _above_the_centroid_m(run) if stalls else np.array(scenario["uav"]["target_m"]), arrival
+
+
+def _above_the_centroid_m(run: Run) -> Array:
+    """The place at the flight altitude above the centroid of the UGVs at the end, (3,)."""
+    centroid = np.mean([run.position_m[ugv][-1] for ugv in run.ugvs], axis=0)
+    return np.asarray(centroid + np.array([0.0, 0.0, run.scenario["uav"]["altitude_m"]]))
 
 
 def _ends(run: Run) -> Iterator[tuple[str, str, float]]:
@@ -39,9 +60,8 @@ def _ends(run: Run) -> Iterator[tuple[str, str, float]]:
         else:
             yield ugv, "at its target", arrival - short
     if stalls:
-        centroid = np.mean([end[ugv] for ugv in run.ugvs], axis=0)
-        above = centroid + np.array([0.0, 0.0, scenario["uav"]["altitude_m"]])
-        yield run.uav, "over the centroid of the UGVs", arrival - float(np.linalg.norm(end[run.uav] - above))
+        off = float(np.linalg.norm(end[run.uav] - _above_the_centroid_m(run)))
+        yield run.uav, "over the centroid of the UGVs", arrival - off
     else:
         yield run.uav, "at its target", arrival - float(np.linalg.norm(end[run.uav] - scenario["uav"]["target_m"]))
 
@@ -54,7 +74,9 @@ def _moved_at_the_end_m(run: Run, robot: str) -> float:
 
 
 def comm(run: Run, _: Json) -> Found:
-    """COMM: proposals and decisions only while a UGV is intervened on, and no more than an always-on scheme has.
+    """COMM: proposals and decisions only while their UGV or their cause is intervened on, and not too many of them.
+
+    Too many are more than an always-on scheme has.
 
     The UAV withdraws its proposal at its next planning instant after a release, and the gatekeeper notices at its next
     sample: hence the allowance of one period each.
@@ -65,8 +87,10 @@ def comm(run: Run, _: Json) -> Found:
     for ugv in run.ugvs:
         decided = decided_s(run, ugv)
         _decisions_are_on_proposals(run, ugv)
-        _no_strays(run, ugv, "proposal", run.times_s(ugv, "proposal"), planning_s + gating_s)
-        _no_strays(run, ugv, "decision", decided, planning_s + gating_s)
+        sent = run.times_s(ugv, "proposal")
+        _no_strays(run, ugv, "proposal", sent, sent, planning_s + gating_s)
+        issued = run.decisions.loc[run.decisions["robot"] == ugv, "issued_s"].to_numpy(dtype=np.float64)
+        _no_strays(run, ugv, "decision", decided, issued, planning_s + gating_s)
         silent = not len(run.times_s(ugv, "proposal")) or (gated and not len(decided))
         if silent and run.talk_is_due(ugv):
             return Found("not_run")
@@ -76,7 +100,8 @@ def comm(run: Run, _: Json) -> Found:
     always_on = {"proposal": n * int(duration / planning_s), "decision": n * int(duration / gating_s) if gated else 0}
     saved = [1.0 - spent[kind] / most for kind, most in always_on.items() if most]
     status = "holds" if all(spent[kind] <= most for kind, most in always_on.items()) else "refuted"
-    return Found.with_margin(status, min(saved), spent=spent, always_on=always_on) if saved else Found(status)
+    found = Found.with_margin(status, min(saved), spent=spent, always_on=always_on) if saved else Found(status)
+    return found.counted(proposals)
 
 
 def decided_s(run: Run, ugv: str) -> Array:
@@ -96,21 +121,30 @@ def _decisions_are_on_proposals(run: Run, ugv: str) -> None:
     holds("decisions are on proposals", known, issued, "the time of a proposal", about=ugv, t_s=when)
 
 
-def _no_strays(run: Run, ugv: str, kind: str, times_s: Array, allowance_s: float) -> None:
-    stays = run.interventions_s(ugv)
-    begun = times_s[:, None] >= stays[:, 0] - SMALL
-    not_over = times_s[:, None] <= stays[:, 1] + allowance_s + SMALL
-    inside = (begun & not_over).any(axis=1)
-    holds(f"a {kind} only during interventions", inside, times_s, "during one", about=ugv, t_s=times_s)
+def _no_strays(run: Run, ugv: str, kind: str, times_s: Array, issued_s: Array, allowance_s: float) -> None:
+    """Messages on proposals issued at some times are within a stay in mode 'intervening' of the UGV or of a cause."""
+    causes = {(p.ugv, p.issued_s): p.cause for p in proposals_of(run)}
+    stays = {name: run.interventions_s(name) for name in run.ugvs}
+    inside = []
+    for when, issued in zip(times_s.tolist(), issued_s.tolist(), strict=True):
+        concerned = {ugv, causes.get((ugv, issued), ugv)}
+        inside.append(
+            any(
+                begin - SMALL <= when <= end + allowance_s + SMALL
+                for name in concerned
+                for begin, end in stays[name].tolist()
+            )
+        )
+    holds(f"a {kind} only during interventions", np.array(inside, bool), times_s, "during one", about=ugv, t_s=times_s)
 
 
 def gate_time(run: Run, _: Json) -> Found:
     """GATE-TIME: the 99th percentile of the CPU times, rounded up to an order statistic, is below the period."""
     times, period = np.array(run.decision_times_s, dtype=np.float64), float(run.scenario["gatekeeper"]["period_s"])
     if not len(run.decisions):
-        return Found("not_run" if any(map(run.talk_is_due, run.ugvs)) else "holds")
+        return Found("not_run") if any(map(run.talk_is_due, run.ugvs)) else Found("holds").counted(0)
     same("one time for each decision", len(times), len(run.decisions))
     holds("times are not negative", times >= 0.0, times, "0 or more")
     p50, p99 = (float(np.quantile(times, level, method="higher")) for level in (0.5, 0.99))
     facts = {"p50_s": p50, "p99_s": p99, "max_s": float(times.max()), "period_s": period, "count": len(times)}
-    return Found.with_margin("holds" if p99 < period else "refuted", period - p99, **facts)
+    return Found.with_margin("holds" if p99 < period else "refuted", period - p99, **facts).counted(len(times))

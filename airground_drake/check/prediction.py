@@ -8,6 +8,7 @@ import numpy as np
 
 from .decisions import Decision, decisions_of, silent_ugvs
 from .files import Json
+from .foresight import outcomes
 from .law import PLANE, avoiding, inequalities, limited
 from .proposals import proposals_of
 from .rules import SMALL, Array, Found, close, holds
@@ -53,9 +54,11 @@ def gate_model(run: Run, _: Json) -> Found:
     """GATE-MODEL: both choices of every decision rolled out again; what came of them is evidence, and not checked."""
     if silent_ugvs(run):
         return Found("not_run")
+    if run.method == "d":
+        return outcomes(run) if len(run.decisions) else Found("holds")
     decisions = decisions_of(run)
     if not decisions:
-        return Found("holds")
+        return Found("holds").counted(0)
     loops = Loops(*(np.stack(part) for part in zip(*(_loop(run, each) for each in decisions), strict=True)))
     off = 0.0
     for accepted, choice in enumerate(CHOICES):
@@ -67,7 +70,8 @@ def gate_model(run: Run, _: Json) -> Found:
             off = max(off, float(np.abs(recorded - modes[k]).max()))
             if accepted:
                 close("bend", decision.row["bend"], bend[k], within=BEND, **at)
-    return Found.with_margin("holds", VELOCITY_M_S - off, within=1e-7, decisions=len(decisions))
+    found = Found.with_margin("holds", VELOCITY_M_S - off, within=1e-7, decisions=len(decisions))
+    return found.counted(len(decisions))
 
 
 def _loop(run: Run, decision: Decision) -> tuple[Array, ...]:

@@ -24,6 +24,8 @@ class Proposal:
         times_s: vertices of the motion, (M,).
         positions_m: the same, (M, 3).
         jacobian: J_int, (m, 3).
+        mapped_m: obstacles that the UAV says it knows, (k, 3).
+        cause: UGV whose trigger it is sent for.
     """
 
     ugv: str
@@ -32,6 +34,8 @@ class Proposal:
     times_s: Array
     positions_m: Array
     jacobian: Array
+    mapped_m: Array
+    cause: str
 
     @cached_property
     def projector(self) -> Array:
@@ -65,20 +69,36 @@ def proposals_of(run: Run) -> list[Proposal]:
 
 
 def _proposal(run: Run, row: dict[Any, Any]) -> Proposal:
-    times, places, jacobian = (
-        np.asarray(row[name], dtype=np.float64).ravel() for name in ("times_s", "positions_m", "selection")
+    times, places, jacobian, mapped = (
+        np.asarray(row[name], dtype=np.float64).ravel() for name in ("times_s", "positions_m", "selection", "mapped_m")
     )
     at: Json = {"about": f"proposal to {row['robot']}", "t_s": float(row["issued_s"])}
-    numbers = np.concatenate([times, places, jacobian, [row["issued_s"]]])
+    numbers = np.concatenate([times, places, jacobian, mapped, [row["issued_s"]]])
     holds("numbers of a proposal are finite", np.isfinite(numbers), numbers, "a number", **at)
     holds("a proposal is to a UGV", row["robot"] in run.ugvs, row["robot"], "a UGV of the run", **at)
+    holds("a proposal is for a UGV's trigger", row["cause"] in run.ugvs, row["cause"], "a UGV of the run", **at)
     shaped = len(times) > 0 and len(places) == 3 * len(times) and len(jacobian) > 0 and len(jacobian) % 3 == 0
-    sizes = [len(times), len(places), len(jacobian)]
-    holds("a proposal is a motion", shaped, sizes, "M times, 3 M coordinates, 3 m of J", **at)
+    shaped = shaped and len(mapped) % 3 == 0
+    sizes = [len(times), len(places), len(jacobian), len(mapped)]
+    holds("a proposal is a motion", shaped, sizes, "M times, 3 M coordinates, 3 m of J, 3 k of the map", **at)
     holds("times of a motion increase", (np.diff(times) > 0.0).all(), times, "later than the one before", **at)
+    _is_for_whom_it_says(run, row, at)
     return Proposal(
-        str(row["robot"]), str(row["policy"]), at["t_s"], times, places.reshape(-1, 3), jacobian.reshape(-1, 3)
-    )
+        str(row["robot"]), str(row["policy"]), at["t_s"], times, places.reshape(-1, 3), jacobian.reshape(-1, 3),
+        mapped.reshape(-1, 3), str(row["cause"]),
+    )  # fmt: skip
+
+
+def _is_for_whom_it_says(run: Run, row: dict[Any, Any], at: Json) -> None:
+    """A proposal is for the trigger of its UGV while that is intervened on, else for that of another one that is.
+
+    Modes of a row hold since the row before; the next row's counts as well, for what begins at that instant.
+    """
+    ugv, cause = str(row["robot"]), str(row["cause"])
+    sent = int(np.searchsorted(run.t_s, at["t_s"] - SMALL))
+    on = {name: run.column(f"{name}.mode")[sent : sent + 2] == INTERVENING for name in (ugv, cause)}
+    right = on[cause].any() and (cause == ugv or not on[ugv].all())
+    holds("a proposal is for a trigger", right, cause, "a UGV that is intervened on, its own first", **at)
 
 
 @lru_cache(maxsize=32)
@@ -115,10 +135,12 @@ def _taken_back_s(
 ) -> float:
     """A little later than the planning instant at which a proposal is taken back, infinite if it never is.
 
-    That is the first at which another is sent, the UGV is not intervened on, the motion is over, or the last answer was
-    a refusal.
+    That is the first at which another is sent, neither the UGV nor the one that it is to make way for is intervened
+    on, the motion is over, or the last answer was a refusal.
     """
-    plan_s, mode = run.scenario["intervention"]["period_s"], run.column(f"{proposal.ugv}.mode")
+    plan_s = run.scenario["intervention"]["period_s"]
+    modes = np.stack([run.column(f"{ugv}.mode") for ugv in {proposal.ugv, proposal.cause}])
+    wanted = (modes == INTERVENING).any(axis=0)
     k = round(proposal.issued_s / plan_s)
     while (k := k + 1) * plan_s <= run.t_s[-1] + SMALL:
         now = k * plan_s
@@ -126,6 +148,6 @@ def _taken_back_s(
         before = [yes for when, issued, yes in answers if issued == proposal.issued_s and when < now - SMALL]
         replaced = any(proposal.issued_s < other.issued_s <= now + SMALL for other in mine)
         over = run.t_s[row] >= proposal.times_s[-1]
-        if replaced or over or mode[row] != INTERVENING or (before and not before[-1]):
+        if replaced or over or not wanted[row] or (before and not before[-1]):
             return now + SMALL
     return np.inf

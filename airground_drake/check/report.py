@@ -21,16 +21,23 @@ from .metrics import check_metrics
 from .optimality import gate_opt, gate_sur
 from .outcome import comm, gate_time, live_goal
 from .prediction import gate_model
+from .progress import live_prog
 from .rules import Disagreement, Found, NotEstablished, agrees, holds, same
 from .run import Run, read_run
 from .safety import safe_hyp, safe_trace
 from .statistics import ddm, refine
 from .triggers import thr_trig, zeno_trace
 
-SCHEMA = "airground_drake.report/1"
+SCHEMA = "airground_drake.report/2"
 AGREES, DISAGREES, OPEN = "agrees", "DISAGREES", "cannot be re-established"
 UNDECIDED = ("inconclusive", "error", "not_run")
 """Statuses that say nothing about a claim."""
+PASSING = ("proved", "holds", "supported")
+"""Statuses in which a claim was established."""
+EXERCISED = "exercised"
+"""What may be expected besides a status: that the claim was established, on something that put it to the test."""
+NOT_EXERCISED = "not_exercised"
+"""How a claim counts that was established because nothing put it to the test."""
 EXIT_CODES = {"as_expected": 0, "not_as_expected": 1, "inconclusive": 3}
 
 OfRun = Callable[[Run, Json], Found]
@@ -52,12 +59,18 @@ WITH_GATEKEEPER: Mapping[str, OfRun] = {
     "GATE-MODEL": gate_model,
     "GATE-TIME": gate_time,
 }
+WITH_OUTCOMES: Mapping[str, OfRun] = {
+    "GATE-FEAS": gate_feas,
+    "GATE-MODEL": gate_model,
+    "GATE-TIME": gate_time,
+    "LIVE-PROG": live_prog,
+}
 ROUNDING_ROUTES = ("relaxed", "nonlinear")
 """Routes that GATE-SUR is about."""
-REFUTED_BY_RULES = ("THR-TRIG", "COMM", "GATE-OPT", "GATE-SUR", "GATE-FEAS", "GATE-MODEL")
+REFUTED_BY_RULES = ("THR-TRIG", "COMM", "GATE-OPT", "GATE-SUR", "GATE-FEAS", "GATE-MODEL", "LIVE-PROG")
 """Claims that any broken rule of theirs refutes; the others are refuted by their margin."""
 OF_MODEL: Mapping[str, OfModel] = {
-    **dict.fromkeys(("SAFE-LEMMA", "SAFE-INV", "SAFE-GATE", "SAFE-DIST", "ZENO-PROOF", "THR-ISO"), prove),
+    **dict.fromkeys(("SAFE-LEMMA", "SAFE-INV", "SAFE-GATE", "SAFE-DIST", "ZENO-PROOF", "LIVE-WAIT", "THR-ISO"), prove),
     "THR-ROOT": root,
     "THR-OPT": root,
     "THR-DDM": ddm,
@@ -192,7 +205,9 @@ def claims_of(method: str, route: str) -> dict[str, OfRun]:
     found = dict(EVERY_RUN)
     if method != "a":
         found |= WITH_MESSAGES
-    if method in ("c", "d"):
+    if method == "d":
+        found |= WITH_OUTCOMES
+    if method == "c":
         found |= WITH_GATEKEEPER
         if route not in ROUNDING_ROUTES:
             del found["GATE-SUR"]
@@ -209,9 +224,17 @@ def expectations(scenario: Json) -> dict[tuple[str, str], str]:
     return wanted
 
 
-def _alternatives(expected: str | None) -> list[str]:
-    """The statuses that an expectation admits: "holds", or "holds or refuted"."""
-    return str(expected).split(" or ")
+def _meets(expected: str | None, claim: Json) -> bool:
+    """Whether a verdict is one of those that an expectation admits: "holds", "holds or refuted", "exercised"."""
+    admitted = str(expected).split(" or ")
+    status, count = claim["status"], claim["exercised"]
+    return status in admitted or (EXERCISED in admitted and status in PASSING and count is not None and count > 0)
+
+
+def _outcome(claim: Json) -> str:
+    """How a verdict counts: by its status, unless nothing put the claim to the test."""
+    idle = claim["status"] in PASSING and claim["exercised"] == 0
+    return NOT_EXERCISED if idle else str(claim["status"])
 
 
 def _judge(claim: Json, scenario: Json, decide: Callable[[Json], Found]) -> str:
@@ -219,7 +242,7 @@ def _judge(claim: Json, scenario: Json, decide: Callable[[Json], Found]) -> str:
     wanted, status = expectations(scenario), claim["status"]
     expected = wanted.get((claim["run"], claim["id"]))
     same("expected verdict", claim["expected"], expected)
-    same("as expected", claim["as_expected"], status in _alternatives(expected))
+    same("as expected", claim["as_expected"], _meets(expected, claim))
     same("a counterexample comes with a refutation", bool(claim["counterexample"]), status == "refuted")
     try:
         found = decide(claim)
@@ -233,6 +256,8 @@ def _judge(claim: Json, scenario: Json, decide: Callable[[Json], Found]) -> str:
     if status in UNDECIDED and found.status != status:
         raise NotEstablished("verdict", f"recorded {status!r}, which decides nothing; here it is {found.status!r}")
     same("verdict", status, found.status)
+    if not remark:
+        _counted_as_here(claim, found)
     margin = claim["margin"]
     if found.least is None or found.most is None or margin is None:
         same("margin", margin, found.least)
@@ -241,7 +266,20 @@ def _judge(claim: Json, scenario: Json, decide: Callable[[Json], Found]) -> str:
         possible = found.least if found.least == found.most else f"{found.least} to {found.most}"
         holds("margin", found.least - slop <= margin <= found.most + slop, margin, possible)
     agrees("evidence", claim["evidence"], found.facts, within=1e-8)
+    if _outcome(claim) == NOT_EXERCISED:
+        return f"{status}, nothing to check"
     return f"{status}{remark}" if margin is None else f"{status}{remark}, margin {margin:.6g} {claim['unit']}".rstrip()
+
+
+def _counted_as_here(claim: Json, found: Found) -> None:
+    """How often the claim was put to the test is what is counted here, where something is."""
+    recorded, rule = claim["exercised"], "how often the claim was exercised"
+    if found.exercised is None:
+        same(rule, recorded, None)
+        return
+    least, most = found.exercised
+    possible = type(recorded) is int and least <= recorded <= most
+    holds(rule, possible, recorded, f"{least}" if least == most else f"{least} to {most}")
 
 
 @lru_cache(maxsize=16)
@@ -286,16 +324,15 @@ def _check_overall(folder: Path, report: Json) -> str:
     overall = _overall(report)
     agrees("verdict over all", report["overall"], overall, within=0.0)
     same("counts of verdicts", report["overall"]["counts"], overall["counts"])
+    same("claims with nothing to check", report["overall"]["not_exercised"], overall["not_exercised"])
     return f"{overall['status']}, exit code {overall['exit_code']}"
 
 
 def _overall(report: Json) -> Json:
     """The verdict over all claims, and what stands in its way; findings about the paper count where all were made."""
     claims, audited = report["claims"], bool(report["mutants"])
-    keys = ("id", "run", "status", "expected")
-    unexpected = [
-        {key: claim[key] for key in keys} for claim in claims if claim["status"] not in _alternatives(claim["expected"])
-    ]
+    keys = ("id", "run", "status", "expected", "exercised")
+    unexpected = [{key: claim[key] for key in keys} for claim in claims if not _meets(claim["expected"], claim)]
     undecided = [entry for entry in unexpected if entry["status"] in UNDECIDED]
     differs = [entry for entry in unexpected if entry["status"] not in UNDECIDED]
     undemonstrated = [item["id"] for item in report["audit"] if not item["demonstrated"]] if audited else []
@@ -310,7 +347,8 @@ def _overall(report: Json) -> Json:
         "exit_code": EXIT_CODES[status],
         "checks": len(claims),
         "as_expected": len(claims) - len(unexpected),
-        "counts": dict(Counter(claim["status"] for claim in claims)),
+        "counts": dict(Counter(map(_outcome, claims))),
+        "not_exercised": [{"id": c["id"], "run": c["run"]} for c in claims if _outcome(c) == NOT_EXERCISED],
         "differs": differs,
         "undecided": undecided,
         "missing": [],

@@ -7,7 +7,7 @@ what it should be third. So nothing is rejected without saying why.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -64,6 +64,8 @@ class Found:
         most: largest one; differs from `least` only where rounding or a solver decides.
         facts: what the recorded evidence must contain.
         within: by which a recorded margin may differ.
+        exercised: how often the claim was put to the test, at least and at most: they differ where rounding decides
+            whether something counts; None: not counted here.
     """
 
     status: str
@@ -71,6 +73,11 @@ class Found:
     most: float | None = None
     facts: Mapping[str, Any] = field(default_factory=dict)
     within: float = SMALL
+    exercised: tuple[int, int] | None = None
+
+    def counted(self, least: int, most: int | None = None) -> Found:
+        """The same, with how often the claim was put to the test."""
+        return replace(self, exercised=(int(least), int(least if most is None else most)))
 
     @classmethod
     def with_margin(cls, status: str, margin: float, *, within: float = SMALL, **facts: Any) -> Found:

@@ -32,15 +32,23 @@ def safe_trace(run: Run, claim: Json) -> Found:
     recorded = claim["evidence"]["pairs"]
     same("pairs", sorted([p["first"], p["second"]] for p in recorded), sorted([p.robot, p.other] for p in run.pairs))
     by_names = {(entry["first"], entry["second"]): entry for entry in recorded}
-    margins = {}
+    margins, close_by, doubtful = {}, 0, 0
     for pair in run.pairs:
         least = least_distance_m(run, pair)
+        noted = by_names[pair.robot, pair.other]
         margins[pair.robot, pair.other] = least - pair.safe_m
-        _evidence_on_a_pair(run, pair, least, by_names[pair.robot, pair.other])
+        _evidence_on_a_pair(run, pair, least, noted)
+        spare = least - pair.safe_m - pair.closing_m_s * run.scenario["control"]["period_s"]
+        close_by += spare < -SMALL
+        doubtful += abs(spare) <= SMALL
+        if abs(spare) > SMALL:
+            about = f"{pair.robot}, {pair.other}"
+            same("a period at full speed breaks it", noted["exercised"], bool(spare < 0.0), about=about)
     margin = min(margins.values())
     worst = claim["where"]["first"], claim["where"]["second"]
     close("pair of least margin", margins[worst], margin, within=SMALL, about=", ".join(worst))
-    return Found.with_margin("holds" if margin >= -SMALL else "refuted", margin)
+    found = Found.with_margin("holds" if margin >= -SMALL else "refuted", margin)
+    return found.counted(close_by, close_by + doubtful)
 
 
 def _evidence_on_a_pair(run: Run, pair: Pair, least_m: float, recorded: Json) -> None:
@@ -53,11 +61,35 @@ def _evidence_on_a_pair(run: Run, pair: Pair, least_m: float, recorded: Json) ->
 
 
 class Hypothesis(NamedTuple):
-    """A hypothesis of SAFE-INV at some instants: it holds where its margin is not negative."""
+    """A hypothesis of SAFE-INV at some instants: it holds where its margin is not negative.
+
+    Of an avoidance inequality `kind` says who moves and what it avoids, such as `ugv beside obstacle`.
+    """
 
     name: str
     t_s: Array
     margin: Array
+    kind: str = ""
+
+
+KINDS = ("ugv beside obstacle", "uav beside obstacle", "ugv beside ugv", "ugv beside uav", "uav beside ugv")
+DOUBT_M_S = 1e-11
+"""An inequality binds where a command has 1e-9 m/s to spare at most; of one this close to that, rounding decides."""
+
+
+def _binding(found: list[Hypothesis], recorded: Json) -> tuple[int, int]:
+    """How many avoidance inequalities bound a command, at least and at most; by kinds as recorded."""
+    least, most = dict.fromkeys(KINDS, 0), dict.fromkeys(KINDS, 0)
+    for each in found:
+        if each.name == "avoidance":
+            least[each.kind] += int((each.margin <= SMALL - DOUBT_M_S).sum())
+            most[each.kind] += int((each.margin <= SMALL + DOUBT_M_S).sum())
+    same("kinds of inequalities", sorted(recorded), sorted(KINDS))
+    for kind in KINDS:
+        possible = type(recorded[kind]) is int and least[kind] <= recorded[kind] <= most[kind]
+        between = f"{least[kind]}" if least[kind] == most[kind] else f"{least[kind]} to {most[kind]}"
+        holds("inequalities that bind", possible, recorded[kind], between, about=kind)
+    return sum(least.values()), sum(most.values())
 
 
 def safe_hyp(run: Run, claim: Json) -> Found:
@@ -80,7 +112,8 @@ def safe_hyp(run: Run, claim: Json) -> Found:
     margins = [float(each.margin.min()) for each in found if each.name == leading and len(each.margin)]
     status = "refuted" if broken else "holds"
     margin = min(margins, default=None)
-    return Found(status, margin, margin, {"inequalities_in_range": in_range})
+    least, most = _binding(found, claim["evidence"]["inequalities_that_bind"])
+    return Found(status, margin, margin, {"inequalities_in_range": in_range}).counted(least, most)
 
 
 def _constants(run: Run) -> Iterator[Hypothesis]:
@@ -111,11 +144,13 @@ def _velocities(run: Run) -> Iterator[Hypothesis]:
 
 def _inequalities(run: Run) -> Iterator[Hypothesis]:
     """n.v >= share A (d - D) where D <= d, else n.v >= -share (D - d) / h, for what is within sensing range."""
+    sort = {robot: "uav" if robot == run.uav else "ugv" for robot in run.robots}
     for pair in run.views:
         if pair.robot in run.robots:
+            kind = f"{sort[pair.robot]} beside {sort.get(pair.other, 'obstacle')}"
             spare = avoidance_spare_m_s(run, pair, run.command_m_s[pair.robot][run.chosen_row])
             seen = np.isfinite(spare)
-            yield Hypothesis("avoidance", run.sample_s[seen], spare[seen])
+            yield Hypothesis("avoidance", run.sample_s[seen], spare[seen], kind)
 
 
 def avoidance_spare_m_s(run: Run, pair: Pair, v_m_s: Array) -> Array:

@@ -101,7 +101,8 @@ def ddm(claim: Json, files: Files, scenario: Json) -> Found:
         close("(17)", time["formula"], experiment.decision_time_s(), within=SMALL, about=experiment.name)
         close("(18)", error["formula"], experiment.error_rate(), within=SMALL, about=experiment.name)
         margins += [_margin(time, experiment.decision_time_s()), _margin(error, experiment.error_rate())]
-    return Found.with_margin("supported" if min(margins) >= 0.0 else "refuted", min(margins))
+    found = Found.with_margin("supported" if min(margins) >= 0.0 else "refuted", min(margins))
+    return found.counted(sum(experiment.paths for experiment in experiments))
 
 
 def _counts_are_possible(row: Json, experiment: Experiment) -> None:
@@ -202,7 +203,7 @@ def refine(claim: Json, files: Files, scenario: Json) -> Found:
         status = "inconclusive"
     elif slack < -SMALL:
         status = "refuted"
-    return Found.with_margin(status, slack, **facts)
+    return Found.with_margin(status, slack, **facts).counted(PATHS)
 
 
 def _steps_of(scenario: Json) -> tuple[Array, float, float]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import zip_longest
+from itertools import pairwise, zip_longest
 from typing import NamedTuple
 
 import numpy as np
@@ -148,6 +148,7 @@ def thr_trig(run: Run, _: Json) -> Found:
     """THR-TRIG: the recorded triggers and releases are those of the automaton run on x."""
     _only_ugvs_are_triggered_on(run)
     lags_s: list[float] = []
+    least, most = 0, 0
     for ugv in run.ugvs:
         x = decision_variable(run, ugv)
         steps = automaton(x, run.levels)
@@ -155,9 +156,21 @@ def thr_trig(run: Run, _: Json) -> Found:
         recorded = run.column(f"{ugv}.decision_variable_m")
         close("decision variable", recorded, at_rows, within=VARIABLE_M, about=ugv, t_s=run.t_s)
         lags_s += _events_are_the_automatons(run, ugv, steps)
+        least += _transitions(steps, before_s=float(run.t_s[-1]) - EVENT_S, at_once_s=EVENT_S)
+        most += _transitions(steps, before_s=np.inf, at_once_s=0.0)
         _modes_are_the_automatons(run, ugv, steps)
     facts = run.levels._asdict()
-    return Found.with_margin("holds", EVENT_S - max(lags_s), **facts) if lags_s else Found("holds", facts=facts)
+    found = Found.with_margin("holds", EVENT_S - max(lags_s), **facts) if lags_s else Found("holds", facts=facts)
+    return found.counted(least, most)
+
+
+def _transitions(steps: list[Step], before_s: float, at_once_s: float) -> int:
+    """Transitions of the automaton before a time; the end of a rest with a trigger within `at_once_s` is one."""
+    ends_of_a_rest_with_a_trigger = sum(
+        one.event == "" and other.event == "trigger" and other.t_s - one.t_s <= at_once_s
+        for one, other in pairwise(steps)
+    )
+    return sum(step.t_s < before_s for step in steps) - ends_of_a_rest_with_a_trigger
 
 
 def _only_ugvs_are_triggered_on(run: Run) -> None:
@@ -206,9 +219,9 @@ def zeno_trace(run: Run, _: Json) -> Found:
         listed[ugv] = {"count": len(triggers), "t_s": triggers.tolist()}
         gaps += np.diff(triggers).tolist()
     if not gaps:
-        return Found("holds", facts={"triggers": listed})
+        return Found("holds", facts={"triggers": listed}).counted(0)
     status = "holds" if min(gaps) >= bound - SMALL else "refuted"
-    return Found.with_margin(status, min(gaps) - bound, triggers=listed)
+    return Found.with_margin(status, min(gaps) - bound, triggers=listed).counted(len(gaps))
 
 
 def _columns_follow_the_events(run: Run, ugv: str) -> None:

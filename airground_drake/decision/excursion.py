@@ -13,9 +13,13 @@ straight between them.
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 from numba import njit
 
 from airground_drake.arrays import Array
+
+SUPERVISING, INTERVENING = 0, 1
+"""Modes of `decision.trigger.Mode`, as numba takes them; the third is REFRACTORY."""
 
 
 @njit(cache=True)
@@ -45,3 +49,51 @@ def extremes(before: Array, after: Array) -> tuple[Array, Array]:
         if 0.0 < travelled < length:
             least[j] = min(least[j], aside * level - slope * along + n)
     return least, most
+
+
+@njit(cache=True)
+def task_errors(signals: Array) -> Array:
+    """Task error, m, and noise, m, of every UGV, (n, 4).
+
+    Args:
+        signals: time, s, positions and references (3n each), m, and noise (n), m: (1 + 7n,).
+    """
+    n = len(signals) // 7
+    parts = np.empty((n, 4))
+    for j in range(n):
+        for a in range(3):
+            parts[j, a] = signals[1 + 3 * (n + j) + a] - signals[1 + 3 * j + a]
+        parts[j, 3] = signals[1 + 6 * n + j]
+    return parts
+
+
+@njit(cache=True)
+def excursions(begun: Array, now: Array) -> tuple[Array, Array]:
+    """Least and largest x between two instants whose signals are these, see `task_errors`; (n,) and (n,), m."""
+    return extremes(task_errors(begun), task_errors(now))
+
+
+@njit(cache=True)
+def transitions_due(
+    status: Array, t: float, least: Array, most: Array, levels: tuple[float, float, float]
+) -> npt.NDArray[np.bool_]:
+    """For which UGVs a transition of the trigger is due, (n,).
+
+    Args:
+        status: mode, number of triggers, times of the last trigger and of the last release, s, per UGV: (4n,).
+        t: time, s.
+        least: smallest x in this step, (n,), m.
+        most: largest, (n,), m.
+        levels: zeta, m, release, m, and dwell, s, of the trigger.
+    """
+    zeta, release, dwell = levels
+    due = np.zeros(len(least), dtype=np.bool_)
+    for j in range(len(least)):
+        mode, triggers, triggered_at = status[4 * j], status[4 * j + 1], status[4 * j + 2]
+        if mode == SUPERVISING:
+            due[j] = most[j] >= zeta
+        elif mode == INTERVENING:
+            due[j] = least[j] <= release and least[j] < zeta
+        else:
+            due[j] = t >= (triggered_at + dwell if triggers else 0.0)
+    return due

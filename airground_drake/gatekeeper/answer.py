@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 
 from airground_drake.gatekeeper.budget import Budget, Clock
+from airground_drake.gatekeeper.outcome import Outcome
 from airground_drake.gatekeeper.problem import Problem
 from airground_drake.gatekeeper.solution import ConstantPlans, Solution
 from airground_drake.intervention.messages import ACCEPT, SILENT
@@ -54,8 +55,61 @@ class Rules:
             yield replace(self.budget, deadline_s=begin + allowance * (i + 1) / count, clock=self.clock)
 
 
-Reason = Literal["cheaper", "not_cheaper", "no_difference", "bent", "kept", "dwell", "reversed", "no_plan"]
-"""Why an answer is what it is: see `settle`."""
+Reason = Literal[
+    "cheaper", "not_cheaper", "no_difference", "bent", "kept", "dwell", "reversed", "no_plan",
+    "stalls", "exhausted", "no_progress", "over",
+]  # fmt: skip
+"""Why an answer is what it is: see `settle` for method (c), `certified` for method (d)."""
+
+WORDS: dict[Reason, str] = {
+    "cheaper": "the proposal leads to a better outcome than the UGV's own task",
+    "not_cheaper": "the UGV's own task leads to as good an outcome or a better one",
+    "no_difference": "the proposal would change nothing",
+    "bent": "avoidance would bend the proposal too much",
+    "kept": "as answered before",
+    "dwell": "as answered before: it is too early for another answer",
+    "reversed": "the other answer has become the cheaper one",
+    "no_plan": "no outcome could be computed",
+    "stalls": "with the proposal the UGV would come to rest short of its goal, no nearer than without",
+    "exhausted": "the UGV has gone along as often as it does without a rest on its own",
+    "no_progress": "the UGV is farther behind the proposed motion than predicted, for too long",
+    "over": "the time for which the proposal was accepted is over",
+}
+"""The same as sentences."""
+
+
+@dataclass(frozen=True)
+class Planned:
+    """What a decision by (26) rests on.
+
+    Attributes:
+        problem: (26) as predicted.
+        solution: the route's.
+        throughout: costs (25) of accepting and of refusing throughout; -1 without a plan.
+    """
+
+    problem: Problem
+    solution: Solution
+    throughout: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Foreseen:
+    """What a decision by outcomes rests on.
+
+    Attributes:
+        refuse: what comes of refusing; None unless it was looked at.
+        accept: what comes of accepting; None unless it was looked at.
+        lag: distance from where the UGV is to be, m; -1 unless it executes the proposal.
+        predicted_lag: the same as predicted at the acceptance, m.
+        tries: acceptances since the last rest, with this decision.
+    """
+
+    refuse: Outcome | None = None
+    accept: Outcome | None = None
+    lag: float = -1.0
+    predicted_lag: float = -1.0
+    tries: int = 0
 
 
 @dataclass(frozen=True)
@@ -66,21 +120,28 @@ class Decision:
         t: when, s.
         robot: for which UGV.
         proposal: on what.
-        problem: (26) as predicted.
-        solution: the route's.
-        throughout: costs (25) of accepting and of refusing throughout; -1 without a plan.
         accepted: the answer.
         reason: why.
+        grounds: what it rests on.
     """
 
     t: float
     robot: int
     proposal: Proposal
-    problem: Problem
-    solution: Solution
-    throughout: tuple[float, float]
     accepted: bool
     reason: Reason
+    grounds: Planned | Foreseen
+
+
+def in_words(decision: Decision) -> str:
+    """Why the answer is what it is, as a sentence for the UAV."""
+    words, grounds = WORDS[decision.reason], decision.grounds
+    if decision.reason == "stalls" and isinstance(grounds, Foreseen) and grounds.accept is not None:
+        x, y, _ = grounds.accept.end
+        words += f": at ({x:.2f}, {y:.2f}) m, {grounds.accept.left:.2f} m short"
+    if decision.reason == "no_progress" and isinstance(grounds, Foreseen):
+        words += f": {grounds.lag:.2f} m behind, predicted {grounds.predicted_lag:.2f} m"
+    return words
 
 
 def costs_throughout(problem: Problem, solution: Solution) -> tuple[float, float]:

@@ -26,8 +26,7 @@ class ClosedLoop(NamedTuple):
         preset: own preset trajectory at the control samples, (S + 1, 3), m.
         wanted: the proposed motion at the control samples, (S + 1, 3), m.
         chosen: J_int^+ J_int, projector onto the directions in which the UAV intervenes, (3, 3).
-        centres: of the points to keep away from, at the beginning, (K, 3), m.
-        velocities: of those points, taken as constant, (K, 3), m/s.
+        points: where the points to keep away from are at the control samples, (S + 1, K, 3), m.
         distances: safe distances to them, (K,), m.
         shares: share of each avoidance inequality, (K,).
         max_speed: own speed limit, m/s.
@@ -45,8 +44,7 @@ class ClosedLoop(NamedTuple):
     preset: Array
     wanted: Array
     chosen: Array
-    centres: Array
-    velocities: Array
+    points: Array
     distances: Array
     shares: Array
     max_speed: float
@@ -95,7 +93,6 @@ class Workspace(NamedTuple):
 
     Attributes:
         mobility: (3,), 1 where the UGV can move, 0 where it cannot; not written to.
-        points: where the points are, (K, 3), m.
         normal: of the avoidance inequalities, (K, 3).
         bound: of the avoidance inequalities, (K,), m/s.
         own: velocity that the UGV's own task wants, (3,), m/s.
@@ -103,7 +100,6 @@ class Workspace(NamedTuple):
     """
 
     mobility: Array
-    points: Array
     normal: Array
     bound: Array
     own: Array
@@ -115,7 +111,7 @@ def workspace(loop: ClosedLoop) -> Workspace:
     """Uninitialised arrays for `velocity_of`."""
     count = len(loop.distances)
     plane = np.array([1.0, 1.0, 0.0])
-    return Workspace(plane, np.empty((count, 3)), np.empty((count, 3)), np.empty(count), np.empty(3), np.empty(3))
+    return Workspace(plane, np.empty((count, 3)), np.empty(count), np.empty(3), np.empty(3))
 
 
 @njit(cache=True)
@@ -129,13 +125,10 @@ def velocity_of(loop: ClosedLoop, mode: int, k: int, position: Array, work: Work
         position: of the UGV at its beginning, (3,), m.
         work: overwritten; `task` is then what was wanted below the avoidance inequalities.
     """
-    mobility, points, normal, bound, own, task = work
+    mobility, normal, bound, own, task = work
     h = loop.period
-    for c in range(len(points)):
-        for a in range(3):
-            points[c, a] = loop.centres[c, a] + k * h * loop.velocities[c, a]
     fill_half_spaces(
-        position, points, loop.distances, loop.shares, loop.avoidance_gain, h, mobility, loop.sensing_range,
+        position, loop.points[k], loop.distances, loop.shares, loop.avoidance_gain, h, mobility, loop.sensing_range,
         normal, bound,
     )  # fmt: skip
     for a in range(3):
@@ -192,9 +185,8 @@ def _constant_plans(loop: ClosedLoop) -> tuple[Array, Array, float]:
 @njit(cache=True)
 def _is_finite(loop: ClosedLoop) -> bool:
     motions = np.isfinite(loop.preset).all() and np.isfinite(loop.wanted).all() and np.isfinite(loop.chosen).all()
-    points = np.isfinite(loop.centres).all() and np.isfinite(loop.velocities).all()
     keep = np.isfinite(loop.distances).all() and np.isfinite(loop.shares).all()
-    return bool(motions and points and keep and np.isfinite(loop.start).all())
+    return bool(motions and np.isfinite(loop.points).all() and keep and np.isfinite(loop.start).all())
 
 
 @njit(cache=True)

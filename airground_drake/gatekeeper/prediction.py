@@ -106,15 +106,33 @@ def closed_loop(scene: Scene, law: UgvLaw, proposal: Proposal, stages: int, subs
         stages: N.
         substeps: control periods per stage.
     """
+    h = law.avoidance.period
+    after = h * np.arange(0.0, stages * substeps + 1.0)
+    points = scene.centres + after[:, None, None] * scene.velocities
+    return loop_among(scene, law, proposal, after, points, substeps)
+
+
+def loop_among(
+    scene: Scene, law: UgvLaw, proposal: Proposal, after: Array, points: Array, substeps: int = 1
+) -> ClosedLoop:
+    """The UGV's closed loop among points that move in any way.
+
+    Args:
+        scene: what the UGV knows; its `centres` and `velocities` are not looked at.
+        law: its control law.
+        proposal: the intervention in question.
+        after: control samples from now on, (S + 1,), s.
+        points: where the points are at these, (S + 1, K, 3), m.
+        substeps: control periods per stage.
+    """
     avoidance = law.avoidance
-    t = scene.t + avoidance.period * np.arange(0.0, stages * substeps + 1.0)
+    t = scene.t + after
     return ClosedLoop(
         start=scene.position,
         preset=scene.preset.sample(t),
         wanted=proposal.motion.sample(t),
         chosen=proposal.chosen,
-        centres=scene.centres,
-        velocities=scene.velocities,
+        points=points,
         distances=scene.distances,
         shares=scene.shares,
         max_speed=float(scene.max_speed),

@@ -1,46 +1,71 @@
-"""What the UGVs do at one sample of the gatekeeper: sense, predict, solve (26), answer."""
+"""What the UGVs do at one sample of the gatekeeper: sense, predict, decide, answer; by (26) under method (c)."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+import abc
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from time import thread_time
 from typing import Any, Self
 
 import numpy as np
+import numpy.typing as npt
 
 from airground_drake.arrays import Array
-from airground_drake.gatekeeper.answer import Decision, Rules, costs_throughout, settle
+from airground_drake.gatekeeper.answer import Decision, Planned, Rules, costs_throughout, in_words, settle
+from airground_drake.gatekeeper.budget import Budget
+from airground_drake.gatekeeper.patience import Turn
 from airground_drake.gatekeeper.prediction import Horizon, Scene, predicted_problem
-from airground_drake.gatekeeper.problem import Problem
 from airground_drake.gatekeeper.routes.route import Route
-from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT, Point, Proposals, Reports, answer_to
+from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT, Point, Proposals, Report, Reports, answer_to
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.law import UgvLaw
 from airground_drake.nsbc.motion import Motion
 from airground_drake.nsbc.team import Team
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
+class Commitment:
+    """What a UGV watches while it executes a proposal.
+
+    Attributes:
+        lags: predicted distances from where it is to be, at the control samples since the acceptance, (S + 1,), m.
+        on_time: when it was last no farther behind than it may be, s.
+    """
+
+    lags: Array
+    on_time: float
+
+
+@dataclass(frozen=True, eq=False)
 class Memory:
     """What the gatekeepers of n UGVs keep from sample to sample.
 
     Attributes:
         answers: in force, (2n,), see `messages`.
         since: when each UGV's answer became what it is, (n,), s.
-        reports: what was sensed with them.
+        reports: what came with them.
         decisions: every one so far.
+        turns: under method (d), each UGV's patience.
+        commitments: under method (d), what each UGV watches while it executes a proposal.
+        sensed: under method (d), which obstacles each UGV has sensed so far, (n, m).
     """
 
     answers: tuple[float, ...]
     since: tuple[float, ...]
     reports: Reports
     decisions: tuple[Decision, ...] = ()
+    turns: tuple[Turn, ...] = ()
+    commitments: tuple[Commitment | None, ...] = ()
+    sensed: npt.NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 0), dtype=bool))
 
     @classmethod
     def empty(cls, count: int) -> Memory:
         """Of `count` UGVs that have answered nothing yet."""
-        return cls((SILENT, -1.0) * count, (0.0,) * count, ((),) * count)
+        return cls(
+            (SILENT, -1.0) * count, (0.0,) * count, (Report(),) * count,
+            turns=(Turn(),) * count, commitments=(None,) * count,
+        )  # fmt: skip
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
         """Immutable: the copy is the object itself."""
@@ -49,7 +74,7 @@ class Memory:
 
 @dataclass(frozen=True)
 class Judging:
-    """How proposals are judged.
+    """How proposals are judged under method (c).
 
     Attributes:
         route: solves (26).
@@ -64,23 +89,42 @@ class Judging:
     period: float
 
 
-class Gatekeepers:
+@dataclass(frozen=True, eq=False)
+class Situation:
+    """What all UGVs see at a sample.
+
+    Attributes:
+        t: time, s.
+        proposals: in force, one entry per UGV.
+        positions: of all robots, (n + 1, 3), m.
+        velocities: of all robots, (n + 1, 3), m/s.
+        before: memory from the sample before.
+    """
+
+    t: float
+    proposals: Proposals
+    positions: Array
+    velocities: Array
+    before: Memory
+
+
+class Gatekeepers(abc.ABC):
     """The UGVs of a team, as they judge proposals.
 
     Attributes:
-        times_s: CPU time of every prediction and solution so far (what it costs, not what else the machine did
+        times_s: CPU time of every prediction and decision so far (what it costs, not what else the machine did
             meanwhile).
     """
 
-    def __init__(self, team: Team, law: UgvLaw, presets: Sequence[Motion], judging: Judging) -> None:
+    def __init__(self, team: Team, law: UgvLaw, presets: Sequence[Motion]) -> None:
         """Of the UGVs of a team, with their control law and preset trajectories."""
         self._law = law
         self._presets = tuple(presets)
-        self._judging = judging
         self._neighbourhood = team.neighbourhood(slice(0, len(team.ugvs)))
         self._max_speed = team.max_speed
         self.times_s: list[float] = []
 
+    @abc.abstractmethod
     def sample(self, t: float, proposals: Proposals, positions: Array, velocities: Array, memory: Memory) -> Memory:
         """Judge every proposal in force.
 
@@ -91,47 +135,75 @@ class Gatekeepers:
             velocities: of all robots, (n + 1, 3), m/s.
             memory: from the sample before.
         """
+
+    def idle(self, proposals: Proposals, positions: Array, memory: Memory) -> bool:
+        """Whether a sample changes nothing: no proposal, no answer to take back, nothing new to remember."""
+        return not any(proposals) and not any(memory.answers[::2])
+
+    def _sensed(self, position: Array) -> npt.NDArray[np.bool_]:
+        """Which obstacles are within sensing range, (m,)."""
+        away = np.linalg.norm(self._neighbourhood.obstacles - position, axis=1)
+        return np.asarray(away <= self._law.avoidance.sensing_range)
+
+    def _report(self, position: Array, decision: Decision) -> Report:
+        """What goes with an answer."""
+        near = self._neighbourhood.obstacles[self._sensed(position)]
+        points: tuple[Point, ...] = tuple((x, y, z) for x, y, z in near.tolist())
+        return Report(points, decision.reason, in_words(decision))
+
+    def _scene(self, seen: Situation, i: int) -> Scene:
+        """What a UGV has around it: all obstacles and robots, whether within sensing range or not."""
+        around = self._neighbourhood
+        return Scene(
+            t=seen.t,
+            position=seen.positions[i].copy(),
+            preset=self._presets[i],
+            centres=around.around(seen.positions).centre[i],
+            velocities=np.concatenate([np.zeros_like(around.obstacles), seen.velocities[around.others[i]]]),
+            distances=around.distance[i],
+            shares=around.share[i],
+            max_speed=float(self._max_speed[i]),
+        )
+
+
+class PaperGatekeepers(Gatekeepers):
+    """Method (c): problem (26) at every sample, and the first stage of its plan is the answer."""
+
+    def __init__(self, team: Team, law: UgvLaw, presets: Sequence[Motion], judging: Judging) -> None:
+        """Of the UGVs of a team, with their control law, their preset trajectories and how they judge."""
+        super().__init__(team, law, presets)
+        self._judging = judging
+
+    def sample(self, t: float, proposals: Proposals, positions: Array, velocities: Array, memory: Memory) -> Memory:
+        """Judge every proposal in force by (26)."""
+        seen = Situation(t, proposals, positions, velocities, memory)
         answers: list[float] = []
         since: list[float] = []
-        reports: list[tuple[Point, ...]] = []
+        reports: list[Report] = []
         decisions = list(memory.decisions)
         budgets = self._judging.rules.budgets(sum(p is not None for p in proposals), self._judging.period)
         for i, proposal in enumerate(proposals):
             if proposal is None:
                 answers += [SILENT, -1.0]
                 since.append(t)
-                reports.append(())
+                reports.append(Report())
                 continue
-            started = thread_time()
-            problem = self._predict(t, i, proposal, positions, velocities)
-            solution = self._judging.route.solve(problem, next(budgets))
-            self.times_s.append(thread_time() - started)
-            standing, stood = answer_to(proposal, memory.answers, i), t - memory.since[i]
-            throughout = costs_throughout(problem, solution)
-            accepted, reason = settle(solution, throughout, problem.bend, standing, stood, self._judging.rules)
-            decisions.append(Decision(t, i, proposal, problem, solution, throughout, accepted, reason))
-            answer = ACCEPT if accepted else REFUSE
+            decision = self._decide(seen, i, proposal, budgets)
+            decisions.append(decision)
+            answer = ACCEPT if decision.accepted else REFUSE
             answers += [answer, proposal.issued]
-            since.append(memory.since[i] if answer == standing else t)
-            reports.append(self._sensed(positions[i]))
-        return Memory(tuple(answers), tuple(since), tuple(reports), tuple(decisions))
-
-    def _sensed(self, position: Array) -> tuple[Point, ...]:
-        """Obstacles within sensing range."""
-        obstacles = self._neighbourhood.obstacles
-        near = np.linalg.norm(obstacles - position, axis=1) <= self._law.avoidance.sensing_range
-        return tuple((x, y, z) for x, y, z in obstacles[near].tolist())
-
-    def _predict(self, t: float, i: int, proposal: Proposal, positions: Array, velocities: Array) -> Problem:
-        around = self._neighbourhood
-        scene = Scene(
-            t=t,
-            position=positions[i].copy(),
-            preset=self._presets[i],
-            centres=around.around(positions).centre[i],
-            velocities=np.concatenate([np.zeros_like(around.obstacles), velocities[around.others[i]]]),
-            distances=around.distance[i],
-            shares=around.share[i],
-            max_speed=float(self._max_speed[i]),
+            since.append(memory.since[i] if answer == answer_to(proposal, memory.answers, i) else t)
+            reports.append(self._report(positions[i], decision))
+        return replace(
+            memory, answers=tuple(answers), since=tuple(since), reports=tuple(reports), decisions=tuple(decisions)
         )
-        return predicted_problem(scene, self._law, proposal, self._judging.horizon)
+
+    def _decide(self, seen: Situation, i: int, proposal: Proposal, budgets: Iterator[Budget]) -> Decision:
+        started = thread_time()
+        problem = predicted_problem(self._scene(seen, i), self._law, proposal, self._judging.horizon)
+        solution = self._judging.route.solve(problem, next(budgets))
+        self.times_s.append(thread_time() - started)
+        standing, stood = answer_to(proposal, seen.before.answers, i), seen.t - seen.before.since[i]
+        throughout = costs_throughout(problem, solution)
+        accepted, reason = settle(solution, throughout, problem.bend, standing, stood, self._judging.rules)
+        return Decision(seen.t, i, proposal, accepted, reason, Planned(problem, solution, throughout))

@@ -10,7 +10,7 @@ import numpy as np
 
 from airground_drake.errors import PluginError
 from airground_drake.intervention.guard import OutOfTime, time_limit
-from airground_drake.intervention.policy import Observation, Policy, Proposal
+from airground_drake.intervention.policy import Observation, Policy, Proposal, Teammate
 from airground_drake.nsbc.motion import Motion
 from airground_drake.registry import POLICIES
 
@@ -21,8 +21,8 @@ PREDICTION_S = 3.0
 INTRUSION = 1000.0
 """Weight of squared intrusion against squared task error, as the gatekeeper's by default."""
 
-Candidate = tuple[int, str, Motion]
-"""A proposal: its turn, the policy's name, the motion."""
+Candidate = tuple[int, str, dict[str, Motion]]
+"""What a policy proposes: its turn, the policy's name, motions by UGV."""
 
 
 def make_policy(name: str, parameters: Mapping[str, float]) -> Policy:
@@ -48,16 +48,39 @@ class Desk:
         turn: index of the policy that made it, or that is to be asked next.
         refusals: refused proposals since the trigger.
         retry_at: no new proposal before this time, s.
+        cause: name of the UGV whose trigger it was last sent a proposal for; empty: its own.
+        party: names of the UGVs of the joint plan that the proposal is part of; empty: it is none.
     """
 
     proposal: Proposal | None = None
     turn: int = 0
     refusals: int = 0
     retry_at: float = -1.0
+    cause: str = ""
+    party: tuple[str, ...] = ()
+
+    def is_due(self, t: float) -> bool:
+        """Whether nothing is in force at time t, s, and the rest after a refusal is over."""
+        return t >= (self.proposal.motion.end if self.proposal is not None else self.retry_at)
 
     def __deepcopy__(self, memo: object) -> Desk:
         """Immutable: the copy is the object itself."""
         return self
+
+
+@dataclass(frozen=True)
+class Planned:
+    """What came of asking the policies about one UGV.
+
+    Attributes:
+        desk: of that UGV.
+        asked: desks of the other UGVs that a joint plan has proposals for, by name.
+        faults: of the policies asked.
+    """
+
+    desk: Desk
+    asked: Mapping[str, Desk]
+    faults: list[Fault]
 
 
 @dataclass(frozen=True)
@@ -75,7 +98,7 @@ class BehaviourDatabase:
 
     Attributes:
         policies: (name, policy) pairs; none at all means that the UAV only supervises.
-        retry: rest after a refusal, s.
+        retry: rest after a refusal, or after no policy has proposed anything, s.
         ranking: 'listed' takes the policies in turn; 'predicted' asks them all and takes the proposal with the
             best predicted outcome on the UAV's own map, after refusals the next best.
         budget: wall-clock time that a policy may take for one proposal, s.
@@ -95,83 +118,120 @@ class BehaviourDatabase:
         self.ranking = ranking
         self.budget = budget
 
-    def plan(
-        self, desk: Desk, seen: Observation, *, refused: bool = False, learnt: bool = False
-    ) -> tuple[Desk, list[Fault]]:
-        """Next proposal for a UGV that needs one.
+    def after_refusal(self, desk: Desk, t: float, *, learnt: bool = False) -> Desk:
+        """Memory of a UGV that has refused its proposal.
 
-        A proposal stays in force until it is refused or has run out.
+        Args:
+            desk: with the proposal.
+            t: time, s.
+            learnt: whether the refusal has put an obstacle on the map: then a ranking starts anew.
+        """
+        turn = 0 if learnt and self.ranking == "predicted" else desk.turn + 1
+        return Desk(turn=turn, refusals=desk.refusals + 1, retry_at=t + self.retry, cause=desk.cause)
+
+    def plan(self, desk: Desk, seen: Observation) -> Planned:
+        """Next proposal for a UGV that needs one, and those to others that go with it.
+
+        If no policy proposes anything, what is in force and has not run out stays so; otherwise the UAV rests.
 
         Args:
             desk: memory of this UGV.
             seen: what the UAV sees.
-            refused: whether the UGV has refused the proposal in force.
-            learnt: whether that refusal has put an obstacle on the map: then a ranking starts anew.
-
-        Returns:
-            The new memory and the faults of policies asked.
         """
-        if refused:
-            turn = 0 if learnt and self.ranking == "predicted" else desk.turn + 1
-            desk = Desk(turn=turn, refusals=desk.refusals + 1, retry_at=seen.t + self.retry)
-        if seen.t < (desk.proposal.motion.end if desk.proposal is not None else desk.retry_at):
-            return desk, []
         seen = replace(seen, refusals=desk.refusals)
         candidates, faults = self._ranked(seen, desk.turn) if self.ranking == "predicted" else self._next(seen, desk)
         if not candidates:
-            return replace(desk, proposal=None), faults
-        turn, name, motion = candidates[0]
-        return replace(desk, proposal=Proposal(name, seen.t, motion), turn=turn), faults
+            if desk.is_due(seen.t):
+                desk = replace(desk, proposal=None, party=(), retry_at=seen.t + self.retry)
+            return Planned(desk, {}, faults)
+        turn, name, motions = candidates[0]
+        party = tuple(motions) if len(motions) > 1 else ()
+        asked = {}
+        for robot, motion in motions.items():
+            before = desk if robot == seen.robot else Desk(refusals=_mate(seen, robot).refusals)
+            cause = robot if robot == seen.robot or _mate(seen, robot).triggered else seen.robot
+            proposal = Proposal(name, seen.t, motion, cause=cause, mapped=seen.obstacles)
+            asked[robot] = replace(before, proposal=proposal, turn=turn, cause=cause, party=party)
+        own = asked.pop(seen.robot, replace(desk, proposal=None, party=(), retry_at=seen.t + self.retry))
+        return Planned(own, asked, faults)
 
     def _next(self, seen: Observation, desk: Desk) -> tuple[list[Candidate], list[Fault]]:
         """The first policy, from this turn on, that proposes."""
         faults: list[Fault] = []
         for step in range(len(self.policies)):
             turn = (desk.turn + step) % len(self.policies)
-            motion = self._ask(turn, seen, faults)
-            if motion is not None:
-                return [(turn, self.policies[turn][0], motion)], faults
+            motions = self._ask(turn, seen, faults)
+            if motions:
+                return [(turn, self.policies[turn][0], motions)], faults
         return [], faults
 
     def _ranked(self, seen: Observation, turn: int) -> tuple[list[Candidate], list[Fault]]:
         """All proposals from best to worst, rotated so that the one of this turn comes first."""
         faults: list[Fault] = []
-        motions = [(name, self._ask(i, seen, faults)) for i, (name, _) in enumerate(self.policies)]
-        found = [(name, motion) for name, motion in motions if motion is not None]
+        asked = [(name, self._ask(i, seen, faults)) for i, (name, _) in enumerate(self.policies)]
+        found = [(name, motions) for name, motions in asked if motions]
         found.sort(key=lambda entry: predicted_cost(entry[1], seen))
-        ranked = [(i, name, motion) for i, (name, motion) in enumerate(found)]
+        ranked = [(i, name, motions) for i, (name, motions) in enumerate(found)]
         first = turn % len(ranked) if ranked else 0
         return ranked[first:] + ranked[:first], faults
 
-    def _ask(self, index: int, seen: Observation, faults: list[Fault]) -> Motion | None:
+    def _ask(self, index: int, seen: Observation, faults: list[Fault]) -> dict[str, Motion]:
         name, policy = self.policies[index]
         try:
             with time_limit(self.budget):
-                return _plain(policy.propose(seen))
+                return _plain(policy.propose(seen), seen)
         except (Exception, OutOfTime) as error:  # whatever a user's policy does, it must not stop the UAV
             faults.append(Fault(seen.t, seen.robot, name, f"{type(error).__name__}: {error}"))
-            return None
+            return {}
 
 
-def predicted_cost(motion: Motion, seen: Observation) -> float:
-    """Outcome that the UAV predicts for a motion on the obstacles that it knows; smaller is better.
+def predicted_cost(motions: Mapping[str, Motion], seen: Observation) -> float:
+    """Outcome that the UAV predicts for a proposal on the obstacles that it knows; smaller is better.
 
-    The cost (25) over PREDICTION_S, for a UGV that follows the motion exactly: squared distance to the preset
-    trajectory, and squared intrusion into safe distances with the weight INTRUSION.
+    The cost (25) over PREDICTION_S, for a UGV that follows its motion exactly (or stands, without one): squared
+    distance to the preset trajectory, and squared intrusion into safe distances, with the weight INTRUSION, to
+    obstacles, and to UGVs that stand, have accepted a motion, or get one with this proposal.
     """
     t = seen.start + np.arange(0.0, PREDICTION_S, 0.05)
-    positions = motion.sample(t)
+    own = motions.get(seen.robot)
+    positions = own.sample(t) if own is not None else np.tile(seen.position, (len(t), 1))
     cost = np.square(positions - seen.preset.sample(t)).sum()
     if len(seen.obstacles):
         distance = np.linalg.norm(positions[:, None] - seen.obstacles, axis=2).min(axis=1)
         cost += INTRUSION * np.square(np.maximum(0.0, seen.safe_distance - distance)).sum()
+    for mate in seen.team:
+        motion = motions.get(mate.name, mate.proposal.motion if mate.proposal and mate.answered == "accepted" else None)
+        if mate.name == seen.robot or (motion is None and not mate.standing):
+            continue
+        distance = np.linalg.norm(positions - (mate.position if motion is None else motion.sample(t)), axis=1)
+        cost += INTRUSION * np.square(np.maximum(0.0, seen.robot_distance - distance)).sum()
     return float(0.05 * cost)
 
 
-def _plain(motion: object) -> Motion | None:
-    """A policy's answer as plain data, so that none of its code is called later; raises if it is no motion."""
-    if motion is None:
-        return None
-    if not isinstance(motion, Motion):
-        raise TypeError(f"a policy proposes a Motion or None, not {type(motion).__name__}")
-    return Motion(motion.times, motion.positions)
+def _mate(seen: Observation, name: str) -> Teammate:
+    return next(mate for mate in seen.team if mate.name == name)
+
+
+def _plain(proposed: object, seen: Observation) -> dict[str, Motion]:
+    """A policy's answer as plain data, so that none of its code is called later; empty: nothing.
+
+    Raises:
+        TypeError: if it is neither a motion nor motions by name.
+        ValueError: if it names what is no UGV of the team, or asks one again that has a proposal of this instant.
+    """
+    if proposed is None:
+        return {}
+    if not isinstance(proposed, Mapping):
+        proposed = {seen.robot: proposed}
+    known = {seen.robot, *(mate.name for mate in seen.team)}
+    taken = {mate.name for mate in seen.team if mate.proposal is not None and mate.proposal.issued == seen.t}
+    motions = {}
+    for name, motion in list(proposed.items()):
+        if not isinstance(motion, Motion):
+            raise TypeError(f"a policy proposes a Motion, Motions by UGV or None, not {type(motion).__name__}")
+        if not isinstance(name, str) or name not in known:
+            raise ValueError(f"a policy proposes to UGVs of the team, not to {name!r}")
+        if name in taken:
+            raise ValueError(f"{name} has a proposal of this instant already")
+        motions[str(name)] = Motion(motion.times, motion.positions)
+    return motions

@@ -1,4 +1,4 @@
-"""The detour policy: shortest path round the obstacles that the UAV knows, back to the preset trajectory."""
+"""The detour policy: shortest path round obstacles that the UAV knows and robots that stand, back to the preset."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from airground_drake.arrays import Array
 from airground_drake.intervention.paths import NoPath, shortest_path
-from airground_drake.intervention.policy import Observation, Policy
+from airground_drake.intervention.policy import Observation, Policy, Teammate
 from airground_drake.nsbc.motion import Motion
 
 SAMPLE_S = 0.05
@@ -44,13 +44,11 @@ class Detour(Policy):
     def propose(self, seen: Observation) -> Motion | None:
         """Shortest path to the earliest rendezvous with the preset trajectory, then along it.
 
-        None where no free path to the preset trajectory exists up to its end.
+        Robots that stand, and have accepted nothing that will move them, are in the way like obstacles. None where no
+        free path to the preset trajectory exists up to its end.
         """
         height = seen.position[2]
-        reach = seen.safe_distance + self.clearance
-        squared = reach**2 - (seen.obstacles[:, 2] - height) ** 2
-        centres = seen.obstacles[squared > 0.0, :2]
-        radii = np.sqrt(squared[squared > 0.0])
+        centres, radii = self._in_the_way(seen)
         start = seen.position[:2]
 
         gap = np.linalg.norm(seen.preset.at(seen.start)[0][:2] - start)
@@ -73,6 +71,29 @@ class Detour(Policy):
         legs = np.array([path.at(path.length_m * k / count)[0] for k in range(count + 1)])
         times = seen.start + np.linspace(0.0, max(duration, RENDEZVOUS_TOLERANCE_S), count + 1)
         return _then_follow(times, legs, seen.preset, self.follow, height)
+
+    def _in_the_way(self, seen: Observation) -> tuple[Array, Array]:
+        """Centres (m, 2), m, and radii (m,), m, of the discs to keep out of, in the plane of the UGV."""
+        height = seen.position[2]
+        robots = [mate for mate in seen.team if mate.name != seen.robot and mate.standing and not _will_move(mate)]
+        places = np.array([mate.position for mate in robots]).reshape(-1, 3)
+        # two targets may be as near to each other as the safe distance allows
+        parked = np.array([np.linalg.norm(mate.position - seen.target) for mate in robots])
+        least = seen.robot_distance
+        reach = np.concatenate(
+            [
+                np.full(len(seen.obstacles), seen.safe_distance + self.clearance),
+                np.clip(parked, least, least + self.clearance),
+            ]
+        )
+        around = np.concatenate([seen.obstacles, places])
+        squared = reach**2 - (around[:, 2] - height) ** 2
+        near = squared > 0.0
+        return around[near, :2], np.sqrt(squared[near])
+
+
+def _will_move(mate: Teammate) -> bool:
+    return mate.proposal is not None and mate.answered == "accepted"
 
 
 def _then_follow(times: Array, legs: Array, preset: Motion, follow: float, height: float) -> Motion:

@@ -2,12 +2,13 @@
 
 An answer is two numbers per UGV: ACCEPT, REFUSE or SILENT, and the time of issue of the proposal that it
 answers. An answer to another proposal than the one in force means nothing. With it comes a report: the obstacles
-that the UGV sensed when it decided.
+that the UGV sensed when it decided, and why it answers so.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from airground_drake.arrays import Array
 from airground_drake.intervention.policy import Proposal
@@ -17,8 +18,23 @@ ACCEPT, SILENT, REFUSE = 1.0, 0.0, -1.0
 Point = tuple[float, float, float]
 """Centre of an obstacle, m, world frame."""
 
-Reports = tuple[tuple[Point, ...], ...]
-"""Per UGV, the obstacles that it sensed at its last decision; empty if it has not decided."""
+
+class Report(NamedTuple):
+    """What comes with an answer.
+
+    Attributes:
+        sensed: obstacles that the UGV sensed when it decided.
+        reason: of the answer, see `gatekeeper.answer.Reason`; empty if it has not decided.
+        words: the same as a sentence.
+    """
+
+    sensed: tuple[Point, ...] = ()
+    reason: str = ""
+    words: str = ""
+
+
+Reports = tuple[Report, ...]
+"""One entry per UGV."""
 
 Proposals = tuple[Proposal | None, ...]
 """One entry per UGV."""

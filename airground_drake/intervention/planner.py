@@ -2,17 +2,36 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import numpy as np
 
 from airground_drake.arrays import Array
 from airground_drake.intervention.database import BehaviourDatabase, Desk, Fault
-from airground_drake.intervention.messages import REFUSE, Point, Proposals, Reports, answer_to
-from airground_drake.intervention.policy import Observation, Proposal
+from airground_drake.intervention.messages import ACCEPT, REFUSE, Point, Proposals, Reports, answer_to
+from airground_drake.intervention.policy import Answered, Observation, Proposal, Teammate
 from airground_drake.nsbc.motion import Motion
+
+STANDS_S = 1.0
+"""A UGV stands once it has kept to one place for this long, s."""
+STANDS_M = 0.1
+"""One place: no farther than this from where it came to a halt, m."""
+
+
+@dataclass(frozen=True)
+class Halt:
+    """Where a UGV has been since when.
+
+    Attributes:
+        place: m, world frame.
+        since: s.
+    """
+
+    place: Point
+    since: float
 
 
 @dataclass(frozen=True)
@@ -24,12 +43,14 @@ class PlannerMemory:
         learnt: obstacles that came with refusals and were not on the map.
         sent: (UGV, proposal), in order.
         faults: of policies, in order.
+        halts: of the UGVs, one each; none before the first planning instant.
     """
 
     desks: tuple[Desk, ...]
     learnt: tuple[Point, ...] = ()
     sent: tuple[tuple[int, Proposal], ...] = ()
     faults: tuple[Fault, ...] = ()
+    halts: tuple[Halt, ...] = ()
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
         """Immutable: the copy is the object itself."""
@@ -46,7 +67,10 @@ class Planner:
     """The UAV's planner, on its own map, which may miss obstacles.
 
     A refusal moves it to the next behaviour; the obstacles that the UGV senses come with it, and the UAV knows them
-    from then on.
+    from then on. Policies are asked for UGVs that are intervened on. What they propose to others, which are to make
+    way, is a proposal like any other, in force as long as the UGV that it is for is intervened on. If one UGV refuses
+    its part of a joint plan, the policies are asked again for the others, whose parts stay in force if nothing better
+    is found.
 
     Attributes:
         ugvs: names.
@@ -56,6 +80,8 @@ class Planner:
         targets: (n, 3), m.
         mapped: obstacles on the UAV's map, (m, 3), m.
         safe_distance: d to obstacles, m.
+        robot_distance: d between UGVs, m.
+        max_speed: of the UGVs, (n,), m/s.
     """
 
     ugvs: tuple[str, ...]
@@ -65,10 +91,32 @@ class Planner:
     targets: Array
     mapped: Array
     safe_distance: float
+    robot_distance: float
+    max_speed: Array
 
     def start(self) -> PlannerMemory:
         """What is remembered at the beginning: nothing."""
         return PlannerMemory((Desk(),) * len(self.ugvs))
+
+    def watch(self, memory: PlannerMemory, t: float, positions: Array) -> PlannerMemory:
+        """Notice which UGVs have moved; to be called at every planning instant.
+
+        Args:
+            memory: before.
+            t: time, s.
+            positions: of all robots, (n + 1, 3), m, world frame.
+
+        Returns:
+            The new memory; the same object if none has left its place.
+        """
+        places: list[Point] = [(x, y, z) for x, y, z in positions[: len(self.ugvs)].tolist()]
+        if not memory.halts:
+            return replace(memory, halts=tuple(Halt(place, t) for place in places))
+        moved = [math.dist(halt.place, place) > STANDS_M for halt, place in zip(memory.halts, places, strict=True)]
+        if not any(moved):
+            return memory
+        halts = [Halt(places[i], t) if moved[i] else halt for i, halt in enumerate(memory.halts)]
+        return replace(memory, halts=tuple(halts))
 
     def plan(
         self,
@@ -82,7 +130,7 @@ class Planner:
         """One planning period.
 
         Args:
-            memory: before.
+            memory: before, and watching up to now.
             t: time, s.
             positions: of all robots, (n + 1, 3), m, world frame.
             intervening: per UGV, whether the trigger has it in mode INTERVENING.
@@ -90,14 +138,17 @@ class Planner:
             reports: what they sensed, see `messages`.
         """
         refused = [answer_to(desk.proposal, answers, i) == REFUSE for i, desk in enumerate(memory.desks)]
-        reported = {point for i, points in enumerate(reports) if refused[i] for point in points}
+        reported = {point for i, report in enumerate(reports) if refused[i] for point in report.sensed}
         fresh = tuple(sorted(reported - set(memory.learnt) - set(map(tuple, self.mapped.tolist()))))
         learnt = memory.learnt + fresh
         obstacles = np.concatenate([self.mapped, np.array(learnt).reshape(-1, 3)])
-        desks, sent, faults = list(memory.desks), list(memory.sent), list(memory.faults)
+        let_down = self._let_down(memory.desks, refused)
+        desks = self._after_answers(memory.desks, t, intervening, refused, learnt=bool(fresh))
+        sent, faults = list(memory.sent), list(memory.faults)
         for i, robot in enumerate(self.ugvs):
-            if not intervening[i]:
-                desks[i] = Desk()
+            in_force = desks[i].proposal
+            just_sent = in_force is not None and in_force.issued == t
+            if not intervening[i] or just_sent or not (desks[i].is_due(t) or robot in let_down):
                 continue
             seen = Observation(
                 t=t,
@@ -111,10 +162,76 @@ class Planner:
                 others=np.delete(positions, i, axis=0),
                 safe_distance=self.safe_distance,
                 refusals=desks[i].refusals,
+                team=self._team(t, positions, intervening, answers, desks, memory.halts),
+                robot_distance=self.robot_distance,
             )
-            desk, failed = self.database.plan(desks[i], seen, refused=refused[i], learnt=bool(fresh))
-            faults += failed
-            if desk.proposal is not None and desk.proposal is not desks[i].proposal:
-                sent.append((i, desk.proposal))
-            desks[i] = desk
-        return PlannerMemory(tuple(desks), learnt, tuple(sent), tuple(faults))
+            planned = self.database.plan(desks[i], seen)
+            faults += planned.faults
+            for j, name in enumerate(self.ugvs):
+                desk = planned.desk if j == i else planned.asked.get(name, desks[j])
+                if desk.proposal is not None and desk.proposal is not desks[j].proposal:
+                    sent.append((j, desk.proposal))
+                desks[j] = desk
+        return replace(memory, desks=tuple(desks), learnt=learnt, sent=tuple(sent), faults=tuple(faults))
+
+    def _after_answers(
+        self, desks: Sequence[Desk], t: float, intervening: Sequence[bool], refused: Sequence[bool], *, learnt: bool
+    ) -> list[Desk]:
+        """Desks without what is over: refused, run out, or for a UGV that is not intervened on any more."""
+        called = {name for name, one in zip(self.ugvs, intervening, strict=True) if one}
+        found = []
+        for name, desk, no in zip(self.ugvs, desks, refused, strict=True):
+            if name not in called and desk.cause not in called:
+                desk = Desk()
+            elif no:
+                desk = self.database.after_refusal(desk, t, learnt=learnt)
+            elif name not in called and desk.proposal is not None and desk.is_due(t):
+                desk = replace(desk, proposal=None, party=())
+            found.append(desk)
+        return found
+
+    def _let_down(self, desks: Sequence[Desk], refused: Sequence[bool]) -> set[str]:
+        """Names of the UGVs with proposals of joint plans of which another UGV has refused its part."""
+        found = set()
+        for desk, no in zip(desks, refused, strict=True):
+            if no and desk.proposal is not None:
+                issued = desk.proposal.issued
+                for name, other, also in zip(self.ugvs, desks, refused, strict=True):
+                    same = other.proposal is not None and other.proposal.issued == issued
+                    if name in desk.party and same and not also:
+                        found.add(name)
+        return found
+
+    def _team(
+        self,
+        t: float,
+        positions: Array,
+        intervening: Sequence[bool],
+        answers: Array,
+        desks: Sequence[Desk],
+        halts: Sequence[Halt],
+    ) -> tuple[Teammate, ...]:
+        """Every UGV as it is now."""
+        return tuple(
+            Teammate(
+                name=name,
+                position=positions[i].copy(),
+                target=self.targets[i],
+                preset=self.presets[i],
+                max_speed=float(self.max_speed[i]),
+                triggered=bool(intervening[i]),
+                standing=t - halts[i].since >= STANDS_S if halts else False,
+                proposal=desks[i].proposal,
+                answered=_answered(desks[i].proposal, answers, i),
+                refusals=desks[i].refusals,
+                resting=desks[i].proposal is None and t < desks[i].retry_at,
+            )
+            for i, name in enumerate(self.ugvs)
+        )
+
+
+def _answered(proposal: Proposal | None, answers: Array, robot: int) -> Answered:
+    answer = answer_to(proposal, answers, robot)
+    if answer == ACCEPT:
+        return "accepted"
+    return "refused" if answer == REFUSE else "silent"

@@ -10,14 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from airground_drake.registry import STATUSES, method_of
+from airground_drake.registry import NOT_EXERCISED, STATUSES, method_of, outcome
 from airground_drake.report import metrics, reproduction
 from airground_drake.report.audit import of_runs
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.trace import Trace
 from airground_drake.verify.claim import Verdict
 
-SCHEMA = "airground_drake.report/1"
+SCHEMA = "airground_drake.report/2"
 
 UNDECIDED = ("inconclusive", "error", "not_run")
 """Statuses that say nothing about the claim: unexpected, they leave the report inconclusive."""
@@ -91,15 +91,20 @@ def overall(
 ) -> dict[str, Any]:
     """The verdict over all claims: `status`, `exit_code`, `why`, counts, and what differs, is open or missing.
 
+    `counts` has a claim that was established because nothing put it to the test under `not_exercised`, never under
+    its status; the list of that name says which they are.
+
     Of `items`, the findings about the paper, one that was not demonstrated differs, too, and of `mutants` one that
     was not refuted.
     """
     surviving = [f"{mutant['claim']}: {mutant['mutant']}" for mutant in mutants if not mutant["refuted"]]
     undemonstrated = [item["id"] for item in items if not item["demonstrated"]]
-    unexpected = [{key: c[key] for key in ("id", "run", "status", "expected")} for c in claims if not c["as_expected"]]
+    keys = ("id", "run", "status", "expected", "exercised")
+    unexpected = [{key: c[key] for key in keys} for c in claims if not c["as_expected"]]
     differs = [c for c in unexpected if c["status"] not in UNDECIDED]
     undecided = [c for c in unexpected if c["status"] in UNDECIDED]
-    counts = Counter(c["status"] for c in claims)
+    counts = Counter(outcome(c["status"], c["exercised"]) for c in claims)
+    idle = [{"id": c["id"], "run": c["run"]} for c in claims if outcome(c["status"], c["exercised"]) == NOT_EXERCISED]
     if differs:
         status = "not_as_expected"
         differ = "differs" if len(differs) == 1 else "differ"
@@ -117,6 +122,7 @@ def overall(
     else:
         status = "as_expected"
         why = f"All {_checks(len(claims))} gave the verdict that the scenario declares for them."
+        why += f" {_nothing_to_check(idle)}" if idle else ""
         why += f" All {len(items)} findings about the paper were demonstrated." if items else ""
         why += f" All {len(mutants)} broken variants of the proofs were refuted." if mutants else ""
     return {
@@ -125,7 +131,8 @@ def overall(
         "why": why,
         "checks": len(claims),
         "as_expected": len(claims) - len(unexpected),
-        "counts": {name: counts[name] for name in STATUSES if counts[name]},
+        "counts": {name: counts[name] for name in (*STATUSES, NOT_EXERCISED) if counts[name]},
+        "not_exercised": idle,
         "differs": differs,
         "undecided": undecided,
         "missing": list(absent),
@@ -187,15 +194,33 @@ def _checks(count: int) -> str:
     return f"{count} check" if count == 1 else f"{count} checks"
 
 
+def _nothing_to_check(idle: Sequence[Mapping[str, Any]]) -> str:
+    """Which claims were established for lack of anything that could have refuted them; those of equal runs together."""
+    runs: dict[str, list[str]] = {}
+    for item in idle:
+        runs.setdefault(item["id"], []).append(item["run"])
+    together: dict[str, list[str]] = {}
+    for name, where in runs.items():
+        together.setdefault(", ".join(filter(None, where)), []).append(name)
+    listed = "; ".join(f"{', '.join(names)}{_on(where)}" for where, names in together.items())
+    return f"{len(idle)} of them had nothing to check: {listed}."
+
+
 def _list(items: Sequence[Mapping[str, Any]], limit: int = 4) -> str:
     """The first few items in words."""
     words = [
-        f"{item['id']}{_on(item['run'])} ({item['status']}, expected {item['expected']})"
+        f"{item['id']}{_on(item['run'])} ({_found(item)}, expected {item['expected']})"
         if "status" in item
         else f"{item['id'] or 'run'} {item['run']} ({item['why']})"
         for item in items[:limit]
     ]
     return ", ".join(words) + (f" and {len(items) - limit} more" if len(items) > limit else "")
+
+
+def _found(item: Mapping[str, Any]) -> str:
+    """The status, or that there was nothing to check."""
+    idle = outcome(item["status"], item["exercised"]) == NOT_EXERCISED
+    return f"{item['status']}, nothing to check" if idle else str(item["status"])
 
 
 def _on(run: str) -> str:

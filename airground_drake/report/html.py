@@ -10,6 +10,7 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
+from airground_drake.registry import outcome
 from airground_drake.report.figures import svg
 from airground_drake.report.figures.panels import Figure
 from airground_drake.report.reproduction import YES_NO
@@ -25,6 +26,7 @@ CHIPS = {
     "proved": ("✓", "proved", "good"),
     "holds": ("✓", "holds", "good"),
     "supported": ("✓", "supported", "good"),
+    "not_exercised": ("∅", "holds, nothing to check", "idle"),
     "refuted": ("✗", "refuted", "bad"),
     "inconclusive": ("?", "inconclusive", "open"),
     "error": ("!", "error", "open"),
@@ -76,7 +78,7 @@ def _environment() -> Environment:
         lstrip_blocks=True,
     )
     environment.filters.update(num=number, value=value, pretty=pretty, inline=Markup)
-    environment.globals.update(chips=CHIPS)
+    environment.globals.update(chips=CHIPS, outcome=outcome)
     return environment
 
 

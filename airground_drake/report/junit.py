@@ -8,6 +8,8 @@ import xml.etree.ElementTree as ET
 from collections.abc import Mapping
 from typing import Any
 
+from airground_drake.registry import NOT_EXERCISED, outcome
+
 _NOT_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 """Characters that XML 1.0 cannot hold, not even escaped."""
 
@@ -15,8 +17,9 @@ _NOT_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]"
 def render(document: Mapping[str, Any]) -> str:
     """JUnit XML of report.json: a suite per run.
 
-    A claim whose status is the expected one passes. Otherwise it fails; an `error` is an error and a `not_run`
-    is skipped. What is missing altogether (a run without a trace, a claim that nobody checked) is an error.
+    A claim whose status is the expected one passes; if it holds because nothing put it to the test, it is skipped,
+    with that reason. Otherwise it fails; an `error` is an error and a `not_run` is skipped. What is missing altogether
+    (a run without a trace, a claim that nobody checked) is an error.
 
     Args:
         document: as built by `document.build`.
@@ -47,18 +50,23 @@ def _case(suite: ET.Element, scenario: str, run: str, claim: str) -> ET.Element:
 
 
 def _outcome(case: ET.Element, claim: Mapping[str, Any]) -> None:
+    idle = outcome(claim["status"], claim["exercised"]) == NOT_EXERCISED
+    if claim["as_expected"] and idle:
+        reason = f"{claim['status']}, nothing to check: 0 {claim['exercised_by']}; {claim['statement']}"
+        ET.SubElement(case, "skipped", {"message": _text(reason)})
     if claim["as_expected"]:
         return
     kind = {"error": "error", "not_run": "skipped"}.get(claim["status"], "failure")
     margin = "" if claim["margin"] is None else f", margin {claim['margin']:.4g} {claim['unit']}".rstrip()
     if margin and claim["quantity"]:
         margin += f" ({claim['quantity']})"
-    message = f"{claim['status']}, expected {claim['expected']}{margin}: {claim['statement']}"
-    outcome = ET.SubElement(case, kind, {"message": _text(message)})
+    found = f"{claim['status']}, nothing to check (0 {claim['exercised_by']})" if idle else claim["status"]
+    message = f"{found}, expected {claim['expected']}{margin}: {claim['statement']}"
+    element = ET.SubElement(case, kind, {"message": _text(message)})
     if kind != "skipped":
-        outcome.set("type", claim["status"])
+        element.set("type", claim["status"])
         details = {key: claim[key] for key in ("where", "counterexample", "evidence") if claim[key]}
-        outcome.text = _text(json.dumps(details, indent=1, ensure_ascii=False))
+        element.text = _text(json.dumps(details, indent=1, ensure_ascii=False))
 
 
 def _count(element: ET.Element, suites: list[ET.Element], seconds: float) -> None:

@@ -1,7 +1,7 @@
 """From the name or file of a scenario to a validated `Scenario`; every mistake becomes one line.
 
 The YAML text is composed to nodes, which know their line; `--set` replaces nodes; the nodes are checked against
-the type hints of the schema; pydrake's typed reader builds the dataclasses; `validate.py` checks the meaning.
+the type hints of the schema, whose dataclasses are built as they are; `validate.py` checks the meaning.
 Scalars are read by the rules of YAML 1.2 (`1e-3` is a number, `yes` and `1:30` are text). Anchors, merge keys
 (`<<`) and templates under top-level keys that begin with an underscore work as in Drake's own files.
 """
@@ -21,7 +21,6 @@ from typing import Any, NoReturn, get_args, get_origin
 
 import numpy as np
 import yaml
-from pydrake.common.yaml import yaml_load_typed
 
 from airground_drake import files
 from airground_drake.errors import Fault, ScenarioError
@@ -138,8 +137,7 @@ def from_data(data: Mapping[str, Any], source: str) -> Scenario:
 
 def _build(root: yaml.Node, source: str) -> Scenario:
     """The scenario of a document, checked."""
-    plain = _plain(root, Scenario, "", "")
-    scenario: Scenario = yaml_load_typed(schema=Scenario, data=yaml.safe_dump(plain, sort_keys=False))
+    scenario: Scenario = _made(root, Scenario, "", "")
     try:
         validate.check(scenario, source)
     except ScenarioError as error:
@@ -266,8 +264,8 @@ def _replace(node: yaml.Node | None, hint: Any, parts: list[str], key: str, new:
     return yaml.MappingNode(f"{_TAG}map", list(children.values()), *marks)
 
 
-def _plain(node: yaml.Node, hint: Any, key: str, name: str) -> Any:
-    """Data of a node, of the types that the hint says; `name` is the key whose suffix gives the unit."""
+def _made(node: yaml.Node, hint: Any, key: str, name: str) -> Any:
+    """A node as an object of the type that the hint says; `name` is the key whose suffix gives the unit."""
     if hint in _WANTED:
         value = _value(node)
         if hint is float and type(value) is int:
@@ -276,10 +274,10 @@ def _plain(node: yaml.Node, hint: Any, key: str, name: str) -> Any:
             raise ScenarioError(_where(node), key, value, _wanted(hint, name))
         return value
     children = _children(node, hint, key, name)
-    if not dataclasses.is_dataclass(hint):
+    if not (isinstance(hint, type) and dataclasses.is_dataclass(hint)):
         item, named = get_args(hint)[-1], get_origin(hint) is dict and not validate.unit_of(name)
         data = {
-            part: _plain(child, item, validate.dotted(key, part), part if named else name)
+            part: _made(child, item, validate.dotted(key, part), part if named else name)
             for part, (_, child) in children.items()
         }
         return data if get_origin(hint) is dict else list(data.values())
@@ -291,11 +289,12 @@ def _plain(node: yaml.Node, hint: Any, key: str, name: str) -> Any:
         if part not in children:
             wanted = _wanted(hints[part], part)
             raise ScenarioError(_where(node), validate.dotted(key, part), Fault("missing"), wanted)
-    return {
-        part: _plain(child, hints[part], validate.dotted(key, part), part)
+    values = {
+        part: _made(child, hints[part], validate.dotted(key, part), part)
         for part, (_, child) in children.items()
         if part in hints
     }
+    return hint(**values)
 
 
 def _hints(cls: Any) -> dict[str, Any]:

@@ -39,7 +39,7 @@ class Ugv:
 class Uav:
     """The UAV: a spatial first-order robot whose `task` is to fly over the centroid of the UGVs, eqs (9)-(10).
 
-    Another task is named as `module:Class`.
+    Another task is named as `module:Class`. `phantoms_m` are obstacles on its map that are not there.
     """
 
     name: str = "uav"
@@ -48,6 +48,7 @@ class Uav:
     altitude_m: float = 2.0
     task: str = "formation"
     max_speed_m_s: float = 10.0
+    phantoms_m: list[Vector] = field(default_factory=list)
 
 
 @dataclass
@@ -137,6 +138,11 @@ class Gatekeeper:
     by more than the share `max_bend` of its own motion is refused. A decision may take `budget_iterations` of a
     solver and `budget_nodes` of a search (budget 'counted': a run is the same on every machine), or besides the
     share `budget_share` of the sampling period by the clock (budget 'wall_clock': for real time).
+
+    Under method (d) outcomes are compared instead, `settling_s` past the end of motion and preset trajectory. An
+    accepted proposal is executed for `longest_s` at most, and given back when the UGV has been farther behind it than
+    predicted, by more than `lag_m`, for `behind_s`. A UGV accepts `tries` proposals, and then none until it has been
+    on its own for `rest_s`.
     """
 
     route: str = "relaxed"
@@ -152,6 +158,12 @@ class Gatekeeper:
     budget_iterations: int = 100
     budget_nodes: int = 15000
     budget_share: float = 0.5
+    longest_s: float = 30.0
+    settling_s: float = 10.0
+    tries: int = 5
+    rest_s: float = 5.0
+    lag_m: float = 0.5
+    behind_s: float = 2.0
 
 
 @dataclass
@@ -160,7 +172,7 @@ class Run:
 
     `stalls_m` names the UGVs that must end (to within `stall_tolerance_m`) at that point short of their
     target. `expected` maps claim identifiers to the expected verdict; a claim not named must hold. Where
-    there is no guarantee, "holds or refuted" admits either.
+    there is no guarantee, "holds or refuted" admits either. `exercised` is "holds, and something put it to the test".
     """
 
     method: str = field(default_factory=str, metadata=REQUIRED)

@@ -18,13 +18,13 @@ from airground_drake.errors import Fault, ScenarioError
 from airground_drake.intervention.database import RANKINGS
 from airground_drake.nsbc.avoidance import COMPOSITIONS
 from airground_drake.registry import (
+    EXPECTATIONS,
     METHODS,
     MODEL_CLAIMS,
     PLUGIN,
     POLICIES,
     ROUTES,
     RUN_CLAIMS,
-    STATUSES,
     UAV_TASKS,
     Registry,
     alternatives,
@@ -82,8 +82,9 @@ def _one_of(key: str, value: str, allowed: Iterable[str], what: str = "one of") 
 
 def _expectation(key: str, expected: str) -> Problems:
     for status in alternatives(expected):
-        if status not in STATUSES:
-            yield key, expected, f"one of {', '.join(STATUSES)}, or several of them: holds or refuted"
+        if status not in EXPECTATIONS:
+            allowed = f"one of {', '.join(EXPECTATIONS)}, or several of them, such as: exercised or refuted"
+            yield key, expected, allowed
 
 
 def _registered(key: str, name: str, registry: Registry) -> Problems:
@@ -138,7 +139,7 @@ def _counts(scenario: Scenario) -> Problems:
         yield "seed", scenario.seed, f"a whole number from 0 to {MAX_SEED}"
     if not 1 <= scenario.gatekeeper.stages <= MAX_STAGES:
         yield "gatekeeper.stages", scenario.gatekeeper.stages, f"a whole number from 1 to {MAX_STAGES}"
-    for name in ("budget_iterations", "budget_nodes"):
+    for name in ("budget_iterations", "budget_nodes", "tries"):
         if not 1 <= getattr(scenario.gatekeeper, name) <= MAX_SEED:
             yield f"gatekeeper.{name}", getattr(scenario.gatekeeper, name), f"a whole number from 1 to {MAX_SEED}"
     if scenario.gatekeeper.budget_share > 1.0:
@@ -195,6 +196,7 @@ def _ugv_points(scenario: Scenario) -> Iterator[tuple[str, Vector]]:
 def _points(scenario: Scenario) -> Problems:
     others = [("uav.start_m", scenario.uav.start_m), ("uav.target_m", scenario.uav.target_m)]
     others += [(f"obstacles.{name}.position_m", each.position_m) for name, each in scenario.obstacles.items()]
+    others += [(f"uav.phantoms_m.{index}", point) for index, point in enumerate(scenario.uav.phantoms_m)]
     for key, point in (*_ugv_points(scenario), *others):
         if len(point) != 3:
             yield key, point, "3 numbers in m: [x, y, z]"

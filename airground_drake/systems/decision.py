@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 from pydrake.systems.framework import (
     BasicVector,
     Context,
@@ -19,7 +19,7 @@ from pydrake.systems.framework import (
 )
 
 from airground_drake.arrays import Array
-from airground_drake.decision.excursion import extremes
+from airground_drake.decision.excursion import excursions, extremes, task_errors, transitions_due
 from airground_drake.decision.trigger import Mode, Trigger, TriggerState
 from airground_drake.nsbc.motion import Motion
 
@@ -85,11 +85,12 @@ class EventTrigger(LeafSystem):
         """Declare ports, state and events for `count` UGVs; the presets (default: none) tell where references bend."""
         super().__init__()
         self._trigger = trigger
+        self._levels = (float(trigger.zeta), float(trigger.release), float(trigger.dwell))
         self._count = count
         self._presets = tuple(presets)
         corners = [(t, j) for j, preset in enumerate(self._presets) for t in preset.times.tolist()]
         self._corners = sorted(corners)
-        self._corner_times = np.array([t for t, _ in self._corners])
+        self._corner_times = [t for t, _ in self._corners]
         self._position = self.DeclareVectorInputPort("team_position", 3 * (count + 1))
         self._reference = self.DeclareVectorInputPort("reference", 6 * count)
         self._noise = self.DeclareVectorInputPort("noise", count)
@@ -113,7 +114,7 @@ class EventTrigger(LeafSystem):
 
     def _start(self, context: Context, state: State) -> EventStatus:
         signals = self._signals(context)
-        t, x = float(signals[0]), _norms(self._parts(signals))
+        t, x = float(signals[0]), _norms(signals)
         discrete = state.get_mutable_discrete_state()
         discrete.set_value(0, _pack([self._trigger.start(t, float(x[j])) for j in range(self._count)]))
         discrete.set_value(1, signals)
@@ -124,49 +125,39 @@ class EventTrigger(LeafSystem):
         begun = context.get_discrete_state(1).value()
         if context.get_time() - begun[0] < SHORTEST_S:
             return 1.0
-        status = context.get_discrete_state(0).value().reshape(-1, FIELDS)
         now = self._signals(context)
-        return -1.0 if self._due(status, now[0], *self._excursions(begun, now)).any() else 1.0
+        least, most = self._excursions(begun, now)
+        due = transitions_due(context.get_discrete_state(0).value(), now[0], least, most, self._levels)
+        return -1.0 if due.any() else 1.0
 
     def update(self, context: Context, discrete: DiscreteValues) -> EventStatus:
         """Make the transitions that have become due in the step that ends, and begin another: the per-step update."""
         now = self._signals(context)
         least, most = self._excursions(context.get_discrete_state(1).value(), now)
-        status = context.get_discrete_state(0).value().reshape(-1, FIELDS).copy()
-        due = np.flatnonzero(self._due(status, now[0], least, most))
-        if len(due):
-            t, x = float(now[0]), _norms(self._parts(now))
-            for j in due:
-                before = _unpack(status[j])
-                seen = {Mode.SUPERVISING: most[j], Mode.INTERVENING: least[j], Mode.REFRACTORY: x[j]}[before.mode]
-                after = self._trigger.step(before, t, float(seen))
-                if after.mode is not before.mode:  # x may have come back already
-                    after = self._trigger.step(after, t, float(x[j]))
-                status[j] = _pack([after])
+        before = context.get_discrete_state(0).value()
+        due = transitions_due(before, now[0], least, most, self._levels)
+        if due.any():
+            status = before.reshape(-1, FIELDS).copy()
+            t, x = float(now[0]), _norms(now)
+            for j in np.flatnonzero(due):
+                status[j] = _pack([self._moved(_unpack(status[j]), t, float(x[j]), float(least[j]), float(most[j]))])
             discrete.set_value(0, status.ravel())
         discrete.set_value(1, now)
         return EventStatus.Succeeded()
 
-    def _due(self, status: Array, t: float, least: Array, most: Array) -> npt.NDArray[np.bool_]:
-        """For which UGVs a transition is due at time t, s, given how far x went in this step, (n,)."""
-        mode, trigger = status[:, 0], self._trigger
-        due = (mode == Mode.SUPERVISING) & (most >= trigger.zeta)
-        due |= (mode == Mode.INTERVENING) & (least <= trigger.release) & (least < trigger.zeta)
-        for j in np.flatnonzero(mode == Mode.REFRACTORY):
-            due[j] = t >= trigger.dwell_end(_unpack(status[j]))
-        return due
-
-    def _parts(self, signals: Array) -> Array:
-        """Task error and noise of every UGV, (n, 4), m."""
-        n = 3 * self._count
-        error = (signals[1 + n : 1 + 2 * n] - signals[1 : 1 + n]).reshape(-1, 3)
-        return np.column_stack([error, signals[1 + 2 * n :]])
+    def _moved(self, before: TriggerState, t: float, x: float, least: float, most: float) -> TriggerState:
+        """State at the end of a step in which a transition became due: x now, and how far it went, m."""
+        seen = {Mode.SUPERVISING: most, Mode.INTERVENING: least, Mode.REFRACTORY: x}[before.mode]
+        after = self._trigger.step(before, t, seen)
+        return after if after.mode is before.mode else self._trigger.step(after, t, x)  # x may have come back already
 
     def _excursions(self, begun: Array, now: Array) -> tuple[Array, Array]:
         """Least and largest x since the step began, (n,) each, m."""
-        before, after = self._parts(begun), self._parts(now)
-        least, most = extremes(before, after)
-        first, last = np.searchsorted(self._corner_times, [begun[0], now[0]], side="right")
+        least, most = excursions(begun, now)
+        first, last = bisect_right(self._corner_times, begun[0]), bisect_right(self._corner_times, now[0])
+        if first == last:
+            return least, most
+        before, after = task_errors(begun), task_errors(now)
         for j in {robot for _, robot in self._corners[first:last]}:
             times = [t for t, robot in self._corners[first:last] if robot == j and t < now[0]]
             share = (np.array(times) - begun[0]) / (now[0] - begun[0])
@@ -180,9 +171,9 @@ class EventTrigger(LeafSystem):
         return least, most
 
 
-def _norms(parts: Array) -> Array:
-    """x of every UGV, (n,), m, from task errors and noise, (n, 4)."""
-    return extremes(parts, parts)[0]
+def _norms(signals: Array) -> Array:
+    """x of every UGV, (n,), m."""
+    return excursions(signals, signals)[0]
 
 
 def _pack(states: Sequence[TriggerState]) -> Array:

@@ -2,29 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
 from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSystem, State
 
-from airground_drake.gatekeeper.answer import Decision, Rules
-from airground_drake.gatekeeper.prediction import Horizon
-from airground_drake.gatekeeper.routes.route import Route
-from airground_drake.gatekeeper.sample import Gatekeepers, Judging, Memory
-from airground_drake.intervention.messages import ACCEPT, SILENT
-from airground_drake.nsbc.law import UgvLaw
-from airground_drake.nsbc.motion import Motion
-from airground_drake.nsbc.team import Team
+from airground_drake.gatekeeper.answer import Decision
+from airground_drake.gatekeeper.sample import Gatekeepers, Memory
+from airground_drake.intervention.messages import ACCEPT, SILENT, Report
 from airground_drake.systems.ticks import Ticks
 
 
 class Gatekeeper(LeafSystem):
-    """Decides at every sample about the proposal in force for each UGV: (21)-(29), see `gatekeeper.sample`.
+    """Decides at every sample about the proposal in force for each UGV, (21)-(29).
 
-    Each UGV predicts its own closed loop under both choices from what it senses (23), solves (26) through a route
-    and answers by the first stage of the plan, within the rules. The answer goes to its controller and back to
-    the UAV.
+    Under method (c) each UGV predicts its own closed loop under both choices from what it senses (23), solves (26)
+    through a route and answers by the first stage of the plan, see `gatekeeper.sample`; under (d) it judges the
+    outcome and watches the progress, see `gatekeeper.certified`. The answer goes to its controller and back to the
+    UAV.
 
     Ports (n UGVs):
         in  `team_position` (3(n+1)) m; `ugv_command` (3n) and `uav_command` (3) m/s, for the predicted motion
@@ -34,21 +28,11 @@ class Gatekeeper(LeafSystem):
     Rate: one update per gatekeeper period, from t = 0.
     """
 
-    def __init__(
-        self,
-        team: Team,
-        law: UgvLaw,
-        presets: Sequence[Motion],
-        route: Route,
-        horizon: Horizon,
-        *,
-        period: float,
-        rules: Rules,
-    ) -> None:
-        """Declare ports, state and the periodic update; period in s."""
+    def __init__(self, gatekeepers: Gatekeepers, count: int, *, period: float, control: float) -> None:
+        """Declare ports, state and the periodic update for `count` UGVs; its period and the controllers', s."""
         super().__init__()
-        n = len(team.ugvs)
-        self._gatekeepers = Gatekeepers(team, law, presets, Judging(route, horizon, rules, period))
+        n = count
+        self._gatekeepers = gatekeepers
         self._position = self.DeclareVectorInputPort("team_position", 3 * (n + 1))
         self._ugv_command = self.DeclareVectorInputPort("ugv_command", 3 * n)
         self._uav_command = self.DeclareVectorInputPort("uav_command", 3)
@@ -59,7 +43,7 @@ class Gatekeeper(LeafSystem):
         self.DeclareAbstractOutputPort(
             "reports", lambda: Value(object()), self._calc_reports, prerequisites_of_calc=held
         )
-        self._ticks = Ticks(period, law.avoidance.period)
+        self._ticks = Ticks(period, control)
         self.DeclarePeriodicUnrestrictedUpdateEvent(self._ticks.period, 0.0, self._update)
 
     @property
@@ -92,9 +76,9 @@ class Gatekeeper(LeafSystem):
         if not self._ticks.due(context.get_time()):
             return EventStatus.DidNothing()
         proposals, memory = self._proposals.Eval(context), self._memory(context)
-        if not any(proposals) and not any(memory.answers[::2]):
-            return EventStatus.DidNothing()
         positions = self._position.Eval(context).reshape(-1, 3)
+        if self._gatekeepers.idle(proposals, positions, memory):
+            return EventStatus.DidNothing()
         velocities = np.concatenate([self._ugv_command.Eval(context), self._uav_command.Eval(context)]).reshape(-1, 3)
         new = self._gatekeepers.sample(context.get_time(), proposals, positions, velocities, memory)
         state.get_mutable_abstract_state(int(self._state)).set_value(new)
@@ -118,7 +102,7 @@ class DirectAcceptance(LeafSystem):
         self.DeclareAbstractOutputPort(
             "reports",
             lambda: Value(object()),
-            lambda context, output: output.set_value(((),) * count),
+            lambda context, output: output.set_value((Report(),) * count),
             prerequisites_of_calc={self.nothing_ticket()},
         )
 

@@ -51,17 +51,13 @@ class InterventionPlanner(LeafSystem):
     def _update(self, context: Context, state: State) -> EventStatus:
         if not self._ticks.due(context.get_time()):
             return EventStatus.DidNothing()
-        memory = self.memory(context)
+        before, positions = self.memory(context), self._position.Eval(context).reshape(-1, 3)
+        memory = self._planner.watch(before, context.get_time(), positions)
         intervening = [mode == Mode.INTERVENING for mode in self._status.Eval(context)[::FIELDS]]
-        if not any(intervening) and not any(memory.proposals):
+        if any(intervening) or any(memory.proposals):
+            answers, reports = self._answers.Eval(context), self._reports.Eval(context)
+            memory = self._planner.plan(memory, context.get_time(), positions, intervening, answers, reports)
+        if memory is before:
             return EventStatus.DidNothing()
-        new = self._planner.plan(
-            memory,
-            context.get_time(),
-            self._position.Eval(context).reshape(-1, 3),
-            intervening,
-            self._answers.Eval(context),
-            self._reports.Eval(context),
-        )
-        state.get_mutable_abstract_state(int(self._memory)).set_value(new)
+        state.get_mutable_abstract_state(int(self._memory)).set_value(memory)
         return EventStatus.Succeeded()

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from airground_drake import trace
 from airground_drake.errors import AirgroundError, UnknownNameError
+from airground_drake.registry import NOT_EXERCISED, outcome
 from airground_drake.scenarios.load import from_data, load
 from airground_drake.verify import Verdict, verify, verify_model
 from airground_drake.verify.registry import model_claims, run_claims
@@ -52,8 +53,11 @@ def _line(verdict: Verdict) -> str:
     name = f"{verdict.claim.id} {verdict.run}" if verdict.run else verdict.claim.id
     margin = "" if finding.margin is None else f", margin {finding.margin:.6g} {finding.unit}".rstrip()
     of = f" ({finding.quantity})" if margin and finding.quantity else ""
+    idle = outcome(finding.status, finding.exercised) == NOT_EXERCISED
+    found = f"{finding.status}, nothing to check" if idle else finding.status
+    tested = f" [{finding.exercised} {verdict.claim.exercised_by}]" if finding.exercised is not None else ""
     expected = "" if verdict.as_expected else f", expected {verdict.expected}"
-    return f"{name}: {finding.status}{margin}{of}{expected}"
+    return f"{name}: {found}{margin}{of}{tested}{expected}"
 
 
 def _judge(target: str, wanted: Sequence[str]) -> list[Verdict]:

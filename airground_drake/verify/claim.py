@@ -12,7 +12,7 @@ import numpy as np
 
 from airground_drake import files
 from airground_drake.errors import TraceError
-from airground_drake.registry import PASSING, Status, alternatives
+from airground_drake.registry import PASSING, Status, meets
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.trace import Trace
 from airground_drake.verify.finding import Finding
@@ -48,6 +48,7 @@ class Claim(abc.ABC):
         assumptions: what is taken for granted.
         does_not_establish: what a reader must not conclude from it.
         expected: the status that a scenario expects unless it says otherwise.
+        exercised_by: what its findings count as `exercised`, in words that follow a number; '' if they count nothing.
     """
 
     id: str
@@ -58,6 +59,7 @@ class Claim(abc.ABC):
     assumptions: tuple[str, ...]
     does_not_establish: str
     expected: Status
+    exercised_by: str = ""
 
 
 class ModelClaim(Claim):
@@ -93,6 +95,7 @@ class ModelClaim(Claim):
             return Finding("error", evidence=inputs)
         try:
             finding = self.check(inputs)
+            require_count(self, finding)
             json.dumps(asdict(finding), allow_nan=False)
         except Exception as error:  # whatever went wrong, the claim was not decided
             return Finding("error", evidence={"error": f"{type(error).__name__}: {error}"})
@@ -122,6 +125,7 @@ class TraceClaim(Claim):
             finding = self.check(trace)
             if finding.status in PASSING:
                 require_whole_run(trace)
+            require_count(self, finding)
             json.dumps(asdict(finding), allow_nan=False)  # a margin that is not a number must not pass
         except Exception as error:  # whatever went wrong, the claim was not decided
             return Finding("error", evidence={"error": f"{type(error).__name__}: {error}"})
@@ -151,7 +155,7 @@ class Verdict:
         claim: the claim.
         run: on which run; '' for a claim about the model.
         finding: what was found.
-        expected: the status that the scenario expects; "holds or refuted" admits either.
+        expected: the status that the scenario expects, or `exercised`; "holds or refuted" admits either.
         inputs: the constants that a claim about the model is about.
     """
 
@@ -163,12 +167,12 @@ class Verdict:
 
     @property
     def as_expected(self) -> bool:
-        """Whether the status is the expected one."""
-        return self.finding.status in alternatives(self.expected)
+        """Whether the status is the expected one, and the claim was exercised where that is expected."""
+        return meets(self.expected, self.finding.status, self.finding.exercised)
 
     def to_json(self) -> dict[str, Any]:
         """The entry of `claims` in report.json; of certificates, their names and SHA-256."""
-        described = ("id", "statement", "formula", "method", "equations", "does_not_establish")
+        described = ("id", "statement", "formula", "method", "equations", "does_not_establish", "exercised_by")
         digests = {name: files.sha256(text.encode()) for name, text in self.finding.certificates.items()}
         return {
             **{name: getattr(self.claim, name) for name in described},
@@ -180,6 +184,19 @@ class Verdict:
             **asdict(self.finding),
             "certificates": digests,
         }
+
+
+def require_count(claim: Claim, finding: Finding) -> None:
+    """Check that a claim that says what exercises it has counted that, so that no pass is taken for more than it is.
+
+    Raises:
+        ValueError: if it passes without a count, or the count is none.
+    """
+    count = finding.exercised
+    if count is None and claim.exercised_by and finding.status in PASSING:
+        raise ValueError(f"{claim.id} passes without a count of {claim.exercised_by}")
+    if count is not None and (type(count) is not int or count < 0):
+        raise ValueError(f"{claim.id} was exercised {count!r} times")
 
 
 def require_motion(trace: Trace) -> None:

@@ -21,6 +21,8 @@ class Finding:
         evidence: numbers behind the verdict, strict JSON.
         certificates: texts that others can check, by file name.
         quantity: what the margin is of, in a few words.
+        exercised: how often the claim was put to the test, in what its `exercised_by` counts; 0: nothing could have
+            refuted it; None: not counted.
     """
 
     status: Status
@@ -31,3 +33,4 @@ class Finding:
     evidence: dict[str, Any] = field(default_factory=dict)
     certificates: dict[str, str] = field(default_factory=dict)
     quantity: str = ""
+    exercised: int | None = None

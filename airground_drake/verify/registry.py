@@ -21,6 +21,7 @@ MUTANTS: tuple[str, ...] = (
     "airground_drake.verify.model.avoidance.mutants",
     "airground_drake.verify.model.trigger.mutants",
     "airground_drake.verify.model.threshold.mutants",
+    "airground_drake.verify.model.patience.mutants",
 )
 """Modules with a table MUTANTS of broken variants, each of which names the claim that must refute it."""
 

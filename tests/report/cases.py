@@ -90,12 +90,13 @@ class Kept(TraceClaim):
     equations = "(7)"
     assumptions = ("straight lines",)
     does_not_establish = "anything else"
+    exercised_by = "pairs"
 
     def check(self, trace: Trace) -> Finding:
         raise NotImplementedError
 
 
-def verdict(run: str, status: Status = "holds", expected: Status = "holds", **finding: Any) -> Verdict:
+def verdict(run: str, status: Status = "holds", expected: str = "holds", **finding: Any) -> Verdict:
     return Verdict(Kept(), run, Finding(status, **finding), expected)
 
 

@@ -91,6 +91,6 @@ def test_every_mutant_of_the_proofs_is_refuted(tmp_path: Path) -> None:
 
 def test_a_mutant_that_survives_is_in_the_verdict() -> None:
     surviving = [{"claim": "SAFE-INV", "mutant": "harmless", "refuted": False}]
-    overall = document.overall([{"as_expected": True, "status": "holds"}], [], (), surviving)
+    overall = document.overall([{"as_expected": True, "status": "holds", "exercised": 1}], [], (), surviving)
     assert (overall["status"], overall["exit_code"]) == ("not_as_expected", 1)
     assert "SAFE-INV: harmless" in overall["why"]

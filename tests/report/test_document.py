@@ -18,7 +18,7 @@ from airground_drake.verify.finding import Finding
 
 def test_minimum_of_the_schema_in_strict_json(scenario: Scenario, traces: dict[str, Trace]) -> None:
     report = json.loads(json.dumps(built(scenario, traces, FINE), allow_nan=False))
-    assert report["schema"] == "airground_drake.report/1"
+    assert report["schema"] == "airground_drake.report/2"
     assert {"name", "sha256", "resolved"} <= set(report["scenario"])
     run = report["runs"]["c"]
     assert set(run["events"][0]) == {"t_s", "robot", "kind", "position_m"}
@@ -56,6 +56,12 @@ def test_minimum_of_the_schema_in_strict_json(scenario: Scenario, traces: dict[s
         ([*FINE, verdict("a", "not_run")], "inconclusive", 3),
         ([*FINE, verdict("a", "error")], "inconclusive", 3),
         ([*FINE, verdict("a", "inconclusive", "inconclusive")], "as_expected", 0),
+        ([*FINE, verdict("a", exercised=0)], "as_expected", 0),
+        ([*FINE, verdict("a", "holds", "exercised", exercised=4)], "as_expected", 0),
+        ([*FINE, verdict("a", "holds", "exercised", exercised=0)], "not_as_expected", 1),
+        ([*FINE, verdict("a", "refuted", "exercised", exercised=4)], "not_as_expected", 1),
+        ([*FINE, verdict("a", "refuted", "exercised or refuted", exercised=4)], "as_expected", 0),
+        ([*FINE, verdict("a", "not_run", "exercised")], "inconclusive", 3),
         (FINE[:2], "inconclusive", 3),
         ([], "inconclusive", 3),
     ],
@@ -63,6 +69,19 @@ def test_minimum_of_the_schema_in_strict_json(scenario: Scenario, traces: dict[s
 def test_overall(verdicts: list[Verdict], status: str, code: int, scenario: Scenario, traces: dict[str, Trace]) -> None:
     report = built(scenario, traces, verdicts)
     assert (report["overall"]["status"], document.exit_code(report)) == (status, code)
+
+
+def test_what_had_nothing_to_check_is_counted_apart(scenario: Scenario, traces: dict[str, Trace]) -> None:
+    idle = [verdict("a", exercised=0), verdict("c", exercised=0), verdict("", "proved", "proved", exercised=0)]
+    overall = built(scenario, traces, [*FINE, verdict("a", exercised=1), *idle])["overall"]
+    assert overall["counts"] == {"holds": 3, "refuted": 1, "not_exercised": 3}
+    assert [(item["id"], item["run"]) for item in overall["not_exercised"]] == [("SAFE-TRACE", run) for run in "ac"] + [
+        ("SAFE-TRACE", "")
+    ]
+    assert overall["why"].endswith("3 of them had nothing to check: SAFE-TRACE on run a, c.")
+    assert (overall["checks"], overall["as_expected"]) == (7, 7)
+    missed = built(scenario, traces, [*FINE, verdict("a", "holds", "exercised", exercised=0)])["overall"]
+    assert "SAFE-TRACE on run a (holds, nothing to check, expected exercised)" in missed["why"]
 
 
 def test_nothing_at_all_is_no_pass(scenario: Scenario) -> None:

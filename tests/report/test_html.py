@@ -148,6 +148,21 @@ def test_an_unexpected_refutation_is_in_the_banner(
     assert "4.25" in attention
 
 
+def test_what_had_nothing_to_check_has_a_chip_of_its_own_that_needs_no_colour(
+    scenario: Scenario, traces: dict[str, Trace], page: str
+) -> None:
+    text = html.render(built(scenario, traces, [*FINE, verdict("c", exercised=0), verdict("c", exercised=12)]), [])
+    table = text[text.index("Every claim on every run") : text.index('<details class="claim"')]
+    assert table.count("holds, nothing to check") == 1
+    assert "\N{EMPTY SET}" in table
+    banner = text[text.index('class="banner') : text.index("</section>")]
+    assert "1 holds, nothing to check" in banner
+    assert "1 of them had nothing to check: SAFE-TRACE on run c." in banner
+    assert '<td data-label="Exercised">12</td>' in text
+    assert "<dt>Exercised by</dt><dd>pairs</dd>" in text
+    assert "1 holds, nothing to check" not in page
+
+
 def test_a_row_that_is_not_reproduced_shows(scenario: Scenario, traces: dict[str, Trace]) -> None:
     changed = replace(scenario.reproduction[1], id="A5", paper=[10.6])
     text = html.render(built(replace(scenario, reproduction=[changed]), traces, FINE), [])

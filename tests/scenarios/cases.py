@@ -19,6 +19,9 @@ CASE_A = Path(schema.__file__).with_name("case_a.yaml")
 DATA: dict[str, Any] = yaml.safe_load(CASE_A.read_text(encoding="utf-8"))
 DELETE = object()
 
+DEADLOCKS = ("pocket", "swap", "doorway", "intersection", "crossing", "warehouse")
+"""Shipped scenarios in which somebody is stuck without the UAV."""
+
 
 Write = Callable[[str | bytes], str]
 """Writes a file and returns its path."""

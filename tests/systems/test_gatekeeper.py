@@ -1,4 +1,4 @@
-"""The gatekeeper in a diagram: dwell, bend, budget by counts and by an injected clock."""
+"""The gatekeeper in a diagram: dwell, refusals, budget by counts and by an injected clock."""
 
 from __future__ import annotations
 
@@ -36,19 +36,20 @@ class Alternating:
 def test_opposite_answers_of_a_run_are_a_dwell_apart(case_a: Scenario, dwell: float) -> None:
     case_a.gatekeeper.min_dwell_s, case_a.gatekeeper.route = dwell, "alternating"
     with ROUTES.adding("alternating", Alternating):
-        decisions = simulate(case_a, "d").decisions
+        decisions = simulate(case_a, "c").decisions
     for _, of_one in decisions.groupby(["robot", "issued_s"]):
         changes = of_one["t_s"][of_one["decision"] != of_one["decision"].shift()].to_numpy()
         assert (changes[1:] - changes[:-1] >= dwell - 1e-9).all()
     assert ("dwell" in set(decisions["reason"])) == (dwell > 0.05)
 
 
-def test_a_proposal_into_an_obstacle_is_refused_as_bent(case_a: Scenario) -> None:
-    """Method (d), with a gatekeeper that would accept anything that helps a little."""
-    scenario, _ = load("case_b", ["intervention.policies.0.name=towards", "gatekeeper.max_bend=0.0"])
+def test_a_proposal_that_leads_nowhere_is_refused_under_d_and_the_uav_is_told_where() -> None:
+    scenario, _ = load("case_b", ["intervention.policies.0.name=towards"])
     refused = simulate(scenario, "d").decisions
-    assert refused["bend"].max() > 0.9
-    assert (refused.loc[refused["bend"] > 0.0, "decision"] == "refuse").all()
+    first = refused.iloc[0]
+    assert (first["decision"], first["reason"]) == ("refuse", "stalls")
+    assert first["accept_stalls"] == 1.0
+    assert first["accept_left_m"] > 5.0
 
 
 @dataclass
@@ -80,7 +81,7 @@ def recorded_budgets(scenario: Scenario, monkeypatch: pytest.MonkeyPatch, clock:
         make = components.make_rules
         monkeypatch.setattr(components, "make_rules", lambda s: Rules(**{**make(s).__dict__, "clock": clock}))
     with ROUTES.adding("watching", Watching):
-        Recorder(scenario, "d").simulate(duration=16.0)
+        Recorder(scenario, "c").simulate(duration=16.0)
     return Watching.given
 
 
@@ -113,7 +114,7 @@ def test_with_no_time_left_every_proposal_is_refused(
     case_a.gatekeeper.budget, case_a.gatekeeper.route = "wall_clock", route
     make = components.make_rules
     monkeypatch.setattr(components, "make_rules", lambda s: Rules(**{**make(s).__dict__, "clock": Clock(tick=0.05)}))
-    decisions = simulate(case_a, "d").decisions
+    decisions = simulate(case_a, "c").decisions
     assert len(decisions)
     assert set(decisions["decision"]) == {"refuse"}
     assert set(decisions["status"]) == {"refused_budget_spent"}

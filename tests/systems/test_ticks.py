@@ -40,7 +40,7 @@ def test_answers_are_executed_from_the_sample_at_which_they_are_given(case_a: Sc
     case_a.control.formation_gain_1_s, case_a.control.sensing_range_m = 3.0, 6.0
     case_a.intervention.retry_s, case_a.gatekeeper.route = 0.0, "alternating"
     with ROUTES.adding("alternating", Alternating):
-        trace = simulate(case_a, "d")
+        trace = simulate(case_a, "c")
     assert set(trace.decisions["decision"]) == {"accept", "refuse"}, trace.decisions
     finding = judge("EXEC", trace)
     assert finding.status == "holds", finding

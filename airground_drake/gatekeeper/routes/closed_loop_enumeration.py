@@ -185,9 +185,9 @@ def _modes(block: int) -> int:
 
 def _smallest() -> Problem:
     """One stage without points, to compile the search with."""
-    still, none, row = np.zeros((2, 3)), np.zeros((0, 3)), np.zeros((1, 3))
+    still, row = np.zeros((2, 3)), np.zeros((1, 3))
     loop = ClosedLoop(
-        start=np.zeros(3), preset=still, wanted=still, chosen=np.eye(3), centres=none, velocities=none,
+        start=np.zeros(3), preset=still, wanted=still, chosen=np.eye(3), points=np.zeros((2, 0, 3)),
         distances=np.zeros(0), shares=np.zeros(0), max_speed=1.0, motion_gain=1.0, intervention_gain=1.0,
         avoidance_gain=1.0, period=1.0, sensing_range=1.0, composition=0, intervention_on_top=False, substeps=1,
     )  # fmt: skip

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from typing import Any
+from unittest import mock
 
 import numpy as np
 from pydrake.solvers import ClarabelSolver, MathematicalProgram
 
-from airground_drake.gatekeeper.budget import Budget
-from airground_drake.gatekeeper.problem import Problem
-from airground_drake.gatekeeper.solution import Solution
+from airground_drake.gatekeeper.certified import CertifiedGatekeepers
 from airground_drake.report.audit.item import Item
 from airground_drake.report.metrics import closest_obstacle
 from airground_drake.report.reproduction import MEASURES
 from airground_drake.scenarios.load import load
 from airground_drake.simulation import simulate
 from airground_drake.trace import Trace
+from airground_drake.verify.model.patience.attack import Believing
 
 
 def companion_findings() -> list[Item]:
@@ -27,18 +27,10 @@ def _run(name: str, run: str, changes: tuple[str, ...] = ()) -> Trace:
     return simulate(load(name, changes)[0], run)
 
 
-class Credulous:
-    """A route that calls every proposal a great gain."""
-
-    def solve(self, problem: Problem, budget: Budget) -> Solution:
-        """Accept."""
-        return Solution(True, "optimal", objective=0.0)
-
-
 def _accepting(name: str, run: str) -> Trace:
-    """A run whose gatekeeper accepts everything, however much the inequalities bend it."""
-    route = f"{Credulous.__module__}:{Credulous.__name__}"
-    return _run(name, run, ("gatekeeper.max_bend=1e9", f"gatekeeper.route={route}"))
+    """A run of method (d) whose gatekeeper takes every proposal for useful."""
+    with mock.patch.object(CertifiedGatekeepers, "foresee", Believing.foresee):
+        return _run(name, run)
 
 
 def _sign() -> Item:

@@ -121,6 +121,10 @@ def _map(trace: Trace, frame: Frame, width_in: float, above_in: float = 0.1) -> 
         if len(trace.scenario["obstacles"]) <= MAX_NAMED_OBSTACLES:
             text = short(name, 12) + ("" if known else "\n(unseen by the UAV)")
             axes.annotate(text, (x, y), (0, -6), textcoords="offset points", ha="center", va="top", fontsize=7.5)
+    for x, y, _ in trace.scenario["uav"].get("phantoms_m", []):
+        axes.plot(x, y, marker="x", markersize=6, color=MUTED, zorder=3)
+        text = "(only on the UAV's map)"
+        axes.annotate(text, (x, y), (0, -6), textcoords="offset points", ha="center", va="top", fontsize=7.5)
     return figure, axes
 
 

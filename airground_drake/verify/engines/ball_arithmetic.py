@@ -207,5 +207,6 @@ def conclude(
         counterexample=None if false is None else {"false_statement": false.to_json(), "value": false.witness()},
         evidence=evidence | fields.pop("evidence", {}),
         certificates={"statements.json": json.dumps(certificate, indent=1) + "\n", **(scripts or {})},
+        exercised=len(statements),
         **fields,
     )

@@ -15,9 +15,10 @@ multiplied out, so that a checker need not parse anything but sums of products.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from fractions import Fraction
+from functools import cache
 from typing import Any
 
 import sympy
@@ -168,8 +169,9 @@ _NUMBERS = {"Integer": sympy.Integer, "Float": sympy.Float, "Rational": sympy.Ra
 _RATIONAL = (*sympy.parsing.sympy_parser.standard_transformations, sympy.parsing.sympy_parser.rationalize)
 
 
-def polynomial(text: str, variables: Sequence[str]) -> Any:
-    """A text as a sympy polynomial with rational coefficients.
+@cache
+def polynomial(text: str, variables: tuple[str, ...]) -> Any:
+    """A text as a sympy polynomial with rational coefficients; parsed once, as it is needed in several forms.
 
     Raises:
         ValueError: if it is none, or in other variables.

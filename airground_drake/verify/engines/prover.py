@@ -90,6 +90,7 @@ def finding(proofs: Sequence[Proof], **evidence: Any) -> Finding:
         counterexample=broken if status == "refuted" else None,
         evidence={**evidence, "obligations": [proof.to_json() for proof in proofs]},
         certificates=certificates([proof.obligation for proof in proofs]),
+        exercised=len(proofs),
     )
 
 

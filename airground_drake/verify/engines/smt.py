@@ -38,8 +38,12 @@ class Result:
     proof: str = ""
 
 
+_DECIDED: dict[tuple[Solver, str], Result] = {}
+"""What a solver has said of a script: all that its answer depends on is in the script."""
+
+
 def solve(scripts: Sequence[str], solver: Solver = "z3", limit_s: float = 20.0) -> list[Result]:
-    """Run a solver on each script.
+    """Run a solver on each script; one that it has decided in this process is not asked again.
 
     Args:
         scripts: SMT-LIB 2 texts, each with one `(check-sat)`; logic HORN asks z3's Spacer.
@@ -50,9 +54,12 @@ def solve(scripts: Sequence[str], solver: Solver = "z3", limit_s: float = 20.0) 
         One result per script, in order; never raises for what a solver does.
     """
     results: list[Result] = []
-    while len(results) < len(scripts):
-        results += _attempt(scripts[len(results) :], solver, limit_s)
-    return results
+    open_ones = [script for script in dict.fromkeys(scripts) if (solver, script) not in _DECIDED]
+    while len(results) < len(open_ones):
+        results += _attempt(open_ones[len(results) :], solver, limit_s)
+    found = dict(zip(open_ones, results, strict=True))
+    _DECIDED.update({(solver, script): each for script, each in found.items() if each.answer in ("sat", "unsat")})
+    return [found.get(script) or _DECIDED[solver, script] for script in scripts]
 
 
 def _attempt(scripts: Sequence[str], solver: Solver, limit_s: float) -> list[Result]:

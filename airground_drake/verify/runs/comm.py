@@ -12,7 +12,7 @@ from airground_drake.errors import TraceError
 from airground_drake.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S, TraceClaim
 from airground_drake.verify.finding import Finding
-from airground_drake.verify.runs.interventions import GATED_METHODS, intervening, talk_is_due
+from airground_drake.verify.runs.interventions import GATED_METHODS, causes_of, intervening, talk_is_due
 
 
 class Comm(TraceClaim):
@@ -20,8 +20,8 @@ class Comm(TraceClaim):
 
     id = "COMM"
     statement = (
-        "Messages and gatekeeper solves were spent only while a UGV was being intervened on, and no more of them than "
-        "an always-on scheme would have spent."
+        "Messages and gatekeeper solves were spent only while the UGV concerned, or the one that it was asked to make "
+        "way for, was being intervened on, and no more of them than an always-on scheme would have spent."
     )
     formula = (
         "every proposal and decision in [trigger, release + intervention period + gatekeeper period]; "
@@ -29,7 +29,8 @@ class Comm(TraceClaim):
     )
     method = (
         "Counts of proposal events and of decisions (each one solve and one answer), each looked up in the intervals "
-        "in which the mode column says 'intervening'. After a release the UAV withdraws its proposal at its next "
+        "in which the mode column of the UGV, or of the one whose trigger is the proposal's cause, says "
+        "'intervening'. After a release the UAV withdraws its proposal at its next "
         "planning instant and the gatekeeper notices at its next sample: hence the allowance of one period each."
     )
     equations = "(20), (26)"
@@ -46,6 +47,8 @@ class Comm(TraceClaim):
         """Method (a) sends nothing by construction."""
         return trace.meta.get("method") != "a"
 
+    exercised_by = "proposals sent"
+
     def check(self, trace: Trace) -> Finding:
         """Count, look for strays, compare with always-on; the margin is the fraction saved of what saves least."""
         scenario = trace.scenario
@@ -55,6 +58,7 @@ class Comm(TraceClaim):
         named = {e["robot"] for e in trace.events if e["kind"] == "proposal"} | set(trace.decisions["robot"])
         if strangers := named - set(trace.ugvs):
             raise TraceError(f"proposals or decisions for {sorted(strangers)}, which are not UGVs of the trace")
+        causes = causes_of(trace)
         strays: list[dict[str, Any]] = []
         per_ugv: dict[str, dict[str, Any]] = {}
         for ugv in trace.ugvs:
@@ -67,8 +71,12 @@ class Comm(TraceClaim):
             }
             if np.setdiff1d(_decisions(trace, ugv, "issued_s"), sent["proposal"]).size:
                 raise TraceError(f"{ugv}: a decision is about a proposal that is not among the events")
+            about = {"proposal": sent["proposal"], "decision": _decisions(trace, ugv, "issued_s")}
             for kind, times in sent.items():
                 late = _outside(times, intervals, planning + gating)
+                for other in {*causes.values()} - {ugv}:
+                    asked = np.array([causes.get((ugv, float(issued)), ugv) == other for issued in about[kind]], bool)
+                    late &= ~asked | _outside(times, intervening(trace, other), planning + gating)
                 strays += [{"robot": ugv, "kind": kind, "t_s": float(time)} for time in times[late]]
                 if not times.size and (kind == "proposal" or gated) and talk_is_due(trace, ugv):
                     reason = f"{ugv} was in mode 'intervening', but the trace has no {kind}"
@@ -92,6 +100,7 @@ class Comm(TraceClaim):
                 "ugvs": per_ugv,
                 "outside_interventions": strays,
             },
+            exercised=spent["proposal"],
         )
 
 

@@ -90,7 +90,9 @@ class Exec(TraceClaim):
     assumptions = (
         "The command of a row is the velocity applied since the row before (the trace's convention); that it is held "
         "between samples is SAFE-HYP.",
-        "A proposal stays in force as the planner's rules say: see `verify.runs.proposals.accepted_at`.",
+        "A proposal stays in force as the planner's rules say: see `verify.runs.proposals.accepted_at`. One that asks "
+        "a UGV to make way for another one is in force as long as one of the two is intervened on. The trace's table "
+        "of proposals says for whose trigger each was sent; that has to be the UGV's own while it is intervened on.",
         "The UAV feeds the UGVs' commands of the sample before forward: controllers of one sample see each other's "
         "last commands.",
     )
@@ -99,6 +101,8 @@ class Exec(TraceClaim):
         "Commands that are wrong by less than 1e-6 m/s. Under a disturbance of the motion it is about the commands, "
         "not about where they led. A UAV with another task than 'formation' is not judged; the evidence says so."
     )
+
+    exercised_by = "commands for which an accepted proposal was executed, or which an avoidance inequality bound"
 
     def check(self, trace: Trace) -> Finding:
         """Compare every command with the law; the margin is the tolerance less the largest difference."""
@@ -133,6 +137,7 @@ class Exec(TraceClaim):
                 "not_judged": [] if formation else [f"{trace.robots[-1]}: task {trace.scenario['uav']['task']}"],
                 "tolerance_m_s": COMMAND_TOLERANCE_M_S,
             },
+            exercised=sum(int((one.executing | one.binding).sum()) for one in judged),
         )
 
 

@@ -25,6 +25,7 @@ from airground_drake.verify.runs.control_law import (
 )
 from airground_drake.verify.runs.control_samples import control_samples
 from airground_drake.verify.runs.gate_record import GateClaim, Off, Row, conclude
+from airground_drake.verify.runs.outcome_rolls import foreseen
 from airground_drake.verify.runs.pairs import pairs_of
 from airground_drake.verify.runs.proposals import Sent, accepted_at, proposals_of
 
@@ -33,6 +34,10 @@ VELOCITY_TOLERANCE_M_S = 1e-6
 two inequalities, which the closed loop damps; a corner of nearly parallel ones enlarges it."""
 BEND_TOLERANCE = 1e-6
 """Recorded and recomputed bends may differ by this: they are ratios of sums of such velocities."""
+OUTCOME_TOLERANCE = 1e-6
+"""Recorded and recomputed outcomes may differ by this, relative, or in m^2 s: they are sums over such velocities."""
+LEFT_TOLERANCE_M = 1e-3
+"""A recorded way may be this much outside its bounds, m: the recomputed end is not quite the recorded one."""
 BLOCKS = 6
 """Of stages, for each of which the plans that a decision's plan is compared with choose a mode."""
 MOST_REGRETS = 12
@@ -111,8 +116,12 @@ class GateModel(GateClaim):
         "2^N."
     )
 
+    exercised_by = "decisions"
+
     def judge_rows(self, trace: Trace, rows: list[Row]) -> Finding:
         """Roll out both choices of every decision; the margin is the tolerance less the largest difference."""
+        if trace.meta["method"] not in ON_TOP:
+            return judge_outcomes(trace, rows)
         sent = proposals_of(trace)
         scenes = scenes_of(trace, rows, sent)
         stages = len(rows[0]["reference_m"])
@@ -133,8 +142,35 @@ class GateModel(GateClaim):
             unit="m/s",
             quantity="tolerance left by which a predicted velocity may differ from the closed loop's",
             evidence={**evidence, **_realised(trace, rows, sent), **_regrets(trace, rows, scenes)},
+            exercised=len(rows),
         )
         return conclude(finding, compared)
+
+
+def judge_outcomes(trace: Trace, rows: Sequence[Row]) -> Finding:
+    """Method (d): what comes of either choice, rolled out again for every first decision about a proposal."""
+    sent, compared, largest = proposals_of(trace), list[Off](), 0.0
+    speeds = {ugv: trace.scenario["ugvs"][ugv]["preset"]["speed_m_s"] for ugv in trace.ugvs}
+    looked = [row for row in rows if row.given["accept_stalls"] >= 0.0]
+    for row in looked:
+        for choice, found in zip(("refuse", "accept"), foreseen(trace, row.given, sent), strict=True):
+            cost, left = (float(row.given[f"{choice}_{name}"]) for name in ("outcome_m2_s", "left_m"))
+            ahead = left**3 / (3.0 * speeds[str(row.given["robot"])])
+            due = ahead if found.stalls else found.integral_m2_s + ahead
+            compared.append(Off(row, f"{choice}: stalls", row.given[f"{choice}_stalls"] - float(found.stalls), 0.0))
+            allowed = OUTCOME_TOLERANCE * max(1.0, due)
+            compared.append(Off(row, f"{choice}: outcome, m^2 s", cost - due, allowed, recomputed=due, recorded=cost))
+            largest = max(largest, abs(cost - due) / allowed)
+            short = max(0.0, found.least_left_m - left, left - found.most_left_m)
+            compared.append(Off(row, f"{choice}: way left, m", short, LEFT_TOLERANCE_M, recorded=left))
+    finding = Finding(
+        "holds",
+        margin=1.0 - largest,
+        unit="of the tolerance",
+        quantity="part left of the tolerance of a recorded outcome",
+        evidence={"decisions": len(rows), "outcomes": 2 * len(looked)},
+    )
+    return conclude(finding, compared)
 
 
 def scenes_of(trace: Trace, rows: Sequence[Row], sent: Sequence[Sent]) -> Scenes:

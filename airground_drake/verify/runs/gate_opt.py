@@ -17,7 +17,14 @@ from airground_drake.errors import TraceError
 from airground_drake.trace import Trace
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.convex_bounds import Enclosure, enclose
-from airground_drake.verify.runs.gate_record import POSITION_TOLERANCE_M, GateClaim, Off, Row, conclude, cost_tolerance
+from airground_drake.verify.runs.gate_record import (
+    POSITION_TOLERANCE_M,
+    Off,
+    ProblemClaim,
+    Row,
+    conclude,
+    cost_tolerance,
+)
 
 OVERSTATED = 1e-5
 """A recorded lower bound may be above the optimum by this, relative: a solver's primal cost errs by 1e-6 or less."""
@@ -38,7 +45,7 @@ HALF_PLANE_ROUTES = ("relaxed", "branch_and_bound")
 """Routes that bound the cost with distances along recorded normals; the others know no bound, or an exact one."""
 
 
-class GateOpt(GateClaim):
+class GateOpt(ProblemClaim):
     """GATE-OPT."""
 
     largest_gap = 0.05
@@ -80,6 +87,8 @@ class GateOpt(GateClaim):
         "than the bound, and the gap is negative. Refusals for want of a plan are only listed."
     )
 
+    exercised_by = "decisions that rest on a plan"
+
     def judge_rows(self, trace: Trace, rows: list[Row]) -> Finding:
         """Enclose every optimum; the margin is what is left of the largest gap allowed."""
         route = trace.scenario["gatekeeper"]["route"]
@@ -90,7 +99,8 @@ class GateOpt(GateClaim):
         compared = [one for row in planned for one in compare_with_constant_plans(row)]
         if route not in (*HALF_PLANE_ROUTES, *DWELL_ROUTES):
             reason = f"route {route!r} has no bound that can be established again"
-            return conclude(Finding("inconclusive", evidence={"decisions": len(rows), "reason": reason}), compared)
+            open_ = Finding("inconclusive", evidence={"decisions": len(rows), "reason": reason}, exercised=len(planned))
+            return conclude(open_, compared)
         bounded = bound([row for row in planned if row not in lacking], route)
         for each in bounded:
             compared += compare_bounds(each.row, each.optimum, each.normals)
@@ -98,7 +108,7 @@ class GateOpt(GateClaim):
                 compared.append(compare_with_blocks(each, self.largest_gap))
         finding = self._finding(bounded, lacking)
         listed = {"decisions": len(rows), "without_a_plan": [row.label for row in rows if not row.planned]}
-        return conclude(replace(finding, evidence=listed | finding.evidence), compared)
+        return conclude(replace(finding, evidence=listed | finding.evidence, exercised=len(planned)), compared)
 
     def _finding(self, bounded: Sequence[Bounded], lacking: Sequence[Row]) -> Finding:
         """What the gaps say, as long as nothing recorded is wrong; a gap that is too wide is open, not refuted."""

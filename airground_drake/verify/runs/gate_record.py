@@ -18,6 +18,7 @@ from airground_drake.errors import TraceError
 from airground_drake.trace import PROBLEM_ARRAYS, PROBLEM_SCALARS, Trace
 from airground_drake.verify.claim import TraceClaim
 from airground_drake.verify.finding import Finding
+from airground_drake.verify.runs.control_law import ON_TOP
 from airground_drake.verify.runs.interventions import GATED_METHODS, talk_is_due
 
 POSITION_TOLERANCE_M = 1e-9
@@ -123,6 +124,25 @@ def rows_of(trace: Trace) -> list[Row]:
     return rows
 
 
+def bare_rows_of(trace: Trace) -> list[Row]:
+    """All decisions by outcomes: they have no problem.
+
+    Raises:
+        TraceError: if there is a problem all the same, or a number is not finite.
+    """
+    if len(trace.problems):
+        raise TraceError(f"{len(trace.problems)} problems, though outcomes are compared")
+    rows = []
+    for given in trace.decisions.to_dict("records"):
+        row = Row({str(name): value for name, value in given.items()}, -1.0, -1.0, -1.0, {})
+        if not np.isfinite([value for value in given.values() if isinstance(value, float)]).all():
+            raise TraceError(f"{row.label}: it has numbers that are not finite")
+        if given["robot"] not in trace.ugvs:
+            raise TraceError(f"{row.label}: not of a UGV of the trace")
+        rows.append(row)
+    return rows
+
+
 def _shaped(flat: dict[str, Array], n: int) -> dict[str, Array | None]:
     """Arrays of a problem of n stages in their shapes; None for what is empty and may be."""
     m = len(flat["distances_m"])
@@ -177,7 +197,7 @@ def conclude(finding: Finding, compared: Iterable[Off]) -> Finding:
 
 
 class GateClaim(TraceClaim):
-    """What the three claims share: they are about the decisions of an optimising gatekeeper, all of them recorded."""
+    """What the claims share: they are about the decisions of a gatekeeper, all of them recorded."""
 
     def applies(self, trace: Trace) -> bool:
         """Methods (a) and (b) optimise nothing."""
@@ -185,18 +205,27 @@ class GateClaim(TraceClaim):
 
     def check(self, trace: Trace) -> Finding:
         """Decide the claim; without decisions it holds only if no UGV was long enough in intervention to need one."""
-        if len(trace.decisions) and not len(trace.problems):
+        if len(trace.decisions) and not len(trace.problems) and trace.meta["method"] in ON_TOP:
             return Finding("not_run", evidence={"reason": "the problems of the decisions were not recorded"})
         for ugv in trace.ugvs:
             needed = (trace.column(f"{ugv}.accepted") != 0.0).any() or talk_is_due(trace, ugv)
             if needed and not (trace.decisions["robot"] == ugv).any():
                 reason = f"{ugv} was in mode 'intervening', but the trace has no decision of it"
                 return Finding("not_run", evidence={"reason": reason, "faults": trace.meta["faults"]})
-        rows = rows_of(trace)
+        rows = rows_of(trace) if trace.meta["method"] in ON_TOP else bare_rows_of(trace)
         if not rows:
-            return Finding("holds", evidence={"decisions": 0, "reason": "no UGV was intervened on: nothing to decide"})
+            reason = "no UGV was intervened on: nothing to decide"
+            return Finding("holds", evidence={"decisions": 0, "reason": reason}, exercised=0)
         return self.judge_rows(trace, rows)
 
     @abc.abstractmethod
     def judge_rows(self, trace: Trace, rows: list[Row]) -> Finding:
         """Decide the claim about at least one decision."""
+
+
+class ProblemClaim(GateClaim):
+    """A claim about problem (26): of method (c) alone."""
+
+    def applies(self, trace: Trace) -> bool:
+        """Method (d) compares outcomes and solves no problem (26)."""
+        return super().applies(trace) and trace.meta.get("method") in ON_TOP

@@ -9,7 +9,7 @@ import numpy as np
 from airground_drake.errors import TraceError
 from airground_drake.trace import Trace
 from airground_drake.verify.finding import Finding
-from airground_drake.verify.runs.gate_record import GateClaim, Off, Row, conclude
+from airground_drake.verify.runs.gate_record import Off, ProblemClaim, Row, conclude
 
 TIE = 1e-9
 """Accumulated deficits of sum-up rounding closer to 1/2 than this are a tie: either mode may follow."""
@@ -18,7 +18,7 @@ ROUNDED_ROUTES = ("relaxed", "nonlinear")
 """Routes that solve (27) and round by (28)-(29)."""
 
 
-class GateSur(GateClaim):
+class GateSur(ProblemClaim):
     """GATE-SUR."""
 
     id = "GATE-SUR"
@@ -39,6 +39,8 @@ class GateSur(GateClaim):
         "That the relaxed plan is optimal (GATE-OPT), or that the rounded one was taken: the cheapest plan known was. "
         "A small integrated error bounds positions, not costs."
     )
+
+    exercised_by = "relaxed plans that were rounded"
 
     def applies(self, trace: Trace) -> bool:
         """Only some routes round; a trace without a scenario is for `judge` to reject."""
@@ -63,6 +65,7 @@ class GateSur(GateClaim):
             quantity="half a stage less the integrated rounding error",
             where={name: worst.given[name] for name in ("robot", "t_s")},
             evidence={**skipped, "largest_error_s": error, "bound_s": bound},
+            exercised=len(rounded),
         )
         return conclude(finding, (one for row in rounded for one in compare_rounding(row)))
 

@@ -29,6 +29,8 @@ class GateTime(TraceClaim):
         "than 100 decisions p99 is the maximum. Simulated time waits for the solver, so late decisions had no effect."
     )
 
+    exercised_by = "decisions that were timed"
+
     def applies(self, trace: Trace) -> bool:
         """Methods (a) and (b) have no gatekeeper to be timed."""
         return trace.meta.get("method") in GATED_METHODS
@@ -39,7 +41,8 @@ class GateTime(TraceClaim):
         period = float(trace.scenario["gatekeeper"]["period_s"])
         decisions = len(trace.decisions)
         if not decisions and not any(talk_is_due(trace, ugv) for ugv in trace.ugvs):
-            return Finding("holds", evidence={"count": 0, "reason": "no UGV was intervened on: nothing to decide"})
+            reason = "no UGV was intervened on: nothing to decide"
+            return Finding("holds", evidence={"count": 0, "reason": reason}, exercised=0)
         if not decisions or not times.size:
             return Finding("not_run", evidence={"reason": "no decision, or none timed", "decisions": decisions})
         if len(times) < decisions or not (times >= 0.0).all():
@@ -63,4 +66,5 @@ class GateTime(TraceClaim):
             quantity=quantity,
             counterexample=counterexample,
             evidence=evidence,
+            exercised=len(times),
         )

@@ -38,6 +38,8 @@ class LiveGoal(TraceClaim):
         "tracked their preset on the way. Without potential or navigation function no convergence proof exists."
     )
 
+    exercised_by = "robots that had a way to go to where they must end"
+
     def check(self, trace: Trace) -> Finding:
         """Compare each robot's end with what its scenario declares; the least margin is reported."""
         scenario = trace.scenario
@@ -46,11 +48,14 @@ class LiveGoal(TraceClaim):
             raise TraceError(f"stalls_m names {sorted(unknown)}, which are not UGVs of the trace")
         final = {robot: trace.position(robot)[-1] for robot in trace.robots}
         conditions: list[dict[str, Any]] = []
+        away_from_there: list[str] = []
 
         def within(robot: str, what: str, point: Array, tolerance: float) -> float:
             distance = float(np.linalg.norm(final[robot] - point))
             entry = {"robot": robot, "condition": what, "point_m": point.tolist(), "final_m": final[robot].tolist()}
             conditions.append({**entry, "distance_m": distance, "margin_m": tolerance - distance})
+            if float(np.linalg.norm(trace.position(robot)[0] - point)) > tolerance:
+                away_from_there.append(robot)
             return distance
 
         arrival = float(scenario["arrival_tolerance_m"])
@@ -79,7 +84,8 @@ class LiveGoal(TraceClaim):
             quantity="tolerance left about where a robot must end",
             where={"robot": worst["robot"], "condition": worst["condition"]},
             counterexample=None if live else worst,
-            evidence={"conditions": conditions},
+            evidence={"conditions": conditions, "had_a_way_to_go": away_from_there},
+            exercised=len(away_from_there),
         )
 
 

@@ -31,6 +31,19 @@ def pairs_of(trace: Trace) -> Iterator[Pair]:
             yield Pair(robot, other, safe["air_ground_m"] if uav in (robot, other) else safe["ugv_m"], 0.5)
 
 
+def speed_limits(trace: Trace) -> dict[str, float]:
+    """Maximum speed of each robot, m/s."""
+    robots = {**trace.scenario["ugvs"], trace.scenario["uav"]["name"]: trace.scenario["uav"]}
+    return {name: float(robot["max_speed_m_s"]) for name, robot in robots.items()}
+
+
+def reach_m(trace: Trace, pair: Pair) -> float:
+    """By how much a pair can come closer to each other in one control period, m."""
+    limits = speed_limits(trace)
+    closing = limits[pair.first] + limits.get(pair.second, 0.0)
+    return closing * float(trace.scenario["control"]["period_s"])
+
+
 def places_of(trace: Trace) -> dict[str, Array]:
     """Positions by name, m: (T, 3) of a robot, (3,) of an obstacle, whether the UAV knows it or not."""
     obstacles = trace.scenario["obstacles"]

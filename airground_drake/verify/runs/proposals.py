@@ -27,6 +27,8 @@ class Sent:
         times_s: vertices of the motion that it asks for, (M,).
         positions_m: where they are, (M, 3).
         chosen: J_int^+ J_int, (3, 3).
+        mapped_m: obstacles that the UAV says it knows, (k, 3).
+        cause: UGV whose trigger it is for: this one, or another one that it is to make way for.
     """
 
     ugv: str
@@ -35,6 +37,8 @@ class Sent:
     times_s: Array
     positions_m: Array
     chosen: Array
+    mapped_m: Array
+    cause: str
 
     def place(self, t: float | Array) -> Array:
         """Where the UGV is to be at times: (3,) or (K, 3), m; at rest before the first vertex and after the last."""
@@ -61,19 +65,23 @@ def proposals_of(trace: Trace) -> list[Sent]:
     """
     found = []
     for row in trace.proposals.to_dict("records"):
-        times, places, selection = (
-            np.asarray(row[name], dtype=np.float64).ravel() for name in ("times_s", "positions_m", "selection")
+        times, places, selection, mapped = (
+            np.asarray(row[name], dtype=np.float64).ravel()
+            for name in ("times_s", "positions_m", "selection", "mapped_m")
         )
         label = f"proposal to {row['robot']} at t = {row['issued_s']} s"
-        numbers = np.concatenate([times, places, selection, [row["issued_s"]]])
+        numbers = np.concatenate([times, places, selection, mapped, [row["issued_s"]]])
         if not np.isfinite(numbers).all() or not len(times) or not (np.diff(times) > 0.0).all():
             raise TraceError(f"{label}: numbers that are not finite, or times that do not increase")
-        if len(places) != 3 * len(times) or not len(selection) or len(selection) % 3 or row["robot"] not in trace.ugvs:
+        shaped = len(places) == 3 * len(times) and len(selection) and not len(selection) % 3 and not len(mapped) % 3
+        if not shaped or row["robot"] not in trace.ugvs:
             raise TraceError(f"{label}: no motion of a UGV of the trace")
+        if row["cause"] not in trace.ugvs or not _is_cause(trace, row["robot"], row["cause"], row["issued_s"]):
+            raise TraceError(f"{label}: its cause {row['cause']!r} is no UGV whose trigger it can have been sent for")
         found.append(
             Sent(
                 str(row["robot"]), str(row["policy"]), float(row["issued_s"]), times, places.reshape(-1, 3),
-                selected(selection),
+                selected(selection), mapped.reshape(-1, 3), str(row["cause"]),
             )
         )  # fmt: skip
     recorded = sorted((s.ugv, s.issued_s, s.policy) for s in found)
@@ -83,12 +91,23 @@ def proposals_of(trace: Trace) -> list[Sent]:
     return sorted(found, key=lambda sent: sent.issued_s)
 
 
+def _is_cause(trace: Trace, ugv: str, cause: str, issued_s: float) -> bool:
+    """Whether a UGV's own trigger is the cause if it is intervened on, and that of another one that is if not.
+
+    The mode of a row is in force up to it, so that of the next row counts, too: a trigger may be at that very instant.
+    """
+    row = min(int(np.searchsorted(trace.t, issued_s - TIME_TOLERANCE_S)), len(trace.t) - 1)
+    called = {name: trace.column(f"{name}.mode")[row : row + 2] == 1.0 for name in (ugv, cause)}
+    return bool(called[cause].any()) and (cause == ugv or not called[ugv].all())
+
+
 def accepted_at(trace: Trace, ugv: str, proposals: list[Sent], t: Array) -> list[Sent | None]:
     """The proposal that a UGV has accepted, at control samples (S,), s, or None.
 
-    A proposal is in force from when it is sent until, at a planning instant, the UGV is not being intervened on, the
-    motion has run out, the UGV's last answer was a refusal, or another one is sent. Under method (b) it is accepted
-    all the while; under (c) and (d) while the decision of the last sample of the gatekeeper accepts it.
+    A proposal is in force from when it is sent until, at a planning instant, neither the UGV nor the one that it is to
+    make way for is being intervened on, the motion has run out, the UGV's last answer was a refusal, or another one is
+    sent. Under method (b) it is accepted all the while; under (c) and (d) while the decision of the last sample of the
+    gatekeeper accepts it.
 
     Args:
         trace: one run.
@@ -129,7 +148,8 @@ def accepted_at(trace: Trace, ugv: str, proposals: list[Sent], t: Array) -> list
 def _withdrawn_s(trace: Trace, ugv: str, sent: Sent, mine: list[Sent], answers: list[Any]) -> float:
     """The planning instant at which a proposal is taken back, s; infinite if it never is."""
     period = trace.scenario["intervention"]["period_s"]
-    mode, t = trace.column(f"{ugv}.mode"), trace.t
+    called = (trace.column(f"{ugv}.mode") == 1.0) | (trace.column(f"{sent.cause}.mode") == 1.0)
+    t = trace.t
     later = [other.issued_s for other in mine if other.issued_s > sent.issued_s]
     refused = [(when, yes) for when, issued, yes in answers if issued == sent.issued_s]
     first = round(sent.issued_s / period) + 1
@@ -138,7 +158,7 @@ def _withdrawn_s(trace: Trace, ugv: str, sent: Sent, mine: list[Sent], answers: 
         row = min(int(np.searchsorted(t, now - TIME_TOLERANCE_S)), len(t) - 1)
         before = [yes for when, yes in refused if when < now - TIME_TOLERANCE_S]
         # whether a motion that ends at this very instant has run out is a matter of the clock's own rounding
-        out = mode[row] != 1.0 or t[row] >= sent.times_s[-1] or (before and not before[-1])
+        out = not called[row] or t[row] >= sent.times_s[-1] or (before and not before[-1])
         if out or (later and later[0] <= now + TIME_TOLERANCE_S):
             return now
     return np.inf

@@ -15,11 +15,20 @@ from airground_drake.verify.claim import TIME_TOLERANCE_S, TraceClaim
 from airground_drake.verify.engines.segments import MERGE_S
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.control_samples import control_samples
-from airground_drake.verify.runs.pairs import DISTANCE_TOLERANCE_M, pairs_of, places_of, slack_of, snapshot
+from airground_drake.verify.runs.pairs import (
+    DISTANCE_TOLERANCE_M,
+    pairs_of,
+    places_of,
+    slack_of,
+    snapshot,
+    speed_limits,
+)
 
 VELOCITY_TOLERANCE_M_S = 1e-9
 """A velocity may miss an inequality, a limit or the held command by this much, m/s: distances are divided by the
 control period, so rounding errs by 1e-13 m/s; in one period of 25 ms it moves a robot 2.5e-11 m."""
+BINDING_M_S = 1e-9
+"""An avoidance inequality binds where a command has no more than this to spare, m/s."""
 
 
 @dataclass(frozen=True)
@@ -68,6 +77,8 @@ class SafeHyp(TraceClaim):
         "is said about samples that the run did not visit."
     )
 
+    exercised_by = "avoidance inequalities that bound a command at a control sample"
+
     def check(self, trace: Trace) -> Finding:
         """Evaluate all hypotheses; the first violation in time is the counterexample."""
         monitored = [*_static(trace), *_sampled(trace)]
@@ -81,6 +92,7 @@ class SafeHyp(TraceClaim):
                 worst[key] = entry
         name = first["hypothesis"] if first else "avoidance"
         leading = min((w for w in worst.values() if w["hypothesis"] == name), key=lambda w: w["margin"], default={})
+        binding = _binding(trace, monitored)
         in_range = sum(int(np.isfinite(h.margin).sum()) for h in monitored if h.name == "avoidance")
         return Finding(
             "refuted" if first else "holds",
@@ -92,9 +104,23 @@ class SafeHyp(TraceClaim):
             evidence={
                 "worst": list(worst.values()),
                 "inequalities_in_range": in_range,
+                "inequalities_that_bind": binding,
                 "tolerance_m_s": VELOCITY_TOLERANCE_M_S,
             },
+            exercised=sum(binding.values()),
         )
+
+
+def _binding(trace: Trace, monitored: list[_Hypothesis]) -> dict[str, int]:
+    """How many avoidance inequalities bound a command, by who moved and what it had to avoid."""
+    count = {"ugv beside obstacle": 0, "uav beside obstacle": 0}
+    count |= {"ugv beside ugv": 0, "ugv beside uav": 0, "uav beside ugv": 0}
+    kind = dict.fromkeys(trace.ugvs, "ugv") | {trace.robots[-1]: "uav"}
+    for h in monitored:
+        if h.name == "avoidance":
+            sides = kind[h.about["robot"]], kind.get(h.about["other"], "obstacle")
+            count[" beside ".join(sides)] += int((h.margin <= BINDING_M_S).sum())
+    return count
 
 
 def _static(trace: Trace) -> Iterator[_Hypothesis]:
@@ -102,7 +128,7 @@ def _static(trace: Trace) -> Iterator[_Hypothesis]:
     control, places = trace.scenario["control"], places_of(trace)
     start = trace.t[:1]
     period = control["period_s"]
-    limits = _speed_limits(trace)
+    limits = speed_limits(trace)
     stable = np.array([1.0 - control["avoidance_gain_1_s"] * period])
     yield _Hypothesis("gain: A h <= 1", "1", start, stable, 1e-12, {})
     for pair in pairs_of(trace):
@@ -117,7 +143,7 @@ def _static(trace: Trace) -> Iterator[_Hypothesis]:
 def _sampled(trace: Trace) -> Iterator[_Hypothesis]:
     """Hypotheses at the control samples: their spacing, the hold between them, limits and inequalities."""
     control = trace.scenario["control"]
-    limits = _speed_limits(trace)
+    limits = speed_limits(trace)
     t = trace.t
     samples = control_samples(t, control["period_s"])
     chosen = np.searchsorted(t, t[samples] + MERGE_S)  # the velocity chosen at a sample is the next row's command
@@ -145,8 +171,3 @@ def _sampled(trace: Trace) -> Iterator[_Hypothesis]:
             )
             about = {"robot": robot, "other": other}
             yield _Hypothesis("avoidance", "m/s", t[samples], slack, VELOCITY_TOLERANCE_M_S, about)
-
-
-def _speed_limits(trace: Trace) -> dict[str, float]:
-    robots = {**trace.scenario["ugvs"], trace.scenario["uav"]["name"]: trace.scenario["uav"]}
-    return {name: float(robot["max_speed_m_s"]) for name, robot in robots.items()}

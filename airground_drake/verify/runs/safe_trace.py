@@ -8,7 +8,7 @@ from airground_drake.trace import Trace
 from airground_drake.verify.claim import TraceClaim
 from airground_drake.verify.engines.segments import closest_approach
 from airground_drake.verify.finding import Finding
-from airground_drake.verify.runs.pairs import DISTANCE_TOLERANCE_M, pairs_of, places_of, snapshot
+from airground_drake.verify.runs.pairs import DISTANCE_TOLERANCE_M, pairs_of, places_of, reach_m, snapshot
 
 
 class SafeTrace(TraceClaim):
@@ -33,6 +33,8 @@ class SafeTrace(TraceClaim):
         "nor that positions in the trace are those of a real robot. It says nothing about why the distance was kept."
     )
 
+    exercised_by = "pairs that came so close that one control period at full speed would have broken the distance"
+
     def check(self, trace: Trace) -> Finding:
         """Compare the minimum distance of each pair with its safe distance; the worst pair gives the margin."""
         t, places = trace.t, places_of(trace)
@@ -48,6 +50,7 @@ class SafeTrace(TraceClaim):
                     "margin_m": nearest.distance_m - pair.safe_m,
                     "t_s": nearest.t_s,
                     "row": nearest.row,
+                    "exercised": bool(nearest.distance_m - pair.safe_m < reach_m(trace, pair)),
                 }
             )
         worst = min(pairs, key=lambda entry: float(entry["margin_m"]))
@@ -60,4 +63,5 @@ class SafeTrace(TraceClaim):
             where={key: worst[key] for key in ("first", "second", "t_s")},
             counterexample=None if safe else worst | snapshot(trace, (worst["first"], worst["second"]), worst["t_s"]),
             evidence={"pairs": pairs, "tolerance_m": DISTANCE_TOLERANCE_M},
+            exercised=sum(entry["exercised"] for entry in pairs),
         )

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from itertools import zip_longest
+from collections import Counter
+from collections.abc import Iterator
+from itertools import pairwise, zip_longest
 from typing import Any
 
 import numpy as np
@@ -65,6 +67,8 @@ class ThrTrig(TraceClaim):
         "1e-12 m, a trigger and none are equally right and the verdict follows the rounding."
     )
 
+    exercised_by = "transitions of the automaton that were due"
+
     def check(self, trace: Trace) -> Finding:
         """Compare the events of each UGV with the recomputed ones; the first disagreement is the counterexample."""
         decision, zeta = trace.scenario["decision"], float(trace.meta["zeta_m"])
@@ -81,9 +85,11 @@ class ThrTrig(TraceClaim):
         ]
         evidence: list[dict[str, Any]] = []
         lags: list[tuple[float, str]] = []
+        due: Counter[str] = Counter()
         for ugv in trace.ugvs:
             x = decision_variable(trace, ugv)
             predicted = list(transitions(x, zeta, release, dwell))
+            due.update(_as_transitions(predicted))
             recorded = recorded_events(trace, ugv)
             expected = [(time, EVENT_KINDS[kind]) for time, kind in predicted if kind in EVENT_KINDS]
             lag, mismatch = _compare(expected, recorded, x)
@@ -106,8 +112,25 @@ class ThrTrig(TraceClaim):
             quantity="time left by which an event may differ from the crossing",
             where={"robot": worst[1]} if worst else {},
             counterexample=min(wrong, key=lambda conflict: float(conflict["t_s"])) if wrong else None,
-            evidence={"ugvs": evidence, "zeta_m": zeta, "release_m": release, "dwell_s": dwell},
+            evidence={
+                "ugvs": evidence,
+                "zeta_m": zeta,
+                "release_m": release,
+                "dwell_s": dwell,
+                "transitions_due": dict(due),
+            },
+            exercised=due.total(),
         )
+
+
+def _as_transitions(predicted: list[Transition]) -> Iterator[str]:
+    """Those of the automaton, by name: what becomes due at the end of the dwell is one, with a trigger or without."""
+    before = ""
+    for (time, kind), (later, then) in pairwise([*predicted, (math.inf, "")]):
+        at_once = kind == "resume" and (later, then) == (time, "trigger")
+        if not at_once:
+            yield "retrigger" if before == "at once" else kind
+        before = "at once" if at_once else kind
 
 
 def _compare(expected: list[Transition], recorded: list[Transition], x: NormSignal) -> tuple[float, Conflict | None]:

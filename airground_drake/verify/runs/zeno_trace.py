@@ -29,6 +29,8 @@ class ZenoTrace(TraceClaim):
         "claim holds for lack of a gap (the margin is then empty)."
     )
 
+    exercised_by = "gaps between consecutive triggers of one UGV"
+
     def check(self, trace: Trace) -> Finding:
         """Compare the smallest gap of each UGV with the bound."""
         bound = float(trace.scenario["decision"]["min_inter_event_s"])
@@ -49,7 +51,7 @@ class ZenoTrace(TraceClaim):
             "most_triggers_possible": int(trace.scenario["duration_s"] / bound) + 1,
         }
         if not gaps:
-            return Finding("holds", evidence=evidence | {"reason": "no UGV was triggered twice"})
+            return Finding("holds", evidence=evidence | {"reason": "no UGV was triggered twice"}, exercised=0)
         gap, ugv, before, after = min(gaps)
         smallest = {"robot": ugv, "previous_t_s": before, "t_s": after, "gap_s": gap}
         held = gap >= bound - TIME_TOLERANCE_S
@@ -61,4 +63,5 @@ class ZenoTrace(TraceClaim):
             where={"robot": ugv, "t_s": after},
             counterexample=None if held else smallest,
             evidence=evidence | {"smallest_gap": smallest},
+            exercised=len(gaps),
         )

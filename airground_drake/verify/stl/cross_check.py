@@ -166,7 +166,8 @@ def cross_check(trace: Trace, formulas: Sequence[StlFormula] = FORMULAS) -> list
             continue
         check |= {"formula": text, "verdict": "satisfied" if robustness >= -formula.tolerance else "violated"}
         checks.append(check | {"robustness": robustness if abs(robustness) < NEVER / 2 else None})
-    return [check | {"engine": f"rtamt {version('rtamt')}" if rtamt else "rtamt"} for check in checks]
+    engine = f"rtamt {version('rtamt')}" if rtamt else "rtamt"
+    return [check | {"engine": engine} for check in checks]
 
 
 def _robustness(rtamt: Any, text: str, semantics: str, sets: Sequence[dict[str, Samples]]) -> float:

@@ -186,21 +186,33 @@ def triggers(trace: Trace) -> Signals | None:
 
 
 def messages(trace: Trace) -> Signals | None:
-    """Per UGV a pulse at each proposal and decision, and when the events say that it was intervened on."""
+    """A pulse at each proposal and decision, and when the events say that its UGV or its cause was intervened on.
+
+    One set for each UGV and each UGV that it was asked to make way for, itself among them.
+    """
     if trace.meta["method"] == "a":
         return None
     end = float(trace.t[-1])
     scenario = trace.scenario
     table = trace.decisions
+    issued = trace.proposals.to_dict("records")
+    pairs = {(ugv, ugv) for ugv in trace.ugvs} | {(row["robot"], row["cause"]) for row in issued}
     sets: list[dict[str, Samples]] = []
-    for ugv in trace.ugvs:
-        sent = [*_times(trace, ugv, "proposal"), *table.loc[table["robot"] == ugv, "t_s"].tolist()]
-        begins, ends = _times(trace, ugv, "trigger"), _times(trace, ugv, "release")
-        spans = zip_longest(begins, ends[: len(begins)], fillvalue=end)  # they alternate
+    for ugv, cause in sorted(pairs):
+        elsewhere = {row["issued_s"] for row in issued if row["robot"] == ugv and row["cause"] != cause}
+        own = table[(table["robot"] == ugv) & ~table["issued_s"].isin(elsewhere)]
+        sent = [t for t in _times(trace, ugv, "proposal") if t not in elsewhere] + own["t_s"].tolist()
+        spans = [span for name in {ugv, cause} for span in _stays(trace, name, end)]
         message = square(((t, t + PULSE_S) for t in sent), end + 1.0)
         asked = square(((b - TIME_TOLERANCE_S, e + TIME_TOLERANCE_S + PULSE_S) for b, e in spans), end + 1.0)
         sets.append({"message": message, "intervening": asked})
     return Signals({"allowance": scenario["intervention"]["period_s"] + scenario["gatekeeper"]["period_s"]}, sets)
+
+
+def _stays(trace: Trace, ugv: str, end: float) -> list[tuple[float, float]]:
+    """From each trigger to the release after it, or to the end, s."""
+    begins, ends = _times(trace, ugv, "trigger"), _times(trace, ugv, "release")
+    return list(zip_longest(begins, ends[: len(begins)], fillvalue=end))  # they alternate
 
 
 def counts(trace: Trace) -> Signals | None:

@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from check.tampering.base import (
-    UGV,
-    claim_of,
-    edited_entries,
-    edited_report,
-    edited_table,
-    edited_timings,
-    ignored,
-    read_table,
-    refused_by,
-    write_table,
-)
-from check.tampering.events import first, without_event
+from check.tampering import base
+from check.tampering.base import UGV, edited_report, ignored
+from check.tampering.events import first
+from check.tampering.events import without_event as without_event_of
+
+RUN = "c"
+"""The run whose decisions are by problem (26)."""
+refused_by = partial(base.refused_by, run=RUN)
+claim_of = partial(base.claim_of, run=RUN)
+edited_entries = partial(base.edited_entries, run=RUN)
+edited_table = partial(base.edited_table, run=RUN)
+edited_timings = partial(base.edited_timings, run=RUN)
+read_table = partial(base.read_table, run=RUN)
+write_table = partial(base.write_table, run=RUN)
+without_event = partial(without_event_of, run=RUN)
 
 
 def set_decision(folder: Path, row: int, **values: Any) -> None:
@@ -212,7 +215,7 @@ def rounded_plan_changed(folder: Path) -> None:
     edit_arrays(folder, "rounded", lambda rounded: np.roll(rounded, 1))
 
 
-@refused_by("GATE-FEAS", "positions of the plan, (23)")
+@refused_by("GATE-FEAS", "cost of accept throughout")
 def mode_velocities_changed(folder: Path) -> None:
     edit_arrays(folder, "accept_m_s", lambda velocity: 0.9 * velocity)
 

@@ -77,6 +77,18 @@ def proposal_to_nobody(folder: Path) -> None:
         frame["robot"] = "ugv9"
 
 
+@refused_by("EXEC", "a proposal is for a UGV's trigger")
+def proposal_for_nobody(folder: Path) -> None:
+    with edited_table(folder, "proposals") as frame:
+        frame["cause"] = "ugv9"
+
+
+@refused_by("EXEC", "a proposal is for a trigger")
+def proposal_for_another_ugv(folder: Path) -> None:
+    with edited_table(folder, "proposals") as frame:
+        frame["cause"] = [next(ugv for ugv in ("ugv1", "ugv2") if ugv != robot) for robot in frame["robot"]]
+
+
 @refused_by("EXEC", "what is executed is what was accepted")
 def proposals_table_emptied(folder: Path) -> None:
     write_table(folder, read_table(folder, "proposals").iloc[:0], "proposals")
@@ -111,38 +123,38 @@ def executions_miscounted(folder: Path) -> None:
         claim["evidence"]["robots"][UGV]["executing"] += 1
 
 
-@refused_by("GATE-MODEL", "velocity of mode accept")
+@refused_by("GATE-MODEL", "velocity of mode accept", run="c")
 def last_predicted_velocity_changed(folder: Path) -> None:
-    with edited_table(folder, "problems") as frame:
+    with edited_table(folder, "problems", "c") as frame:
         frame["accept_m_s"] = [np.append(np.array(v)[:-3], np.array(v)[-3:] + 1e-5) for v in frame["accept_m_s"]]
 
 
-@refused_by("GATE-MODEL", "velocity of mode refuse")
+@refused_by("GATE-MODEL", "velocity of mode refuse", run="c")
 def own_way_predicted_slower(folder: Path) -> None:
-    with edited_table(folder, "problems") as frame:
+    with edited_table(folder, "problems", "c") as frame:
         frame["refuse_m_s"] = [0.99 * np.array(value) for value in frame["refuse_m_s"]]
 
 
-@refused_by("GATE-MODEL", "bend")
+@refused_by("GATE-MODEL", "bend", run="c")
 def bend_lowered(folder: Path) -> None:
-    with edited_table(folder, "decisions") as frame:
+    with edited_table(folder, "decisions", "c") as frame:
         frame["bend"] *= 0.999
 
 
-@refused_by("GATE-MODEL", "a decision is on a proposal that was sent")
+@refused_by("GATE-MODEL", "a decision is on a proposal that was sent", run="c")
 def decisions_on_a_proposal_that_is_not_in_the_table(folder: Path) -> None:
-    write_table(folder, read_table(folder, "proposals").iloc[1:], "proposals")
+    write_table(folder, read_table(folder, "proposals", "c").iloc[1:], "proposals", "c")
 
 
-@refused_by("GATE-MODEL", "margin")
+@refused_by("GATE-MODEL", "margin", run="c")
 def prediction_margin_raised(folder: Path) -> None:
-    with edited_claim(folder, "GATE-MODEL") as claim:
+    with edited_claim(folder, "GATE-MODEL", "c") as claim:
         claim["margin"] = 1.0
 
 
-@refused_by("GATE-MODEL", "evidence")
+@refused_by("GATE-MODEL", "evidence", run="c")
 def predictions_miscounted(folder: Path) -> None:
-    with edited_claim(folder, "GATE-MODEL") as claim:
+    with edited_claim(folder, "GATE-MODEL", "c") as claim:
         claim["evidence"]["decisions"] += 1
 
 

@@ -135,14 +135,14 @@ def meta_with_a_key_twice(folder: Path) -> None:
     write(path, path.read_bytes().replace(b'"run":', b'"run": "c", "run":', 1))
 
 
-@refused_by("GATE-FEAS", "initial position")
+@refused_by("GATE-FEAS", "initial position", run="c")
 def problems_with_labels(folder: Path) -> None:
     """The order of the rows is what counts, not the labels that a table may have for them."""
-    path = trace(folder) / "problems.parquet"
+    path = trace(folder, "c") / "problems.parquet"
     reversed_rows = pd.read_parquet(path).iloc[::-1]
     path.unlink()
     reversed_rows.to_parquet(path, index=True)
-    seal(folder)
+    seal(folder, "c")
 
 
 @refused_by("trace", "the signals have the column")

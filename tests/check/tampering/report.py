@@ -18,7 +18,7 @@ from check.tampering.base import (
     trace,
 )
 
-GATED = ("GATE-OPT", "GATE-SUR", "GATE-FEAS", "GATE-TIME")
+GATED = ("GATE-FEAS", "GATE-MODEL", "GATE-TIME", "LIVE-PROG")
 
 
 @refused_by("SAFE-TRACE", "as expected", run="b")
@@ -109,9 +109,9 @@ def margin_above_the_tolerance(folder: Path) -> None:
         claim["margin"] = 1.5
 
 
-@refused_by("GATE-OPT", "margin")
+@refused_by("GATE-OPT", "margin", run="c")
 def margin_of_the_gap_changed(folder: Path) -> None:
-    with edited_claim(folder, "GATE-OPT") as claim:
+    with edited_claim(folder, "GATE-OPT", "c") as claim:
         claim["margin"] = 0.049
 
 

@@ -29,7 +29,7 @@ def position_and_commands_changed(folder: Path) -> None:
         shift(frame, middle(frame), 1e-4)
 
 
-@refused_by("GATE-FEAS", "initial position")
+@refused_by("LIVE-PROG", "lag")
 def position_commands_and_decision_variable_changed(folder: Path) -> None:
     with edited_table(folder) as frame:
         shift(frame, middle(frame), 1e-3)

@@ -140,7 +140,7 @@ def no_speed_limit_of_the_uav(monkeypatch: pytest.MonkeyPatch) -> None:
 def one_direction_only(monkeypatch: pytest.MonkeyPatch) -> None:
     """Not a mutant: proposals concern one direction."""
     along = np.array([[1.0, 0.0, 0.0]])
-    monkeypatch.setattr(database, "Proposal", lambda *given: Proposal(*given, selection=along))
+    monkeypatch.setattr(database, "Proposal", lambda *given, **more: Proposal(*given, selection=along, **more))
 
 
 def selection_ignored(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -277,11 +277,13 @@ def test_another_proposal_than_was_executed_is_refuted(run: Callable[[str, str],
         lambda table: table.iloc[:0],
         lambda table: table.drop(columns="times_s"),
         lambda table: table.assign(robot="ugv9"),
+        lambda table: table.assign(cause="ugv9"),
+        lambda table: table.assign(cause="ugv2"),
         lambda table: table.assign(positions_m=[value[:-1] for value in table["positions_m"]]),
         lambda table: table.assign(times_s=[np.asarray(value)[::-1] for value in table["times_s"]]),
         lambda table: table.assign(positions_m=[np.nan * np.asarray(value) for value in table["positions_m"]]),
     ],
-    ids=["none", "column missing", "stranger", "cut", "backwards", "nan"],
+    ids=["none", "column missing", "stranger", "cause unknown", "cause another", "cut", "backwards", "nan"],
 )
 def test_proposals_that_are_none_are_an_error(run: Callable[[str, str], Trace], edit: Any) -> None:
     trace = run("case_b", "d")

@@ -50,9 +50,7 @@ def record_of(run: Callable[[str, str], Trace]) -> Simulated:
     return get
 
 
-@pytest.mark.parametrize(
-    ("name", "run_name"), [("case_b", "c"), ("case_a", "d"), ("soft_gate", "c"), ("soft_gate", "d")]
-)
+@pytest.mark.parametrize(("name", "run_name"), [("case_b", "c"), ("case_a", "c"), ("soft_gate", "c")])
 def test_real_runs_pass(record_of: Simulated, name: str, run_name: str) -> None:
     trace = record_of(name, run_name, "relaxed")
     assert len(trace.decisions) > 5
@@ -63,7 +61,7 @@ def test_real_runs_pass(record_of: Simulated, name: str, run_name: str) -> None:
 
 @pytest.mark.parametrize("route", ["enumeration", "branch_and_bound", "nonlinear", "rollout"])
 def test_real_runs_of_other_routes(record_of: Simulated, route: str) -> None:
-    trace = record_of("case_b", "d", route)
+    trace = record_of("case_b", "c", route)
     assert FEAS.judge(trace).status == "holds"
     bounded = route in ("enumeration", "branch_and_bound")
     assert OPT.judge(trace).status == ("holds" if bounded else "inconclusive")
@@ -71,7 +69,7 @@ def test_real_runs_of_other_routes(record_of: Simulated, route: str) -> None:
 
 
 def test_a_real_run_saved_and_broken(record_of: Simulated, tmp_path: Any) -> None:
-    trace = record_of("case_b", "d", "relaxed")
+    trace = record_of("case_b", "c", "relaxed")
     save(trace, tmp_path)
     for claim in (FEAS, SUR, OPT):
         assert claim.judge(load_trace(tmp_path)) == claim.judge(trace)
@@ -84,9 +82,10 @@ def test_a_real_run_saved_and_broken(record_of: Simulated, tmp_path: Any) -> Non
         assert claim.judge(with_decision(trace, edit)).status == "refuted", edit
 
 
-def test_a_run_that_hides_an_intervention_is_refuted(record_of: Simulated) -> None:
+@pytest.mark.parametrize("run_name", ["c", "d"])
+def test_a_run_that_hides_an_intervention_is_refuted(record_of: Simulated, run_name: str) -> None:
     """What was executed is not the UGV's own task, whatever the `accepted` column says."""
-    trace = record_of("case_b", "d", "relaxed")
+    trace = record_of("case_b", run_name, "relaxed")
     assert FEAS.judge(trace).status == "holds"
     hidden = replace(trace, signals=trace.signals.assign(**{"ugv1.accepted": 0.0}))
     finding = FEAS.judge(hidden)

@@ -69,6 +69,8 @@ class SafeDist(ModelClaim):
         "distance, nor how fast it recovers: the layer's velocities there are not limited."
     )
 
+    exercised_by = "obligations of the proof"
+
     def inputs(self, scenario: Scenario) -> Inputs:
         """The constants of SAFE-INV, and the bound on the disturbance, m/s."""
         given = constants(scenario)

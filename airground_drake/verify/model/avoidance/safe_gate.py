@@ -54,6 +54,8 @@ class SafeGate(ModelClaim):
         "which put interventions on top. The sample supports the reading of the code; the proof is about its equations."
     )
 
+    exercised_by = "obligations of the proof"
+
     def inputs(self, scenario: Scenario) -> Inputs:
         """Those of SAFE-INV, and what the diagram of method (d) was built with."""
         given = built_from(scenario)

@@ -74,6 +74,8 @@ class SafeInv(ModelClaim):
         "velocity that meets both. The diagram is compared in a sample of states, not in all."
     )
 
+    exercised_by = "obligations of the proof"
+
     def inputs(self, scenario: Scenario) -> Inputs:
         """Gain, period, sensing range and the team; and what the diagram is built from."""
         return constants(scenario) | {"scenario": built_from(scenario)}

@@ -36,6 +36,8 @@ class SafeLemma(ModelClaim):
     assumptions = ("Real arithmetic; x is not 0 (a robot is not at the point that it avoids).",)
     does_not_establish = "Anything about velocities that change within the period, or about rounding (see SAFE-INV)."
 
+    exercised_by = "obligations of the proof"
+
     def inputs(self, scenario: Scenario) -> Inputs:
         """None: it is about no constants."""
         return {}

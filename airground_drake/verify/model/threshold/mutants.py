@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from scipy.optimize import brentq
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from airground_drake.decision.bayes import optimal_threshold
 from airground_drake.verify.claim import Mutant
@@ -63,7 +63,7 @@ def _printed_is_better(inputs: dict[str, Any]) -> Finding:
     allowance = c2 * 2.0 * ERROR_ALLOWANCE + c1 * TIME_ALLOWANCE * (chosen[-2].period + chosen[-1].period)
     z = (risks[1] - risks[0] - allowance) / math.sqrt(sum(variances))
     numbers = {"risk_at_the_bayes_threshold": risks[0], "risk_at_the_printed_threshold": risks[1], "z_score": z}
-    if z <= float(norm.isf(1.0 - LEVEL)):
+    if z <= float(ndtri(LEVEL)):
         return Finding("inconclusive", evidence=numbers)
     thresholds = {"bayes_threshold_m": chosen[-2].zeta, "printed_threshold_m": chosen[-1].zeta}
     found = {"drift_m_s": chosen[-1].drift, **thresholds, **numbers}

@@ -19,7 +19,7 @@ from collections.abc import Callable
 from dataclasses import asdict
 from typing import Any
 
-from scipy.stats import beta, norm
+from scipy.special import betainccinv, betaincinv, ndtri
 
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.claim import ModelClaim
@@ -73,6 +73,8 @@ class ThrDdm(ModelClaim):
     )
     expected = "supported"
 
+    exercised_by = "simulated paths"
+
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
         """The numbers of the threshold rule."""
         rule = scenario.decision.threshold
@@ -93,14 +95,15 @@ def compare(chosen: tuple[PassageExperiment, ...], formulas: Formulas) -> Findin
     rows = [row for each in chosen for row in _rows(simulate(each), formulas(each), 2 * len(chosen))]
     worst = min(rows, key=lambda row: float(row["margin"]))
     supported = worst["margin"] >= 0.0
+    paths = sum(each.paths for each in chosen)
     evidence = {
-        "paths": sum(each.paths for each in chosen),
+        "paths": paths,
         "comparisons": rows,
         "family_level": LEVEL,
         "pyddm": {each.name: _pyddm(each) for each in chosen},
     }
     tail = (1.0 - LEVEL) / len(rows) / 2.0
-    certificate = {"channels": CHANNELS, "tail": tail, "normal_quantile": float(norm.isf(tail)), "comparisons": rows}
+    certificate = {"channels": CHANNELS, "tail": tail, "normal_quantile": float(-ndtri(tail)), "comparisons": rows}
     return Finding(
         "supported" if supported else "refuted",
         margin=worst["margin"],
@@ -110,6 +113,7 @@ def compare(chosen: tuple[PassageExperiment, ...], formulas: Formulas) -> Findin
         counterexample=None if supported else worst,
         evidence=evidence,
         certificates={"paths.json": json.dumps(certificate, indent=1) + "\n"},
+        exercised=paths,
     )
 
 
@@ -121,10 +125,10 @@ def _rows(sample: Sample, formula: tuple[float, float], comparisons: int) -> lis
     period = each.period
     mean = sample.periods / count
     deviation = math.sqrt((sample.squares - sample.periods * mean) / (count - 1.0) / count)
-    half = float(norm.isf(tail)) * deviation + TIME_ALLOWANCE
+    half = float(-ndtri(tail)) * deviation + TIME_ALLOWANCE
     time = [(mean - 0.25 + side * half) * period for side in (-1.0, 1.0)]
-    low = float(beta.ppf(tail, sample.wrong, count - sample.wrong + 1)) if sample.wrong else 0.0
-    high = float(beta.isf(tail, sample.wrong + 1, count - sample.wrong)) if sample.wrong < count else 1.0
+    low = float(betaincinv(sample.wrong, count - sample.wrong + 1, tail)) if sample.wrong else 0.0
+    high = float(betainccinv(sample.wrong + 1, count - sample.wrong, tail)) if sample.wrong < count else 1.0
     rate = sample.wrong / count
     spread = math.sqrt(max(rate * (1.0 - rate), 1.0 / count) / count)
     found = (

@@ -72,6 +72,8 @@ class ThrOpt(ModelClaim):
         "minimises the risk with an initial deviation. For c1 = c2 the printed equation has the same root."
     )
 
+    exercised_by = "statements of the proof"
+
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
         """As THR-ROOT."""
         return ThrRoot().inputs(scenario)

@@ -56,6 +56,8 @@ class ThrRoot(ModelClaim):
         "decision variable follows (15) at all."
     )
 
+    exercised_by = "statements of the proof"
+
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
         """The numbers of the threshold rule and the threshold in force."""
         rule = scenario.decision.threshold

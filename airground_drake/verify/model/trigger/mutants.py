@@ -10,6 +10,7 @@ from unittest import mock
 import numpy as np
 
 from airground_drake.arrays import Array
+from airground_drake.decision.excursion import task_errors
 from airground_drake.decision.trigger import Mode, Trigger, TriggerState
 from airground_drake.systems import decision
 from airground_drake.verify.claim import Mutant
@@ -67,11 +68,11 @@ def _smooth_does_not_diverge(inputs: dict[str, Any]) -> Finding:
 def _ends_only(inputs: dict[str, Any]) -> Finding:
     """The running system looks at the ends of its steps only."""
 
-    def of_ends(before: Array, after: Array) -> tuple[Array, Array]:
-        x = [np.linalg.norm(parts[:, :3], axis=1) + parts[:, 3] for parts in (before, after)]
+    def of_ends(begun: Array, now: Array) -> tuple[Array, Array]:
+        x = [np.linalg.norm(parts[:, :3], axis=1) + parts[:, 3] for parts in map(task_errors, (begun, now))]
         return np.minimum(*x), np.maximum(*x)
 
-    with mock.patch.object(decision, "extremes", of_ends):
+    with mock.patch.object(decision, "excursions", of_ends):
         return judge(Trigger(inputs["zeta_m"], inputs["released_below_m"], inputs["dwell_s"]))
 
 

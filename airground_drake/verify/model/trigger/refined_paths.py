@@ -22,7 +22,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.signal import lfilter
 
 from airground_drake.arrays import Array
 from airground_drake.decision.trigger import Mode, Trigger
@@ -87,7 +86,7 @@ def path(setting: Refinement, index: int) -> list[Array]:
     found = []
     for dt, count in zip(setting.dt_s, steps, strict=True):
         summed = increments.reshape(count, -1).sum(axis=1)
-        found.append(lfilter([1.0], [1.0, -(1.0 - setting.leak_1_s * dt)], np.concatenate([[start], summed])))
+        found.append(leaky_sum(1.0 - setting.leak_1_s * dt, np.concatenate([[start], summed])))
     return found
 
 
@@ -131,10 +130,18 @@ def _crossing(height: Array, segment: int, dt: float) -> float:
     return float((segment + before / (before - after)) * dt) if before < 0.0 else float(segment * dt)
 
 
+def leaky_sum(keep: float, added: Array) -> Array:
+    """y[k] = keep * y[k-1] + added[k] from y[-1] = 0."""
+    from scipy.signal import lfilter  # takes longer to import than to read a finding that was kept
+
+    found: Array = lfilter([1.0], [1.0, -keep], added)
+    return found
+
+
 def expected_bare(setting: Refinement, dt: float) -> float:
     """Expected number of triggers of the bare threshold, exact (module docstring)."""
     count, keep = round(setting.duration_s / dt), 1.0 - setting.leak_1_s * dt
-    variance = lfilter([1.0], [1.0, -keep * keep], np.concatenate([[setting.dt_s[0]], np.full(count, dt)]))
+    variance = leaky_sum(keep * keep, np.concatenate([[setting.dt_s[0]], np.full(count, dt)]))
     rho = keep * np.sqrt(variance[:-1] / variance[1:])
     return 0.5 + float(np.arccos(np.minimum(rho, 1.0)).sum()) / (2.0 * math.pi)
 

@@ -52,6 +52,8 @@ class ThrIso(ModelClaim):
         "between the noise samples. Two crossings closer than the isolation, 1e-6 s, may be taken at one instant."
     )
 
+    exercised_by = "obligations of the proof"
+
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
         """The running trigger's levels, m, and dwell, s."""
         trigger = make_trigger(scenario, threshold(scenario))

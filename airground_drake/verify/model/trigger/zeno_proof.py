@@ -72,6 +72,8 @@ class ZenoProof(ModelClaim):
         "|dx/dt| <= R (not Wiener noise) 2 (zeta - release)/R would bound the inter-event time as well: `rate_bound`."
     )
 
+    exercised_by = "obligations of the proof"
+
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
         """The running trigger's levels, m, and dwell, s; the bound claimed, s; the time within which to be exact, s."""
         trigger = make_trigger(scenario, threshold(scenario))

@@ -88,6 +88,8 @@ class ZenoRefine(ModelClaim):
         "run of the scenario has: its task error passes the threshold, it does not stay there (ZENO-TRACE counts them)."
     )
 
+    exercised_by = "simulated paths, each at every noise step"
+
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
         """The running trigger, the noise of (15) and its step, the duration."""
         trigger = make_trigger(scenario, threshold(scenario))
@@ -202,5 +204,5 @@ def judge_experiment(setting: Refinement) -> Finding:
     table = "\n".join([f"path,dt_s,{','.join(SERIES)}", *rows]) + "\n"
     quantity = "what the confidence interval of an exponent, or a count, leaves of the condition"
     return Finding(
-        status, slack[condition], "", {"condition": condition}, broken, evidence, {"counts.csv": table}, quantity
+        status, slack[condition], "", {"condition": condition}, broken, evidence, {"counts.csv": table}, quantity, PATHS
     )

@@ -1,0 +1,221 @@
+"""GATE-MODEL under method (d): what comes of accepting a proposal and of refusing it, rolled out again."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .law import PLANE, avoiding, inequalities, limited
+from .proposals import Proposal, proposals_of
+from .rules import SMALL, Array, Found, at_most, close, holds, same
+from .run import Run
+
+STILL_M = 0.05
+"""Less than this within the last second is at rest."""
+OUTCOME = 1e-6
+"""Recorded and recomputed outcomes may differ by this, relative, or in m^2 s."""
+LEFT_M = 1e-3
+"""A way left may be outside its bounds by this: the recomputed end is not quite the recorded one."""
+AROUND = 40
+"""Points around a safe circle."""
+CHOICES = ("refuse", "accept")
+
+
+class Foreseen(NamedTuple):
+    """What comes of a choice.
+
+    Attributes:
+        places_m: at the control samples, (S + 1, 3).
+        stalls: whether it is at rest short of the goal in the end.
+        home: whether it is at the goal.
+        integral_m2_s: of the squared distance from the preset trajectory.
+        goal_m: end of the preset trajectory, (3,).
+        discs_m: obstacles that are known, (k, 3).
+    """
+
+    places_m: Array
+    stalls: bool
+    home: bool
+    integral_m2_s: float
+    goal_m: Array
+    discs_m: Array
+
+
+def rows_of(run: Run) -> list[dict[str, Any]]:
+    """The decisions of a run under method (d), finite, and without problems (26)."""
+    same("problems of decisions by outcomes", len(run.problems), 0)
+    rows = [{str(name): value for name, value in row.items()} for row in run.decisions.to_dict("records")]
+    for row in rows:
+        numbers = np.array([value for value in row.values() if isinstance(value, float)])
+        about = f"decision of {row['robot']}"
+        holds("numbers of a decision are finite", np.isfinite(numbers), numbers, "a number", about=about)
+        holds("a decision is of a UGV", row["robot"] in run.ugvs, row["robot"], "a UGV of the run", about=about)
+    return rows
+
+
+def outcomes(run: Run) -> Found:
+    """Every outcome that was looked at, against the roll-out."""
+    rows, most = rows_of(run), 0.0
+    looked = [row for row in rows if row["accept_stalls"] >= 0.0]
+    for row in looked:
+        about: dict[str, Any] = {"about": f"decision of {row['robot']}", "t_s": row["t_s"]}
+        speed = run.scenario["ugvs"][row["robot"]]["preset"]["speed_m_s"]
+        for choice, found in zip(CHOICES, foreseen(run, row["robot"], row["t_s"], row["issued_s"]), strict=True):
+            left, recorded = row[f"{choice}_left_m"], row[f"{choice}_outcome_m2_s"]
+            same(f"{choice}: stalls", row[f"{choice}_stalls"], float(found.stalls), **about)
+            _way_left(found, run.scenario["safe_distance"]["obstacle_m"], left, choice, about)
+            due = left**3 / (3.0 * speed) + (0.0 if found.stalls else found.integral_m2_s)
+            allowed = OUTCOME * max(1.0, due)
+            close(f"{choice}: outcome", recorded, due, within=allowed, **about)
+            most = max(most, abs(recorded - due) / allowed)
+    return Found.with_margin("holds", 1.0 - most, within=0.1, decisions=len(rows), outcomes=2 * len(looked))
+
+
+def on_which(run: Run, ugv: str, issued_s: float) -> Proposal:
+    """The proposal that a decision is on."""
+    found = [proposal for proposal in proposals_of(run) if (proposal.ugv, proposal.issued_s) == (ugv, issued_s)]
+    holds("the decision is on a proposal", len(found) == 1, issued_s, "one that was sent", about=ugv)
+    return found[0]
+
+
+@lru_cache(maxsize=256)
+def foreseen(run: Run, ugv: str, t_s: float, issued_s: float) -> tuple[Foreseen, Foreseen]:
+    """What comes of refusing and of accepting a proposal at a time."""
+    gate, h = run.scenario["gatekeeper"], run.scenario["control"]["period_s"]
+    asked, preset = on_which(run, ugv, issued_s), run.presets[ugv]
+    arrives = float(preset.corner_s[-1]) if len(preset.corner_s) else 0.0
+    until = min(float(asked.times_s[-1]), t_s + gate["longest_s"])
+    ends = min(max(until, arrives), t_s + gate["longest_s"]) + gate["settling_s"]
+    after = h * np.arange(np.ceil((ends - t_s) / h) + 1.0)
+    discs = _known_m(run, ugv, t_s, asked)
+    ways, over = [np.tile(discs, (len(after), 1, 1))], [until, arrives, float(t_s + gate["horizon_s"])]
+    views = [pair for pair in run.views if pair.robot == ugv and pair.other in run.robots]
+    for pair in views:
+        way, way_over = _way_of(run, pair.other, t_s, after)
+        ways.append(way[:, None])
+        over.append(way_over)
+    points = np.concatenate(ways, axis=1)
+    safe = np.append(np.full(len(discs), run.scenario["safe_distance"]["obstacle_m"]), [p.safe_m for p in views])
+    share = np.append(np.ones(len(discs)), [pair.share for pair in views])
+    settled = int(np.ceil((max(over) - t_s) / h - SMALL))
+    start, goal = run.place_m(ugv, t_s), preset.corners_m[-1]
+    own, wanted = preset.position_m(t_s + after), asked.place_m(t_s + after)
+    executed = (0, max(0, int(np.ceil((until - t_s) / h - SMALL))))
+    found = []
+    for periods in executed:
+        places, integral = [start], 0.0
+        for k in range(len(after) - 1):
+            given = inequalities((places[-1] - points[k])[None], safe, share, run.scenario["control"], PLANE)
+            intervention = (wanted[k], wanted[k + 1], asked.projector) if k < periods else None
+            v = _command(run, ugv, places[-1], own[k : k + 2], intervention)
+            places.append(places[-1] + h * avoiding(v, given, run.scenario["runs"][run.name]["composition"])[0])
+            integral += h * float(((own[k + 1] - places[-1]) ** 2).sum())
+            if k >= settled and _resting(run, places, goal, h):
+                break
+        end, earlier = places[-1], places[max(0, len(places) - 1 - max(1, round(1.0 / h)))]
+        home = bool(np.linalg.norm(end - goal) <= run.scenario["arrival_tolerance_m"])
+        stalls = not home and bool(np.linalg.norm(end - earlier) < STILL_M)
+        found.append(Foreseen(np.array(places), stalls, home, integral, goal, discs))
+    return found[0], found[1]
+
+
+def _command(run: Run, ugv: str, place: Array, own: Array, asked: tuple[Array, Array, Array] | None) -> Array:
+    """What is wanted below the inequalities, (1, 3): (6), and with an intervention (14) above it."""
+    control, limit = run.scenario["control"], run.robots[ugv]["max_speed_m_s"]
+    h = control["period_s"]
+    task = limited((PLANE * ((own[1] - own[0]) / h + control["motion_gain_1_s"] * (own[0] - place)))[None], limit)
+    if asked is None:
+        return task
+    here, there, projector = asked
+    wish = PLANE * ((there - here) / h + control["intervention_gain_1_s"] * (here - place))
+    return limited((PLANE * (task[0] + projector @ (wish - task[0])))[None], limit)
+
+
+def _resting(run: Run, places: list[Array], goal: Array, h: float) -> bool:
+    """Whether the roll-out may end: it is home, or has hardly moved for a second."""
+    second = max(1, round(1.0 / h))
+    if np.linalg.norm(goal - places[-1]) < run.scenario["arrival_tolerance_m"]:
+        return True
+    return len(places) > second and bool(np.linalg.norm(places[-1] - places[-1 - second]) < 0.1 * STILL_M)
+
+
+def _known_m(run: Run, ugv: str, t_s: float, asked: Proposal) -> Array:
+    """Obstacles within sensing range at a sample of the gatekeeper up to now, and those of the message out of it."""
+    reach, gate_s = run.scenario["control"]["sensing_range_m"], run.scenario["gatekeeper"]["period_s"]
+    samples = np.minimum(gate_s * np.arange(round(t_s / gate_s) + 1.0), t_s)
+    was = np.stack([np.interp(samples, run.t_s, axis) for axis in run.position_m[ugv].T], axis=1)
+    places = [np.array(o["position_m"], dtype=np.float64) for o in run.scenario["obstacles"].values()]
+    known = [place for place in places if (np.linalg.norm(was - place, axis=1) <= reach).any()]
+    for place in asked.mapped_m:
+        hidden = np.linalg.norm(place - was[-1]) > reach
+        if hidden and all(np.linalg.norm(place - other) > SMALL for other in known if other is not place):
+            known.append(place)
+    return np.array(known).reshape(-1, 3)
+
+
+def _way_of(run: Run, robot: str, t_s: float, after: Array) -> tuple[Array, float]:
+    """Where another robot is predicted, (S + 1, 3): on the motion it is asked for, or coasting to a stop."""
+    here = run.place_m(robot, t_s)
+    asked = _asked_of(run, robot, t_s)
+    if asked is not None:
+        beside = here - asked.place_m(np.array([t_s]))[0]
+        return asked.place_m(t_s + after) + np.exp(-after)[:, None] * beside, float(asked.times_s[-1])
+    held = min(int(np.searchsorted(run.t_s, t_s - SMALL)), len(run.t_s) - 1)
+    coasting = np.minimum(after, run.scenario["gatekeeper"]["horizon_s"])
+    return here + coasting[:, None] * run.command_m_s[robot][held], -np.inf
+
+
+def _asked_of(run: Run, ugv: str, t_s: float) -> Proposal | None:
+    """What a UGV decides about at a sample, if it has not refused it before."""
+    refused = False
+    for row in run.decisions[run.decisions["robot"] == ugv].to_dict("records"):
+        if abs(row["t_s"] - t_s) <= SMALL:
+            earlier = run.decisions[
+                (run.decisions["robot"] == ugv)
+                & (run.decisions["issued_s"] == row["issued_s"])
+                & (run.decisions["t_s"] < t_s - SMALL)
+            ]
+            refused = len(earlier) > 0 and earlier["decision"].iloc[-1] == "refuse"
+            return None if refused else on_which(run, ugv, row["issued_s"])
+    return None
+
+
+def _way_left(found: Foreseen, safe_m: float, left_m: float, choice: str, about: dict[str, Any]) -> None:
+    """The way that is left is no shorter than straight, and no longer than one over points around the circles."""
+    if found.home:
+        same(f"{choice}: way left", left_m, 0.0, **about)
+        return
+    end, goal = found.places_m[-1], found.goal_m
+    direct = float(np.linalg.norm((goal - end)[:2]))
+    at_most(f"{choice}: straight way", direct, left_m, within=LEFT_M, **about)
+    if left_m > direct + LEFT_M:
+        around = _way_around_m(end, goal, found.discs_m, safe_m)
+        at_most(f"{choice}: way left", left_m, around, within=LEFT_M, **about)
+
+
+def _way_around_m(start: Array, goal: Array, discs_m: Array, safe_m: float) -> float:
+    """Length of a way outside the safe circles, infinite if none is found: Dijkstra over points around them."""
+    squared = safe_m**2 - (discs_m[:, 2] - start[2]) ** 2
+    centres, radii = discs_m[squared > 0.0, :2], np.sqrt(squared[squared > 0.0])
+    angle = 2.0 * np.pi * np.arange(AROUND) / AROUND
+    ring = np.stack([np.cos(angle), np.sin(angle)], axis=1) / np.cos(np.pi / AROUND) * (1.0 + SMALL)
+    around = (centres[:, None] + radii[:, None, None] * ring).reshape(-1, 2)
+    outside = (np.linalg.norm(around[:, None] - centres, axis=2) >= radii).all(axis=1)
+    nodes = np.concatenate([start[None, :2], goal[None, :2], around[outside]])
+    length = np.full(len(nodes), np.inf)
+    length[0] = 0.0
+    left = np.full(len(nodes), True)
+    while left.any():
+        here = int(np.where(left, length, np.inf).argmin())
+        if not np.isfinite(length[here]) or here == 1:
+            break
+        left[here] = False
+        legs = nodes - nodes[here]
+        reach = np.linalg.norm(legs, axis=1)
+        share = np.clip(((centres - nodes[here]) @ legs.T) / np.maximum(reach, 1e-150) ** 2, 0.0, 1.0)
+        nearest = nodes[here] + share[..., None] * legs - centres[:, None]
+        clear = (np.linalg.norm(nearest, axis=2) >= radii[:, None] * (1.0 - 1e-6)).all(axis=0)
+        length = np.where(clear, np.minimum(length, length[here] + reach), length)
+    return float(length[1])

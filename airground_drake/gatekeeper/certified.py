@@ -1,0 +1,160 @@
+"""Method (d)'s gatekeeper: proposals are judged by their outcome, once, and their progress is watched.
+
+At the first sample at which a UGV sees a proposal it rolls out what comes of accepting it now and of refusing it for
+ever (`outcome`), and takes the better one. That answer stands: a refusal for good, an acceptance until the proposal is
+withdrawn, its motion is over, or the UGV has been farther behind it than predicted for too long. It is never reversed
+because waiting looks cheaper, nor because the other choice does. How often a UGV goes along is bounded (`patience`).
+
+Nothing here has a part in safety: whatever is accepted is executed below the avoidance inequalities.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from time import thread_time
+
+import numpy as np
+
+from airground_drake.arrays import Array
+from airground_drake.gatekeeper.answer import Decision, Foreseen, Reason
+from airground_drake.gatekeeper.outcome import Other, Outcome, Outlook, outcomes
+from airground_drake.gatekeeper.patience import Patience, Turn
+from airground_drake.gatekeeper.sample import Commitment, Gatekeepers, Memory, Situation
+from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT, Proposals, Report, answer_to
+from airground_drake.intervention.policy import Proposal
+from airground_drake.nsbc.law import UgvLaw
+from airground_drake.nsbc.motion import Motion
+from airground_drake.nsbc.team import Team
+
+SAME_M = 1e-9
+"""Obstacles closer to each other than this are one, m."""
+
+
+class CertifiedGatekeepers(Gatekeepers):
+    """The UGVs of a team under method (d)."""
+
+    def __init__(
+        self, team: Team, law: UgvLaw, presets: Sequence[Motion], outlook: Outlook, patience: Patience
+    ) -> None:
+        """Of the UGVs of a team: their law, their preset trajectories, how far they look and how long they wait."""
+        super().__init__(team, law, presets)
+        self._outlook, self._patience = outlook, patience
+        self._distance = team.obstacle_distance
+
+    def idle(self, proposals: Proposals, positions: Array, memory: Memory) -> bool:
+        """Whether a sample changes nothing."""
+        return super().idle(proposals, positions, memory) and memory.sensed is self._remembered(positions, memory)
+
+    def sample(self, t: float, proposals: Proposals, positions: Array, velocities: Array, memory: Memory) -> Memory:
+        """Judge every proposal in force by its outcome, if it is new, or else by its progress."""
+        sensed = self._remembered(positions, memory)
+        seen = Situation(t, proposals, positions, velocities, replace(memory, sensed=sensed))
+        answers: list[float] = []
+        reports: list[Report] = []
+        turns, commitments = list(memory.turns), list(memory.commitments)
+        decisions = list(memory.decisions)
+        for i, proposal in enumerate(proposals):
+            standing = answer_to(proposal, memory.answers, i)
+            if turns[i].executing and standing != ACCEPT:  # withdrawn
+                turns[i], commitments[i] = self._patience.stop(turns[i], t), None
+            turns[i] = self._patience.rested(turns[i], t)
+            if proposal is None:
+                answers += [SILENT, -1.0]
+                reports.append(Report())
+                continue
+            started = thread_time()
+            if standing == ACCEPT:
+                decision, turns[i], commitments[i] = self._watch(seen, i, proposal)
+            elif standing == REFUSE:
+                decision = Decision(t, i, proposal, False, "kept", Foreseen(tries=turns[i].tries))
+            else:
+                decision, turns[i], commitments[i] = self._judge(seen, i, proposal, turns[i])
+            self.times_s.append(thread_time() - started)
+            decisions.append(decision)
+            answers += [ACCEPT if decision.accepted else REFUSE, proposal.issued]
+            reports.append(self._report(positions[i], decision))
+        return replace(
+            memory, answers=tuple(answers), reports=tuple(reports), decisions=tuple(decisions),
+            turns=tuple(turns), commitments=tuple(commitments), sensed=sensed,
+        )  # fmt: skip
+
+    def _remembered(self, positions: Array, memory: Memory) -> np.ndarray:
+        """Which obstacles each UGV has sensed up to now, (n, m); the very same array if nothing is new."""
+        now = np.array([self._sensed(position) for position in positions[:-1]])
+        if memory.sensed.shape != now.shape:
+            return now
+        return memory.sensed if not (now & ~memory.sensed).any() else memory.sensed | now
+
+    def _judge(
+        self, seen: Situation, i: int, proposal: Proposal, turn: Turn
+    ) -> tuple[Decision, Turn, Commitment | None]:
+        """The first decision about a proposal."""
+        if self._patience.exhausted(turn):
+            return Decision(seen.t, i, proposal, False, "exhausted", Foreseen(tries=turn.tries)), turn, None
+        refuse, accept = self.foresee(seen, i, proposal)
+        reason = reason_of(refuse, accept)
+        if reason != "cheaper":
+            return Decision(seen.t, i, proposal, False, reason, Foreseen(refuse, accept, tries=turn.tries)), turn, None
+        turn = self._patience.accept(turn, seen.t, proposal.motion.end)
+        after = self._law.avoidance.period * np.arange(0.0, len(accept.positions))
+        lags = lags_of(proposal, seen.t + after, accept.positions)
+        grounds = Foreseen(refuse, accept, float(lags[0]), float(lags[0]), turn.tries)
+        return Decision(seen.t, i, proposal, True, reason, grounds), turn, Commitment(lags, seen.t)
+
+    def _watch(self, seen: Situation, i: int, proposal: Proposal) -> tuple[Decision, Turn, Commitment | None]:
+        """A later decision about a proposal that is executed."""
+        t, turn, patience = seen.t, seen.before.turns[i], self._patience
+        commitment = seen.before.commitments[i]
+        assert commitment is not None
+        k = min(round((t - turn.since) / self._law.avoidance.period), len(commitment.lags) - 1)
+        predicted = float(commitment.lags[k])
+        lag = float(lags_of(proposal, np.array([t]), seen.positions[i][None])[0])
+        on_time = t if lag <= predicted + patience.lag else commitment.on_time
+        grounds = Foreseen(lag=lag, predicted_lag=predicted, tries=turn.tries)
+        late = patience.late(on_time, t)
+        if late or patience.over(turn, t):
+            reason: Reason = "no_progress" if late else "over"
+            return Decision(t, i, proposal, False, reason, grounds), patience.stop(turn, t), None
+        return Decision(t, i, proposal, True, "kept", grounds), turn, Commitment(commitment.lags, on_time)
+
+    def foresee(self, seen: Situation, i: int, proposal: Proposal) -> tuple[Outcome, Outcome]:
+        """What comes of refusing and of accepting, with what the UGV knows."""
+        scene = self._scene(seen, i)
+        discs = self._known(seen, i, proposal)
+        first = len(self._neighbourhood.obstacles)
+        others = []
+        for k, j in enumerate(self._neighbourhood.others[i], start=first):
+            asked = seen.proposals[j] if j < len(seen.proposals) else None
+            goes = asked is not None and answer_to(asked, seen.before.answers, int(j)) != REFUSE
+            others.append(
+                Other(
+                    scene.centres[k], scene.velocities[k], asked.motion if goes and asked is not None else None,
+                    float(scene.distances[k]), float(scene.shares[k]),
+                )
+            )  # fmt: skip
+        return outcomes(scene, self._law, proposal, discs, self._distance, others, self._outlook)
+
+    def _known(self, seen: Situation, i: int, proposal: Proposal) -> Array:
+        """Obstacles that a UGV has sensed, and those of the UAV's map that are out of its sight, (k, 3), m."""
+        sensed = self._neighbourhood.obstacles[seen.before.sensed[i]]
+        claimed = proposal.mapped
+        hidden = np.linalg.norm(claimed - seen.positions[i], axis=1) > self._law.avoidance.sensing_range
+        apart = np.linalg.norm(claimed[:, None] - sensed, axis=2)
+        new = claimed[hidden & (apart > SAME_M).all(axis=1)]
+        return np.concatenate([sensed, new])
+
+
+def reason_of(refuse: Outcome, accept: Outcome) -> Reason:
+    """Accept ('cheaper') or why not, given what comes of either."""
+    if not (np.isfinite(accept.cost) and np.isfinite(refuse.cost)):
+        return "no_plan"
+    if accept.better_than(refuse):
+        return "cheaper"
+    return "stalls" if accept.stalls else "not_cheaper"
+
+
+def lags_of(proposal: Proposal, t: Array, positions: Array) -> Array:
+    """Distance of positions (K, 3), m, at times (K,), s, from where the UGV is asked to be, (K,), m."""
+    away = positions - proposal.motion.sample(t)
+    return np.asarray(np.linalg.norm(away @ proposal.chosen.T, axis=1))

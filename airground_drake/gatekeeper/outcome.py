@@ -1,0 +1,209 @@
+"""What comes of accepting a proposal, and of refusing it: both rolled out to the end and past it, eq (25).
+
+Two choices only, never and now: follow the proposed motion until it is over and then the own task, or the own task all
+along. "Wait, then accept" is not among them; it looks cheaper at every sample and never comes to an acceptance.
+
+Each is worth the cost (25) along the roll-out plus a terminal cost, in the sense of the stability theory of model
+predictive control: a bound of what (25) will still grow by,
+
+    V(p) = L(p)^3 / (3 v),
+
+with L the length of the shortest way to the goal among the safe circles that are known and v the reference speed. Along
+that way V falls at the rate L^2 >= ||goal - p||^2, the integrand of (25). A roll-out that comes to rest short of the
+goal will never get there: its terminal cost is infinite. Of two such the one that leaves less of the way is better.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from airground_drake.arrays import Array
+from airground_drake.gatekeeper.closed_loop import ACCEPTED, REFUSED, ClosedLoop, velocity_of, workspace
+from airground_drake.gatekeeper.prediction import Scene, loop_among
+from airground_drake.intervention.paths import NoPath, shortest_path
+from airground_drake.intervention.policy import Proposal
+from airground_drake.nsbc.law import UgvLaw
+from airground_drake.nsbc.motion import Motion
+
+USELESS = 1e-6
+"""Relative gain below which an intervention makes no difference."""
+
+
+@dataclass(frozen=True)
+class Outlook:
+    """How far outcomes are looked at.
+
+    Attributes:
+        longest: time that an accepted intervention may last, s.
+        past: time that is rolled out when motion and preset trajectory are over, s.
+        coasting: time for which a robot without a proposal is predicted to keep its velocity; then it stands, s.
+        near: this close to the goal the own task is done, m.
+        still: less than this within the last second counts as being at rest, m.
+    """
+
+    longest: float
+    past: float = 10.0
+    coasting: float = 3.0
+    near: float = 0.1
+    still: float = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What comes of one choice.
+
+    Attributes:
+        positions: at the control samples, (S + 1, 3), m.
+        stalls: whether it comes to rest short of the goal.
+        left: length of the way that is left at the end, m.
+        cost: (25) with weight 1, plus the terminal cost; without the former for one that stalls, m^2 s.
+    """
+
+    positions: Array
+    stalls: bool
+    left: float
+    cost: float
+
+    @property
+    def end(self) -> Array:
+        """Where it ends, (3,), m."""
+        return np.asarray(self.positions[-1])
+
+    def better_than(self, other: Outcome) -> bool:
+        """Whether it is better, by more than what makes no difference."""
+        if self.stalls != other.stalls:
+            return other.stalls
+        return self.cost < (1.0 - USELESS) * other.cost
+
+
+@dataclass(frozen=True)
+class Other:
+    """A robot that is to be kept away from, as predicted.
+
+    Attributes:
+        position: now, (3,), m.
+        velocity: now, (3,), m/s.
+        asked: the motion that it has accepted or is asked for, if any: it is predicted to follow it.
+        distance: to keep from it, m.
+        share: of the avoidance inequality.
+    """
+
+    position: Array
+    velocity: Array
+    asked: Motion | None
+    distance: float
+    share: float
+
+    def places(self, t: float, after: Array, coasting: float) -> Array:
+        """Where it will be at times `after` from t, (S + 1, 3), m.
+
+        On the motion that it is asked to make, by as much beside it as it is now, less with every second: it tracks.
+        Without one: on as now for a while, then at rest.
+        """
+        if self.asked is None:
+            return self.position + np.minimum(after, coasting)[:, None] * self.velocity
+        beside = self.position - self.asked.at(t)[0]
+        return self.asked.sample(t + after) + np.exp(-after)[:, None] * beside
+
+
+def outcomes(
+    scene: Scene, law: UgvLaw, proposal: Proposal, discs: Array, distance: float, others: Sequence[Other], look: Outlook
+) -> tuple[Outcome, Outcome]:
+    """What comes of refusing and of accepting.
+
+    Args:
+        scene: time, own position, preset trajectory and speed limit.
+        law: the UGV's control law.
+        proposal: in question.
+        discs: centres of the obstacles that are known, (m, 3), m.
+        distance: safe distance to them, m.
+        others: the other robots.
+        look: how far to look.
+    """
+    h = law.avoidance.period
+    until = min(proposal.motion.end, scene.t + look.longest)
+    ends = min(max(until, scene.preset.end), scene.t + look.longest) + look.past
+    after = h * np.arange(0.0, np.ceil((ends - scene.t) / h) + 1.0)
+    places = [each.places(scene.t, after, look.coasting) for each in others]
+    fixed = np.broadcast_to(discs, (len(after), len(discs), 3))
+    points = np.concatenate([fixed, np.stack(places, axis=1)], axis=1) if others else np.ascontiguousarray(fixed)
+    known = Scene(
+        scene.t, scene.position, scene.preset, scene.centres, scene.velocities,
+        np.concatenate([np.full(len(discs), distance), [each.distance for each in others]]),
+        np.concatenate([np.ones(len(discs)), [each.share for each in others]]),
+        scene.max_speed,
+    )  # fmt: skip
+    loop = loop_among(known, law, proposal, after, points)
+    goal = scene.preset.positions[-1]
+    settled = max(
+        until, scene.preset.end, scene.t + look.coasting, *(e.asked.end for e in others if e.asked is not None)
+    )
+    steps = int(np.ceil((settled - scene.t) / h - 1e-9))
+    found = []
+    for accepted in (0, max(0, int(np.ceil((until - scene.t) / h - 1e-9)))):
+        positions, cost = _rolled_out(loop, accepted, goal, steps, look.near, look.still)
+        found.append(_outcome(positions, cost, goal, scene.preset.max_speed, discs, distance, h, look))
+    return found[0], found[1]
+
+
+def _outcome(
+    positions: Array, cost: float, goal: Array, speed: float, discs: Array, distance: float, h: float, look: Outlook
+) -> Outcome:
+    end = positions[-1]
+    if np.linalg.norm(end - goal) <= look.near:
+        return Outcome(positions, False, 0.0, cost)
+    before = positions[max(0, len(positions) - 1 - max(1, round(1.0 / h)))]
+    stalls = bool(np.linalg.norm(end - before) < look.still)
+    left = way_left(end, goal, discs, distance)
+    ahead = left**3 / (3.0 * max(speed, 1e-9))
+    return Outcome(positions, stalls, left, ahead if stalls else cost + ahead)
+
+
+def way_left(place: Array, goal: Array, discs: Array, distance: float) -> float:
+    """Length of the shortest way to the goal among circles around discs (m, 3), m; straight if there is none."""
+    squared = distance**2 - np.square(discs[:, 2] - place[2])
+    near = squared > 0.0
+    centres, radii = discs[near, :2], np.sqrt(squared[near])
+    leg = goal[:2] - place[:2]
+    length = float(np.sqrt(leg @ leg))
+    along = np.clip((centres - place[:2]) @ leg / max(length**2, 1e-300), 0.0, 1.0)
+    if (np.linalg.norm(place[:2] + along[:, None] * leg - centres, axis=1) >= radii).all():
+        return length
+    try:
+        return shortest_path(place[:2], goal[:2], centres, radii).length_m
+    except NoPath:
+        return length
+
+
+@njit(cache=True)
+def _rolled_out(
+    loop: ClosedLoop, accepted: int, goal: Array, settled: int, near: float, still: float
+) -> tuple[Array, float]:
+    """Positions at the control samples (k + 1, 3), m, and (25) with weight 1, accepted for so many periods.
+
+    It ends when nothing moves any more: after `settled` periods, at the goal or at rest for a second.
+    """
+    steps = len(loop.preset) - 1
+    second = max(1, round(1.0 / loop.period))
+    positions = np.empty((steps + 1, 3))
+    positions[0] = loop.start
+    position, work = loop.start.copy(), workspace(loop)
+    cost = 0.0
+    for k in range(steps):
+        velocity = velocity_of(loop, ACCEPTED if k < accepted else REFUSED, k, position, work)
+        squared, left, moved = 0.0, 0.0, 0.0
+        for a in range(3):
+            position[a] += loop.period * velocity[a]
+            positions[k + 1, a] = position[a]
+            squared += (loop.preset[k + 1, a] - position[a]) ** 2
+            left += (goal[a] - position[a]) ** 2
+            if k + 1 >= second:
+                moved += (position[a] - positions[k + 1 - second, a]) ** 2
+        cost += loop.period * squared
+        if k >= settled and (left < near**2 or (k + 1 >= second and moved < (0.1 * still) ** 2)):
+            return positions[: k + 2], cost
+    return positions, cost

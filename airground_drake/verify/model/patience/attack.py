@@ -1,0 +1,94 @@
+"""UAVs that waste a UGV's time, against the running `CertifiedGatekeepers`: how long do they keep it from its task?
+
+The gatekeeper believes whatever is predicted: its roll-outs are replaced by ones in which refusing stalls and accepting
+does not, as a lying map could make it. The UAV proposes and withdraws at will, motions long and short; the UGV follows
+well, badly or not at all.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from airground_drake.arrays import Array
+from airground_drake.gatekeeper.certified import CertifiedGatekeepers
+from airground_drake.gatekeeper.outcome import Outcome, Outlook
+from airground_drake.gatekeeper.patience import Patience
+from airground_drake.gatekeeper.sample import Memory, Situation
+from airground_drake.intervention.messages import ACCEPT
+from airground_drake.intervention.policy import Proposal
+from airground_drake.nsbc.avoidance import Avoidance
+from airground_drake.nsbc.law import UgvLaw
+from airground_drake.nsbc.motion import Motion
+from airground_drake.nsbc.team import Team
+
+MOST_SAMPLES = 20_000
+"""Of each attack: else as many as all tries take, and a fifth more."""
+
+
+class Believing(CertifiedGatekeepers):
+    """Takes every proposal for useful, followed without any lag."""
+
+    def foresee(self, seen: Situation, i: int, proposal: Proposal) -> tuple[Outcome, Outcome]:
+        """Refusing stalls, accepting does not."""
+        steps = np.arange(0.0, 2.0, self._law.avoidance.period)
+        follows = proposal.motion.sample(seen.t + steps)
+        return Outcome(follows, True, 1.0, 1.0), Outcome(follows, False, 0.0, 0.0)
+
+
+def attacks(patience: Patience, period: float) -> list[dict[str, Any]]:
+    """What each attack came to: `attack`, `tries`, `longest_between_rests_s`, `longest_try_s`, `reasons`."""
+    return [_attack(name, patience, period) for name in ("endless", "greedy", "random", "stuck")]
+
+
+def _attack(name: str, patience: Patience, period: float) -> dict[str, Any]:
+    rng = np.random.default_rng(len(name))
+    team = Team(("ugv",), "uav", np.empty((0, 3)), 1.0, 1.0, 1.0, np.ones(2))
+    preset = Motion(np.zeros(1), np.zeros((1, 3)))
+    law = UgvLaw(Avoidance(1.0, period), 1.0, 1.0, intervention_on_top=False)
+    gatekeepers = Believing(team, law, [preset], Outlook(patience.longest), patience)
+    memory, proposal, place = Memory.empty(1), None, np.zeros(3)
+    executed, worst, began, longest, tries, alone = 0.0, 0.0, 0.0, 0.0, 0, 0.0
+    for k in range(min(MOST_SAMPLES, int(1.2 * patience.most * patience.longest / period))):
+        t = k * period
+        proposal = _next(name, proposal, memory, t, rng, patience)
+        if proposal is not None and name != "stuck":
+            place = proposal.motion.at(t)[0]
+        before = memory.answers[0] == ACCEPT
+        if before:
+            executed += period
+            worst = max(worst, executed)
+        memory = gatekeepers.sample(t, (proposal,), np.stack([place, place]), np.zeros((2, 3)), memory)
+        now = memory.answers[0] == ACCEPT
+        another = now and memory.turns[0].since == t
+        if before and (another or not now):
+            longest = max(longest, t - began)
+        if another:
+            executed = 0.0 if not before and t >= alone + patience.rest else executed
+            began, tries = t, tries + 1
+        if before and not now:
+            alone = t
+    reasons = sorted({decision.reason for decision in memory.decisions})
+    return {
+        "attack": name, "tries": tries, "longest_between_rests_s": worst, "longest_try_s": longest, "reasons": reasons,
+    }  # fmt: skip
+
+
+def _next(
+    name: str, proposal: Proposal | None, memory: Memory, t: float, rng: np.random.Generator, patience: Patience
+) -> Proposal | None:
+    """What the UAV proposes now: a new one when the last is refused, withdrawn or replaced."""
+    refused = memory.answers[0] < 0.0
+    if proposal is not None and not refused:
+        if name == "greedy" and t >= proposal.issued + 0.9 * patience.longest:
+            return _proposal(t, 2.0 * patience.longest, rng)
+        return proposal if name != "random" or rng.random() > 0.01 else None
+    if name == "random" and rng.random() < 0.7:
+        return None
+    return _proposal(t, float(rng.choice([0.1, 1.0, 100.0])) * patience.longest, rng)
+
+
+def _proposal(t: float, lasts: float, rng: np.random.Generator) -> Proposal:
+    way: Array = rng.normal(size=(3, 3)) * [5.0, 5.0, 0.0]
+    return Proposal("waste", t, Motion(t + lasts * np.array([0.0, 0.5, 1.0]), way))

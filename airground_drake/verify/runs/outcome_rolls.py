@@ -1,0 +1,196 @@
+"""What comes of a proposal and of its refusal, rolled out again from a trace: method (d)'s usefulness, with own code.
+
+Both choices of one decision side by side, in plain numpy. The way that is left is found on another graph than the
+gatekeeper's: between points all around the safe circles, which is longer by a part of a thousandth.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.sparse.csgraph import dijkstra
+
+from airground_drake.arrays import Array
+from airground_drake.errors import TraceError
+from airground_drake.trace import Trace
+from airground_drake.verify.claim import TIME_TOLERANCE_S
+from airground_drake.verify.engines.segments import corner_times, interpolate, travelled
+from airground_drake.verify.runs.control_law import Asked, avoiding, inequalities, intervened, tracking
+from airground_drake.verify.runs.pairs import pairs_of
+from airground_drake.verify.runs.proposals import Sent
+
+STILL_M = 0.05
+"""Less than this within the last second is at rest, m."""
+AROUND = 48
+"""Points around each safe circle."""
+
+
+class Foreseen(NamedTuple):
+    """What comes of a choice: places (S + 1, 3), m, whether it stalls, (25) along it, m^2 s, and the way left, m.
+
+    `least_left_m` and `most_left_m` are bounds of the latter.
+    """
+
+    places_m: Array
+    stalls: bool
+    integral_m2_s: float
+    least_left_m: float
+    most_left_m: float
+
+
+def foreseen(trace: Trace, given: dict[str, Any], sent: Sequence[Sent]) -> tuple[Foreseen, Foreseen]:
+    """What comes of refusing and of accepting, for the first decision about a proposal.
+
+    Args:
+        trace: the run.
+        given: the decision's row.
+        sent: all proposals.
+
+    Raises:
+        TraceError: if the decision is on a proposal that was not sent.
+    """
+    scenario, control, gate = trace.scenario, trace.scenario["control"], trace.scenario["gatekeeper"]
+    t, robot, h = float(given["t_s"]), str(given["robot"]), trace.scenario["control"]["period_s"]
+    on = [one for one in sent if (one.ugv, one.issued_s) == (robot, float(given["issued_s"]))]
+    if not on:
+        raise TraceError(f"the decision of {robot} at t = {t} s is on no proposal that was sent")
+    spec = scenario["ugvs"][robot]
+    corners, speed = np.asarray(spec["preset"]["waypoints_m"], dtype=np.float64), float(spec["preset"]["speed_m_s"])
+    arrives = float(corner_times(corners, speed)[-1]) if len(corners) > 1 else 0.0
+    longest = gate["longest_s"]
+    until = min(float(on[0].times_s[-1]), t + longest)
+    ends = min(max(until, arrives), t + longest) + gate["settling_s"]
+    after = h * np.arange(np.ceil((ends - t) / h) + 1.0)
+    here = interpolate(trace.t, trace.position(robot), t)
+    discs = known_discs(trace, robot, t, on[0])
+    others = [_other(trace, robot, t, after, pair, sent) for pair in pairs_of(trace) if _between(trace, pair, robot)]
+    around = [np.tile(discs, (len(after), 1, 1)), *(one[0][:, None] for one in others)]
+    points = np.concatenate(around, axis=1)
+    safe = np.array([scenario["safe_distance"]["obstacle_m"]] * len(discs) + [one[1] for one in others])
+    share = np.array([1.0] * len(discs) + [one[2] for one in others])
+    settled = max(until, arrives, t + gate["horizon_s"], *(end for _, _, _, end in others))
+    goal = corners[-1]
+    last = round(np.ceil((settled - t) / h - 1e-9))
+    periods = np.array([0, max(0, int(np.ceil((until - t) / h - 1e-9)))])
+    preset, wanted = travelled(corners, speed, t + after), on[0].place(t + after)
+    place = np.stack([here, here])
+    ways, integral = [place], np.zeros((len(after), 2))
+    done = np.full(2, len(after) - 1)
+    for k in range(len(after) - 1):
+        given_here = inequalities(place, np.stack([points[k]] * 2), safe, share, control, planar=True)
+        rate = (preset[k + 1] - preset[k]) / h
+        own = tracking(place, preset[k], rate, control["motion_gain_1_s"], spec["max_speed_m_s"])
+        task = own.copy()
+        if k < periods[1]:
+            asked = Asked(wanted[k][None], ((wanted[k + 1] - wanted[k]) / h)[None], on[0].chosen[None])
+            gain = control["intervention_gain_1_s"]
+            task[1:] = intervened(place[1:], own[1:], asked, gain, spec["max_speed_m_s"])
+        velocity = avoiding(task, given_here, trace.meta["composition"], planar=True)
+        place = place + h * velocity
+        ways.append(place)
+        integral[k + 1] = integral[k] + h * np.square(preset[k + 1] - place).sum(axis=1)
+        second = max(1, round(1.0 / h))
+        if k >= last:
+            home = np.linalg.norm(goal - place, axis=1) < scenario["arrival_tolerance_m"]
+            moved = np.linalg.norm(place - ways[k + 1 - second], axis=1) if k + 1 >= second else np.full(2, np.inf)
+            resting = home | (moved < 0.1 * STILL_M)
+            done = np.where(resting, np.minimum(done, k + 1), done)
+            if (done <= k + 1).all():
+                break
+    way = np.array(ways)
+    found = []
+    for choice in (0, 1):
+        k = int(done[choice])
+        found.append(_concluded(way[: k + 1, choice], float(integral[k, choice]), goal, discs, scenario, h))
+    return found[0], found[1]
+
+
+def _between(trace: Trace, pair: Any, robot: str) -> bool:
+    return robot in (pair.first, pair.second) and {pair.first, pair.second} <= set(trace.robots)
+
+
+def _concluded(
+    places: Array, integral: float, goal: Array, discs: Array, scenario: dict[str, Any], h: float
+) -> Foreseen:
+    end = places[-1]
+    if np.linalg.norm(end - goal) <= scenario["arrival_tolerance_m"]:
+        return Foreseen(places, False, integral, 0.0, 0.0)
+    before = places[max(0, len(places) - 1 - max(1, round(1.0 / h)))]
+    stalls = bool(np.linalg.norm(end - before) < STILL_M)
+    least, most = bounds_of_way_left(end, goal, discs, scenario["safe_distance"]["obstacle_m"])
+    return Foreseen(places, stalls, integral, least, most)
+
+
+def known_discs(trace: Trace, robot: str, t: float, on: Sent) -> Array:
+    """Obstacles that a UGV has sensed up to a time, and those of the message that it would not sense, (k, 3), m."""
+    sensing, gate_s = trace.scenario["control"]["sensing_range_m"], trace.scenario["gatekeeper"]["period_s"]
+    samples = gate_s * np.arange(round(t / gate_s) + 1.0)
+    was = interpolate(trace.t, trace.position(robot), np.minimum(samples, t))
+    places = [o["position_m"] for o in trace.scenario["obstacles"].values()]
+    obstacles = np.array(places, dtype=np.float64).reshape(-1, 3)
+    seen = (np.linalg.norm(was[:, None] - obstacles, axis=2) <= sensing).any(axis=0)
+    hidden = np.linalg.norm(on.mapped_m - was[-1], axis=1) > sensing
+    claimed = on.mapped_m[hidden]
+    apart = np.linalg.norm(claimed[:, None] - obstacles[seen], axis=2)
+    return np.concatenate([obstacles[seen], claimed[(apart > 1e-9).all(axis=1)]])
+
+
+def _other(
+    trace: Trace, robot: str, t: float, after: Array, pair: Any, sent: Sequence[Sent]
+) -> tuple[Array, float, float, float]:
+    """Where another robot is predicted to be, (S + 1, 3), m; its safe distance, its share, when its motion is over."""
+    other = pair.second if pair.first == robot else pair.first
+    row = min(int(np.searchsorted(trace.t, t - TIME_TOLERANCE_S)), len(trace.t) - 1)
+    place, velocity = interpolate(trace.t, trace.position(other), t), trace.command(other)[row]
+    asked = asked_of(trace, other, t, sent)
+    if asked is None:
+        coasting = np.minimum(after, trace.scenario["gatekeeper"]["horizon_s"])
+        return place + coasting[:, None] * velocity, pair.safe_m, pair.share, -np.inf
+    beside = place - asked.place(t)
+    return asked.place(t + after) + np.exp(-after)[:, None] * beside, pair.safe_m, pair.share, float(asked.times_s[-1])
+
+
+def asked_of(trace: Trace, ugv: str, t: float, sent: Sequence[Sent]) -> Sent | None:
+    """The proposal in force for a UGV at a sample of the gatekeeper, unless it has refused it by the sample before.
+
+    A proposal in force is one that the UGV decides about at that sample.
+    """
+    table = trace.decisions[(trace.decisions["robot"] == ugv)]
+    now = table[np.abs(table["t_s"] - t) <= TIME_TOLERANCE_S]
+    if not len(now):
+        return None
+    issued = float(now["issued_s"].iloc[0])
+    before = table[(table["issued_s"] == issued) & (table["t_s"] < t - TIME_TOLERANCE_S)]
+    if len(before) and before["decision"].iloc[-1] == "refuse":
+        return None
+    return next((one for one in sent if (one.ugv, one.issued_s) == (ugv, issued)), None)
+
+
+def bounds_of_way_left(place: Array, goal: Array, discs: Array, distance: float) -> tuple[float, float]:
+    """Bounds of the length of the shortest way among safe circles, m: straight, and over points around the circles.
+
+    The latter is infinite where no way between those points is found.
+    """
+    squared = distance**2 - np.square(discs[:, 2] - place[2])
+    centres, radii = discs[squared > 0.0, :2], np.sqrt(squared[squared > 0.0])
+    direct = float(np.linalg.norm(goal[:2] - place[:2]))
+    if not len(centres):
+        return direct, direct
+    angle = 2.0 * np.pi * np.arange(AROUND) / AROUND
+    ring = np.column_stack([np.cos(angle), np.sin(angle)]) / np.cos(np.pi / AROUND)
+    rings = (centres[:, None] + radii[:, None, None] * (1.0 + 1e-9) * ring).reshape(-1, 2)
+    free = (np.linalg.norm(rings[:, None] - centres, axis=2) >= radii).all(axis=1)
+    nodes = np.concatenate([place[None, :2], goal[None, :2], rings[free]])
+    legs = nodes[None] - nodes[:, None]
+    lengths = np.linalg.norm(legs, axis=2)
+    clear = np.ones(lengths.shape, dtype=bool)
+    for centre, radius in zip(centres, radii, strict=True):
+        along = np.clip(((centre - nodes)[:, None] * legs).sum(axis=2) / np.maximum(lengths, 1e-150) ** 2, 0.0, 1.0)
+        nearest = nodes[:, None] + along[..., None] * legs - centre
+        clear &= np.linalg.norm(nearest, axis=2) >= radius * (1.0 - 1e-6)
+    if clear[0, 1]:
+        return direct, direct
+    found = float(dijkstra(np.where(clear, lengths, 0.0), indices=0)[1])
+    return direct, found

@@ -1,0 +1,95 @@
+"""The benchmark's own planners on cases with a known answer, and against the package's shortest paths."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import feasible
+import numpy as np
+import pytest
+from feasible import JointPlan, joint_plan, shortest_length
+from hypothesis import given
+from hypothesis import strategies as st
+from properties import examples
+
+from airground_drake.intervention.paths import NoPath, shortest_path
+
+NOTHING = np.empty((0, 2))
+START, TARGET = np.array([0.0, 0.0]), np.array([20.0, 0.0])
+
+
+def ring(radius: float, count: int = 6) -> np.ndarray:
+    angles = 2.0 * np.pi * np.arange(count) / count
+    return radius * np.column_stack([np.cos(angles), np.sin(angles)])
+
+
+def test_it_knows_nothing_of_what_it_judges() -> None:
+    tree = ast.parse(Path(feasible.__file__).read_text(encoding="utf-8"))
+    imported = {node.module or "" for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
+    imported |= {name.name for node in ast.walk(tree) if isinstance(node, ast.Import) for name in node.names}
+    assert not any(name.startswith("airground_drake") for name in imported)
+
+
+def test_straight_and_round_one_disc() -> None:
+    assert shortest_length(START, TARGET, NOTHING, 2.0) == pytest.approx(20.0)
+    round_it = 2.0 * np.sqrt(10.0**2 - 2.0**2) + 2.0 * 2.0 * np.arcsin(0.2)
+    assert shortest_length(START, TARGET, np.array([[10.0, 0.0]]), 2.0) == pytest.approx(round_it)
+
+
+def test_a_ring_is_closed_from_half_its_spacing_on() -> None:
+    discs = ring(3.5)  # neighbours are 3.5 m apart
+    assert np.isfinite(shortest_length(START, TARGET, discs, 1.749))
+    assert np.isinf(shortest_length(START, TARGET, discs, 1.751))
+
+
+def test_inside_a_disc_there_is_no_way() -> None:
+    assert np.isinf(shortest_length(START, TARGET, np.array([[0.5, 0.0]]), 1.0))
+    assert np.isinf(shortest_length(START, TARGET, np.array([[20.5, 0.0]]), 1.0))
+
+
+@given(seed=st.integers(0, 10**6), count=st.integers(0, 12))
+@examples(25)
+def test_lengths_are_those_of_the_packages_shortest_paths(seed: int, count: int) -> None:
+    """Two programs that share no code."""
+    centres = np.random.default_rng(seed).uniform([2.0, -5.0], [18.0, 5.0], (count, 2))
+    ours = shortest_length(START, TARGET, centres, 1.5)
+    try:
+        theirs = shortest_path(START, TARGET, centres, np.full(count, 1.5)).length_m
+    except NoPath:
+        theirs = np.inf
+    assert ours == pytest.approx(theirs, abs=1e-6)
+    assert ours == pytest.approx(shortest_length(TARGET, START, centres, 1.5), abs=1e-9)
+    assert ours <= shortest_length(START, TARGET, centres, 1.6) + 1e-9
+
+
+def plan(starts: np.ndarray, targets: np.ndarray, centres: np.ndarray, duration: float = 40.0) -> JointPlan | None:
+    return joint_plan(starts, targets, centres, obstacle_m=1.0, ugv_m=1.0, speed_m_s=1.0, duration_s=duration)
+
+
+def test_two_exchange_places() -> None:
+    ends = np.array([[-4.0, 0.0], [4.0, 0.3]])
+    found = plan(ends, ends[::-1], np.array([[0.0, 0.0]]))
+    assert found is not None
+    assert found.least_between() >= 1.0
+    assert found.least_to(np.array([[0.0, 0.0]])) >= 1.0
+    assert found.top_speed() <= 1.0 + 1e-9
+    assert np.array_equal(found.positions[:, 0], ends)
+    assert np.array_equal(found.positions[:, -1], ends[::-1])
+
+
+def test_no_plan_where_nobody_can_pass_or_arrive_in_time() -> None:
+    along = np.arange(-6.0, 6.1, 1.0)
+    tube = np.concatenate([np.column_stack([along, np.full(13, y)]) for y in (-1.4, 1.4)] + [[[-6.0, 0.0], [6.0, 0.0]]])
+    ends = np.array([[-4.0, 0.0], [4.0, 0.0]])
+    assert plan(ends, ends[::-1], tube) is None
+    assert plan(ends[:1], ends[1:], tube) is not None
+    assert plan(ends[:1], ends[1:], tube, duration=6.0) is None
+
+
+def test_distances_of_a_plan_are_those_in_between() -> None:
+    """Two robots that change places in one step are apart at both ends and meet in the middle."""
+    meeting = JointPlan(np.array([0.0, 1.0]), np.array([[[0.0, 0.0], [2.0, 0.0]], [[2.0, 0.0], [0.0, 0.0]]]))
+    assert meeting.least_between() == 0.0
+    assert meeting.least_to(np.array([[1.0, 0.5]])) == 0.5
+    assert meeting.top_speed() == 2.0

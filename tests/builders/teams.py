@@ -1,0 +1,50 @@
+"""Teams in the plane for joint planning: where robots are, where they are to go, and what is in between."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from airground_drake.intervention.coordination.joint import Plan
+from airground_drake.intervention.coordination.roadmap import Errand, Space
+from airground_drake.intervention.coordination.timed import at_rest
+
+Array = npt.NDArray[np.float64]
+
+APART = 2.0
+"""Distance to keep, m."""
+
+
+def space(obstacles: Sequence[Sequence[float]] | Array = ()) -> Space:
+    """Discs of 2 m, robots 2 m apart, with 0.1 m and 0.2 m to spare."""
+    centres = np.array(obstacles, dtype=np.float64).reshape(-1, 2)
+    return Space(centres, np.full(len(centres), APART), 0.1, APART, 0.2)
+
+
+def errand(start: Sequence[float] | Array, target: Sequence[float] | Array) -> Errand:
+    """From a place to a target, where the preset has arrived already."""
+    return Errand(np.asarray(start, dtype=np.float64), np.array([[0.0, *target]]))
+
+
+def random_team(seed: int, count: int, obstacles: int, extent: float) -> tuple[Space, list[Errand]]:
+    """Robots and discs at random in a square."""
+    rng = np.random.default_rng([seed, count])
+
+    def apart(number: int, others: Sequence[Array], least: float) -> list[Array]:
+        found: list[Array] = []
+        while len(found) < number:
+            point = rng.uniform(0.0, extent, 2)
+            if all(np.hypot(*(point - other)) >= least for other in [*others, *found]):
+                found.append(point)
+        return found
+
+    discs = apart(obstacles, [], 1.0)
+    starts, targets = apart(count, discs, 2.15), apart(count, discs, 2.15)
+    return space(discs), [errand(start, target) for start, target in zip(starts, targets, strict=True)]
+
+
+def motions(plan: Plan, errands: Sequence[Errand]) -> list[Array]:
+    """What every robot does, those that stay included."""
+    return [at_rest(e.start) if way is None else way.motion for way, e in zip(plan.ways, errands, strict=True)]

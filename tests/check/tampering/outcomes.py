@@ -1,0 +1,85 @@
+"""Tampering with what method (d) foresaw, with what it watched, and with the map in a message."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from check.tampering.base import edited_claim, edited_table, refused_by
+
+
+def change(folder: Path, where: Callable[[pd.DataFrame], Any], **values: Any) -> None:
+    """Change columns of the first decision for which something holds."""
+    with edited_table(folder, "decisions") as frame:
+        row = frame.index[np.flatnonzero(where(frame))[0]]
+        for name, value in values.items():
+            frame.loc[row, name] = value(frame.loc[row, name]) if callable(value) else value
+
+
+def first_accepted(frame: pd.DataFrame) -> Any:
+    return frame["reason"] == "cheaper"
+
+
+def first_refused(frame: pd.DataFrame) -> Any:
+    return frame["reason"] == "stalls"
+
+
+def under_way(frame: pd.DataFrame) -> Any:
+    return (frame["decision"] == "accept") & (frame["lag_m"] > 0.0)
+
+
+@refused_by("GATE-MODEL", "accept: outcome")
+def outcome_made_better(folder: Path) -> None:
+    change(folder, first_accepted, accept_outcome_m2_s=lambda value: 0.99 * value)
+
+
+@refused_by("GATE-MODEL", "accept: stalls")
+def stall_denied(folder: Path) -> None:
+    change(folder, first_refused, accept_stalls=0.0)
+
+
+@refused_by("GATE-MODEL", "refuse: way left")
+def way_left_made_long(folder: Path) -> None:
+    change(folder, first_refused, refuse_left_m=lambda value: 3.0 * value)
+
+
+@refused_by("GATE-MODEL", "accept: ")
+def map_in_a_message_exchanged(folder: Path) -> None:
+    with edited_table(folder, "proposals") as frame:
+        walls = [3.3, 9.5, 0.0, 5.0, 9.0, 0.0, 6.5, 7.5, 0.0]
+        frame["mapped_m"] = [np.array(walls) for _ in range(len(frame))]
+
+
+@refused_by("LIVE-PROG", "answer and its reason")
+def reason_of_a_refusal_changed(folder: Path) -> None:
+    change(folder, first_refused, reason="not_cheaper")
+
+
+@refused_by("LIVE-PROG", "tries")
+def tries_understated(folder: Path) -> None:
+    change(folder, under_way, tries=0.0)
+
+
+@refused_by("LIVE-PROG", "lag")
+def lag_understated(folder: Path) -> None:
+    change(folder, under_way, lag_m=lambda value: 0.5 * value)
+
+
+@refused_by("LIVE-PROG", "predicted lag")
+def lag_predicted_afterwards(folder: Path) -> None:
+    change(folder, under_way, predicted_lag_m=lambda value: value + 0.1)
+
+
+@refused_by("LIVE-PROG", "margin")
+def patience_overstated(folder: Path) -> None:
+    with edited_claim(folder, "LIVE-PROG") as claim:
+        claim["margin"] = 3.0
+
+
+@refused_by("GATE-MODEL", "evidence")
+def outcomes_miscounted(folder: Path) -> None:
+    with edited_claim(folder, "GATE-MODEL") as claim:
+        claim["evidence"]["outcomes"] += 2

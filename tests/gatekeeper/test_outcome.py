@@ -1,0 +1,122 @@
+"""What comes of accepting and of refusing, rolled out to the end."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from airground_drake.gatekeeper.outcome import Other, Outcome, Outlook, outcomes, way_left
+from airground_drake.gatekeeper.prediction import Scene
+from airground_drake.intervention.policy import Proposal
+from airground_drake.nsbc.avoidance import Avoidance
+from airground_drake.nsbc.law import UgvLaw
+from airground_drake.nsbc.motion import Motion
+
+LAW = UgvLaw(Avoidance(3.0, 0.05, 4.0), 2.0, 1.5, intervention_on_top=False)
+LOOK = Outlook(longest=20.0)
+NONE = np.empty((0, 3))
+
+
+def situation(*discs: tuple[float, float]) -> tuple[Scene, np.ndarray]:
+    """A UGV at the origin that is to go to (8, 0), and discs of 2 m."""
+    preset = Motion.at_speed(np.array([[0.0, 0.0, 0.0], [8.0, 0.0, 0.0]]), 1.0)
+    scene = Scene(0.0, np.zeros(3), preset, NONE, NONE, np.empty(0), np.empty(0), 3.0)
+    return scene, np.array([[x, y, 0.0] for x, y in discs]).reshape(-1, 3)
+
+
+def along(*corners: tuple[float, float], speed: float = 2.0) -> Proposal:
+    return Proposal("way", 0.0, Motion.at_speed(np.array([[x, y, 0.0] for x, y in corners]), speed))
+
+
+ROUND = along((0.0, 0.0), (1.0, 3.5), (5.0, 3.5), (8.0, 0.0))
+
+
+def test_a_way_round_a_wall_is_better_than_standing_in_front_of_it() -> None:
+    scene, discs = situation((4.0, 1.0), (4.0, -1.0))
+    refuse, accept = outcomes(scene, LAW, ROUND, discs, 2.0, (), LOOK)
+    assert refuse.stalls
+    assert not accept.stalls
+    assert accept.left == 0.0
+    assert accept.better_than(refuse)
+    assert not refuse.better_than(accept)
+    assert np.linalg.norm(accept.end - [8.0, 0.0, 0.0]) < 0.1
+
+
+def test_where_the_own_task_gets_there_a_detour_is_not_taken() -> None:
+    scene, discs = situation()
+    refuse, accept = outcomes(scene, LAW, ROUND, discs, 2.0, (), LOOK)
+    assert not refuse.stalls
+    assert refuse.cost < 1e-9
+    assert not accept.better_than(refuse)
+
+
+def test_a_proposal_to_stay_makes_no_difference_to_a_stall() -> None:
+    scene, discs = situation((4.0, 1.0), (4.0, -1.0))
+    refuse, accept = outcomes(scene, LAW, along((0.0, 0.0), (0.01, 0.0)), discs, 2.0, (), LOOK)
+    assert refuse.stalls
+    assert accept.stalls
+    assert not accept.better_than(refuse)
+
+
+def test_what_is_not_known_is_not_avoided_and_a_map_that_lies_costs_no_more_than_usefulness() -> None:
+    scene, discs = situation((4.0, 1.0), (4.0, -1.0))
+    assert not outcomes(scene, LAW, ROUND, NONE, 2.0, (), LOOK)[0].stalls
+    walled = np.concatenate([discs, [[3.0, 3.5, 0.0]]])
+    assert outcomes(scene, LAW, ROUND, walled, 2.0, (), LOOK)[1].stalls
+
+
+def test_another_robot_is_predicted_on_the_motion_that_it_is_asked_for() -> None:
+    scene, discs = situation()
+    away = Motion.at_speed(np.array([[4.0, 0.0, 0.0], [4.0, 9.0, 0.0]]), 2.0)
+    standing = Other(np.array([4.0, 0.0, 0.0]), np.zeros(3), None, 2.0, 0.5)
+    assert outcomes(scene, LAW, ROUND, discs, 2.0, (standing,), LOOK)[0].stalls
+    assert not outcomes(scene, LAW, ROUND, discs, 2.0, (replace(standing, asked=away),), LOOK)[0].stalls
+    after = np.array([0.0, 1.0, 10.0])
+    passing = replace(standing, velocity=np.array([1.0, 0.0, 0.0]))
+    np.testing.assert_allclose(passing.places(0.0, after, 3.0)[:, 0], [4.0, 5.0, 7.0])
+    beside = replace(standing, position=np.array([3.0, 0.0, 0.0]), asked=away).places(0.0, after, 3.0)
+    np.testing.assert_allclose(beside[:, 0], 4.0 - np.exp(-after))
+
+
+@pytest.mark.parametrize(
+    ("place", "discs", "expected"),
+    [
+        ((0.0, 0.0), [], 8.0),
+        ((0.0, 0.0), [(4.0, 2.0)], 8.0),
+        ((4.0, 0.0), [(4.0, 0.0)], 4.0),
+        ((0.0, 0.0), [(8.0, 0.0)], 8.0),
+    ],
+)  # fmt: skip
+def test_the_way_left(place: tuple[float, float], discs: list[tuple[float, float]], expected: float) -> None:
+    centres = np.array([[x, y, 0.0] for x, y in discs]).reshape(-1, 3)
+    found = way_left(np.array([*place, 0.0]), np.array([8.0, 0.0, 0.0]), centres, 2.0)
+    assert found == pytest.approx(expected)  # straight where it is free, from inside a disc, and without any way
+
+
+def test_the_way_left_goes_round() -> None:
+    left = way_left(np.zeros(3), np.array([8.0, 0.0, 0.0]), np.array([[4.0, 0.0, 0.0]]), 2.0)
+    assert left == pytest.approx(2.0 * np.sqrt(12.0) + 2.0 * np.pi / 3.0)
+
+
+def test_the_terminal_cost_falls_along_the_way_by_what_is_left_squared() -> None:
+    """The condition of the stability theory: dV = -L^2 dt, and L is no less than the distance to the goal."""
+    scene, discs = situation((4.0, 0.0))
+    goal, v, step = scene.preset.positions[-1], 1.0, 1e-4
+    here = np.array([1.0, 0.5, 0.0])
+    left = way_left(here, goal, discs, 2.0)
+    ahead = here + step * np.array([*np.array([2.9, 1.7]) / np.hypot(2.9, 1.7), 0.0])
+    gains = (left**3 - (left - step) ** 3) / (3.0 * v)
+    assert gains == pytest.approx(left**2 * step / v, rel=1e-3)
+    assert left >= np.linalg.norm(goal - here)
+    assert way_left(ahead, goal, discs, 2.0) >= left - step
+
+
+def test_outcomes_are_compared_by_stalling_first() -> None:
+    still = np.zeros((1, 3))
+    home, far, near = Outcome(still, False, 0.0, 100.0), Outcome(still, True, 2.0, 9.0), Outcome(still, True, 1.0, 1.0)
+    assert home.better_than(far)
+    assert not far.better_than(home)
+    assert near.better_than(far)
+    assert not near.better_than(replace(near, cost=near.cost * (1.0 + 1e-7)))

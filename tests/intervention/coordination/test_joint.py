@@ -1,0 +1,128 @@
+"""Joint plans keep every distance exactly, at all times, and are found where there is one."""
+
+from __future__ import annotations
+
+import math
+from itertools import combinations
+
+import numpy as np
+import pytest
+from builders.teams import APART, Array, errand, motions, random_team, space
+from hypothesis import given
+from hypothesis import strategies as st
+from properties import examples
+
+from airground_drake.intervention.coordination.joint import Effort, Plan, plan
+from airground_drake.intervention.coordination.roadmap import Errand, Space
+
+CORRIDOR = [(x, y) for x in np.arange(-6.0, 6.1, 1.5) for y in (-2.3, 2.3)]
+
+
+def sampled(motion: Array, t: Array) -> Array:
+    return np.column_stack([np.interp(t, motion[:, 0], axis) for axis in motion[:, 1:].T])
+
+
+def distances(one: Array, other: Array) -> Array:
+    """Least distance on each piece on which both go straight, by a formula of its own: minimum of a parabola."""
+    t = np.union1d(one[:, 0], other[:, 0])
+    offset = sampled(one, t) - sampled(other, t)
+    step = np.diff(offset, axis=0)
+    a, b = np.square(step).sum(axis=1), (offset[:-1] * step).sum(axis=1)
+    s = np.clip(-b / np.where(a > 0.0, a, 1.0), 0.0, 1.0)
+    inner = np.square(offset[:-1]).sum(axis=1) + 2.0 * s * b + s * s * a
+    return np.sqrt(np.append(inner, np.square(offset[-1]).sum()))
+
+
+def assert_keeps_distances(room: Space, errands: list[Errand], found: Plan, speed: float, fixed: list[Array]) -> None:
+    ways = motions(found, errands)
+    for way, one in zip(ways, errands, strict=True):
+        assert way[0].tolist() == [0.0, *one.start]
+        assert (np.diff(way[:, 0]) > 0.0).all()
+        legs = np.diff(way, axis=0)
+        assert (np.hypot(legs[:, 1], legs[:, 2]) <= speed * legs[:, 0] * (1.0 + 1e-9) + 1e-9).all()
+        for centre, radius in zip(room.centres, room.radii, strict=True):
+            least = min(radius, float(np.hypot(*(one.start - centre))))
+            assert distances(way, np.array([[0.0, *centre]])).min() >= least - 2e-9
+    for one, other in [*combinations(ways, 2), *((way, motion) for way in ways for motion in fixed)]:
+        least = min(room.apart, float(np.hypot(*(one[0, 1:] - other[0, 1:]))))
+        assert distances(one, other).min() >= least - 2e-9
+
+
+@given(seed=st.integers(0, 10**6), count=st.integers(1, 5), obstacles=st.integers(0, 6), extent=st.floats(9.0, 20.0))
+@examples(15, fuzz=1000)
+def test_every_distance_is_kept_at_all_times(seed: int, count: int, obstacles: int, extent: float) -> None:
+    room, errands = random_team(seed, min(count, 1 + int(extent / 4.0)), min(obstacles, int(extent / 3.0)), extent)
+    fixed = [np.array([[0.0, -30.0, extent / 2.0], [30.0, 2.0 * extent, extent / 2.0]])]
+    found = plan(room, errands, [1.0] * len(errands), fixed, effort=Effort(orders=6))
+    assert_keeps_distances(room, errands, found, 1.0, fixed)
+    for way, one in zip(found.ways, errands, strict=True):
+        assert way is None or way.motion[-1, 1:].tolist() == one.preset[-1, 1:].tolist()
+
+
+@pytest.mark.parametrize(
+    ("obstacles", "ways"),
+    [
+        (CORRIDOR, [((-10.0, 0.0), (10.0, 0.0)), ((10.0, 0.0), (-10.0, 0.0))]),
+        (CORRIDOR, [((-5.0, 0.0), (5.0, 0.0)), ((5.0, 0.0), (-5.0, 0.0))]),
+        ([], [((-1.0, 0.0), (5.0, 0.0)), ((1.0, 0.0), (-5.0, 0.0))]),
+        ([(4.0 * math.cos(a), 4.0 * math.sin(a)) for a in np.linspace(-1.7, 1.7, 9)], [((2.0, 0.0), (9.0, 0.0))]),
+        ([(1.995, 0.6), (-1.995, 0.6)], [((0.0, 0.6 - math.sqrt(4.0 - 1.995**2)), (0.0, 8.0))]),
+        ([], [((6 * math.cos(a), 6 * math.sin(a)), (-6 * math.cos(a), -6 * math.sin(a))) for a in np.arange(6.0)]),
+    ],
+    ids=["swap", "swap inside", "nose to nose", "pocket", "stalled in a gap", "crossing"],
+)
+def test_deadlocks_are_resolved(
+    obstacles: list[tuple[float, float]], ways: list[tuple[tuple[float, float], tuple[float, float]]]
+) -> None:
+    room, errands = space(obstacles), [errand(*way) for way in ways]
+    found = plan(room, errands, [1.0] * len(errands))
+    assert found.complete
+    assert_keeps_distances(room, errands, found, 1.0, [])
+
+
+def test_a_parked_robot_steps_aside_and_comes_back() -> None:
+    walls = [(x, y) for x in np.arange(-14.0, 14.1, 1.4) for y in (-2.2, 2.2) if not (y > 0.0 and 3.0 < x < 8.0)]
+    room = space([*walls, *((x, 7.0) for x in (2.0, 4.0, 6.0, 8.0)), (1.0, 5.0), (9.5, 5.0)])
+    errands = [errand((-6.0, 0.0), (12.0, 0.0)), errand((2.0, 0.0), (2.0, 0.0))]
+    found = plan(room, errands, [1.0, 1.0])
+    assert found.complete
+    assert_keeps_distances(room, errands, found, 1.0, [])
+    aside = motions(found, errands)[1]
+    assert np.abs(aside[:, 1:] - [2.0, 0.0]).max() > APART
+    assert aside[-1, 1:].tolist() == [2.0, 0.0]
+
+
+def test_who_finds_no_way_stays_and_is_gone_round() -> None:
+    cage = [(-8.0 + 2.5 * math.cos(a), 2.5 * math.sin(a)) for a in np.linspace(0.0, 2.0 * math.pi, 9)[:-1]]
+    errands = [errand((-8.0, 0.0), (8.0, 0.0)), errand((4.0, 0.0), (-2.0, 0.0))]
+    room = space(cage)
+    found = plan(room, errands, [1.0, 1.0])
+    assert found.ways[0] is None
+    assert found.ways[1] is not None
+    assert_keeps_distances(room, errands, found, 1.0, [])
+
+
+def test_the_preset_is_joined_where_it_is_free_again() -> None:
+    """A preset through a disc, at half of the robot's speed."""
+    preset = np.array([[0.0, 0.0, 0.0], [20.0, 10.0, 0.0]])
+    stuck = Errand(np.array([-1.0, 0.0]), preset)
+    (way,) = plan(space([(3.0, 0.3)]), [stuck], [1.0], follow=5.0).ways
+    assert way is not None
+    assert 10.0 < way.joined < 12.0  # 5 m along the preset the disc is over
+    after = np.linspace(way.joined, 20.0, 9)
+    assert np.abs(sampled(way.motion, after) - sampled(preset, after)).max() < 1e-9
+
+
+def test_the_same_plan_each_time() -> None:
+    room, errands = random_team(3, 5, 4, 14.0)
+    one, two = (plan(room, errands, [1.0] * 5) for _ in range(2))
+    assert [way.motion.tolist() for way in one.ways if way] == [way.motion.tolist() for way in two.ways if way]
+    assert (one.orders, one.expansions) == (two.orders, two.expansions)
+
+
+def test_an_effort_bounds_what_is_spent() -> None:
+    room, errands = random_team(3, 5, 4, 14.0)
+    found = plan(room, errands, [1.0] * 5, effort=Effort(orders=1, expansions=50))
+    assert found.orders <= 1
+    assert found.expansions <= 50
+    assert_keeps_distances(room, errands, found, 1.0, [])

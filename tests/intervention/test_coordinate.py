@@ -1,0 +1,153 @@
+"""The coordinate policy: who moves, who is asked to make way, and what is proposed to whom."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from builders.observations import mate, seen
+from timeline import times
+from verify.judging import judge
+
+from airground_drake.intervention.coordinate import MOST_REFUSALS, Coordinate, predicted
+from airground_drake.intervention.policy import Observation, Proposal
+from airground_drake.nsbc.motion import Motion
+from airground_drake.scenarios.schema import (
+    Control,
+    Decision,
+    Intervention,
+    Obstacle,
+    Policy,
+    Preset,
+    Run,
+    Scenario,
+    Threshold,
+    Uav,
+    Ugv,
+)
+from airground_drake.simulation import simulate
+
+BAY = [
+    *((x, y) for x in np.arange(-14.0, 14.1, 1.4) for y in (-2.2, 2.2) if not (y > 0.0 and 3.0 < x < 8.0)),
+    *((x, 7.0) for x in (2.0, 4.0, 6.0, 8.0)), (1.0, 5.0), (9.5, 5.0),
+]  # fmt: skip
+"""A corridor along y = 0 in which two robots cannot pass each other, with a bay above 3 m < x < 8 m."""
+COMES = mate("comes", [-1.0, 0.0], [12.0, 0.0])
+PARKED = mate("parked", [2.0, 0.0], [2.0, 0.0], triggered=False)
+
+
+def propose(what: Observation) -> Mapping[str, Motion]:
+    found = Coordinate().propose(what)
+    assert found is not None
+    return found
+
+
+def least_distance(one: Motion, other: Motion) -> float:
+    t = np.linspace(min(one.times[0], other.times[0]), max(one.end, other.end), 2000)
+    return float(np.linalg.norm(one.sample(t) - other.sample(t), axis=1).min())
+
+
+def test_two_that_block_each_other_get_motions_that_fit_together() -> None:
+    one, other = mate("one", [-1.0, 0.0], [6.0, 0.0]), mate("other", [1.0, 0.0], [-6.0, 0.0])
+    found = propose(seen([one, other]))
+    assert list(found) == ["one", "other"]
+    assert {motion.times[0] for motion in found.values()} == {10.05}
+    assert least_distance(found["one"], found["other"]) >= 2.0 - 1e-9
+    assert max(motion.max_speed for motion in found.values()) <= 0.8 + 1e-9
+
+
+def test_a_parked_robot_is_asked_aside_and_back_only_where_it_is_in_the_way() -> None:
+    found = propose(seen([COMES, PARKED], BAY))
+    assert list(found) == ["comes", "parked"]
+    assert found["parked"].positions[-1].tolist() == [2.0, 0.0, 0.0]
+    assert np.abs(found["parked"].positions - [2.0, 0.0, 0.0]).max() > 2.0
+    assert least_distance(found["comes"], found["parked"]) >= 2.0 - 1e-9
+    assert list(propose(seen([COMES, PARKED]))) == ["comes"]  # there is room to go round
+
+
+@pytest.mark.parametrize(
+    "unwilling",
+    [
+        {"refusals": MOST_REFUSALS},
+        {"resting": True, "refusals": 1},
+        {"proposal": Proposal("other", 10.0, Motion(np.array([11.0]), np.array([[2.0, 0.0, 0.0]])))},
+    ],
+    ids=["refused often", "resting", "asked this instant"],
+)
+def test_who_is_unwilling_is_not_asked(unwilling: dict[str, object]) -> None:
+    assert Coordinate().propose(seen([COMES, replace(PARKED, **unwilling)], BAY)) is None  # type: ignore[arg-type]
+
+
+def test_a_robot_that_follows_a_proposal_is_left_to_it() -> None:
+    away = Proposal("coordinate", 9.0, Motion(np.array([10.0, 16.0]), np.array([[4.0, 0.0, 0.0], [4.0, 6.0, 0.0]])))
+    other = mate("other", [4.0, 0.0], [4.0, 8.0], proposal=away, answered="accepted", standing=False)
+    found = propose(seen([mate("one", [0.0, 0.0], [10.0, 0.0]), other]))
+    assert list(found) == ["one"]
+    assert least_distance(found["one"], away.motion) >= 2.0 - 1e-9
+
+
+def test_what_others_are_taken_to_do() -> None:
+    preset = Motion(np.array([0.0, 20.0]), np.array([[0.0, 0.0, 0.0], [20.0, 0.0, 0.0]]))
+    moving = mate("one", [10.0, 0.5], [20.0, 0.0], preset=preset, triggered=False, standing=False)
+    assert predicted(replace(moving, standing=True), 10.0).tolist() == [[0.0, 10.0, 0.5]]
+    ahead = predicted(moving, 10.0)
+    assert ahead[0].tolist() == [0.0, 10.0, 0.5]
+    assert ahead[-1] == pytest.approx([10.0, 20.0, 0.0], abs=1e-3)
+    onto = Proposal("detour", 9.0, Motion(np.array([9.0, 14.0]), np.array([[9.0, 3.0, 0.0], [14.0, 0.0, 0.0]])))
+    along = predicted(replace(moving, proposal=onto, answered="accepted"), 10.0)
+    assert along[-1].tolist() == [10.0, 20.0, 0.0]
+    assert predicted(replace(moving, proposal=onto, answered="refused", triggered=True), 10.0).shape == (1, 3)
+
+
+def test_nothing_without_a_team_and_no_nonsense() -> None:
+    alone = seen([COMES])
+    assert Coordinate().propose(replace(alone, team=())) is None
+    assert list(propose(alone)) == ["comes"]
+    with pytest.raises(ValueError, match="spacing_m"):
+        Coordinate(spacing_m=0.0)
+
+
+def test_the_same_proposals_each_time() -> None:
+    one, two = (propose(seen([COMES, PARKED], BAY)) for _ in range(2))
+    assert [motion.positions.tolist() for motion in one.values()] == [m.positions.tolist() for m in two.values()]
+
+
+def aside() -> Scenario:
+    """One UGV stands parked in the corridor that another one has to pass."""
+
+    def ugv(start: list[float], target: list[float], through: list[float]) -> Ugv:
+        return Ugv([*start, 0.0], [*target, 0.0], Preset([[*p, 0.0] for p in (start, through, target)], 0.7), 1.5)
+
+    return Scenario(
+        name="aside",
+        duration_s=28.0,
+        ugvs={
+            "comes": ugv([-6.0, 0.0], [12.0, 0.0], [3.0, 0.0]),
+            "parked": ugv([2.0, 0.0], [2.0, 0.0], [2.001, 0.0]),
+        },
+        uav=Uav(start_m=[0.0, 30.0, 3.0], target_m=[7.0, 0.0, 3.0], altitude_m=3.0),
+        obstacles={f"o{k}": Obstacle([float(x), float(y), 0.0]) for k, (x, y) in enumerate(BAY)},
+        control=Control(period_s=0.05),
+        decision=Decision(Threshold(zeta_m=2.0), release_m=1.0, noise_period_s=0.05),
+        intervention=Intervention(policies=[Policy("coordinate")], ranking="listed"),
+        runs={"b": Run("b")},
+    )
+
+
+def test_a_parked_robot_makes_way_in_a_run() -> None:
+    of_run = simulate(aside(), "b")
+    asked = of_run.proposals[of_run.proposals["robot"] == "parked"]
+    assert asked["cause"].tolist() == ["comes"]
+    assert len(set(of_run.proposals["issued_s"])) == 1
+    assert [e["robot"] for e in of_run.events if e["kind"] == "arrival"].count("comes") == 1
+    assert np.abs(of_run.position("parked") - [2.0, 0.0, 0.0]).max() > 2.0
+    for ugv, target in (("parked", 2.0), ("comes", 12.0)):
+        assert math.dist(of_run.position(ugv)[-1], (target, 0.0, 0.0)) < 0.1
+    for claim in ("EXEC", "COMM", "SAFE-TRACE"):
+        assert judge(claim, of_run).status == "holds", claim
+    assert len(times(of_run, "trigger")) == 2  # the one that has made way is far from its target, too
+    swapped = asked.assign(cause="parked")
+    assert judge("EXEC", replace(of_run, proposals=swapped)).status == "error"

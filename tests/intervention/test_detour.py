@@ -1,0 +1,54 @@
+"""The detour: round obstacles, and round robots that stand."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from builders.observations import mate, seen
+
+from airground_drake.components import make_planner
+from airground_drake.intervention.detour import Detour
+from airground_drake.intervention.planner import STANDS_S, PlannerMemory
+from airground_drake.intervention.policy import Observation, Proposal
+from airground_drake.nsbc.motion import Motion
+from airground_drake.registry import METHODS
+from airground_drake.scenarios.load import load
+
+DETOUR = Detour(speed_m_s=1.0)
+
+
+def least_distance(what: Observation, other: int) -> float:
+    motion = DETOUR.propose(what)
+    assert motion is not None
+    return float(np.linalg.norm(motion.positions - what.team[other].position, axis=1).min())
+
+
+def test_a_robot_that_stands_is_gone_round() -> None:
+    stuck, parked = mate("ugv1", [0.0, 0.0], [10.0, 0.0]), mate("ugv2", [5.0, 0.1], [5.0, 0.1], triggered=False)
+    assert least_distance(seen([stuck, parked]), 1) >= 2.05 - 1e-3  # chords of arcs
+
+
+def test_a_robot_that_moves_or_will_is_not() -> None:
+    stuck, parked = mate("ugv1", [0.0, 0.0], [10.0, 0.0]), mate("ugv2", [5.0, 0.1], [5.0, 0.1])
+    away = Proposal("detour", 9.0, Motion(np.array([9.0]), np.array([[5.0, 4.0, 0.0]])))
+    for leaves in (replace(parked, standing=False), replace(parked, proposal=away, answered="accepted")):
+        assert least_distance(seen([stuck, leaves]), 1) < 0.2
+    refused = replace(parked, proposal=away, answered="refused")
+    assert least_distance(seen([stuck, refused]), 1) > 2.0
+
+
+def test_targets_may_be_as_near_as_the_safe_distance_allows() -> None:
+    stuck, parked = mate("ugv1", [0.0, 0.0], [10.0, 0.0]), mate("ugv2", [12.0, 0.0], [12.0, 0.0], triggered=False)
+    motion = DETOUR.propose(seen([stuck, parked]))
+    assert motion is not None
+    assert motion.positions[-1].tolist() == [10.0, 0.0, 0.0]
+
+
+def test_who_keeps_to_one_place_stands() -> None:
+    planner = make_planner(load("case_a")[0], METHODS["d"])
+    places = np.zeros((3, 3))
+    memory = planner.watch(PlannerMemory(()), 0.0, places)
+    assert planner.watch(memory, 0.5, places + 0.05) is memory
+    later = planner.watch(memory, STANDS_S, places + np.array([[0.0], [1.0], [0.0]]))
+    assert [halt.since for halt in later.halts] == [0.0, STANDS_S]

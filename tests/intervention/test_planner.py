@@ -1,0 +1,143 @@
+"""The UAV's planner: joint plans, who is asked for whom, and what a refusal changes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+
+from airground_drake.intervention.database import BehaviourDatabase
+from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT
+from airground_drake.intervention.planner import Planner, PlannerMemory
+from airground_drake.intervention.policy import Observation, Policy
+from airground_drake.nsbc.motion import Motion
+
+PLACES = np.array([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [8.0, 0.0, 0.0], [0.0, 0.0, 3.0]])
+UGVS = ("one", "two", "three")
+NOBODY = ((), (), ())
+
+
+def wait(seconds: float) -> Motion:
+    return Motion(np.array([0.0, seconds]), np.zeros((2, 3)))
+
+
+class Scripted(Policy):
+    """Proposes what it is told; remembers what it saw."""
+
+    def __init__(self, *answers: object) -> None:
+        self.answers = list(answers)
+        self.seen: list[Observation] = []
+
+    def propose(self, seen: Observation) -> Mapping[str, Motion] | None:
+        self.seen.append(seen)
+        return self.answers.pop(0) if self.answers else None  # type: ignore[return-value]
+
+
+def planner(policy: Policy) -> Planner:
+    presets = tuple(Motion(np.zeros(1), place[None]) for place in PLACES[:3])
+    database = BehaviourDatabase([("scripted", policy)], retry=1.0, ranking="listed")
+    return Planner(UGVS, database, 0.1, presets, PLACES[:3], np.zeros((0, 3)), 1.0, 1.0, np.ones(3))
+
+
+def step(
+    uav: Planner, memory: PlannerMemory, t: float, intervening: str, answers: Mapping[str, float] | None = None
+) -> PlannerMemory:
+    """One planning instant; who is intervened on, and answers to the proposals in force, by name."""
+    given = []
+    for name, desk in zip(UGVS, memory.desks, strict=True):
+        issued = desk.proposal.issued if desk.proposal else -1.0
+        given += [(answers or {}).get(name, SILENT), issued]
+    called = [name in intervening.split() for name in UGVS]
+    return uav.plan(uav.watch(memory, t, PLACES), t, PLACES, called, np.array(given), NOBODY)
+
+
+def in_force(memory: PlannerMemory) -> dict[str, tuple[float, str]]:
+    """Time of issue and cause of what is in force."""
+    pairs = zip(UGVS, memory.proposals, strict=True)
+    return {name: (proposal.issued, proposal.cause) for name, proposal in pairs if proposal is not None}
+
+
+def test_one_plan_for_all_with_the_cause_of_each() -> None:
+    policy = Scripted({"one": wait(9.0), "two": wait(9.0), "three": wait(9.0)})
+    uav = planner(policy)
+    memory = step(uav, uav.start(), 1.0, "one three")
+    assert in_force(memory) == {"one": (1.0, "one"), "two": (1.0, "one"), "three": (1.0, "three")}
+    assert [UGVS[i] for i, _ in memory.sent] == ["one", "two", "three"]
+    assert len(policy.seen) == 1  # a joint plan answers for all that are in it
+
+
+def test_who_makes_way_does_so_as_long_as_the_cause_needs_it() -> None:
+    uav = planner(Scripted({"one": wait(9.0), "two": wait(9.0)}))
+    memory = step(uav, uav.start(), 1.0, "one")
+    memory = step(uav, memory, 1.1, "one two", {"two": ACCEPT})  # it is far from its own preset now
+    memory = step(uav, memory, 1.2, "two", {"two": ACCEPT})
+    assert in_force(memory) == {"two": (1.0, "one")}
+    assert in_force(step(uav, memory, 1.3, "")) == {}
+    memory = step(uav, uav.start(), 1.0, "one")
+    assert in_force(step(uav, memory, 1.1, "")) == {}
+
+
+def test_a_motion_that_has_run_out_is_over() -> None:
+    uav = planner(Scripted({"one": wait(9.0), "two": wait(2.0)}))
+    memory = step(uav, uav.start(), 1.0, "one")
+    assert in_force(step(uav, memory, 2.0, "one")) == {"one": (1.0, "one")}
+
+
+def test_when_one_refuses_the_others_are_planned_for_again() -> None:
+    policy = Scripted({"one": wait(9.0), "two": wait(9.0), "three": wait(9.0)}, {"one": wait(8.0), "three": wait(8.0)})
+    uav = planner(policy)
+    memory = step(uav, uav.start(), 1.0, "one three")
+    memory = step(uav, memory, 1.1, "one three", {"one": ACCEPT, "two": REFUSE})
+    assert in_force(memory) == {"one": (1.1, "one"), "three": (1.1, "three")}
+    one, two, three = policy.seen[-1].team
+    assert (two.proposal, two.refusals, two.resting) == (None, 1, True)
+    assert (one.answered, three.answered) == ("accepted", "silent")
+    assert not step(uav, memory, 2.2, "one three").desks[1].proposal  # nobody asks it for itself
+
+
+def test_without_a_better_plan_the_others_keep_their_parts() -> None:
+    uav = planner(Scripted({"one": wait(9.0), "two": wait(9.0)}))
+    memory = step(uav, uav.start(), 1.0, "one")
+    memory = step(uav, memory, 1.1, "one", {"two": REFUSE})
+    assert in_force(memory) == {"one": (1.0, "one")}
+
+
+def test_who_refuses_its_own_rests_before_the_next() -> None:
+    policy = Scripted({"one": wait(9.0)}, {"one": wait(9.0)})
+    uav = planner(policy)
+    memory = step(uav, uav.start(), 1.0, "one")
+    memory = step(uav, memory, 1.1, "one", {"one": REFUSE})
+    assert in_force(memory) == {}
+    assert len(policy.seen) == 1
+    assert in_force(step(uav, memory, 2.1, "one")) == {"one": (2.1, "one")}
+    assert policy.seen[-1].refusals == 1
+
+
+def test_after_nothing_the_uav_rests() -> None:
+    policy = Scripted(None, {"two": wait(9.0)}, {"one": wait(9.0)})
+    uav = planner(policy)
+    memory = step(uav, uav.start(), 1.0, "one")
+    memory = step(uav, memory, 1.1, "one")
+    assert len(policy.seen) == 1
+    memory = step(uav, memory, 2.0, "one")  # another one goes first; this one has nothing to do yet
+    assert in_force(memory) == {"two": (2.0, "one")}
+    assert in_force(step(uav, memory, 3.0, "one")) == {"one": (3.0, "one"), "two": (2.0, "one")}
+
+
+@pytest.mark.parametrize(
+    ("proposed", "said"),
+    [
+        ({"four": wait(1.0)}, "not to 'four'"),
+        ({"one": "left"}, "not str"),
+        ({1: wait(1.0)}, "not to 1"),
+        ([wait(1.0)], "not list"),
+        ({"one": wait(1.0), "two": wait(1.0)}, "proposal of this instant"),
+    ],
+)
+def test_nonsense_is_no_intervention(proposed: object, said: str) -> None:
+    uav = planner(Scripted({"one": wait(9.0)}, proposed))
+    memory = step(uav, uav.start(), 1.0, "one two")
+    assert in_force(memory) == {"one": (1.0, "one")}
+    assert [fault.robot for fault in memory.faults] == ["two"]
+    assert said in memory.faults[0].what
