@@ -8,13 +8,12 @@ problems. Times are CPU times of the process.
 
 Plans are compared with the best known: the best of all rows of the same problem. `excess` is the cost (25) above it, in
 per cent of it, or of a hundredth of the cheaper constant plan's cost if that is more (relative to a cost of almost 0 it
-would mean nothing); `other_choice` counts the problems where the first stage is not that of the best plan known, although accepting and
-refusing first differ by more than 0.1 %. Every problem where the default route misses either by more than 0.1 % is
-listed at the end. CasADi with IPOPT and cvxpy with SCIP take part if they are installed; the last columns are how
-often their median time goes into that of the default route.
-
-The closed-loop route has another cost (its plans are rolled out anew) and is not among these rows. What one sample of
-method (d) costs, which solves no problem (26), comes first: both outcomes, to their ends, for every UGV.
+would mean nothing); `other_choice` counts the problems where the first stage is not that of the best plan known,
+although accepting and refusing first differ by more than 0.1 %. Every problem where the default route misses either by
+more than 0.1 % is listed at the end. CasADi with IPOPT and cvxpy with SCIP take part if they are installed; the last
+columns are how often their median time goes into that of the default route. The closed-loop route has another cost (its
+plans are rolled out anew) and is not among these rows. What one sample of method (d) costs, which solves no problem
+(26), comes first: both outcomes, to their ends, for every UGV.
 """
 
 from __future__ import annotations
