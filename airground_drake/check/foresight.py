@@ -70,8 +70,8 @@ def outcomes(run: Run) -> Found:
             allowed = OUTCOME * max(1.0, due)
             close(f"{choice}: outcome", recorded, due, within=allowed, **about)
             most = max(most, abs(recorded - due) / allowed)
-    found = Found.with_margin("holds", 1.0 - most, within=0.1, decisions=len(rows), outcomes=2 * len(looked))
-    return found.counted(len(looked))
+    agreed = Found.with_margin("holds", 1.0 - most, within=0.1, decisions=len(rows), outcomes=2 * len(looked))
+    return agreed.counted(len(looked))
 
 
 def on_which(run: Run, ugv: str, issued_s: float) -> Proposal:
