@@ -21,7 +21,6 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass, field
 from itertools import combinations
 from pathlib import Path
@@ -273,11 +272,12 @@ def _many(first: int, wanted: int, jobs: int | None, take: Callable[[Row], None]
     """Scenarios from this number on until so many were valid."""
     valid, number = 0, first
     fresh = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(jobs, mp_context=fresh, max_tasks_per_child=RUNS_PER_PROCESS) as pool:
+    # multiprocessing's own pool: that of concurrent.futures hangs where processes are replaced (Python 3.11)
+    with fresh.Pool(jobs, maxtasksperchild=RUNS_PER_PROCESS) as pool:
         while valid < wanted:
             batch = range(number, number + max(8, (wanted - valid) // 4))
             number = batch.stop
-            for row in pool.map(judged, batch):
+            for row in pool.imap_unordered(judged, batch):
                 if valid < wanted:
                     take(row)
                     valid += not row.invalid

@@ -71,8 +71,12 @@ ROUNDING_ROUTES = ("relaxed", "nonlinear")
 """Routes that GATE-SUR is about."""
 REFUTED_BY_RULES = ("THR-TRIG", "COMM", "GATE-OPT", "GATE-SUR", "GATE-FEAS", "GATE-MODEL", "LIVE-PROG")
 """Claims that any broken rule of theirs refutes; the others are refuted by their margin."""
+PROVED = (
+    "SAFE-LEMMA", "SAFE-INV", "SAFE-GATE", "SAFE-DIST", "ZENO-PROOF", "LIVE-GATE", "LIVE-WAIT", "THR-ISO",
+)  # fmt: skip
+"""Claims with certificates."""
 OF_MODEL: Mapping[str, OfModel] = {
-    **dict.fromkeys(("SAFE-LEMMA", "SAFE-INV", "SAFE-GATE", "SAFE-DIST", "ZENO-PROOF", "LIVE-WAIT", "THR-ISO"), prove),
+    **dict.fromkeys(PROVED, prove),
     "THR-ROOT": root,
     "THR-OPT": root,
     "THR-DDM": ddm,

@@ -359,16 +359,16 @@ DECISION = (
     Mutant(
         "events come at the ends of steps",
         "systems/decision.py",
-        "return -1.0 if self._due(status, now[0], *self._excursions(begun, now)).any() else 1.0",
-        "return 1.0 if self._due(status, now[0], *self._excursions(begun, now)).any() else 1.0",
+        "return -1.0 if due.any() else 1.0",
+        "return 1.0",
         proofs=("THR-ISO",),
         tests=TRIGGER,
     ),
     Mutant(
         "extremes at the ends of steps only",
         "systems/decision.py",
-        "least, most = extremes(before, after)",
-        "least, most = (np.minimum(_norms(before), _norms(after)), np.maximum(_norms(before), _norms(after)))",
+        "least, most = excursions(begun, now)\n        first",
+        "least, most = np.minimum(_norms(begun), _norms(now)), np.maximum(_norms(begun), _norms(now))\n        first",
         proofs=("THR-ISO",),
         tests=TRIGGER,
     ),
@@ -434,8 +434,8 @@ INTERVENTION = (
     Mutant(
         "proposals are not withdrawn after a release",
         "intervention/planner.py",
-        "            if not intervening[i]:\n                desks[i] = Desk()\n                continue",
-        "            if not intervening[i]:\n                continue",
+        "            if name not in called and desk.cause not in called:\n",
+        "            if False:\n",
     ),
     Mutant(
         "proposals while refractory",
@@ -453,8 +453,8 @@ INTERVENTION = (
     Mutant(
         "the rest after a refusal ignored",
         "intervention/database.py",
-        "retry_at=seen.t + self.retry)",
-        "retry_at=seen.t)",
+        "refusals=desk.refusals + 1, retry_at=t + self.retry,",
+        "refusals=desk.refusals + 1, retry_at=t,",
         tests=PLANNER,
     ),
     Mutant(
@@ -474,16 +474,16 @@ INTERVENTION = (
     Mutant(
         "a proposal outlives its motion",
         "intervention/database.py",
-        "if seen.t < (desk.proposal.motion.end if desk.proposal",
-        "if seen.t < (desk.proposal.motion.end + 1e3 if desk.proposal",
+        "return t >= (self.proposal.motion.end if self.proposal",
+        "return t >= (self.proposal.motion.end + 1e3 if self.proposal",
         runs=("crowd b", "crowd d", "case_b d"),
         tests=PLANNER,
     ),
     Mutant(
         "detours inside the safe distance",
         "intervention/detour.py",
-        "reach = seen.safe_distance + self.clearance",
-        "reach = 0.8 * seen.safe_distance",
+        "np.full(len(seen.obstacles), seen.safe_distance + self.clearance)",
+        "np.full(len(seen.obstacles), 0.8 * seen.safe_distance)",
         tests=PLANNER,
     ),
     Mutant(
@@ -578,14 +578,14 @@ GATEKEEPER = (
     Mutant(
         "other robots are predicted to stand",
         "gatekeeper/sample.py",
-        "velocities[around.others[i]]]),",
-        "0.0 * velocities[around.others[i]]]),",
+        "seen.velocities[around.others[i]]]),",
+        "0.0 * seen.velocities[around.others[i]]]),",
     ),
     Mutant(
-        "obstacles move with their velocity twice",
+        "points are predicted to stand where they are",
         "gatekeeper/closed_loop.py",
-        "loop.centres[c, a] + k * h * loop.velocities[c, a]",
-        "loop.centres[c, a] + 2 * k * h * loop.velocities[c, a]",
+        "position, loop.points[k], loop.distances,",
+        "position, loop.points[0], loop.distances,",
     ),
     Mutant(
         "the prediction has no avoidance",
@@ -622,7 +622,7 @@ GATEKEEPER = (
     Mutant(
         "an answer is always new",
         "gatekeeper/sample.py",
-        "since.append(memory.since[i] if answer == standing else t)",
+        "since.append(memory.since[i] if answer == answer_to(proposal, memory.answers, i) else t)",
         "since.append(t)",
     ),
     Mutant(
@@ -636,8 +636,8 @@ GATEKEEPER = (
     Mutant(
         "what is sensed does not come with a refusal",
         "gatekeeper/sample.py",
-        "reports.append(self._sensed(positions[i]))",
-        "reports.append(())",
+        "near = self._neighbourhood.obstacles[self._sensed(position)]",
+        "near = self._neighbourhood.obstacles[:0]",
         tests=("tests/intervention", "tests/systems", "tests/test_simulation.py"),
     ),
     Mutant(

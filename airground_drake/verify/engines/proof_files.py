@@ -57,10 +57,17 @@ def _kept(folder: Path, script: Path, result: Result) -> dict[str, Any]:
     why = outcome(result)
     if why == "complete":
         file = folder / "proofs" / claim / f"{script.stem}.cpc"
-        files.write_text(file, result.proof)
-        content = result.proof.encode()
+        text = commands(result.proof)
+        files.write_text(file, text)
+        content = text.encode()
         entry |= {"file": f"proofs/{claim}/{file.name}", "bytes": len(content), "sha256": files.sha256(content)}
     return entry | {"outcome": why}
+
+
+def commands(proof: str) -> str:
+    """The proof without the brackets that cvc5 puts around all of it: what Ethos reads."""
+    text = proof.strip()
+    return text[1:-1].strip() + "\n" if text.startswith("(\n") and text.endswith("\n)") else text + "\n"
 
 
 def outcome(result: Result) -> str:

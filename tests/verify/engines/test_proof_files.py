@@ -25,6 +25,8 @@ def test_proofs_are_written_where_there_are_any(tmp_path: Path) -> None:
     assert found["proved"]["outcome"] == "complete"
     content = (tmp_path / found["proved"]["file"]).read_bytes()
     assert hashlib.sha256(content).hexdigest() == found["proved"]["sha256"]
+    assert content.startswith(b"(declare-const ")
+    assert content.count(b"(") == content.count(b")")
     assert content.count(b"assume") >= 2
     assert b":rule trust" not in content
 
