@@ -55,6 +55,8 @@ class LiveGate(ModelClaim):
         "LIVE-PROG says what came of it, and LIVE-WAIT bounds the time."
     )
 
+    exercised_by = "obligations of the proof"
+
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
         """Gains, period, speed limits and the running patience's numbers."""
         law, patience = make_law(scenario, METHODS["d"]), make_patience(scenario)
