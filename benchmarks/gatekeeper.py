@@ -6,8 +6,9 @@ Problems are those that the gatekeeper of cases A and B was given in a run, and 
 discs (a detour or a straight line proposed), for one to eight UGVs. A solution is one sample: with two UGVs, both
 problems. Times are CPU times of the process.
 
-Plans are compared with the best known: the best of all rows of the same problem. `excess` is the cost (25) above it, in per cent of it, or of a hundredth of
-the cheaper constant plan's cost if that is more (relative to a cost of almost 0 it would mean nothing);
+Plans are compared with the best known: the best of all rows of the same problem. `excess` is the cost (25) above it, in
+per cent of it, or of a hundredth of the cheaper constant plan's cost if that is more (relative to a cost of almost 0 it
+would mean nothing);
 `other_choice` counts the problems where the first stage is not that of the best plan known, although accepting and
 refusing first differ by more than 0.1 %. Every problem where the default route misses either by more than 0.1 % is
 listed at the end. CasADi with IPOPT and cvxpy with SCIP take part if they are installed; the last columns are how
@@ -163,9 +164,9 @@ def way(start: np.ndarray, goal: np.ndarray, centres: np.ndarray, radius: float)
 def groups(quick: bool) -> Iterator[tuple[str, int, int, int, list[Sample]]]:
     """Name, UGVs, points, stages and samples of every group."""
     many, few = (20, 5) if quick else (200, 30)
-    for case, run in (("case_a", "c"), ("case_a", "d"), ("case_b", "c"), ("case_b", "d")):
-        samples = recorded(case, run, many)
-        yield f"{case}, run {run}", 1, max(len(s[0].distances) for s in samples), samples[0][0].stages, samples
+    for case in ("case_a", "case_b"):
+        samples = recorded(case, "c", many)
+        yield f"{case}, run c", 1, max(len(s[0].distances) for s in samples), samples[0][0].stages, samples
 
     def random(ugvs: int, discs: int, stages: int, safe: float, count: int) -> tuple[int, int, int, list[Sample]]:
         rng = np.random.default_rng([ugvs, discs, stages])
