@@ -140,7 +140,7 @@ def no_speed_limit_of_the_uav(monkeypatch: pytest.MonkeyPatch) -> None:
 def one_direction_only(monkeypatch: pytest.MonkeyPatch) -> None:
     """Not a mutant: proposals concern one direction."""
     along = np.array([[1.0, 0.0, 0.0]])
-    monkeypatch.setattr(database, "Proposal", lambda *given: Proposal(*given, selection=along))
+    monkeypatch.setattr(database, "Proposal", lambda *given, **known: Proposal(*given, selection=along, **known))
 
 
 def selection_ignored(monkeypatch: pytest.MonkeyPatch) -> None:
