@@ -129,6 +129,7 @@ def whole_run(seed: int) -> tuple[float, int, float, float, float]:
     scenario.intervention.ranking, scenario.intervention.retry_s = "listed", 0.05
     scenario.gatekeeper.error_weight_1_m2_s = float(random.choice([1.0, 30.0, 1000.0]))
     scenario.obstacles["obstacle_2"].known_to_uav = bool(random.integers(2))
+    scenario.choices = []  # some are about runs that are not made here
     margins, executed, stolen = {}, 0, 0.0
     for method in ("d", "c"):
         scenario.runs, scenario.reproduction = {method: Run(method=method)}, []

@@ -96,7 +96,7 @@ def gate_scenario(route: str) -> dict[str, Any]:
     gate = Gatekeeper(route=route, horizon_s=STAGES * STAGE_S, stages=STAGES, slack_weight_1_m2_s=10.0)
     spec = Scenario(
         duration_s=0.5, ugvs={"ugv1": ugv(0.0), "ugv2": ugv(-3.0)}, uav=AWAY, gatekeeper=gate,
-        obstacles={"rock": Obstacle([1.2, 2.4, 0.0]), "far": Obstacle([30.0, 0.0, 0.0])}, runs={"d": Run("d")},
+        obstacles={"rock": Obstacle([1.2, 2.4, 0.0]), "far": Obstacle([30.0, 0.0, 0.0])}, runs={"c": Run("c")},
     )  # fmt: skip
     return asdict(spec)
 
@@ -149,7 +149,7 @@ def solve_as_documented(data: GateData, route: str) -> Solution:
 def decided_run(route: str = "relaxed") -> Trace:
     """Six decisions of ugv1 on a proposal of t = 0."""
     spec = gate_scenario(route)
-    base = simulate(spec, "d", lambda t: [[0.1, 0.2, 0.0], [0.5, 0.1, 0.0], [0.0, 0.0, 0.0]])
+    base = simulate(spec, "c", lambda t: [[0.1, 0.2, 0.0], [0.5, 0.1, 0.0], [0.0, 0.0, 0.0]])
     rules = Rules(switching_margin=spec["gatekeeper"]["switching_margin"], min_dwell=0.2, max_bend=0.5)
     standing, since, decisions, problems = SILENT, 0.0, [], []
     for k in range(1, 7):

@@ -71,7 +71,7 @@ def _soft_gate() -> Item:
         evidence[name] = {
             "accepted": len(accepted),
             "least_predicted_clearance_of_accepted_m": (
-                float(accepted["predicted_clearance_m"].min()) if len(accepted) else None
+                float(accepted["predicted_clearance_m"].min()) if len(accepted) and run == "c" else None
             ),
             "min_distance_m": nearest[0] if nearest else None,
             "t_s": nearest[1] if nearest else None,
