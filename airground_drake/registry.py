@@ -216,6 +216,7 @@ MODEL_CLAIMS = Registry(
         "SAFE-DIST": "airground_drake.verify.model.avoidance.safe_dist:SafeDist",
         "ZENO-PROOF": "airground_drake.verify.model.trigger.zeno_proof:ZenoProof",
         "ZENO-REFINE": "airground_drake.verify.model.trigger.zeno_refine:ZenoRefine",
+        "LIVE-GATE": "airground_drake.verify.model.patience.live_gate:LiveGate",
         "LIVE-WAIT": "airground_drake.verify.model.patience.live_wait:LiveWait",
         "THR-ISO": "airground_drake.verify.model.trigger.thr_iso:ThrIso",
         "THR-ROOT": "airground_drake.verify.model.threshold.thr_root:ThrRoot",

@@ -1,8 +1,8 @@
 """Are two reports' verdicts the same? `python benchmarks/compare_reports.py BEFORE AFTER` (folders of reports).
 
 Compares report by report, found by name in both folders: every claim's status, expectation, margin (to the last digit;
-not GATE-TIME's, which is measured) and unit, the mutants' refutations, the reproduction table, the findings of the
-audit, and events. Exit code: 0 equal, 1 not, 2 nothing to compare.
+not GATE-TIME's, which is measured), unit and count of what exercised it, the mutants' refutations, the reproduction
+table, the findings of the audit, and events. Exit code: 0 equal, 1 not, 2 nothing to compare.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ def facts(report: dict[str, Any]) -> Iterator[tuple[str, Any]]:
     for claim in report["claims"]:
         for field in ("status", "expected", "unit", *(() if claim["id"] in MEASURED else ("margin",))):
             yield f"{claim['id']} {claim['run'] or 'model'}: {field}", claim[field]
+        yield f"{claim['id']} {claim['run'] or 'model'}: exercised", claim.get("exercised")  # older reports have none
     for mutant in report["mutants"]:
         yield f"{mutant['claim']} mutant {mutant['mutant'].rpartition(': ')[2]}", (mutant["status"], mutant["refuted"])
     for row in report["reproduction"]:

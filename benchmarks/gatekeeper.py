@@ -6,15 +6,14 @@ Problems are those that the gatekeeper of cases A and B was given in a run, and 
 discs (a detour or a straight line proposed), for one to eight UGVs. A solution is one sample: with two UGVs, both
 problems. Times are CPU times of the process.
 
-Plans are compared with the best known: the best of all rows of the same problem, and of a search with 4096 labels
-(`best_known`), which uses no relaxation. `excess` is the cost (25) above it, in per cent of it, or of a hundredth of
-the cheaper constant plan's cost if that is more (relative to a cost of almost 0 it would mean nothing);
-`other_choice` counts the problems where the first stage is not that of the best plan known, although accepting and
-refusing first differ by more than 0.1 %. Every problem where the default route misses either by more than 0.1 % is
-listed at the end. CasADi with IPOPT and cvxpy with SCIP take part if they are installed; the last columns are how
-often their median time goes into that of the default route.
-
-The closed-loop route has another cost (its plans are rolled out anew) and is not among these rows.
+Plans are compared with the best known: the best of all rows of the same problem. `excess` is the cost (25) above it, in
+per cent of it, or of a hundredth of the cheaper constant plan's cost if that is more (relative to a cost of almost 0 it
+would mean nothing); `other_choice` counts the problems where the first stage is not that of the best plan known,
+although accepting and refusing first differ by more than 0.1 %. Every problem where the default route misses either by
+more than 0.1 % is listed at the end. CasADi with IPOPT and cvxpy with SCIP take part if they are installed; the last
+columns are how often their median time goes into that of the default route. The closed-loop route has another cost (its
+plans are rolled out anew) and is not among these rows. What one sample of method (d) costs, which solves no problem
+(26), comes first: both outcomes, to their ends, for every UGV.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ import numpy as np
 
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.half_planes import normals_along
-from airground_drake.gatekeeper.local_search import best_known
+from airground_drake.gatekeeper.outcome import Other, Outlook, outcomes
 from airground_drake.gatekeeper.prediction import Horizon, Scene, predicted_problem
 from airground_drake.gatekeeper.problem import Problem
 from airground_drake.gatekeeper.rounding import sum_up_rounding
@@ -49,6 +48,8 @@ from airground_drake.nsbc.motion import Motion
 from airground_drake.registry import ROUTES
 from airground_drake.scenarios.load import load
 from airground_drake.simulation import Recorder
+
+LAW = UgvLaw(Avoidance(3.0, 0.05, 4.0), 2.0, 1.5, intervention_on_top=False)
 
 Sample = list[Problem]
 """The problems of one solution, one per UGV."""
@@ -83,8 +84,44 @@ def recorded(case: str, run: str, most: int) -> list[Sample]:
 
 
 def rolled_out(rng: np.random.Generator, ugvs: int, discs: int, stages: int, safe: float) -> Sample:
+    """Problems (26) of UGVs among discs; the same situations as `among`, by mode velocities."""
+    horizon, sample = Horizon(stages, 1, 1.0, 1000.0), []
+    for scene, proposal in among(rng, ugvs, discs, safe):
+        sample.append(replace(predicted_problem(scene, LAW, proposal, horizon), loop=None))
+    return sample
+
+
+def outcomes_of(situations: list[tuple[Scene, Proposal]], discs: int, safe: float) -> None:
+    """What method (d) looks at, at one sample: both outcomes for every UGV."""
+    motions = [proposal.motion for _, proposal in situations]
+    for i, (scene, proposal) in enumerate(situations):
+        asked = motions[:i] + motions[i + 1 :]
+        others = [
+            Other(scene.centres[discs + k], scene.velocities[discs + k], motion, safe, 0.5)
+            for k, motion in enumerate(asked)
+        ]
+        outcomes(scene, LAW, proposal, scene.centres[:discs], safe, others, Outlook(longest=30.0))
+
+
+def cost_of_outcomes(count: int) -> None:
+    """Print the CPU time of one sample of method (d) with new proposals for all UGVs."""
+    for ugvs, discs in ((1, 4), (2, 4), (4, 4), (2, 16)):
+        rng = np.random.default_rng([ugvs, discs])
+        samples = [among(rng, ugvs, discs, 2.0 if discs < 16 else 1.0) for _ in range(count)]
+        outcomes_of(samples[0], discs, 2.0)
+        times = []
+        for sample in samples:
+            started = time.process_time()
+            outcomes_of(sample, discs, 2.0 if discs < 16 else 1.0)
+            times.append(1e3 * (time.process_time() - started))
+        p50, p99 = np.percentile(times, [50, 99])
+        print(
+            f"method (d), {ugvs} UGVs, {discs} obstacles: p50 {p50:.2f} ms, p99 {p99:.2f} ms, max {max(times):.2f} ms"
+        )
+
+
+def among(rng: np.random.Generator, ugvs: int, discs: int, safe: float) -> list[tuple[Scene, Proposal]]:
     """UGVs among the same discs, all within sensing range of the first; each senses the others, which move."""
-    law = UgvLaw(Avoidance(3.0, 0.05, 4.0), 2.0, 1.5, intervention_on_top=False)
     angle, radius = rng.uniform(-np.pi, np.pi, discs), rng.uniform(safe + 0.1, 3.8, discs)
     centres = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), np.zeros(discs)])
     starts, speeds = np.zeros((ugvs, 3)), rng.uniform(-0.5, 0.5, (ugvs, 3)) * [1, 1, 0]
@@ -108,9 +145,7 @@ def rolled_out(rng: np.random.Generator, ugvs: int, discs: int, stages: int, saf
             max_speed=3.0,
         )
         motion = Motion.at_speed(way(starts[i], aim, centres, safe + 0.05), 2.85, start=0.0)
-        horizon = Horizon(stages, 1, 1.0, 1000.0)
-        problem = predicted_problem(scene, law, Proposal("proposed", 0.0, motion), horizon)
-        sample.append(replace(problem, loop=None))
+        sample.append((scene, Proposal("proposed", 0.0, motion)))
     return sample
 
 
@@ -251,10 +286,12 @@ class Known:
 
     @classmethod
     def of(cls, problem: Problem, solutions: list[Solution]) -> Known:
-        """By `best_known`, and by every plan of `solutions`."""
-        plans = [d.plan for d in solutions if d.has_plan and d.plan is not None]
-        refuse, accept = best_known(problem, 4096 if problem.stages <= 60 else 1024, plans)
-        constant = ConstantPlans.of(problem).better.objective
+        """By the constant plans and every plan of `solutions`."""
+        constants = ConstantPlans.of(problem)
+        planned = [d for d in solutions if d.has_plan]
+        refuse = min([constants.refuse.objective, *(d.objective_refuse for d in planned)])
+        accept = min([constants.accept.objective, *(d.objective_accept for d in planned)])
+        constant = constants.better.objective
         return cls(refuse, accept, max(refuse if refuse < accept else accept, 0.01 * constant, 1e-12))
 
     def excess(self, solution: Solution) -> float:
@@ -309,6 +346,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="a tenth of the problems")
     parser.add_argument("-o", "--output", metavar="CSV", help="write the table there, too")
+    parser.add_argument("--outcomes", action="store_true", help="only what a decision of method (d) costs")
     parser.add_argument("--routes", metavar="NAMES", help="only these, separated by commas (default: all)")
     arguments = parser.parse_args()
     logging.getLogger("drake").setLevel(logging.ERROR)  # solvers that give up are counted below
@@ -317,6 +355,9 @@ def main() -> None:
     if unknown := set(chosen) - set(makers):
         parser.error(f"--routes: unknown {', '.join(sorted(unknown))}; allowed: {', '.join(makers)}")
     routes = {name: makers[name]() for name in chosen}
+    cost_of_outcomes(20 if arguments.quick else 200)
+    if arguments.outcomes:
+        return
     layout = "{:<19}{:>5}{:>7}{:>7}  {:<17}{:>9}{:>9}{:>9}{:>9}{:>14}{:>13}{:>11}{:>9}{:>13}{:>8}{:>10}"
     print(layout.format(*COLUMNS))
     table, missed, solved = [], [], 0

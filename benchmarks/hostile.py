@@ -5,8 +5,10 @@
 Solution level: UGVs at random safe places among obstacles, many exactly at the safe distance, with proposals of
 random position, speed, direction and course, a third of them aimed at what is nearest. Under method (d) each one
 is executed whether accepted or not; under (c) only if its gatekeeper accepts. Whole runs: case A with the
-policies `hostile`, `towards` and `noisy` of random parameters, a gatekeeper that accepts nearly anything, and
-obstacles that the UAV does not know. Distances are exact in continuous time.
+policies `hostile`, `towards` and `noisy` of random parameters, a gatekeeper that accepts nearly anything (under method
+(d) one that takes every prediction for useful, as a lying map could make it), and obstacles that the UAV does not know.
+Distances are exact in continuous time. The time that a UAV steals is measured besides: the longest that a UGV executed
+interventions between two rests, against the bound of LIVE-WAIT.
 """
 
 from __future__ import annotations
@@ -15,11 +17,13 @@ import argparse
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import partial
+from unittest import mock
 
 import numpy as np
 
 from airground_drake.arrays import Array
 from airground_drake.components import make_presets, make_team
+from airground_drake.gatekeeper.certified import CertifiedGatekeepers
 from airground_drake.gatekeeper.prediction import Horizon, Scene, predicted_problem
 from airground_drake.gatekeeper.routes.relaxed import RelaxedRoute
 from airground_drake.intervention.policy import Proposal
@@ -30,6 +34,8 @@ from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Policy, Run
 from airground_drake.simulation import Recorder
 from airground_drake.systems.controllers import UgvController
+from airground_drake.trace import Trace
+from airground_drake.verify.model.patience.attack import Believing
 from airground_drake.verify.runs.safe_trace import SafeTrace
 
 STEPS = 30
@@ -108,8 +114,8 @@ def execute(
     return least
 
 
-def whole_run(seed: int) -> tuple[float, int, float]:
-    """Margins, m, of one run under (d) and (c), and the number of proposals that (d) executed."""
+def whole_run(seed: int) -> tuple[float, int, float, float, float]:
+    """Margins, m, of one run under (d) and (c), proposals that (d) executed, time stolen and the bound of it, s."""
     random = np.random.default_rng(seed)
     scenario = load("case_a", ["duration_s=20", f"seed={seed}"])[0]
     x, y = random.uniform([-1.0, 3.0], [6.0, 10.0])
@@ -123,15 +129,32 @@ def whole_run(seed: int) -> tuple[float, int, float]:
     scenario.intervention.ranking, scenario.intervention.retry_s = "listed", 0.05
     scenario.gatekeeper.error_weight_1_m2_s = float(random.choice([1.0, 30.0, 1000.0]))
     scenario.obstacles["obstacle_2"].known_to_uav = bool(random.integers(2))
-    margins, executed = {}, 0
+    margins, executed, stolen = {}, 0, 0.0
     for method in ("d", "c"):
-        scenario.runs = {method: Run(method=method)}
-        trace = Recorder(scenario, method, scenario.runs[method]).simulate()
+        scenario.runs, scenario.reproduction = {method: Run(method=method)}, []
+        with mock.patch.object(CertifiedGatekeepers, "foresee", Believing.foresee):
+            trace = Recorder(scenario, method).simulate()
         margin = SafeTrace().check(trace).margin
         margins[method] = np.nan if margin is None else margin
         if method == "d":
             executed = sum(event["kind"] == "accept" for event in trace.events)
-    return margins["d"], executed, margins["c"]
+            stolen = max(stolen_s(trace, ugv) for ugv in trace.ugvs)
+    gate = scenario.gatekeeper
+    return margins["d"], executed, margins["c"], stolen, gate.tries * (gate.longest_s + gate.period_s)
+
+
+def stolen_s(trace: Trace, ugv: str) -> float:
+    """The longest that a UGV executed interventions between two rests, s."""
+    t, busy = trace.t, trace.column(f"{ugv}.accepted") != 0.0
+    worst, sum_s, alone_s = 0.0, 0.0, 0.0
+    for k in range(1, len(t)):
+        step = float(t[k] - t[k - 1])
+        alone_s = 0.0 if busy[k] else alone_s + step
+        if alone_s >= trace.scenario["gatekeeper"]["rest_s"]:
+            sum_s = 0.0
+        sum_s += step if busy[k] else 0.0
+        worst = max(worst, sum_s)
+    return worst
 
 
 def main() -> None:
@@ -152,6 +175,8 @@ def main() -> None:
             runs = np.array(list(pool.map(whole_run, range(options.runs), chunksize=5)))
             print(f"{options.runs} whole runs with a hostile UAV:")
             print(f"  (d) accepted {int(runs[:, 1].sum())} proposals; worst margin to d: {runs[:, 0].min():.3g} m")
+            print(f"  (d) longest kept from its own task between two rests: {runs[:, 3].max():.1f} s, "
+                  f"bound {runs[:, 4].max():.1f} s")  # fmt: skip
             print(f"  (c) runs below d: {int((runs[:, 2] < -1e-9).sum())}; worst margin: {runs[:, 2].min():.3g} m")
 
 

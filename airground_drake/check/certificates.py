@@ -1,4 +1,4 @@
-"""SAFE-LEMMA, SAFE-INV, SAFE-GATE, SAFE-DIST, ZENO-PROOF, LIVE-WAIT and THR-ISO: every certificate expanded, exactly.
+"""SAFE-LEMMA, SAFE-INV, SAFE-GATE, SAFE-DIST, ZENO-PROOF, LIVE-GATE, LIVE-WAIT and THR-ISO, every certificate exactly.
 
 An obligation says: wherever all hypotheses are >= 0, the strict ones > 0 and all equations 0, the goal is >= 0. Its
 certificate is an identity of polynomials with rational coefficients,
@@ -289,6 +289,20 @@ def _recorded_of_zeno(claim: Json, scenario: Json) -> Found:
     return Found.with_margin("proved", SMALL - rounding, within=1e-16)
 
 
+def _recorded_of_live(claim: Json, scenario: Json) -> Found:
+    """Differences contract; no run that was disturbed within the bound was given back; the margin is what it left."""
+    evidence, gate, control = claim["evidence"], scenario["gatekeeper"], scenario["control"]
+    gain = control["intervention_gain_1_s"]
+    at_most("gain times period", gain * control["period_s"], 1.0)
+    close("disturbance allowed", evidence["disturbance_m_s"], gain * gate["lag_m"], within=SMALL)
+    holds("the running code was run", bool(evidence["runs"]), "no run", "some")
+    for row in evidence["runs"]:
+        same("given back before its time", row["given_back"], False)
+        at_most("excess of a run's lag", row["largest_excess_m"], gate["lag_m"], within=SMALL)
+    excess = max(row["largest_excess_m"] for row in evidence["runs"])
+    return Found.with_margin("proved", gate["lag_m"] - excess, within=SMALL)
+
+
 def _recorded_of_wait(claim: Json, scenario: Json) -> Found:
     """The bound is all tries to their ends; no attack on the running gatekeeper kept a UGV for longer."""
     evidence, gate = claim["evidence"], scenario["gatekeeper"]
@@ -318,6 +332,7 @@ _RECORDED: dict[str, Any] = {
     "SAFE-GATE": _recorded_of_gate,
     "SAFE-DIST": _recorded_of_dist,
     "ZENO-PROOF": _recorded_of_zeno,
+    "LIVE-GATE": _recorded_of_live,
     "LIVE-WAIT": _recorded_of_wait,
     "THR-ISO": _recorded_of_iso,
 }

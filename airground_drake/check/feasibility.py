@@ -82,7 +82,8 @@ def _obedience(run: Run) -> Found:
         _nothing_is_executed_without_acceptance(run, ugv, mine)
         if answers:
             _own_task_while_nothing_is_accepted(run, ugv)
-    return Found("holds", 0.0, 1.0, {"decisions": len(answers)}) if answers else Found("holds")
+    found = Found("holds", 0.0, 1.0, {"decisions": len(answers)}) if answers else Found("holds")
+    return found.counted(len(answers))
 
 
 def _decisions_come_when_due(run: Run, decisions: Sequence[Decision | Answer]) -> None:

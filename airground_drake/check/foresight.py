@@ -70,7 +70,8 @@ def outcomes(run: Run) -> Found:
             allowed = OUTCOME * max(1.0, due)
             close(f"{choice}: outcome", recorded, due, within=allowed, **about)
             most = max(most, abs(recorded - due) / allowed)
-    return Found.with_margin("holds", 1.0 - most, within=0.1, decisions=len(rows), outcomes=2 * len(looked))
+    facts = {"decisions": len(rows), "outcomes": 2 * len(looked)}
+    return Found.with_margin("holds", 1.0 - most, within=0.1, **facts).counted(len(looked))
 
 
 def on_which(run: Run, ugv: str, issued_s: float) -> Proposal:
@@ -90,13 +91,14 @@ def foreseen(run: Run, ugv: str, t_s: float, issued_s: float) -> tuple[Foreseen,
     ends = min(max(until, arrives), t_s + gate["longest_s"]) + gate["settling_s"]
     after = h * np.arange(np.ceil((ends - t_s) / h) + 1.0)
     discs = _known_m(run, ugv, t_s, asked)
-    ways, over = [np.tile(discs, (len(after), 1, 1))], [until, arrives, float(t_s + gate["horizon_s"])]
+    fixed, over = np.tile(discs, (len(after), 1, 1)), [until, arrives, float(t_s + gate["horizon_s"])]
+    ways: tuple[list[Array], list[Array]] = ([fixed], [fixed])  # if it is refused, if it is accepted
     views = [pair for pair in run.views if pair.robot == ugv and pair.other in run.robots]
     for pair in views:
-        way, way_over = _way_of(run, pair.other, t_s, after)
-        ways.append(way[:, None])
+        refused, accepted, way_over = _way_of(run, pair.other, t_s, after)
+        ways[0].append(refused[:, None])
+        ways[1].append(accepted[:, None])
         over.append(way_over)
-    points = np.concatenate(ways, axis=1)
     safe = np.append(np.full(len(discs), run.scenario["safe_distance"]["obstacle_m"]), [p.safe_m for p in views])
     share = np.append(np.ones(len(discs)), [pair.share for pair in views])
     settled = int(np.ceil((max(over) - t_s) / h - SMALL))
@@ -104,7 +106,8 @@ def foreseen(run: Run, ugv: str, t_s: float, issued_s: float) -> tuple[Foreseen,
     own, wanted = preset.position_m(t_s + after), asked.place_m(t_s + after)
     executed = (0, max(0, int(np.ceil((until - t_s) / h - SMALL))))
     found = []
-    for periods in executed:
+    for periods, around in zip(executed, ways, strict=True):
+        points = np.concatenate(around, axis=1)
         places, integral = [start], 0.0
         for k in range(len(after) - 1):
             given = inequalities((places[-1] - points[k])[None], safe, share, run.scenario["control"], PLANE)
@@ -155,21 +158,25 @@ def _known_m(run: Run, ugv: str, t_s: float, asked: Proposal) -> Array:
     return np.array(known).reshape(-1, 3)
 
 
-def _way_of(run: Run, robot: str, t_s: float, after: Array) -> tuple[Array, float]:
-    """Where another robot is predicted, (S + 1, 3): on the motion it is asked for, or coasting to a stop."""
+def _way_of(run: Run, robot: str, t_s: float, after: Array) -> tuple[Array, Array, float]:
+    """Where another robot is predicted, (S + 1, 3), if the proposal is refused, and if it is accepted.
+
+    On the motion that it is asked for, or coasting to a stop; if the proposal is refused, it does what it is asked for
+    only if it has accepted that before.
+    """
     here = run.place_m(robot, t_s)
-    asked = _asked_of(run, robot, t_s)
-    if asked is not None:
-        beside = here - asked.place_m(np.array([t_s]))[0]
-        return asked.place_m(t_s + after) + np.exp(-after)[:, None] * beside, float(asked.times_s[-1])
     held = min(int(np.searchsorted(run.t_s, t_s - SMALL)), len(run.t_s) - 1)
-    coasting = np.minimum(after, run.scenario["gatekeeper"]["horizon_s"])
-    return here + coasting[:, None] * run.command_m_s[robot][held], -np.inf
+    coasting = here + np.minimum(after, run.scenario["gatekeeper"]["horizon_s"])[:, None] * run.command_m_s[robot][held]
+    asked, accepted = _asked_of(run, robot, t_s)
+    if asked is None:
+        return coasting, coasting, -np.inf
+    beside = here - asked.place_m(np.array([t_s]))[0]
+    goes = asked.place_m(t_s + after) + np.exp(-after)[:, None] * beside
+    return goes if accepted else coasting, goes, float(asked.times_s[-1])
 
 
-def _asked_of(run: Run, ugv: str, t_s: float) -> Proposal | None:
-    """What a UGV decides about at a sample, if it has not refused it before."""
-    refused = False
+def _asked_of(run: Run, ugv: str, t_s: float) -> tuple[Proposal | None, bool]:
+    """What a UGV decides about at a sample, if it has not refused it before; and whether it has accepted it before."""
     for row in run.decisions[run.decisions["robot"] == ugv].to_dict("records"):
         if abs(row["t_s"] - t_s) <= SMALL:
             earlier = run.decisions[
@@ -177,9 +184,9 @@ def _asked_of(run: Run, ugv: str, t_s: float) -> Proposal | None:
                 & (run.decisions["issued_s"] == row["issued_s"])
                 & (run.decisions["t_s"] < t_s - SMALL)
             ]
-            refused = len(earlier) > 0 and earlier["decision"].iloc[-1] == "refuse"
-            return None if refused else on_which(run, ugv, row["issued_s"])
-    return None
+            answer = earlier["decision"].iloc[-1] if len(earlier) else ""
+            return None if answer == "refuse" else on_which(run, ugv, row["issued_s"]), answer == "accept"
+    return None, False
 
 
 def _way_left(found: Foreseen, safe_m: float, left_m: float, choice: str, about: dict[str, Any]) -> None:

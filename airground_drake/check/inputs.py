@@ -18,10 +18,10 @@ def inputs_of(claim: str, scenario: Json) -> Json:
         case "ZENO-PROOF":
             bound = float(scenario["decision"]["min_inter_event_s"])
             return {**_trigger(scenario), "min_inter_event_s": bound, "duration_s": float(scenario["duration_s"])}
+        case "LIVE-GATE":
+            return {**_patience(scenario), **_tracking(scenario)}
         case "LIVE-WAIT":
-            gate = scenario["gatekeeper"]
-            names = ("tries", "rest_s", "longest_s", "lag_m", "behind_s", "period_s")
-            return {name: gate[name] for name in names}
+            return _patience(scenario)
         case "THR-ISO":
             return _trigger(scenario)
         case "ZENO-REFINE":
@@ -33,6 +33,22 @@ def inputs_of(claim: str, scenario: Json) -> Json:
         case "THR-DDM":
             return _threshold(scenario)
     return {}
+
+
+def _patience(scenario: Json) -> Json:
+    names = ("tries", "rest_s", "longest_s", "lag_m", "behind_s", "period_s")
+    return {name: scenario["gatekeeper"][name] for name in names}
+
+
+def _tracking(scenario: Json) -> Json:
+    control = scenario["control"]
+    names = ("intervention_gain_1_s", "motion_gain_1_s", "avoidance_gain_1_s", "sensing_range_m")
+    return {
+        **{name: control[name] for name in names},
+        "control_period_s": control["period_s"],
+        "max_speed_m_s": max(float(ugv["max_speed_m_s"]) for ugv in scenario["ugvs"].values()),
+        "obstacle_m": scenario["safe_distance"]["obstacle_m"],
+    }
 
 
 def _avoidance(scenario: Json) -> Json:

@@ -55,7 +55,7 @@ def gate_model(run: Run, _: Json) -> Found:
     if silent_ugvs(run):
         return Found("not_run")
     if run.method == "d":
-        return outcomes(run) if len(run.decisions) else Found("holds")
+        return outcomes(run) if len(run.decisions) else Found("holds").counted(0)
     decisions = decisions_of(run)
     if not decisions:
         return Found("holds").counted(0)

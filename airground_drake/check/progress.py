@@ -37,16 +37,18 @@ def live_prog(run: Run, _: Json) -> Found:
         return Found("not_run")
     rows = rows_of(run)
     if not rows:
-        return Found("holds")
-    longest = 0.0
+        return Found("holds").counted(0)
+    longest, accepted = 0.0, 0
     for ugv in run.ugvs:
         state, last = _Ugv(), None
         for row in [row for row in rows if row["robot"] == ugv]:
             _follow(run, row, last, state)
             if row["decision"] == "accept":
                 longest = max(longest, row["t_s"] - state.on_time_s)
+                accepted += 1
             last = row
-    return Found.with_margin("holds", run.scenario["gatekeeper"]["behind_s"] - longest, decisions=len(rows))
+    found = Found.with_margin("holds", run.scenario["gatekeeper"]["behind_s"] - longest, decisions=len(rows))
+    return found.counted(accepted)
 
 
 def _follow(run: Run, row: dict[str, Any], last: dict[str, Any] | None, state: _Ugv) -> None:

@@ -30,6 +30,8 @@ from .triggers import thr_trig, zeno_trace
 
 SCHEMA = "airground_drake.report/2"
 AGREES, DISAGREES, OPEN = "agrees", "DISAGREES", "cannot be re-established"
+DECIDED_FROM = ("id", "status", "where", "evidence", "inputs", "certificates")
+"""What of a recorded claim its formula looks at; the rest is compared with what the formula gives."""
 UNDECIDED = ("inconclusive", "error", "not_run")
 """Statuses that say nothing about a claim."""
 PASSING = ("proved", "holds", "supported")
@@ -69,8 +71,12 @@ ROUNDING_ROUTES = ("relaxed", "nonlinear")
 """Routes that GATE-SUR is about."""
 REFUTED_BY_RULES = ("THR-TRIG", "COMM", "GATE-OPT", "GATE-SUR", "GATE-FEAS", "GATE-MODEL", "LIVE-PROG")
 """Claims that any broken rule of theirs refutes; the others are refuted by their margin."""
+PROVED = (
+    "SAFE-LEMMA", "SAFE-INV", "SAFE-GATE", "SAFE-DIST", "ZENO-PROOF", "LIVE-GATE", "LIVE-WAIT", "THR-ISO",
+)  # fmt: skip
+"""Claims with certificates."""
 OF_MODEL: Mapping[str, OfModel] = {
-    **dict.fromkeys(("SAFE-LEMMA", "SAFE-INV", "SAFE-GATE", "SAFE-DIST", "ZENO-PROOF", "LIVE-WAIT", "THR-ISO"), prove),
+    **dict.fromkeys(PROVED, prove),
     "THR-ROOT": root,
     "THR-OPT": root,
     "THR-DDM": ddm,
@@ -166,9 +172,10 @@ def _lines(folder: Path, report: Json) -> Iterator[Line]:
     scenario_text = canonical(scenario)
 
     def decide(claim: Json) -> Found:
+        about = canonical({key: claim[key] for key in DECIDED_FROM if key in claim})
         if claim["run"]:
-            return _decide_of_run(loaded(claim["run"]), canonical(claim))
-        return _decide_of_model(canonical(claim), read_folder(folder / "certificates" / claim["id"]), scenario_text)
+            return _decide_of_run(loaded(claim["run"]), about)
+        return _decide_of_model(about, read_folder(folder / "certificates" / claim["id"]), scenario_text)
 
     for claim in report["claims"]:
         yield _attempt(claim["id"], claim["run"], partial(_judge, claim, scenario, decide))

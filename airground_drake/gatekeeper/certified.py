@@ -126,10 +126,11 @@ class CertifiedGatekeepers(Gatekeepers):
         others = []
         for k, j in enumerate(self._neighbourhood.others[i], start=first):
             asked = seen.proposals[j] if j < len(seen.proposals) else None
-            goes = asked is not None and answer_to(asked, seen.before.answers, int(j)) != REFUSE
+            answer = SILENT if asked is None else answer_to(asked, seen.before.answers, int(j))
             others.append(
                 Other(
-                    scene.centres[k], scene.velocities[k], asked.motion if goes and asked is not None else None,
+                    scene.centres[k], scene.velocities[k],
+                    asked.motion if asked is not None and answer != REFUSE else None, answer == ACCEPT,
                     float(scene.distances[k]), float(scene.shares[k]),
                 )
             )  # fmt: skip

@@ -88,6 +88,7 @@ class Other:
         position: now, (3,), m.
         velocity: now, (3,), m/s.
         asked: the motion that it has accepted or is asked for, if any: it is predicted to follow it.
+        accepted: whether it has accepted that.
         distance: to keep from it, m.
         share: of the avoidance inequality.
     """
@@ -95,16 +96,18 @@ class Other:
     position: Array
     velocity: Array
     asked: Motion | None
+    accepted: bool
     distance: float
     share: float
 
-    def places(self, t: float, after: Array, coasting: float) -> Array:
+    def places(self, t: float, after: Array, coasting: float, *, together: bool) -> Array:
         """Where it will be at times `after` from t, (S + 1, 3), m.
 
         On the motion that it is asked to make, by as much beside it as it is now, less with every second: it tracks.
-        Without one: on as now for a while, then at rest.
+        Without one: on as now for a while, then at rest. What it has not accepted yet counts only together with what
+        this UGV is asked: else each would refuse its part of a joint plan because the others free its way.
         """
-        if self.asked is None:
+        if self.asked is None or not (together or self.accepted):
             return self.position + np.minimum(after, coasting)[:, None] * self.velocity
         beside = self.position - self.asked.at(t)[0]
         return self.asked.sample(t + after) + np.exp(-after)[:, None] * beside
@@ -128,23 +131,22 @@ def outcomes(
     until = min(proposal.motion.end, scene.t + look.longest)
     ends = min(max(until, scene.preset.end), scene.t + look.longest) + look.past
     after = h * np.arange(0.0, np.ceil((ends - scene.t) / h) + 1.0)
-    places = [each.places(scene.t, after, look.coasting) for each in others]
     fixed = np.broadcast_to(discs, (len(after), len(discs), 3))
-    points = np.concatenate([fixed, np.stack(places, axis=1)], axis=1) if others else np.ascontiguousarray(fixed)
     known = Scene(
         scene.t, scene.position, scene.preset, scene.centres, scene.velocities,
         np.concatenate([np.full(len(discs), distance), [each.distance for each in others]]),
         np.concatenate([np.ones(len(discs)), [each.share for each in others]]),
         scene.max_speed,
     )  # fmt: skip
-    loop = loop_among(known, law, proposal, after, points)
     goal = scene.preset.positions[-1]
     settled = max(
         until, scene.preset.end, scene.t + look.coasting, *(e.asked.end for e in others if e.asked is not None)
     )
     steps = int(np.ceil((settled - scene.t) / h - 1e-9))
     found = []
-    for accepted in (0, max(0, int(np.ceil((until - scene.t) / h - 1e-9)))):
+    for together, accepted in ((False, 0), (True, max(0, int(np.ceil((until - scene.t) / h - 1e-9))))):
+        places = [each.places(scene.t, after, look.coasting, together=together)[:, None] for each in others]
+        loop = loop_among(known, law, proposal, after, np.concatenate([fixed, *places], axis=1))
         positions, cost = _rolled_out(loop, accepted, goal, steps, look.near, look.still)
         found.append(_outcome(positions, cost, goal, scene.preset.max_speed, discs, distance, h, look))
     return found[0], found[1]

@@ -44,6 +44,8 @@ class Coordinate(Policy):
         follow: how long a proposal goes on along the preset after it has been joined, s, and for which it must be free.
     """
 
+    counted = True
+
     def __init__(
         self, *, speed_m_s: float = math.inf, clearance_m: float = 0.1, spacing_m: float = 0.2, follow_s: float = 8.0
     ) -> None:

@@ -6,7 +6,7 @@ import abc
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Literal, Self
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 
@@ -122,7 +122,13 @@ class Policy(abc.ABC):
 
     A policy may fail: an exception, or anything but motions of finite numbers or None, counts as no
     intervention and is reported (see `database.py`). No policy's code runs in a UGV's control loop.
+
+    Attributes:
+        counted: whether a proposal's effort is bounded in counts. Then no clock stops it (`intervention.budget_s`), and
+            runs are the same on every machine.
     """
+
+    counted: ClassVar[bool] = False
 
     @abc.abstractmethod
     def propose(self, seen: Observation) -> Motion | Mapping[str, Motion] | None:

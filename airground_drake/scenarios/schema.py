@@ -119,7 +119,8 @@ class Intervention:
     """The UAV's intervention behaviours; how often it plans, and how long it rests after a refusal.
 
     `ranking` is 'listed' (in the order of the list) or 'predicted' (best predicted outcome on the UAV's map
-    first). A policy that takes longer than `budget_s` for a proposal counts as proposing nothing.
+    first). A policy that takes longer than `budget_s` for a proposal counts as proposing nothing; one that bounds its
+    effort in counts, such as `coordinate`, is not timed.
     """
 
     period_s: float = 0.05

@@ -70,14 +70,26 @@ def test_what_is_not_known_is_not_avoided_and_a_map_that_lies_costs_no_more_than
 def test_another_robot_is_predicted_on_the_motion_that_it_is_asked_for() -> None:
     scene, discs = situation()
     away = Motion.at_speed(np.array([[4.0, 0.0, 0.0], [4.0, 9.0, 0.0]]), 2.0)
-    standing = Other(np.array([4.0, 0.0, 0.0]), np.zeros(3), None, 2.0, 0.5)
+    standing = Other(np.array([4.0, 0.0, 0.0]), np.zeros(3), None, False, 2.0, 0.5)
     assert outcomes(scene, LAW, ROUND, discs, 2.0, (standing,), LOOK)[0].stalls
-    assert not outcomes(scene, LAW, ROUND, discs, 2.0, (replace(standing, asked=away),), LOOK)[0].stalls
+    going = replace(standing, asked=away, accepted=True)
+    assert not outcomes(scene, LAW, ROUND, discs, 2.0, (going,), LOOK)[0].stalls
     after = np.array([0.0, 1.0, 10.0])
     passing = replace(standing, velocity=np.array([1.0, 0.0, 0.0]))
-    np.testing.assert_allclose(passing.places(0.0, after, 3.0)[:, 0], [4.0, 5.0, 7.0])
-    beside = replace(standing, position=np.array([3.0, 0.0, 0.0]), asked=away).places(0.0, after, 3.0)
+    np.testing.assert_allclose(passing.places(0.0, after, 3.0, together=True)[:, 0], [4.0, 5.0, 7.0])
+    beside = replace(going, position=np.array([3.0, 0.0, 0.0])).places(0.0, after, 3.0, together=False)
     np.testing.assert_allclose(beside[:, 0], 4.0 - np.exp(-after))
+
+
+def test_nobody_refuses_his_part_of_a_joint_plan_because_the_others_would_free_his_way() -> None:
+    """What another robot has not accepted yet is no reason to refuse."""
+    scene, discs = situation()
+    away = Motion.at_speed(np.array([[4.0, 0.0, 0.0], [4.0, 9.0, 0.0]]), 2.0)
+    asked = Other(np.array([4.0, 0.0, 0.0]), np.zeros(3), away, False, 2.0, 0.5)
+    refuse, accept = outcomes(scene, LAW, ROUND, discs, 2.0, (asked,), LOOK)
+    assert refuse.stalls
+    assert not accept.stalls
+    assert accept.better_than(refuse)
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ from airground_drake.components import make_map, positions
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.simulation import simulate
+from airground_drake.verify import verify
 
 ROOM_M = 0.1
 
@@ -52,6 +53,16 @@ def test_under_method_d_everything_is_expected_to_hold(name: str) -> None:
     assert list(scenario.runs) == ["a", "b", "c", "d"]
     assert not scenario.runs["d"].expected
     assert not scenario.runs["d"].stalls_m
+
+
+@pytest.mark.parametrize("name", ["pocket", "swap", "doorway"])
+def test_under_method_d_everybody_arrives_and_every_claim_holds(name: str) -> None:
+    """Of the smaller ones; `.ci/run` has the reports of all."""
+    trace = simulate(load(name)[0], "d")
+    for ugv in trace.ugvs:
+        assert kinds(trace, ugv)[-1] == "arrival"
+    for verdict in verify(trace):
+        assert verdict.as_expected, (verdict.claim.id, verdict.finding)
 
 
 def test_the_map_of_the_warehouse_is_wrong() -> None:

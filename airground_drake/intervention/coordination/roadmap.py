@@ -21,6 +21,10 @@ PITCH = 0.2
 """Spacing of the lattice as a share of the distance that robots keep."""
 REACH = 1.75
 """Nodes that are no part of the lattice are connected to all nodes within this many spacings."""
+FAR = 0.95
+"""Share of the longest edges from starts and to targets that are used, see `single.find`."""
+RINGS, RAYS = 3, 16
+"""Nodes round a start: robots that block each other leave little room between what they must keep away from."""
 MOST_NODES = 30_000
 """Of the lattice: a larger area gets a wider spacing."""
 MOST_WOVEN = 2_000
@@ -41,7 +45,7 @@ class Space:
         radii: distance to keep from them, (m,), m.
         clearance: wished for beyond that, m; nodes keep it all (where they can), edges half of it.
         apart: distance that robots have to keep from each other, m.
-        spacing: wished for beyond that, m.
+        spacing: wished for beyond that, m; not 0.
     """
 
     centres: Array
@@ -49,6 +53,16 @@ class Space:
     clearance: float
     apart: float
     spacing: float
+
+    def wide(self, longest: float) -> float:
+        """Distance of robots from both ends of an edge, m, that keeps them as far from the edge as is wished.
+
+        The squared distance to a point of an edge of length L is a mean of those to the ends less s (1 - s) L^2.
+
+        Args:
+            longest: edge, m.
+        """
+        return math.sqrt((self.apart + self.spacing) ** 2 + longest**2 / 4.0)
 
     @property
     def discs(self) -> Array:
@@ -107,7 +121,7 @@ class Roadmap:
         first_edge: of each node, (N + 1,).
         heads: where edges lead, (E,).
         lengths: of edges, (E,), m.
-        longest: edge, m.
+        longest: edge between nodes that are no start and no target, m.
         woven: one entry per robot.
         cells, members, corner, size, shape: see `kernels.blocked_times`.
     """
@@ -162,17 +176,22 @@ def weave(space: Space, errands: Sequence[Errand], others: Sequence[Array] = ())
     free = space.points_are_free(lattice, space.clearance)
     number = np.where(free, np.cumsum(free) - 1, -1).reshape(columns, rows)
     nodes: list[Array] = [lattice[free]]
+    reach = REACH * pitch
+    far = FAR * math.sqrt(space.wide(reach) ** 2 - space.apart**2)
     count, woven = int(free.sum()), []
     for errand in errands:
         preset, times = _preset_nodes(errand.preset, pitch)
-        path = _path_nodes(space, errand.start, preset[-1], pitch)
+        path = np.concatenate([_path_nodes(space, errand.start, preset[-1], pitch), _fan(space, errand.start, far)])
         nodes += [errand.start[None], preset, path]
         along = np.arange(count + 1, count + 1 + len(preset))
         woven.append(Woven(count, int(along[-1]), along, times, space.points_are_free(preset, 0.0)))
         count += 1 + len(preset) + len(path)
     points = np.concatenate(nodes)
-    reach = REACH * pitch
-    pairs = np.concatenate([_lattice_edges(number), _other_edges(points, int(free.sum()), reach)])
+    radii = np.full(len(points) - int(free.sum()), reach)
+    for own in woven:
+        radii[np.array([own.start, own.target]) - int(free.sum())] = max(far, reach)
+    pairs = np.concatenate([_lattice_edges(number), _other_edges(points, radii)])
+    pairs = pairs[~_is_short_cut(points, pairs, woven)]
     shut = np.concatenate([own.preset[~own.usable] for own in woven])
     pairs = pairs[~np.isin(pairs, shut).any(axis=1)]
     pairs = pairs[space.segments_are_free(points[pairs[:, 0]], points[pairs[:, 1]])]
@@ -238,12 +257,31 @@ def _lattice_edges(number: npt.NDArray[np.intp]) -> Indices:
     return np.concatenate(found).astype(np.int64)
 
 
-def _other_edges(points: Array, lattice: int, reach: float) -> Indices:
-    """Pairs of nodes within reach of which the second is no node of the lattice, (E, 2)."""
-    others = np.arange(lattice, len(points))
-    near = cKDTree(points).query_ball_point(points[lattice:], reach, return_sorted=True)
-    pairs = [(n, own) for own, found in zip(others.tolist(), near, strict=True) for n in found if n < own]
-    return np.array(pairs, dtype=np.int64).reshape(-1, 2)
+def _other_edges(points: Array, radii: Array) -> Indices:
+    """Pairs of nodes, (E, 2), of which the second is one of the last ones and has the first within its radius, m."""
+    others = np.arange(len(points) - len(radii), len(points))
+    near = cKDTree(points).query_ball_point(points[others], radii, return_sorted=True)
+    tails = np.concatenate([np.zeros(0, dtype=np.int64), *(np.array(found, dtype=np.int64) for found in near)])
+    heads = np.repeat(others, [len(found) for found in near])
+    pairs = np.column_stack([np.minimum(tails, heads), np.maximum(tails, heads)])[tails != heads]
+    return np.unique(pairs, axis=0)
+
+
+def _is_short_cut(points: Array, pairs: Indices, woven: Sequence[Woven]) -> npt.NDArray[np.bool_]:
+    """Which edges lead from a robot's start to its target: others may be nearer to both than to any other node."""
+    found = np.zeros(len(pairs), dtype=bool)
+    for own in woven:
+        if np.hypot(*(points[own.start] - points[own.target])) > ROUNDING_M:
+            found |= np.isin(pairs, [own.start, own.target]).all(axis=1)
+    return found
+
+
+def _fan(space: Space, start: Array, far: float) -> Array:
+    """Places round a start, (K, 2), m, up to a distance, m, in rings."""
+    angles = 2.0 * np.pi * np.arange(RAYS) / RAYS
+    rays = np.column_stack([np.cos(angles), np.sin(angles)])
+    places = np.concatenate([start + far * (ring + 1.0) / RINGS * rays for ring in range(RINGS)])
+    return np.asarray(places[space.points_are_free(places, CHORDS * space.clearance)])
 
 
 def _in_rows(points: Array, pairs: Indices) -> tuple[Indices, Indices, Array]:

@@ -94,7 +94,7 @@ def find(
         The way, None if there is none or the budget is spent; and what was spent.
     """
     own = mover.woven
-    wide = math.sqrt((space.apart + space.spacing) ** 2 + roadmap.longest**2 / 4.0)
+    wide = space.wide(roadmap.longest)
     start, target = roadmap.nodes[own.start], roadmap.nodes[own.target]
     nodes, times = [np.zeros(0, np.int64)], [np.zeros((0, 2))]
     ends = np.array([own.start, own.target])

@@ -106,6 +106,7 @@ def judge_obedience(trace: Trace, rows: list[Row]) -> Finding:
             "wrong": sum(one.wrong for one in compared),
             "reasons": {str(k): int(v) for k, v in trace.decisions["reason"].value_counts().items()},
         },
+        exercised=len(rows),
     )
     return conclude(finding, compared)
 

@@ -116,7 +116,7 @@ class GateModel(GateClaim):
         "2^N."
     )
 
-    exercised_by = "decisions"
+    exercised_by = "decisions that were rolled out again"
 
     def judge_rows(self, trace: Trace, rows: list[Row]) -> Finding:
         """Roll out both choices of every decision; the margin is the tolerance less the largest difference."""
@@ -169,6 +169,7 @@ def judge_outcomes(trace: Trace, rows: Sequence[Row]) -> Finding:
         unit="of the tolerance",
         quantity="part left of the tolerance of a recorded outcome",
         evidence={"decisions": len(rows), "outcomes": 2 * len(looked)},
+        exercised=len(looked),
     )
     return conclude(finding, compared)
 

@@ -72,6 +72,8 @@ class LiveProg(GateClaim):
         "how far the UGV was from it."
     )
 
+    exercised_by = "decisions that accepted a proposal, at first or again"
+
     def applies(self, trace: Trace) -> bool:
         """Only method (d) predicts progress."""
         return trace.meta.get("method") == METHOD
@@ -107,6 +109,7 @@ class LiveProg(GateClaim):
                 "reasons": {str(k): int(v) for k, v in trace.decisions["reason"].value_counts().items()},
                 "most_tries": float(trace.decisions["tries"].max()),
             },
+            exercised=accepted,
         )
         return conclude(finding, compared)
 

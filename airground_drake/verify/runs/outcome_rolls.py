@@ -66,8 +66,8 @@ def foreseen(trace: Trace, given: dict[str, Any], sent: Sequence[Sent]) -> tuple
     here = interpolate(trace.t, trace.position(robot), t)
     discs = known_discs(trace, robot, t, on[0])
     others = [_other(trace, robot, t, after, pair, sent) for pair in pairs_of(trace) if _between(trace, pair, robot)]
-    around = [np.tile(discs, (len(after), 1, 1)), *(one[0][:, None] for one in others)]
-    points = np.concatenate(around, axis=1)
+    fixed = np.tile(discs, (len(after), 1, 1))
+    points = [np.concatenate([fixed, *(one[0][choice][:, None] for one in others)], axis=1) for choice in (0, 1)]
     safe = np.array([scenario["safe_distance"]["obstacle_m"]] * len(discs) + [one[1] for one in others])
     share = np.array([1.0] * len(discs) + [one[2] for one in others])
     settled = max(until, arrives, t + gate["horizon_s"], *(end for _, _, _, end in others))
@@ -79,7 +79,7 @@ def foreseen(trace: Trace, given: dict[str, Any], sent: Sequence[Sent]) -> tuple
     ways, integral = [place], np.zeros((len(after), 2))
     done = np.full(2, len(after) - 1)
     for k in range(len(after) - 1):
-        given_here = inequalities(place, np.stack([points[k]] * 2), safe, share, control, planar=True)
+        given_here = inequalities(place, np.stack([points[0][k], points[1][k]]), safe, share, control, planar=True)
         rate = (preset[k + 1] - preset[k]) / h
         own = tracking(place, preset[k], rate, control["motion_gain_1_s"], spec["max_speed_m_s"])
         task = own.copy()
@@ -139,33 +139,37 @@ def known_discs(trace: Trace, robot: str, t: float, on: Sent) -> Array:
 
 def _other(
     trace: Trace, robot: str, t: float, after: Array, pair: Any, sent: Sequence[Sent]
-) -> tuple[Array, float, float, float]:
-    """Where another robot is predicted to be, (S + 1, 3), m; its safe distance, its share, when its motion is over."""
+) -> tuple[tuple[Array, Array], float, float, float]:
+    """Where another robot is predicted to be, (S + 1, 3), m; its safe distance, its share, when its motion is over.
+
+    Twice: if the proposal is refused, and if it is accepted. What it has not accepted yet counts in the latter only.
+    """
     other = pair.second if pair.first == robot else pair.first
     row = min(int(np.searchsorted(trace.t, t - TIME_TOLERANCE_S)), len(trace.t) - 1)
     place, velocity = interpolate(trace.t, trace.position(other), t), trace.command(other)[row]
-    asked = asked_of(trace, other, t, sent)
+    coasting = place + np.minimum(after, trace.scenario["gatekeeper"]["horizon_s"])[:, None] * velocity
+    asked, accepted = asked_of(trace, other, t, sent)
     if asked is None:
-        coasting = np.minimum(after, trace.scenario["gatekeeper"]["horizon_s"])
-        return place + coasting[:, None] * velocity, pair.safe_m, pair.share, -np.inf
-    beside = place - asked.place(t)
-    return asked.place(t + after) + np.exp(-after)[:, None] * beside, pair.safe_m, pair.share, float(asked.times_s[-1])
+        return (coasting, coasting), pair.safe_m, pair.share, -np.inf
+    goes = asked.place(t + after) + np.exp(-after)[:, None] * (place - asked.place(t))
+    return (goes if accepted else coasting, goes), pair.safe_m, pair.share, float(asked.times_s[-1])
 
 
-def asked_of(trace: Trace, ugv: str, t: float, sent: Sequence[Sent]) -> Sent | None:
+def asked_of(trace: Trace, ugv: str, t: float, sent: Sequence[Sent]) -> tuple[Sent | None, bool]:
     """The proposal in force for a UGV at a sample of the gatekeeper, unless it has refused it by the sample before.
 
-    A proposal in force is one that the UGV decides about at that sample.
+    A proposal in force is one that the UGV decides about at that sample. Besides: whether it has accepted it by then.
     """
     table = trace.decisions[(trace.decisions["robot"] == ugv)]
     now = table[np.abs(table["t_s"] - t) <= TIME_TOLERANCE_S]
     if not len(now):
-        return None
+        return None, False
     issued = float(now["issued_s"].iloc[0])
     before = table[(table["issued_s"] == issued) & (table["t_s"] < t - TIME_TOLERANCE_S)]
-    if len(before) and before["decision"].iloc[-1] == "refuse":
-        return None
-    return next((one for one in sent if (one.ugv, one.issued_s) == (ugv, issued)), None)
+    answer = str(before["decision"].iloc[-1]) if len(before) else ""
+    if answer == "refuse":
+        return None, False
+    return next((one for one in sent if (one.ugv, one.issued_s) == (ugv, issued)), None), answer == "accept"
 
 
 def bounds_of_way_left(place: Array, goal: Array, discs: Array, distance: float) -> tuple[float, float]:

@@ -10,7 +10,7 @@ import pytest
 from builders.edits import with_decision, with_scenario
 from verify.judging import judge
 
-from airground_drake.gatekeeper import prediction
+from airground_drake.gatekeeper import outcome, prediction
 from airground_drake.gatekeeper.closed_loop import ClosedLoop
 from airground_drake.scenarios.load import load
 from airground_drake.simulation import simulate
@@ -20,31 +20,25 @@ Run = Callable[[str, str], Trace]
 Patch = Callable[[pytest.MonkeyPatch], None]
 
 
-@pytest.mark.parametrize(
-    ("name", "run_name"), [("case_b", "c"), ("case_b", "d"), ("case_a", "d"), ("soft_gate", "c"), ("soft_gate", "d")]
-)
-def test_shipped_runs_hold(run: Run, name: str, run_name: str) -> None:
-    finding = judge("GATE-MODEL", run(name, run_name))
+@pytest.mark.parametrize("name", ["case_b", "case_a", "soft_gate"])
+def test_shipped_runs_hold(run: Run, name: str) -> None:
+    finding = judge("GATE-MODEL", run(name, "c"))
     assert finding.status == "holds", finding
     assert finding.margin == pytest.approx(1e-6, rel=0.02)
     assert finding.evidence["regrets"] >= 8
 
 
 def test_what_came_of_predictions_and_plans_is_reported(run: Run) -> None:
-    """A refusal that stood came as predicted; the paper's gatekeeper chose a plan that the closed loop disowns."""
-    stood = judge("GATE-MODEL", run("soft_gate", "d")).evidence
-    assert stood["answers_that_stood_to_the_horizon"] > 0
-    assert stood["farthest_from_predicted"]["away_m"] < 1e-9
-    regret = judge("GATE-MODEL", run("case_b", "c")).evidence["largest_regret_against_blocks"]
-    assert regret["against_blocks"] > 5.0
-    certified = judge("GATE-MODEL", run("case_b", "d")).evidence["largest_regret_against_blocks"]
-    assert 0.0 <= certified["against_blocks"] < 0.1
+    """The paper's gatekeeper chose a plan that the closed loop disowns."""
+    evidence = judge("GATE-MODEL", run("case_b", "c")).evidence
+    assert evidence["largest_regret_against_blocks"]["against_blocks"] > 5.0
+    assert evidence["farthest_from_predicted"]["away_m"] > 0.0
 
 
 def test_stages_of_several_control_periods_hold() -> None:
     scenario = load("case_a")[0]
     scenario.gatekeeper.stages, scenario.duration_s = 20, 16.0
-    finding = judge("GATE-MODEL", simulate(scenario, "d"))
+    finding = judge("GATE-MODEL", simulate(scenario, "c"))
     assert finding.status == "holds", finding
     assert finding.evidence["decisions"] > 5
 
@@ -101,11 +95,6 @@ def swapped(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ClosedLoop, "constant_plans", lambda self: (*honest(self)[1::-1], honest(self)[2]))
 
 
-def no_bend(monkeypatch: pytest.MonkeyPatch) -> None:
-    honest = ClosedLoop.constant_plans
-    monkeypatch.setattr(ClosedLoop, "constant_plans", lambda self: (*honest(self)[:2], 0.5 * honest(self)[2]))
-
-
 MUTANTS: dict[str, Patch] = {
     "motion gain": gain("motion_gain"),
     "intervention gain": gain("intervention_gain"),
@@ -114,7 +103,6 @@ MUTANTS: dict[str, Patch] = {
     "priorities": on_top,
     "late": late,
     "modes swapped": swapped,
-    "bend halved": no_bend,
 }
 
 
@@ -124,10 +112,28 @@ def test_a_wrong_prediction_model_is_refuted(name: str, monkeypatch: pytest.Monk
     if name == "speed limit":
         scenario.ugvs["ugv1"].max_speed_m_s = 2.0
     MUTANTS[name](monkeypatch)
-    finding = judge("GATE-MODEL", simulate(scenario, "d"))
+    finding = judge("GATE-MODEL", simulate(scenario, "c"))
     assert finding.status == "refuted", finding
     assert finding.counterexample is not None
-    assert finding.counterexample["what"].startswith("bend" if name == "bend halved" else "velocity of mode")
+    assert finding.counterexample["what"].startswith("velocity of mode")
+
+
+WRONG: dict[str, Callable[[ClosedLoop], ClosedLoop]] = {
+    "speed limit": lambda loop: loop._replace(max_speed=0.5 * loop.max_speed),
+    "priorities": lambda loop: loop._replace(intervention_on_top=True),
+    "no obstacles": lambda loop: loop._replace(shares=0.0 * loop.shares, distances=0.0 * loop.distances),
+    "late": lambda loop: loop._replace(wanted=np.concatenate([loop.wanted[:1], loop.wanted[:-1]])),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_wrong_outcomes_are_refuted(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Method (d), until shortly after its first acceptance."""
+    made = outcome.loop_among
+    monkeypatch.setattr(outcome, "loop_among", lambda *arguments: WRONG[name](made(*arguments)))
+    scenario = load("case_b", ["duration_s=14.0", "reproduction=[]"])[0]
+    finding = judge("GATE-MODEL", simulate(scenario, "d"))
+    assert finding.status == "refuted", finding
 
 
 # ------------------------------------------------------------------------------------- mutants of the trace
@@ -141,17 +147,13 @@ def slower(row: dict[str, Any], problem: dict[str, Any]) -> None:
     problem["refuse_m_s"][4] -= 1e-5
 
 
-def bent(row: dict[str, Any], problem: dict[str, Any]) -> None:
-    row["bend"] += 1e-4
-
-
-@pytest.mark.parametrize("edit", [faster, slower, bent])
+@pytest.mark.parametrize("edit", [faster, slower])
 def test_a_decision_on_other_data_is_refuted(run: Run, edit: Any) -> None:
-    assert judge("GATE-MODEL", with_decision(run("case_b", "d"), edit)).status == "refuted"
+    assert judge("GATE-MODEL", with_decision(run("case_b", "c"), edit)).status == "refuted"
 
 
 def test_another_law_than_the_scenarios_is_refuted(run: Run) -> None:
-    trace = with_scenario(run("case_b", "d"), control__intervention_gain_1_s=1.6)
+    trace = with_scenario(run("case_b", "c"), control__intervention_gain_1_s=1.6)
     assert judge("GATE-MODEL", trace).status == "refuted"
 
 
@@ -159,4 +161,4 @@ def test_a_decision_on_a_proposal_that_was_not_sent_is_an_error(run: Run) -> Non
     def other(row: dict[str, Any], problem: dict[str, Any]) -> None:
         row["issued_s"] += 0.01
 
-    assert judge("GATE-MODEL", with_decision(run("case_b", "d"), other)).status == "error"
+    assert judge("GATE-MODEL", with_decision(run("case_b", "c"), other)).status == "error"

@@ -49,6 +49,8 @@ class LiveWait(ModelClaim):
         "nothing but messages. Safety is SAFE-GATE."
     )
 
+    exercised_by = "obligations of the proof"
+
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
         """The running patience's numbers, and the period of the gatekeeper, s."""
         patience = make_patience(scenario)

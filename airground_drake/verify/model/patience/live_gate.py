@@ -1,0 +1,96 @@
+"""LIVE-GATE: an intervention that is accepted where there is room is never given back, and ends in time.
+
+The tracking error between prediction and run is a contraction with an input; obligations in `tracking_obligations`,
+the running gatekeeper and the running control law in `tracking_runs`. Certificates: `obligations.json` and an SMT-LIB
+script for each obligation.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from airground_drake.components import make_law, make_patience
+from airground_drake.gatekeeper.patience import Patience
+from airground_drake.registry import METHODS
+from airground_drake.scenarios.schema import Scenario
+from airground_drake.verify.claim import ModelClaim
+from airground_drake.verify.engines.prover import LIMIT_S, discharge, finding
+from airground_drake.verify.finding import Finding
+from airground_drake.verify.model.patience.tracking_obligations import Tracking, obligations
+from airground_drake.verify.model.patience.tracking_runs import runs
+
+
+class LiveGate(ModelClaim):
+    """LIVE-GATE."""
+
+    id = "LIVE-GATE"
+    statement = (
+        "Under method (d) an accepted intervention is never given back before its time, and is over when its motion "
+        "is, as long as there is room along the predicted way, disturbances are bounded and the speed limit is not "
+        "reached."
+    )
+    formula = (
+        "predicted distances >= d + v h + lag_m (robots: d + 2 v h + lag_m), |disturbance| <= Lambda lag_m: |p - "
+        "predicted| <= lag_m at every sample, so lag <= predicted lag + lag_m: never late; over by t0 + length / speed "
+        "+ h for a motion of that length at that speed, if that is no more than longest_s"
+    )
+    method = (
+        "The difference e between run and prediction obeys e' = (1 - Lambda h) e + h w, w the disturbance: it never "
+        "leaves the ball of radius lag_m; within it, with that room, no avoidance inequality can bind, so that both "
+        "are the same law. Polynomial implications with exact certificates, z3 and cvc5; what is late and what is over "
+        "is read off the running `Patience`. The running gatekeeper and the running control law are run on random "
+        "ways with room, disturbed by the most that is allowed: nothing may be given back."
+    )
+    equations = "(14), (20)"
+    assumptions = (
+        "The obstacles near the way are known and stand still, and no other robot comes nearer to it than stated.",
+        "Neither run nor prediction reaches the speed limit: speed of the motion + Lambda lag < v.",
+        "The disturbance includes what the rate of the motion differs by from that of the motion sampled every "
+        "period (0 but at its corners), besides what moves the robot otherwise.",
+        "The UAV does not withdraw the proposal. Rounding is not counted.",
+    )
+    does_not_establish = (
+        "That a proposal with room is accepted: that depends on its outcome; that it has room: where it has less, "
+        "LIVE-PROG says what came of it, and LIVE-WAIT bounds the time."
+    )
+
+    def inputs(self, scenario: Scenario) -> dict[str, Any]:
+        """Gains, period, speed limits and the running patience's numbers."""
+        law, patience = make_law(scenario, METHODS["d"]), make_patience(scenario)
+        return {
+            "intervention_gain_1_s": float(law.intervention_gain),
+            "motion_gain_1_s": float(law.motion_gain),
+            "avoidance_gain_1_s": float(law.avoidance.gain),
+            "control_period_s": float(law.avoidance.period),
+            "sensing_range_m": float(law.avoidance.sensing_range),
+            "period_s": float(scenario.gatekeeper.period_s),
+            "max_speed_m_s": max(float(ugv.max_speed_m_s) for ugv in scenario.ugvs.values()),
+            "obstacle_m": float(scenario.safe_distance.obstacle_m),
+            "tries": int(patience.most),
+            "rest_s": float(patience.rest),
+            "longest_s": float(patience.longest),
+            "lag_m": float(patience.lag),
+            "behind_s": float(patience.behind),
+        }
+
+    def check(self, inputs: dict[str, Any]) -> Finding:
+        """Prove, and run."""
+        return judge(Tracking(), Patience, inputs)
+
+
+def judge(tracking: Tracking, kind: type[Patience], inputs: dict[str, Any]) -> Finding:
+    """The finding for a kind of tracking and of patience."""
+    patience = kind(*(inputs[name] for name in ("tries", "rest_s", "longest_s", "lag_m", "behind_s")))
+    found = finding(discharge(obligations(tracking, kind), LIMIT_S))
+    ran = runs(patience, inputs)
+    evidence = {**found.evidence, "disturbance_m_s": inputs["intervention_gain_1_s"] * inputs["lag_m"], "runs": ran}
+    given_back = [row for row in ran if row["given_back"]]
+    if found.status != "proved":
+        return replace(found, evidence=evidence)
+    if given_back or inputs["intervention_gain_1_s"] * inputs["control_period_s"] > 1.0:
+        return replace(found, status="error", evidence=evidence)  # the running code is not what was proved
+    return replace(
+        found, evidence=evidence, margin=inputs["lag_m"] - max(row["largest_excess_m"] for row in ran), unit="m",
+        quantity="lag allowed above the predicted one, less the largest that a disturbed run had",
+    )  # fmt: skip

@@ -1,0 +1,67 @@
+"""LIVE-WAIT and LIVE-GATE: proved for the shipped numbers; broken automata and weaker assumptions have no proof."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from verify.judging import Judged
+
+from airground_drake.gatekeeper.patience import Patience
+from airground_drake.scenarios.load import load
+from airground_drake.verify.engines.prover import discharge
+from airground_drake.verify.model.patience import attack, live_wait, mutants, tracking_runs
+from airground_drake.verify.model.patience.live_gate import LiveGate
+from airground_drake.verify.model.patience.live_wait import LiveWait
+from airground_drake.verify.model.patience.relation import obligations, symbolic
+from airground_drake.verify.model.patience.tracking_obligations import Tracking
+from airground_drake.verify.model.patience.tracking_obligations import obligations as of_tracking
+
+KINDS = [
+    mutants.NeverExhausted, mutants.RestsAtOnce, mutants.Endless, mutants.DoesNotCount, mutants.NeverOver,
+    mutants.NeverLate,
+]  # fmt: skip
+WEAKER = [{"disturbance": "2*g*r"}, {"contraction": "1"}, {"room": "v*h"}, {"room": "r"}]
+
+
+@pytest.mark.parametrize("claim", [LiveWait(), LiveGate()])
+def test_proved_for_the_shipped_numbers(judged: Judged, claim: LiveWait | LiveGate) -> None:
+    finding = judged(claim, claim.inputs(load("case_b")[0]))
+    assert finding.status == "proved", finding
+    assert finding.margin is not None
+    assert finding.margin > 0.0
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_broken_patience_has_no_proof(kind: type[Patience]) -> None:
+    failing = [each for each in obligations(symbolic(kind)) if not each.certified()]
+    assert "refuted" in {proof.status for proof in discharge(failing)}
+
+
+@pytest.mark.parametrize("changes", WEAKER)
+def test_weaker_assumptions_have_no_proof(changes: dict[str, str]) -> None:
+    failing = [each for each in of_tracking(Tracking(**changes), Patience) if not each.certified()]
+    assert "refuted" in {proof.status for proof in discharge(failing)}
+
+
+def test_an_attack_that_gets_through_makes_the_claim_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What runs is not what was read off: the relation would be worth nothing."""
+    row = {"attack": "endless", "tries": 9, "longest_between_rests_s": 1e9, "longest_try_s": 1.0, "reasons": []}
+    monkeypatch.setattr(live_wait, "attacks", lambda *_: [row])
+    monkeypatch.setattr(live_wait, "discharge", lambda *_: [])
+    inputs = LiveWait().inputs(load("case_b")[0])
+    assert live_wait.judge(Patience, inputs).status in ("error", "inconclusive")
+
+
+def test_attacks_use_all_tries_and_no_more() -> None:
+    patience = Patience(most=2, rest=1.0, longest=2.0, lag=0.5, behind=0.5)
+    rows: list[dict[str, Any]] = attack.attacks(patience, 0.1)
+    assert {reason for row in rows for reason in row["reasons"]} >= {"over", "exhausted", "no_progress"}
+    assert max(row["longest_between_rests_s"] for row in rows) == pytest.approx(4.0, abs=0.3)
+
+
+def test_a_run_that_is_given_back_early_is_noticed() -> None:
+    inputs = LiveGate().inputs(load("case_b")[0])
+    numbers = [inputs[name] for name in ("tries", "rest_s", "longest_s", "lag_m", "behind_s")]
+    assert not any(row["given_back"] for row in tracking_runs.runs(Patience(*numbers), inputs))
+    assert all(row["given_back"] for row in tracking_runs.runs(mutants.LateAtOnce(*numbers), inputs))
