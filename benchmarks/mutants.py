@@ -256,7 +256,8 @@ def main() -> int:
                         options.json.write_text(json.dumps([*kept.values()], indent=1), encoding="utf-8")
     results = [kept[mutant.name] for mutant in MUTANTS if mutant.name in kept]
     if options.page:
-        options.page.write_text(page(results), encoding="utf-8")
+        others = [mutant.name for mutant in MUTANTS if mutant.name not in kept]
+        options.page.write_text(page(results, others), encoding="utf-8")
     print(dict(Counter(each["stage"] for each in results)))
     return int(any(each["stage"] == "nothing" and not each["equivalent"] for each in results))
 

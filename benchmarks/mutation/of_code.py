@@ -668,10 +668,10 @@ GATEKEEPER = (
         tests=ROUTES,
     ),
     Mutant(
-        "the rounded plan is not offered to the search",
+        "the rounded plan is not among the candidates",
         "gatekeeper/routes/relaxed.py",
-        "        search.offer_both(rounded)\n",
-        "",
+        "(constants.accept, constants.refuse, problem.evaluate(rounded), problem.evaluate(other)),",
+        "(constants.accept, constants.refuse),",
         runs=("case_b d",),
         tests=ROUTES,
     ),

@@ -33,8 +33,8 @@ under each claim, and `python -m airground_drake.report audit` shows the counter
 """
 
 
-def page(results: Sequence[dict[str, Any]]) -> str:
-    """A table by what caught them, and the edits."""
+def page(results: Sequence[dict[str, Any]], others: Sequence[str] = ()) -> str:
+    """The results by what caught them, and the names of mutants of which there is none."""
     lines = ["<!-- Made by: python benchmarks/mutants.py --page -->", "# Mutants", "", *HEAD.splitlines(), ""]
     count = Counter(each["stage"] for each in results)
     lines += [
@@ -52,5 +52,10 @@ def page(results: Sequence[dict[str, Any]]) -> str:
                 lines += textwrap.wrap(
                     text, WIDTH, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False
                 )
+    if others:
+        lines += ["", "## Not judged yet", ""]
+        lines += textwrap.wrap(
+            f"{len(others)} mutants of the list, of which the file of results has none: {'; '.join(others)}.", WIDTH
+        )
     lines += ["", "## Elsewhere", "", *ELSEWHERE.splitlines()]
     return "\n".join(lines) + "\n"
