@@ -76,7 +76,7 @@ def _follow(run: Run, row: dict[str, Any], last: dict[str, Any] | None, state: _
     elif standing == "refuse":
         answer = ["refuse", "kept"]
     else:
-        answer = _first(row, state, gate)
+        answer = _first(row, on_which(run, row["robot"], row["issued_s"]).cause, state, gate)
         if answer[0] == "accept":
             lag = predicted = _accept(run, row, state)
     same("answer and its reason", [row["decision"], row["reason"]], answer, **about)
@@ -86,8 +86,8 @@ def _follow(run: Run, row: dict[str, Any], last: dict[str, Any] | None, state: _
     close("predicted lag", row["predicted_lag_m"], predicted, within=LAG_M, **about)
 
 
-def _first(row: dict[str, Any], state: _Ugv, gate: Json) -> list[str]:
-    """The first answer to a proposal, from the recorded outcomes."""
+def _first(row: dict[str, Any], cause: str, state: _Ugv, gate: Json) -> list[str]:
+    """The first answer to a proposal sent for the trigger of `cause`, from the recorded outcomes."""
     if state.tries >= gate["tries"]:
         return ["refuse", "exhausted"]
     if row["accept_stalls"] < 0.0:
@@ -97,7 +97,9 @@ def _first(row: dict[str, Any], state: _Ugv, gate: Json) -> list[str]:
         better = row["accept_stalls"] < row["refuse_stalls"]
     if better:
         return ["accept", "cheaper"]
-    return ["refuse", "stalls" if row["accept_stalls"] == 1.0 else "not_cheaper"]
+    if row["accept_stalls"] == 1.0:
+        return ["refuse", "stalls"]
+    return ["refuse", "not_cheaper"] if cause == row["robot"] else ["accept", "makes_way"]
 
 
 def _accept(run: Run, row: dict[str, Any], state: _Ugv) -> float:

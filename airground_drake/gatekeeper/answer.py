@@ -57,7 +57,7 @@ class Rules:
 
 Reason = Literal[
     "cheaper", "not_cheaper", "no_difference", "bent", "kept", "dwell", "reversed", "no_plan",
-    "stalls", "exhausted", "no_progress", "over",
+    "stalls", "makes_way", "exhausted", "no_progress", "over",
 ]  # fmt: skip
 """Why an answer is what it is: see `settle` for method (c), `certified` for method (d)."""
 
@@ -71,6 +71,7 @@ WORDS: dict[Reason, str] = {
     "reversed": "the other answer has become the cheaper one",
     "no_plan": "no outcome could be computed",
     "stalls": "with the proposal the UGV would come to rest short of its goal, no nearer than without",
+    "makes_way": "the UGV makes way for the one whose trigger the proposal is for, and gets to its goal all the same",
     "exhausted": "the UGV has gone along as often as it does without a rest on its own",
     "no_progress": "the UGV is farther behind the proposed motion than predicted, for too long",
     "over": "the time for which the proposal was accepted is over",

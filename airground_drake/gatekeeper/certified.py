@@ -27,6 +27,8 @@ from airground_drake.nsbc.law import UgvLaw
 from airground_drake.nsbc.motion import Motion
 from airground_drake.nsbc.team import Team
 
+ACCEPTING: tuple[Reason, ...] = ("cheaper", "makes_way")
+"""Reasons for which a proposal is accepted."""
 SAME_M = 1e-9
 """Obstacles closer to each other than this are one, m."""
 
@@ -40,7 +42,7 @@ class CertifiedGatekeepers(Gatekeepers):
         """Of the UGVs of a team: their law, their preset trajectories, how far they look and how long they wait."""
         super().__init__(team, law, presets)
         self._outlook, self._patience = outlook, patience
-        self._distance = team.obstacle_distance
+        self._distance, self._names = team.obstacle_distance, team.ugvs
 
     def idle(self, proposals: Proposals, positions: Array, memory: Memory) -> bool:
         """Whether a sample changes nothing."""
@@ -93,8 +95,8 @@ class CertifiedGatekeepers(Gatekeepers):
         if self._patience.exhausted(turn):
             return Decision(seen.t, i, proposal, False, "exhausted", Foreseen(tries=turn.tries)), turn, None
         refuse, accept = self.foresee(seen, i, proposal)
-        reason = reason_of(refuse, accept)
-        if reason != "cheaper":
+        reason = reason_of(refuse, accept, favour=proposal.cause not in ("", self._names[i]))
+        if reason not in ACCEPTING:
             return Decision(seen.t, i, proposal, False, reason, Foreseen(refuse, accept, tries=turn.tries)), turn, None
         turn = self._patience.accept(turn, seen.t, proposal.motion.end)
         after = self._law.avoidance.period * np.arange(0.0, len(accept.positions))
@@ -146,13 +148,19 @@ class CertifiedGatekeepers(Gatekeepers):
         return np.concatenate([sensed, new])
 
 
-def reason_of(refuse: Outcome, accept: Outcome) -> Reason:
-    """Accept ('cheaper') or why not, given what comes of either."""
+def reason_of(refuse: Outcome, accept: Outcome, *, favour: bool) -> Reason:
+    """Why to accept (one of ACCEPTING) or why not, given what comes of either.
+
+    A UGV that is asked to make way for another one (a `favour`) has nothing to gain: it accepts unless it would come to
+    rest short of its own goal. What that may cost it is bounded like any other try (`patience`).
+    """
     if not (np.isfinite(accept.cost) and np.isfinite(refuse.cost)):
         return "no_plan"
     if accept.better_than(refuse):
         return "cheaper"
-    return "stalls" if accept.stalls else "not_cheaper"
+    if accept.stalls:
+        return "stalls"
+    return "makes_way" if favour else "not_cheaper"
 
 
 def lags_of(proposal: Proposal, t: Array, positions: Array) -> Array:

@@ -29,6 +29,7 @@ from airground_drake.scenarios.schema import (
     Ugv,
 )
 from airground_drake.simulation import simulate
+from airground_drake.verify import verify
 
 BAY = [
     *((x, y) for x in np.arange(-14.0, 14.1, 1.4) for y in (-2.2, 2.2) if not (y > 0.0 and 3.0 < x < 8.0)),
@@ -133,8 +134,21 @@ def aside() -> Scenario:
         control=Control(period_s=0.05),
         decision=Decision(Threshold(zeta_m=2.0), release_m=1.0, noise_period_s=0.05),
         intervention=Intervention(policies=[Policy("coordinate")], ranking="listed"),
-        runs={"b": Run("b")},
+        runs={"b": Run("b"), "d": Run("d")},
     )
+
+
+def test_under_method_d_it_consents_because_it_gets_home_again() -> None:
+    of_run = simulate(aside(), "d")
+    first = of_run.decisions[of_run.decisions["reason"] == "makes_way"]
+    assert first["robot"].tolist() == ["parked"]
+    assert (first["accept_outcome_m2_s"] > first["refuse_outcome_m2_s"]).all()  # it has nothing to gain
+    for ugv, target in (("parked", 2.0), ("comes", 12.0)):
+        assert math.dist(of_run.position(ugv)[-1], (target, 0.0, 0.0)) < 0.1
+    for verdict in verify(of_run):
+        assert verdict.finding.status == "holds", verdict
+    own = of_run.proposals.assign(cause=of_run.proposals["robot"])
+    assert judge("LIVE-PROG", replace(of_run, proposals=own)).status in ("refuted", "error")
 
 
 def test_a_parked_robot_makes_way_in_a_run() -> None:

@@ -55,7 +55,8 @@ class LiveProg(GateClaim):
     formula = (
         "lag(t) = ||J^+ J (p(t) - rho_int(t))||, predicted along the roll-out; not for longer than behind_s lag > "
         "predicted + lag_m; accepted(t0) to min(end of motion, t0 + longest_s); tries <= most, 0 after rest_s on its "
-        "own; first answer: accept iff (stalls, cost) of accepting is better than of refusing by 1e-6, tries left"
+        "own; first answer: accept iff tries left and (stalls, cost) of accepting is better than of refusing by 1e-6, "
+        "or it is another UGV's trigger and accepting does not stall"
     )
     method = (
         "The decisions of each UGV are gone through by time; lags from the signals and the table of proposals, "
@@ -137,9 +138,9 @@ def judge_decision(trace: Trace, row: Row, last: Row | None, patience: Patience,
     elif standing == "refuse":
         answer = ("refuse", "kept")
     else:
-        answer = _first(row, patience, gate)
+        on = next(one for one in sent if (one.ugv, one.issued_s) == (given["robot"], given["issued_s"]))
+        answer = _first(row, on, patience, gate)
         if answer[0] == "accept":
-            on = next(one for one in sent if (one.ugv, one.issued_s) == (given["robot"], given["issued_s"]))
             places = foreseen(trace, given, sent)[1].places_m
             after = trace.scenario["control"]["period_s"] * np.arange(float(len(places)))
             away = (places - on.place(t + after)) @ on.chosen.T
@@ -173,7 +174,7 @@ def _kept(t: float, patience: Patience, gate: dict[str, Any]) -> tuple[str, str]
     return ("refuse", "over") if t >= patience.until else ("accept", "kept")
 
 
-def _first(row: Row, patience: Patience, gate: dict[str, Any]) -> tuple[str, str]:
+def _first(row: Row, on: Sent, patience: Patience, gate: dict[str, Any]) -> tuple[str, str]:
     """The first answer to a proposal."""
     given = row.given
     if patience.tries >= gate["tries"]:
@@ -185,4 +186,6 @@ def _first(row: Row, patience: Patience, gate: dict[str, Any]) -> tuple[str, str
     better = stalls[1] < stalls[0] or (stalls[1] == stalls[0] and cost[1] < (1.0 - NO_DIFFERENCE) * cost[0])
     if better:
         return "accept", "cheaper"
-    return "refuse", "stalls" if stalls[1] == 1.0 else "not_cheaper"
+    if stalls[1] == 1.0:
+        return "refuse", "stalls"
+    return ("accept", "makes_way") if on.cause != on.ugv else ("refuse", "not_cheaper")
