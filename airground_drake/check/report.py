@@ -30,7 +30,7 @@ from .triggers import thr_trig, zeno_trace
 
 SCHEMA = "airground_drake.report/2"
 AGREES, DISAGREES, OPEN = "agrees", "DISAGREES", "cannot be re-established"
-DECIDED_FROM = ("id", "status", "where", "evidence", "inputs", "certificates")
+DECIDED_FROM = ("id", "status", "where", "counterexample", "evidence", "inputs", "certificates")
 """What of a recorded claim its formula looks at; the rest is compared with what the formula gives."""
 UNDECIDED = ("inconclusive", "error", "not_run")
 """Statuses that say nothing about a claim."""

@@ -146,7 +146,8 @@ def outcomes(
     found = []
     for together, accepted in ((False, 0), (True, max(0, int(np.ceil((until - scene.t) / h - 1e-9))))):
         places = [each.places(scene.t, after, look.coasting, together=together)[:, None] for each in others]
-        loop = loop_among(known, law, proposal, after, np.concatenate([fixed, *places], axis=1))
+        points = np.ascontiguousarray(np.concatenate([fixed, *places], axis=1))  # the layout that is compiled for
+        loop = loop_among(known, law, proposal, after, points)
         positions, cost = _rolled_out(loop, accepted, goal, steps, look.near, look.still)
         found.append(_outcome(positions, cost, goal, scene.preset.max_speed, discs, distance, h, look))
     return found[0], found[1]

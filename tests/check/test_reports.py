@@ -35,7 +35,7 @@ def test_reports_of_changed_scenarios_agree(
 ) -> None:
     settings = [word for change in changes for word in ("--set", change)]
     assert write(["case_b", "-o", str(tmp_path / "r"), "--format", "json", *settings]) in (0, 1)
-    found = set(pd.read_parquet(tmp_path / "r/trace/d/decisions.parquet")["reason"])
+    found = set(pd.read_parquet(tmp_path / "r/trace/c/decisions.parquet")["reason"])
     assert reasons <= found if reasons else not found
     capsys.readouterr()
     assert check.main([str(tmp_path / "r")]) == 0, capsys.readouterr().out

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from airground_drake.intervention.database import BehaviourDatabase
-from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT
+from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT, Report
 from airground_drake.intervention.planner import Planner, PlannerMemory
 from airground_drake.intervention.policy import Observation, Policy
 from airground_drake.nsbc.motion import Motion
 
 PLACES = np.array([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [8.0, 0.0, 0.0], [0.0, 0.0, 3.0]])
 UGVS = ("one", "two", "three")
-NOBODY = ((), (), ())
+NOBODY = (Report(),) * 3
 
 
 def wait(seconds: float) -> Motion:

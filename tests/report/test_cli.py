@@ -10,7 +10,7 @@ import pytest
 
 from airground_drake import trace
 from airground_drake.report.__main__ import main
-from airground_drake.scenarios.load import load
+from airground_drake.scenarios.load import load, shipped
 from airground_drake.verify import __main__ as judge
 
 Report = Callable[[str], Path]
@@ -95,7 +95,7 @@ def test_a_folder_that_cannot_be_written_is_exit_code_4(tmp_path: Path, capsys: 
 
 def test_the_shipped_scenarios_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--list"]) == 0
-    assert capsys.readouterr().out.split() == ["case_a", "case_a_table1", "case_b", "soft_gate", "audit"]
+    assert capsys.readouterr().out.split() == [*shipped(), "audit"]
 
 
 def test_claims_are_judged_again_from_a_saved_run(report: Report, capsys: pytest.CaptureFixture[str]) -> None:

@@ -35,7 +35,7 @@ def test_values_are_those_of_the_file() -> None:
             return len(whole) == len(part) and all(map(covers, whole, part))
         return bool(whole == part)
 
-    assert covers(plain, DATA)
+    assert covers(plain, {name: part for name, part in DATA.items() if not name.startswith("_")})
 
 
 def test_resolved_round_trips(write: Write) -> None:

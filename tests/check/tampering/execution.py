@@ -136,9 +136,9 @@ def own_way_predicted_slower(folder: Path) -> None:
 
 
 @refused_by("GATE-MODEL", "bend", run="c")
-def bend_lowered(folder: Path) -> None:
+def bend_raised(folder: Path) -> None:
     with edited_table(folder, "decisions", "c") as frame:
-        frame["bend"] *= 0.999
+        frame["bend"] += 0.001
 
 
 @refused_by("GATE-MODEL", "a decision is on a proposal that was sent", run="c")

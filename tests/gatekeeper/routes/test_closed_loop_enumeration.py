@@ -205,7 +205,7 @@ def test_the_clock_ends_the_search(visited: list[int], monkeypatch: pytest.Monke
 
 @pytest.fixture(scope="module")
 def proposals_of_case_b() -> dict[str, Problem]:
-    """The first problem that UGV1's gatekeeper has with the wrong proposal, and with the detour, method (d)."""
+    """The first problem that UGV1's gatekeeper has with the wrong proposal, and with the detour, executed as in (d)."""
     seen: list[Problem] = []
 
     class Listening(ClosedLoopEnumerationRoute):
@@ -217,10 +217,13 @@ def proposals_of_case_b() -> dict[str, Problem]:
     scenario = load("case_b")[0]
     scenario.gatekeeper.route = "listening"
     with ROUTES.adding("listening", Listening):
-        trace = Recorder(scenario, "d").simulate(duration=13.3)
+        trace = Recorder(scenario, "c").simulate(duration=13.3)
     first: dict[str, Problem] = {}
     for policy, problem in zip(trace.decisions["policy"], seen, strict=True):
-        first.setdefault(policy, problem)
+        assert problem.loop is not None
+        below = problem.loop._replace(intervention_on_top=False)
+        accept, refuse, bend = below.constant_plans()
+        first.setdefault(policy, replace(problem, accept=accept, refuse=refuse, bend=bend, loop=below))
     return first
 
 

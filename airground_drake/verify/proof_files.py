@@ -1,6 +1,6 @@
 """cvc5's own proofs of a report's SMT-LIB certificates, for checkers of others.
 
-    python -m airground_drake.verify.engines.proof_files DIR
+    python -m airground_drake.verify.proof_files DIR
 
 reads the scripts `DIR/certificates/<claim>/<name>.smt2` and writes `DIR/proofs/<claim>/<name>.cpc`, cvc5's proof in its
 Cooperating Proof Calculus (CPC), wherever cvc5 finds one all of whose steps have a rule; and `DIR/proofs/index.json`,
@@ -85,7 +85,7 @@ def outcome(result: Result) -> str:
 
 def main(arguments: list[str] | None = None) -> int:
     """Write the proofs of a report, and say by claim how many there are; 2 if the folder is no report's."""
-    parser = argparse.ArgumentParser(prog="python -m airground_drake.verify.engines.proof_files")
+    parser = argparse.ArgumentParser(prog="python -m airground_drake.verify.proof_files")
     parser.add_argument("report", type=Path, metavar="DIR", help="folder with certificates/")
     folder = parser.parse_args(arguments).report
     if not (folder / "certificates").is_dir():

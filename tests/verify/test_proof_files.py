@@ -6,10 +6,10 @@ import hashlib
 import json
 from pathlib import Path
 
-from airground_drake.verify.engines import proof_files
-from airground_drake.verify.engines.proof_files import LARGEST_BYTES, outcome
+from airground_drake.verify import proof_files
 from airground_drake.verify.engines.smt import Result
 from airground_drake.verify.model.avoidance.obligations import rest
+from airground_drake.verify.proof_files import LARGEST_BYTES, outcome
 
 
 def test_proofs_are_written_where_there_are_any(tmp_path: Path) -> None:
