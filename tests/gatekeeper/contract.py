@@ -8,7 +8,6 @@ from typing import get_args
 
 import numpy as np
 import pytest
-from gatekeeper.formulas import cost, half_plane_cost
 
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.problem import Evaluation, Problem
@@ -17,6 +16,7 @@ from airground_drake.gatekeeper.routes.nonlinear import NonlinearRoute
 from airground_drake.gatekeeper.routes.route import Route
 from airground_drake.gatekeeper.solution import Solution, Status
 from airground_drake.registry import ROUTES
+from gatekeeper.formulas import cost, half_plane_cost
 
 DEFAULT = Budget()
 

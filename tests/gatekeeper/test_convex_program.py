@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 from builders.problems import random_problem, rolled_out
-from gatekeeper.formulas import blocked, half_plane_cost, total
 from pydrake.solvers import ClarabelSolver, MixedIntegerBranchAndBound, SolutionResult
 
 from airground_drake.gatekeeper.convex_program import team_program
 from airground_drake.gatekeeper.half_planes import normals_along
 from airground_drake.gatekeeper.problem import Problem
 from airground_drake.gatekeeper.solution import ConstantPlans
+from gatekeeper.formulas import blocked, half_plane_cost, total
 
 TEAM = (
     rolled_out(0),

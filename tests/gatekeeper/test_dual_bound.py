@@ -7,8 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from builders.problems import PLANS, random_problem, rolled_out
-from gatekeeper.contract import used
-from gatekeeper.formulas import half_plane_cost
 from hypothesis import given
 from hypothesis import strategies as st
 from pydrake.solvers import ClarabelSolver, SolverOptions
@@ -17,6 +15,8 @@ from airground_drake.gatekeeper.convex_program import team_program
 from airground_drake.gatekeeper.dual_bound import dual_bound
 from airground_drake.gatekeeper.half_planes import normals_along
 from airground_drake.gatekeeper.problem import Problem
+from gatekeeper.contract import used
+from gatekeeper.formulas import half_plane_cost
 
 
 def check_bounds(
