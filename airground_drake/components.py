@@ -136,7 +136,6 @@ def make_rules(scenario: Scenario) -> Rules:
     return Rules(
         switching_margin=gate.switching_margin,
         min_dwell=gate.min_dwell_s,
-        max_bend=gate.max_bend,
         budget=Budget(gate.budget_iterations, gate.budget_nodes),
         budget_share=gate.budget_share if gate.budget == "wall_clock" else None,
     )

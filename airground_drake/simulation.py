@@ -186,7 +186,6 @@ def _decision(decision: Decision, robot: str, route: str) -> dict[str, Any]:
         "refuse_throughout": grounds.throughout[1],
         "rounding_deviation_s": solution.rounding_deviation,
         "predicted_clearance_m": solution.clearance,
-        "bend": grounds.problem.bend,
     }
 
 

@@ -58,7 +58,6 @@ DECISION_COLUMNS = {
     "refuse_throughout": "float64",
     "rounding_deviation_s": "float64",
     "predicted_clearance_m": "float64",
-    "bend": "float64",
     "refuse_outcome_m2_s": "float64",
     "accept_outcome_m2_s": "float64",
     "refuse_stalls": "float64",
@@ -70,9 +69,9 @@ DECISION_COLUMNS = {
     "tries": "float64",
 }
 """Columns of `Trace.decisions`, one row per robot and gatekeeper call; -1 where a number does not apply. Those up to
-`bend` are of decisions by problem (26), the others of decisions by outcomes: what comes of either choice as
-`gatekeeper.outcome` has it (cost, 1 if it comes to rest short of the goal, way left), how far the UGV is behind the
-proposed motion, and how often it has gone along since it last rested."""
+`predicted_clearance_m` are of decisions by problem (26), the others of decisions by outcomes: what comes of either
+choice as `gatekeeper.outcome` has it (cost, 1 if it comes to rest short of the goal, way left), how far the UGV is
+behind the proposed motion, and how often it has gone along since it last rested."""
 
 PROBLEM_SCALARS = ("dt_s", "error_weight_1_m2_s", "slack_weight_1_m2_s")
 PROBLEM_ARRAYS = (

@@ -214,14 +214,22 @@ def _costs_and_clearance(decision: Decision) -> None:
 
 
 def _no_faster_than_the_limit(run: Run, decision: Decision) -> None:
-    """No step of the plan, or of a constant one, is longer than the speed limit allows, unless it begins inside."""
+    """No step of the plan, or of a constant one, is longer than the speed limit allows, unless it begins inside.
+
+    By (23) a plan has the velocity of a constant one at every stage, so that it counts where that one is.
+    """
     limit = run.robots[decision.ugv]["max_speed_m_s"]
-    ways = dict(zip(("refusing throughout", "accepting throughout"), decision.constant_m, strict=True))
+    refusing, accepting = decision.constant_m
+    clear_refusing = _clear_of_safe_distances(run, decision, refusing)
+    clear_accepting = _clear_of_safe_distances(run, decision, accepting)
+    ways = [("refusing throughout", refusing, clear_refusing), ("accepting throughout", accepting, clear_accepting)]
     if decision.planned:
-        ways["the plan"] = decision.positions_m
-    for name, positions in ways.items():
+        clear = _clear_of_safe_distances(run, decision, decision.positions_m)
+        if decision.row["route"] != "rollout":
+            clear = np.where(decision.plan == 1.0, clear_accepting, clear_refusing)
+        ways.append(("the plan", decision.positions_m, clear))
+    for name, positions, clear in ways:
         steps = np.linalg.norm(np.diff(positions, axis=0, prepend=decision.initial_m[None]), axis=1)
-        clear = _clear_of_safe_distances(run, decision, positions)
         longest = limit * decision.dt_s * (1.0 + SPEED)
         at_most("length of a step", steps[clear], longest, **_at(decision, name))
 
@@ -256,7 +264,7 @@ def _answers_follow_the_rules(run: Run, decisions: list[Decision]) -> None:
 
 
 def _answer(decision: Decision, standing: str | None, stood_s: float, gate: Json) -> tuple[str, str]:
-    """Answer and reason by the rules, from the recorded costs and bend.
+    """Answer and reason by the rules, from the recorded costs.
 
     Args:
         decision: the decision.
@@ -264,7 +272,7 @@ def _answer(decision: Decision, standing: str | None, stood_s: float, gate: Json
         stood_s: for how long it has been that.
         gate: the scenario's margins.
     """
-    row, bent = decision.row, decision.row["bend"] > gate["max_bend"]
+    row = decision.row
     if not decision.planned:
         return "refuse", "no_plan"
     first = CHOICES[int(decision.plan[0])]
@@ -273,11 +281,9 @@ def _answer(decision: Decision, standing: str | None, stood_s: float, gate: Json
             return "refuse", "not_cheaper"
         if row["objective"] >= (1.0 - NO_DIFFERENCE) * row["refuse_throughout"]:
             return "refuse", "no_difference"
-        return ("refuse", "bent") if bent else ("accept", "cheaper")
+        return "accept", "cheaper"
     enough = (1.0 - gate["switching_margin"]) * row[f"{standing}_throughout"]
-    cheaper = first != standing and row["objective"] < enough
-    turn = cheaper or bent if standing == "accept" else cheaper and not bent
-    if not turn:
+    if first == standing or row["objective"] >= enough:
         return standing, "kept"
     if stood_s < gate["min_dwell_s"] - SMALL:
         return standing, "dwell"

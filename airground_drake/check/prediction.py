@@ -17,8 +17,6 @@ from .run import Run
 VELOCITY_M_S = 1e-6
 """Recorded and recomputed mode velocities may differ by this: a corner of nearly parallel inequalities enlarges their
 rounding."""
-BEND = 1e-6
-"""Recorded and recomputed bends may differ by this."""
 UNSEEN_M = 1e9
 """As far away is put what a UGV does not sense."""
 CHOICES = ("refuse", "accept")
@@ -62,14 +60,12 @@ def gate_model(run: Run, _: Json) -> Found:
     loops = Loops(*(np.stack(part) for part in zip(*(_loop(run, each) for each in decisions), strict=True)))
     off = 0.0
     for accepted, choice in enumerate(CHOICES):
-        modes, bend = _rolled_out(run, loops, decisions[0].stages, accepted=bool(accepted))
+        modes = _rolled_out(run, loops, decisions[0].stages, accepted=bool(accepted))
         for k, decision in enumerate(decisions):
             recorded = decision.accept_m_s if accepted else decision.refuse_m_s
             at: Json = {"about": f"decision of {decision.ugv}", "t_s": decision.t_s}
             close(f"velocity of mode {choice}", recorded.ravel(), modes[k].ravel(), within=VELOCITY_M_S, **at)
             off = max(off, float(np.abs(recorded - modes[k]).max()))
-            if accepted:
-                close("bend", decision.row["bend"], bend[k], within=BEND, **at)
     found = Found.with_margin("holds", VELOCITY_M_S - off, within=1e-7, decisions=len(decisions))
     return found.counted(len(decisions))
 
@@ -101,12 +97,11 @@ def _loop(run: Run, decision: Decision) -> tuple[Array, ...]:
     )
 
 
-def _rolled_out(run: Run, loops: Loops, stages: int, *, accepted: bool) -> tuple[Array, Array]:
-    """Mean velocity of each stage under one choice throughout, (B, N, 3), and the bend, (B,)."""
+def _rolled_out(run: Run, loops: Loops, stages: int, *, accepted: bool) -> Array:
+    """Mean velocity of each stage under one choice throughout, (B, N, 3)."""
     control, composition = run.scenario["control"], run.scenario["runs"][run.name]["composition"]
     h, on_top = control["period_s"], run.method == "c"
     here, velocities = loops.start_m, []
-    bent, wanted = np.zeros(len(here)), np.zeros(len(here))
     for k in range(loops.preset_m.shape[1] - 1):
         offset = here[:, None] - (loops.points_m + k * h * loops.moving_m_s)
         given = inequalities(offset, loops.safe_m, loops.share, control, PLANE)
@@ -121,9 +116,6 @@ def _rolled_out(run: Run, loops: Loops, stages: int, *, accepted: bool) -> tuple
             change = np.einsum("bij,bj->bi", loops.projector, asked - below)
             task = limited(PLANE * (below + change), loops.limit_m_s)
             velocity = task if on_top else avoiding(task, given, composition)
-        bent = bent + np.linalg.norm(velocity - task, axis=1)
-        wanted = wanted + np.linalg.norm(task, axis=1)
         here = here + h * velocity
         velocities.append(velocity)
-    mean = np.stack(velocities, axis=1).reshape(len(here), stages, -1, 3).mean(axis=2)
-    return mean, bent / np.where(wanted > 0.0, wanted, 1.0)
+    return np.stack(velocities, axis=1).reshape(len(here), stages, -1, 3).mean(axis=2)

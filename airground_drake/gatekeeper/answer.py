@@ -7,8 +7,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
-import numpy as np
-
 from airground_drake.gatekeeper.budget import Budget, Clock
 from airground_drake.gatekeeper.outcome import Outcome
 from airground_drake.gatekeeper.problem import Problem
@@ -27,7 +25,6 @@ class Rules:
     Attributes:
         switching_margin: relative gain that a reversal needs over keeping the answer throughout.
         min_dwell: least time between opposite answers to a proposal, s.
-        max_bend: largest share of its motion by which a proposal may be bent by the avoidance inequalities.
         budget: of one solution, in counts.
         budget_share: of the sampling period that all solutions of a sample may take by the clock; None: no limit.
         clock: what that is measured with.
@@ -35,7 +32,6 @@ class Rules:
 
     switching_margin: float = 0.0
     min_dwell: float = 0.0
-    max_bend: float = np.inf
     budget: Budget = field(default_factory=Budget)
     budget_share: float | None = None
     clock: Clock = time.monotonic
@@ -56,7 +52,7 @@ class Rules:
 
 
 Reason = Literal[
-    "cheaper", "not_cheaper", "no_difference", "bent", "kept", "dwell", "reversed", "no_plan",
+    "cheaper", "not_cheaper", "no_difference", "kept", "dwell", "reversed", "no_plan",
     "stalls", "makes_way", "exhausted", "no_progress", "over",
 ]  # fmt: skip
 """Why an answer is what it is: see `settle` for method (c), `certified` for method (d)."""
@@ -65,7 +61,6 @@ WORDS: dict[Reason, str] = {
     "cheaper": "the proposal leads to a better outcome than the UGV's own task",
     "not_cheaper": "the UGV's own task leads to as good an outcome or a better one",
     "no_difference": "the proposal would change nothing",
-    "bent": "avoidance would bend the proposal too much",
     "kept": "as answered before",
     "dwell": "as answered before: it is too early for another answer",
     "reversed": "the other answer has become the cheaper one",
@@ -154,44 +149,40 @@ def costs_throughout(problem: Problem, solution: Solution) -> tuple[float, float
 
 
 def settle(
-    solution: Solution, throughout: tuple[float, float], bend: float, standing: float, stood: float, rules: Rules
+    solution: Solution, throughout: tuple[float, float], standing: float, stood: float, rules: Rules
 ) -> tuple[bool, Reason]:
     """Whether the proposal is accepted, and why.
 
     Without a plan it is refused, whatever stands. A new proposal is accepted if the best plan starts by accepting
-    it, unless it makes no difference (one that the avoidance inequalities block entirely) or they would bend it
-    too much. A standing answer is reversed only if the best plan starts with the other choice and is cheaper, by
-    the switching margin, than to keep the answer throughout; or if an accepted proposal has come to be bent too
-    much; and not before the dwell is over. (The best plan that keeps the answer for one more stage and then
-    changes it costs nearly the same as the one that changes it now: that comparison would decide nothing.)
+    it, unless it makes no difference. A standing answer is reversed only if the best plan starts with the other
+    choice and is cheaper, by the switching margin, than to keep the answer throughout, and not before the dwell is
+    over. (The best plan that keeps the answer for one more stage and then changes it costs nearly the same as the one
+    that changes it now: that comparison would decide nothing.)
 
     Args:
         solution: the route's.
         throughout: costs (25) of accepting and of refusing throughout the horizon.
-        bend: see `Problem.bend`.
         standing: ACCEPT, REFUSE or SILENT.
         stood: for how long that has been the answer, s.
         rules: margins and limits.
     """
     if not solution.has_plan:
         return False, "no_plan"
-    bent = bend > rules.max_bend
     if standing == SILENT:
-        return _first_answer(solution, throughout, bent)
+        return _first_answer(solution, throughout)
     accepted = standing == ACCEPT
     kept = throughout[0] if accepted else throughout[1]
     cheaper = solution.objective < (1.0 - rules.switching_margin) * kept
-    better = cheaper and solution.accept_first != accepted
-    if not ((better or bent) if accepted else (better and not bent)):
+    if not (cheaper and solution.accept_first != accepted):
         return accepted, "kept"
     if stood < rules.min_dwell - 1e-9:
         return accepted, "dwell"
     return not accepted, "reversed"
 
 
-def _first_answer(solution: Solution, throughout: tuple[float, float], bent: bool) -> tuple[bool, Reason]:
+def _first_answer(solution: Solution, throughout: tuple[float, float]) -> tuple[bool, Reason]:
     if not solution.accept_first:
         return False, "not_cheaper"
     if not solution.objective < (1.0 - USELESS) * throughout[1]:
         return False, "no_difference"
-    return (False, "bent") if bent else (True, "cheaper")
+    return True, "cheaper"

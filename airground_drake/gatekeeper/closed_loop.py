@@ -80,11 +80,8 @@ class ClosedLoop(NamedTuple):
             raise ValueError(f"a plan needs {self.stages} answers that are 0 or 1, got {omega!r}")
         return _follow(self, answers.astype(np.int64))[0]
 
-    def constant_plans(self) -> tuple[Array, Array, float]:
-        """Mean velocity of each stage, (N, 3) m/s, accepted throughout and refused throughout; and the bend.
-
-        See `Problem.bend` for the last.
-        """
+    def constant_plans(self) -> tuple[Array, Array]:
+        """Mean velocity of each stage, (N, 3) m/s, accepted throughout and refused throughout."""
         return _constant_plans(self)
 
 
@@ -123,7 +120,7 @@ def velocity_of(loop: ClosedLoop, mode: int, k: int, position: Array, work: Work
         mode: REFUSED or ACCEPTED.
         k: control period, from 0.
         position: of the UGV at its beginning, (3,), m.
-        work: overwritten; `task` is then what was wanted below the avoidance inequalities.
+        work: overwritten.
     """
     mobility, normal, bound, own, task = work
     h = loop.period
@@ -154,32 +151,26 @@ def velocity_of(loop: ClosedLoop, mode: int, k: int, position: Array, work: Work
 
 
 @njit(cache=True)
-def _follow(loop: ClosedLoop, answers: npt.NDArray[np.int64]) -> tuple[Array, Array, float]:
-    """Positions at the ends of the stages (N, 3), m, mean velocities of the stages (N, 3), m/s, and the bend."""
+def _follow(loop: ClosedLoop, answers: npt.NDArray[np.int64]) -> tuple[Array, Array]:
+    """Positions at the ends of the stages, (N, 3), m, and mean velocities of the stages, (N, 3), m/s."""
     stages = len(answers)
     positions, mean = np.empty((stages, 3)), np.zeros((stages, 3))
     position, work = loop.start.copy(), workspace(loop)
-    bent, wanted = 0.0, 0.0
     for stage in range(stages):
         for k in range(stage * loop.substeps, (stage + 1) * loop.substeps):
             velocity = velocity_of(loop, answers[stage], k, position, work)
-            change, speed = 0.0, 0.0
             for a in range(3):
-                change += (velocity[a] - work.task[a]) ** 2
-                speed += work.task[a] ** 2
                 position[a] += loop.period * velocity[a]
                 mean[stage, a] += velocity[a] / loop.substeps
-            bent += np.sqrt(change)
-            wanted += np.sqrt(speed)
         positions[stage] = position
-    return positions, mean, bent / wanted if wanted > 0.0 else 0.0
+    return positions, mean
 
 
 @njit(cache=True)
-def _constant_plans(loop: ClosedLoop) -> tuple[Array, Array, float]:
+def _constant_plans(loop: ClosedLoop) -> tuple[Array, Array]:
     stages = (len(loop.preset) - 1) // loop.substeps
-    _, accept, bend = _follow(loop, np.ones(stages, dtype=np.int64))
-    return accept, _follow(loop, np.zeros(stages, dtype=np.int64))[1], bend
+    accept = _follow(loop, np.ones(stages, dtype=np.int64))[1]
+    return accept, _follow(loop, np.zeros(stages, dtype=np.int64))[1]
 
 
 @njit(cache=True)

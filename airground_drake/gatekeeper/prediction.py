@@ -71,7 +71,7 @@ def predicted_problem(scene: Scene, law: UgvLaw, proposal: Proposal, horizon: Ho
     """(26) for one UGV: roll out both choices and keep the points that it senses and might come near."""
     scene = scene.restrict(np.linalg.norm(scene.centres - scene.position, axis=1) <= law.avoidance.sensing_range)
     loop = closed_loop(scene, law, proposal, horizon.stages, horizon.substeps)
-    accept, refuse, bend = loop.constant_plans()
+    accept, refuse = loop.constant_plans()
     dt = horizon.substeps * law.avoidance.period
     after = dt * np.arange(1.0, horizon.stages + 1.0)
     squared = np.maximum(np.square(accept).sum(axis=1), np.square(refuse).sum(axis=1))
@@ -92,7 +92,6 @@ def predicted_problem(scene: Scene, law: UgvLaw, proposal: Proposal, horizon: Ho
         error_weight=horizon.error_weight,
         slack_weight=horizon.slack_weight,
         loop=loop,
-        bend=bend,
     )
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -32,11 +31,6 @@ class Problem:
         error_weight: a_i of (25), 1/(m^2 s).
         slack_weight: b_i of (25), 1/(m^2 s).
         loop: what the mode velocities were rolled out from; None for a problem that is given by them alone.
-        bend: how much the avoidance inequalities bend the intervention along the roll-out "accept throughout":
-            the integral of ||v - v_below|| dt over that of ||v_below|| dt, with v the velocity commanded and
-            v_below the one that the task below the inequalities wants, within the speed limit. 0 where nothing
-            is wanted, or nothing stands above the intervention (methods (b), (c)); 1 where all that is wanted is
-            blocked; more where the inequalities make the UGV retreat.
     """
 
     dt: float
@@ -49,7 +43,6 @@ class Problem:
     error_weight: float
     slack_weight: float
     loop: ClosedLoop | None = None
-    bend: float = 0.0
 
     @property
     def stages(self) -> int:
@@ -71,7 +64,7 @@ class Problem:
         """Whether all data are finite numbers."""
         data = (self.initial, self.accept, self.refuse, self.reference, self.centres, self.distances)
         looped = self.loop is None or self.loop.is_finite()
-        return looped and math.isfinite(self.bend) and all(np.isfinite(array).all() for array in data)
+        return looped and all(np.isfinite(array).all() for array in data)
 
     def positions(self, omega: Array) -> Array:
         """Predicted positions at the ends of the stages, (23): omega (N,) in [0, 1] to (N, 3), m."""

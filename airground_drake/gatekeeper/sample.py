@@ -205,5 +205,5 @@ class PaperGatekeepers(Gatekeepers):
         self.times_s.append(thread_time() - started)
         standing, stood = answer_to(proposal, seen.before.answers, i), seen.t - seen.before.since[i]
         throughout = costs_throughout(problem, solution)
-        accepted, reason = settle(solution, throughout, problem.bend, standing, stood, self._judging.rules)
+        accepted, reason = settle(solution, throughout, standing, stood, self._judging.rules)
         return Decision(seen.t, i, proposal, accepted, reason, Planned(problem, solution, throughout))

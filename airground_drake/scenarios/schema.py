@@ -134,11 +134,10 @@ class Intervention:
 class Gatekeeper:
     """The accept/refuse decision, eqs (21)-(29).
 
-    A decision on a proposal is reversed only for a plan that is cheaper by the (relative) switching margin, and
-    not before `min_dwell_s` have passed. Under method (d) a proposal that the avoidance inequalities would bend
-    by more than the share `max_bend` of its own motion is refused. A decision may take `budget_iterations` of a
-    solver and `budget_nodes` of a search (budget 'counted': a run is the same on every machine), or besides the
-    share `budget_share` of the sampling period by the clock (budget 'wall_clock': for real time).
+    Under method (c) a decision on a proposal is reversed only for a plan that is cheaper by the (relative) switching
+    margin, and not before `min_dwell_s` have passed. A decision may take `budget_iterations` of a solver and
+    `budget_nodes` of a search (budget 'counted': a run is the same on every machine), or besides the share
+    `budget_share` of the sampling period by the clock (budget 'wall_clock': for real time).
 
     Under method (d) outcomes are compared instead, `settling_s` past the end of motion and preset trajectory. An
     accepted proposal is executed for `longest_s` at most, and given back when the UGV has been farther behind it than
@@ -154,7 +153,6 @@ class Gatekeeper:
     slack_weight_1_m2_s: float = field(default=1000.0, metadata=FROM_ZERO)
     switching_margin: float = field(default=0.05, metadata=FROM_ZERO)
     min_dwell_s: float = field(default=0.2, metadata=FROM_ZERO)
-    max_bend: float = field(default=0.5, metadata=FROM_ZERO)
     budget: str = "counted"
     budget_iterations: int = 100
     budget_nodes: int = 15000

@@ -594,18 +594,11 @@ GATEKEEPER = (
         "return task",
     ),
     Mutant(
-        "the bend is halved",
-        "gatekeeper/closed_loop.py",
-        "bent / wanted if wanted > 0.0 else 0.0",
-        "0.5 * bent / wanted if wanted > 0.0 else 0.0",
-    ),
-    Mutant(
         "a first stage that refuses is accepted",
         "gatekeeper/answer.py",
         '    if not solution.accept_first:\n        return False, "not_cheaper"',
         '    if False:\n        return False, "not_cheaper"',
     ),
-    Mutant("a bent proposal is accepted", "gatekeeper/answer.py", "bent = bend > rules.max_bend", "bent = False"),
     Mutant(
         "the switching margin is a bonus",
         "gatekeeper/answer.py",

@@ -150,14 +150,14 @@ def decided_run(route: str = "relaxed") -> Trace:
     """Six decisions of ugv1 on a proposal of t = 0."""
     spec = gate_scenario(route)
     base = simulate(spec, "c", lambda t: [[0.1, 0.2, 0.0], [0.5, 0.1, 0.0], [0.0, 0.0, 0.0]])
-    rules = Rules(switching_margin=spec["gatekeeper"]["switching_margin"], min_dwell=0.2, max_bend=0.5)
+    rules = Rules(switching_margin=spec["gatekeeper"]["switching_margin"], min_dwell=0.2)
     standing, since, decisions, problems = SILENT, 0.0, [], []
     for k in range(1, 7):
         t = k * STAGE_S
         data = gate_data_at(base, t)
         found = solve_as_documented(data, route)
         throughout = data.plan_cost(np.ones(STAGES)), data.plan_cost(np.zeros(STAGES))
-        accepted, reason = settle(found, throughout, 0.1, standing, t - since, rules)
+        accepted, reason = settle(found, throughout, standing, t - since, rules)
         answer = ACCEPT if accepted else REFUSE
         standing, since = answer, since if answer == standing else t
         decisions.append(
@@ -169,7 +169,6 @@ def decided_run(route: str = "relaxed") -> Trace:
                 "objective_accept": found.objective_accept, "objective_refuse": found.objective_refuse,
                 "accept_throughout": throughout[0], "refuse_throughout": throughout[1],
                 "rounding_deviation_s": found.rounding_deviation, "predicted_clearance_m": found.clearance,
-                "bend": 0.1,
             }
         )  # fmt: skip
         arrays = (

@@ -1,4 +1,4 @@
-"""From a solution to an answer: margin, dwell, bend."""
+"""From a solution to an answer: margin, dwell."""
 
 from __future__ import annotations
 
@@ -18,47 +18,41 @@ from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.motion import Motion
 
-RULES = Rules(switching_margin=0.1, min_dwell=0.2, max_bend=0.5)
+RULES = Rules(switching_margin=0.1, min_dwell=0.2)
 
 
 def solution(accept: float, refuse: float, status: Any = "optimal") -> Solution:
     return Solution(accept < refuse, status, objective=min(accept, refuse))
 
 
-def answer(accept: float, refuse: float, bend: float, standing: float, stood: float) -> tuple[bool, str]:
+def answer(accept: float, refuse: float, standing: float, stood: float) -> tuple[bool, str]:
     """`settle` where keeping an answer throughout costs what the best plan costs that starts with it."""
-    return settle(solution(accept, refuse), (accept, refuse), bend, standing, stood, RULES)
+    return settle(solution(accept, refuse), (accept, refuse), standing, stood, RULES)
 
 
 def test_a_new_proposal_is_judged_by_the_plan_alone() -> None:
-    assert answer(10.0, 10.5, 0.0, SILENT, 0.0) == (True, "cheaper")
-    assert answer(10.5, 10.0, 0.0, SILENT, 0.0) == (False, "not_cheaper")
-    assert answer(10.0 - 1e-9, 10.0, 0.0, SILENT, 0.0) == (False, "no_difference")
-    assert answer(1.0, 10.0, 0.6, SILENT, 0.0) == (False, "bent")
+    assert answer(10.0, 10.5, SILENT, 0.0) == (True, "cheaper")
+    assert answer(10.5, 10.0, SILENT, 0.0) == (False, "not_cheaper")
+    assert answer(10.0 - 1e-9, 10.0, SILENT, 0.0) == (False, "no_difference")
 
 
 def test_a_standing_answer_is_reversed_only_for_a_clear_gain() -> None:
-    assert answer(10.5, 10.0, 0.0, ACCEPT, 1.0) == (True, "kept")
-    assert answer(10.0, 10.5, 0.0, REFUSE, 1.0) == (False, "kept")
-    assert answer(20.0, 10.0, 0.0, ACCEPT, 1.0) == (False, "reversed")
-    assert answer(10.0, 20.0, 0.0, REFUSE, 1.0) == (True, "reversed")
-
-
-def test_a_proposal_that_has_come_to_be_bent_is_handed_back() -> None:
-    assert answer(10.0, 20.0, 0.6, ACCEPT, 1.0) == (False, "reversed")
-    assert answer(10.0, 20.0, 0.6, REFUSE, 1.0) == (False, "kept")
+    assert answer(10.5, 10.0, ACCEPT, 1.0) == (True, "kept")
+    assert answer(10.0, 10.5, REFUSE, 1.0) == (False, "kept")
+    assert answer(20.0, 10.0, ACCEPT, 1.0) == (False, "reversed")
+    assert answer(10.0, 20.0, REFUSE, 1.0) == (True, "reversed")
 
 
 def test_no_reversal_before_the_dwell_is_over() -> None:
-    assert answer(20.0, 10.0, 0.0, ACCEPT, 0.15) == (True, "dwell")
-    assert answer(10.0, 20.0, 0.0, REFUSE, 0.15) == (False, "dwell")
-    assert answer(20.0, 10.0, 0.0, ACCEPT, 0.2) == (False, "reversed")
+    assert answer(20.0, 10.0, ACCEPT, 0.15) == (True, "dwell")
+    assert answer(10.0, 20.0, REFUSE, 0.15) == (False, "dwell")
+    assert answer(20.0, 10.0, ACCEPT, 0.2) == (False, "reversed")
 
 
-@given(st.sampled_from([SILENT, ACCEPT, REFUSE]), st.floats(0.0, 1.0), st.floats(0.0, 2.0))
-def test_without_a_plan_everything_is_refused_at_once(standing: float, stood: float, bend: float) -> None:
+@given(st.sampled_from([SILENT, ACCEPT, REFUSE]), st.floats(0.0, 1.0))
+def test_without_a_plan_everything_is_refused_at_once(standing: float, stood: float) -> None:
     for status in ("refused_solver_failed", "refused_not_finite", "refused_budget_spent"):
-        assert settle(solution(1.0, 2.0, status), (1.0, 2.0), bend, standing, stood, RULES) == (False, "no_plan")
+        assert settle(solution(1.0, 2.0, status), (1.0, 2.0), standing, stood, RULES) == (False, "no_plan")
 
 
 @given(
@@ -73,18 +67,15 @@ def test_opposite_answers_never_want_each_other(
 ) -> None:
     """Reversed once, the same costs do not reverse it back."""
     rules = Rules(switching_margin=margin)
-    accepted, _ = settle(solution(accept, refuse), kept, 0.0, standing, 1.0, rules)
-    assert settle(solution(accept, refuse), kept, 0.0, ACCEPT if accepted else REFUSE, 1.0, rules)[1] == "kept"
+    accepted, _ = settle(solution(accept, refuse), kept, standing, 1.0, rules)
+    assert settle(solution(accept, refuse), kept, ACCEPT if accepted else REFUSE, 1.0, rules)[1] == "kept"
 
 
 def test_a_proposal_into_an_obstacle_is_refused() -> None:
     scene, law, _, horizon = case_a_proposal()
     motion = Motion.at_speed(np.array([STALL_POSITION, [4.0, 7.0, 0.0]]), 2.0, start=scene.t)
-    for on_top in (True, False):
-        problem = predicted_problem(
-            scene, replace(law, intervention_on_top=on_top), Proposal("bad", scene.t, motion), horizon
-        )
-        throughout = tuple(problem.evaluate(np.full(problem.stages, answer)).objective for answer in (1.0, 0.0))
-        solution = RelaxedRoute().solve(problem)
-        assert not settle(solution, throughout, problem.bend, SILENT, 0.0, Rules(max_bend=0.5))[0]
-        assert (problem.bend > 0.5) == (not on_top)
+    problem = predicted_problem(
+        scene, replace(law, intervention_on_top=True), Proposal("bad", scene.t, motion), horizon
+    )
+    throughout = tuple(problem.evaluate(np.full(problem.stages, answer)).objective for answer in (1.0, 0.0))
+    assert not settle(RelaxedRoute().solve(problem), throughout, SILENT, 0.0, Rules())[0]

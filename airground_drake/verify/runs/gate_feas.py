@@ -41,15 +41,16 @@ class GateFeas(GateClaim):
     formula = (
         "rho(0) = p(t); omega in {0, 1}; rho_k = rho_(k-1) + dt (omega_k a_k + (1 - omega_k) b_k); u_k = max(0, max_j "
         "d_j - ||rho_k - o_jk||); objective = dt sum_k a ||rho_rd - rho_k||^2 + b u_k^2; reference, centres and "
-        "distances as the scenario and the signals at t have them; answer = rules(costs, bend, standing answer)"
+        "distances as the scenario and the signals at t have them; answer = rules(costs, standing answer)"
     )
     method = (
         "All recomputed in numpy from the scenario, the signals and the recorded mode velocities. A sensed obstacle or "
         "robot may be missing only if no plan can come within its safe distance. The rules (no difference below a "
-        "relative gain of 1e-6, bend, switching margin, dwell) are run again over the decisions of each UGV, which "
+        "relative gain of 1e-6, switching margin, dwell) are run again over the decisions of each UGV, which "
         "must follow each other without a gap while a proposal stands. Route 'rollout' predicts the nonlinear closed "
         "loop: there (23) is checked up to the first change of mode, after it that no step is longer than the speed "
-        "limit allows, except where it begins more than 1e-6 m inside a safe distance: avoidance may then demand more. "
+        "limit allows. Constant plans keep to it, except where they begin more than 1e-6 m inside a safe distance: "
+        "avoidance may then demand more; so do other plans where the constant plan of their stage's choice does. "
         "Under method (d), which solves no problem (26), it is about the times of the decisions and about obedience; "
         "what its answers rest on is GATE-MODEL, how they follow LIVE-PROG."
     )
@@ -57,7 +58,7 @@ class GateFeas(GateClaim):
     assumptions = (
         "The mode velocities of (23) are the recorded ones, in stages of the recorded length.",
         "Other robots keep the velocity that they have at the time of the decision.",
-        "The bend, and the cost of the choice that lost, are the recorded ones.",
+        "The cost of the choice that lost is the recorded one.",
     )
     does_not_establish = (
         "That the mode velocities are those of the closed loop, or that the run went as predicted. (26d) is soft: a "
@@ -73,28 +74,22 @@ class GateFeas(GateClaim):
         compared = [one for row in rows for one in (*compare_situation(trace, row), *compare_plan(trace, row))]
         compared += [*compare_answers(trace, rows), *compare_obedience(trace, rows), *compare_own_task(trace, rows)]
         slack = [float(np.maximum(0.0, -row.clearance(row["positions_m"])).max()) for row in rows if row.planned]
-        finding = Finding(
-            "holds",
-            margin=min((1.0 - one.off / one.allowed for one in compared if one.allowed > 0.0), default=None),
-            unit="of the tolerance",
-            quantity="part left of the tolerance of a recorded number",
-            evidence={
-                "decisions": len(rows),
-                "without_a_plan": [row.label for row in rows if not row.planned],
-                "comparisons": len(compared),
-                "wrong": sum(one.wrong for one in compared),
-                "reasons": {str(k): int(v) for k, v in trace.decisions["reason"].value_counts().items()},
-                "largest_slack_m": max(slack, default=0.0),
-                "plans_with_slack": sum(value > 0.0 for value in slack),
-            },
-            exercised=len(rows),
-        )
-        return conclude(finding, compared)
+        return judge_compared(
+            trace, rows, compared,
+            without_a_plan=[row.label for row in rows if not row.planned],
+            largest_slack_m=max(slack, default=0.0),
+            plans_with_slack=sum(value > 0.0 for value in slack),
+        )  # fmt: skip
 
 
 def judge_obedience(trace: Trace, rows: list[Row]) -> Finding:
     """Method (d): decisions come when they are due, and nothing is done without an acceptance."""
     compared = [*compare_times(trace, rows), *compare_obedience(trace, rows), *compare_own_task(trace, rows)]
+    return judge_compared(trace, rows, compared)
+
+
+def judge_compared(trace: Trace, rows: list[Row], compared: list[Off], **evidence: Any) -> Finding:
+    """The finding of these comparisons; the margin is the part of a tolerance left."""
     finding = Finding(
         "holds",
         margin=min((1.0 - one.off / one.allowed for one in compared if one.allowed > 0.0), default=None),
@@ -105,6 +100,7 @@ def judge_obedience(trace: Trace, rows: list[Row]) -> Finding:
             "comparisons": len(compared),
             "wrong": sum(one.wrong for one in compared),
             "reasons": {str(k): int(v) for k, v in trace.decisions["reason"].value_counts().items()},
+            **evidence,
         },
         exercised=len(rows),
     )
@@ -184,7 +180,9 @@ def compare_plan(trace: Trace, row: Row) -> Iterator[Off]:
     """(26b)-(26e), (25) and what was recorded about the plan."""
     limit = trace.scenario["ugvs"][row.given["robot"]]["max_speed_m_s"]
     period = trace.scenario["control"]["period_s"]
-    trajectories = dict(zip(("refusing throughout", "accepting throughout"), row.constant, strict=True))
+    refusing, accepting = row.constant
+    clear_refusing, clear_accepting = _clear(row, refusing, period), _clear(row, accepting, period)
+    ways = [("refusing throughout", refusing, clear_refusing), ("accepting throughout", accepting, clear_accepting)]
     if row.planned:
         plan = row["plan"]
         positions = row["positions_m"]
@@ -193,7 +191,10 @@ def compare_plan(trace: Trace, row: Row) -> Iterator[Off]:
         same = np.logical_and.accumulate(plan == plan[0]) | (given["route"] != "rollout")
         away = positions - row.positions(plan)
         yield Off(row, "positions are not those of (23), m", away[same], POSITION_TOLERANCE_M)
-        trajectories["the plan"] = positions
+        clear = _clear(row, positions, period)
+        if given["route"] != "rollout":  # by (23) a mode's velocity is that of its own way, wherever the plan is
+            clear = np.where(plan == 1.0, clear_accepting, clear_refusing)
+        ways.append(("the plan", positions, clear))
         cost = float(row.cost(positions))
         clearance = min(float(row.clearance(positions).min()), 1e9)
         first = "accept" if plan[0] == 1.0 else "refuse"
@@ -209,9 +210,9 @@ def compare_plan(trace: Trace, row: Row) -> Iterator[Off]:
         yield Off(row, "first stage", float(given["first_stage"] != first), 0.0, plan=first)
         shift = given["predicted_clearance_m"] - clearance
         yield Off(row, "predicted clearance, m", shift, POSITION_TOLERANCE_M, recomputed_m=clearance)
-    for name, positions in trajectories.items():
+    for name, positions, clear in ways:
         step = np.linalg.norm(np.diff(positions, axis=0, prepend=row["initial_m"][None]), axis=1)
-        over = (step / (limit * row.dt) - 1.0)[_clear(row, positions, period)]
+        over = (step / (limit * row.dt) - 1.0)[clear]
         yield Off(row, f"{name}: faster than the speed limit", np.maximum(0.0, over), SPEED_TOLERANCE)
 
 
@@ -247,7 +248,7 @@ def compare_answers(trace: Trace, rows: Sequence[Row]) -> Iterator[Off]:
 
 
 def rule(row: Row, standing: str | None, stood: float, gate: dict[str, Any]) -> tuple[bool, str]:
-    """Whether a proposal is accepted and why, from the recorded costs and bend.
+    """Whether a proposal is accepted and why, from the recorded costs.
 
     Args:
         row: the decision.
@@ -255,7 +256,7 @@ def rule(row: Row, standing: str | None, stood: float, gate: dict[str, Any]) -> 
         stood: for how long it has been that, s.
         gate: the scenario's margins.
     """
-    given, bent = row.given, row.given["bend"] > gate["max_bend"]
+    given = row.given
     if not row.planned:
         return False, "no_plan"
     if standing is None:
@@ -263,11 +264,11 @@ def rule(row: Row, standing: str | None, stood: float, gate: dict[str, Any]) -> 
             return False, "not_cheaper"
         if given["objective"] >= (1.0 - NO_DIFFERENCE) * given["refuse_throughout"]:
             return False, "no_difference"
-        return not bent, "bent" if bent else "cheaper"
+        return True, "cheaper"
     accepted = standing == "accept"
     enough = (1.0 - gate["switching_margin"]) * given[f"{standing}_throughout"]
     cheaper = (row["plan"][0] == 1.0) != accepted and given["objective"] < enough
-    if not ((cheaper or bent) if accepted else (cheaper and not bent)):
+    if not cheaper:
         return accepted, "kept"
     if stood < gate["min_dwell_s"] - TIME_TOLERANCE_S:
         return accepted, "dwell"

@@ -32,8 +32,6 @@ from airground_drake.verify.runs.proposals import Sent, accepted_at, proposals_o
 VELOCITY_TOLERANCE_M_S = 1e-6
 """Recorded and recomputed mode velocities may differ by this, m/s: rounding of two algorithms, 1e-12 m/s at a corner of
 two inequalities, which the closed loop damps; a corner of nearly parallel ones enlarges it."""
-BEND_TOLERANCE = 1e-6
-"""Recorded and recomputed bends may differ by this: they are ratios of sums of such velocities."""
 OUTCOME_TOLERANCE = 1e-6
 """Recorded and recomputed outcomes may differ by this, relative, or in m^2 s: they are sums over such velocities."""
 LEFT_TOLERANCE_M = 1e-3
@@ -77,11 +75,10 @@ class Scenes(NamedTuple):
 
 
 class Ways(NamedTuple):
-    """Where B closed loops lead: positions at the ends of N stages, their mean velocities (B, N, 3), bends (B,)."""
+    """Where B closed loops lead: positions at the ends of N stages, m, and their mean velocities, m/s, (B, N, 3)."""
 
     positions: Array
     velocities: Array
-    bend: Array
 
 
 class GateModel(GateClaim):
@@ -89,13 +86,12 @@ class GateModel(GateClaim):
 
     id = "GATE-MODEL"
     statement = (
-        "The mode velocities and the bend that every gatekeeper decision rests on are those of the UGV's closed loop, "
+        "The mode velocities that every gatekeeper decision rests on are those of the UGV's closed loop, "
         "with the proposal accepted throughout and refused throughout, rolled out again from what it sensed."
     )
     formula = (
         "a_k, b_k = mean velocity over stage k of rho+ = rho + h law(rho; accepted | refused), rho(0) = p(t), others "
-        "at their velocities at t; |recorded - recomputed| <= 1e-6 m/s; bend = sum ||v - v_below|| / sum ||v_below|| "
-        "along a_k, to 1e-6"
+        "at their velocities at t; |recorded - recomputed| <= 1e-6 m/s"
     )
     method = (
         "The control law in numpy as for EXEC, with code of its own, from the signals, the scenario and the table of "
@@ -133,8 +129,6 @@ class GateModel(GateClaim):
                 off = row[f"{name}_m_s"] - way.velocities[k]
                 largest = max(largest, float(np.abs(off).max()))
                 compared.append(Off(row, f"velocity of mode {name}, m/s", off, VELOCITY_TOLERANCE_M_S))
-            bend = float(ways[1].bend[k])
-            compared.append(Off(row, "bend", row.given["bend"] - bend, BEND_TOLERANCE, recomputed=bend))
         evidence = {"decisions": len(rows), "largest_difference_m_s": largest}
         finding = Finding(
             "holds",
@@ -224,14 +218,13 @@ def roll_out(trace: Trace, scenes: Scenes, plans: Array) -> Ways:
     each = steps // stages
     position = scenes.start.copy()
     positions, velocities = np.empty((len(plans), stages, 3)), np.zeros((len(plans), stages, 3))
-    bent, wanted = np.zeros(len(plans)), np.zeros(len(plans))
     for k in range(steps):
         accepted = plans[:, k // each] == 1.0
         centres = scenes.centres + k * h * scenes.velocities
         given = inequalities(position, centres, scenes.safe, scenes.share, control, planar=True)
         rate = (scenes.preset[:, k + 1] - scenes.preset[:, k]) / h
         own = tracking(position, scenes.preset[:, k], rate, control["motion_gain_1_s"], scenes.limit)
-        below, velocity = own.copy(), avoiding(own, given, composition, planar=True)
+        velocity = avoiding(own, given, composition, planar=True)
         if accepted.any():
             asked = Asked(
                 scenes.wanted[accepted, k],
@@ -240,16 +233,13 @@ def roll_out(trace: Trace, scenes: Scenes, plans: Array) -> Ways:
             )
             lower = (velocity if on_top else own)[accepted]
             gain = control["intervention_gain_1_s"]
-            below[accepted] = intervened(position[accepted], lower, asked, gain, scenes.limit[accepted])
+            task = intervened(position[accepted], lower, asked, gain, scenes.limit[accepted])
             bounds = Inequalities(given.normal[accepted], given.bound[accepted])
-            task = below[accepted]
             velocity[accepted] = task if on_top else avoiding(task, bounds, composition, planar=True)
-        bent += np.linalg.norm(velocity - below, axis=1)
-        wanted += np.linalg.norm(below, axis=1)
         position = position + h * velocity
         velocities[:, k // each] += velocity / each
         positions[:, k // each] = position
-    return Ways(positions, velocities, np.where(wanted > 0.0, bent / np.where(wanted > 0.0, wanted, 1.0), 0.0))
+    return Ways(positions, velocities)
 
 
 def _realised(trace: Trace, rows: Sequence[Row], sent: list[Sent]) -> dict[str, Any]:

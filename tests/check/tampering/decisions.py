@@ -111,9 +111,9 @@ def first_stage_is_no_choice(folder: Path) -> None:
 
 
 @refused_by("GATE-FEAS", "numbers of a decision are finite")
-def bend_is_nan(folder: Path) -> None:
+def gap_is_nan(folder: Path) -> None:
     with edited_table(folder, "decisions") as frame:
-        frame["bend"] = np.nan
+        frame["gap"] = np.nan
 
 
 @refused_by("GATE-OPT", "objective_accept against accept throughout")

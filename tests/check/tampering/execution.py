@@ -135,12 +135,6 @@ def own_way_predicted_slower(folder: Path) -> None:
         frame["refuse_m_s"] = [0.99 * np.array(value) for value in frame["refuse_m_s"]]
 
 
-@refused_by("GATE-MODEL", "bend", run="c")
-def bend_raised(folder: Path) -> None:
-    with edited_table(folder, "decisions", "c") as frame:
-        frame["bend"] += 0.001
-
-
 @refused_by("GATE-MODEL", "a decision is on a proposal that was sent", run="c")
 def decisions_on_a_proposal_that_is_not_in_the_table(folder: Path) -> None:
     write_table(folder, read_table(folder, "proposals", "c").iloc[1:], "proposals", "c")

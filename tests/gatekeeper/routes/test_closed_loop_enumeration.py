@@ -109,7 +109,6 @@ def broken() -> Iterator[tuple[str, Problem]]:
     loop = problem.loop
     assert loop is not None
     yield "mode velocities", replace(problem, accept=np.full((12, 3), np.nan))
-    yield "bend", replace(problem, bend=np.nan)
     yield "start", replace(problem, loop=loop._replace(start=np.full(3, np.inf)))
     yield "proposal", replace(problem, loop=loop._replace(wanted=np.full_like(loop.wanted, np.nan)))
     yield "distances", replace(problem, loop=loop._replace(distances=np.full_like(loop.distances, np.nan)))
@@ -222,14 +221,9 @@ def proposals_of_case_b() -> dict[str, Problem]:
     for policy, problem in zip(trace.decisions["policy"], seen, strict=True):
         assert problem.loop is not None
         below = problem.loop._replace(intervention_on_top=False)
-        accept, refuse, bend = below.constant_plans()
-        first.setdefault(policy, replace(problem, accept=accept, refuse=refuse, bend=bend, loop=below))
+        accept, refuse = below.constant_plans()
+        first.setdefault(policy, replace(problem, accept=accept, refuse=refuse, loop=below))
     return first
-
-
-def test_the_wrong_proposal_of_case_b_is_bent_and_the_detour_is_not(proposals_of_case_b: dict[str, Problem]) -> None:
-    assert proposals_of_case_b["towards"].bend > 0.9
-    assert proposals_of_case_b["detour"].bend < 0.05
 
 
 @pytest.mark.parametrize("error_weight", [1.0, 30.0, 100.0])

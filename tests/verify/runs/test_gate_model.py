@@ -92,7 +92,7 @@ def late(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def swapped(monkeypatch: pytest.MonkeyPatch) -> None:
     honest = ClosedLoop.constant_plans
-    monkeypatch.setattr(ClosedLoop, "constant_plans", lambda self: (*honest(self)[1::-1], honest(self)[2]))
+    monkeypatch.setattr(ClosedLoop, "constant_plans", lambda self: honest(self)[::-1])
 
 
 MUTANTS: dict[str, Patch] = {
