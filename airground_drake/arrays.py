@@ -10,3 +10,10 @@ Array = npt.NDArray[np.float64]
 
 ROUNDOFF = 2.0**-53
 """Unit roundoff u of binary64: every operation returns its exact result times 1 + e, |e| <= u."""
+
+
+def read_only(values: npt.ArrayLike) -> Array:
+    """A copy of the values that cannot be written to."""
+    copy = np.array(values, dtype=np.float64)
+    copy.setflags(write=False)
+    return copy

@@ -50,7 +50,7 @@ def make_database(scenario: Scenario, method: Method) -> BehaviourDatabase:
     given = scenario.intervention
     policies = given.policies if method.intervenes else []
     return BehaviourDatabase(
-        [(entry.name, make_policy(entry.name, entry.parameters)) for entry in policies],
+        [(entry.name, make_policy(entry.name, entry.parameters, given.budget_s)) for entry in policies],
         retry=given.retry_s,
         ranking=given.ranking,  # type: ignore[arg-type]
         budget=given.budget_s,
@@ -88,7 +88,7 @@ def make_route(scenario: Scenario) -> Route:
     Raises:
         UnknownNameError, PluginError: if the scenario names a route that cannot be made.
     """
-    return ROUTES.load(scenario.gatekeeper.route, of=Route)()
+    return ROUTES.make(scenario.gatekeeper.route, of=Route)
 
 
 def first_order_plant(robot: str, start: Array) -> LinearSystem:

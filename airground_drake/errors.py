@@ -6,6 +6,8 @@ from collections.abc import Iterable
 
 VALUE_WIDTH = 120
 """Longer values are cut in messages, characters."""
+FAULT_WIDTH = 300
+"""What code of others says of its failure is cut after so many characters."""
 
 
 class AirgroundError(Exception):
@@ -31,7 +33,7 @@ class ScenarioError(AirgroundError):
         self.source, self.key, self.value, self.allowed = source, key, value, allowed
         where = f"{source}: {key}: " if key else f"{source}: "
         fault = str(value) if isinstance(value, Fault) else f"{_short(repr(value))} is not allowed"
-        super().__init__(_one_line(f"{where}{fault}; {allowed}"))
+        super().__init__(one_line(f"{where}{fault}; {allowed}"))
 
 
 class UnknownNameError(AirgroundError):
@@ -47,11 +49,19 @@ class UnknownNameError(AirgroundError):
         """Build the one-line message from its parts."""
         self.kind, self.name, self.allowed = kind, name, tuple(allowed)
         options = ", ".join(self.allowed) or "none"
-        super().__init__(_one_line(f"unknown {kind} {_short(repr(name))}; allowed: {options}"))
+        super().__init__(one_line(f"unknown {kind} {_short(repr(name))}; allowed: {options}"))
 
 
 class PluginError(AirgroundError):
     """A class named in a scenario that cannot be imported, is of another kind, or does not take its parameters."""
+
+
+class PolicyError(AirgroundError):
+    """What went wrong in a policy's process, in words: the policy's own exception, or what became of the process."""
+
+
+class ReportError(AirgroundError):
+    """A report that is not there, or differs from what was written, when it is read back."""
 
 
 class SimulationError(AirgroundError):
@@ -70,7 +80,7 @@ class SimulationError(AirgroundError):
 
     def __str__(self) -> str:
         """One line."""
-        return _one_line(f"run {self.run} stopped at t = {self.t:.6g} s: {self.what}")
+        return one_line(f"run {self.run} stopped at t = {self.t:.6g} s: {self.what}")
 
 
 class TraceError(AirgroundError):
@@ -81,6 +91,15 @@ def _short(text: str) -> str:
     return text if len(text) <= VALUE_WIDTH else f"{text[: VALUE_WIDTH - 3]}..."
 
 
-def _one_line(text: str) -> str:
+def described(error: BaseException) -> str:
+    """An exception of somebody else's code as one printable line of bounded length, whatever its `__str__` does."""
+    try:
+        text = f"{type(error).__name__}: {error}"[:FAULT_WIDTH]
+    except BaseException:  # its text is code of others, too
+        text = "an exception that cannot be put into words"
+    return one_line(text)
+
+
+def one_line(text: str) -> str:
     """Escape what would break the line or upset a terminal."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)

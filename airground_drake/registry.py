@@ -17,9 +17,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import entry_points
-from typing import Literal, TypeVar, get_args
+from typing import Any, Literal, TypeVar, get_args
 
-from airground_drake.errors import PluginError, UnknownNameError
+from airground_drake.errors import PluginError, UnknownNameError, described
 
 T = TypeVar("T")
 
@@ -64,6 +64,10 @@ class Registry:
         """Whether a name is registered, or has the form `module:Class`; nothing is imported."""
         return name in self or is_plugin(name)
 
+    def is_foreign(self, name: str) -> bool:
+        """Whether a name stands for code of others that is to be imported: neither the package's own nor added here."""
+        return name not in self._own and name not in self._added
+
     def load(self, name: str, of: type[T]) -> type[T]:
         """The class that a name stands for.
 
@@ -83,11 +87,28 @@ class Registry:
             module, _, attribute = place.partition(":")
             try:
                 found = getattr(importlib.import_module(module), attribute)
-            except Exception as error:  # a module of others may raise anything when it is imported
-                raise PluginError(f"{self.kind} {name!r} cannot be imported: {error}") from error
+            except KeyboardInterrupt:
+                raise
+            except BaseException as error:  # a module of others may raise anything when it is imported
+                raise PluginError(f"{self.kind} {name!r} cannot be imported: {described(error)}") from None
         if not (isinstance(found, type) and issubclass(found, of)):
             raise PluginError(f"{self.kind} {name!r} is not a subclass of {of.__module__}.{of.__qualname__}")
         return found
+
+    def make(self, name: str, of: type[T], **parameters: Any) -> T:
+        """An object of the class that a name stands for.
+
+        Raises:
+            UnknownNameError: as `load`.
+            PluginError: as `load`, and if the class does not take these parameters.
+        """
+        kind = self.load(name, of)
+        try:
+            return kind(**parameters)
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:
+            raise PluginError(f"{self.kind} {name!r} with {parameters}: {described(error)}") from None
 
     @contextmanager
     def adding(self, name: str, what: type) -> Iterator[None]:

@@ -9,9 +9,10 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from airground_drake.errors import PluginError
+from airground_drake.errors import PolicyError, described
 from airground_drake.intervention.guard import OutOfTime, time_limit
-from airground_drake.intervention.policy import Observation, Policy, Proposal, Teammate
+from airground_drake.intervention.policy import Observation, Policy, Proposal, Teammate, motions_of
+from airground_drake.intervention.process import GuestPolicy
 from airground_drake.nsbc.motion import Motion
 from airground_drake.registry import POLICIES
 
@@ -26,18 +27,21 @@ Candidate = tuple[int, str, dict[str, Motion]]
 """What a policy proposes: its turn, the policy's name, motions by UGV."""
 
 
-def make_policy(name: str, parameters: Mapping[str, float]) -> Policy:
-    """Build a policy.
+def make_policy(name: str, parameters: Mapping[str, float], budget: float = 2.0) -> Policy:
+    """Build a policy: in this process, if it comes with the package or was added here, else in one of its own.
+
+    Args:
+        name: of a policy.
+        parameters: of the policy.
+        budget: wall-clock time for a proposal of a policy in a process of its own, s.
 
     Raises:
         UnknownNameError: if the name is neither registered nor of the form `module:Class`.
         PluginError: if it cannot be imported, is no Policy, or does not take these parameters.
     """
-    kind = POLICIES.load(name, of=Policy)
-    try:
-        return kind(**parameters)
-    except (TypeError, ValueError) as error:
-        raise PluginError(f"policy {name!r} with {dict(parameters)}: {error}") from error
+    if POLICIES.accepts(name) and POLICIES.is_foreign(name):
+        return GuestPolicy(name, parameters, budget)
+    return POLICIES.make(name, of=Policy, **parameters)
 
 
 @dataclass(frozen=True)
@@ -119,6 +123,12 @@ class BehaviourDatabase:
         self.ranking = ranking
         self.budget = budget
 
+    def close(self) -> None:
+        """End the processes of policies that have one."""
+        for _, policy in self.policies:
+            if isinstance(policy, GuestPolicy):
+                policy.close()
+
     def after_refusal(self, desk: Desk, t: float, *, learnt: bool = False) -> Desk:
         """Memory of a UGV that has refused its proposal.
 
@@ -180,10 +190,12 @@ class BehaviourDatabase:
         name, policy = self.policies[index]
         try:
             with nullcontext() if policy.counted else time_limit(self.budget):
-                return _plain(policy.propose(seen), seen)
-        except (Exception, OutOfTime) as error:  # whatever a user's policy does, it must not stop the UAV
-            faults.append(Fault(seen.t, seen.robot, name, f"{type(error).__name__}: {error}"))
-            return {}
+                return motions_of(policy.propose(seen if isinstance(policy, GuestPolicy) else seen.fresh()), seen)
+        except PolicyError as fault:
+            faults.append(Fault(seen.t, seen.robot, name, str(fault)))
+        except (Exception, OutOfTime, SystemExit) as error:  # whatever a policy does, it must not stop the UAV
+            faults.append(Fault(seen.t, seen.robot, name, described(error)))
+        return {}
 
 
 def predicted_cost(motions: Mapping[str, Motion], seen: Observation) -> float:
@@ -211,28 +223,3 @@ def predicted_cost(motions: Mapping[str, Motion], seen: Observation) -> float:
 
 def _mate(seen: Observation, name: str) -> Teammate:
     return next(mate for mate in seen.team if mate.name == name)
-
-
-def _plain(proposed: object, seen: Observation) -> dict[str, Motion]:
-    """A policy's answer as plain data, so that none of its code is called later; empty: nothing.
-
-    Raises:
-        TypeError: if it is neither a motion nor motions by name.
-        ValueError: if it names what is no UGV of the team, or asks one again that has a proposal of this instant.
-    """
-    if proposed is None:
-        return {}
-    if not isinstance(proposed, Mapping):
-        proposed = {seen.robot: proposed}
-    known = {seen.robot, *(mate.name for mate in seen.team)}
-    taken = {mate.name for mate in seen.team if mate.proposal is not None and mate.proposal.issued == seen.t}
-    motions = {}
-    for name, motion in list(proposed.items()):
-        if not isinstance(motion, Motion):
-            raise TypeError(f"a policy proposes a Motion, Motions by UGV or None, not {type(motion).__name__}")
-        if not isinstance(name, str) or name not in known:
-            raise ValueError(f"a policy proposes to UGVs of the team, not to {name!r}")
-        if name in taken:
-            raise ValueError(f"{name} has a proposal of this instant already")
-        motions[str(name)] = Motion(motion.times, motion.positions)
-    return motions

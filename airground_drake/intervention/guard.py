@@ -1,4 +1,4 @@
-"""A time limit for code of others."""
+"""A time limit for policies in the process of the simulation; `process.py` has those of others."""
 
 from __future__ import annotations
 

@@ -154,7 +154,7 @@ class Planner:
                 t=t,
                 start=t + self.period,
                 robot=robot,
-                position=positions[i].copy(),
+                position=positions[i],
                 target=self.targets[i],
                 preset=self.presets[i],
                 obstacles=obstacles,
@@ -215,7 +215,7 @@ class Planner:
         return tuple(
             Teammate(
                 name=name,
-                position=positions[i].copy(),
+                position=positions[i],
                 target=self.targets[i],
                 preset=self.presets[i],
                 max_speed=float(self.max_speed[i]),

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import abc
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 
-from airground_drake.arrays import Array
+from airground_drake.arrays import Array, read_only
 from airground_drake.nsbc.motion import Motion
 from airground_drake.nsbc.task import pseudoinverse
 
@@ -84,6 +84,10 @@ class Observation:
     team: tuple[Teammate, ...] = ()
     robot_distance: float = 0.0
 
+    def fresh(self) -> Self:
+        """A copy whose arrays are its own and read-only: whatever becomes of it, nothing else changes."""
+        return _fresh(self)
+
 
 @dataclass(frozen=True, eq=False)
 class Proposal:
@@ -121,11 +125,12 @@ class Policy(abc.ABC):
     """An intervention behaviour of the UAV. Subclasses take their parameters as keyword numbers.
 
     A policy may fail: an exception, or anything but motions of finite numbers or None, counts as no
-    intervention and is reported (see `database.py`). No policy's code runs in a UGV's control loop.
+    intervention and is reported (see `database.py`). No policy's code runs in a UGV's control loop, and one that does
+    not come with the package runs in a process of its own (see `process.py`).
 
     Attributes:
-        counted: whether a proposal's effort is bounded in counts. Then no clock stops it (`intervention.budget_s`), and
-            runs are the same on every machine.
+        counted: whether a proposal's effort is bounded in counts. Then it is not stopped after `intervention.budget_s`,
+            and runs are the same on every machine.
     """
 
     counted: ClassVar[bool] = False
@@ -138,3 +143,39 @@ class Policy(abc.ABC):
         team: those that are triggered get proposals of their own, others are asked to make way for this one. Only a
         UGV that has a proposal of this very instant (`issued == seen.t`) cannot be asked again.
         """
+
+
+def motions_of(proposed: object, seen: Observation) -> dict[str, Motion]:
+    """A policy's answer as plain data, so that none of its code is called later; empty: nothing.
+
+    Raises:
+        TypeError: if it is neither a motion nor motions by name.
+        ValueError: if it names what is no UGV of the team, or asks one again that has a proposal of this instant.
+    """
+    if proposed is None:
+        return {}
+    if not isinstance(proposed, Mapping):
+        proposed = {seen.robot: proposed}
+    known = {seen.robot, *(mate.name for mate in seen.team)}
+    taken = {mate.name for mate in seen.team if mate.proposal is not None and mate.proposal.issued == seen.t}
+    motions = {}
+    for name, motion in list(proposed.items()):
+        if not isinstance(motion, Motion):
+            raise TypeError(f"a policy proposes a Motion, Motions by UGV or None, not {type(motion).__name__}")
+        if not isinstance(name, str) or name not in known:
+            raise ValueError(f"a policy proposes to UGVs of the team, not to {name!r}")
+        if name in taken:
+            raise ValueError(f"{name} has a proposal of this instant already")
+        motions[str(name)] = Motion(motion.times, motion.positions)
+    return motions
+
+
+def _fresh(value: Any) -> Any:
+    """A copy of a dataclass, and of what is in it, with arrays of its own that are read-only."""
+    if isinstance(value, np.ndarray):
+        return read_only(value)
+    if isinstance(value, tuple):
+        return tuple(map(_fresh, value))
+    if is_dataclass(value) and not isinstance(value, type):
+        return replace(value, **{field.name: _fresh(getattr(value, field.name)) for field in fields(value)})
+    return value

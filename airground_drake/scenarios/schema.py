@@ -120,7 +120,7 @@ class Intervention:
 
     `ranking` is 'listed' (in the order of the list) or 'predicted' (best predicted outcome on the UAV's map
     first). A policy that takes longer than `budget_s` for a proposal counts as proposing nothing; one that bounds its
-    effort in counts, such as `coordinate`, is not timed.
+    effort in counts, such as `coordinate`, is not timed (one of others is, after a minute).
     """
 
     period_s: float = 0.05

@@ -45,6 +45,10 @@ class InterventionPlanner(LeafSystem):
         memory: PlannerMemory = context.get_abstract_state(int(self._memory)).get_value()
         return memory
 
+    def close(self) -> None:
+        """End the processes of policies that have one; the next run starts them anew."""
+        self._planner.database.close()
+
     def _calc_proposals(self, context: Context, output: AbstractValue) -> None:
         output.set_value(self.memory(context).proposals)
 
