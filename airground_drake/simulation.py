@@ -2,14 +2,8 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import os
-import sys
 import time
-import warnings
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
 from functools import cache
 from typing import Any
 
@@ -23,7 +17,7 @@ from pydrake.systems.primitives import LogVectorOutput, VectorLogSink
 
 from airground_drake.arrays import Array
 from airground_drake.diagram import RECORDED, Model, build_model
-from airground_drake.errors import AirgroundError, SimulationError, UnknownNameError
+from airground_drake.errors import SimulationError, UnknownNameError, described
 from airground_drake.events import extract
 from airground_drake.gatekeeper.answer import Decision, Foreseen, Planned
 from airground_drake.gatekeeper.outcome import Outlook, outcomes
@@ -108,8 +102,10 @@ class Recorder:
             simulator.Initialize()
             simulator.AdvanceTo(self._scenario.duration_s if duration is None else duration)
         except (Exception, SystemExit) as error:  # Drake raises many kinds
-            what = f"{type(error).__name__}: {error}".splitlines()[0]
+            what = described(error)
             raise SimulationError(self._name, context.get_time(), what) from error
+        finally:
+            self._model.planner.close()
         wall = time.perf_counter() - started
         return self._trace(context, seed, wall)
 
@@ -236,34 +232,6 @@ def warm_up() -> None:
     law, horizon = UgvLaw(avoidance, 1.0, 1.0, False), Horizon(2, 1, 1.0, 1.0)
     RelaxedRoute().solve(predicted_problem(scene, law, Proposal("", 0.0, motion), horizon))
     outcomes(scene, law, Proposal("", 0.0, motion), one, 1.0, (), Outlook(longest=1.0))
-
-
-def simulate_all(scenario: Scenario, jobs: int | None = None) -> dict[str, Trace]:
-    """Simulate every run of a scenario, in its order, on several processes where the system can fork.
-
-    Args:
-        scenario: validated scenario.
-        jobs: number of processes; default: one for each processor that this process may use.
-
-    Raises:
-        AirgroundError: if a process dies.
-    """
-    names = list(scenario.runs)
-    jobs = min(len(names), _processors() if jobs is None else jobs)
-    if jobs < 2 or "fork" not in multiprocessing.get_all_start_methods() or sys.platform == "darwin":
-        return {name: simulate(scenario, name) for name in names}
-    warm_up()
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)  # idle threads of numerical libraries survive a fork
-        with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("fork")) as pool:
-            try:
-                return dict(zip(names, pool.map(simulate, [scenario] * len(names), names), strict=True))
-            except BrokenProcessPool as error:
-                raise AirgroundError(f"a simulation of {scenario.name} died: {error}") from error
-
-
-def _processors() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def simulate(scenario: Scenario, run: str, seed: int | None = None) -> Trace:

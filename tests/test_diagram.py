@@ -16,7 +16,7 @@ from airground_drake.scenarios.load import load
 
 PACKAGE = Path(airground_drake.__file__).parent
 LAYERS = (
-    ("arrays", "errors", "files", "check"),
+    ("arrays", "confinement", "errors", "files", "check"),
     ("registry",),
     ("nsbc",),
     ("decision", "intervention"),
@@ -26,6 +26,7 @@ LAYERS = (
     ("components", "trace"),
     ("diagram", "events"),
     ("simulation", "graphviz", "verify"),
+    ("runs",),
     ("report",),
 )
 """From left to right: a module imports from its own layer or from those before it."""

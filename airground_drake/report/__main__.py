@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import platform
 import shlex
 import shutil
@@ -18,14 +19,15 @@ from typing import Any
 
 from airground_drake import files, graphviz, trace
 from airground_drake.diagram import build_diagram
-from airground_drake.errors import AirgroundError, PluginError, ScenarioError, UnknownNameError
+from airground_drake.errors import AirgroundError, PluginError, ReportError, ScenarioError, UnknownNameError
 from airground_drake.report import audit, document, html, junit
 from airground_drake.report.figures import zeno_refine
 from airground_drake.report.figures.draw import draw
 from airground_drake.report.figures.panels import Figure
+from airground_drake.runs import simulate_all
+from airground_drake.scenarios import plugins
 from airground_drake.scenarios.load import load, shipped
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.simulation import simulate_all
 from airground_drake.verify import Verdict, cache_folder, verify, verify_model
 from airground_drake.verify.mutants import refute_mutants
 from airground_drake.verify.registry import model_claims
@@ -62,11 +64,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         overrides = [*options.set, *([] if options.seed is None else [f"seed={options.seed}"])]
         audited = options.scenario == AUDIT
         scenario, digest = load(AUDITED if audited else options.scenario, overrides)
+        if not options.allow_plugins:
+            plugins.refuse(scenario, str(options.scenario))
         if audited:
             scenario.name, scenario.title, scenario.description = AUDIT, AUDIT_TITLE, AUDIT_DESCRIPTION
         kept = None if options.no_cache else cache_folder()
         folder = options.output or Path("reports") / scenario.name
         report = write_report(scenario, digest, folder, options.format, shlex.join(command), kept, audited)
+        _read_back(folder, options.format, report)
     except (ScenarioError, PluginError, UnknownNameError) as error:
         print(f"error: {error}", file=sys.stderr)
         return EXIT_USAGE
@@ -120,7 +125,7 @@ def write_report(
         _progress("auditing the paper")
     findings = audit.whole(scenario, verdicts) if audited else ()
     mutants = refute_mutants(scenario, kept=kept) if audited else ()
-    dot = graphviz.dot(build_diagram(scenario))
+    dot = graphviz.dot(build_diagram(plugins.without(scenario)))
     drawn = graphviz.svg(dot)
     provenance = _provenance(scenario, started, command)
 
@@ -164,6 +169,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--no-cache", action="store_true", help="redo every proof instead of reusing one whose inputs are unchanged"
     )
+    parser.add_argument(
+        plugins.OPTION, action="store_true", help="import and run what the scenario names as module:Class"
+    )
     parser.add_argument("--open", action="store_true", help="open the report in a browser")
     parser.add_argument("--list", action="store_true", help="list the shipped scenarios")
     return parser
@@ -175,6 +183,24 @@ def _formats(text: str) -> tuple[str, ...]:
     if unknown:
         raise argparse.ArgumentTypeError(f"{', '.join(unknown)!r} is not allowed; formats are {', '.join(FORMATS)}")
     return chosen
+
+
+def _read_back(folder: Path, formats: Sequence[str], report: dict[str, Any]) -> None:
+    """See that the report is there, and says what was written.
+
+    Raises:
+        ReportError: if not.
+        OSError: if a file cannot be read.
+    """
+    written = {"html": "report.html", "json": "report.json", "junit": "junit.xml"}
+    for path in (folder / written[each] for each in formats):
+        text = path.read_text(encoding="utf-8")
+        try:
+            same = bool(text) and (path.suffix != ".json" or json.loads(text) == report)
+        except ValueError:
+            same = False
+        if not same:
+            raise ReportError(f"{path}: read back, it is not what was written")
 
 
 def _drop_stale(folder: Path, current: set[str]) -> None:

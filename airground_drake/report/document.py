@@ -13,6 +13,7 @@ import numpy as np
 from airground_drake.registry import NOT_EXERCISED, STATUSES, method_of, outcome
 from airground_drake.report import metrics, reproduction
 from airground_drake.report.audit import of_runs
+from airground_drake.scenarios.plugins import OPTION
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.trace import Trace
 from airground_drake.verify.claim import Verdict
@@ -55,7 +56,8 @@ def build(
     claims = [
         {
             **verdict.to_json(),
-            "rerun": f"python -m airground_drake.verify trace/{verdict.run or some_run} {verdict.claim.id}",
+            "rerun": f"python -m airground_drake.verify trace/{verdict.run or some_run} {verdict.claim.id}"
+            + f" {OPTION}" * (verdict.claim.id in scenario.claims),
         }
         for verdict in verdicts
     ]

@@ -11,6 +11,7 @@ from pathlib import Path
 from airground_drake import trace
 from airground_drake.errors import AirgroundError, UnknownNameError
 from airground_drake.registry import NOT_EXERCISED, outcome
+from airground_drake.scenarios import plugins
 from airground_drake.scenarios.load import from_data, load
 from airground_drake.verify import Verdict, verify, verify_model
 from airground_drake.verify.registry import model_claims, run_claims
@@ -31,9 +32,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("target", help="folder of a saved run (DIR/trace/RUN), or a scenario, shipped or a YAML file")
     parser.add_argument("claims", nargs="*", metavar="CLAIM", help="identifiers (default: all that apply)")
     parser.add_argument("--json", action="store_true", help="print the whole verdicts as JSON")
+    parser.add_argument(
+        plugins.OPTION, action="store_true", help="import and run what the scenario names as module:Class"
+    )
     options = parser.parse_args(arguments)
     try:
-        verdicts = _judge(options.target, options.claims)
+        verdicts = _judge(options.target, options.claims, allow_plugins=options.allow_plugins)
     except (AirgroundError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return EXIT_USAGE
@@ -60,17 +64,23 @@ def _line(verdict: Verdict) -> str:
     return f"{name}: {found}{margin}{of}{tested}{expected}"
 
 
-def _judge(target: str, wanted: Sequence[str]) -> list[Verdict]:
+def _judge(target: str, wanted: Sequence[str], *, allow_plugins: bool) -> list[Verdict]:
     """Verdicts on the claims wanted (none: all), as far as they say anything about the target.
+
+    Of what a saved run names, only claims of others that are wanted are imported, and nothing unless that is allowed.
 
     Raises:
         UnknownNameError: if there is no such claim.
+        ScenarioError: if code of others is named that is not allowed.
     """
     folder = Path(target)
     run = trace.load(folder) if (folder / "meta.json").is_file() else None
     scenario = load(target)[0] if run is None else from_data(run.scenario, target)
-    about_run = [claim.id for claim in run_claims(added=scenario.claims)]
-    about_model = [claim.id for claim in model_claims(added=scenario.claims)]
+    added = {name: place for name, place in scenario.claims.items() if not wanted or name in wanted}
+    if not allow_plugins:
+        plugins.refuse(scenario, target, None if run is None else [f"claims.{name}" for name in added])
+    about_run = [claim.id for claim in run_claims(added=added)]
+    about_model = [claim.id for claim in model_claims(added=added)]
     for name in wanted:
         if name not in (known := [*about_run, *about_model]):
             raise UnknownNameError("claim", name, known)

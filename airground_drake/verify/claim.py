@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from airground_drake import files
-from airground_drake.errors import TraceError
+from airground_drake.errors import TraceError, described
 from airground_drake.registry import PASSING, Status, meets
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.trace import Trace
@@ -86,8 +86,8 @@ class ModelClaim(Claim):
         """`inputs` under guard: what keeps them from being found is told to `judge`."""
         try:
             return self.inputs(scenario)
-        except Exception as error:
-            return {"error": f"{type(error).__name__}: {error}"}
+        except (Exception, SystemExit) as error:
+            return {"error": described(error)}
 
     def judge(self, inputs: dict[str, Any]) -> Finding:
         """`check` under guard."""
@@ -97,8 +97,8 @@ class ModelClaim(Claim):
             finding = self.check(inputs)
             require_count(self, finding)
             json.dumps(asdict(finding), allow_nan=False)
-        except Exception as error:  # whatever went wrong, the claim was not decided
-            return Finding("error", evidence={"error": f"{type(error).__name__}: {error}"})
+        except (Exception, SystemExit) as error:  # whatever went wrong, the claim was not decided
+            return Finding("error", evidence={"error": described(error)})
         return finding
 
 
@@ -127,8 +127,8 @@ class TraceClaim(Claim):
                 require_whole_run(trace)
             require_count(self, finding)
             json.dumps(asdict(finding), allow_nan=False)  # a margin that is not a number must not pass
-        except Exception as error:  # whatever went wrong, the claim was not decided
-            return Finding("error", evidence={"error": f"{type(error).__name__}: {error}"})
+        except (Exception, SystemExit) as error:  # whatever went wrong, the claim was not decided
+            return Finding("error", evidence={"error": described(error)})
         return finding
 
 

@@ -52,7 +52,8 @@ def mutants() -> list[Mutant]:
 
 def _made(registry: Registry, kind: type[C], ids: Collection[str] | None, added: Mapping[str, str]) -> list[C]:
     places = {name: name for name in registry}
-    places |= {name: place for name, place in added.items() if issubclass(registry.load(place, of=Claim), kind)}
+    asked = {name: place for name, place in added.items() if ids is None or name in ids}
+    places |= {name: place for name, place in asked.items() if issubclass(registry.load(place, of=Claim), kind)}
     for name in ids or ():
         if name not in places:
             raise UnknownNameError("claim", name, places)
@@ -61,7 +62,7 @@ def _made(registry: Registry, kind: type[C], ids: Collection[str] | None, added:
 
 @cache
 def _instance(registry: Registry, kind: type[C], name: str, place: str) -> C:
-    claim = registry.load(place, of=kind)()
+    claim = registry.make(place, of=kind)
     if claim.id != name:
         raise PluginError(f"claim {name!r}: {place} has the identifier {claim.id!r}")
     return claim

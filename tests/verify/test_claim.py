@@ -88,6 +88,15 @@ def test_checkers_that_fail_are_errors() -> None:
     assert TraceClaim.applies(claim, run_of("a"))
 
 
+def test_a_claim_that_ends_the_process_is_an_error_too() -> None:
+    class Exits(type(CLAIMS["SAFE-TRACE"])):  # type: ignore[misc]
+        def check(self, trace: Trace) -> Finding:
+            raise SystemExit(0)
+
+    finding = Exits().judge(run_of("d"))
+    assert (finding.status, finding.evidence) == ("error", {"error": "SystemExit: 0"})
+
+
 def test_half_a_run_can_refute_but_not_pass() -> None:
     cut = rows(lambda signals: signals[signals["t_s"] < 0.8])
     assert judge("SAFE-TRACE", cut(passing_by(-1e-3))).status == "refuted"

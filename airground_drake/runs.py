@@ -1,0 +1,134 @@
+"""The runs of a scenario, each simulated in a child process; what comes back is a saved trace, read with its checks.
+
+So nothing that a scenario's routes and tasks do to the process that they run in reaches the one in which verdicts are
+made; and a run that ends its process is a failure, not the end of whoever asked for it.
+"""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import os
+import signal
+import sys
+import tempfile
+import warnings
+from collections import deque
+from multiprocessing.connection import wait
+from multiprocessing.process import BaseProcess
+from pathlib import Path
+
+from airground_drake import confinement, files, trace
+from airground_drake.errors import AirgroundError, PluginError, SimulationError, described, one_line
+from airground_drake.intervention.process import end_all
+from airground_drake.scenarios.load import validated
+from airground_drake.scenarios.schema import Scenario
+from airground_drake.simulation import simulate, warm_up
+from airground_drake.trace import Trace
+
+FAILURE = "failure.json"
+
+
+def simulate_all(scenario: Scenario, jobs: int | None = None) -> dict[str, Trace]:
+    """Simulate every run of a scenario, in its order, each in a process of its own.
+
+    Args:
+        scenario: from a file or made in Python.
+        jobs: number of processes at a time; default: one for each processor that this process may use.
+
+    Raises:
+        ScenarioError: if the scenario is not valid.
+        PluginError: if it names a policy, route or task that cannot be made.
+        SimulationError: if a simulation stops before its end.
+        AirgroundError: if its process dies.
+    """
+    scenario = validated(scenario)
+    most = _processors() if jobs is None else max(1, jobs)
+    fork = "fork" in multiprocessing.get_all_start_methods() and sys.platform != "darwin"
+    context = multiprocessing.get_context("fork") if fork else multiprocessing.get_context("spawn")
+    if fork:
+        warm_up()
+    waiting, running = deque(scenario.runs), dict[str, BaseProcess]()
+    traces: dict[str, Trace] = {}
+    with tempfile.TemporaryDirectory(prefix="airground_drake.") as made, warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # idle threads of numerical libraries survive a fork
+        try:
+            while waiting or running:
+                while waiting and len(running) < most:
+                    name = waiting.popleft()
+                    running[name] = context.Process(target=_simulate, args=(scenario, name, Path(made, name)))
+                    running[name].start()
+                wait([process.sentinel for process in running.values()])
+                for name, process in list(running.items()):
+                    if not process.is_alive():
+                        traces[name] = _result(Path(made, name), running.pop(name), f"run {name} of {scenario.name}")
+        finally:
+            _stop(list(running.values()))
+    return {name: traces[name] for name in scenario.runs}
+
+
+def _simulate(scenario: Scenario, run: str, folder: Path) -> None:
+    """Simulate a run in this process and save it, or what has kept it from being simulated."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent's to heed
+    signal.signal(signal.SIGTERM, _end)
+    confinement.die_with_parent(signal.SIGTERM)
+    folder.mkdir()
+    try:
+        trace.save(simulate(scenario, run), folder)
+    except BaseException as error:
+        stopped = [error.run, error.t, error.what] if isinstance(error, SimulationError) else None
+        plain = str(error) if isinstance(error, AirgroundError) else described(error)
+        refused = isinstance(error, PluginError)
+        files.write_json(folder / FAILURE, {"what": plain, "refused": refused, "stopped": stopped})
+
+
+def _end(*_: object) -> None:
+    """End this process and those of its policies at once, whatever code is just running."""
+    end_all()
+    os._exit(128 + signal.SIGTERM)
+
+
+def _result(folder: Path, process: BaseProcess, what: str) -> Trace:
+    """The trace that a process has left behind.
+
+    Raises:
+        PluginError, SimulationError: as the process has noted.
+        AirgroundError: if it has noted something else, or died.
+        TraceError: if the trace cannot be used.
+    """
+    process.join()
+    code = process.exitcode or 0
+    process.close()
+    if (folder / FAILURE).is_file():
+        raise _noted((folder / FAILURE).read_bytes(), what)
+    if code or not (folder / "meta.json").is_file():
+        how = f"signal {-code}" if code < 0 else f"exit code {code}"
+        raise AirgroundError(one_line(f"{what}: the process that simulated it died ({how})"))
+    return trace.load(folder)
+
+
+def _noted(note: bytes, what: str) -> AirgroundError:
+    """The error that a process has noted."""
+    try:
+        failure = json.loads(note)
+        if failure["stopped"] is None:
+            return (PluginError if failure["refused"] else AirgroundError)(one_line(str(failure["what"])))
+        run, t, why = failure["stopped"]
+        return SimulationError(str(run), float(t), str(why))
+    except (ValueError, KeyError, TypeError, RecursionError):
+        return AirgroundError(one_line(f"{what}: the process that simulated it left no readable note"))
+
+
+def _stop(processes: list[BaseProcess]) -> None:
+    """End processes, those that do not heed the request by force."""
+    for process in processes:
+        process.terminate()
+    for process in processes:
+        process.join(timeout=2.0)
+        process.kill()
+        process.join()
+        process.close()
+
+
+def _processors() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

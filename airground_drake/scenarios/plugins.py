@@ -1,0 +1,52 @@
+"""What of a scenario is code of others: names of the form `module:Class`, which are imported when they are used."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import replace
+
+from airground_drake.errors import ScenarioError
+from airground_drake.registry import POLICIES, ROUTES, UAV_TASKS, Registry, is_plugin
+from airground_drake.scenarios.schema import Scenario
+
+OPTION = "--allow-plugins"
+WANTED = f"code of others is imported and run only with {OPTION}"
+
+
+def plugins(scenario: Scenario) -> dict[str, str]:
+    """Names of the form `module:Class` in a scenario, by key; entry points of installed packages are none."""
+    named: list[tuple[str, str, Registry]] = [
+        ("uav.task", scenario.uav.task, UAV_TASKS),
+        ("gatekeeper.route", scenario.gatekeeper.route, ROUTES),
+    ]
+    for index, policy in enumerate(scenario.intervention.policies):
+        named.append((f"intervention.policies.{index}.name", policy.name, POLICIES))
+    found = {key: name for key, name, registry in named if name not in registry and is_plugin(name)}
+    return found | {f"claims.{claim}": place for claim, place in scenario.claims.items()}
+
+
+def refuse(scenario: Scenario, source: str, keys: Collection[str] | None = None) -> None:
+    """Refuse code of others.
+
+    Args:
+        scenario: validated.
+        source: where it comes from, for the message.
+        keys: those that matter; default: all.
+
+    Raises:
+        ScenarioError: if the scenario names any; says how to allow it.
+    """
+    for key, name in plugins(scenario).items():
+        if keys is None or key in keys:
+            raise ScenarioError(source, key, name, WANTED)
+
+
+def without(scenario: Scenario) -> Scenario:
+    """The scenario with the package's own task and route and no policies: its diagram has the same systems."""
+    return replace(
+        scenario,
+        uav=replace(scenario.uav, task="formation"),
+        intervention=replace(scenario.intervention, policies=[]),
+        gatekeeper=replace(scenario.gatekeeper, route="relaxed"),
+        choices=[],
+    )

@@ -1,0 +1,81 @@
+"""Runs in child processes: what comes back is a trace, an error in words, or that the process died."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from airground_drake import runs
+from airground_drake.errors import AirgroundError, PluginError, ScenarioError, SimulationError
+from airground_drake.registry import UAV_TASKS
+from airground_drake.runs import simulate_all
+from airground_drake.scenarios.schema import Scenario
+
+
+def one_run(scenario: Scenario) -> Scenario:
+    scenario.duration_s, scenario.runs = 0.5, {"a": scenario.runs["a"]}
+    scenario.reproduction, scenario.choices = [], []
+    scenario.uav.task = "of_the_test"
+    return scenario
+
+
+def task(does: Callable[[], Any]) -> type:
+    """A task of the UAV that does something else."""
+
+    class Task:
+        def __init__(self, *_: Any) -> None:
+            does()
+
+        value = jacobian = desired = desired_rate = gain = task_velocity = velocity = None
+
+    return Task
+
+
+def parent_of() -> None:
+    raise RuntimeError(f"simulated in {os.getpid()}")
+
+
+@pytest.mark.parametrize(
+    ("does", "error", "said"),
+    [
+        (lambda: os._exit(0), AirgroundError, r"run a of case_a: the process that simulated it died \(exit code 0\)"),
+        (lambda: os._exit(3), AirgroundError, r"died \(exit code 3\)"),
+        (lambda: os.kill(os.getpid(), signal.SIGKILL), AirgroundError, r"died \(signal 9\)"),
+        (parent_of, SimulationError, "run a stopped at t = 0 s: RuntimeError: simulated in"),
+    ],
+)
+def test_one_run_alone_is_simulated_in_a_child_too(
+    case_a: Scenario, monkeypatch: pytest.MonkeyPatch, does: Callable[[], Any], error: type[Exception], said: str
+) -> None:
+    monkeypatch.setattr(UAV_TASKS, "load", lambda name, of: task(does))
+    with UAV_TASKS.adding("of_the_test", task(does)), pytest.raises(error, match=said) as stopped:
+        simulate_all(one_run(case_a), jobs=1)
+    assert type(stopped.value) is error
+    assert f"simulated in {os.getpid()}" not in str(stopped.value)
+
+
+def test_what_is_not_valid_is_said_before_anything_runs(case_a: Scenario, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(runs, "warm_up", lambda: pytest.fail("simulated"))
+    case_a.duration_s = -1.0
+    with pytest.raises(ScenarioError, match="duration_s"):
+        simulate_all(case_a)
+
+
+@pytest.mark.parametrize(
+    "note",
+    [b"", b"{", b"[]", b"{}", b'{"stopped": 3}', b'{"stopped": [1]}', b'{"stopped": ["a", "b", "c"]}', b"[" * 10**5],
+)
+def test_a_note_that_is_none_is_an_error_in_words(note: bytes) -> None:
+    assert "left no readable note" in str(runs._noted(note, "run a of case_a"))
+
+
+def test_what_a_process_notes_is_the_error_that_it_met(tmp_path: Path) -> None:
+    refused = runs._noted(b'{"stopped": null, "refused": true, "what": "no\\nsuch thing"}', "")
+    assert (type(refused), str(refused)) == (PluginError, r"no\nsuch thing")
+    stopped = runs._noted(b'{"stopped": ["d", 1.5, "why"], "refused": false, "what": ""}', "")
+    assert str(stopped) == "run d stopped at t = 1.5 s: why"
