@@ -12,7 +12,7 @@ import pytest
 from airground_drake.report.__main__ import main
 
 ROOT = Path(__file__).parent.parent
-PAGES = sorted([ROOT / "README.md", ROOT / "CHANGELOG.md", *(ROOT / "docs").glob("*.md")])
+PAGES = sorted([ROOT / "README.md", ROOT / "CHANGELOG.md", ROOT / "SECURITY.md", *(ROOT / "docs").glob("*.md")])
 EXTENDING = ROOT / "docs" / "extending.md"
 
 
@@ -54,7 +54,9 @@ def test_everything_that_can_be_added_works_from_a_folder_of_its_own(
         path.parent.mkdir(exist_ok=True)
         path.write_text(block, encoding="utf-8")
     monkeypatch.syspath_prepend(str(tmp_path))
-    assert main([str(tmp_path / "mine.yaml"), "-o", str(tmp_path / "report"), "--format", "json"]) == 0
+    assert (
+        main([str(tmp_path / "mine.yaml"), "-o", str(tmp_path / "report"), "--format", "json", "--allow-plugins"]) == 0
+    )
     document = json.loads((tmp_path / "report" / "report.json").read_text())
     found = {claim["id"]: claim["status"] for claim in document["claims"]}
     assert (found["CORRIDOR"], found["STABLE"], found["SAFE-TRACE"]) == ("holds", "proved", "holds")
