@@ -80,11 +80,11 @@ def far(centre: Array, columns: slice) -> Array:
     return moved
 
 
-def layer(**changed: float) -> Patch:
+def layer(**changed: Any) -> Patch:
     right = components.make_avoidance
 
     def wrong(*args: Any) -> Avoidance:
-        return replace(right(*args), **changed)  # type: ignore[arg-type]
+        return replace(right(*args), **changed)
 
     return lambda patch: patch.setattr(components, "make_avoidance", wrong)
 
