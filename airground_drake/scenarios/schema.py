@@ -229,7 +229,7 @@ class Scenario:
     stall_tolerance_m: float = 0.1
     ugvs: dict[str, Ugv] = field(default_factory=dict, metadata=REQUIRED)
     uav: Uav = field(default_factory=Uav, metadata=REQUIRED)
-    obstacles: dict[str, Obstacle] = field(default_factory=dict, metadata=REQUIRED)
+    obstacles: dict[str, Obstacle] = field(default_factory=dict)
     safe_distance: SafeDistance = field(default_factory=SafeDistance)
     control: Control = field(default_factory=Control)
     decision: Decision = field(default_factory=Decision)
