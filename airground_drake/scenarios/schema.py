@@ -151,6 +151,7 @@ class Gatekeeper:
     stages: int = 60
     error_weight_1_m2_s: float = 1.0
     slack_weight_1_m2_s: float = field(default=1000.0, metadata=FROM_ZERO)
+    terminal_weight_s: float = field(default=0.0, metadata=FROM_ZERO)
     switching_margin: float = field(default=0.05, metadata=FROM_ZERO)
     min_dwell_s: float = field(default=0.2, metadata=FROM_ZERO)
     budget: str = "counted"

@@ -20,7 +20,8 @@ def test_costs_follow_25(seed: int, omega: np.ndarray) -> None:
     )
     distance = np.linalg.norm(positions[:, None] - problem.centres, axis=2) - problem.distances
     slack = np.maximum(0.0, -distance.min(axis=1))
-    cost = problem.dt * (((problem.reference - positions) ** 2).sum() + 200.0 * (slack**2).sum())
+    error = ((problem.reference - positions) ** 2).sum(axis=1)
+    cost = problem.dt * (error.sum() + 200.0 * (slack**2).sum()) + problem.terminal_weight * error[-1]
     ours = problem.evaluate(omega)
     assert ours.objective == pytest.approx(cost)
     assert ours.clearance == pytest.approx(distance.min())

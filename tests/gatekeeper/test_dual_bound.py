@@ -51,7 +51,7 @@ def test_the_dual_bound_holds_for_any_multipliers(seed: int, at: np.ndarray, ome
 
 def test_a_wrong_slope_is_refuted() -> None:
     rng = np.random.default_rng(0)
-    for seed in range(5):
+    for seed in range(0, 10, 2):
         problem = random_problem(seed)
         at = used("relaxed").solve(problem).relaxed
         assert at is not None

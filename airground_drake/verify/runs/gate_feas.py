@@ -133,6 +133,7 @@ def compare_situation(trace: Trace, row: Row) -> Iterator[Off]:
     yield Off(row, "length of a stage, s", row.dt - after[0], TIME_TOLERANCE_S)
     yield Off(row, "weight of task errors", row.error_weight - gate["error_weight_1_m2_s"], 0.0)
     yield Off(row, "weight of slack", row.slack_weight - gate["slack_weight_1_m2_s"], 0.0)
+    yield Off(row, "weight of the terminal cost", row.terminal_weight - gate["terminal_weight_s"], 0.0)
     own = interpolate(trace.t, trace.position(robot), t)
     yield Off(row, "initial position, m", row["initial_m"] - own, POSITION_TOLERANCE_M, position_m=own.tolist())
     reference = travelled(np.asarray(preset["waypoints_m"], dtype=np.float64), preset["speed_m_s"], t + after)
