@@ -40,8 +40,9 @@ class GateFeas(GateClaim):
     )
     formula = (
         "rho(0) = p(t); omega in {0, 1}; rho_k = rho_(k-1) + dt (omega_k a_k + (1 - omega_k) b_k); u_k = max(0, max_j "
-        "d_j - ||rho_k - o_jk||); objective = dt sum_k a ||rho_rd - rho_k||^2 + b u_k^2; reference, centres and "
-        "distances as the scenario and the signals at t have them; answer = rules(costs, standing answer)"
+        "d_j - ||rho_k - o_jk||); objective = dt sum_k a ||rho_rd - rho_k||^2 + b u_k^2, and the terminal "
+        "cost w a ||rho_rd - rho_N||^2 (w = 0 unless the scenario says so); reference, centres, distances and weights "
+        "as the scenario and the signals at t have them; answer = rules(costs, standing answer)"
     )
     method = (
         "All recomputed in numpy from the scenario, the signals and the recorded mode velocities. A sensed obstacle or "

@@ -118,7 +118,7 @@ def rows_of(trace: Trace) -> list[Row]:
         scalars = [float(problem[name]) for name in PROBLEM_SCALARS]
         flat = {name: np.asarray(problem[name], dtype=np.float64).ravel() for name in PROBLEM_ARRAYS}
         columns = {str(name): value for name, value in given.items()}
-        row = Row(columns, *scalars, data=_shaped(flat, int(gate["stages"])))
+        row = Row(columns, scalars[0], scalars[1], scalars[2], scalars[3], _shaped(flat, int(gate["stages"])))
         numbers = [np.array(scalars), np.array([v for v in given.values() if isinstance(v, float)]), *flat.values()]
         if not all(np.isfinite(values).all() for values in numbers):
             raise TraceError(f"{row.label}: it or its problem has numbers that are not finite")
