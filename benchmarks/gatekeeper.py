@@ -97,7 +97,7 @@ def outcomes_of(situations: list[tuple[Scene, Proposal]], discs: int, safe: floa
     for i, (scene, proposal) in enumerate(situations):
         asked = motions[:i] + motions[i + 1 :]
         others = [
-            Other(scene.centres[discs + k], scene.velocities[discs + k], motion, safe, 0.5)
+            Other(scene.centres[discs + k], scene.velocities[discs + k], motion, False, safe, 0.5)
             for k, motion in enumerate(asked)
         ]
         outcomes(scene, LAW, proposal, scene.centres[:discs], safe, others, Outlook(longest=30.0))
