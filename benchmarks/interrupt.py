@@ -52,6 +52,12 @@ def of_session(leader: int) -> list[int]:
     return found
 
 
+def listens(pid: int) -> bool:
+    """Whether a process handles SIGTERM, as a report does from a tenth of a second after its start."""
+    caught = Path(f"/proc/{pid}/status").read_text(encoding="utf-8").partition("SigCgt:")[2].split()[0]
+    return bool(int(caught, 16) >> (signal.SIGTERM - 1) & 1)
+
+
 def wait_until(true: Callable[[], bool], limit_s: float) -> bool:
     """Whether something becomes true within a time."""
     end = time.monotonic() + limit_s
@@ -67,13 +73,12 @@ def trial(folder: Path, number: signal.Signals, delay_s: float, *, writing: bool
     page = folder / "report.json"
     before = page.exists() and page.stat().st_mtime_ns
     process = report(folder)
+    wait_until(lambda: process.poll() is not None or listens(process.pid), 600.0)
     if writing:  # an earlier report's page goes first
         wait_until(lambda: process.poll() is not None or not page.exists(), 600.0)
     wait_until(lambda: process.poll() is not None, delay_s)
-    if number == signal.SIGINT:
-        os.killpg(process.pid, number)
-    else:
-        process.send_signal(number)
+    if process.poll() is None:
+        (os.killpg if number == signal.SIGINT else os.kill)(process.pid, number)
     said = process.communicate(timeout=60.0)[1]
     wrong = []
     if process.returncode not in (CODES[number], 0, 1):

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from airground_drake import interruption
+
+if __name__ == "__main__":
+    interruption.end_on_signals()  # before the imports, which take seconds
+
 import argparse
 import platform
 import shlex
@@ -16,7 +21,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from airground_drake import files, graphviz, interruption, trace
+from airground_drake import files, graphviz, trace
 from airground_drake.diagram import build_diagram
 from airground_drake.errors import (
     AirgroundError,
@@ -272,11 +277,5 @@ def _progress(text: str) -> None:
         print(f"\r\033[K{text}", end="", file=sys.stderr, flush=True)
 
 
-def entry() -> None:
-    """Console script."""
-    interruption.end_on_signals()
-    sys.exit(main())
-
-
 if __name__ == "__main__":
-    entry()
+    sys.exit(main())

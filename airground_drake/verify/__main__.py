@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from airground_drake import interruption
+
+if __name__ == "__main__":
+    interruption.end_on_signals()  # before the imports, which take seconds
+
 import argparse
 import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from airground_drake import interruption, trace
+from airground_drake import trace
 from airground_drake.errors import AirgroundError, UnknownNameError
 from airground_drake.registry import NOT_EXERCISED, outcome
 from airground_drake.scenarios.load import from_data, load
@@ -79,5 +84,4 @@ def _judge(target: str, wanted: Sequence[str]) -> list[Verdict]:
 
 
 if __name__ == "__main__":
-    interruption.end_on_signals()
     sys.exit(main())
