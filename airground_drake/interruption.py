@@ -29,6 +29,10 @@ _PR_SET_PDEATHSIG = 1
 def end_on_signals() -> None:
     """From now on SIGINT and SIGTERM end this process with exit code 130 and 143, and its descendants with it."""
     owner = os.getpid()
+    try:
+        stderr = os.dup(2)  # 2 itself may be pointed elsewhere while a C library is kept silent
+    except OSError:  # closed from the beginning
+        stderr = os.open(os.devnull, os.O_WRONLY)
 
     def end(number: int, frame: FrameType | None) -> NoReturn:
         for each in STOPPING:
@@ -37,7 +41,7 @@ def end_on_signals() -> None:
             end_descendants()
             files.discard_partial()
             with suppress(OSError):
-                os.write(2, _line(number))
+                os.write(stderr, _line(number, clear=os.isatty(stderr)))
         os._exit(128 + number)
 
     for each in STOPPING:
@@ -47,9 +51,10 @@ def end_on_signals() -> None:
     os.register_at_fork(before=forks.before, after_in_child=forks.in_child)
 
 
-def _line(number: int) -> bytes:
-    clear = "\r\033[K" if os.isatty(2) else ""
-    return f"{clear}error: interrupted ({signal.Signals(number).name})\n".encode()
+def _line(number: int, *, clear: bool) -> bytes:
+    """What is said of an interruption; over a line of progress, if there may be one."""
+    before = "\r\033[K" if clear else ""
+    return f"{before}error: interrupted ({signal.Signals(number).name})\n".encode()
 
 
 def end_descendants() -> None:

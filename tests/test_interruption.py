@@ -33,6 +33,7 @@ fork = multiprocessing.get_context("fork")
 done = fork.Event()
 fork.Process(target=parent, args=(done,)).start()
 done.wait()
+os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
 name = Path(sys.argv[3]) / "file"
 os.fsync = lambda _: (os.write(int(sys.argv[4]), b"!"), time.sleep(600))
 files.write_text(name, "never")
