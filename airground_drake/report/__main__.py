@@ -82,7 +82,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         output = options.output or Path("reports") / scenario.name
         limits = Limits(options.limit_steps, options.limit_memory * GIB)
         report = write_report(scenario, digest, output, options.format, shlex.join(command), kept, audited, limits)
-    except (ScenarioError, PluginError, UnknownNameError, LimitError, FolderError) as error:
+    except LimitError as error:
+        print(f"error: {error}; see --limit-steps and --limit-memory", file=sys.stderr)
+        return EXIT_USAGE
+    except (ScenarioError, PluginError, UnknownNameError, FolderError) as error:
         print(f"error: {error}", file=sys.stderr)
         return EXIT_USAGE
     except (AirgroundError, OSError) as error:
