@@ -31,7 +31,30 @@ class ScenarioError(AirgroundError):
         self.source, self.key, self.value, self.allowed = source, key, value, allowed
         where = f"{source}: {key}: " if key else f"{source}: "
         fault = str(value) if isinstance(value, Fault) else f"{_short(repr(value))} is not allowed"
-        super().__init__(_one_line(f"{where}{fault}; {allowed}"))
+        super().__init__(one_line(f"{where}{fault}; {allowed}"))
+
+
+class LimitError(AirgroundError):
+    """A scenario that asks for more work than is allowed.
+
+    Attributes:
+        scenario: its name.
+        asked: for what, in words.
+        allowed: in words.
+    """
+
+    def __init__(self, scenario: str, asked: str, allowed: str) -> None:
+        """Build the one-line message from its parts."""
+        super().__init__(scenario, asked, allowed)
+        self.scenario, self.asked, self.allowed = scenario, asked, allowed
+
+    def __str__(self) -> str:
+        """One line."""
+        return one_line(f"{self.scenario} asks for about {self.asked}; allowed: {self.allowed}")
+
+
+class FolderError(AirgroundError):
+    """A folder that is to take a report, and holds something else."""
 
 
 class UnknownNameError(AirgroundError):
@@ -47,7 +70,7 @@ class UnknownNameError(AirgroundError):
         """Build the one-line message from its parts."""
         self.kind, self.name, self.allowed = kind, name, tuple(allowed)
         options = ", ".join(self.allowed) or "none"
-        super().__init__(_one_line(f"unknown {kind} {_short(repr(name))}; allowed: {options}"))
+        super().__init__(one_line(f"unknown {kind} {_short(repr(name))}; allowed: {options}"))
 
 
 class PluginError(AirgroundError):
@@ -70,7 +93,7 @@ class SimulationError(AirgroundError):
 
     def __str__(self) -> str:
         """One line."""
-        return _one_line(f"run {self.run} stopped at t = {self.t:.6g} s: {self.what}")
+        return one_line(f"run {self.run} stopped at t = {self.t:.6g} s: {self.what}")
 
 
 class TraceError(AirgroundError):
@@ -81,6 +104,6 @@ def _short(text: str) -> str:
     return text if len(text) <= VALUE_WIDTH else f"{text[: VALUE_WIDTH - 3]}..."
 
 
-def _one_line(text: str) -> str:
-    """Escape what would break the line or upset a terminal."""
+def one_line(text: str) -> str:
+    """The text with everything escaped that would break a line, upset a terminal or turn the direction of writing."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
