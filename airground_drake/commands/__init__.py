@@ -10,6 +10,8 @@ from importlib import import_module
 from importlib.metadata import version
 from typing import NamedTuple
 
+from airground_drake import interruption
+
 EXIT_USAGE = 2
 
 
@@ -62,4 +64,5 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def entry() -> None:
     """Console script."""
+    interruption.end_on_signals()  # before the imports, which take seconds
     sys.exit(main())
