@@ -127,7 +127,8 @@ def make_horizon(scenario: Scenario) -> Horizon:
     """The gatekeeper's grid and weights."""
     gate = scenario.gatekeeper
     substeps = round(gate.horizon_s / gate.stages / scenario.control.period_s)
-    return Horizon(gate.stages, substeps, gate.error_weight_1_m2_s, gate.slack_weight_1_m2_s)
+    weights = gate.error_weight_1_m2_s, gate.slack_weight_1_m2_s, gate.terminal_weight_s
+    return Horizon(gate.stages, substeps, *weights)
 
 
 def make_rules(scenario: Scenario) -> Rules:

@@ -1,9 +1,8 @@
 """What a child process gives up before it runs code of others, as far as the system has it.
 
-Memory and core files are limited by `resource` (POSIX; macOS does not enforce the limit of the address space). On Linux
-the process is killed when its parent ends, and by Landlock (kernel 6.12 and later) it can neither send a signal to a
-process that it has not started, nor look into its memory, nor gain privileges. Nothing here keeps it from files or the
-network.
+Memory and core files are limited by `resource` (POSIX; macOS does not enforce the limit of the address space). By
+Landlock (Linux 6.12 and later) the process can neither send a signal to a process that it has not started, nor look
+into its memory, nor gain privileges. Nothing here keeps it from files or the network.
 """
 
 from __future__ import annotations
@@ -11,11 +10,10 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import os
-import signal
 import struct
 import sys
 
-PR_SET_PDEATHSIG, PR_SET_NO_NEW_PRIVS = 1, 38
+PR_SET_NO_NEW_PRIVS = 38
 LANDLOCK_CREATE_RULESET, LANDLOCK_RESTRICT_SELF = 444, 446
 LANDLOCK_SCOPES = 0b11
 """Abstract Unix sockets and signals."""
@@ -34,12 +32,6 @@ def limit_memory(bytes_: int) -> None:
         most = most if hard == resource.RLIM_INFINITY else min(most, hard)
         with contextlib.suppress(ValueError, OSError):
             resource.setrlimit(kind, (most, most))
-
-
-def die_with_parent(how: signal.Signals = signal.SIGKILL) -> None:
-    """Be sent a signal when the thread of the parent that started this process ends (Linux)."""
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, how, 0, 0, 0)
 
 
 def leave_others_alone() -> bool:

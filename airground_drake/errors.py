@@ -36,6 +36,29 @@ class ScenarioError(AirgroundError):
         super().__init__(one_line(f"{where}{fault}; {allowed}"))
 
 
+class LimitError(AirgroundError):
+    """A scenario that asks for more work than is allowed.
+
+    Attributes:
+        scenario: its name.
+        asked: for what, in words.
+        allowed: in words.
+    """
+
+    def __init__(self, scenario: str, asked: str, allowed: str) -> None:
+        """Build the one-line message from its parts."""
+        super().__init__(scenario, asked, allowed)
+        self.scenario, self.asked, self.allowed = scenario, asked, allowed
+
+    def __str__(self) -> str:
+        """One line."""
+        return one_line(f"{self.scenario} asks for about {self.asked}; allowed: {self.allowed}")
+
+
+class FolderError(AirgroundError):
+    """A folder that is to take a report, and holds something else."""
+
+
 class UnknownNameError(AirgroundError):
     """A name that stands for nothing: of a run, a method, a route, a policy, a claim.
 
@@ -101,5 +124,5 @@ def described(error: BaseException) -> str:
 
 
 def one_line(text: str) -> str:
-    """Escape what would break the line or upset a terminal."""
+    """The text with everything escaped that would break a line, upset a terminal or turn the direction of writing."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)

@@ -5,27 +5,113 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import re
+import shutil
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+_PARTIAL = re.compile(r"\..*\.(?P<pid>\d+)\.[a-z0-9_]+\.partial")
+"""Name of a temporary file: the process that writes it is in it."""
+
+_open: set[str] = set()
+"""Temporary files and folders of this process."""
+
 
 def write_bytes(path: Path, data: bytes) -> None:
-    """Write a file atomically: to a temporary file beside it, then rename. Creates parent folders.
+    """Write a file atomically: to a temporary file beside it, on the disk, then rename. Creates parent folders.
 
     Raises:
-        OSError: as the system reports it; the old file, if any, is then still there.
+        OSError: as the system reports it, with the path; the old file, if any, is then still there.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-        os.chmod(name, 0o644)
-        os.replace(name, path)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.{os.getpid()}.", suffix=".partial")
+        _open.add(name)
+        try:
+            with os.fdopen(handle, "wb") as file:
+                file.write(data)
+                file.flush()
+                os.fsync(file.fileno())
+            os.chmod(name, 0o644)
+            os.replace(name, path)
+        except BaseException:
+            Path(name).unlink(missing_ok=True)
+            raise
+        finally:
+            _open.discard(name)
+        _sync(path.parent)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from error
+
+
+def _sync(folder: Path) -> None:
+    """See to it that what was renamed in a folder outlives a loss of power."""
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def discard_partial() -> None:
+    """Remove the temporary files and folders of this process, because it ends at once."""
+    for name in tuple(_open):
+        if os.path.isdir(name):
+            shutil.rmtree(name, ignore_errors=True)
+        else:
+            Path(name).unlink(missing_ok=True)
+
+
+@contextmanager
+def temporary_folder() -> Iterator[Path]:
+    """A folder that is removed in the end, also where this process ends at once.
+
+    Raises:
+        OSError: if it cannot be made.
+    """
+    with tempfile.TemporaryDirectory(prefix="airground_drake.") as name:
+        _open.add(name)
+        try:
+            yield Path(name)
+        finally:
+            _open.discard(name)
+
+
+def is_partial(path: Path) -> bool:
+    """Whether a path is a temporary file of `write_bytes`, by its name."""
+    return _PARTIAL.fullmatch(path.name) is not None
+
+
+def try_to_write(folder: Path) -> None:
+    """Write a file to a folder and remove it.
+
+    Raises:
+        OSError: as `write_bytes`.
+    """
+    probe = folder / f".{os.getpid()}.probe"
+    write_bytes(probe, b"\n")
+    probe.unlink()
+
+
+def sweep(folder: Path) -> None:
+    """Remove the temporary files in a folder, and below, of processes that were killed while they wrote."""
+    for path in folder.rglob(".*.partial"):
+        found = _PARTIAL.fullmatch(path.name)
+        if found and not _runs(int(found["pid"])):
+            path.unlink(missing_ok=True)
+
+
+def _runs(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:
+        pass
+    return pid > 0
 
 
 def write_text(path: Path, text: str) -> None:

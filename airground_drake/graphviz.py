@@ -21,13 +21,13 @@ from airground_drake.scenarios.load import load, shipped
 _NODE = re.compile(r"\b(cluster|clusters|s|_)(\d+)(?=[a-z]*\b)")
 
 
-def dot(diagram: Diagram) -> str:
-    """Graphviz text of a diagram: its systems and wires, one level deep.
+def dot(diagram: Diagram, depth: int = 1) -> str:
+    """Graphviz text of a diagram: its systems and wires, diagrams inside of it opened to so many levels.
 
     Drake numbers systems in the order in which the process made them, and lists wires in the order of memory
     addresses; here systems are numbered from 1 and wires sorted, so that a diagram always gives the same text.
     """
-    text = str(diagram.GetGraphvizString(max_depth=1))
+    text = str(diagram.GetGraphvizString(max_depth=depth))
     numbers = sorted({int(found) for _, found in _NODE.findall(text)})
     rank = {str(number): str(i) for i, number in enumerate(numbers, start=1)}
     lines = _NODE.sub(lambda match: match[1] + rank[match[2]], text).splitlines(keepends=True)
@@ -48,11 +48,16 @@ def svg(dot_text: str) -> str:
     The same text gives the same bytes on the same machine; box sizes depend on its fonts. The digest of the text
     is in the picture, so that it can be told whether a picture is current.
     """
+    text = re.sub(r"<!--.*?-->\n?", "", drawn(dot_text, "svg").decode(), flags=re.DOTALL)
+    return text.replace("<svg ", f"<!-- {_digest(dot_text)} -->\n<svg ", 1)
+
+
+def drawn(dot_text: str, kind: str) -> bytes:
+    """Lay out Graphviz text as a picture: svg, pdf, png, or what else Graphviz knows."""
     with _silent_stderr(), warnings.catch_warnings():
         warnings.simplefilter("ignore")  # Graphviz and fontconfig remark on fonts; errors still raise
-        drawn = pygraphviz.AGraph(string=dot_text).draw(format="svg", prog="dot").decode()
-    drawn = re.sub(r"<!--.*?-->\n?", "", drawn, flags=re.DOTALL)
-    return drawn.replace("<svg ", f"<!-- {_digest(dot_text)} -->\n<svg ", 1)
+        picture: bytes = pygraphviz.AGraph(string=dot_text).draw(format=kind, prog="dot")
+    return picture
 
 
 def is_current(name: str, content: str, found: str) -> bool:

@@ -11,14 +11,13 @@ import multiprocessing
 import os
 import signal
 import sys
-import tempfile
 import warnings
 from collections import deque
 from multiprocessing.connection import wait
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 
-from airground_drake import confinement, files, trace
+from airground_drake import files, interruption, trace
 from airground_drake.errors import AirgroundError, PluginError, SimulationError, described, one_line
 from airground_drake.intervention.process import end_all
 from airground_drake.scenarios.load import validated
@@ -50,18 +49,18 @@ def simulate_all(scenario: Scenario, jobs: int | None = None) -> dict[str, Trace
         warm_up()
     waiting, running = deque(scenario.runs), dict[str, BaseProcess]()
     traces: dict[str, Trace] = {}
-    with tempfile.TemporaryDirectory(prefix="airground_drake.") as made, warnings.catch_warnings():
+    with files.temporary_folder() as made, warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)  # idle threads of numerical libraries survive a fork
         try:
             while waiting or running:
                 while waiting and len(running) < most:
                     name = waiting.popleft()
-                    running[name] = context.Process(target=_simulate, args=(scenario, name, Path(made, name)))
+                    running[name] = context.Process(target=_simulate, args=(scenario, name, made / name))
                     running[name].start()
                 wait([process.sentinel for process in running.values()])
                 for name, process in list(running.items()):
                     if not process.is_alive():
-                        traces[name] = _result(Path(made, name), running.pop(name), f"run {name} of {scenario.name}")
+                        traces[name] = _result(made / name, running.pop(name), f"run {name} of {scenario.name}")
         finally:
             _stop(list(running.values()))
     return {name: traces[name] for name in scenario.runs}
@@ -71,7 +70,7 @@ def _simulate(scenario: Scenario, run: str, folder: Path) -> None:
     """Simulate a run in this process and save it, or what has kept it from being simulated."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent's to heed
     signal.signal(signal.SIGTERM, _end)
-    confinement.die_with_parent(signal.SIGTERM)
+    interruption.end_with_parent(signal.SIGTERM)
     folder.mkdir()
     try:
         trace.save(simulate(scenario, run), folder)

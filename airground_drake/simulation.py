@@ -208,7 +208,7 @@ def _problems(decided: Sequence[Decision]) -> pd.DataFrame:
     planned = [(r.grounds.problem, r.grounds.solution) for r in decided if isinstance(r.grounds, Planned)]
     rows = [
         (
-            p.dt, p.error_weight, p.slack_weight,
+            p.dt, p.error_weight, p.slack_weight, p.terminal_weight,
             *map(flat, (
                 p.initial, p.accept, p.refuse, p.reference, p.centres, p.distances,
                 s.plan, s.positions, s.relaxed, s.rounded, s.normals,

@@ -73,7 +73,7 @@ DECISION_COLUMNS = {
 choice as `gatekeeper.outcome` has it (cost, 1 if it comes to rest short of the goal, way left), how far the UGV is
 behind the proposed motion, and how often it has gone along since it last rested."""
 
-PROBLEM_SCALARS = ("dt_s", "error_weight_1_m2_s", "slack_weight_1_m2_s")
+PROBLEM_SCALARS = ("dt_s", "error_weight_1_m2_s", "slack_weight_1_m2_s", "terminal_weight_s")
 PROBLEM_ARRAYS = (
     "initial_m", "accept_m_s", "refuse_m_s", "reference_m", "centres_m", "distances_m",
     "plan", "positions_m", "relaxed", "rounded", "normals",

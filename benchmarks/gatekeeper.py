@@ -97,7 +97,7 @@ def outcomes_of(situations: list[tuple[Scene, Proposal]], discs: int, safe: floa
     for i, (scene, proposal) in enumerate(situations):
         asked = motions[:i] + motions[i + 1 :]
         others = [
-            Other(scene.centres[discs + k], scene.velocities[discs + k], motion, safe, 0.5)
+            Other(scene.centres[discs + k], scene.velocities[discs + k], motion, False, safe, 0.5)
             for k, motion in enumerate(asked)
         ]
         outcomes(scene, LAW, proposal, scene.centres[:discs], safe, others, Outlook(longest=30.0))
@@ -203,8 +203,9 @@ class CasadiRoute:
             height = problem.initial[2] - problem.centres[:, m, 2]
             rows.append(casadi.sqrt(casadi.sum1(offset**2).T + height**2 + 1e-12) + u)
             low.append(np.full(stages, problem.distances[m]))
-        error = casadi.sumsqr(p - problem.reference[:, :2].T)
-        cost = problem.dt * (problem.error_weight * error + problem.slack_weight * casadi.sumsqr(u))
+        weights = casadi.DM(problem.terms.error_weights)
+        error = casadi.dot(weights, casadi.sum1((p - problem.reference[:, :2].T) ** 2).T)
+        cost = problem.dt * (error + problem.slack_weight * casadi.sumsqr(u))
         nlp = {"x": casadi.vertcat(casadi.vec(p), omega, u), "f": cost, "g": casadi.vertcat(*rows)}
         silent = {"print_time": False, "ipopt.print_level": 0, "ipopt.sb": "yes"}
         solver = casadi.nlpsol("nlp", "ipopt", nlp, silent)
@@ -234,7 +235,8 @@ class ScipRoute:
             cvxpy.sum(cvxpy.multiply(normals[:, m], p - problem.centres[:, m]), axis=1) >= d - u
             for m, d in enumerate(problem.distances)
         ]
-        error = problem.error_weight * cvxpy.sum_squares(problem.reference - p)
+        away = cvxpy.multiply(np.sqrt(problem.terms.error_weights)[:, None], problem.reference - p)
+        error = cvxpy.sum_squares(away)
         cost = problem.dt * (error + problem.slack_weight * cvxpy.sum_squares(u))
         model = cvxpy.Problem(cvxpy.Minimize(cost), rows)
         try:

@@ -1,6 +1,6 @@
 """Attack the gatekeeper: hostile proposals at decision level, and whole runs with a hostile UAV.
 
-    python benchmarks/hostile.py --proposals 10000 --runs 300
+    python benchmarks/hostile.py --proposals 10000 --runs 300 --lies 300
 
 Solution level: UGVs at random safe places among obstacles, many exactly at the safe distance, with proposals of
 random position, speed, direction and course, a third of them aimed at what is nearest. Under method (d) each one
@@ -9,29 +9,37 @@ policies `hostile`, `towards` and `noisy` of random parameters, a gatekeeper tha
 (d) one that takes every prediction for useful, as a lying map could make it), and obstacles that the UAV does not know.
 Distances are exact in continuous time. The time that a UAV steals is measured besides: the longest that a UGV executed
 interventions between two rests, against the bound of LIVE-WAIT.
+
+Lies: runs of case A under (d) with a UAV that lies in every part of its messages (`hostile_uav`), half of them before
+gatekeepers that believe every prediction, with patience of random numbers. A small evolutionary search looks for the
+tactics that steal the most of what the bound leaves.
 """
 
 from __future__ import annotations
 
 import argparse
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import replace
+from dataclasses import dataclass, fields, replace
 from functools import partial
 from unittest import mock
 
 import numpy as np
+from hostile_uav import CHOICES, LyingPlanner, Tactic, drawn, mutated
 
+from airground_drake import components
 from airground_drake.arrays import Array
-from airground_drake.components import make_presets, make_team
+from airground_drake.components import make_planner, make_presets, make_team
 from airground_drake.gatekeeper.certified import CertifiedGatekeepers
 from airground_drake.gatekeeper.prediction import Horizon, Scene, predicted_problem
 from airground_drake.gatekeeper.routes.relaxed import RelaxedRoute
+from airground_drake.intervention.planner import Planner
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.law import UgvLaw
 from airground_drake.nsbc.motion import Motion
+from airground_drake.registry import Method
 from airground_drake.scenarios.load import load
-from airground_drake.scenarios.schema import Policy, Run
+from airground_drake.scenarios.schema import Policy, Run, Scenario
 from airground_drake.simulation import Recorder
 from airground_drake.systems.controllers import UgvController
 from airground_drake.trace import Trace
@@ -40,6 +48,8 @@ from airground_drake.verify.runs.safe_trace import SafeTrace
 
 STEPS = 30
 """Control periods for which a proposal is executed at decision level."""
+GENERATION, BEST = 20, 5
+"""Lies of a generation, and those of all before whose tactics the next one mutates."""
 
 
 def attack(random: np.random.Generator, start: Array, centres: Array, t: float) -> Motion:
@@ -144,14 +154,116 @@ def whole_run(seed: int) -> tuple[float, int, float, float, float]:
     return margins["d"], executed, margins["c"], stolen, gate.tries * (gate.longest_s + gate.period_s)
 
 
+@dataclass(frozen=True)
+class Lie:
+    """A run to be made with a lying UAV: its tactic, the seed of everything else, whether gatekeepers believe it."""
+
+    tactic: Tactic
+    seed: int
+    believed: bool
+
+
+@dataclass(frozen=True)
+class Told:
+    """What came of a lie: margin to d, m; time stolen and the bound of it, s; longest decision, s."""
+
+    lie: Lie
+    margin_m: float
+    stolen_s: float
+    bound_s: float
+    decision_s: float
+
+    @property
+    def share(self) -> float:
+        """Of the bound that was stolen."""
+        return self.stolen_s / self.bound_s
+
+
+def told(lie: Lie) -> Told:
+    """Make the run."""
+    random = np.random.default_rng(lie.seed)
+    scenario = load("case_a", [f"seed={lie.seed}"])[0]
+    gate = scenario.gatekeeper
+    gate.tries, gate.longest_s = int(random.integers(1, 5)), float(random.uniform(0.5, 4.0))
+    gate.rest_s, gate.behind_s = float(random.uniform(0.3, 3.0)), float(random.uniform(0.2, 2.0))
+    gate.lag_m, gate.period_s = float(random.uniform(0.05, 1.0)), float(random.choice([0.05, 0.1, 0.15]))
+    scenario.intervention.period_s = float(random.choice([0.05, 0.1]))
+    scenario.duration_s = max(20.0, 2.5 * (gate.tries * gate.longest_s + gate.rest_s))
+    scenario.obstacles["obstacle_2"].known_to_uav = bool(random.integers(2))
+    scenario.choices, scenario.runs, scenario.reproduction = [], {"d": Run(method="d")}, []
+
+    def lying(given: Scenario, method: Method) -> Planner:
+        honest = make_planner(given, method)
+        parts = {f.name: getattr(honest, f.name) for f in fields(Planner)}
+        return LyingPlanner(**parts, tactic=lie.tactic, random=random)
+
+    foresee = Believing.foresee if lie.believed else CertifiedGatekeepers.foresee
+    with (
+        mock.patch.object(components, "make_planner", lying),
+        mock.patch.object(CertifiedGatekeepers, "foresee", foresee),
+    ):
+        trace = Recorder(scenario, "d").simulate()
+    margin = SafeTrace().check(trace).margin
+    return Told(
+        lie,
+        np.nan if margin is None else float(margin),
+        max(stolen_s(trace, ugv) for ugv in trace.ugvs),
+        gate.tries * (gate.longest_s + gate.period_s),
+        max(trace.timings["decision_times_s"], default=0.0),
+    )
+
+
+def search(pool: ProcessPoolExecutor, runs: int) -> list[Told]:
+    """Lies in generations: the first at random, then what stole the most, with parts of its tactic drawn again."""
+    random = np.random.default_rng(0)
+    found: list[Told] = []
+    while len(found) < runs:
+        best = sorted(found, key=lambda one: -one.share)[:BEST]
+        count = min(GENERATION, runs - len(found))
+        seeds = range(len(found), len(found) + count)
+        tactics = [
+            mutated(best[k % len(best)].lie.tactic, random) if best and k % 4 else drawn(random) for k in range(count)
+        ]
+        lies = [Lie(tactic, seed, bool(seed % 2)) for tactic, seed in zip(tactics, seeds, strict=True)]
+        found += pool.map(told, lies)
+    return found
+
+
+def print_lies(found: list[Told]) -> None:
+    """The worst of all, the worst for each part of a tactic, and those that stole the most."""
+    print(f"{len(found)} runs with a lying UAV:")
+    print(f"  (d) worst margin to d: {min(one.margin_m for one in found):.3g} m")
+    above = sum(one.stolen_s > one.bound_s + 1e-9 for one in found)
+    print(f"  runs in which more was stolen than the bound: {above}")
+    for believed in (False, True):
+        those = [one for one in found if one.lie.believed == believed]
+        most = max(those, key=lambda one: one.share)
+        judging = "believe every prediction" if believed else "judge by outcomes"
+        print(f"  gatekeepers that {judging}: {len(those)} runs, most stolen {most.stolen_s:.3f} s of a bound of "
+              f"{most.bound_s:.3f} s ({100.0 * most.share:.2f} %)")  # fmt: skip
+    print(f"  longest decision: {1e3 * max(one.decision_s for one in found):.0f} ms CPU")
+    print("\n| part | is | runs | stole anything | most stolen, % of the bound | worst margin to d, m |")
+    print("| --- | --- | --- | --- | --- | --- |")
+    for part in ("mapped", "motion", "cause", "forge"):
+        for value in CHOICES[part]:
+            those = [one for one in found if getattr(one.lie.tactic, part) == value and not one.lie.believed]
+            if those:
+                most, least = max(one.share for one in those), min(one.margin_m for one in those)
+                stole = sum(one.stolen_s > 0.0 for one in those)
+                print(f"| {part} | {value} | {len(those)} | {stole} | {100.0 * most:.1f} | {least:.3g} |")
+    for one in sorted(found, key=lambda one: -one.share)[:BEST]:
+        print(f"  {100.0 * one.share:.2f} %: {one.lie}")
+
+
 def stolen_s(trace: Trace, ugv: str) -> float:
     """The longest that a UGV executed interventions between two rests, s."""
     t, busy = trace.t, trace.column(f"{ugv}.accepted") != 0.0
+    rest_s = trace.scenario["gatekeeper"]["rest_s"] - 1e-9
     worst, sum_s, alone_s = 0.0, 0.0, 0.0
     for k in range(1, len(t)):
         step = float(t[k] - t[k - 1])
         alone_s = 0.0 if busy[k] else alone_s + step
-        if alone_s >= trace.scenario["gatekeeper"]["rest_s"]:
+        if alone_s >= rest_s:
             sum_s = 0.0
         sum_s += step if busy[k] else 0.0
         worst = max(worst, sum_s)
@@ -163,15 +275,17 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--proposals", type=int, default=10_000)
     parser.add_argument("--runs", type=int, default=300)
+    parser.add_argument("--lies", type=int, default=300)
     parser.add_argument("--jobs", type=int, default=2)
     options = parser.parse_args()
     with ProcessPoolExecutor(options.jobs) as pool:
-        share = options.proposals // 20
-        parts = list(pool.map(partial(at_decision_level, proposals=share), range(20)))
-        worst, accepted, below = min(p[0] for p in parts), sum(p[1] for p in parts), sum(p[2] for p in parts)
-        print(f"{20 * share} hostile proposals, each executed for {STEPS} control periods:")
-        print(f"  (d) worst margin to d: {worst:.3g} m")
-        print(f"  (c) accepted {accepted}, of which {below} then came below d")
+        if options.proposals:
+            share = options.proposals // 20
+            parts = list(pool.map(partial(at_decision_level, proposals=share), range(20)))
+            worst, accepted, below = min(p[0] for p in parts), sum(p[1] for p in parts), sum(p[2] for p in parts)
+            print(f"{20 * share} hostile proposals, each executed for {STEPS} control periods:")
+            print(f"  (d) worst margin to d: {worst:.3g} m")
+            print(f"  (c) accepted {accepted}, of which {below} then came below d")
         if options.runs:
             runs = np.array(list(pool.map(whole_run, range(options.runs), chunksize=5)))
             print(f"{options.runs} whole runs with a hostile UAV:")
@@ -179,6 +293,8 @@ def main() -> None:
             print(f"  (d) longest kept from its own task between two rests: {runs[:, 3].max():.1f} s, "
                   f"bound {runs[:, 4].max():.1f} s")  # fmt: skip
             print(f"  (c) runs below d: {int((runs[:, 2] < -1e-9).sum())}; worst margin: {runs[:, 2].min():.3g} m")
+        if options.lies:
+            print_lies(search(pool, options.lies))
 
 
 if __name__ == "__main__":

@@ -162,7 +162,9 @@ class Bench:
             if made[0][2] != "0":
                 sys.exit(f"no report of the package as it is: {made}")
         for kept in (here.folder / PACKAGE).rglob("*.nb*"):  # what was compiled meanwhile
-            shutil.copy2(kept, first / kept.relative_to(here.folder))
+            there = first / kept.relative_to(here.folder)
+            there.parent.mkdir(exist_ok=True)
+            shutil.copy2(kept, there)
         self.unbroken = here
         self.copies: queue.Queue[Copy] = queue.Queue()
         for k in range(jobs):

@@ -97,16 +97,13 @@ def _realised() -> Iterator[tuple[str, list[str]]]:
     for path in sorted(path for package in REALISED_IN for path in (PACKAGE / package).rglob("*.py")):
         module = ".".join(path.relative_to(PACKAGE).with_suffix("").parts)
         tree = ast.parse(path.read_text(encoding="utf-8"))
-        for parent, prefix in [(tree, module), *((n, f"{module}.{n.name}") for n in tree.body if _is_class(n))]:
-            for node in parent.body:  # type: ignore[attr-defined]
+        classes = [node for node in tree.body if isinstance(node, ast.ClassDef)]
+        for parent, prefix in [(tree, module), *((each, f"{module}.{each.name}") for each in classes)]:
+            for node in parent.body:
                 if isinstance(node, ast.ClassDef | ast.FunctionDef) and not node.name.startswith("__"):
                     first = (ast.get_docstring(node) or "").split("\n\n")[0]
                     if numbers := _numbers(first):
                         yield f"{prefix}.{node.name}", numbers
-
-
-def _is_class(node: ast.AST) -> bool:
-    return isinstance(node, ast.ClassDef)
 
 
 def _numbers(text: str) -> list[str]:

@@ -16,7 +16,7 @@ from airground_drake.scenarios.load import load
 
 PACKAGE = Path(airground_drake.__file__).parent
 LAYERS = (
-    ("arrays", "confinement", "errors", "files", "check"),
+    ("arrays", "confinement", "errors", "files", "interruption", "check"),
     ("registry",),
     ("nsbc",),
     ("decision", "intervention"),
@@ -28,6 +28,7 @@ LAYERS = (
     ("simulation", "graphviz", "verify"),
     ("runs",),
     ("report",),
+    ("commands", "__main__"),
 )
 """From left to right: a module imports from its own layer or from those before it."""
 

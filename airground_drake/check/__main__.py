@@ -1,8 +1,21 @@
 """`python -m airground_drake.check DIR`."""
 
+import os
+import signal
 import sys
+from types import FrameType
+from typing import NoReturn
 
 from .command import main
 
+
+def _end(number: int, frame: FrameType | None) -> NoReturn:
+    """One line, and the exit code that stands for the signal."""
+    os.write(2, f"error: interrupted ({signal.Signals(number).name})\n".encode())
+    os._exit(128 + number)
+
+
 if __name__ == "__main__":
+    signal.signal(signal.SIGINT, _end)
+    signal.signal(signal.SIGTERM, _end)
     sys.exit(main())

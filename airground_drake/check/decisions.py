@@ -30,6 +30,7 @@ class Decision:
         dt_s: length of a stage.
         error_weight_1_m2_s: a of (25).
         slack_weight_1_m2_s: b of (25).
+        terminal_weight_s: w of the terminal cost w a ||rho_rd - rho_N||^2, which (25) has besides; 0 in the paper.
         initial_m: (3,).
         accept_m_s: a_k of (23), (N, 3).
         refuse_m_s: b_k of (23), (N, 3).
@@ -47,6 +48,7 @@ class Decision:
     dt_s: float
     error_weight_1_m2_s: float
     slack_weight_1_m2_s: float
+    terminal_weight_s: float
     initial_m: Array
     accept_m_s: Array
     refuse_m_s: Array
@@ -91,10 +93,17 @@ class Decision:
         return reach - self.distances_m
 
     def cost(self, positions_m: Array, normals: Array | None = None) -> Array:
-        """(25): dt sum_k a ||rho_rd - rho_k||^2 + b u_k^2, u_k being what the distances lack at most; (...)."""
-        error = ((positions_m - self.reference_m) ** 2).sum(axis=(-1, -2))
+        """(25): sum_k e_k ||rho_rd - rho_k||^2 + dt b u_k^2, u_k being what the distances lack at most; (...)."""
+        error = (((positions_m - self.reference_m) ** 2).sum(axis=-1) * self.error_weights_1_m2).sum(axis=-1)
         slack = self.gaps_m(positions_m, normals).min(axis=-1, initial=0.0)
-        return self.dt_s * (self.error_weight_1_m2_s * error + self.slack_weight_1_m2_s * (slack**2).sum(axis=-1))
+        return np.asarray(error + self.dt_s * self.slack_weight_1_m2_s * (slack**2).sum(axis=-1))
+
+    @cached_property
+    def error_weights_1_m2(self) -> Array:
+        """e_k: dt a for every stage, and w a besides for the last, (N,)."""
+        seconds = np.full(self.stages, self.dt_s)
+        seconds[-1] += self.terminal_weight_s
+        return self.error_weight_1_m2_s * seconds
 
     @cached_property
     def constant_m(self) -> Array:
@@ -141,6 +150,7 @@ def _decision(row: dict[Any, Any], problem: dict[Any, Any], stages: int) -> Deci
         dt_s=float(problem["dt_s"]),
         error_weight_1_m2_s=float(problem["error_weight_1_m2_s"]),
         slack_weight_1_m2_s=float(problem["slack_weight_1_m2_s"]),
+        terminal_weight_s=float(problem["terminal_weight_s"]),
         initial_m=flat["initial_m"],
         accept_m_s=flat["accept_m_s"].reshape(stages, 3),
         refuse_m_s=flat["refuse_m_s"].reshape(stages, 3),

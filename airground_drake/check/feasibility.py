@@ -127,6 +127,7 @@ def _about_the_situation(run: Run, decision: Decision) -> None:
     close("length of a stage", decision.dt_s, after[0], within=SMALL, **at)
     same("weight of errors", decision.error_weight_1_m2_s, gate["error_weight_1_m2_s"], **at)
     same("weight of slack", decision.slack_weight_1_m2_s, gate["slack_weight_1_m2_s"], **at)
+    same("weight of the terminal cost", decision.terminal_weight_s, gate["terminal_weight_s"], **at)
     close("initial position", decision.initial_m, run.place_m(decision.ugv, decision.t_s), within=SMALL, **at)
     reference = run.presets[decision.ugv].position_m(decision.t_s + after)
     close("reference", decision.reference_m, reference, within=SMALL, **at)

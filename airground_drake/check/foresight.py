@@ -20,6 +20,8 @@ LEFT_M = 1e-3
 """A way left may be outside its bounds by this: the recomputed end is not quite the recorded one."""
 AROUND = 40
 """Points around a safe circle."""
+MOST_CLAIMED = 64
+"""Obstacles of a message that a UGV takes into account."""
 CHOICES = ("refuse", "accept")
 
 
@@ -145,17 +147,16 @@ def _resting(run: Run, places: list[Array], goal: Array, h: float) -> bool:
 
 
 def _known_m(run: Run, ugv: str, t_s: float, asked: Proposal) -> Array:
-    """Obstacles within sensing range at a sample of the gatekeeper up to now, and those of the message out of it."""
+    """Obstacles within sensing range at a sample of the gatekeeper up to now, the nearest of the message out of it."""
     reach, gate_s = run.scenario["control"]["sensing_range_m"], run.scenario["gatekeeper"]["period_s"]
     samples = np.minimum(gate_s * np.arange(round(t_s / gate_s) + 1.0), t_s)
     was = np.stack([np.interp(samples, run.t_s, axis) for axis in run.position_m[ugv].T], axis=1)
     places = [np.array(o["position_m"], dtype=np.float64) for o in run.scenario["obstacles"].values()]
     known = [place for place in places if (np.linalg.norm(was - place, axis=1) <= reach).any()]
-    for place in asked.mapped_m:
-        hidden = np.linalg.norm(place - was[-1]) > reach
-        if hidden and all(np.linalg.norm(place - other) > SMALL for other in known if other is not place):
-            known.append(place)
-    return np.array(known).reshape(-1, 3)
+    away = np.linalg.norm(asked.mapped_m - was[-1], axis=1)
+    new = [k for k in np.flatnonzero(away > reach) if all(np.linalg.norm(asked.mapped_m[k] - o) > SMALL for o in known)]
+    nearest = sorted(sorted(new, key=lambda k: away[k])[:MOST_CLAIMED])
+    return np.concatenate([np.array(known).reshape(-1, 3), asked.mapped_m[nearest]])
 
 
 def _way_of(run: Run, robot: str, t_s: float, after: Array) -> tuple[Array, Array, float]:

@@ -207,13 +207,14 @@ def _lower_bound(decision: Decision, positions_m: Array, lacking_m: Array, share
     dt, omega = decision.dt_s, decision.relaxed
     error, slack = positions_m - decision.reference_m, lacking_m.max(axis=1, initial=0.0)
     shared = (shares * lacking_m).sum(axis=1)
-    of_error = decision.error_weight_1_m2_s * (error**2).sum()
-    of_slack = decision.slack_weight_1_m2_s * (2.0 * slack * shared - slack**2).sum()
+    of_error = (decision.error_weights_1_m2[:, None] * error**2).sum()
+    of_slack = dt * decision.slack_weight_1_m2_s * (2.0 * slack * shared - slack**2).sum()
     away = np.zeros_like(error) if decision.normals is None else (shares[..., None] * decision.normals).sum(axis=1)
-    forces = decision.error_weight_1_m2_s * error - decision.slack_weight_1_m2_s * slack[:, None] * away
-    slopes = _slopes(decision, 2.0 * dt * forces)
+    forces = decision.error_weights_1_m2[:, None] * error
+    forces -= dt * decision.slack_weight_1_m2_s * slack[:, None] * away
+    slopes = _slopes(decision, 2.0 * forces)
     corner = np.minimum(-slopes * omega, slopes * (1.0 - omega)).sum()
-    return float(dt * (of_error + of_slack) + corner)
+    return float(of_error + of_slack + corner)
 
 
 def _shares_at_ties(decision: Decision, positions_m: Array, lacking_m: Array, normals: Array) -> Array:
@@ -235,7 +236,7 @@ def _shares_at_ties(decision: Decision, positions_m: Array, lacking_m: Array, no
         force = np.zeros((n, 3))
         force[k] = -2.0 * decision.dt_s * decision.slack_weight_1_m2_s * slack[k] * normals[k, j]
         columns.append(_slopes(decision, force))
-    own = _slopes(decision, 2.0 * decision.dt_s * decision.error_weight_1_m2_s * error)
+    own = _slopes(decision, 2.0 * decision.error_weights_1_m2[:, None] * error)
     at_0, at_1 = np.eye(n)[:, omega <= EDGE], np.eye(n)[:, omega >= 1.0 - EDGE]
     of_slopes = np.hstack([np.stack(columns, axis=1), -at_0, at_1])
     heavy = 10.0 * max(1.0, float(np.abs(of_slopes).max()))

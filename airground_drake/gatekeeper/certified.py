@@ -29,6 +29,8 @@ from airground_drake.nsbc.team import Team
 
 ACCEPTING: tuple[Reason, ...] = ("cheaper", "makes_way")
 """Reasons for which a proposal is accepted."""
+MOST_CLAIMED = 64
+"""Obstacles of the UAV's map that a UGV takes into account."""
 SAME_M = 1e-9
 """Obstacles closer to each other than this are one, m."""
 
@@ -139,13 +141,17 @@ class CertifiedGatekeepers(Gatekeepers):
         return outcomes(scene, self._law, proposal, discs, self._distance, others, self._outlook)
 
     def _known(self, seen: Situation, i: int, proposal: Proposal) -> Array:
-        """Obstacles that a UGV has sensed, and those of the UAV's map that are out of its sight, (k, 3), m."""
+        """Obstacles that a UGV has sensed, and those of the UAV's map that are out of its sight, (k, 3), m.
+
+        Of the latter the `MOST_CLAIMED` that are nearest, so that no map makes a decision take long.
+        """
         sensed = self._neighbourhood.obstacles[seen.before.sensed[i]]
         claimed = proposal.mapped
         hidden = np.linalg.norm(claimed - seen.positions[i], axis=1) > self._law.avoidance.sensing_range
         apart = np.linalg.norm(claimed[:, None] - sensed, axis=2)
         new = claimed[hidden & (apart > SAME_M).all(axis=1)]
-        return np.concatenate([sensed, new])
+        nearest = np.argsort(np.linalg.norm(new - seen.positions[i], axis=1), kind="stable")[:MOST_CLAIMED]
+        return np.concatenate([sensed, new[np.sort(nearest)]])
 
 
 def reason_of(refuse: Outcome, accept: Outcome, *, favour: bool) -> Reason:

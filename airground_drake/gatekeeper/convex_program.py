@@ -14,6 +14,7 @@ from scipy.sparse import csc_matrix
 
 from airground_drake.arrays import Array
 from airground_drake.gatekeeper.blocks import block_of_stage
+from airground_drake.gatekeeper.cost import error_weights
 from airground_drake.gatekeeper.half_planes import offsets
 from airground_drake.gatekeeper.problem import Problem
 from airground_drake.gatekeeper.reachable_box import within_reach
@@ -30,6 +31,7 @@ class Shape:
         dt: length of a stage, s.
         error_weight: a of (25), in the program's unit of cost.
         slack_weight: b of (25), in the program's unit of cost.
+        terminal_weight: of the terminal cost, s.
         blocks: variables omega of the UGV, each for a block of N / `blocks` stages.
     """
 
@@ -37,13 +39,15 @@ class Shape:
     dt: float
     error_weight: float
     slack_weight: float
+    terminal_weight: float
     blocks: int
 
     @classmethod
     def of(cls, problem: Problem, *, blocks: int | None = None, scale: float = 1.0) -> Shape:
         """Of a problem: one omega per stage unless `blocks` says so; `scale` is the cost that counts as 1."""
         count = problem.stages if blocks is None else min(blocks, problem.stages)
-        return cls(problem.stages, problem.dt, problem.error_weight / scale, problem.slack_weight / scale, count)
+        weights = problem.error_weight / scale, problem.slack_weight / scale, problem.terminal_weight
+        return cls(problem.stages, problem.dt, *weights, count)
 
 
 class UgvProgram:
@@ -93,8 +97,10 @@ class UgvProgram:
             f"({equation}d) as half-planes": self.avoidance,
             f"({equation}e) slack": program.AddBoundingBoxConstraint(0.0, np.inf, u),
         }
-        for what, weight, variables in (("task error", shape.error_weight, e), ("slack", shape.slack_weight, u)):
-            hessian = 2.0 * weight * shape.dt * np.eye(len(variables))
+        of_error = error_weights(n, shape.dt, shape.error_weight, shape.terminal_weight).repeat(AXES)
+        of_slack = np.full(n, shape.slack_weight)
+        for what, weights, variables in (("task error", of_error, e), ("slack", of_slack, u)):
+            hessian = np.diag(2.0 * weights * shape.dt)
             constraints[f"(25) {what}"] = program.AddQuadraticCost(
                 hessian, np.zeros(len(variables)), variables, is_convex=True
             )

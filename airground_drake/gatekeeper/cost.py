@@ -23,7 +23,7 @@ class Terms(NamedTuple):
         reference: preset trajectory at the ends of the stages, (N, 3), m.
         centres: points to keep away from at the ends of the stages, (N, m, 3), m.
         distances: safe distances d of (26d), (m,), m.
-        error_weight: a_i of (25), 1/(m^2 s).
+        error_weights: a_i of (25) at the ends of the stages, (N,), 1/(m^2 s), see `error_weights`.
         slack_weight: b_i of (25), 1/(m^2 s).
     """
 
@@ -31,17 +31,34 @@ class Terms(NamedTuple):
     reference: Array
     centres: Array
     distances: Array
-    error_weight: float
+    error_weights: Array
     slack_weight: float
+
+
+def error_weights(stages: int, dt: float, error_weight: float, terminal_weight: float) -> Array:
+    """Weights of the task error in (25) at the ends of the stages, (N,), in the unit of `error_weight`.
+
+    The terminal cost w a ||rho_rd - rho_N||^2 of the stability theory of model predictive control (Mayne et al.,
+    Automatica 36, 2000) falls on the last: a stage of length dt weighs dt a there, and it makes that (dt + w) a.
+
+    Args:
+        stages: N.
+        dt: length of a stage, s.
+        error_weight: a_i of (25).
+        terminal_weight: w, s; 0: (25) as the paper has it.
+    """
+    weights = np.full(stages, error_weight)
+    weights[-1] *= 1.0 + terminal_weight / dt
+    return weights
 
 
 @njit(cache=True)
 def add_stage(total: float, terms: Terms, k: int, x: float, y: float, z: float, slack: float) -> float:
     """`total` plus the integrand of (25), 1/s, at the end of stage k in (x, y, z), m, with slack u of (26e), m."""
     total += terms.slack_weight * slack * slack
-    total += terms.error_weight * (terms.reference[k, 0] - x) ** 2
-    total += terms.error_weight * (terms.reference[k, 1] - y) ** 2
-    total += terms.error_weight * (terms.reference[k, 2] - z) ** 2
+    total += terms.error_weights[k] * (terms.reference[k, 0] - x) ** 2
+    total += terms.error_weights[k] * (terms.reference[k, 1] - y) ** 2
+    total += terms.error_weights[k] * (terms.reference[k, 2] - z) ** 2
     return total
 
 

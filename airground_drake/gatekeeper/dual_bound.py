@@ -83,8 +83,8 @@ def _dual_bound(
         slope = 0.0
         for a in range(3):
             error = positions[k, a] - terms.reference[k, a]
-            total += terms.dt * terms.error_weight * error * error
-            slopes[k, a] += 2.0 * terms.dt * terms.error_weight * error
+            total += terms.dt * terms.error_weights[k] * error * error
+            slopes[k, a] += 2.0 * terms.dt * terms.error_weights[k] * error
             slope += terms.dt * (motion.velocities[1, k, a] - motion.velocities[0, k, a]) * slopes[k, a]
         constants[k] = total + min(-omega[k] * slope, (1.0 - omega[k]) * slope)
     return constants, slopes

@@ -31,6 +31,8 @@ from airground_drake.nsbc.motion import Motion
 
 USELESS = 1e-6
 """Relative gain below which an intervention makes no difference."""
+MOST_CIRCLES = 32
+"""Among which a shortest way is looked for: it takes 10 ms, and eight times as long for twice as many."""
 
 
 @dataclass(frozen=True)
@@ -167,15 +169,22 @@ def _outcome(
 
 
 def way_left(place: Array, goal: Array, discs: Array, distance: float) -> float:
-    """Length of the shortest way to the goal among circles around discs (m, 3), m; straight if there is none."""
+    """Length of the shortest way to the goal among circles around discs (m, 3), m; straight if there is none.
+
+    Of more than `MOST_CIRCLES` those nearest to the straight way count, so that no map makes it take long.
+    """
     squared = distance**2 - np.square(discs[:, 2] - place[2])
     near = squared > 0.0
     centres, radii = discs[near, :2], np.sqrt(squared[near])
     leg = goal[:2] - place[:2]
     length = float(np.sqrt(leg @ leg))
     along = np.clip((centres - place[:2]) @ leg / max(length**2, 1e-300), 0.0, 1.0)
-    if (np.linalg.norm(place[:2] + along[:, None] * leg - centres, axis=1) >= radii).all():
+    beside = np.linalg.norm(place[:2] + along[:, None] * leg - centres, axis=1) - radii
+    if (beside >= 0.0).all():
         return length
+    if len(centres) > MOST_CIRCLES:
+        nearest = np.argsort(beside, kind="stable")[:MOST_CIRCLES]
+        centres, radii = centres[nearest], radii[nearest]
     try:
         return shortest_path(place[:2], goal[:2], centres, radii).length_m
     except NoPath:

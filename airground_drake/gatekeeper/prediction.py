@@ -59,12 +59,14 @@ class Horizon:
         substeps: control periods per stage.
         error_weight: a_i of (25), 1/(m^2 s).
         slack_weight: b_i of (25), 1/(m^2 s).
+        terminal_weight: of the terminal cost, see `cost.error_weights`, s.
     """
 
     stages: int
     substeps: int
     error_weight: float
     slack_weight: float
+    terminal_weight: float = 0.0
 
 
 def predicted_problem(scene: Scene, law: UgvLaw, proposal: Proposal, horizon: Horizon) -> Problem:
@@ -91,6 +93,7 @@ def predicted_problem(scene: Scene, law: UgvLaw, proposal: Proposal, horizon: Ho
         distances=scene.distances[near],
         error_weight=horizon.error_weight,
         slack_weight=horizon.slack_weight,
+        terminal_weight=horizon.terminal_weight,
         loop=loop,
     )
 

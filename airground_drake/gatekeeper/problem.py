@@ -10,7 +10,7 @@ import numpy as np
 
 from airground_drake.arrays import Array
 from airground_drake.gatekeeper.closed_loop import ClosedLoop
-from airground_drake.gatekeeper.cost import Terms, half_plane_cost, plan_cost
+from airground_drake.gatekeeper.cost import Terms, error_weights, half_plane_cost, plan_cost
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +30,7 @@ class Problem:
         distances: safe distances d of (26d), (m,), m.
         error_weight: a_i of (25), 1/(m^2 s).
         slack_weight: b_i of (25), 1/(m^2 s).
+        terminal_weight: of the terminal cost, see `cost.error_weights`, s; 0: none, as the paper has it.
         loop: what the mode velocities were rolled out from; None for a problem that is given by them alone.
     """
 
@@ -42,6 +43,7 @@ class Problem:
     distances: Array
     error_weight: float
     slack_weight: float
+    terminal_weight: float = 0.0
     loop: ClosedLoop | None = None
 
     @property
@@ -52,8 +54,9 @@ class Problem:
     @cached_property
     def terms(self) -> Terms:
         """What (25) is made of, for compiled code."""
-        weights = float(self.error_weight), float(self.slack_weight)
-        return Terms(float(self.dt), self.reference, self.centres, self.distances, *weights)
+        weights = error_weights(self.stages, self.dt, self.error_weight, self.terminal_weight)
+        data = self.reference, self.centres, self.distances
+        return Terms(float(self.dt), *data, weights, float(self.slack_weight))
 
     @cached_property
     def kinematics(self) -> Kinematics:

@@ -63,7 +63,7 @@ def _remaining_cost(motion: Kinematics, terms: Terms) -> Array:
         squared = 0.0
         for a in range(3):
             squared += max(0.0, low[a] - terms.reference[k, a], terms.reference[k, a] - high[a]) ** 2
-        tail[k] = terms.dt * terms.error_weight * squared
+        tail[k] = terms.dt * terms.error_weights[k] * squared
     for k in range(stages - 1, -1, -1):
         tail[k] += tail[k + 1]
     return (1.0 - 1e-9) * tail  # the last digits of the running sums must not cut an optimum

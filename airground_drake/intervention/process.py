@@ -35,8 +35,8 @@ MEMORY = 4 * 2**30
 
 _PROGRAM = (
     "import json, sys; sys.path[:] = json.loads(sys.argv[2]); "
-    "from airground_drake import confinement; "
-    "int(sys.argv[4]) and confinement.die_with_parent(); "
+    "from airground_drake import confinement, interruption; "
+    "int(sys.argv[4]) and interruption.end_with_parent(); "
     "confinement.limit_memory(int(sys.argv[3])); confinement.leave_others_alone(); "
     "from airground_drake.intervention.worker import main; main(int(sys.argv[1]))"
 )

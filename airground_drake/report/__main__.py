@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from airground_drake import interruption
+
+if __name__ == "__main__":
+    interruption.end_on_signals()  # before the imports, which take seconds
+
 import argparse
 import json
 import platform
@@ -19,13 +24,23 @@ from typing import Any
 
 from airground_drake import files, graphviz, trace
 from airground_drake.diagram import build_diagram
-from airground_drake.errors import AirgroundError, PluginError, ReportError, ScenarioError, UnknownNameError
-from airground_drake.report import audit, document, html, junit
+from airground_drake.errors import (
+    AirgroundError,
+    FolderError,
+    LimitError,
+    PluginError,
+    ReportError,
+    ScenarioError,
+    UnknownNameError,
+    one_line,
+)
+from airground_drake.report import audit, document, folder, html, junit
 from airground_drake.report.figures import zeno_refine
 from airground_drake.report.figures.draw import draw
 from airground_drake.report.figures.panels import Figure
 from airground_drake.runs import simulate_all
 from airground_drake.scenarios import plugins
+from airground_drake.scenarios.estimate import DEFAULT_LIMITS, GIB, Limits, within
 from airground_drake.scenarios.load import load, shipped
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify import Verdict, cache_folder, verify, verify_model
@@ -69,52 +84,63 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if audited:
             scenario.name, scenario.title, scenario.description = AUDIT, AUDIT_TITLE, AUDIT_DESCRIPTION
         kept = None if options.no_cache else cache_folder()
-        folder = options.output or Path("reports") / scenario.name
-        report = write_report(scenario, digest, folder, options.format, shlex.join(command), kept, audited)
-        _read_back(folder, options.format, report)
-    except (ScenarioError, PluginError, UnknownNameError) as error:
+        output = options.output or Path("reports") / scenario.name
+        limits = Limits(options.limit_steps, options.limit_memory * GIB)
+        report = write_report(scenario, digest, output, options.format, shlex.join(command), kept, audited, limits)
+        _read_back(output, options.format, report)
+    except LimitError as error:
+        print(f"error: {error}; see --limit-steps and --limit-memory", file=sys.stderr)
+        return EXIT_USAGE
+    except (ScenarioError, PluginError, UnknownNameError, FolderError) as error:
         print(f"error: {error}", file=sys.stderr)
         return EXIT_USAGE
     except (AirgroundError, OSError) as error:
-        print(f"error: {error}", file=sys.stderr)
+        print(f"error: {one_line(str(error))}", file=sys.stderr)
         return EXIT_TOOL
     overall = report["overall"]
-    print(f"{scenario.name}: {overall['status'].replace('_', ' ')}. {overall['why']}\n{folder}")
+    print(f"{scenario.name}: {overall['status'].replace('_', ' ')}. {overall['why']}\n{one_line(str(output))}")
     if options.open and "html" in options.format:
-        webbrowser.open((folder / "report.html").resolve().as_uri())
+        webbrowser.open((output / "report.html").resolve().as_uri())
     return document.exit_code(report)
 
 
 def write_report(
     scenario: Scenario,
     digest: str,
-    folder: Path,
+    output: Path,
     formats: Sequence[str] = FORMATS,
     command: str = "",
     kept: Path | None = None,
     audited: bool = False,
+    limits: Limits = DEFAULT_LIMITS,
 ) -> dict[str, Any]:
     """Simulate every run, judge it, and write everything to a folder.
 
     Args:
         scenario: validated scenario.
         digest: SHA-256 of its file.
-        folder: created if need be; files of an earlier report are replaced, one by one and whole.
+        output: folder, created if need be; the files of an earlier report are replaced.
         formats: which of html, json and junit to write; traces and diagram are always written.
         command: how to make this report again.
         kept: folder of kept findings about the model, see `verify_model`; None: every proof anew.
         audited: add all findings about the paper, also those that take other runs, and the proofs' mutants.
+        limits: what the scenario may ask for.
 
     Returns:
         The document, as in report.json.
 
     Raises:
+        LimitError: if the scenario asks for more than the limits.
+        FolderError: if the folder holds something that is no report.
         PluginError: if the scenario names a policy, route or task that cannot be made.
         OSError: if the folder cannot be written.
     """
+    within(scenario, limits)
     started, clock = datetime.now(UTC), time.perf_counter()
     required = [claim.id for claim in model_claims(added=scenario.claims)]
-    folder.mkdir(parents=True, exist_ok=True)  # before the work, in case it cannot be
+    folder.prepare(output)
+    if kept is not None and kept.is_dir():
+        files.sweep(kept)
     _progress(f"simulating {', '.join(scenario.runs)}")
     traces = simulate_all(scenario)
     _progress("checking claims")
@@ -130,23 +156,23 @@ def write_report(
     provenance = _provenance(scenario, started, command)
 
     _progress("writing")
-    _save_certificates(folder / "certificates", verdicts)
-    _drop_stale(folder / "trace", set(traces))
+    _drop_stale(output, set(traces))
+    _save_certificates(output / "certificates", verdicts)
     for name, of_run in traces.items():
-        trace.save(of_run, folder / "trace" / name)
-    files.write_text(folder / "diagram.dot", dot)
-    files.write_text(folder / "diagram.svg", drawn)
+        trace.save(of_run, output / "trace" / name)
+    files.write_text(output / "diagram.dot", dot)
+    files.write_text(output / "diagram.svg", drawn)
     provenance["wall_s"] = time.perf_counter() - clock
     report = document.build(
         scenario, digest, traces, verdicts, provenance, audit=findings, mutants=mutants, required=required
     )
     if "junit" in formats:
-        files.write_text(folder / "junit.xml", junit.render(report))
+        files.write_text(output / "junit.xml", junit.render(report))
     if "html" in formats:
         plates = [*draw(scenario, traces), *_refinement(verdicts)]
-        files.write_text(folder / "report.html", html.render(report, plates, drawn))
+        files.write_text(output / "report.html", html.render(report, plates, drawn))
     if "json" in formats:
-        files.write_json(folder / "report.json", report)
+        files.write_json(output / "report.json", report)
     _progress("")
     return report
 
@@ -155,10 +181,11 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="python -m airground_drake.report",
         description="Simulate all runs of a scenario, check the claims on them, and write the report.",
-        epilog="exit codes: 0 as expected, 1 a claim differs, 2 usage or bad scenario, 3 inconclusive, 4 tool error",
+        epilog="exit codes: 0 as expected, 1 a claim differs, 2 usage or bad scenario, 3 inconclusive, 4 tool error, "
+        "130 interrupted (SIGINT), 143 terminated (SIGTERM)",
     )
     parser.add_argument("scenario", nargs="?", help="name of a shipped scenario, path to a YAML file, or audit")
-    parser.add_argument("-o", "--output", type=Path, metavar="DIR", help="default: reports/<scenario>")
+    parser.add_argument("-o", "--output", type=Path, metavar="DIR", help=f"default: reports/<scenario>; {folder.RULE}")
     parser.add_argument(
         "--format", type=_formats, default=FORMATS, help="comma-separated: html,json,junit (default: all)"
     )
@@ -172,6 +199,14 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         plugins.OPTION, action="store_true", help="import and run what the scenario names as module:Class"
     )
+    parser.add_argument(
+        "--limit-steps", type=_positive, default=DEFAULT_LIMITS.work, metavar="N",
+        help="refuse a scenario that asks for more: robots moved by one step, over all runs (default: %(default).0g)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--limit-memory", type=_positive, default=DEFAULT_LIMITS.memory / GIB, metavar="GIB",
+        help="refuse a scenario that asks for more (default: %(default)g)",
+    )  # fmt: skip
     parser.add_argument("--open", action="store_true", help="open the report in a browser")
     parser.add_argument("--list", action="store_true", help="list the shipped scenarios")
     return parser
@@ -203,9 +238,19 @@ def _read_back(folder: Path, formats: Sequence[str], report: dict[str, Any]) -> 
             raise ReportError(f"{path}: read back, it is not what was written")
 
 
+def _positive(text: str) -> float:
+    value = float(text)
+    if not value > 0.0:
+        raise argparse.ArgumentTypeError(f"{text} is not allowed; wanted: a number above 0")
+    return value
+
+
 def _drop_stale(folder: Path, current: set[str]) -> None:
-    """Remove traces of an earlier report's runs that this report does not have."""
-    for meta in folder.glob("*/meta.json"):
+    """Remove what an earlier report has left that this one may not replace: pages, certificates, traces of others."""
+    for name in ("report.json", "report.html", "junit.xml"):
+        (folder / name).unlink(missing_ok=True)
+    shutil.rmtree(folder / "certificates", ignore_errors=True)
+    for meta in folder.glob("trace/*/meta.json"):
         if meta.parent.name not in current:
             shutil.rmtree(meta.parent)
 
@@ -217,8 +262,7 @@ def _refinement(verdicts: Sequence[Verdict]) -> list[Figure]:
 
 
 def _save_certificates(folder: Path, verdicts: Sequence[Verdict]) -> None:
-    """Write every certificate to <folder>/<claim>/; those of an earlier report are removed."""
-    shutil.rmtree(folder, ignore_errors=True)
+    """Write every certificate to <folder>/<claim>/."""
     for verdict in verdicts:
         for name, text in verdict.finding.certificates.items():
             files.write_text(folder / verdict.claim.id / name, text)
@@ -263,10 +307,5 @@ def _progress(text: str) -> None:
         print(f"\r\033[K{text}", end="", file=sys.stderr, flush=True)
 
 
-def entry() -> None:
-    """Console script."""
-    sys.exit(main())
-
-
 if __name__ == "__main__":
-    entry()
+    sys.exit(main())

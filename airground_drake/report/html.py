@@ -10,6 +10,7 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
+from airground_drake.errors import one_line
 from airground_drake.registry import outcome
 from airground_drake.report.figures import svg
 from airground_drake.report.figures.panels import Figure
@@ -19,6 +20,9 @@ MAX_DIAGRAM_CHARS = 500_000
 MAX_JSON_CHARS = 4_000
 LINE_CHARS = 110
 MAX_DISTANCE_ROWS = 120
+MAX_FAULT_CHARS = 300
+MAX_FAULTS = 40
+"""Different ones of a run that are listed."""
 
 CHIPS = {
     "as_expected": ("✓", "as expected", "good"),
@@ -77,8 +81,8 @@ def _environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters.update(num=number, value=value, pretty=pretty, inline=Markup)
-    environment.globals.update(chips=CHIPS, outcome=outcome)
+    environment.filters.update(num=number, value=value, pretty=pretty, together=faults_together, inline=Markup)
+    environment.globals.update(chips=CHIPS, outcome=outcome, max_faults=MAX_FAULTS)
     return environment
 
 
@@ -105,8 +109,26 @@ def value(x: Any, unit: str = "") -> str:
 
 def pretty(x: Any, limit: int = MAX_JSON_CHARS) -> str:
     """JSON for reading: what fits on a line is on a line; cut where it gets long."""
-    text = _lay_out(x, "")
+    text = "\n".join(map(one_line, _lay_out(x, "").split("\n")))
     return text if len(text) <= limit else f"{text[:limit]}\n… cut here; report.json has all of it"
+
+
+def faults_together(faults: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """What went wrong in a run, each thing once: the policy, what it said (cut), how often, of whom, first and last."""
+    together: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
+    for fault in faults:
+        together.setdefault((str(fault["policy"]), str(fault["what"])), []).append(fault)
+    return [
+        {
+            "policy": one_line(policy),
+            "what": one_line(what if len(what) <= MAX_FAULT_CHARS else f"{what[:MAX_FAULT_CHARS]}…"),
+            "count": len(alike),
+            "robots": sorted({str(fault["robot"]) for fault in alike}),
+            "first_s": alike[0]["t_s"],
+            "last_s": alike[-1]["t_s"],
+        }
+        for (policy, what), alike in together.items()
+    ]
 
 
 def _lay_out(x: Any, indent: str) -> str:

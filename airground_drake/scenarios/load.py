@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
+import itertools
 import json
 import math
 import re
@@ -28,6 +29,10 @@ from airground_drake.scenarios import validate
 from airground_drake.scenarios.schema import Scenario
 
 MAX_BYTES = 2**20
+MAX_VALUES = 50_000
+"""Values of a scenario with every alias and merge expanded."""
+MAX_DEPTH = 100
+"""Of values within values."""
 NO_LINE = -1
 """Line of what was made in Python."""
 
@@ -54,7 +59,22 @@ Children = dict[str, tuple[yaml.Node, yaml.Node]]
 
 
 class _Loader(yaml.BaseLoader):
-    """Composes nodes whose scalars are tagged by the rules of YAML 1.2."""
+    """Composes nodes whose scalars are tagged by the rules of YAML 1.2; stops when there are too many."""
+
+    count, depth = 0, 0
+
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
+        """A node and those within it.
+
+        Raises:
+            ScenarioError: if the document has more of them than MAX_VALUES, or deeper ones than MAX_DEPTH.
+        """
+        self.count, self.depth = self.count + 1, self.depth + 1
+        if self.count > MAX_VALUES or self.depth > MAX_DEPTH:
+            raise _excess(f"{self.name}:{self.line + 1}", deep=self.depth > MAX_DEPTH)
+        node: yaml.Node | None = super().compose_node(parent, index)
+        self.depth -= 1
+        return node
 
 
 for _name, (_pattern, _) in _SCALARS.items():
@@ -92,13 +112,11 @@ def load(name_or_path: str | Path, overrides: Overrides = ()) -> tuple[Scenario,
         line = data.count(b"\n", 0, error.start) + 1
         raise ScenarioError(f"{source}:{line}", "", Fault("not UTF-8 text"), "wanted: a YAML file") from None
     texts = _texts(overrides)
-    try:
-        root = _compose(text, source)
-        for override in texts:
-            root = _override(root, override)
-        scenario = _build(root, source)
-    except RecursionError:
-        raise ScenarioError(source, "", Fault("nested too deeply"), "wanted: a scenario") from None
+    root = _compose(text, source)
+    for override in texts:
+        _expanded(root)
+        root = _override(root, override)
+    scenario = _build(root, source)
     digest = files.sha256(b"\0".join([data, *(override.encode() for override in texts)]))
     return scenario, digest
 
@@ -130,19 +148,56 @@ def from_data(data: Mapping[str, Any], source: str) -> Scenario:
         ScenarioError: if it is not valid.
     """
     try:
-        return _build(_node(data, source), source)
+        root = _node(data, source)
     except RecursionError:
-        raise ScenarioError(source, "", Fault("nested too deeply"), "wanted: a scenario") from None
+        raise _excess(source, deep=True) from None
+    return _build(root, source)
 
 
 def _build(root: yaml.Node, source: str) -> Scenario:
     """The scenario of a document, checked."""
+    _expanded(root)
     scenario: Scenario = _made(root, Scenario, "", "")
     try:
         validate.check(scenario, source)
     except ScenarioError as error:
         raise ScenarioError(_where(_nearest(root, error.key)), error.key, error.value, error.allowed) from None
     return scenario
+
+
+def _expanded(root: yaml.Node) -> None:
+    """Count the values of a document with its aliases and merges expanded, looking at each node once.
+
+    Raises:
+        ScenarioError: if there are more than MAX_VALUES or deeper ones than MAX_DEPTH; one that holds itself is.
+    """
+    counted: dict[int, tuple[int, int]] = {}
+
+    def count(node: yaml.Node, above: int) -> tuple[int, int]:
+        """Number of values in a node, itself among them, and of levels."""
+        if id(node) not in counted and above < MAX_DEPTH:
+            within = [count(child, above + 1) for child in _within(node)]
+            counted[id(node)] = 1 + sum(n for n, _ in within), 1 + max((levels for _, levels in within), default=0)
+        values, levels = counted.get(id(node), (1, 1))
+        if values > MAX_VALUES or above + levels > MAX_DEPTH:
+            raise _excess(_where(node), deep=above + levels > MAX_DEPTH)
+        return values, levels
+
+    count(root, 0)
+
+
+def _within(node: yaml.Node) -> Iterable[yaml.Node]:
+    """Nodes of the items of a list, or of the keys and values of a mapping."""
+    if isinstance(node, yaml.MappingNode):
+        return itertools.chain.from_iterable(node.value)
+    return node.value if isinstance(node, yaml.SequenceNode) else ()
+
+
+def _excess(where: str, *, deep: bool) -> ScenarioError:
+    if deep:
+        return ScenarioError(where, "", Fault("nested too deeply"), f"at most {MAX_DEPTH} levels are allowed")
+    allowed = f"at most {MAX_VALUES} are allowed, with aliases and merges expanded"
+    return ScenarioError(where, "", Fault("too many values"), allowed)
 
 
 def _texts(overrides: Overrides) -> list[str]:
@@ -334,10 +389,12 @@ def _entries(node: yaml.Node, key: str) -> Children:
         entries[name.value] = (name, child)
     if "<<" in entries:
         _, template = entries.pop("<<")
+        parts = [entries]  # by precedence
         for each in template.value if isinstance(template, yaml.SequenceNode) else [template]:
             if not isinstance(each, yaml.MappingNode):
                 raise ScenarioError(_where(each), validate.dotted(key, "<<"), _value(each), "wanted: mappings to merge")
-            entries = {**_entries(each, key), **entries}
+            parts.append(_entries(each, key))
+        entries = dict(entry for part in reversed(parts) for entry in part.items())
     return entries
 
 

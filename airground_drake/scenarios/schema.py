@@ -137,7 +137,8 @@ class Gatekeeper:
     Under method (c) a decision on a proposal is reversed only for a plan that is cheaper by the (relative) switching
     margin, and not before `min_dwell_s` have passed. A decision may take `budget_iterations` of a solver and
     `budget_nodes` of a search (budget 'counted': a run is the same on every machine), or besides the share
-    `budget_share` of the sampling period by the clock (budget 'wall_clock': for real time).
+    `budget_share` of the sampling period by the clock (budget 'wall_clock': for real time). `terminal_weight_s` is the
+    w of a terminal cost w a ||rho_rd - rho_N||^2 besides (25); the paper has none.
 
     Under method (d) outcomes are compared instead, `settling_s` past the end of motion and preset trajectory. An
     accepted proposal is executed for `longest_s` at most, and given back when the UGV has been farther behind it than
@@ -151,6 +152,7 @@ class Gatekeeper:
     stages: int = 60
     error_weight_1_m2_s: float = 1.0
     slack_weight_1_m2_s: float = field(default=1000.0, metadata=FROM_ZERO)
+    terminal_weight_s: float = field(default=0.0, metadata=FROM_ZERO)
     switching_margin: float = field(default=0.05, metadata=FROM_ZERO)
     min_dwell_s: float = field(default=0.2, metadata=FROM_ZERO)
     budget: str = "counted"
@@ -229,7 +231,7 @@ class Scenario:
     stall_tolerance_m: float = 0.1
     ugvs: dict[str, Ugv] = field(default_factory=dict, metadata=REQUIRED)
     uav: Uav = field(default_factory=Uav, metadata=REQUIRED)
-    obstacles: dict[str, Obstacle] = field(default_factory=dict, metadata=REQUIRED)
+    obstacles: dict[str, Obstacle] = field(default_factory=dict)
     safe_distance: SafeDistance = field(default_factory=SafeDistance)
     control: Control = field(default_factory=Control)
     decision: Decision = field(default_factory=Decision)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+import unicodedata
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import fields, is_dataclass
@@ -39,6 +40,7 @@ SOURCES: tuple[str, ...] = ("calibrated", "ours")
 BUDGETS: tuple[str, ...] = ("counted", "wall_clock")
 
 MAX_UGVS, MAX_STAGES, MAX_SEED = 100, 1000, 2**31 - 1
+MAX_NAME, MAX_TEXT = 64, 10_000  # characters
 LARGEST, SMALLEST = 1e9, 1e-9  # of any number; of a positive number: products and quotients stay finite
 TOLERANCE = 1e-9  # m between points; relative between periods
 _SHORT = 1.0 - 1e-5  # of a limit that is printed with six digits, so that what a message allows is allowed
@@ -120,6 +122,22 @@ def _bounds(scenario: Scenario) -> Problems:
                 yield dotted(key, field.name), getattr(value, field.name), allowed
 
 
+def _texts(scenario: Scenario) -> Problems:
+    """No text may take anything else's place where it is shown: no control characters, nothing that turns writing."""
+    for key, _, value in _nodes(scenario):
+        if isinstance(value, str):
+            if hidden := next(filter(_is_hidden, value), None):
+                allowed = "text without control characters and without marks that turn the direction of writing"
+                yield key, hidden, allowed
+            if len(value) > MAX_TEXT:
+                yield key, value, f"at most {MAX_TEXT} characters are allowed"
+
+
+def _is_hidden(character: str) -> bool:
+    """Whether a character shows only by what it does to others; line breaks, tabs and joiners are not meant."""
+    return character not in "\n\t\u200c\u200d" and unicodedata.category(character) in ("Cc", "Cf", "Cs", "Zl", "Zp")
+
+
 def _names(scenario: Scenario) -> Problems:
     bodies = [(f"ugvs.{name}", name) for name in scenario.ugvs]
     bodies += [("uav.name", scenario.uav.name), *((f"obstacles.{name}", name) for name in scenario.obstacles)]
@@ -130,6 +148,8 @@ def _names(scenario: Scenario) -> Problems:
     for key, name in (*bodies, *others):
         if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", name):
             yield key, name, "a name of letters, digits and underscores that does not begin with a digit"
+        if len(name) > MAX_NAME:
+            yield key, name, f"a name of at most {MAX_NAME} characters"
         if count[name] > 1:
             yield key, name, "a name that no other UGV, obstacle or UAV has"
 
@@ -176,8 +196,9 @@ def _runs(scenario: Scenario) -> Problems:
         yield from _one_of(f"expected.{claim}", claim, known, "one of the claims about the model")
         yield from _expectation(f"expected.{claim}", status)
     for claim, place in scenario.claims.items():
-        if claim in (*RUN_CLAIMS, *MODEL_CLAIMS) or not re.fullmatch(r"[A-Z][A-Z0-9-]*", claim):
-            yield f"claims.{claim}", claim, "a new identifier of capitals, digits and hyphens, such as MY-CLAIM"
+        if claim in (*RUN_CLAIMS, *MODEL_CLAIMS) or not re.fullmatch(rf"[A-Z][A-Z0-9-]{{,{MAX_NAME - 1}}}", claim):
+            what = f"a new identifier of at most {MAX_NAME} capitals, digits and hyphens, such as MY-CLAIM"
+            yield f"claims.{claim}", claim, what
         if not is_plugin(place):
             yield f"claims.{claim}", place, PLUGIN
 
@@ -364,7 +385,7 @@ def _choices(scenario: Scenario) -> Problems:
 
 
 CHECKS: tuple[Callable[[Scenario], Problems], ...] = (
-    _finite, _bounds, _counts, _names, _options, _runs, _points, _presets, _gains, _periods, _release,
+    _finite, _bounds, _counts, _texts, _names, _options, _runs, _points, _presets, _gains, _periods, _release,
     _distances, _sensing, _extent, _clearances, _reproduction, _choices,
 )  # fmt: skip
 """Every rule; later ones rely on earlier ones (finite numbers, three coordinates)."""

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from airground_drake import interruption
+
+if __name__ == "__main__":
+    interruption.end_on_signals()  # before the imports, which take seconds
+
 import argparse
 import json
 import sys

@@ -570,6 +570,13 @@ GATEKEEPER = (
         "total += terms.slack_weight * slack",
     ),
     Mutant(
+        "the terminal cost is forgotten",
+        "gatekeeper/cost.py",
+        "weights[-1] *= 1.0 + terminal_weight / dt",
+        "weights[-1] *= 1.0",
+        tests=("tests/gatekeeper/test_cost.py",),
+    ),
+    Mutant(
         "what a UGV might come near is left out",
         "gatekeeper/prediction.py",
         "near = ((gap < 0.0) & ",

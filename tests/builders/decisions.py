@@ -20,7 +20,7 @@ from builders.layout import decision_table
 from builders.scenarios import AWAY
 from builders.simulation import simulate
 
-STAGES, STAGE_S = 8, 0.05
+STAGES, STAGE_S, TERMINAL_S = 8, 0.05, 0.03
 
 ALL_PLANS = np.array(list(product((0.0, 1.0), repeat=STAGES)))
 
@@ -36,13 +36,14 @@ class GateData:
         centres: Array,
         distances: Array,
         slack_weight: float = 10.0,
+        terminal_weight: float = TERMINAL_S,
     ) -> None:
         rng = np.random.default_rng(seed)
         planar = np.array([1.0, 1.0, 0.0])
         self.accept = (np.array([2.0, 3.0, 0.0]) + rng.uniform(-1.0, 1.0, (STAGES, 3))) * planar
         self.refuse = (np.array([0.0, 0.5, 0.0]) + rng.uniform(-0.4, 0.4, (STAGES, 3))) * planar
         self.initial, self.reference, self.centres, self.distances = initial, reference, centres, distances
-        self.error_weight, self.slack_weight = 1.0, slack_weight
+        self.error_weight, self.slack_weight, self.terminal_weight = 1.0, slack_weight, terminal_weight
         self.guide = min((self.positions(np.full(STAGES, mode)) for mode in (0.0, 1.0)), key=self.cost)
         away = self.guide[:, None] - centres
         self.normals = away / np.linalg.norm(away, axis=2)[:, :, None]
@@ -55,7 +56,7 @@ class GateData:
         return np.array(path)
 
     def cost(self, positions: Array, along: bool = False) -> float:
-        total = 0.0
+        total = self.terminal_weight * self.error_weight * np.sum((self.reference[-1] - positions[-1]) ** 2)
         for k, at in enumerate(positions):
             slack = 0.0
             for j, distance in enumerate(self.distances):
@@ -94,6 +95,7 @@ def gate_scenario(route: str) -> dict[str, Any]:
         return Ugv([x, 0.0, 0.0], [x, 9.0, 0.0], Preset([[x, 2.0, 0.0], [x, 9.0, 0.0]], 1.0))
 
     gate = Gatekeeper(route=route, horizon_s=STAGES * STAGE_S, stages=STAGES, slack_weight_1_m2_s=10.0)
+    gate.terminal_weight_s = TERMINAL_S
     spec = Scenario(
         duration_s=0.5, ugvs={"ugv1": ugv(0.0), "ugv2": ugv(-3.0)}, uav=AWAY, gatekeeper=gate,
         obstacles={"rock": Obstacle([1.2, 2.4, 0.0]), "far": Obstacle([30.0, 0.0, 0.0])}, runs={"c": Run("c")},
@@ -176,7 +178,7 @@ def decided_run(route: str = "relaxed") -> Trace:
             found.plan, found.positions, found.relaxed, found.rounded, found.normals,
         )  # fmt: skip
         flat = [[] if array is None else array.ravel().tolist() for array in arrays]
-        problems.append([STAGE_S, data.error_weight, data.slack_weight, *flat])
+        problems.append([STAGE_S, data.error_weight, data.slack_weight, data.terminal_weight, *flat])
     return replace(
         base,
         decisions=decision_table(decisions),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,11 +15,11 @@ from airground_drake.nsbc.motion import Motion
 Array = npt.NDArray[np.float64]
 
 
-def mate(name: str, position: Sequence[float], target: Sequence[float], **more: object) -> Teammate:
+def mate(name: str, position: Sequence[float], target: Sequence[float], **more: Any) -> Teammate:
     """A UGV in the plane whose preset has ended at its target; triggered and standing unless `more` says otherwise."""
     goal = np.array([*target, 0.0])
     known = Teammate(name, np.array([*position, 0.0]), goal, Motion(np.zeros(1), goal[None]), 1.0, True, True)
-    return replace(known, **more)  # type: ignore[arg-type]
+    return replace(known, **more)
 
 
 def seen(team: Sequence[Teammate], obstacles: Sequence[Sequence[float]] = (), *, robot: int = 0) -> Observation:

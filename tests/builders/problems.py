@@ -22,7 +22,7 @@ LAW = UgvLaw(Avoidance(3.0, 0.05, 4.0), 2.0, 1.5, intervention_on_top=False)
 
 
 def random_problem(seed: int, stages: int = 24, points: int = 2) -> Problem:
-    """Mode velocities and references without any structure, of both modes independent."""
+    """Mode velocities and references without any structure, of both modes independent; odd: with a terminal cost."""
     rng = np.random.default_rng(seed)
 
     def plane(*shape: int) -> np.ndarray:
@@ -31,7 +31,7 @@ def random_problem(seed: int, stages: int = 24, points: int = 2) -> Problem:
     accept, refuse, reference = plane(stages), plane(stages), plane(stages)
     centres = np.repeat(rng.uniform(-3, 3, (1, points, 3)) * [1, 1, 0], stages, axis=0)
     distances = rng.uniform(0.2, 1.2, points)
-    return Problem(0.05, np.zeros(3), accept, refuse, reference, centres, distances, 1.0, 200.0)
+    return Problem(0.05, np.zeros(3), accept, refuse, reference, centres, distances, 1.0, 200.0, 0.7 * (seed % 2))
 
 
 def rolled_out(seed: int) -> Problem:
@@ -90,6 +90,7 @@ def instances() -> dict[str, Problem]:
         "case A, stalled, intervention on top": case_a_problem(STALL, 14.55, ROUND, True),
         "case A, on the way": case_a_problem((5.2, 5.3), 15.2, ROUND, False),
         "case A, into the obstacle": case_a_problem(STALL, 14.55, ((4.0, 7.0),), True),
+        "rolled out, a terminal cost": replace(rolled_out(1), terminal_weight=0.5),
         "no points": with_points(plain, np.zeros((0, 3)), []),
         "a point at the robot": with_points(plain, np.zeros(3), [0.8]),
         "deep inside a large disc": with_points(plain, np.array([[0.1, 0, 0], [0.3, 0, 0]]), [5.0, 0.1]),

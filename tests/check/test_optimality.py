@@ -9,7 +9,7 @@ from airground_drake.check.decisions import Decision
 from airground_drake.check.optimality import enclose, least_squares
 
 
-def decision(relaxed: np.ndarray, centres_m: list[list[float]]) -> Decision:
+def decision(relaxed: np.ndarray, centres_m: list[list[float]], terminal_weight_s: float) -> Decision:
     """Accepting leads along x at 1 m/s, towards the reference and between the points; refusing stays."""
     n = len(relaxed)
     offset = np.array([0.0, 0.0, 0.0]) - centres_m
@@ -19,6 +19,7 @@ def decision(relaxed: np.ndarray, centres_m: list[list[float]]) -> Decision:
         dt_s=0.1,
         error_weight_1_m2_s=1.0,
         slack_weight_1_m2_s=50.0,
+        terminal_weight_s=terminal_weight_s,
         initial_m=np.zeros(3),
         accept_m_s=np.tile([1.0, 0.0, 0.0], (n, 1)),
         refuse_m_s=np.zeros((n, 3)),
@@ -46,12 +47,15 @@ def least_cost(problem: Decision, steps: int = 20000) -> float:
     return best
 
 
+@pytest.mark.parametrize("terminal_weight_s", [0.0, 0.4])
 @pytest.mark.parametrize("centres", [[[1.5, 0.3, 0.0]], [[1.5, 0.3, 0.0], [1.5, -0.3, 0.0]]])
-def test_the_bound_is_below_what_can_be_had_and_close_to_it(centres: list[list[float]]) -> None:
+def test_the_bound_is_below_what_can_be_had_and_close_to_it(
+    centres: list[list[float]], terminal_weight_s: float
+) -> None:
     rng = np.random.default_rng(1)
-    start = decision(np.full(12, 0.5), centres)
+    start = decision(np.full(12, 0.5), centres, terminal_weight_s)
     for _ in range(20):
-        found = enclose(decision(rng.uniform(0.0, 1.0, 12), centres))
+        found = enclose(decision(rng.uniform(0.0, 1.0, 12), centres, terminal_weight_s))
         assert found.lower <= least_cost(start) + 1e-9 <= found.upper + 1e-9
 
 

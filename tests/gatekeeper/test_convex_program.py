@@ -104,6 +104,7 @@ def test_a_program_of_other_data_is_refuted() -> None:
         (TEAM[0], replace(TEAM[1], accept=TEAM[1].refuse), TEAM[2]),
         (TEAM[0], replace(TEAM[1], distances=TEAM[1].distances + 0.5), TEAM[2]),
         (TEAM[0], replace(TEAM[1], slack_weight=1.0), TEAM[2]),
+        (TEAM[0], replace(TEAM[1], terminal_weight=0.0), TEAM[2]),
     ):
         with pytest.raises(AssertionError):
             check_program(team_program(wrong, normals, relaxed=True), TEAM, normals)

@@ -112,6 +112,13 @@ def test_the_way_left_goes_round() -> None:
     assert left == pytest.approx(2.0 * np.sqrt(12.0) + 2.0 * np.pi / 3.0)
 
 
+def test_of_very_many_circles_those_beside_the_way_count() -> None:
+    far = np.array([[x, y, 0.0] for x in range(-50, 50, 5) for y in (40.0, 50.0, 60.0)])
+    discs = np.concatenate([far, [[4.0, 0.0, 0.0]]])
+    left = way_left(np.zeros(3), np.array([8.0, 0.0, 0.0]), discs, 2.0)
+    assert left == pytest.approx(2.0 * np.sqrt(12.0) + 2.0 * np.pi / 3.0)
+
+
 def test_the_terminal_cost_falls_along_the_way_by_what_is_left_squared() -> None:
     """The condition of the stability theory: dV = -L^2 dt, and L is no less than the distance to the goal."""
     scene, discs = situation((4.0, 0.0))

@@ -15,5 +15,6 @@ def test_no_plan_costs_less_than_what_remains(seed: int, omega: np.ndarray) -> N
     problem = random_problem(seed)
     positions = problem.positions(omega)
     stage = problem.dt * np.square(problem.reference - positions).sum(axis=1)  # no slack is cheapest
+    stage[-1] *= 1.0 + problem.terminal_weight / problem.dt
     to_come = np.append(np.cumsum(stage[::-1])[::-1], 0.0)
     assert (remaining_cost(problem) <= to_come + 1e-9).all()

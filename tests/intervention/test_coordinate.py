@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -78,8 +79,8 @@ def test_a_parked_robot_is_asked_aside_and_back_only_where_it_is_in_the_way() ->
     ],
     ids=["refused often", "resting", "asked this instant"],
 )
-def test_who_is_unwilling_is_not_asked(unwilling: dict[str, object]) -> None:
-    assert Coordinate().propose(seen([COMES, replace(PARKED, **unwilling)], BAY)) is None  # type: ignore[arg-type]
+def test_who_is_unwilling_is_not_asked(unwilling: dict[str, Any]) -> None:
+    assert Coordinate().propose(seen([COMES, replace(PARKED, **unwilling)], BAY)) is None
 
 
 def test_a_robot_that_follows_a_proposal_is_left_to_it() -> None:

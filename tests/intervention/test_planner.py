@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import pytest
@@ -25,13 +26,13 @@ def wait(seconds: float) -> Motion:
 class Scripted(Policy):
     """Proposes what it is told; remembers what it saw."""
 
-    def __init__(self, *answers: object) -> None:
+    def __init__(self, *answers: Any) -> None:
         self.answers = list(answers)
         self.seen: list[Observation] = []
 
     def propose(self, seen: Observation) -> Mapping[str, Motion] | None:
         self.seen.append(seen)
-        return self.answers.pop(0) if self.answers else None  # type: ignore[return-value]
+        return self.answers.pop(0) if self.answers else None
 
 
 def planner(policy: Policy) -> Planner:

@@ -68,6 +68,9 @@ def test_an_unexpected_verdict_is_exit_code_1(tmp_path: Path, capsys: pytest.Cap
         (["case_a", "--seed", "-1"], "seed"),
         (["case_a", "--set", "intervention.policies.0.name=teleport"], "teleport"),
         (["case_a", "--set", "intervention.policies.0.parameters.warp=9"], "warp"),
+        (["case_a", "--set", "decision.noise_period_s=1e-9"], "allowed: 1e+07 steps, 8 GiB"),
+        (["case_a", "--limit-steps", "100"], "allowed: 1e+02 steps, 8 GiB"),
+        (["case_a", "--limit-memory", "0.1"], "allowed: 1e+07 steps, 0.1 GiB"),
     ],
 )
 def test_a_users_mistake_is_one_line_and_exit_code_2(
@@ -80,7 +83,10 @@ def test_a_users_mistake_is_one_line_and_exit_code_2(
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("arguments", [[], ["case_a", "--format", "pdf"], ["case_a", "--seed", "x"], ["--what"]])
+@pytest.mark.parametrize(
+    "arguments",
+    [[], ["case_a", "--format", "pdf"], ["case_a", "--seed", "x"], ["--what"], ["case_a", "--limit-steps", "-1"]],
+)
 def test_usage_errors_are_exit_code_2(arguments: list[str]) -> None:
     with pytest.raises(SystemExit) as stopped:
         main(arguments)
@@ -91,6 +97,13 @@ def test_a_folder_that_cannot_be_written_is_exit_code_4(tmp_path: Path, capsys: 
     (tmp_path / "file").write_text("in the way")
     assert main(["case_a", "--set", "duration_s=1", "-o", str(tmp_path / "file")]) == 4
     assert capsys.readouterr().err.startswith("error: ")
+
+
+def test_a_folder_of_something_else_is_exit_code_2(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "thesis.tex").write_text("mine")
+    assert main(["case_a", "-o", str(tmp_path)]) == 2
+    assert "holds 'thesis.tex' and no report" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
 
 
 def test_the_shipped_scenarios_are_listed(capsys: pytest.CaptureFixture[str]) -> None:

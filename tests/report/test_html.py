@@ -62,7 +62,7 @@ def hostile_page() -> str:
     scenario.runs[HOSTILE] = Run("b")
     traces = make_traces(scenario)
     traces[HOSTILE] = make_trace(scenario, HOSTILE, events=[event(1.0, HOSTILE, HOSTILE)])
-    traces[HOSTILE].meta["faults"].append({"what": HOSTILE})
+    traces[HOSTILE].meta["faults"].append({"t_s": 1.0, "robot": HOSTILE, "policy": HOSTILE, "what": HOSTILE})
     claim = type(
         "Hostile", (Kept,), {"id": HOSTILE, "statement": HOSTILE, "formula": HOSTILE, "assumptions": (HOSTILE,)}
     )
@@ -70,6 +70,16 @@ def hostile_page() -> str:
     report = built(scenario, traces, [*FINE, Verdict(claim(), HOSTILE, finding, "holds")])
     report["provenance"][HOSTILE] = report["provenance"]["command"] = HOSTILE
     return html.render(report, draw.draw(scenario, traces), DIAGRAM)
+
+
+def test_faults_are_told_once_each_cut_and_without_what_turns_or_breaks_lines() -> None:
+    alike = [{"t_s": 0.5 * k, "robot": f"ugv{k % 2}", "policy": "p", "what": "ValueError: no"} for k in range(900)]
+    other = {"t_s": 7.0, "robot": "ugv1", "policy": "q", "what": "\u202eevil\n\x1b[2J" + "x" * 9000}
+    one, cut = html.faults_together([*alike, other])
+    assert (one["count"], one["first_s"], one["last_s"], one["robots"]) == (900, 0.0, 449.5, ["ugv0", "ugv1"])
+    assert cut["what"].startswith("\\u202eevil\\n\\x1b[2J")
+    assert len(cut["what"]) < html.MAX_FAULT_CHARS + 30
+    assert html.pretty({"a": "\u202e"}) == '{"a": "\\u202e"}'
 
 
 @pytest.fixture(scope="module")

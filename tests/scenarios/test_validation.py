@@ -51,6 +51,11 @@ BAD: list[tuple[str, object, list[str]]] = [
     ("reproduction.0.paper", [math.inf], ["reproduction.0.paper.0: inf", "a finite number"]),
     # names
     ("name", "a b", ["name: 'a b'", "letters, digits and underscores"]),
+    ("name", "n" * 65, ["name: 'nnn", "a name of at most 64 characters"]),
+    ("runs." + "r" * 65, {"method": "a"}, ["'rrr", "a name of at most 64 characters"]),
+    ("title", "a\u202eb", ["title: '\\u202e'", "the direction of writing"]),
+    ("description", "\x1b[2J", ["description: '\\x1b'", "control characters"]),
+    ("choices.0.reason", "r" * 10_001, ["choices.0.reason: 'rrr", "at most 10000 characters"]),
     ("name", "../x", ["name: '../x'", "letters, digits and underscores"]),
     ("ugvs.two ", DATA["ugvs"]["ugv1"], ["'two '", "letters"]),
     ("obstacles.1st", {"position_m": [50, 50, 0]}, ["obstacles.1st: '1st'", "does not begin with a digit"]),

@@ -13,6 +13,7 @@ from pydrake.systems.primitives import ConstantVectorSource
 
 from airground_drake import components
 from airground_drake.diagram import build_diagram, make_monitor
+from airground_drake.nsbc.avoidance import Composition
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.simulation import EVENT_ACCURACY
@@ -27,11 +28,11 @@ def watched(
     honest: Scenario | None = None,
     *,
     terminate: bool = False,
-    composition: str = "augmented",
+    composition: Composition = "augmented",
 ) -> tuple[Violation | None, SimulatorStatus]:
     """Run a monitored diagram; the monitor is made from another scenario if one is given."""
-    monitor = make_monitor(honest or scenario, method, composition, terminate=terminate)  # type: ignore[arg-type]
-    diagram = build_diagram(scenario, method, composition, monitor=monitor)  # type: ignore[arg-type]
+    monitor = make_monitor(honest or scenario, method, composition, terminate=terminate)
+    diagram = build_diagram(scenario, method, composition, monitor=monitor)
     context = diagram.CreateDefaultContext()
     diagram.SetRandomContext(context, RandomGenerator(scenario.seed))
     context.SetAccuracy(EVENT_ACCURACY)

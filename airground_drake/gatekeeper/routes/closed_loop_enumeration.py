@@ -191,4 +191,4 @@ def _smallest() -> Problem:
         distances=np.zeros(0), shares=np.zeros(0), max_speed=1.0, motion_gain=1.0, intervention_gain=1.0,
         avoidance_gain=1.0, period=1.0, sensing_range=1.0, composition=0, intervention_on_top=False, substeps=1,
     )  # fmt: skip
-    return Problem(1.0, np.zeros(3), row, row, row, np.zeros((1, 0, 3)), np.zeros(0), 1.0, 1.0, loop)
+    return Problem(1.0, np.zeros(3), row, row, row, np.zeros((1, 0, 3)), np.zeros(0), 1.0, 1.0, loop=loop)

@@ -143,8 +143,9 @@ def relaxation(problem: Problem, start: Evaluation) -> Relaxation:
     u = program.NewContinuousVariables(stages, "u")
     r = program.NewContinuousVariables(len(stage), "r")
 
-    for name, weight, variables in (("error", problem.error_weight, e), ("slack", problem.slack_weight, u)):
-        hessian = 2.0 * weight * dt * np.eye(len(variables))
+    of_error, of_slack = problem.terms.error_weights.repeat(_AXES), np.full(stages, problem.slack_weight)
+    for name, weights, variables in (("error", of_error, e), ("slack", of_slack, u)):
+        hessian = np.diag(2.0 * weights * dt)
         cost = program.AddQuadraticCost(hessian, np.zeros(len(variables)), variables, is_convex=True)
         cost.evaluator().set_description(f"(25) {name}")
     program.AddBoundingBoxConstraint(0.0, 1.0, omega).evaluator().set_description("(27c) relaxed")

@@ -35,6 +35,7 @@ RELATIVE_WIDTH = Fraction(1, 10**12)
 _BINARY = {ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv}
 _flint = threading.Lock()  # flint's precision is one for all threads
 
+Relation = Literal["<", ">"]
 Values = Mapping[str, Fraction]
 
 
@@ -46,7 +47,7 @@ class Sign:
     says: str
     expression: str
     values: Values
-    sign: Literal["<", ">"]
+    sign: Relation
 
     def holds(self) -> bool | None:
         """None: the ball contains 0."""
@@ -160,7 +161,7 @@ def bracket(
     name: str, says: str, expression: str, values: Values, ends: Sequence[Fraction], rising: bool = True
 ) -> list[Statement]:
     """The two statements that the expression changes its sign between the ends."""
-    signs: tuple[Literal["<", ">"], ...] = ("<", ">") if rising else (">", "<")
+    signs: tuple[Relation, ...] = ("<", ">") if rising else (">", "<")
     only = {key: value for key, value in values.items() if key in _names(expression)}
     return [
         Sign(f"{name}_{side}", says, expression, {**only, "u": u}, sign)
@@ -168,7 +169,7 @@ def bracket(
     ]
 
 
-def sign(name: str, says: str, expression: str, values: Values, relation: Literal["<", ">"]) -> Sign:
+def sign(name: str, says: str, expression: str, values: Values, relation: Relation) -> Sign:
     """A sign statement with the values that its expression names."""
     return Sign(name, says, expression, {key: values[key] for key in _names(expression)}, relation)
 

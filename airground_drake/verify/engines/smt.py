@@ -17,6 +17,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+from airground_drake.interruption import end_with_parent
+
 Solver = Literal["z3", "cvc5", "cvc5_proof"]
 Answer = Literal["sat", "unsat", "unknown", "timeout", "error"]
 
@@ -171,7 +173,8 @@ def _text(value: str | bytes) -> str:
 
 
 def main() -> None:
-    """Answer the scripts on stdin one by one."""
+    """Answer the scripts on stdin one by one, for as long as somebody waits for the answers."""
+    end_with_parent()
     decide = {"z3": _z3, "cvc5": _cvc5, "cvc5_proof": _cvc5_proof}[sys.argv[1]]
     for script in json.load(sys.stdin):
         try:

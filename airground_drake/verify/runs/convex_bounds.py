@@ -36,15 +36,15 @@ def enclose(rows: Sequence[Row]) -> list[Enclosure]:
     found = []
     for row, omega, solved in zip(rows, shares, multipliers, strict=True):
         dt = row.dt
-        error = row.error_weight
+        error = row.error_weight * row.lasting[:, None]
         slack = row.slack_weight
         normals = row["normals"]
         multiplier = solved * row.scale if slack > 0.0 else 0.0 * solved
         positions = row.positions(omega)
         away = positions - row["reference_m"]
-        value = dt * error * np.square(away).sum() - (multiplier * row.gaps(positions, normals)).sum()
+        value = (error * np.square(away)).sum() - (multiplier * row.gaps(positions, normals)).sum()
         value -= np.square(multiplier.sum(axis=1)).sum() / (4.0 * dt * slack) if slack > 0.0 else 0.0
-        by_position = 2.0 * dt * error * away - np.einsum("km,kmi->ki", multiplier, normals)
+        by_position = 2.0 * error * away - np.einsum("km,kmi->ki", multiplier, normals)
         change = dt * (row["accept_m_s"] - row["refuse_m_s"])
         slope = np.einsum("ki,ki->k", change, np.cumsum(by_position[::-1], axis=0)[::-1])
         corner = np.minimum(-slope * omega, slope * (1.0 - omega))
@@ -79,14 +79,14 @@ def _solve(rows: Sequence[Row]) -> tuple[list[Array], list[Array]]:
     facing = sparse.bsr_matrix((normals, at, np.arange(count + 1)), shape=(count, 3 * total)).tocsr()
     picks = sparse.csr_matrix((np.ones(count), at, np.arange(count + 1)), shape=(count, total))
     least = np.concatenate([-row.gaps(row["reference_m"], row["normals"]).ravel() for row in rows])
-    weights = [(row.dt * row.error_weight / row.scale, row.dt * row.slack_weight / row.scale) for row in rows]
-    of_error, of_slack = np.sqrt(weights).T
+    of_error = np.sqrt(np.concatenate([row.error_weight * row.lasting / row.scale for row in rows]))
+    of_slack = np.sqrt([row.dt * row.slack_weight / row.scale for row in rows])
     e = cp.Variable(3 * total)
     omega = cp.Variable(total)
     u = cp.Variable(total)
     constraints = [dynamics @ e - steering @ omega == drift.ravel(), omega >= 0.0, omega <= 1.0, u >= 0.0]
     constraints += [facing @ e + picks @ u >= least] if count else []
-    error = cp.sum_squares(cp.multiply(np.repeat(of_error, 3 * stages), e))
+    error = cp.sum_squares(cp.multiply(np.repeat(of_error, 3), e))
     slack = cp.sum_squares(cp.multiply(np.repeat(of_slack, stages), u))
     cp.Problem(cp.Minimize(error + slack), constraints).solve(solver=cp.CLARABEL)
     if omega.value is None:

@@ -40,8 +40,9 @@ class GateFeas(GateClaim):
     )
     formula = (
         "rho(0) = p(t); omega in {0, 1}; rho_k = rho_(k-1) + dt (omega_k a_k + (1 - omega_k) b_k); u_k = max(0, max_j "
-        "d_j - ||rho_k - o_jk||); objective = dt sum_k a ||rho_rd - rho_k||^2 + b u_k^2; reference, centres and "
-        "distances as the scenario and the signals at t have them; answer = rules(costs, standing answer)"
+        "d_j - ||rho_k - o_jk||); objective = dt sum_k a ||rho_rd - rho_k||^2 + b u_k^2, and the terminal "
+        "cost w a ||rho_rd - rho_N||^2 (w = 0 unless the scenario says so); reference, centres, distances and weights "
+        "as the scenario and the signals at t have them; answer = rules(costs, standing answer)"
     )
     method = (
         "All recomputed in numpy from the scenario, the signals and the recorded mode velocities. A sensed obstacle or "
@@ -133,6 +134,7 @@ def compare_situation(trace: Trace, row: Row) -> Iterator[Off]:
     yield Off(row, "length of a stage, s", row.dt - after[0], TIME_TOLERANCE_S)
     yield Off(row, "weight of task errors", row.error_weight - gate["error_weight_1_m2_s"], 0.0)
     yield Off(row, "weight of slack", row.slack_weight - gate["slack_weight_1_m2_s"], 0.0)
+    yield Off(row, "weight of the terminal cost", row.terminal_weight - gate["terminal_weight_s"], 0.0)
     own = interpolate(trace.t, trace.position(robot), t)
     yield Off(row, "initial position, m", row["initial_m"] - own, POSITION_TOLERANCE_M, position_m=own.tolist())
     reference = travelled(np.asarray(preset["waypoints_m"], dtype=np.float64), preset["speed_m_s"], t + after)

@@ -61,8 +61,9 @@ class GateOpt(ProblemClaim):
     )
     formula = (
         "L <= min J_n <= U, U - L <= 1e-5 C; route_bound <= U + 1e-5 C; route_bound >= L - 1e-3 C (relaxed); "
-        "(J(plan) - L) / C <= 0.05; J(plan) <= J(0), J(1); C = min(J(0), J(1)); J is (25), J_n >= J with distances "
-        "along unit normals n"
+        "(J(plan) - L) / C <= 0.05; J(plan) <= J(0), J(1); C = min(J(0), J(1)); J is (25) and the "
+        "terminal cost w a ||rho_rd - rho_N||^2 (w = 0 unless the scenario says so), J_n >= J with distances along "
+        "unit normals n"
     )
     method = (
         "Route 'relaxed': the half-plane relaxations of all decisions, from recorded data and normals, are stacked "

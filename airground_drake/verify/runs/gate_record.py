@@ -36,6 +36,7 @@ class Row:
         dt: length of a stage, s.
         error_weight: a of (25), 1/(m^2 s).
         slack_weight: b of (25), 1/(m^2 s).
+        terminal_weight: w of the terminal cost w a ||rho_rd - rho_N||^2 that is added to (25), s.
         data: arrays of `Trace.problems` by name, in the shapes that are stated there; None where empty.
     """
 
@@ -43,6 +44,7 @@ class Row:
     dt: float
     error_weight: float
     slack_weight: float
+    terminal_weight: float
     data: dict[str, Array | None]
 
     def __getitem__(self, name: str) -> Array:
@@ -81,11 +83,16 @@ class Row:
         """The least of the `gaps` of each stage, (..., N), m; infinite without points."""
         return self.gaps(positions, normals).min(axis=-1, initial=np.inf)
 
+    @cached_property
+    def lasting(self) -> Array:
+        """What the task error at the end of each stage counts for, (N,), s: the stage, and at the last w besides."""
+        return np.append(np.full(len(self["reference_m"]) - 1, self.dt), self.dt + self.terminal_weight)
+
     def cost(self, positions: Array, normals: Array | None = None) -> Any:
-        """(25) by the right-hand rectangle rule, slack being max(0, d - distance); (...)."""
-        error = np.square(positions - self["reference_m"]).sum(axis=(-1, -2))
+        """(25) by the right-hand rectangle rule, slack being max(0, d - distance), and the terminal cost; (...)."""
+        error = np.square(positions - self["reference_m"]).sum(axis=-1) @ self.lasting
         slack = np.square(np.minimum(0.0, self.clearance(positions, normals))).sum(axis=-1)
-        return self.dt * (self.error_weight * error + self.slack_weight * slack)
+        return self.error_weight * error + self.dt * self.slack_weight * slack
 
     @cached_property
     def constant(self) -> Array:
@@ -111,7 +118,7 @@ def rows_of(trace: Trace) -> list[Row]:
         scalars = [float(problem[name]) for name in PROBLEM_SCALARS]
         flat = {name: np.asarray(problem[name], dtype=np.float64).ravel() for name in PROBLEM_ARRAYS}
         columns = {str(name): value for name, value in given.items()}
-        row = Row(columns, scalars[0], scalars[1], scalars[2], _shaped(flat, int(gate["stages"])))
+        row = Row(columns, scalars[0], scalars[1], scalars[2], scalars[3], _shaped(flat, int(gate["stages"])))
         numbers = [np.array(scalars), np.array([v for v in given.values() if isinstance(v, float)]), *flat.values()]
         if not all(np.isfinite(values).all() for values in numbers):
             raise TraceError(f"{row.label}: it or its problem has numbers that are not finite")
@@ -134,7 +141,7 @@ def bare_rows_of(trace: Trace) -> list[Row]:
         raise TraceError(f"{len(trace.problems)} problems, though outcomes are compared")
     rows = []
     for given in trace.decisions.to_dict("records"):
-        row = Row({str(name): value for name, value in given.items()}, -1.0, -1.0, -1.0, {})
+        row = Row({str(name): value for name, value in given.items()}, -1.0, -1.0, -1.0, -1.0, {})
         if not np.isfinite([value for value in given.values() if isinstance(value, float)]).all():
             raise TraceError(f"{row.label}: it has numbers that are not finite")
         if given["robot"] not in trace.ugvs:

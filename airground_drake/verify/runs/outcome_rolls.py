@@ -25,6 +25,8 @@ STILL_M = 0.05
 """Less than this within the last second is at rest, m."""
 AROUND = 48
 """Points around each safe circle."""
+MOST_CLAIMED = 64
+"""Obstacles of a message that a UGV takes into account."""
 
 
 class Foreseen(NamedTuple):
@@ -124,7 +126,10 @@ def _concluded(
 
 
 def known_discs(trace: Trace, robot: str, t: float, on: Sent) -> Array:
-    """Obstacles that a UGV has sensed up to a time, and those of the message that it would not sense, (k, 3), m."""
+    """Obstacles that a UGV has sensed up to a time, and those of the message that it would not sense, (k, 3), m.
+
+    Of the latter no more than the `MOST_CLAIMED` nearest.
+    """
     sensing, gate_s = trace.scenario["control"]["sensing_range_m"], trace.scenario["gatekeeper"]["period_s"]
     samples = gate_s * np.arange(round(t / gate_s) + 1.0)
     was = interpolate(trace.t, trace.position(robot), np.minimum(samples, t))
@@ -134,7 +139,9 @@ def known_discs(trace: Trace, robot: str, t: float, on: Sent) -> Array:
     hidden = np.linalg.norm(on.mapped_m - was[-1], axis=1) > sensing
     claimed = on.mapped_m[hidden]
     apart = np.linalg.norm(claimed[:, None] - obstacles[seen], axis=2)
-    return np.concatenate([obstacles[seen], claimed[(apart > 1e-9).all(axis=1)]])
+    new = claimed[(apart > 1e-9).all(axis=1)]
+    order = np.linalg.norm(new - was[-1], axis=1).argsort(kind="stable")
+    return np.concatenate([obstacles[seen], new[order.argsort() < MOST_CLAIMED]])
 
 
 def _other(

@@ -274,6 +274,12 @@ def slack_weight_of_a_problem_lowered(folder: Path) -> None:
         frame["slack_weight_1_m2_s"] *= 0.1
 
 
+@refused_by("GATE-FEAS", "weight of the terminal cost")
+def terminal_cost_added_to_a_problem(folder: Path) -> None:
+    with edited_table(folder, "problems") as frame:
+        frame["terminal_weight_s"] += 0.25
+
+
 @refused_by("GATE-FEAS", "length of a stage")
 def stages_shortened(folder: Path) -> None:
     with edited_table(folder, "problems") as frame:

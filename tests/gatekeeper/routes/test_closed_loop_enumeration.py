@@ -39,8 +39,9 @@ def brute_force(case: Instance, problem: Problem, substeps: int, blocks: int) ->
         centres = case.scene.centres[sensed] + after[:, None, None] * case.scene.velocities[sensed]
         gaps = np.linalg.norm(positions[:, None] - centres, axis=2) - case.scene.distances[sensed]
         slack = np.maximum(0.0, -gaps.min(axis=1, initial=np.inf))
-        errors = np.square(case.preset.sample(after) - positions).sum()
-        cost = substeps * H * (problem.error_weight * errors + problem.slack_weight * np.square(slack).sum())
+        errors = np.square(case.preset.sample(after) - positions).sum(axis=1)
+        cost = substeps * H * (problem.error_weight * errors.sum() + problem.slack_weight * np.square(slack).sum())
+        cost += problem.terminal_weight * problem.error_weight * errors[-1]
         best[modes[0]] = min(best[modes[0]], cost)
     return best
 
@@ -51,7 +52,7 @@ def test_the_search_finds_the_optimum_of_all_plans(
     seed: int, on_top: bool, substeps: int, blocks: int, error_weight: float
 ) -> None:
     case = Instance(seed, on_top=on_top)
-    problem = case.problem(9, substeps, error_weight)
+    problem = replace(case.problem(9, substeps, error_weight), terminal_weight=0.5 * (seed % 2))
     solution = BY_BLOCKS[blocks].solve(problem, UNLIMITED)
     best = brute_force(case, problem, substeps, blocks)
     assert solution.status == "optimal"

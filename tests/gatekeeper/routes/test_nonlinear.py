@@ -14,7 +14,7 @@ from airground_drake.gatekeeper.solution import ConstantPlans
 
 
 @pytest.mark.parametrize("instance", ["random 24x2", "a point at the robot", "case A, stalled",
-                                      "deep inside a large disc"])  # fmt: skip
+                                      "deep inside a large disc", "rolled out, a terminal cost"])  # fmt: skip
 def test_the_nonlinear_program_is_27(instance: str) -> None:
     """The guess is feasible and, like the optimum, costs what (25) says with the exact slack."""
     problem = INSTANCES[instance]

@@ -48,6 +48,7 @@ def test_relaxation_agrees_with_an_independent_model(seed: int) -> None:
         if near.size:
             constraints.append(reach[near] >= problem.distances[m] - u[near])
     cost = problem.dt * (cvxpy.sum_squares(problem.reference - p) + 200.0 * cvxpy.sum_squares(u))
+    cost += problem.terminal_weight * cvxpy.sum_squares(problem.reference[-1] - p[-1])
     best = cvxpy.Problem(cvxpy.Minimize(cost), constraints).solve(solver="CLARABEL")
     solution = RelaxedRoute().solve(problem)
     assert solution.status == "optimal"

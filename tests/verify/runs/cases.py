@@ -5,10 +5,16 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from builders.decisions import ALL_PLANS, STAGE_S, STAGES
+from builders.decisions import ALL_PLANS, STAGE_S, STAGES, TERMINAL_S
 from builders.edits import DecisionEdit
 
 from airground_drake.arrays import Array
+
+
+def task_error(problem: dict[str, Any], positions: Array, terminal_s: float = TERMINAL_S) -> float:
+    """The task error's part of (25) through positions (N, 3), m, and the terminal cost."""
+    error = (positions.ravel() - problem["reference_m"]) ** 2
+    return float(STAGE_S * error.sum() + terminal_s * error[-3:].sum())
 
 
 def flip_plan(row: dict[str, Any], problem: dict[str, Any]) -> None:
@@ -73,6 +79,16 @@ def lighter_slack(row: dict[str, Any], problem: dict[str, Any]) -> None:
     problem["slack_weight_1_m2_s"] = 1.0
 
 
+def other_terminal_cost(row: dict[str, Any], problem: dict[str, Any]) -> None:
+    problem["terminal_weight_s"] = 0.0
+
+
+def without_terminal_cost(row: dict[str, Any], problem: dict[str, Any]) -> None:
+    """What the running code would record if it forgot the terminal cost."""
+    row["objective"] -= task_error(problem, problem["positions_m"]) - task_error(problem, problem["positions_m"], 0.0)
+    row[f"objective_{row['first_stage']}"] = row["objective"]
+
+
 def too_fast(row: dict[str, Any], problem: dict[str, Any]) -> None:
     problem["refuse_m_s"][:3] = [0.0, -6.1, 0.0]
 
@@ -128,8 +144,7 @@ def worst_plan(row: dict[str, Any], problem: dict[str, Any]) -> None:
     def cost(plan: Array) -> float:
         positions = problem["initial_m"] + STAGE_S * np.cumsum(np.where(plan[:, None] == 1.0, accept, refuse), axis=0)
         gap = problem["distances_m"] - np.linalg.norm(positions[:, None] - problem["centres_m"].reshape(shape), axis=2)
-        error = positions - problem["reference_m"].reshape(STAGES, 3)
-        return float(STAGE_S * (np.sum(error**2) + 10.0 * np.sum(np.maximum(0.0, gap.max(axis=1)) ** 2)))
+        return task_error(problem, positions) + float(STAGE_S * 10.0 * np.sum(np.maximum(0.0, gap.max(axis=1)) ** 2))
 
     plan = max(ALL_PLANS, key=cost)
     problem["plan"] = plan

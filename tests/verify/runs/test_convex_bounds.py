@@ -25,7 +25,8 @@ def problems(draw: st.DrawFn) -> GateData:
     reference = np.array([0.0, 1.0, 0.0]) + np.outer(
         STAGE_S * np.arange(1, STAGES + 1), rng.uniform(-2.0, 2.0, 3) * [1, 1, 0]
     )
-    return GateData(seed, np.zeros(3), reference, centres, rng.uniform(0.5, 2.0, count), slack_weight)
+    distances, terminal_weight = rng.uniform(0.5, 2.0, count), draw(st.sampled_from([0.0, 1.0]))
+    return GateData(seed, np.zeros(3), reference, centres, distances, slack_weight, terminal_weight)
 
 
 def row_of(data: GateData, plan: Array) -> Row:
@@ -34,7 +35,8 @@ def row_of(data: GateData, plan: Array) -> Row:
         "reference_m": data.reference, "centres_m": data.centres, "distances_m": data.distances,
         "normals": data.normals,
     }  # fmt: skip
-    return Row({"robot": "ugv1", "t_s": 0.0}, STAGE_S, data.error_weight, data.slack_weight, dict(arrays))
+    weights = data.error_weight, data.slack_weight, data.terminal_weight
+    return Row({"robot": "ugv1", "t_s": 0.0}, STAGE_S, *weights, dict(arrays))
 
 
 @examples(25, fuzz=300)

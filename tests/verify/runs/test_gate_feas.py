@@ -18,15 +18,18 @@ from verify.runs.cases import (
     flip_plan,
     fractional_plan,
     lighter_slack,
+    other_terminal_cost,
     overstate_clearance,
     shift_initial,
     shift_position,
     shift_reference,
     smaller_distance,
     standing_robot,
+    task_error,
     too_fast,
     understate_cost,
     without_point,
+    without_terminal_cost,
     wrong_first_stage,
     wrong_reason,
 )
@@ -54,6 +57,8 @@ MUTANTS: list[tuple[DecisionEdit, str]] = [
     (smaller_distance, "nothing that the UGV senses"),
     (standing_robot, "nothing that the UGV senses"),
     (lighter_slack, "weight of slack"),
+    (other_terminal_cost, "weight of the terminal cost"),
+    (without_terminal_cost, "objective"),
     (too_fast, "faster than the speed limit"),
     (contrary_answer, "answer or reason"),
     (wrong_reason, "answer or reason"),
@@ -73,7 +78,7 @@ def test_hidden_slack_is_refuted() -> None:
         accept = problem["accept_m_s"].reshape(STAGES, 3)
         positions = problem["initial_m"] + STAGE_S * np.cumsum(accept, axis=0)
         problem["plan"], problem["positions_m"] = np.ones(STAGES), positions.ravel()
-        row["objective"] = float(STAGE_S * np.sum((positions - problem["reference_m"].reshape(STAGES, 3)) ** 2))
+        row["objective"] = task_error(problem, positions)
         row["objective_accept"], row["first_stage"] = row["objective"], "accept"
         away = np.linalg.norm(positions[:, None] - problem["centres_m"].reshape(STAGES, 2, 3), axis=2)
         row["predicted_clearance_m"] = float((away - problem["distances_m"]).min())
@@ -112,7 +117,7 @@ def test_rollouts_may_leave_23_after_the_first_change_only() -> None:
 def _cost(problem: dict[str, Any]) -> float:
     away = problem["positions_m"].reshape(STAGES, 3)[:, None] - problem["centres_m"].reshape(STAGES, -1, 3)
     slack = np.maximum(0.0, (problem["distances_m"] - np.linalg.norm(away, axis=2)).max(axis=1))
-    return float(STAGE_S * (np.sum((problem["positions_m"] - problem["reference_m"]) ** 2) + 10.0 * np.sum(slack**2)))
+    return task_error(problem, problem["positions_m"]) + float(STAGE_S * 10.0 * np.sum(slack**2))
 
 
 def _clearance(problem: dict[str, Any]) -> float:
@@ -176,7 +181,7 @@ def test_the_rules_are_those_of_the_running_gatekeeper(
     kept = throughout
     plan = np.array([float(accept <= refuse)]) if planned else None
     given = {"objective": min(costs), "accept_throughout": kept[0], "refuse_throughout": kept[1]}
-    row = Row(given, 1.0, 1.0, 1.0, {"plan": plan})
+    row = Row(given, 1.0, 1.0, 1.0, 0.0, {"plan": plan})
     gate = {"switching_margin": margin, "min_dwell_s": 0.2}
     stands = {SILENT: None, ACCEPT: "accept", REFUSE: "refuse"}[standing]
     rules = Rules(switching_margin=margin, min_dwell=0.2)

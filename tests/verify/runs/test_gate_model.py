@@ -10,11 +10,15 @@ import pytest
 from builders.edits import with_decision, with_scenario
 from verify.judging import judge
 
-from airground_drake.gatekeeper import outcome, prediction
+from airground_drake.check import foresight
+from airground_drake.gatekeeper import certified, outcome, prediction
 from airground_drake.gatekeeper.closed_loop import ClosedLoop
 from airground_drake.scenarios.load import load
+from airground_drake.scenarios.schema import Policy
 from airground_drake.simulation import simulate
 from airground_drake.trace import Trace
+from airground_drake.verify.runs import outcome_rolls
+from airground_drake.verify.runs.proposals import proposals_of
 
 Run = Callable[[str, str], Trace]
 Patch = Callable[[pytest.MonkeyPatch], None]
@@ -41,6 +45,23 @@ def test_stages_of_several_control_periods_hold() -> None:
     finding = judge("GATE-MODEL", simulate(scenario, "c"))
     assert finding.status == "holds", finding
     assert finding.evidence["decisions"] > 5
+
+
+def test_of_a_map_without_end_the_nearest_obstacles_count() -> None:
+    assert certified.MOST_CLAIMED == outcome_rolls.MOST_CLAIMED == foresight.MOST_CLAIMED == 64
+    scenario = load("case_a", ["duration_s=15.5"])[0]
+    scenario.runs, scenario.reproduction, scenario.choices = {"d": scenario.runs["d"]}, [], []
+    scenario.intervention.policies = [Policy("towards", {"x_m": 6.0, "y_m": 5.0, "speed_m_s": 2.0})]
+    scenario.uav.phantoms_m = [[float(x), float(y), 0.0] for x in range(10, 20) for y in range(0, 20, 2)]
+    trace = simulate(scenario, "d")
+    finding = judge("GATE-MODEL", trace)
+    assert finding.status == "holds", finding
+    assert finding.exercised
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(outcome_rolls, "MOST_CLAIMED", 0)
+        sent = proposals_of(trace)[0]
+        assert len(outcome_rolls.known_discs(trace, "ugv1", sent.issued_s, sent)) <= len(scenario.obstacles)
+    assert len(outcome_rolls.known_discs(trace, "ugv1", sent.issued_s, sent)) >= 64
 
 
 # ------------------------------------------------------------------------------------- mutants of the running code

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from airground_drake.gatekeeper.answer import Foreseen
 from airground_drake.gatekeeper.certified import CertifiedGatekeepers
 from airground_drake.gatekeeper.outcome import Outcome, Outlook
 from airground_drake.gatekeeper.patience import Patience
@@ -68,7 +69,8 @@ def _run(rng: np.random.Generator, patience: Patience, inputs: dict[str, Any]) -
             if not last.accepted:
                 over = t
                 break
-            excess = max(excess, last.grounds.lag - last.grounds.predicted_lag)  # type: ignore[union-attr]
+            assert isinstance(last.grounds, Foreseen)
+            excess = max(excess, last.grounds.lag - last.grounds.predicted_lag)
         accepted = [proposal if memory.answers[0] == ACCEPT else None]
         at = np.zeros((1, 3))
         velocity = controller.velocity(t, np.stack([place, FAR]), at, at, accepted)[0]

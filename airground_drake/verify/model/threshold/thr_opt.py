@@ -12,6 +12,7 @@ from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.engines.ball_arithmetic import (
     Derivative,
+    Relation,
     Statement,
     bracket,
     conclude,
@@ -154,10 +155,13 @@ def _deviations(
         if stationary:
             low, high = -Fraction(1, 10**9), Fraction(1, 10**9)
         slopes[f"{name}_slope_1_m"] = (low, high)
-        for side, bound, u, relation in (("from", low, root[w > 0], ">"), ("to", high, root[w < 0], "<")):
+        sides: list[tuple[str, Fraction, Fraction, Relation]] = [
+            ("from", low, root[w > 0], ">"), ("to", high, root[w < 0], "<")
+        ]  # fmt: skip
+        for side, bound, u, relation in sides:
             values = constants.at(u=u, w=w, bound=bound)
             says = f"dB/dzeta at the root with a deviation of {'-' if w < 0 else ''}zeta/2 is {relation} this, 1/m."
-            statements.append(sign(f"{name}_{side}", says, f"{SLOPE_AT_ROOT}-bound", values, relation))  # type: ignore[arg-type]
+            statements.append(sign(f"{name}_{side}", says, f"{SLOPE_AT_ROOT}-bound", values, relation))
     return statements, slopes
 
 

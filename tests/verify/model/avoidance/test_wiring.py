@@ -25,7 +25,7 @@ from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.systems import controllers
 from airground_drake.verify.claim import ModelClaim
-from airground_drake.verify.model.avoidance import scenario_pairs, wiring
+from airground_drake.verify.model.avoidance import binding_states, scenario_pairs, wiring
 from airground_drake.verify.model.avoidance.constants import kinds
 from airground_drake.verify.model.avoidance.safe_gate import SafeGate
 from airground_drake.verify.model.avoidance.safe_inv import SafeInv
@@ -80,11 +80,11 @@ def far(centre: Array, columns: slice) -> Array:
     return moved
 
 
-def layer(**changed: float) -> Patch:
+def layer(**changed: Any) -> Patch:
     right = components.make_avoidance
 
     def wrong(*args: Any) -> Avoidance:
-        return replace(right(*args), **changed)  # type: ignore[arg-type]
+        return replace(right(*args), **changed)
 
     return lambda patch: patch.setattr(components, "make_avoidance", wrong)
 
@@ -263,13 +263,14 @@ def test_a_millionth_of_a_distance_is_noticed(
 
 
 def test_a_pair_that_was_never_near_is_not_proved(monkeypatch: pytest.MonkeyPatch, inputs: dict[str, Any]) -> None:
-    right = wiring._beside
+    right = binding_states.beside
 
-    def apart(given: Any, views: Views, pairs: Any, *more: Any) -> wiring.State:
+    def apart(given: Any, views: Views, pairs: Any, *more: Any) -> binding_states.State:
         return right(given, views, [(i, j) for i, j in pairs if j < 0], *more)
 
-    monkeypatch.setattr(wiring, "_beside", apart)
-    monkeypatch.setattr(wiring, "CROWDED", 0)
+    monkeypatch.setattr(binding_states, "beside", apart)
+    monkeypatch.setattr(wiring, "beside", apart)
+    monkeypatch.setattr(binding_states, "CROWDED", 0)
     assert SafeInv().judge(inputs).status == "inconclusive"
 
 

@@ -1,0 +1,68 @@
+"""The command line `airground`, which is also `python -m airground_drake`: a table of commands, imported when used."""
+
+from __future__ import annotations
+
+import argparse
+import difflib
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+from importlib.metadata import version
+from typing import NamedTuple
+
+from airground_drake import interruption
+
+EXIT_USAGE = 2
+
+
+class Command(NamedTuple):
+    """What `airground NAME ...` does: `main` of a module, which takes the arguments and returns the exit code."""
+
+    module: str
+    says: str
+
+
+COMMANDS: dict[str, Command] = {
+    "report": Command("airground_drake.report.__main__", "simulate a scenario, check its claims, write the report"),
+    "verify": Command("airground_drake.verify.__main__", "judge claims anew, on a saved run or about a model"),
+    "check": Command("airground_drake.check.command", "go over a report with the independent checker"),
+    "proofs": Command("airground_drake.verify.proof_files", "write the proofs of a report for others' checkers"),
+    "diagram": Command("airground_drake.commands.diagram", "draw the diagram of a scenario"),
+    "list": Command("airground_drake.commands.listing", "list scenarios, methods, policies, routes, tasks and claims"),
+    "init": Command("airground_drake.commands.init", "write a small scenario to start from"),
+}
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a command.
+
+    Returns:
+        The command's exit code; 2 if there is none of that name.
+    """
+    width = max(map(len, COMMANDS))
+    parser = argparse.ArgumentParser(
+        prog="airground",
+        description="Event-triggered UAV-to-UGV intervention on Drake, with verification reports.",
+        epilog="commands:\n"
+        + "\n".join(f"  {name:{width}}  {command.says}" for name, command in COMMANDS.items())
+        + "\n\n`airground COMMAND --help` says more.",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        usage="airground COMMAND ...",
+    )
+    parser.add_argument("--version", action="version", version=f"airground_drake {version('airground_drake')}")
+    parser.add_argument("command", metavar="COMMAND")
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    name = parser.parse_args(given[:1]).command
+    if name not in COMMANDS:
+        close = difflib.get_close_matches(name, COMMANDS, n=1)
+        meant = f"did you mean {close[0]}? " if close else ""
+        print(f"error: {name!r} is no command: {meant}commands are {', '.join(COMMANDS)}", file=sys.stderr)
+        return EXIT_USAGE
+    code: int = import_module(COMMANDS[name].module).main(given[1:])
+    return code
+
+
+def entry() -> None:
+    """Console script."""
+    interruption.end_on_signals()  # before the imports, which take seconds
+    sys.exit(main())

@@ -1,0 +1,108 @@
+"""Ending at once, and alone: what SIGINT and SIGTERM do to a command, and what becomes of its children.
+
+Nothing is unwound: an exception out of a signal handler may be lost in a callback, and `with` blocks wait for pools
+that still work. The handler kills every process that descends from this one, removes this process's temporary files,
+says so in one line, and leaves. A process that is killed itself cannot do that: those that it has forked end with it.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import signal
+import sys
+import threading
+from contextlib import suppress
+from pathlib import Path
+from types import FrameType
+from typing import NoReturn
+
+from airground_drake import files
+
+STOPPING = (signal.SIGINT, signal.SIGTERM)
+ROUNDS = 10
+"""Searches for descendants at most: one that is killed may just have begun another."""
+
+_PR_SET_PDEATHSIG = 1
+
+
+def end_on_signals() -> None:
+    """From now on SIGINT and SIGTERM end this process with exit code 130 and 143, and its descendants with it."""
+    owner = os.getpid()
+    try:
+        stderr = os.dup(2)  # 2 itself may be pointed elsewhere while a C library is kept silent
+    except OSError:  # closed from the beginning
+        stderr = os.open(os.devnull, os.O_WRONLY)
+
+    def end(number: int, frame: FrameType | None) -> NoReturn:
+        for each in STOPPING:
+            signal.signal(each, signal.SIG_IGN)
+        if os.getpid() == owner:  # what was forked has inherited this handler
+            end_descendants()
+            files.discard_partial()
+            with suppress(OSError):
+                os.write(stderr, _line(number, clear=os.isatty(stderr)))
+        os._exit(128 + number)
+
+    for each in STOPPING:
+        if signal.getsignal(each) is not signal.SIG_IGN:  # as for what `nohup` starts
+            signal.signal(each, end)
+    forks = _Forks()
+    os.register_at_fork(before=forks.before, after_in_child=forks.in_child)
+
+
+def _line(number: int, *, clear: bool) -> bytes:
+    """What is said of an interruption; over a line of progress, if there may be one."""
+    before = "\r\033[K" if clear else ""
+    return f"{before}error: interrupted ({signal.Signals(number).name})\n".encode()
+
+
+def end_descendants() -> None:
+    """Kill every process that descends from this one, as far as /proc tells."""
+    for _ in range(ROUNDS):
+        found = _descendants()
+        if not found:
+            return
+        for pid in found:
+            with suppress(ProcessLookupError, PermissionError):
+                os.kill(pid, signal.SIGKILL)
+
+
+def _descendants() -> list[int]:
+    """Living processes whose parent, or its parent, and so on, is this one."""
+    children: dict[int, list[int]] = {}
+    for entry in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(OSError):
+            state, parent = entry.read_text(errors="replace").rpartition(")")[2].split()[:2]
+            if state not in "ZX":
+                children.setdefault(int(parent), []).append(int(entry.parent.name))
+    found, above = [], [os.getpid()]
+    while above:
+        below = children.get(above.pop(), [])
+        found += below
+        above += below
+    return found
+
+
+def end_with_parent(how: signal.Signals = signal.SIGKILL) -> None:
+    """From now on this process is sent a signal when the thread that has started it ends, on Linux."""
+    if sys.platform == "linux":
+        with suppress(OSError, AttributeError):
+            ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, how, 0, 0, 0)
+
+
+class _Forks:
+    """Sees to it that what is forked ends with the process that has forked it."""
+
+    def __init__(self) -> None:
+        self.parent, self.from_main = 0, False
+
+    def before(self) -> None:
+        self.parent, self.from_main = os.getpid(), threading.current_thread() is threading.main_thread()
+
+    def in_child(self) -> None:
+        """Not where another thread has forked, which may end before its time."""
+        if self.from_main:
+            end_with_parent()
+            if os.getppid() != self.parent:
+                os._exit(1)

@@ -1,0 +1,130 @@
+"""How much work a scenario asks for, counted from its numbers before any of it is begun.
+
+Of a run of n UGVs and the UAV for T seconds, with control period h, among m obstacles and phantoms (K = n + m points
+that a UGV keeps away from):
+
+    rows        T / min(h, noise period) + 1; each event of a run adds a few
+    steps       (n + 1) rows: robots moved by one step
+    decisions   n (T / gatekeeper's period + 1) where UGVs decide about proposals, if each decides at every sample
+    predictions a decision of method (c) predicts both choices for horizon / h periods; of method (d), once for each
+                proposal, and so no more often than the UAV plans, for (longest + settling) / h periods
+    memory      tables of the trace, one number for each pair and row where a claim looks at distances, what decisions
+                of method (c) keep, the longest prediction, and the tangents of the discs that a way leads round
+
+These are counts, not times: how long a step takes depends on the machine.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from airground_drake.errors import LimitError
+from airground_drake.registry import METHODS
+from airground_drake.scenarios.schema import Run, Scenario
+
+PREDICTED = 2e-4
+"""Work of a period predicted for one UGV next to one point (compiled, some 30 ns) in steps simulated (some 0.2 ms)."""
+
+GIB = 2**30
+FLOAT = 8
+"""Bytes of a number."""
+COPIES = 6
+"""Of a table, while it is logged, made, written and looked at."""
+OF_A_DECISION = 2048
+"""Bytes of a decision without its arrays: a row of a table and some objects."""
+OF_A_TANGENT = 80
+"""Bytes for each tangent of two discs and each disc that may block it: complex numbers and copies of them."""
+PROGRAM = GIB // 2
+"""Bytes of the program itself with its libraries."""
+
+
+class Limits(NamedTuple):
+    """What a scenario may ask for.
+
+    Attributes:
+        work: steps.
+        memory: bytes.
+    """
+
+    work: float = 1e7
+    memory: float = 8.0 * GIB
+
+
+DEFAULT_LIMITS = Limits()
+
+
+class Estimate(NamedTuple):
+    """What the runs of a scenario ask for, in all.
+
+    Attributes:
+        rows: of the traces' signals.
+        steps: robots moved by one step.
+        decisions: of gatekeepers, at most.
+        predicted: periods predicted for one UGV, times the points that it keeps away from, at most.
+        memory: bytes.
+    """
+
+    rows: float
+    steps: float
+    decisions: float
+    predicted: float
+    memory: float
+
+    @property
+    def work(self) -> float:
+        """Steps, with what is predicted in them."""
+        return self.steps + PREDICTED * self.predicted
+
+    def __str__(self) -> str:
+        """In words, on one line."""
+        return (
+            f"{self.work:.2g} steps ({self.rows:.2g} rows, up to {self.decisions:.2g} decisions), "
+            f"{self.memory / GIB:.2g} GiB"
+        )
+
+
+def estimate(scenario: Scenario) -> Estimate:
+    """What all runs of a validated scenario ask for, from its numbers alone; takes no time whatever they are."""
+    of_runs = [_of_run(scenario, run) for run in scenario.runs.values()]
+    rows, steps, decisions, predicted, memory = (sum(column) for column in zip(*of_runs, strict=True))
+    return Estimate(rows, steps, decisions, predicted, PROGRAM + memory + _planning(scenario))
+
+
+def within(scenario: Scenario, limits: Limits) -> Estimate:
+    """The estimate of a validated scenario, if it keeps to the limits.
+
+    Raises:
+        LimitError: if not; names what is asked for and what is allowed.
+    """
+    found = estimate(scenario)
+    if not (found.work <= limits.work and found.memory <= limits.memory):
+        raise LimitError(scenario.name, str(found), f"{limits.work:.2g} steps, {limits.memory / GIB:.2g} GiB")
+    return found
+
+
+def _of_run(scenario: Scenario, run: Run) -> Estimate:
+    gate, h, duration = scenario.gatekeeper, scenario.control.period_s, scenario.duration_s
+    n, m = len(scenario.ugvs), len(scenario.obstacles) + len(scenario.uav.phantoms_m)
+    points, by_outcome = n + m, not METHODS[run.method].intervention_on_top
+    rows = duration / min(h, scenario.decision.noise_period_s) + 1.0
+    columns = 1 + 6 * (n + 1) + 10 * n
+    memory = FLOAT * COPIES * rows * (columns + (n + 1) * points)
+    if not METHODS[run.method].gated:
+        return Estimate(rows, (n + 1) * rows, 0.0, 0.0, memory)
+
+    decisions = n * (duration / gate.period_s + 1.0)
+    periods = ((gate.longest_s + gate.settling_s) if by_outcome else gate.horizon_s) / h
+    judged = min(decisions, n * (duration / scenario.intervention.period_s + 1.0)) if by_outcome else decisions
+    prediction = FLOAT * periods * 3 * (points + 4)
+    problem = 0.0 if by_outcome else FLOAT * gate.stages * (18 + 6 * points) + prediction
+    memory += decisions * (OF_A_DECISION + problem) + 2.0 * prediction
+    return Estimate(rows, (n + 1) * rows, decisions, judged * 2.0 * periods * points, memory)
+
+
+def _planning(scenario: Scenario) -> float:
+    """Bytes for the shortest way among all discs, where some run asks for one: two discs have four tangents."""
+    if not any(METHODS[run.method].intervenes for run in scenario.runs.values()):
+        return 0.0
+    discs = len(scenario.ugvs) + len(scenario.obstacles) + len(scenario.uav.phantoms_m)
+    return 2.0 * OF_A_TANGENT * math.pow(discs, 3)

@@ -1,0 +1,218 @@
+"""Where a team's inequalities bind, and hostile inputs that put them to the test.
+
+Every robot is put beside every obstacle and every other robot, inside and outside of the safe distance, near enough for
+the inequality to bind; then robots crowd around one obstacle. Presets, proposals and the UGVs' velocities that the UAV
+feeds forward drive every robot to what it must avoid. What each may want by them is written here in plain numpy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from airground_drake.arrays import Array
+from airground_drake.intervention.policy import Proposal
+from airground_drake.nsbc.motion import Motion
+from airground_drake.verify.engines.rounding import unit
+from airground_drake.verify.model.avoidance.scenario_pairs import Inputs, Views
+
+STATES = 240
+"""Team positions at least; more where there are many pairs."""
+CROWDED = 60
+"""Team positions besides, in which robots crowd around one obstacle."""
+TRIALS = 24
+"""Directions from an obstacle that are tried for one that is clear of the others."""
+ACCEPT, SILENT, REFUSE = 1.0, 0.0, -1.0
+"""Answers, as messages have them."""
+ANSWERS = ("none", "accepted", "refused", "silent", "answered_another")
+"""What may be the matter with a proposal."""
+TIME_S = 2.0
+"""Time in the contexts, s."""
+
+
+class State(NamedTuple):
+    """Positions of a team, (n + 1, 3), m, and for each robot the point that it is drawn to, (n + 1, 3), m."""
+
+    positions: Array
+    drawn_to: Array
+
+
+class Asked(NamedTuple):
+    """What is put on the controllers' ports, and what each robot may want by it.
+
+    Attributes:
+        reference: presets, (n, 6): m, m/s.
+        proposals: per UGV.
+        answers: (n, 2), one of ACCEPT, SILENT, REFUSE and the time of issue that is answered.
+        feed_forward: velocity that the UAV is told of every UGV, (3,), m/s.
+        wanted: (n + 1, 3), m/s, within speed limits.
+        executed: (n,), whether there is an accepted proposal.
+        how: per UGV, one of ANSWERS.
+    """
+
+    reference: Array
+    proposals: tuple[Proposal | None, ...]
+    answers: Array
+    feed_forward: Array
+    wanted: Array
+    executed: npt.NDArray[np.bool_]
+    how: list[str]
+
+
+def states(inputs: Inputs, views: Views, rng: np.random.Generator) -> Iterator[State]:
+    """Positions in which every robot is beside everything that it must avoid, then crowded ones.
+
+    In a round every robot has one partner: an obstacle, or another robot away from everything else.
+    """
+    n, m = len(views.robots), len(views.obstacles)
+    rounds: list[list[tuple[int, int]]] = [[(i, -1 - (i + r) % m) for i in range(n)] for r in range(m)]
+    rounds += list(_round_robin(n))
+    repeated = max(5, -(-STATES // len(rounds)))
+    for r in range(repeated):
+        for pairs in rounds:
+            yield beside(inputs, views, pairs, r, rng)
+    for _ in range(CROWDED):
+        yield _crowded(inputs, views, rng)
+
+
+def _round_robin(count: int) -> Iterator[list[tuple[int, int]]]:
+    """Rounds in which every two of `count` meet once (circle method)."""
+    members = list(range(count + count % 2))
+    for _ in range(len(members) - 1):
+        pairs = list(zip(members[: len(members) // 2], reversed(members[len(members) // 2 :]), strict=True))
+        yield [(i, j) for i, j in pairs if max(i, j) < count]
+        members = [members[0], members[-1], *members[1:-1]]
+
+
+def _distance(inputs: Inputs, how: int, safe: float, share: float, speed: float, rng: np.random.Generator) -> float:
+    """A distance at which an inequality binds at full speed towards: inside, at d, outside, almost too far."""
+    free = speed * inputs["period_s"] / share  # farther outside than this nothing binds
+    match how % 5:
+        case 0:
+            return safe * (1.0 - 0.3 * rng.random())
+        case 1:
+            return safe * (1.0 + 1e-9 * rng.random())
+        case 2:
+            return safe + 0.5 * free * rng.random()
+        case 3:
+            return min(safe + free * (0.9 + 0.09 * rng.random()), float(inputs["sensing_range_m"]) * (1.0 - 1e-9))
+    return safe + free * rng.random()
+
+
+def beside(inputs: Inputs, views: Views, pairs: Sequence[tuple[int, int]], how: int, rng: np.random.Generator) -> State:
+    """Every pair (robot, robot or -1 - obstacle) beside each other; robots without a partner far away."""
+    n, uav = len(views.robots), len(views.ugvs)
+    cell = 4.0 * (inputs["sensing_range_m"] + views.safe.max(initial=1.0))
+    corner = np.abs(views.obstacles).max(initial=0.0) + cell
+    columns = int(np.ceil(np.sqrt(n)))
+    positions = np.array([[corner + cell * (i % columns), corner + cell * (i // columns), 0.0] for i in range(n)])
+    drawn_to = positions + unit(rng, n)
+    for i, j in pairs:
+        if j < 0:
+            centre = views.obstacles[-1 - j]
+            reach = _distance(inputs, how, views.obstacle_distance, 1.0, views.max_speed[i], rng)
+            positions[i] = _clear_of_others(views, centre, reach, i == uav, rng)
+            drawn_to[i] = centre
+        else:
+            i, j = min(i, j), max(i, j)
+            safe = views.air_ground_distance if j == uav else views.ugv_distance
+            speed = min(views.max_speed[i], views.max_speed[j])
+            reach = _distance(inputs, how, safe, 0.5, speed, rng)
+            steep = 0.5 * np.pi if rng.random() < 0.1 else rng.uniform(0.0, 1.2)
+            positions[j] = positions[i] + reach * _direction(rng.uniform(0.0, 2.0 * np.pi), steep if j == uav else 0.0)
+            drawn_to[i], drawn_to[j] = positions[j], positions[i]
+    return State(positions, drawn_to)
+
+
+def _direction(turn: float, rise: float) -> Array:
+    return np.array([np.cos(turn) * np.cos(rise), np.sin(turn) * np.cos(rise), np.sin(rise)])
+
+
+def _clear_of_others(views: Views, centre: Array, reach: float, flies: bool, rng: np.random.Generator) -> Array:
+    """A place at distance `reach` of an obstacle, as far from the others as some random directions allow."""
+    found: list[Array] = []
+    for _ in range(TRIALS):
+        if flies:
+            found.append(centre + reach * _direction(rng.uniform(0.0, 2.0 * np.pi), rng.uniform(-1.5, 1.5)))
+        else:
+            across = np.sqrt(max(reach**2 - centre[2] ** 2, 1e-4))
+            place = centre + across * _direction(rng.uniform(0.0, 2.0 * np.pi), 0.0)
+            found.append(np.array([place[0], place[1], 0.0]))
+    places = np.array(found)
+    between = np.linalg.norm(places[:, None] - views.obstacles, axis=-1)
+    between[:, np.linalg.norm(views.obstacles - centre, axis=-1) == 0.0] = np.inf
+    return places[int(np.argmax(between.min(axis=1)))]
+
+
+def _crowded(inputs: Inputs, views: Views, rng: np.random.Generator) -> State:
+    """Robots at random around one obstacle, or one point, drawn to one of what they avoid."""
+    n, m = len(views.robots), len(views.obstacles)
+    centre = views.obstacles[rng.integers(m)] if m else np.zeros(3)
+    spread = views.safe.max() * np.sqrt(n) * rng.uniform(0.5, 2.0)
+    positions = centre + rng.uniform(-spread, spread, (n, 3))
+    positions[:-1, 2] = 0.0
+    around = views.centres(positions)
+    excess = np.linalg.norm(positions[:, None] - around, axis=-1) - views.safe
+    nearest = np.where(rng.random(n) < 0.5, np.argmin(excess, axis=1), rng.integers(around.shape[1], size=n))
+    return State(positions, around[np.arange(n), nearest])
+
+
+def hostile(inputs: Inputs, views: Views, state: State, rng: np.random.Generator) -> Asked:
+    """Presets, proposals and a feed-forward that drive every robot to what it is drawn to, at up to 10 times its limit.
+
+    What each may want follows by (6), (9)-(10), (12)-(14) and (20): the intervention's directions from an accepted
+    proposal, the rest from the robot's own task; never more than the speed limit.
+    """
+    n, own = len(views.ugvs), state.positions[:-1]
+    towards = state.drawn_to - state.positions
+    towards /= np.maximum(np.linalg.norm(towards, axis=1, keepdims=True), 1e-9)
+    towards = towards + rng.choice([0.0, 0.3, 1.0], (n + 1, 1)) * unit(rng, n + 1)
+    push = towards * views.max_speed[:, None] * rng.choice([0.5, 1.5, 10.0], (n + 1, 1))
+    planar = views.mobility[:-1]
+
+    places = own + rng.choice([0.0, 1.0], (n, 1)) * rng.uniform(-1.0, 1.0, (n, 3))
+    rates = push[:-1] - inputs["motion_gain_1_s"] * (places - own)
+    task = limited(planar * (rates + inputs["motion_gain_1_s"] * (places - own)), views.max_speed[:-1])
+    how = [str(each) for each in rng.choice(ANSWERS, n, p=[0.2, 0.4, 0.15, 0.1, 0.15])]
+    executed = np.array([each == "accepted" for each in how])
+    proposals: list[Proposal | None] = []
+    answers = np.zeros((n, 2))
+    wanted = task.copy()
+    for i, each in enumerate(how):
+        issued = float(rng.integers(1, 100))
+        if each == "none":
+            proposals.append(None)
+            answers[i] = ACCEPT, issued
+            continue
+        there = own[i] + rng.uniform(-1.0, 1.0, 3)
+        # away from its own task's way where it must not be executed, so that the two cannot be confused
+        rate = push[i] if each == "accepted" else -push[i]
+        rows = np.linalg.qr(rng.normal(size=(3, 3)))[0][: rng.integers(1, 4)] if rng.random() < 0.3 else np.eye(3)
+        motion = Motion(np.array([TIME_S - 1.0, TIME_S + 1.0]), np.array([there - rate, there + rate]))
+        proposals.append(Proposal(f"hostile_{i}", issued, motion, rows))
+        answer = {"accepted": ACCEPT, "refused": REFUSE, "silent": SILENT, "answered_another": ACCEPT}[each]
+        answers[i] = answer, issued + (each == "answered_another")
+        if each == "accepted":
+            at = 0.5 * (motion.positions[0] + motion.positions[1])
+            slope = 0.5 * (motion.positions[1] - motion.positions[0])
+            intervention = planar[i] * (slope + inputs["intervention_gain_1_s"] * (at - own[i]))
+            wanted[i] = planar[i] * (task[i] + rows.T @ rows @ (intervention - task[i]))
+    wanted = limited(wanted, views.max_speed[:-1])
+
+    above = own.mean(axis=0) + np.array([0.0, 0.0, inputs["altitude_m"]])
+    formation = inputs["formation_gain_1_s"] * (above - state.positions[-1])
+    feed_forward = push[-1] - formation
+    flown = limited((feed_forward + formation)[None], views.max_speed[-1:])
+    return Asked(
+        np.hstack([places, rates]), tuple(proposals), answers, feed_forward, np.vstack([wanted, flown]), executed, how
+    )  # fmt: skip
+
+
+def limited(velocity: Array, most: Array) -> Array:
+    """Velocities (n, 3) shortened to at most `most` (n,), m/s."""
+    speed = np.linalg.norm(velocity, axis=1)
+    found: Array = velocity * np.where(speed > most, most / np.maximum(speed, 1e-300), 1.0)[:, None]
+    return found

@@ -1,0 +1,161 @@
+"""A UAV that lies in every part of its messages, to keep UGVs from their own task, or to drive them into something.
+
+It needs no trigger to speak, speaks at every planning instant if it likes, and answers to nobody. What it does follows
+from a `Tactic`; `drawn` draws one, `mutated` changes a part of one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+
+from airground_drake.arrays import Array
+from airground_drake.intervention.database import Desk
+from airground_drake.intervention.messages import ACCEPT, REFUSE, Reports, answer_to
+from airground_drake.intervention.planner import Planner, PlannerMemory
+from airground_drake.intervention.policy import Proposal
+from airground_drake.nsbc.motion import Motion
+
+CHOICES: dict[str, tuple[Any, ...]] = {
+    "mapped": ("true", "nothing", "phantoms", "on the robot", "ahead", "huge"),
+    "motion": ("hold", "stall", "back and forth", "away", "collide", "shadow", "creep"),
+    "cause": ("own", "another", "alternating", "nobody"),
+    "lasts_s": (0.3, 2.0, 10.0, 1e4),
+    "renew_s": (0.05, 0.1, 0.5, 3.0, 1e4),
+    "pause_s": (0.0, 0.05, 0.1, 1.0),
+    "forge": (False, True),
+    "jitter_m": (0.0, 1e-9, 1e-3),
+    "size_m": (0.05, 1.0, 5.0, 100.0),
+}
+"""What each part of a tactic may be."""
+HUGE = 200
+"""Obstacles on a huge map."""
+
+
+@dataclass(frozen=True)
+class Tactic:
+    """How the UAV lies.
+
+    Attributes:
+        mapped: the map that it sends: the true one, none, phantoms at random, some on top of the UGV, a wall across its
+            way out of its sight, or very many.
+        motion: where the UGV is asked to be: where it is; on its way to the goal, then at rest short of it; to and fro;
+            far away; in what is nearest; always where it happens to be; towards its goal, at a crawl.
+        cause: whose trigger the proposal is said to be for.
+        lasts_s: duration of the motion.
+        renew_s: a standing proposal is replaced after so long.
+        pause_s: silence after a refusal, and before a renewal.
+        forge: whether a replacement pretends to be the proposal that was answered (the same time of issue).
+        jitter_m: by which each proposal differs from the one before.
+        size_m: how far motions lead.
+    """
+
+    mapped: str
+    motion: str
+    cause: str
+    lasts_s: float
+    renew_s: float
+    pause_s: float
+    forge: bool
+    jitter_m: float
+    size_m: float
+
+
+def drawn(random: np.random.Generator) -> Tactic:
+    """A tactic, every part at random."""
+    return Tactic(**{name: values[random.integers(len(values))] for name, values in CHOICES.items()})
+
+
+def mutated(tactic: Tactic, random: np.random.Generator) -> Tactic:
+    """The same with one part, or two, drawn again."""
+    parts = random.choice([f.name for f in fields(Tactic)], int(random.integers(1, 3)), replace=False)
+    return replace(tactic, **{name: CHOICES[name][random.integers(len(CHOICES[name]))] for name in parts})
+
+
+@dataclass(frozen=True, eq=False)
+class LyingPlanner(Planner):
+    """Speaks to every UGV as its tactic has it; to be used for one run."""
+
+    tactic: Tactic = Tactic("true", "hold", "own", 1e4, 1e4, 0.0, False, 0.0, 1.0)
+    random: np.random.Generator = np.random.default_rng(0)  # noqa: RUF009 (of one run)
+
+    def watch(self, memory: PlannerMemory, t: float, positions: Array) -> PlannerMemory:
+        """Speak whether anybody is intervened on or not."""
+        spoken = super().watch(memory, t, positions)
+        silent = not any(spoken.proposals)
+        return self._speak(spoken, t, positions, np.zeros(2 * len(self.ugvs))) if silent else spoken
+
+    def plan(
+        self,
+        memory: PlannerMemory,
+        t: float,
+        positions: Array,
+        intervening: Sequence[bool],
+        answers: Array,
+        reports: Reports,
+    ) -> PlannerMemory:
+        """Speak again."""
+        return self._speak(memory, t, positions, answers)
+
+    def _speak(self, memory: PlannerMemory, t: float, positions: Array, answers: Array) -> PlannerMemory:
+        tactic, desks, sent = self.tactic, list(memory.desks), list(memory.sent)
+        for i, desk in enumerate(desks):
+            before, answer = desk.proposal, answer_to(desk.proposal, answers, i)
+            if before is not None and before.issued == t:
+                continue
+            over = before is not None and (answer == REFUSE or t >= desk.retry_at)
+            if over and tactic.pause_s > 0.0 and not (tactic.forge and answer == ACCEPT):
+                desks[i] = Desk(retry_at=t + tactic.pause_s)
+            elif over or (before is None and t >= desk.retry_at):
+                issued = before.issued if before is not None and tactic.forge and answer == ACCEPT else t
+                proposal = self._proposal(i, t, issued, positions)
+                desks[i] = Desk(proposal, retry_at=t + tactic.renew_s)
+                sent.append((i, proposal))
+            elif before is not None and tactic.motion == "shadow" and tactic.forge:
+                desks[i] = replace(desk, proposal=self._proposal(i, t, before.issued, positions))
+        return replace(memory, desks=tuple(desks), sent=tuple(sent))
+
+    def _proposal(self, i: int, t: float, issued: float, positions: Array) -> Proposal:
+        other = self.ugvs[(i + 1) % len(self.ugvs)]
+        alternates = other if self.random.random() < 0.5 else ""
+        cause = {"own": "", "another": other, "alternating": alternates, "nobody": "?"}[self.tactic.cause]
+        motion = self._motion(i, t, positions)
+        return Proposal("lying", issued, motion, mapped=self._map(i, positions), cause=cause)
+
+    def _motion(self, i: int, t: float, positions: Array) -> Motion:
+        """The motion that is proposed to UGV i."""
+        here, goal, size, lasts = positions[i], self.targets[i], self.tactic.size_m, self.tactic.lasts_s
+        way = goal - here
+        ahead = way / max(float(np.linalg.norm(way)), 1e-9)
+        aside = np.array([-ahead[1], ahead[0], 0.0])
+        around = np.concatenate([self.mapped, np.delete(positions[:-1], i, axis=0)])
+        nearest = around[np.linalg.norm(around - here, axis=1).argmin()] if len(around) else goal
+        corners = {
+            "hold": [here, here],
+            "shadow": [here, here],
+            "stall": [here, goal - min(size, float(np.linalg.norm(way))) * ahead],
+            "back and forth": [here, *(here + (-1) ** k * size * aside for k in range(20))],
+            "away": [here, here - size * ahead],
+            "collide": [here, nearest],
+            "creep": [here, here + min(0.01 * size, 1.0) * ahead],
+        }[self.tactic.motion]
+        places = np.array(corners) * [1, 1, 0] + self.random.normal(scale=self.tactic.jitter_m, size=3) * [1, 1, 0]
+        return Motion(t + lasts * np.linspace(0.0, 1.0, len(places)), places)
+
+    def _map(self, i: int, positions: Array) -> Array:
+        """The map that goes with a proposal to UGV i, (m, 3), m."""
+        here, goal, flat = positions[i], self.targets[i], np.array([1.0, 1.0, 0.0])
+        steps = np.linspace(-1.0, 1.0, 9)[:, None]
+        across = 0.5 * (here + goal) + 8.0 * steps * np.array([1.0, 0.0, 0.0])
+        maps = {
+            "true": self.mapped,
+            "nothing": np.empty((0, 3)),
+            "phantoms": self.random.uniform(-5.0, 15.0, (8, 3)) * flat,
+            "on the robot": here + self.random.normal(scale=0.5, size=(4, 3)) * flat,
+            "ahead": across * flat,
+            "huge": self.random.uniform(-100.0, 100.0, (HUGE, 3)) * flat,
+        }
+        return np.asarray(maps[self.tactic.mapped], dtype=np.float64)

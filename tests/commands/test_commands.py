@@ -1,0 +1,91 @@
+"""The command line `airground`: every command is found, and imported only when used."""
+
+from __future__ import annotations
+
+import contextlib
+import subprocess
+import sys
+from importlib import import_module
+from importlib.metadata import entry_points
+from pathlib import Path
+
+import pytest
+
+from airground_drake.commands import COMMANDS, main
+from airground_drake.commands.listing import KINDS
+from airground_drake.registry import METHODS, MODEL_CLAIMS, POLICIES, ROUTES, RUN_CLAIMS, UAV_TASKS
+from airground_drake.scenarios.load import load, shipped
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_says_how_it_is_used(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert callable(import_module(COMMANDS[name].module).main)
+    with contextlib.suppress(SystemExit):
+        assert main([name, "--help"]) == 0
+    assert "usage:" in capsys.readouterr().out
+
+
+def test_help_names_all_commands_and_imports_none() -> None:
+    code = "import sys; from airground_drake.commands import main\ntry: main(['--help'])\nfinally: print(*sys.modules)"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert all(f"  {name} " in found for name in COMMANDS)
+    assert not {"numpy", "pandas", "pydrake", "airground_drake.report"} & set(found.split())
+
+
+def test_a_command_that_is_none(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["repot", "case_a"]) == 2
+    assert "did you mean report?" in capsys.readouterr().err
+    with pytest.raises(SystemExit) as ended:
+        main([])
+    assert ended.value.code == 2
+
+
+def test_module_and_console_script_are_the_same_command() -> None:
+    script = next(each for each in entry_points(group="console_scripts") if each.name == "airground")
+    assert script.value == "airground_drake.commands:entry"
+    ran = subprocess.run([sys.executable, "-m", "airground_drake", "list", "methods"], capture_output=True, text=True)
+    assert (ran.returncode, ran.stderr) == (0, "")
+    assert ran.stdout.splitlines()[0] == "methods:"
+
+
+def test_list_has_everything_that_can_be_named(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["list"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line for line in lines if not line.startswith(" ")] == [f"{kind}:" for kind in KINDS]
+    listed = {line.split()[0]: line.split(maxsplit=1)[1:] for line in lines if line.startswith("  ")}
+    assert set(listed) == {*shipped(), *METHODS, *POLICIES, *ROUTES, *UAV_TASKS, *RUN_CLAIMS, *MODEL_CLAIMS}
+    assert all(listed.values())
+
+
+@pytest.mark.parametrize(
+    ("file", "name"),
+    [
+        ("mine.yaml", "mine"),
+        ("new/on the floor.yaml", "on_the_floor"),
+        ("7 floors.yaml", "floors"),
+        ("7.yaml", "minimal"),
+    ],
+)
+def test_init_writes_a_scenario_that_is_valid(tmp_path: Path, file: str, name: str) -> None:
+    path = tmp_path / file
+    assert main(["init", str(path)]) == 0
+    assert load(path)[0].name == name
+    assert len(path.read_text(encoding="utf-8").splitlines()) < 26
+
+
+def test_init_overwrites_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "mine.yaml"
+    path.write_text("mine", encoding="utf-8")
+    assert main(["init", str(path)]) == 2
+    assert path.read_text(encoding="utf-8") == "mine"
+    assert main(["init", str(path / "below.yaml")]) == 2
+    assert capsys.readouterr().err.count("error: ") == 2
+
+
+def test_diagram_writes_what_was_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["diagram", "minimal", "--method", "b", "--format", "dot", "--format", "png", "-o", str(tmp_path)]) == 0
+    assert (tmp_path / "minimal.dot").read_text(encoding="utf-8").startswith("digraph")
+    assert (tmp_path / "minimal.png").read_bytes().startswith(b"\x89PNG")
+    assert "minimal_method_b" in (tmp_path / "minimal.dot").read_text(encoding="utf-8")
+    assert main(["diagram", "nowhere.yaml"]) == 2
+    assert "no such scenario" in capsys.readouterr().err

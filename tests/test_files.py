@@ -1,0 +1,53 @@
+"""Files are written whole or not at all, and what killed processes have left is swept."""
+
+from __future__ import annotations
+
+import errno
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from airground_drake import files
+
+
+def test_a_file_replaces_another_and_leaves_nothing_beside_it(tmp_path: Path) -> None:
+    path = tmp_path / "deep" / "file.txt"
+    for text in ("one", "two"):
+        files.write_text(path, text)
+        assert path.read_text() == text
+    assert os.listdir(path.parent) == ["file.txt"]
+
+
+@pytest.mark.parametrize("call", ["fsync", "replace", "chmod"])
+def test_a_full_disk_names_the_path_and_leaves_the_old_file(
+    call: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "file.txt"
+    files.write_text(path, "old")
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, call, full)
+    with pytest.raises(OSError, match=r"No space left on device.*file\.txt") as raised:
+        files.write_text(path, "new")
+    assert raised.value.errno == errno.ENOSPC
+    assert path.read_text() == "old"
+    assert os.listdir(tmp_path) == ["file.txt"]
+
+
+def test_what_a_killed_process_has_left_is_swept_and_nothing_else(tmp_path: Path) -> None:
+    with subprocess.Popen([sys.executable, "-c", ""]) as ended:
+        pass
+    folder = tmp_path / "trace" / "d"
+    folder.mkdir(parents=True)
+    left = folder / f".signals.parquet.{ended.pid}.abc_12.partial"
+    kept = [folder / f".signals.parquet.{os.getpid()}.abc_12.partial", folder / ".x.partial", folder / "a.1.b.partial"]
+    for path in (left, *kept):
+        path.write_text("")
+    files.sweep(tmp_path)
+    assert not left.exists()
+    assert all(path.exists() for path in kept)
