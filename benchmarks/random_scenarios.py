@@ -158,7 +158,7 @@ def _decision(rng: np.random.Generator, h: float) -> dict[str, Any]:
     return {
         "threshold": threshold,
         "trigger": "bare" if rng.random() < 0.15 else "automaton",
-        "release_m": zeta * float(rng.choice([0.0, 0.5, 0.98])),
+        "release_m": zeta * float(rng.choice([0.1, 0.5, 0.98])),
         "min_inter_event_s": float(rng.choice([0.0, 0.05, 0.5, 3.0])),
         "noise_m_sqrt_s": float(rng.choice([0.0, 0.01, 0.3])),
         "leak_1_s": float(rng.choice([0.0, 0.5])),

@@ -121,6 +121,11 @@ class Proposal:
         return self
 
 
+SHORTEST_LEG_S = 1e-8
+"""Vertices of a proposed motion are so far apart at least, s: times of a run, of 1e3 s and more, are rounded to 1e-13 s,
+and a leg that is hardly longer has no velocity to speak of."""
+
+
 class Policy(abc.ABC):
     """An intervention behaviour of the UAV. Subclasses take their parameters as keyword numbers.
 
@@ -150,7 +155,8 @@ def motions_of(proposed: object, seen: Observation) -> dict[str, Motion]:
 
     Raises:
         TypeError: if it is neither a motion nor motions by name.
-        ValueError: if it names what is no UGV of the team, or asks one again that has a proposal of this instant.
+        ValueError: if it names what is no UGV of the team, asks one again that has a proposal of this instant, or has
+            vertices that are hardly apart in time.
     """
     if proposed is None:
         return {}
@@ -166,7 +172,10 @@ def motions_of(proposed: object, seen: Observation) -> dict[str, Motion]:
             raise ValueError(f"a policy proposes to UGVs of the team, not to {name!r}")
         if name in taken:
             raise ValueError(f"{name} has a proposal of this instant already")
-        motions[str(name)] = Motion(motion.times, motion.positions)
+        plain = Motion(motion.times, motion.positions)
+        if (np.diff(plain.times) < SHORTEST_LEG_S).any():
+            raise ValueError(f"the vertices of a proposed motion must be {SHORTEST_LEG_S:g} s apart at least")
+        motions[str(name)] = plain
     return motions
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from airground_drake.arrays import Array
 from airground_drake.intervention.detour import Detour
-from airground_drake.intervention.policy import Observation, Policy
+from airground_drake.intervention.policy import SHORTEST_LEG_S, Observation, Policy
 from airground_drake.nsbc.motion import Motion
 
 
@@ -74,7 +74,7 @@ class Hostile(Policy):
 
 def _straight(seen: Observation, goal: Array, speed: float) -> Motion:
     length = float(np.linalg.norm(goal - seen.position))
-    if length == 0.0:
+    if length < SHORTEST_LEG_S * speed:
         return Motion(np.array([seen.start, seen.start + HOLD_S]), np.array([goal, goal]))
     arrival = seen.start + length / speed
     return Motion(np.array([seen.start, arrival, arrival + HOLD_S]), np.array([seen.position, goal, goal]))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
@@ -24,8 +24,6 @@ class Motion:
 
     times: Array
     positions: Array
-    _times: list[float] = field(init=False, repr=False)
-    _slopes: Array = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Check and freeze the arrays.
@@ -75,15 +73,16 @@ class Motion:
     @property
     def max_speed(self) -> float:
         """Largest speed, m/s."""
-        return float(np.linalg.norm(self._slopes, axis=1).max(initial=0.0))
+        slopes: Array = self._slopes  # type: ignore[attr-defined]
+        return float(np.linalg.norm(slopes, axis=1).max(initial=0.0))
 
     def at(self, t: float) -> tuple[Array, Array]:
         """Position (3,) m and velocity (3,) m/s at time t (at a vertex: the velocity after it)."""
-        times = self._times
+        times: list[float] = self._times  # type: ignore[attr-defined]
         k = bisect_right(times, t) - 1
         if k < 0 or k >= len(times) - 1:
             return self.positions[max(k, 0)], np.zeros(3)
-        slope: Array = self._slopes[k]
+        slope: Array = self._slopes[k]  # type: ignore[attr-defined]
         return self.positions[k] + (t - times[k]) * slope, slope
 
     def sample(self, t: Array) -> Array:

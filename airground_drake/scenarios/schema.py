@@ -99,7 +99,7 @@ class Decision:
 
     threshold: Threshold = field(default_factory=Threshold)
     trigger: str = "automaton"
-    release_m: float = field(default=1.5, metadata=FROM_ZERO)
+    release_m: float = 1.5
     min_inter_event_s: float = field(default=0.5, metadata=FROM_ZERO)
     noise_m_sqrt_s: float = field(default=0.0, metadata=FROM_ZERO)
     leak_1_s: float = field(default=0.0, metadata=FROM_ZERO)
