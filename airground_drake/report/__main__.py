@@ -27,6 +27,7 @@ from airground_drake.scenarios.load import load, shipped
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.simulation import simulate_all
 from airground_drake.verify import Verdict, cache_folder, verify, verify_model
+from airground_drake.verify.finding import PLAIN_NAME
 from airground_drake.verify.mutants import refute_mutants
 from airground_drake.verify.registry import model_claims
 from airground_drake.verify.stl import cross_check as stl
@@ -125,21 +126,25 @@ def write_report(
     provenance = _provenance(scenario, started, command)
 
     _progress("writing")
-    _save_certificates(folder / "certificates", verdicts)
-    _drop_stale(folder / "trace", set(traces))
+    _drop_stale(folder, set(traces))
+    written = [f"certificates/{name}" for name in _save_certificates(folder / "certificates", verdicts)]
     for name, of_run in traces.items():
-        trace.save(of_run, folder / "trace" / name)
+        written += [f"trace/{name}/{file}" for file in trace.save(of_run, folder / "trace" / name)]
     files.write_text(folder / "diagram.dot", dot)
     files.write_text(folder / "diagram.svg", drawn)
+    written += ["diagram.dot", "diagram.svg"]
     provenance["wall_s"] = time.perf_counter() - clock
     report = document.build(
         scenario, digest, traces, verdicts, provenance, audit=findings, mutants=mutants, required=required
     )
     if "junit" in formats:
         files.write_text(folder / "junit.xml", junit.render(report))
+        written.append("junit.xml")
     if "html" in formats:
         plates = [*draw(scenario, traces), *_refinement(verdicts)]
         files.write_text(folder / "report.html", html.render(report, plates, drawn))
+        written.append("report.html")
+    report = document.sealed(report, folder, written)
     if "json" in formats:
         files.write_json(folder / "report.json", report)
     _progress("")
@@ -178,8 +183,11 @@ def _formats(text: str) -> tuple[str, ...]:
 
 
 def _drop_stale(folder: Path, current: set[str]) -> None:
-    """Remove traces of an earlier report's runs that this report does not have."""
-    for meta in folder.glob("*/meta.json"):
+    """Remove what an earlier report has left that this one may not replace: pages, certificates, traces of others."""
+    for name in ("report.json", "report.html", "junit.xml"):
+        (folder / name).unlink(missing_ok=True)
+    shutil.rmtree(folder / "certificates", ignore_errors=True)
+    for meta in folder.glob("trace/*/meta.json"):
         if meta.parent.name not in current:
             shutil.rmtree(meta.parent)
 
@@ -190,12 +198,20 @@ def _refinement(verdicts: Sequence[Verdict]) -> list[Figure]:
     return [figure for figure in drawn if figure is not None]
 
 
-def _save_certificates(folder: Path, verdicts: Sequence[Verdict]) -> None:
-    """Write every certificate to <folder>/<claim>/; those of an earlier report are removed."""
-    shutil.rmtree(folder, ignore_errors=True)
+def _save_certificates(folder: Path, verdicts: Sequence[Verdict]) -> list[str]:
+    """Write every certificate to <folder>/<claim>/ and return their paths in the folder.
+
+    Raises:
+        PluginError: if a claim or a certificate has no plain name.
+    """
+    written = []
     for verdict in verdicts:
         for name, text in verdict.finding.certificates.items():
+            if not (PLAIN_NAME.fullmatch(verdict.claim.id) and PLAIN_NAME.fullmatch(name)):
+                raise PluginError(f"claim {verdict.claim.id!r}: {name!r} is no name for a certificate")
             files.write_text(folder / verdict.claim.id / name, text)
+            written.append(f"{verdict.claim.id}/{name}")
+    return written
 
 
 def _provenance(scenario: Scenario, started: datetime, command: str) -> dict[str, Any]:
