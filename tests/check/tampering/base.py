@@ -246,10 +246,10 @@ def _contents(report: Path) -> tuple[set[str], dict[str, int]]:
 def copy(report: Path, folder: Path) -> Path:
     """A copy of a report, to be tampered with; what is there of a copy that was is mended."""
     folders, files = _contents(report)
-    for place, _, names in os.walk(folder, topdown=False):
-        for name in names:
+    for place, inside, names in os.walk(folder, topdown=False):
+        for name in (*names, *(each for each in inside if os.path.islink(os.path.join(place, each)))):
             path = os.path.join(place, name)
-            if files.get(os.path.relpath(path, folder)) != os.stat(path).st_ino:
+            if files.get(os.path.relpath(path, folder)) != os.lstat(path).st_ino:
                 os.unlink(path)
         if os.path.relpath(place, folder) not in folders:
             os.rmdir(place)

@@ -167,7 +167,7 @@ def page_changed(folder: Path) -> None:
 @refused_by("files", "SHA-256 of a file", run="")
 def junit_changed(folder: Path) -> None:
     path = folder / "junit.xml"
-    write(path, path.read_bytes().replace(b"<failure", b"<!-- "))
+    write(path, path.read_bytes().replace(b"<testcase", b"<!-- --><testcase", 1))
 
 
 @refused_by("files", "SHA-256 of a file", run="")
