@@ -6,11 +6,14 @@ import argparse
 import json
 import math
 import sys
+import warnings
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, NoReturn
+
+import numpy as np
 
 from .report import AGREES, DISAGREES, LIMIT_S, OPEN, Line, check_report
 from .rules import Disagreement, NotEstablished
@@ -70,7 +73,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except SystemExit:  # --help has been printed
         return 0
     try:
-        lines = check_report(options.report, options.limit_s)
+        with np.errstate(all="ignore"), warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # numbers out of all proportion are refused by the rules, not by numpy
+            lines = check_report(options.report, options.limit_s)
     except Disagreement as broken:
         return _refuse(f"{options.report} is no report: {broken.rule}: {broken.about} is {broken.recorded}")
     except NotEstablished as error:
