@@ -185,10 +185,13 @@ class Trace:
         return self.vector(ugv, "ref_")
 
 
-def save(trace: Trace, folder: Path) -> None:
+def save(trace: Trace, folder: Path) -> list[str]:
     """Write a Parquet file per table, `timings.json`, then `meta.json` with digests.
 
     Each file is written atomically and `meta.json` last, so that an interrupted save is recognised by `load`.
+
+    Returns:
+        The names of the files.
 
     Raises:
         OSError: if the folder cannot be written.
@@ -208,6 +211,7 @@ def save(trace: Trace, folder: Path) -> None:
         files.write_bytes(folder / name, buffer.getvalue())
     files.write_json(folder / "timings.json", trace.timings)
     files.write_json(folder / "meta.json", {**trace.meta, "files": digests})
+    return [*tables, "timings.json", "meta.json"]
 
 
 def load(folder: Path) -> Trace:

@@ -197,9 +197,7 @@ def judged(number: int) -> Row:
     row.ugvs, row.obstacles = len(scenario.ugvs), len(scenario.obstacles)
     row.trigger, row.route = scenario.decision.trigger, scenario.gatekeeper.route
     try:
-        of_run = simulate(scenario, row.method)
-        verdicts = stl.merge(verify(of_run), stl.cross_check(of_run))
-        row.wrong = [*_claims(scenario, row.method, verdicts), *_checker(scenario, of_run, verdicts)]
+        of_run, verdicts, row.wrong = tried(scenario)
     except AirgroundError as error:
         row.wrong = [str(error)]
         return row
@@ -210,6 +208,15 @@ def judged(number: int) -> Row:
     row.statuses = {verdict.claim.id: verdict.finding.status for verdict in verdicts}
     row.margin_m = next(verdict.finding.margin for verdict in verdicts if verdict.claim.id == "SAFE-TRACE")
     return row
+
+
+def tried(scenario: Scenario) -> tuple[Trace, list[Verdict], list[str]]:
+    """The one run of a scenario, its verdicts, and what must not be."""
+    (name,) = scenario.runs
+    of_run = simulate(scenario, name)
+    verdicts = stl.merge(verify(of_run), stl.cross_check(of_run))
+    method = scenario.runs[name].method
+    return of_run, verdicts, [*_claims(scenario, method, verdicts), *_checker(scenario, of_run, verdicts)]
 
 
 def _claims(scenario: Scenario, method: str, verdicts: Sequence[Verdict]) -> list[str]:

@@ -1,10 +1,12 @@
 """An independent check of a report: `python -m airground_drake.check DIR`.
 
 Every verdict in DIR/report.json is established again from DIR/trace/ and DIR/certificates/, by formulas that are
-written here from the statements of the claims; proofs in exact rational arithmetic. Only the standard library, numpy
-and pandas are used: no Drake, no solver, nothing else of this package. docs/checker.md says what each rule establishes.
+written here from the statements of the claims; proofs in exact rational arithmetic. Only the standard library, numpy,
+pandas and pyarrow are used: no Drake, no solver, nothing else of this package. docs/checker.md says what each rule
+establishes.
 
-    files, rules, scenario     strict reading; what a broken rule says; what a scenario declares
+    files, limits              strict reading; sizes and times beyond which nothing is looked at
+    rules, scenario            what a broken rule says; what a scenario declares
     run, events, metrics       a trace that is of its run and obeys its law of motion; what follows from it
     safety                     SAFE-TRACE, SAFE-HYP
     law, proposals, execution  EXEC: the control law, what was accepted when, commands

@@ -6,13 +6,16 @@ import argparse
 import json
 import math
 import sys
+import warnings
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, NoReturn
 
-from .report import AGREES, DISAGREES, OPEN, Line, check_report
+import numpy as np
+
+from .report import AGREES, DISAGREES, LIMIT_S, OPEN, Line, check_report
 from .rules import Disagreement, NotEstablished
 
 SCHEMA = "airground_drake.check/1"
@@ -22,6 +25,10 @@ Each line says what was checked, on which run, and
   DISAGREES                  files contradict the verdict or each other: the rule, the time, both values
   cannot be re-established   a file cannot be read, or no way is known here to decide the claim
 Exit codes: 0 all agree; 1 not all; 2 usage, or no report."""
+
+
+LONGEST_INTEGER = 10_000
+"""Bits of an integer that is written: Python writes none of more than 4300 digits."""
 
 
 class UsageError(Exception):
@@ -43,6 +50,9 @@ def _parser() -> _Parser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("report", metavar="DIR", type=Path, help="folder with report.json, trace/ and certificates/")
+    parser.add_argument(
+        "--limit-s", type=float, default=LIMIT_S, metavar="S", help="CPU time for each check (default: %(default)g s)"
+    )
     parser.add_argument("--json", action="store_true", help="write strict JSON to standard output")
     return parser
 
@@ -63,7 +73,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except SystemExit:  # --help has been printed
         return 0
     try:
-        lines = check_report(options.report)
+        with np.errstate(all="ignore"), warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # numbers out of all proportion are refused by the rules, not by numpy
+            lines = check_report(options.report, options.limit_s)
     except Disagreement as broken:
         return _refuse(f"{options.report} is no report: {broken.rule}: {broken.about} is {broken.recorded}")
     except NotEstablished as error:
@@ -76,13 +88,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _refuse(why: str) -> int:
-    print("error:", " ".join(why.split()), file=sys.stderr)
+    print("error:", _printable(why), file=sys.stderr)
     return 2
+
+
+def _printable(text: str) -> str:
+    """One line that upsets no terminal and no encoding, whatever names are in it."""
+    return "".join(c if c.isprintable() else " " if c.isspace() else c.encode("unicode_escape").decode() for c in text)
 
 
 def _print(lines: Sequence[Line]) -> None:
     for line in lines:
-        print(f"{line.claim:<12}{line.run or '-':<8} {line.outcome}: {line.text}")
+        print(_printable(f"{line.claim:<12}{line.run or '-':<8} {line.outcome}: {line.text}"))
     counts = _counts(lines)
     print(f"{len(lines)} checks: {', '.join(f'{count} {outcome}' for outcome, count in counts.items())}")
 
@@ -105,6 +122,8 @@ def _strict(value: Any) -> Any:
         return [_strict(item) for item in value]
     if isinstance(value, float) and not math.isfinite(value):
         return str(value)
+    if isinstance(value, int) and value.bit_length() > LONGEST_INTEGER:
+        return "an integer that is too long to be written"
     if value is None or isinstance(value, (str, int, float)):
         return value
     return str(value)

@@ -22,7 +22,7 @@ from typing import Any
 
 from .certificates import rational
 from .files import Files, Json, content_of, parse_json
-from .polynomials import number
+from .polynomials import bounded, number
 from .rules import SMALL, Disagreement, Found, NotEstablished, holds, same
 
 DIGITS = 100
@@ -32,6 +32,8 @@ LONGEST = 5000
 """Characters of an expression; more would take for ever."""
 HIGHEST = 12
 """Power in an expression."""
+MOST_STATEMENTS = 200
+"""In a certificate."""
 
 
 @dataclass(frozen=True)
@@ -109,10 +111,10 @@ def _enclosure(rule: Rule, saved: Json, name: str, zeta: str, ratio: Fraction) -
 def _the_code_returns_the_root(claim: Json, rule: Rule, ends: tuple[Fraction, Fraction]) -> Found:
     """The running threshold, and the one in force if it is the Bayes-optimal one, are in the enclosure."""
     low, high = (rule.zeta_m(end) for end in ends)
-    running = Fraction(claim["evidence"]["running_threshold_m"])
+    running = Fraction(float(claim["evidence"]["running_threshold_m"]))
     values = [running]
     if claim["inputs"]["rule"] == "bayes":
-        values.append(Fraction(claim["inputs"]["zeta_m"]))
+        values.append(Fraction(float(claim["inputs"]["zeta_m"])))
     outside = max(max(low - value, value - high) for value in values)
     for value in values:
         inside = low - NARROW * high <= value <= high + NARROW * high
@@ -137,6 +139,7 @@ def _the_root_is_the_minimum(claim: Json, rule: Rule, saved: Json, ends: tuple[F
 
 def _statements_are_true(statements: list[Json]) -> None:
     """Signs by evaluation, derivatives by dual numbers at points that follow from the statement's text."""
+    holds("there are not too many statements", len(statements) <= MOST_STATEMENTS, len(statements), MOST_STATEMENTS)
     for one in statements:
         if one["kind"] == "sign":
             values = {name: decimal(number(text)) for name, text in one["values"].items()}
@@ -169,7 +172,20 @@ def _derivative_is_right(one: Json) -> None:
 
 
 def _names(text: str) -> list[ast.Name]:
-    return [node for node in ast.walk(ast.parse(text, mode="eval")) if isinstance(node, ast.Name)]
+    return [node for node in ast.walk(_parsed(text)) if isinstance(node, ast.Name)]
+
+
+def _parsed(text: str) -> ast.AST:
+    """The tree of an expression.
+
+    Raises:
+        Disagreement: if it is too long, or none.
+    """
+    holds("an expression is short", len(text) <= LONGEST, f"{len(text)} characters", f"at most {LONGEST}")
+    try:
+        return ast.parse(text, mode="eval").body
+    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        raise Disagreement("an expression is one of Python's", text, type(error).__name__) from error
 
 
 @dataclass(frozen=True)
@@ -178,6 +194,11 @@ class Dual:
 
     value: Fraction
     slope: Fraction
+
+    def __post_init__(self) -> None:
+        """Neither is so long that arithmetic on it would take for ever."""
+        bounded(self.value)
+        bounded(self.slope)
 
     def __add__(self, other: Dual) -> Dual:
         return Dual(self.value + other.value, self.slope + other.slope)
@@ -208,6 +229,9 @@ def evaluate(text: str, values: Mapping[str, Any], constant: Callable[[str], Any
         Disagreement: if the text is anything else.
     """
 
+    def short(value: Any) -> Any:
+        return bounded(value) if isinstance(value, Fraction) else value
+
     def walk(node: ast.AST) -> Any:
         match node:
             case ast.Constant(int(value)):
@@ -217,21 +241,20 @@ def evaluate(text: str, values: Mapping[str, Any], constant: Callable[[str], Any
             case ast.UnaryOp(ast.USub(), operand):
                 return -walk(operand)
             case ast.BinOp(base, ast.Pow(), ast.Constant(int(power))) if 0 < power <= HIGHEST:
-                product = walk(base)
+                product = factor = walk(base)
                 for _ in range(power - 1):
-                    product = product * walk(base)
+                    product = short(product * factor)
                 return product
             case ast.BinOp(left, ast.Add(), right):
-                return walk(left) + walk(right)
+                return short(walk(left) + walk(right))
             case ast.BinOp(left, ast.Sub(), right):
-                return walk(left) - walk(right)
+                return short(walk(left) - walk(right))
             case ast.BinOp(left, ast.Mult(), right):
-                return walk(left) * walk(right)
+                return short(walk(left) * walk(right))
             case ast.BinOp(left, ast.Div(), right):
-                return walk(left) / walk(right)
+                return short(walk(left) / walk(right))
             case ast.Call(ast.Name("exp"), [argument], []):
                 return walk(argument).exp()
         raise Disagreement("an expression has + - * / **, integers, names and exp", text, "nothing else")
 
-    holds("an expression is short", len(text) <= LONGEST, f"{len(text)} characters", f"at most {LONGEST}")
-    return walk(ast.parse(text, mode="eval").body)
+    return walk(_parsed(text))

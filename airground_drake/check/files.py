@@ -1,4 +1,4 @@
-"""Strict reading of a report's files.
+"""Strict reading of a report's files, whoever wrote them: nothing but regular files of the folder, of a bounded size.
 
 What is read depends on the content alone, so contents that were read before are not parsed again. Nothing that is
 returned here may be changed.
@@ -9,12 +9,17 @@ from __future__ import annotations
 import hashlib
 import io
 import json
+import math
+import os
+import stat
 from collections import Counter
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, NoReturn
 
 import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
 
 from .rules import Disagreement, NotEstablished
 
@@ -22,17 +27,64 @@ Json = dict[str, Any]
 Files = tuple[tuple[str, bytes], ...]
 """Names and contents."""
 
+LARGEST_FILE = 256_000_000
+"""Bytes of a file: a run of an hour with ten robots has less."""
+LARGEST_JSON = 64_000_000
+"""Bytes of a JSON file."""
+DEEPEST = 60
+"""Levels of nesting in JSON."""
+LONGEST_NUMBER = 300
+"""Characters of a number in JSON: a longer integer is beyond all floating-point numbers."""
+MOST_CELLS = 50_000_000
+"""Rows times columns of a table, and numbers in its lists."""
+MOST_FILES = 100_000
+"""In the folder of a report."""
+THRIFT = 10_000_000
+"""Bytes of a text, and entries of a list, in the metadata of a table."""
 
-def read_bytes(path: Path) -> bytes:
-    """The content of a file.
+
+def is_plain(name: Any) -> bool:
+    """Whether it is the name of a file or a folder that stays in its folder."""
+    return isinstance(name, str) and name not in ("", ".", "..") and not {*"/\\\0"} & {*name} and name.isprintable()
+
+
+def names_in(folder: Path) -> list[str]:
+    """The paths of all files in a folder, with slashes, in order.
 
     Raises:
-        NotEstablished: if it cannot be read.
+        NotEstablished: if one is no regular file, or there are too many.
+    """
+    found: list[str] = []
+    for place, folders, files in os.walk(folder):
+        for name in (*folders, *files):
+            path = Path(place, name)
+            mode = path.lstat().st_mode
+            if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
+                raise NotEstablished("it has regular files and folders only", "it is neither", str(path))
+        found += [Path(place, name).relative_to(folder).as_posix() for name in files]
+        if len(found) > MOST_FILES:
+            raise NotEstablished("it has a number of files", f"more than {MOST_FILES}", str(folder))
+    return sorted(found)
+
+
+def read_bytes(path: Path) -> bytes:
+    """The content of a regular file.
+
+    Raises:
+        NotEstablished: if it cannot be read, is none, or is too large.
     """
     try:
-        return path.read_bytes()
-    except OSError as error:
-        raise NotEstablished("the file can be read", str(error.strerror), path.name) from error
+        handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOFOLLOW", 0))
+        with os.fdopen(handle, "rb") as file:
+            about = os.fstat(file.fileno())
+            if not stat.S_ISREG(about.st_mode):
+                raise NotEstablished("the file can be read", "it is no regular file", path.name)
+            if about.st_size > LARGEST_FILE:
+                raise NotEstablished("the file can be read", f"it has {about.st_size} bytes", path.name)
+            return file.read()
+    except (OSError, ValueError) as error:
+        why = str(getattr(error, "strerror", None) or error)
+        raise NotEstablished("the file can be read", why, path.name) from error
 
 
 def sha256(content: bytes) -> str:
@@ -77,7 +129,7 @@ def parse_json(content: bytes, name: str) -> Any:
     """The value of a strict JSON text; `name` is what it is called in a refusal.
 
     Raises:
-        NotEstablished: if it is not JSON.
+        NotEstablished: if it is not JSON, or too large or too deep.
         Disagreement: if it is JSON that is not strict.
     """
 
@@ -89,22 +141,83 @@ def parse_json(content: bytes, name: str) -> Any:
         return value
 
     def refused(text: str) -> NoReturn:
-        raise Disagreement("numbers are finite", text, "a number", name)
+        raise Disagreement("numbers are finite", f"{text[:20]}...", "a number", name)
 
+    def real(text: str) -> float:
+        value = float(text)
+        return value if math.isfinite(value) else refused(text)
+
+    def whole(text: str) -> int:
+        return int(text) if len(text) <= LONGEST_NUMBER else refused(text)
+
+    if len(content) > LARGEST_JSON:
+        raise NotEstablished("the file is JSON", f"it has {len(content)} bytes", name)
     try:
-        return json.loads(content.decode("utf-8"), object_pairs_hook=unique, parse_constant=refused)
+        value = json.loads(
+            content.decode("utf-8"), object_pairs_hook=unique, parse_constant=refused, parse_float=real, parse_int=whole
+        )
     except (ValueError, RecursionError) as error:
         raise NotEstablished("the file is JSON", str(error), name) from error
+    if _is_deep(value):
+        raise NotEstablished("the file is JSON", f"it is nested more than {DEEPEST} deep", name)
+    return value
+
+
+def _is_deep(value: Any) -> bool:
+    """Whether it is nested deeper than `DEEPEST`, level by level."""
+    level = [value]
+    for _ in range(DEEPEST):
+        parts = [part for each in level for part in (each.values() if isinstance(each, dict) else each)]
+        level = [part for part in parts if isinstance(part, (dict, list))]
+        if not level:
+            return False
+    return True
 
 
 @lru_cache(maxsize=64)
 def parse_table(content: bytes, name: str) -> pd.DataFrame:
-    """The table in a Parquet file, rows numbered from 0.
+    """The table in a Parquet file, rows numbered from 0: numbers, texts and lists of numbers.
+
+    What the file says of its size and types is looked at before any of it is unpacked. Texts stay in dictionaries
+    until then, so that one that is there a million times takes the room of one.
 
     Raises:
         NotEstablished: if it is none.
     """
     try:
-        return pd.read_parquet(io.BytesIO(content)).reset_index(drop=True)
+        limits = {"thrift_string_size_limit": THRIFT, "thrift_container_size_limit": THRIFT}
+        file = pq.ParquetFile(io.BytesIO(content), **limits)
+        schema, about = file.schema_arrow, file.metadata
+        texts = [field.name for field in schema if _is_text_type(field.type)]
+        chunks = (about.row_group(i).column(j) for i in range(about.num_row_groups) for j in range(about.num_columns))
+        cells = max(about.num_rows * about.num_columns, sum(chunk.num_values for chunk in chunks))
+        wrong = next((field for field in schema if not _is_plain_type(field.type)), None)
+        if cells > MOST_CELLS:
+            raise NotEstablished("the file is a table", f"it has {cells} cells, {MOST_CELLS} at most", name)
+        if wrong is not None:
+            raise NotEstablished("the file is a table", f"column {wrong.name!r} is of type {wrong.type}", name)
+        if len({*schema.names}) < len(schema.names):
+            raise NotEstablished("the file is a table", "a column is there twice", name)
+        file = pq.ParquetFile(io.BytesIO(content), read_dictionary=texts, **limits)
+        table = file.read().to_pandas(ignore_metadata=True)
+        return table.astype(dict.fromkeys(texts, object))
+    except NotEstablished:
+        raise
     except Exception as error:  # pyarrow raises what it likes
         raise NotEstablished("the file is a table", f"{type(error).__name__}: {error}", name) from error
+
+
+def _is_plain_type(kind: pa.DataType) -> bool:
+    """A number, a text, a list of numbers, or nothing."""
+    if pa.types.is_list(kind) or pa.types.is_large_list(kind):
+        return _is_number_type(kind.value_type)
+    return _is_number_type(kind) or _is_text_type(kind)
+
+
+def _is_text_type(kind: pa.DataType) -> bool:
+    return bool(pa.types.is_string(kind) or pa.types.is_large_string(kind))
+
+
+def _is_number_type(kind: pa.DataType) -> bool:
+    of = (pa.types.is_floating, pa.types.is_integer, pa.types.is_boolean, pa.types.is_null)
+    return any(each(kind) for each in of)

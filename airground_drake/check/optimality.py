@@ -35,6 +35,10 @@ TIED_M = 1e-5
 """Points that lack the same to within this are tied."""
 EDGE = 1e-6
 """omega closer to 0 or 1 than this is there."""
+NEWTON_STEPS = 40
+"""Most steps to the minimiser of a smooth convex function: a handful, unless many slacks begin or end on the way."""
+PROBE = 1e-3
+"""Change of omega by which curvature is found."""
 
 
 def gate_sur(run: Run, _: Json) -> Found:
@@ -167,15 +171,16 @@ def _no_plan_of_blocks_is_much_cheaper(decision: Decision) -> None:
 def enclose(decision: Decision) -> Enclosure:
     """Bounds of the least cost of a relaxed plan, omega in [0, 1]^N, with distances along the recorded normals.
 
-    That cost J is convex. Above: its value at the recorded relaxation omega*. Below: slack u_k, the most that a point
-    lacks at stage k, is at least w_k = sum_j l_kj (what point j lacks) for any shares l_kj >= 0 with sum 1, and
-    u_k^2 >= 2 u*_k w_k - (u*_k)^2 for any u*_k >= 0. With that in place of u_k^2, J has become a smooth convex function
-    that is below it; it is nowhere below its tangent at omega*, which is least at a corner of the box:
+    That cost J is convex. Above: its value at any plan, such as the recorded relaxation omega*. Below: slack u_k, the
+    most that a point lacks at stage k, is at least w_k = sum_j l_kj (what point j lacks) for any shares l_kj >= 0 with
+    sum 1. With max(0, w_k) in place of u_k, J has become a smooth convex function that is below it; it is nowhere below
+    its tangent at any omega', which is least at a corner of the box:
 
-        J(omega) >= value + sum_k min(-s_k omega*_k, s_k (1 - omega*_k)),    s: slopes.
+        J(omega) >= value + sum_k min(-s_k omega'_k, s_k (1 - omega'_k)),    s: slopes.
 
     Good shares leave nothing to be gained at omega*: all on the point that lacks most, or, where several lack the
-    same, as `_shares_at_ties` finds them.
+    same, as `_shares_at_ties` finds them. Where costs are tiny, omega* is a solver's, no minimiser to so many digits:
+    the tangent is then taken at the minimiser of the smooth function.
     """
     normals, omega = decision.normals, decision.relaxed
     if normals is None or not len(omega):
@@ -183,13 +188,16 @@ def enclose(decision: Decision) -> Enclosure:
     positions = decision.positions_of(omega)
     upper = float(decision.cost(positions, normals))
     lacking = -decision.gaps_m(positions, normals)
-    if not lacking.shape[1]:
-        return Enclosure(_lower_bound(decision, positions, lacking, lacking), upper)
-    shares = np.eye(lacking.shape[1])[lacking.argmax(axis=1)]
-    lower = _lower_bound(decision, positions, lacking, shares)
+    shares = np.eye(lacking.shape[1])[lacking.argmax(axis=1)] if lacking.shape[1] else lacking
+    lower = _lower_bound(decision, omega, shares)
+    if lacking.shape[1] and upper - lower > NARROW * decision.scale:
+        at_ties = _shares_at_ties(decision, positions, lacking, normals)
+        if (better := _lower_bound(decision, omega, at_ties)) > lower:
+            lower, shares = better, at_ties
     if upper - lower > NARROW * decision.scale:
-        shares = _shares_at_ties(decision, positions, lacking, normals)
-        lower = max(lower, _lower_bound(decision, positions, lacking, shares))
+        omega = _minimiser(decision, omega, shares)
+        lower = max(lower, _lower_bound(decision, omega, shares))
+        upper = min(upper, float(decision.cost(decision.positions_of(omega), normals)))
     return Enclosure(lower, upper)
 
 
@@ -202,19 +210,44 @@ def _slopes(decision: Decision, forces: Array) -> Array:
     return np.asarray((moved * np.cumsum(forces[::-1], axis=0)[::-1]).sum(axis=1))
 
 
-def _lower_bound(decision: Decision, positions_m: Array, lacking_m: Array, shares: Array) -> float:
-    """The bound of `enclose` for shares (N, m) of the points in what is lacking, (N, m)."""
-    dt, omega = decision.dt_s, decision.relaxed
-    error, slack = positions_m - decision.reference_m, lacking_m.max(axis=1, initial=0.0)
-    shared = (shares * lacking_m).sum(axis=1)
+def _smooth(decision: Decision, omega: Array, shares: Array) -> tuple[float, Array]:
+    """The smooth function of `enclose` for shares (N, m) of the points in what is lacking, and its slopes (N,)."""
+    dt, positions, normals = decision.dt_s, decision.positions_of(omega), decision.normals
+    error = positions - decision.reference_m
+    slack = np.maximum(0.0, (shares * -decision.gaps_m(positions, normals)).sum(axis=1))
     of_error = (decision.error_weights_1_m2[:, None] * error**2).sum()
-    of_slack = dt * decision.slack_weight_1_m2_s * (2.0 * slack * shared - slack**2).sum()
-    away = np.zeros_like(error) if decision.normals is None else (shares[..., None] * decision.normals).sum(axis=1)
+    of_slack = dt * decision.slack_weight_1_m2_s * (slack**2).sum()
+    away = np.zeros_like(error) if normals is None else (shares[..., None] * normals).sum(axis=1)
     forces = decision.error_weights_1_m2[:, None] * error
     forces -= dt * decision.slack_weight_1_m2_s * slack[:, None] * away
-    slopes = _slopes(decision, 2.0 * forces)
-    corner = np.minimum(-slopes * omega, slopes * (1.0 - omega)).sum()
-    return float(of_error + of_slack + corner)
+    return float(of_error + of_slack), _slopes(decision, 2.0 * forces)
+
+
+def _lower_bound(decision: Decision, omega: Array, shares: Array) -> float:
+    """The bound of `enclose`: the tangent at omega, at the lowest corner."""
+    value, slopes = _smooth(decision, omega, shares)
+    return value + float(np.minimum(-slopes * omega, slopes * (1.0 - omega)).sum())
+
+
+def _minimiser(decision: Decision, omega: Array, shares: Array) -> Array:
+    """Where in the box the smooth function of `enclose` is least, by projected Newton steps; none may raise it."""
+    value, slopes = _smooth(decision, omega, shares)
+    for _ in range(NEWTON_STEPS):
+        free = ~(((omega <= 0.0) & (slopes >= 0.0)) | ((omega >= 1.0) & (slopes <= 0.0)))
+        if not free.any():
+            break
+        shifts = PROBE * np.where(omega < 0.5, 1.0, -1.0)  # slopes are linear but for where a slack becomes 0
+        rates = [(_smooth(decision, omega + step, shares)[1] - slopes) / step.sum() for step in np.diag(shifts)]
+        curvature = np.stack(rates)[np.ix_(free, free)]
+        step = np.zeros_like(omega)
+        step[free] = -np.linalg.lstsq(curvature, slopes[free], rcond=None)[0]
+        tries = [np.clip(omega + step * 0.5**k, 0.0, 1.0) for k in range(30)]
+        found = next((each for each in tries if _smooth(decision, each, shares)[0] < value), None)
+        if found is None:
+            break
+        omega = found
+        value, slopes = _smooth(decision, omega, shares)
+    return omega
 
 
 def _shares_at_ties(decision: Decision, positions_m: Array, lacking_m: Array, normals: Array) -> Array:

@@ -17,7 +17,23 @@ NUMBER = r"\d+(?:/[1-9]\d*)?"
 NAME = r"[A-Za-z_]\w*"
 PRODUCT = re.compile(rf"([+-]?)(?:{NUMBER}|{NAME})(?:\*(?:{NUMBER}|{NAME}))*")
 LARGEST = 100_000
-"""Most products of terms in a multiplication, and most digits of a number: more would take for ever."""
+"""Most products of terms in a multiplication, and most characters of a polynomial: more would take for ever."""
+MOST_DIGITS = 2_000
+"""Digits of a numerator or denominator; those of a proof have less than 150."""
+MOST_BITS = 4 * MOST_DIGITS
+HIGHEST = 100
+"""Degree of a monomial."""
+
+
+def bounded(value: Fraction) -> Fraction:
+    """The same.
+
+    Raises:
+        Disagreement: if its numerator or denominator is so long that arithmetic on it would take for ever.
+    """
+    if max(value.numerator.bit_length(), value.denominator.bit_length()) > MOST_BITS:
+        raise Disagreement("a number is short", "a longer one", f"{MOST_DIGITS} digits at most")
+    return value
 
 
 class Polynomial(dict[Monomial, Fraction]):
@@ -26,12 +42,14 @@ class Polynomial(dict[Monomial, Fraction]):
     @classmethod
     def of(cls, terms: Mapping[Monomial, Fraction]) -> Polynomial:
         """From terms, some of which may be 0."""
+        if any(len(monomial) > HIGHEST for monomial in terms):
+            raise Disagreement("a degree is low", max(map(len, terms)), f"{HIGHEST} at most")
         return cls({monomial: size for monomial, size in terms.items() if size})
 
     def __add__(self, other: Polynomial) -> Polynomial:
         total = dict(self)
         for monomial, size in other.items():
-            total[monomial] = total.get(monomial, Fraction()) + size
+            total[monomial] = bounded(total.get(monomial, Fraction()) + size)
         return Polynomial.of(total)
 
     def __neg__(self) -> Polynomial:
@@ -47,7 +65,7 @@ class Polynomial(dict[Monomial, Fraction]):
         for left, size in self.items():
             for right, factor in other.items():
                 monomial = tuple(sorted(left + right))
-                total[monomial] = total.get(monomial, Fraction()) + size * factor
+                total[monomial] = bounded(total.get(monomial, Fraction()) + size * factor)
         return Polynomial.of(total)
 
     def at(self, numbers: Mapping[str, Fraction]) -> Polynomial:
@@ -70,9 +88,9 @@ def number(text: str) -> Fraction:
     Raises:
         Disagreement: if the text is none.
     """
-    if not isinstance(text, str) or len(text) > LARGEST or not re.fullmatch(rf"-?{NUMBER}", text):
+    if not isinstance(text, str) or len(text) > 2 * MOST_DIGITS or not re.fullmatch(rf"-?{NUMBER}", text):
         raise Disagreement("a number is an integer or a fraction", text, "such as 3 or 1/20")
-    return Fraction(text)
+    return bounded(Fraction(text))
 
 
 @lru_cache(maxsize=4096)
@@ -85,10 +103,13 @@ def parse(text: str) -> Polynomial:
     words = text.replace(" - ", " -").replace(" + ", " +").split(" ") if isinstance(text, str) else []
     if not words or len(text) > LARGEST or not all(PRODUCT.fullmatch(word) for word in words):
         raise Disagreement("a polynomial is a sum of products", text, "such as 2*h*r - 1/2*d")
-    total = Polynomial()
+    total: dict[Monomial, Fraction] = {}
     for word in words:
         factors = word.lstrip("+-").split("*")
         names = tuple(sorted(factor for factor in factors if re.fullmatch(NAME, factor)))
-        sizes = [Fraction(factor) for factor in factors if not re.fullmatch(NAME, factor)]
-        total += Polynomial.of({names: math.prod(sizes, start=Fraction(-1 if word.startswith("-") else 1))})
-    return total
+        size = Fraction(-1 if word.startswith("-") else 1)
+        for factor in factors:
+            if not re.fullmatch(NAME, factor):
+                size = bounded(size * number(factor))
+        total[names] = bounded(total.get(names, Fraction()) + size)
+    return Polynomial.of(total)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from pathlib import Path
@@ -15,8 +15,9 @@ from .enclosures import root
 from .events import check_events
 from .execution import execution
 from .feasibility import gate_feas
-from .files import Files, Json, canonical, read_folder, read_json, sha256
+from .files import Files, Json, canonical, is_plain, names_in, read_bytes, read_folder, read_json, sha256
 from .inputs import inputs_of
+from .limits import at_most_s, is_of_a_size
 from .metrics import check_metrics
 from .optimality import gate_opt, gate_sur
 from .outcome import comm, gate_time, live_goal
@@ -40,6 +41,10 @@ EXERCISED = "exercised"
 """What may be expected besides a status: that the claim was established, on something that put it to the test."""
 NOT_EXERCISED = "not_exercised"
 """How a claim counts that was established because nothing put it to the test."""
+ADDED_LATER = "proofs/"
+"""Folder of proofs that cvc5 has written for a report's scripts; nothing is taken from there."""
+LIMIT_S = 300.0
+"""CPU time that a check may take, s: those of a report of minutes take seconds."""
 EXIT_CODES = {"as_expected": 0, "not_as_expected": 1, "inconclusive": 3}
 
 OfRun = Callable[[Run, Json], Found]
@@ -113,25 +118,28 @@ class Line:
     recomputed: Any = None
 
 
-def check_report(folder: Path) -> list[Line]:
+def check_report(folder: Path, limit_s: float = LIMIT_S) -> list[Line]:
     """All checks of a report.
 
     Args:
         folder: with report.json, trace/ and certificates/.
+        limit_s: CPU time for each check; one that takes longer is not established.
 
     Raises:
-        Disagreement, NotEstablished: if report.json is not strict JSON, or is not of the shape of a report.
+        Disagreement, NotEstablished: if report.json is not strict JSON, or is not of the shape of a report, or there
+            is anything but regular files in the folder.
     """
     report = read_json(folder / "report.json")
     _is_shaped_like_a_report(report)
-    return [*_lines(folder, report)]
+    is_of_a_size(report["scenario"]["resolved"])
+    return [*_lines(folder, names_in(folder), report, limit_s)]
 
 
 def _is_shaped_like_a_report(report: Any) -> None:
     """Objects are objects, lists are lists of objects."""
     if not isinstance(report, dict):
         raise NotEstablished("it is a report", f"it is a {type(report).__name__}", "report.json")
-    for key in ("scenario", "provenance", "overall", "runs"):
+    for key in ("scenario", "provenance", "overall", "runs", "files"):
         if not isinstance(report.get(key), dict):
             raise NotEstablished("it is a report", f"its {key!r} is missing or is no object", "report.json")
     for key in ("claims", "audit", "mutants", "choices"):
@@ -143,11 +151,16 @@ def _is_shaped_like_a_report(report: Any) -> None:
         raise NotEstablished("it is a report", "it has no resolved scenario with runs", "report.json")
     if not all({"id", "run"} <= {*claim} for claim in report["claims"]):
         raise NotEstablished("it is a report", "a claim has no id or no run", "report.json")
+    for name in (*scenario["runs"], *report["runs"], *(claim["id"] for claim in report["claims"])):
+        if not is_plain(name):
+            raise NotEstablished("it is a report", f"{name!r} is no name of a run or a claim", "report.json")
 
 
-def _lines(folder: Path, report: Json) -> Iterator[Line]:
+def _lines(folder: Path, there: Sequence[str], report: Json, limit_s: float) -> Iterator[Line]:
     scenario = report["scenario"]["resolved"]
-    yield _attempt("report", "", lambda: _check_overall(folder, report))
+    attempt = partial(_attempt, limit_s)
+    yield attempt("report", "", lambda: _check_overall(folder, report))
+    yield attempt("files", "", lambda: _check_files(folder, there, report["files"]))
     runs: dict[str, Run] = {}
 
     def load(name: str) -> str:
@@ -166,9 +179,9 @@ def _lines(folder: Path, report: Json) -> Iterator[Line]:
         return _check_metrics(loaded(name), canonical(report["runs"][name]["metrics"]))
 
     for name in scenario["runs"]:
-        yield _attempt("trace", name, partial(load, name))
-        yield _attempt("events", name, partial(events, name))
-        yield _attempt("metrics", name, partial(metrics, name))
+        yield attempt("trace", name, partial(load, name))
+        yield attempt("events", name, partial(events, name))
+        yield attempt("metrics", name, partial(metrics, name))
     scenario_text = canonical(scenario)
 
     def decide(claim: Json) -> Found:
@@ -178,13 +191,14 @@ def _lines(folder: Path, report: Json) -> Iterator[Line]:
         return _decide_of_model(about, read_folder(folder / "certificates" / claim["id"]), scenario_text)
 
     for claim in report["claims"]:
-        yield _attempt(claim["id"], claim["run"], partial(_judge, claim, scenario, decide))
+        yield attempt(claim["id"], claim["run"], partial(_judge, claim, scenario, decide))
 
 
-def _attempt(claim: str, run: str, check: Callable[[], str]) -> Line:
+def _attempt(limit_s: float, claim: str, run: str, check: Callable[[], str]) -> Line:
     """What a check says, as a line; whatever goes wrong in it is not agreement."""
     try:
-        return Line(str(claim), str(run), AGREES, check())
+        with at_most_s(limit_s):
+            return Line(str(claim), str(run), AGREES, check())
     except Disagreement as broken:
         when = "" if broken.t_s is None else f" at t = {broken.t_s:.9g} s"
         about = f" ({broken.about})" if broken.about else ""
@@ -203,7 +217,10 @@ def _attempt(claim: str, run: str, check: Callable[[], str]) -> Line:
 
 
 def _short(value: Any, most: int = 120) -> str:
-    text = value if isinstance(value, str) else repr(value)
+    try:
+        text = value if isinstance(value, str) else repr(value)
+    except ValueError:  # Python writes no integer of more than 4300 digits
+        text = f"a {type(value).__name__} that is too long to be written"
     return text if len(text) <= most else f"{text[:most]}..."
 
 
@@ -249,6 +266,9 @@ def _judge(claim: Json, scenario: Json, decide: Callable[[Json], Found]) -> str:
     wanted, status = expectations(scenario), claim["status"]
     expected = wanted.get((claim["run"], claim["id"]))
     same("expected verdict", claim["expected"], expected)
+    may_be_kept = claim["run"] == "" and status not in UNDECIDED
+    holds("only what is about the model comes from a cache", claim["from_cache"] in (False, may_be_kept),
+          claim["from_cache"], "false" if not may_be_kept else "true or false")  # fmt: skip
     same("as expected", claim["as_expected"], _meets(expected, claim))
     same("a counterexample comes with a refutation", bool(claim["counterexample"]), status == "refuted")
     try:
@@ -333,6 +353,16 @@ def _check_overall(folder: Path, report: Json) -> str:
     same("counts of verdicts", report["overall"]["counts"], overall["counts"])
     same("claims with nothing to check", report["overall"]["not_exercised"], overall["not_exercised"])
     return f"{overall['status']}, exit code {overall['exit_code']}"
+
+
+def _check_files(folder: Path, there: Sequence[str], recorded: Json) -> str:
+    """Every file that is named is there with its SHA-256, and no other but `report.json` and what was added later."""
+    found = {name for name in there if name != "report.json" and not name.startswith(ADDED_LATER)}
+    for name in sorted({*recorded} | found):
+        holds("a file that is named is there", name in found, "nothing", "a file", about=name)
+        holds("a file that is there is named", name in recorded, "a file", "nothing", about=name)
+        same("SHA-256 of a file", recorded[name], sha256(read_bytes(folder / name)), about=name)
+    return f"{len(found)} files"
 
 
 def _overall(report: Json) -> Json:

@@ -97,9 +97,14 @@ def pairs_of(scenario: Json) -> list[Pair]:
 
 
 def views_of(scenario: Json) -> list[Pair]:
-    """The pairs as each robot sees them: those of two robots from both sides."""
+    """The pairs as each robot sees them: obstacles, then the other robots, UGVs first, as recursion (5) lists them."""
     pairs = pairs_of(scenario)
-    return pairs + [pair.turned() for pair in pairs if pair.share < 1.0]
+    return [
+        pair if pair.robot == robot else pair.turned()
+        for robot in robots_of(scenario)
+        for pair in pairs
+        if robot in (pair.robot, pair.other)
+    ]
 
 
 def preset_of(scenario: Json, ugv: str) -> Preset:

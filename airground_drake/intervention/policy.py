@@ -122,8 +122,8 @@ class Proposal:
 
 
 SHORTEST_LEG_S = 1e-8
-"""Vertices of a proposed motion are so far apart at least, s: times of a run, of 1e3 s and more, are rounded to 1e-13 s,
-and a leg that is hardly longer has no velocity to speak of."""
+"""Vertices of a proposed motion are so far apart at least, s: times of a run are rounded to 1e-13 s and more, and a leg
+that is hardly longer has no velocity to speak of."""
 
 
 class Policy(abc.ABC):

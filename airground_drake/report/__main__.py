@@ -44,6 +44,7 @@ from airground_drake.scenarios.estimate import DEFAULT_LIMITS, GIB, Limits, with
 from airground_drake.scenarios.load import load, shipped
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify import Verdict, cache_folder, verify, verify_model
+from airground_drake.verify.finding import PLAIN_NAME
 from airground_drake.verify.mutants import refute_mutants
 from airground_drake.verify.registry import model_claims
 from airground_drake.verify.stl import cross_check as stl
@@ -157,20 +158,24 @@ def write_report(
 
     _progress("writing")
     _drop_stale(output, set(traces))
-    _save_certificates(output / "certificates", verdicts)
+    written = [f"certificates/{name}" for name in _save_certificates(output / "certificates", verdicts)]
     for name, of_run in traces.items():
-        trace.save(of_run, output / "trace" / name)
+        written += [f"trace/{name}/{file}" for file in trace.save(of_run, output / "trace" / name)]
     files.write_text(output / "diagram.dot", dot)
     files.write_text(output / "diagram.svg", drawn)
+    written += ["diagram.dot", "diagram.svg"]
     provenance["wall_s"] = time.perf_counter() - clock
     report = document.build(
         scenario, digest, traces, verdicts, provenance, audit=findings, mutants=mutants, required=required
     )
     if "junit" in formats:
         files.write_text(output / "junit.xml", junit.render(report))
+        written.append("junit.xml")
     if "html" in formats:
         plates = [*draw(scenario, traces), *_refinement(verdicts)]
         files.write_text(output / "report.html", html.render(report, plates, drawn))
+        written.append("report.html")
+    report = document.sealed(report, output, written)
     if "json" in formats:
         files.write_json(output / "report.json", report)
     _progress("")
@@ -261,11 +266,20 @@ def _refinement(verdicts: Sequence[Verdict]) -> list[Figure]:
     return [figure for figure in drawn if figure is not None]
 
 
-def _save_certificates(folder: Path, verdicts: Sequence[Verdict]) -> None:
-    """Write every certificate to <folder>/<claim>/."""
+def _save_certificates(folder: Path, verdicts: Sequence[Verdict]) -> list[str]:
+    """Write every certificate to <folder>/<claim>/ and return their paths in the folder.
+
+    Raises:
+        PluginError: if a claim or a certificate has no plain name.
+    """
+    written = []
     for verdict in verdicts:
         for name, text in verdict.finding.certificates.items():
+            if not (PLAIN_NAME.fullmatch(verdict.claim.id) and PLAIN_NAME.fullmatch(name)):
+                raise PluginError(f"claim {verdict.claim.id!r}: {name!r} is no name for a certificate")
             files.write_text(folder / verdict.claim.id / name, text)
+            written.append(f"{verdict.claim.id}/{name}")
+    return written
 
 
 def _provenance(scenario: Scenario, started: datetime, command: str) -> dict[str, Any]:

@@ -6,10 +6,12 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from airground_drake.files import sha256
 from airground_drake.registry import NOT_EXERCISED, STATUSES, method_of, outcome
 from airground_drake.report import metrics, reproduction
 from airground_drake.report.audit import of_runs
@@ -27,7 +29,7 @@ EXIT_CODES = {"as_expected": 0, "not_as_expected": 1, "inconclusive": 3}
 
 def build(
     scenario: Scenario,
-    sha256: str,
+    digest: str,
     traces: Mapping[str, Trace],
     verdicts: Iterable[Verdict],
     provenance: Mapping[str, Any],
@@ -40,7 +42,7 @@ def build(
 
     Args:
         scenario: as resolved (after command-line settings).
-        sha256: digest of the scenario file.
+        digest: SHA-256 of the scenario file.
         traces: by run, in the order of the scenario; a run without a trace makes the report inconclusive.
         verdicts: all of them; a claim that the scenario expects and that is missing makes it inconclusive.
         provenance: versions, seed, time, `command` and the like.
@@ -69,7 +71,7 @@ def build(
             "name": scenario.name,
             "title": scenario.title,
             "description": scenario.description,
-            "sha256": sha256,
+            "sha256": digest,
             "resolved": resolved,
         },
         "provenance": dict(provenance),
@@ -80,9 +82,24 @@ def build(
         "choices": [{**asdict(choice), "ours": _lookup(resolved, choice.key)} for choice in scenario.choices],
         "audit": items,
         "mutants": list(mutants),
+        "files": {},
     }
     strict: dict[str, Any] = _strict(document)
     return strict
+
+
+def sealed(document: Mapping[str, Any], folder: Path, names: Iterable[str]) -> dict[str, Any]:
+    """The document with the SHA-256 of every other file of the report under `files`, so that none can be exchanged.
+
+    Args:
+        document: of `build`.
+        folder: of the report.
+        names: paths of its files in there, with slashes.
+
+    Raises:
+        OSError: if one cannot be read.
+    """
+    return {**document, "files": {name: sha256((folder / name).read_bytes()) for name in sorted(names)}}
 
 
 def overall(

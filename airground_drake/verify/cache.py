@@ -1,24 +1,33 @@
-"""Findings of model claims, kept by content: equal code and inputs, equal finding."""
+"""Findings of model claims, kept by content: equal code and inputs, equal finding.
+
+An entry is a file that says what it is about: claim, inputs, digest of the code, versions of the engines, and the
+finding. It is taken if all of that is what is asked for, the finding is well formed, and the claim takes it: one with
+certificates establishes them again (`ModelClaim.takes`). Anything else is decided anew, so that an entry that is
+damaged or under another's name costs time and no more. What is not done again is believed: see docs/verification.md.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import json
+import math
 import os
 import platform
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 from airground_drake import files
-from airground_drake.registry import PASSING
 from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.finding import Finding
 
+SCHEMA = "airground_drake.finding/1"
+LARGEST_BYTES = 16_000_000
+"""A larger entry is not read."""
 ENGINES = ("numpy", "scipy", "numba", "z3-solver", "cvc5", "python-flint", "sympy", "pyddm", "drake")
 """Packages whose versions are part of a finding's key."""
 
@@ -33,21 +42,16 @@ def find(
         inputs: what each is about, strict JSON.
         folder: where findings are kept; None: computed anew, kept nowhere.
     """
-    known = [_read(folder, key(claim, given)) for claim, given in zip(claims, inputs, strict=True)]
+    known = [_read(folder, claim, given) for claim, given in zip(claims, inputs, strict=True)]
     todo = [i for i, found in enumerate(known) if found is None]
     made: Mapping[int, Finding] = {}
     if todo:
         # the solvers run in processes of their own and the experiments in compiled code: threads suffice
         with ThreadPoolExecutor(max_workers=2) as pool:
             made = dict(zip(todo, pool.map(lambda i: claims[i].judge(inputs[i]), todo), strict=True))
-    findings = []
-    for i, found in enumerate(known):
-        finding = found if found is not None else made[i]
-        if found is None and folder is not None and finding.status in (*PASSING, "refuted"):
-            with contextlib.suppress(OSError):  # a folder that cannot be written keeps nothing
-                files.write_json(folder / f"{key(claims[i], inputs[i])}.json", asdict(finding))
-        findings.append(finding)
-    return findings
+    for i, finding in made.items():
+        _keep(folder, claims[i], inputs[i], finding)
+    return [made[i] if found is None else found for i, found in enumerate(known)]
 
 
 def cache_folder() -> Path:
@@ -58,9 +62,13 @@ def cache_folder() -> Path:
 
 
 def key(claim: ModelClaim, inputs: Mapping[str, Any]) -> str:
-    """SHA-256 of everything that a finding depends on: the claim, its inputs, our code, the engines' versions."""
-    content = json.dumps([claim.id, inputs, _code(), _engines()], sort_keys=True, allow_nan=False)
-    return files.sha256(content.encode())
+    """SHA-256 of everything that a finding depends on."""
+    return files.sha256(json.dumps(content(claim, inputs), sort_keys=True, allow_nan=False).encode())
+
+
+def content(claim: ModelClaim, inputs: Mapping[str, Any]) -> dict[str, Any]:
+    """Everything that a finding depends on: the claim, its inputs, our code, the engines' versions."""
+    return {"schema": SCHEMA, "claim": claim.id, "inputs": inputs, "code": _code(), "engines": _engines()}
 
 
 @cache
@@ -85,11 +93,45 @@ def _engines() -> dict[str, str]:
     return found
 
 
-def _read(folder: Path | None, name: str) -> Finding | None:
-    """A finding that was kept; None if there is none that can be read."""
-    if folder is None:
+def _keep(folder: Path | None, claim: ModelClaim, inputs: Mapping[str, Any], finding: Finding) -> None:
+    """Write an entry, whole or not at all, of a finding that would be taken."""
+    if folder is None or not claim.kept or not _takes(claim, inputs, finding):
+        return
+    with contextlib.suppress(OSError):  # a folder that cannot be written keeps nothing
+        files.write_json(_path(folder, claim, inputs), {**content(claim, inputs), "finding": asdict(finding)})
+
+
+def _read(folder: Path | None, claim: ModelClaim, inputs: Mapping[str, Any]) -> Finding | None:
+    """The finding that was kept; None if there is none, or none that can be taken."""
+    if folder is None or not claim.kept:
         return None
+    path = _path(folder, claim, inputs)
     try:
-        return Finding(**json.loads((folder / f"{name}.json").read_text(encoding="utf-8")))
-    except (OSError, ValueError, TypeError):
+        if not path.is_file() or path.stat().st_size > LARGEST_BYTES:
+            return None
+        entry = json.loads(path.read_text(encoding="utf-8"), parse_constant=_refused, parse_float=_finite)
+        finding = Finding.from_json(entry.pop("finding"))
+    except (OSError, ValueError, TypeError, AttributeError, KeyError, RecursionError):
         return None
+    about = json.dumps(entry, sort_keys=True) == json.dumps(content(claim, inputs), sort_keys=True)
+    return replace(finding, from_cache=True) if about and _takes(claim, inputs, finding) else None
+
+
+def _takes(claim: ModelClaim, inputs: Mapping[str, Any], finding: Finding) -> bool:
+    try:
+        return claim.takes(dict(inputs), finding)
+    except Exception:  # whatever is wrong with it, it is not taken
+        return False
+
+
+def _path(folder: Path, claim: ModelClaim, inputs: Mapping[str, Any]) -> Path:
+    return folder / f"{key(claim, inputs)}.json"
+
+
+def _finite(text: str) -> float:
+    value = float(text)
+    return value if math.isfinite(value) else _refused(text)
+
+
+def _refused(text: str) -> NoReturn:
+    raise ValueError(f"{text} is not finite")

@@ -70,6 +70,8 @@ class ModelClaim(Claim):
     """
 
     expected: Status = "proved"
+    kept: bool = True
+    """Whether findings may be kept: not where deciding the claim takes no longer than looking at a kept one."""
 
     @abc.abstractmethod
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
@@ -81,6 +83,13 @@ class ModelClaim(Claim):
 
         Called through `judge`, which turns an exception into `error`.
         """
+
+    def takes(self, inputs: dict[str, Any], finding: Finding) -> bool:
+        """Whether a kept finding for these inputs may be taken for one made anew; whatever it raises means no.
+
+        By default any pass. A claim with certificates establishes them again.
+        """
+        return finding.status in PASSING
 
     def judge_inputs(self, scenario: Scenario) -> dict[str, Any]:
         """`inputs` under guard: what keeps them from being found is told to `judge`."""

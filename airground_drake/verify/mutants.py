@@ -38,9 +38,13 @@ class MutantClaim(ModelClaim):
         """Decide the broken variant."""
         return self.mutant.check(inputs)
 
+    def takes(self, inputs: dict[str, Any], finding: Finding) -> bool:
+        """A refutation: there is nothing to prove again."""
+        return finding.status == "refuted" and finding.counterexample is not None
+
 
 def refute_mutants(scenario: Scenario, *, kept: Path | None = None) -> list[dict[str, Any]]:
-    """What became of every mutant: `claim`, `mutant`, `status`, `refuted`, `counterexample`, `evidence` of an error.
+    """What became of every mutant: `claim`, `mutant`, `status`, `refuted`, `counterexample`, `error`, `from_cache`.
 
     Args:
         scenario: its constants.
@@ -56,6 +60,7 @@ def refute_mutants(scenario: Scenario, *, kept: Path | None = None) -> list[dict
             "refuted": finding.status == "refuted" and finding.counterexample is not None,
             "counterexample": finding.counterexample,
             "error": finding.evidence.get("error"),
+            "from_cache": finding.from_cache,
         }
         for claim, finding in zip(broken, found, strict=True)
     ]

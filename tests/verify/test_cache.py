@@ -2,14 +2,25 @@
 
 from __future__ import annotations
 
+import json
+import os
+from collections.abc import Callable
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 import airground_drake
+from airground_drake.errors import PluginError
+from airground_drake.report.__main__ import _save_certificates
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify import cache
-from airground_drake.verify.claim import ModelClaim
+from airground_drake.verify.claim import ModelClaim, Verdict
+from airground_drake.verify.engines.prover import certificates, proved_again
 from airground_drake.verify.finding import Finding
+from airground_drake.verify.model.avoidance.obligations import gate
+from airground_drake.verify.model.avoidance.safe_gate import SafeGate
 
 
 class Counting(ModelClaim):
@@ -33,8 +44,9 @@ class Counting(ModelClaim):
 
 def test_findings_are_kept_by_their_inputs(tmp_path: Path) -> None:
     claim = Counting(Finding("proved", certificates={"a": "b"}))
-    first = cache.find([claim], [{"x": 1.0}], folder=tmp_path)
-    assert cache.find([claim], [{"x": 1.0}], folder=tmp_path) == first
+    (first,) = cache.find([claim], [{"x": 1.0}], folder=tmp_path)
+    assert not first.from_cache
+    assert cache.find([claim], [{"x": 1.0}], folder=tmp_path) == [replace(first, from_cache=True)]
     assert claim.calls == 1
     cache.find([claim], [{"x": 2.0}], folder=tmp_path)
     cache.find([claim], [{"x": 1.0}], folder=None)
@@ -51,13 +63,121 @@ def test_what_was_left_open_is_tried_again(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-def test_a_kept_finding_that_cannot_be_read_is_made_anew(tmp_path: Path) -> None:
-    claim = Counting(Finding("proved"))
+def put(folder: Path, content: bytes) -> None:
+    """In the place of the one entry."""
+    (kept,) = folder.iterdir()
+    kept.unlink()
+    kept.write_bytes(content)
+
+
+def entry(**changes: Any) -> bytes:
+    """One of COUNTING for {}, with changes to its finding."""
+    finding = asdict(Finding("proved", margin=1.0, exercised=1)) | changes
+    about = cache.content(Counting(Finding("proved")), {})
+    return json.dumps({**about, "finding": finding}).encode()
+
+
+UNUSABLE: dict[str, bytes] = {
+    "nothing": b"",
+    "not JSON": b"{",
+    "not UTF-8": b"\xff\xfe",
+    "a list": b"[]",
+    "deep": b"[" * 100_000,
+    "no finding": json.dumps(cache.content(Counting(Finding("proved")), {})).encode(),
+    "a status that is none": entry(status="lol"),
+    "a status of another type": entry(status=["proved"]),
+    "a margin that is a text": entry(margin="1"),
+    "a margin that is a truth value": entry(margin=True),
+    "a margin of NaN": entry(margin=float("nan")),
+    "a margin beyond all": entry().replace(b"1.0", b"1e999"),
+    "a field too many": entry(more=1),
+    "evidence that is a list": entry(evidence=[]),
+    "a count below 0": entry(exercised=-1),
+    "a certificate outside": entry(certificates={"../../..": "x"}),
+    "a certificate of no text": entry(certificates={"a": 1}),
+    "nothing that passes": entry(status="inconclusive"),
+    "a refutation": entry(status="refuted", counterexample={"x": 1}),
+    "another claim": entry().replace(b"COUNTING", b"ANOTHER"),
+    "another code": entry().replace(cache._code().encode(), b"0" * 64),
+    "another engine": entry().replace(b'"z3-solver"', b'"z4-solver"'),
+    "another schema": entry().replace(b"finding/1", b"finding/2"),
+    "large": entry() + b" " * cache.LARGEST_BYTES,
+}
+
+
+@pytest.mark.parametrize("what", UNUSABLE)
+def test_an_entry_that_cannot_be_taken_is_made_anew(tmp_path: Path, what: str) -> None:
+    claim = Counting(Finding("proved", margin=2.0, exercised=1))
     cache.find([claim], [{}], folder=tmp_path)
+    put(tmp_path, UNUSABLE[what])
+    (found,) = cache.find([claim], [{}], folder=tmp_path)
+    assert (found.margin, found.from_cache, claim.calls) == (2.0, False, 2)
+
+
+def test_an_entry_as_it_should_be_is_taken(tmp_path: Path) -> None:
+    claim = Counting(Finding("proved", margin=2.0, exercised=1))
+    cache.find([claim], [{}], folder=tmp_path)
+    put(tmp_path, entry())
+    assert cache.find([claim], [{}], folder=tmp_path)[0] == Finding("proved", 1.0, exercised=1, from_cache=True)
+
+
+@pytest.mark.parametrize("make", [os.mkfifo, Path.mkdir, lambda path: path.symlink_to("/dev/zero")])
+def test_what_is_no_file_is_not_read(tmp_path: Path, make: Callable[[Path], None]) -> None:
+    make(tmp_path / f"{cache.key(Counting(Finding('proved')), {})}.json")
+    assert cache.find([Counting(Finding("proved"))], [{}], folder=tmp_path)[0] == Finding("proved")
+
+
+def test_an_entry_under_another_key_is_made_anew(tmp_path: Path) -> None:
+    """What was proved for a dwell says nothing of a trigger without."""
+    claim = Counting(Finding("proved"))
+    cache.find([claim], [{"dwell_s": 1.0}], folder=tmp_path)
     (kept,) = tmp_path.iterdir()
-    kept.write_text("{", encoding="utf-8")
-    assert cache.find([claim], [{}], folder=tmp_path)[0].status == "proved"
+    kept.rename(tmp_path / f"{cache.key(claim, {'dwell_s': 0.0})}.json")
+    assert not cache.find([claim], [{"dwell_s": 0.0}], folder=tmp_path)[0].from_cache
     assert claim.calls == 2
+
+
+def proof() -> Finding:
+    """Of SAFE-GATE's obligations, as `discharge` records one; solvers are not asked."""
+    obligations = gate()
+    evidence = {"obligations": [{"name": each.name, "status": "proved"} for each in obligations]}
+    return Finding("proved", evidence=evidence, certificates=certificates(obligations), exercised=len(obligations))
+
+
+def test_certificates_are_established_again() -> None:
+    known = proof()
+    assert proved_again(known, gate())
+    assert SafeGate().takes({}, known)
+    scripts = {name: text for name, text in known.certificates.items() if name != "obligations.json"}
+    wrong = known.certificates["obligations.json"].replace('"coefficient": "1"', '"coefficient": "2"')
+    open_ = [each | {"status": "inconclusive"} for each in known.evidence["obligations"]]
+    for changed in (
+        replace(known, certificates=scripts),
+        replace(known, certificates=scripts | {"obligations.json": wrong}),
+        replace(known, certificates=known.certificates | {"zero_outside.smt2": "(check-sat)"}),
+        replace(known, evidence={"obligations": open_}),
+        replace(known, evidence={"obligations": open_[1:]}),
+        replace(known, exercised=1),
+        replace(known, status="supported"),
+    ):
+        assert not proved_again(changed, gate())
+    broken = [replace(gate()[0], certificate=()), *gate()[1:]]
+    assert not proved_again(replace(known, certificates=certificates(broken)), broken)
+
+
+def test_an_entry_with_malformed_evidence_is_made_anew() -> None:
+    assert not cache._takes(SafeGate(), {}, replace(proof(), evidence={"obligations": [1]}))
+
+
+@pytest.mark.parametrize("name", ["../../..", "..", ".", "", "a/b", "/etc/passwd", "a\\b", "a\0", "x" * 101, "ü"])
+def test_certificates_have_plain_names(name: str, tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="no name for a certificate"):
+        Finding("proved", certificates={name: "x"})
+    claim = Counting(Finding("proved"))
+    claim.id = name
+    with pytest.raises(PluginError):
+        _save_certificates(tmp_path / "c", [Verdict(claim, "", Finding("proved", certificates={"a": "b"}), "proved")])
+    assert not list(tmp_path.iterdir())
 
 
 def test_the_key_covers_every_file_of_the_package_where_it_is(tmp_path: Path) -> None:

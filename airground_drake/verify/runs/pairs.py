@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from itertools import combinations
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,13 +23,16 @@ class Pair(NamedTuple):
 
 
 def pairs_of(trace: Trace) -> Iterator[Pair]:
-    """All robot/obstacle and robot/robot pairs of a run, with the safe distances of its scenario."""
+    """All robot/obstacle and robot/robot pairs of a run, with the safe distances of its scenario.
+
+    Those of one robot come in the order in which its controller lists them: obstacles, then robots in array order.
+    """
     safe, uav = trace.scenario["safe_distance"], trace.scenario["uav"]["name"]
-    for i, robot in enumerate(trace.robots):
+    for robot in trace.robots:
         for obstacle in trace.scenario["obstacles"]:
             yield Pair(robot, obstacle, safe["obstacle_m"], 1.0)
-        for other in trace.robots[i + 1 :]:
-            yield Pair(robot, other, safe["air_ground_m"] if uav in (robot, other) else safe["ugv_m"], 0.5)
+    for robot, other in combinations(trace.robots, 2):
+        yield Pair(robot, other, safe["air_ground_m"] if uav in (robot, other) else safe["ugv_m"], 0.5)
 
 
 def speed_limits(trace: Trace) -> dict[str, float]:

@@ -3,7 +3,7 @@
 `PYTHONPATH=tests python -m check.tampering DIR` tries them all on copies of a report of case B.
 """
 
-from check.tampering import certificates, counts, decisions, events, execution, files, outcomes, report, signals
+from check.tampering import bombs, certificates, counts, decisions, events, execution, files, outcomes, report, signals
 from check.tampering.base import IGNORED, NO_REPORT, TAMPERINGS, Outcome, Tampering, attempt
 
 __all__ = [
@@ -13,6 +13,7 @@ __all__ = [
     "Outcome",
     "Tampering",
     "attempt",
+    "bombs",
     "certificates",
     "counts",
     "decisions",

@@ -8,18 +8,21 @@ import sys
 from pathlib import Path
 
 from check.tampering import IGNORED, TAMPERINGS, attempt
-from check.tampering.base import copy
+from check.tampering.base import copy, mend
 
 
 def main(arguments: list[str]) -> int:
     """0 if every tampering is refused by the rule that must refuse it."""
     report = Path(arguments[0])
     if len(arguments) == 3:
-        TAMPERINGS[arguments[1]].edit(copy(report, Path(arguments[2])))
+        chosen, folder = TAMPERINGS[arguments[1]], copy(report, Path(arguments[2]))
+        chosen.edit(folder)
+        if chosen.mended:
+            mend(folder)
         return 0
     missed = 0
     for name, tampering in TAMPERINGS.items():
-        outcome = attempt(report, tampering.edit)
+        outcome = attempt(report, tampering.edit, mended=tampering.mended)
         found = [f"{entry['claim']}, {entry['rule']}" for entry in outcome.refused] or [outcome.error.strip()]
         expected = outcome.is_by(tampering)
         missed += not expected

@@ -44,6 +44,11 @@ class Tampering:
     rule: str
     run: str
 
+    @property
+    def mended(self) -> bool:
+        """Whether the list of files is made right afterwards: unless it is what is tampered with."""
+        return self.claim not in ("files", NO_REPORT)
+
 
 TAMPERINGS: dict[str, Tampering] = {}
 IGNORED: dict[str, tuple[Callable[[Path], None], str]] = {}
@@ -241,10 +246,10 @@ def _contents(report: Path) -> tuple[set[str], dict[str, int]]:
 def copy(report: Path, folder: Path) -> Path:
     """A copy of a report, to be tampered with; what is there of a copy that was is mended."""
     folders, files = _contents(report)
-    for place, _, names in os.walk(folder, topdown=False):
-        for name in names:
+    for place, inside, names in os.walk(folder, topdown=False):
+        for name in (*names, *(each for each in inside if os.path.islink(os.path.join(place, each)))):
             path = os.path.join(place, name)
-            if files.get(os.path.relpath(path, folder)) != os.stat(path).st_ino:
+            if files.get(os.path.relpath(path, folder)) != os.lstat(path).st_ino:
                 os.unlink(path)
         if os.path.relpath(place, folder) not in folders:
             os.rmdir(place)
@@ -256,10 +261,24 @@ def copy(report: Path, folder: Path) -> Path:
     return folder
 
 
-def attempt(report: Path, edit: Edit) -> Outcome:
-    """Tamper with a copy of a report, beside it, and check it."""
+def mend(folder: Path) -> None:
+    """Make the list of files right, if there is a report to put it into."""
+    try:
+        with edited_report(folder) as report:
+            names = [path for path in folder.rglob("*") if path.is_file() and path.name != "report.json"]
+            report["files"] = {
+                path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest() for path in names
+            }
+    except (OSError, ValueError, TypeError, RecursionError):
+        return
+
+
+def attempt(report: Path, edit: Edit, *, mended: bool = True) -> Outcome:
+    """Tamper with a copy of a report, beside it, and check it; `mended`: with the list of files made right."""
     folder = copy(report, report.with_name(f"tampered_{os.getpid()}"))
     edit(folder)
+    if mended:
+        mend(folder)
     said, complained = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(said), contextlib.redirect_stderr(complained):
         code = check.main(["--json", str(folder)])

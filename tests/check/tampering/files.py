@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 import shutil
 from pathlib import Path
@@ -12,14 +13,17 @@ from check.tampering.base import (
     RUN,
     UGV,
     claim_of,
+    edited_claim,
     edited_json,
     edited_report,
     edited_table,
     edited_timings,
+    ignored,
     middle,
     read_table,
     refused_by,
     seal,
+    seal_certificate,
     trace,
     write,
 )
@@ -152,3 +156,92 @@ def column_missing(folder: Path) -> None:
     path.unlink()
     frame.to_parquet(path, index=False)
     seal(folder)
+
+
+@refused_by("files", "SHA-256 of a file", run="")
+def page_changed(folder: Path) -> None:
+    page = folder / "report.html"
+    write(page, page.read_bytes().replace(b"As expected", b"As we wanted"))
+
+
+@refused_by("files", "SHA-256 of a file", run="")
+def junit_changed(folder: Path) -> None:
+    path = folder / "junit.xml"
+    write(path, path.read_bytes().replace(b"<testcase", b"<!-- --><testcase", 1))
+
+
+@refused_by("files", "SHA-256 of a file", run="")
+def diagram_changed(folder: Path) -> None:
+    write(folder / "diagram.svg", b"<svg/>")
+
+
+@refused_by("files", "SHA-256 of a file", run="")
+def script_changed_with_its_claims_digest(folder: Path) -> None:
+    write(folder / "certificates" / "SAFE-INV" / "outside.smt2", b"(check-sat)")
+    seal_certificate(folder, "SAFE-INV", "outside.smt2")
+
+
+@refused_by("files", "SHA-256 of a file", run="")
+def meta_changed(folder: Path) -> None:
+    with edited_json(trace(folder) / "meta.json") as meta:
+        meta["note"] = "added"
+
+
+@refused_by("files", "a file that is named is there", run="")
+def page_missing(folder: Path) -> None:
+    (folder / "report.html").unlink()
+
+
+@refused_by("files", "a file that is there is named", run="")
+def page_added(folder: Path) -> None:
+    write(folder / "report-2.html", b"<p>All is well.</p>")
+
+
+@refused_by("files", "a file that is there is named", run="")
+def digest_of_the_page_removed(folder: Path) -> None:
+    with edited_report(folder) as report:
+        del report["files"]["report.html"]
+
+
+@refused_by("files", "a file that is named is there", run="")
+def file_of_the_system_named(folder: Path) -> None:
+    with edited_report(folder) as report:
+        report["files"]["/etc/passwd"] = hashlib.sha256(Path("/etc/passwd").read_bytes()).hexdigest()
+
+
+@refused_by("files", "a file that is named is there", run="")
+def file_outside_named(folder: Path) -> None:
+    outside = folder.with_name(f"{folder.name}.outside")
+    outside.write_bytes(b"")
+    with edited_report(folder) as report:
+        report["files"][f"../{outside.name}"] = hashlib.sha256(b"").hexdigest()
+
+
+@refused_by(NO_REPORT, "'files' is missing")
+def list_of_files_removed(folder: Path) -> None:
+    with edited_report(folder) as report:
+        del report["files"]
+
+
+@ignored("proofs of other solvers may be added to a report later; nothing is taken from them")
+def proofs_added(folder: Path) -> None:
+    (folder / "proofs").mkdir()
+    write(folder / "proofs" / "index.json", b"[]")
+
+
+@refused_by("SAFE-TRACE", "only what is about the model comes from a cache")
+def distances_from_the_cache(folder: Path) -> None:
+    with edited_claim(folder, "SAFE-TRACE") as claim:
+        claim["from_cache"] = True
+
+
+@refused_by("SAFE-INV", "only what is about the model comes from a cache", run="")
+def from_the_cache_in_words(folder: Path) -> None:
+    with edited_claim(folder, "SAFE-INV", "") as claim:
+        claim["from_cache"] = "yes"
+
+
+@ignored("a finding that was kept is judged like any other: where it comes from is said, and decides nothing")
+def a_proof_from_the_cache(folder: Path) -> None:
+    with edited_claim(folder, "SAFE-INV", "") as claim:
+        claim["from_cache"] = not claim["from_cache"]

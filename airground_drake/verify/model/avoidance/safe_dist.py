@@ -19,7 +19,8 @@ from typing import Any
 
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.claim import ModelClaim
-from airground_drake.verify.engines.prover import discharge, finding
+from airground_drake.verify.engines.obligation import Obligation
+from airground_drake.verify.engines.prover import discharge, finding, proved_again
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.model.avoidance.conformance import conformance
 from airground_drake.verify.model.avoidance.constants import Inputs, constants, kinds
@@ -87,7 +88,7 @@ class SafeDist(ModelClaim):
             kind.name: kind.safe - pushed(inputs, kind.share) / inputs["avoidance_gain_1_s"] for kind in kinds(inputs)
         }
         found = finding(
-            discharge([*disturbed(), *disturbed_with_scenario(inputs)], LIMIT_S),
+            discharge(obligations(inputs), LIMIT_S),
             disturbance_m_s=inputs["disturbance_m_s"], least_distances_m=bounds, runs=rows, conformance=compared,
         )  # fmt: skip
         covered = [row for row in rows if not row["unmet"]]
@@ -104,3 +105,12 @@ class SafeDist(ModelClaim):
         if found.status == "proved" and not compared["agrees"]:
             return replace(found, status="refuted", counterexample=compared["first_difference"] or compared)
         return found
+
+    def takes(self, inputs: Inputs, finding: Finding) -> bool:
+        """The obligations once more, by expansion."""
+        return proved_again(finding, obligations(inputs))
+
+
+def obligations(inputs: Inputs) -> list[Obligation]:
+    """What is to be proved."""
+    return [*disturbed(), *disturbed_with_scenario(inputs)]

@@ -12,7 +12,7 @@ from airground_drake.diagram import build_model
 from airground_drake.scenarios.load import from_data
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.claim import ModelClaim
-from airground_drake.verify.engines.prover import discharge, finding
+from airground_drake.verify.engines.prover import discharge, finding, proved_again
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.model.avoidance.constants import Inputs, built_from, compositions_of, constants
 from airground_drake.verify.model.avoidance.hostile_inputs import hostile_team, non_finite, postcondition
@@ -87,3 +87,7 @@ class SafeGate(ModelClaim):
             shown = attack if differs is None else attack | {"wiring": differs}
             return replace(found, status="refuted", margin=slack, counterexample=shown)
         return difference(found, wired)
+
+    def takes(self, inputs: Inputs, finding: Finding) -> bool:
+        """The obligations once more, by expansion."""
+        return proved_again(finding, gate())

@@ -22,7 +22,8 @@ from dataclasses import replace
 from airground_drake.scenarios.rounding import TOLERANCE_M
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.claim import ModelClaim
-from airground_drake.verify.engines.prover import discharge, finding
+from airground_drake.verify.engines.obligation import Obligation
+from airground_drake.verify.engines.prover import discharge, finding, proved_again
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.model.avoidance.conformance import conformance, rounding_leaves, rounding_margins
 from airground_drake.verify.model.avoidance.constants import Inputs, built_from, constants, kinds, range_spare
@@ -86,7 +87,7 @@ class SafeInv(ModelClaim):
         spare = {kind.name: float(range_spare(inputs, kind)) for kind in kinds(inputs)}
         lost = rounding_margins(inputs)
         found = finding(
-            discharge([*step(), *rest(), *scaling(), *with_scenario(inputs)], LIMIT_S),
+            discharge(obligations(inputs), LIMIT_S),
             conformance=compared, composition=sampled, wiring=wired, rounding=lost, sensing_range_spare_m=spare,
         )  # fmt: skip
         kind, left = rounding_leaves(lost)
@@ -102,6 +103,15 @@ class SafeInv(ModelClaim):
         if found.status == "proved" and (reason := _open(inputs, lost, left)):
             return replace(found, status="inconclusive", evidence={**found.evidence, "reason": reason})
         return found
+
+    def takes(self, inputs: Inputs, finding: Finding) -> bool:
+        """The obligations once more, by expansion."""
+        return proved_again(finding, obligations(inputs))
+
+
+def obligations(inputs: Inputs) -> list[Obligation]:
+    """What is to be proved."""
+    return [*step(), *rest(), *scaling(), *with_scenario(inputs)]
 
 
 def _refuted(found: Finding, counterexample: Inputs) -> Finding:

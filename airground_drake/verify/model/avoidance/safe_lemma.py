@@ -37,6 +37,7 @@ class SafeLemma(ModelClaim):
     does_not_establish = "Anything about velocities that change within the period, or about rounding (see SAFE-INV)."
 
     exercised_by = "obligations of the proof"
+    kept = False
 
     def inputs(self, scenario: Scenario) -> Inputs:
         """None: it is about no constants."""

@@ -15,7 +15,7 @@ from airground_drake.gatekeeper.patience import Patience
 from airground_drake.registry import METHODS
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.claim import ModelClaim
-from airground_drake.verify.engines.prover import LIMIT_S, discharge, finding
+from airground_drake.verify.engines.prover import LIMIT_S, discharge, finding, proved_again
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.model.patience.tracking_obligations import Tracking, obligations
 from airground_drake.verify.model.patience.tracking_runs import runs
@@ -79,6 +79,10 @@ class LiveGate(ModelClaim):
     def check(self, inputs: dict[str, Any]) -> Finding:
         """Prove, and run."""
         return judge(Tracking(), Patience, inputs)
+
+    def takes(self, inputs: dict[str, Any], finding: Finding) -> bool:
+        """The obligations once more, by expansion."""
+        return proved_again(finding, obligations(Tracking(), Patience))
 
 
 def judge(tracking: Tracking, kind: type[Patience], inputs: dict[str, Any]) -> Finding:

@@ -13,7 +13,7 @@ from airground_drake.components import make_patience
 from airground_drake.gatekeeper.patience import Patience
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.claim import TIME_TOLERANCE_S, ModelClaim
-from airground_drake.verify.engines.prover import LIMIT_S, discharge, finding
+from airground_drake.verify.engines.prover import LIMIT_S, discharge, finding, proved_again
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.model.patience.attack import attacks
 from airground_drake.verify.model.patience.relation import obligations, symbolic
@@ -66,6 +66,10 @@ class LiveWait(ModelClaim):
     def check(self, inputs: dict[str, Any]) -> Finding:
         """Read off, prove, attack."""
         return judge(Patience, inputs)
+
+    def takes(self, inputs: dict[str, Any], finding: Finding) -> bool:
+        """The obligations once more, by expansion."""
+        return proved_again(finding, obligations(symbolic(Patience)))
 
 
 def judge(kind: type[Patience], inputs: dict[str, Any]) -> Finding:

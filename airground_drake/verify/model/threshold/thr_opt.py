@@ -74,6 +74,7 @@ class ThrOpt(ModelClaim):
     )
 
     exercised_by = "statements of the proof"
+    kept = False
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
         """As THR-ROOT."""

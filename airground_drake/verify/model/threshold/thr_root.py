@@ -57,6 +57,7 @@ class ThrRoot(ModelClaim):
     )
 
     exercised_by = "statements of the proof"
+    kept = False
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
         """The numbers of the threshold rule and the threshold in force."""

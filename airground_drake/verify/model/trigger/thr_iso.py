@@ -53,6 +53,7 @@ class ThrIso(ModelClaim):
     )
 
     exercised_by = "obligations of the proof"
+    kept = False
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
         """The running trigger's levels, m, and dwell, s."""

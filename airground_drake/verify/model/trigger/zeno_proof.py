@@ -19,6 +19,7 @@ and `inv_safety.smt2` (the invariant above, for any solver: each must be unsatis
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -27,12 +28,12 @@ from airground_drake.decision.trigger import Trigger
 from airground_drake.registry import Status
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.claim import TIME_TOLERANCE_S, ModelClaim
-from airground_drake.verify.engines.obligation import rational
-from airground_drake.verify.engines.prover import LIMIT_S, discharge, finding
+from airground_drake.verify.engines.obligation import Obligation, rational
+from airground_drake.verify.engines.prover import LIMIT_S, discharge, finding, proved_again
 from airground_drake.verify.engines.smt import solve
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.model.trigger.induction import counterexample, horn, invariant, obligations, remarks
-from airground_drake.verify.model.trigger.relation import conformance, dwell_rounding, read_off
+from airground_drake.verify.model.trigger.relation import Transition, conformance, dwell_rounding, read_off
 
 SHORTEST_S = 1e-3
 """Bound that is tried where the scenario has none (0 s), s: any number would do, the counterexample scales with it."""
@@ -87,15 +88,21 @@ class ZenoProof(ModelClaim):
 
     def check(self, inputs: dict[str, Any]) -> Finding:
         """Prove it for these constants, or find a run that breaks it."""
-        return prove(Trigger(inputs["zeta_m"], inputs["released_below_m"], inputs["dwell_s"]), inputs)
+        return prove(_trigger(inputs), inputs)
+
+    def takes(self, inputs: dict[str, Any], finding: Finding) -> bool:
+        """The obligations once more, by expansion; relation, invariant and clauses as this code writes them."""
+        trigger, bound = _trigger(inputs), _bound(inputs)
+        written = scripts(read_off(lambda _: trigger), trigger, bound).items() <= finding.certificates.items()
+        return written and proved_again(finding, to_prove(trigger, bound))
 
 
 def prove(trigger: Trigger, inputs: dict[str, Any]) -> Finding:
     """The finding for a trigger, the scenario's or a mutant of it."""
-    bound, duration = inputs["min_inter_event_s"] or SHORTEST_S, inputs["duration_s"]
+    bound, duration = _bound(inputs), inputs["duration_s"]
     numeric = read_off(lambda _: trigger)
-    files = {"zeno_horn.smt2": horn(numeric, trigger, bound), **invariant(numeric, trigger, bound)}
-    described = json.dumps({"bound_s": rational(bound), "transitions": [each.to_json() for each in numeric]}, indent=1)
+    saved = scripts(numeric, trigger, bound)
+    files = {name: text for name, text in saved.items() if name.endswith(".smt2")}
     answers = solve(list(files.values()), "z3", LIMIT_S)
     spacer = answers[0]  # on the clauses; the others on our invariant
     z3 = answers[1:]
@@ -105,15 +112,13 @@ def prove(trigger: Trigger, inputs: dict[str, Any]) -> Finding:
         "conformance": conformance(trigger, numeric, duration),
         "rounding_s": dwell_rounding(trigger, duration),
     }
-    saved = {"relation.json": described + "\n", **files}
     if spacer.answer == "unsat":
         broken = counterexample(numeric, trigger, bound)
         status: Status = "refuted" if broken else "error"
         margin = broken["gap_s"] - bound if broken else None
         return Finding(status, margin, "s", {}, broken, evidence, saved, "a gap between triggers less the bound")
     cvc5 = solve(list(files.values())[1:], "cvc5", LIMIT_S)
-    general = read_off(lambda path: type(trigger)(*map(path.symbol, ("zeta", "release", "dwell"))))
-    found = finding(discharge([*obligations(general), *remarks(trigger, bound)]))
+    found = finding(discharge(to_prove(trigger, bound)))
     ours = {name: [a.answer, b.answer] for name, a, b in zip(list(files)[1:], z3, cvc5, strict=True)}
     status = found.status
     if any("sat" in pair for pair in ours.values()) or evidence["conformance"]["disagreements"]:
@@ -125,3 +130,24 @@ def prove(trigger: Trigger, inputs: dict[str, Any]) -> Finding:
         quantity="what rounding leaves of the 1e-9 s by which a gap between triggers may fall short of the bound",
         evidence={**evidence, "invariant": ours, **found.evidence}, certificates={**saved, **found.certificates},
     )  # fmt: skip
+
+
+def scripts(numeric: Sequence[Transition], trigger: Trigger, bound: float) -> dict[str, str]:
+    """The certificates with the scenario's numbers."""
+    described = json.dumps({"bound_s": rational(bound), "transitions": [each.to_json() for each in numeric]}, indent=1)
+    clauses = {"zeno_horn.smt2": horn(numeric, trigger, bound), **invariant(numeric, trigger, bound)}
+    return {"relation.json": described + "\n", **clauses}
+
+
+def to_prove(trigger: Trigger, bound: float) -> list[Obligation]:
+    """The obligations for all parameters, and what follows with the scenario's numbers."""
+    general = read_off(lambda path: type(trigger)(*map(path.symbol, ("zeta", "release", "dwell"))))
+    return [*obligations(general), *remarks(trigger, bound)]
+
+
+def _trigger(inputs: dict[str, Any]) -> Trigger:
+    return Trigger(inputs["zeta_m"], inputs["released_below_m"], inputs["dwell_s"])
+
+
+def _bound(inputs: dict[str, Any]) -> float:
+    return float(inputs["min_inter_event_s"] or SHORTEST_S)

@@ -1,0 +1,271 @@
+"""Files that are made to crash, to hang or to lead out of the folder whoever reads them."""
+
+from __future__ import annotations
+
+import io
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+from check.tampering.base import (
+    NO_REPORT,
+    claim_of,
+    edited_certificate,
+    edited_claim,
+    edited_obligation,
+    edited_report,
+    edited_scenarios,
+    read_table,
+    refused_by,
+    seal,
+    trace,
+    write,
+)
+
+
+@refused_by("THR-ROOT", "a number is an integer or a fraction", run="")
+def enclosure_of_a_billion_digits(folder: Path) -> None:
+    with edited_certificate(folder, "THR-ROOT", "statements.json") as saved:
+        saved["enclosures"]["u"] = ["1e1000000000", "1e1000000001"]
+
+
+@refused_by("THR-ROOT", "the files are well formed", run="")
+def threshold_of_a_billion_digits(folder: Path) -> None:
+    with edited_claim(folder, "THR-ROOT", "") as claim:
+        claim["evidence"]["running_threshold_m"] = "1e1000000000"
+
+
+@refused_by("trace", "the rows cover the run")
+def duration_of_a_billion_digits(folder: Path) -> None:
+    with edited_scenarios(folder) as scenarios:
+        for scenario in scenarios:
+            scenario["duration_s"] = "1e1000000000"
+
+
+@refused_by("SAFE-INV", "a number is short", run="")
+def three_thousand_factors_of_four_thousand_digits(folder: Path) -> None:
+    with edited_obligation(folder, "SAFE-INV", "outside") as one:
+        one["hypotheses"]["long"] = "9" * 4000
+        one["certificate"].append({"coefficient": "1", "factors": ["long"] * 3000, "square": "1"})
+
+
+@refused_by("SAFE-INV", "a number is short", run="")
+def three_thousand_factors_of_four_hundred_digits(folder: Path) -> None:
+    with edited_obligation(folder, "SAFE-INV", "outside") as one:
+        one["hypotheses"]["long"] = "9" * 400
+        one["certificate"].append({"coefficient": "1", "factors": ["long"] * 3000, "square": "1"})
+
+
+@refused_by("SAFE-INV", "a degree is low", run="")
+def a_thousand_squares(folder: Path) -> None:
+    with edited_obligation(folder, "SAFE-INV", "outside") as one:
+        one["hypotheses"]["long"] = "D*D"
+        one["certificate"].append({"coefficient": "1", "factors": ["long"] * 1000, "square": "1"})
+
+
+@refused_by("SAFE-INV", "a polynomial is", run="")
+def many_terms(folder: Path) -> None:
+    with edited_obligation(folder, "SAFE-INV", "outside") as one:
+        one["goal"] = " + ".join(f"a{i}" for i in range(30_000))
+
+
+@refused_by("SAFE-INV", "a polynomial is small enough", run="")
+def many_products(folder: Path) -> None:
+    with edited_obligation(folder, "SAFE-INV", "outside") as one:
+        one["certificate"][0]["square"] = " + ".join(f"a{i}" for i in range(1000))
+
+
+def _expression(text: str) -> Callable[[Path], None]:
+    def edit(folder: Path) -> None:
+        with edited_certificate(folder, "THR-OPT", "statements.json") as saved:
+            one = next(each for each in saved["statements"] if each["kind"] == "derivative")
+            one["function"] = text
+
+    return edit
+
+
+EXPRESSIONS = {
+    "towers_of_powers": ("a number is short", "(((((((((q**12)**12)**12)**12)**12)**12)**12)**12)**12)"),
+    "nested_brackets": ("an expression is one of Python's", "(" * 2000 + "q" + ")" * 2000),
+    "many_signs": ("an expression is one of Python's", "-" * 4999 + "q"),
+    "constant_of_many_digits": ("a number is short", f"q*{'9' * 4000}"),
+    "long_expression": ("an expression is short", "q+" * 3000 + "q"),
+    "imported_expression": ("an expression has", "__import__('os')"),
+}
+for _name, (_rule, _text) in EXPRESSIONS.items():
+    _edit = _expression(_text)
+    _edit.__name__ = _name
+    refused_by("THR-OPT", _rule, run="")(_edit)
+
+
+@refused_by(NO_REPORT, "regular files")
+def fifo_added(folder: Path) -> None:
+    os.mkfifo(folder / "certificates" / "SAFE-INV" / "pipe")
+
+
+@refused_by(NO_REPORT, "regular files")
+def signals_are_a_fifo(folder: Path) -> None:
+    (trace(folder) / "signals.parquet").unlink()
+    os.mkfifo(trace(folder) / "signals.parquet")
+
+
+@refused_by(NO_REPORT, "regular files")
+def page_is_a_device(folder: Path) -> None:
+    (folder / "report.html").unlink()
+    (folder / "report.html").symlink_to("/dev/zero")
+
+
+@refused_by(NO_REPORT, "regular files")
+def meta_is_elsewhere(folder: Path) -> None:
+    elsewhere = folder.with_name(f"{folder.name}.meta")
+    elsewhere.write_bytes((trace(folder) / "meta.json").read_bytes())
+    (trace(folder) / "meta.json").unlink()
+    (trace(folder) / "meta.json").symlink_to(elsewhere)
+
+
+@refused_by(NO_REPORT, "regular files")
+def folder_leads_to_itself(folder: Path) -> None:
+    (folder / "certificates" / "more").symlink_to(folder)
+
+
+@refused_by(NO_REPORT, "the file can be read")
+def report_is_a_fifo(folder: Path) -> None:
+    (folder / "report.json").unlink()
+    os.mkfifo(folder / "report.json")
+
+
+@refused_by(NO_REPORT, "the file can be read")
+def report_is_a_device(folder: Path) -> None:
+    (folder / "report.json").unlink()
+    (folder / "report.json").symlink_to("/dev/zero")
+
+
+@refused_by(NO_REPORT, "the file can be read")
+def report_is_a_folder(folder: Path) -> None:
+    (folder / "report.json").unlink()
+    (folder / "report.json").mkdir()
+
+
+@refused_by(NO_REPORT, "no name of a run")
+def run_is_outside(folder: Path) -> None:
+    with edited_scenarios(folder) as scenarios:
+        for scenario in scenarios:
+            scenario["runs"]["../../d"] = scenario["runs"]["d"]
+
+
+@refused_by(NO_REPORT, "no name of a run")
+def claim_is_outside(folder: Path) -> None:
+    with edited_claim(folder, "SAFE-INV", "") as claim:
+        claim["id"] = "../SAFE-INV"
+
+
+@refused_by(NO_REPORT, "no name of a run")
+def claim_of_two_lines(folder: Path) -> None:
+    with edited_claim(folder, "SAFE-INV", "") as claim:
+        claim["id"] = "SAFE-INV\nSAFE-GATE    -        agrees: proved\n"
+
+
+@refused_by(NO_REPORT, "no name of a run")
+def claim_of_half_a_character(folder: Path) -> None:
+    path = folder / "report.json"
+    write(path, path.read_bytes().replace(b'"id": "SAFE-INV"', b'"id": "\\ud800"', 1))
+
+
+def _margin(text: bytes) -> Callable[[Path], None]:
+    def edit(folder: Path) -> None:
+        with edited_report(folder) as report:
+            claim_of(report, "SAFE-TRACE")["margin"] = "MARGIN"
+        path = folder / "report.json"
+        write(path, path.read_bytes().replace(b'"MARGIN"', text))
+
+    return edit
+
+
+MARGINS = {
+    "infinite_margin": ("numbers are finite", b"Infinity"),
+    "margin_beyond_all": ("numbers are finite", b"1e999"),
+    "margin_of_many_digits": ("numbers are finite", b"9" * 5000),
+    "margin_of_a_thousand_digits": ("numbers are finite", b"9" * 1000),
+    "margin_in_many_brackets": ("nested", b"[" * 70 + b"1" + b"]" * 70),
+    "margin_in_too_many_brackets": ("the file is JSON", b"[" * 200_000 + b"1" + b"]" * 200_000),
+    "margin_of_no_characters": ("the file is JSON", b'"\xff\xfe"'),
+}
+for _name, (_rule, _content) in MARGINS.items():
+    _edit = _margin(_content)
+    _edit.__name__ = _name
+    refused_by(NO_REPORT, _rule)(_edit)
+
+
+def _sized(value: Any, *path: str) -> Callable[[Path], None]:
+    def edit(folder: Path) -> None:
+        with edited_scenarios(folder) as scenarios:
+            for scenario in scenarios:
+                part = scenario
+                for key in path[:-1]:
+                    part = part[key]
+                part[path[-1]] = value
+
+    return edit
+
+
+SIZES = {
+    "period_of_nothing": (0.0, "control", "period_s"),
+    "period_of_a_nanosecond": (1e-9, "control", "period_s"),
+    "proposals_without_end": (1e-12, "intervention", "period_s"),
+    "duration_of_an_age": (1e9, "duration_s"),
+    "duration_beyond_all": (1e300, "duration_s"),
+    "horizon_of_an_age": (1e11, "gatekeeper", "horizon_s"),
+    "stages_without_end": (10**9, "gatekeeper", "stages"),
+}
+for _name, (_value, *_path) in SIZES.items():
+    _edit = _sized(_value, *_path)
+    _edit.__name__ = _name
+    refused_by(NO_REPORT, "the scenario is of a size")(_edit)
+
+
+@refused_by(NO_REPORT, "the scenario is of a size")
+def obstacles_without_end(folder: Path) -> None:
+    with edited_scenarios(folder) as scenarios:
+        for scenario in scenarios:
+            one = next(iter(scenario["obstacles"].values()))
+            scenario["obstacles"] = {f"o{k}": one for k in range(3000)}
+
+
+def _signals(change: Callable[[pa.Table], pa.Table]) -> Callable[[Path], None]:
+    def edit(folder: Path) -> None:
+        table, buffer = pa.Table.from_pandas(read_table(folder)), io.BytesIO()
+        pq.write_table(change(table), buffer)
+        write(trace(folder) / "signals.parquet", buffer.getvalue())
+        seal(folder)
+
+    return edit
+
+
+def _with(values: Callable[[int], pa.Array]) -> Callable[[pa.Table], pa.Table]:
+    return lambda table: table.set_column(0, table.column_names[0], values(len(table)))
+
+
+TABLES = {
+    "times_are_texts": ("the files are well formed", _with(lambda rows: pa.array(["x"] * rows))),
+    "times_are_lists": ("the files are well formed", _with(lambda rows: pa.array([[0.0]] * rows))),
+    "times_are_structures": ("the file is a table", _with(lambda rows: pa.array([{"a": {"b": 1}}] * rows))),
+    "times_are_lists_of_lists": ("the file is a table", _with(lambda rows: pa.array([[[0.0]]] * rows))),
+    "times_are_lists_of_texts": ("the file is a table", _with(lambda rows: pa.array([["x"]] * rows))),
+    "times_are_bytes": ("the file is a table", _with(lambda rows: pa.array([b"x"] * rows))),
+    "times_are_dates": ("the file is a table", _with(lambda rows: pa.array([0] * rows, pa.timestamp("ns")))),
+    "times_are_nothing": ("numbers are finite", _with(pa.nulls)),
+    "a_column_twice": ("the file is a table", lambda table: table.append_column("t_s", table.column(0))),
+    "sixty_million_cells": (
+        "the file is a table",
+        lambda _: pa.table({f"c{k}": pa.nulls(6_000_000) for k in range(10)}),
+    ),
+    "no_columns": ("the signals have the column", lambda table: table.select([])),
+    "no_rows": ("the rows cover the run", lambda table: table.slice(0, 0)),
+}
+for _name, (_rule, _change) in TABLES.items():
+    _edit = _signals(_change)
+    _edit.__name__ = _name
+    refused_by("trace", _rule)(_edit)

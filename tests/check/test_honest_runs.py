@@ -1,0 +1,68 @@
+"""Honest runs of random scenarios: no disagreement, no error. `benchmarks/random_scenarios.py` tries hundreds."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from random_scenarios import draw, tried
+
+from airground_drake.errors import ScenarioError
+from airground_drake.scenarios.load import from_data
+from airground_drake.scenarios.schema import Scenario
+
+KINDS: dict[str, dict[str, dict[str, Any]]] = {
+    "as_drawn": {},
+    "nothing_triggers": {"decision": {"threshold": {"rule": "fixed", "zeta_m": 1e3}}},
+    "triggers_at_once": {"decision": {"threshold": {"rule": "fixed", "zeta_m": 0.01}, "release_m": 0.005}},
+    "bare": {"decision": {"trigger": "bare", "threshold": {"rule": "fixed", "zeta_m": 0.05}, "release_m": 0.0}},
+    "bayes": {
+        "decision": {
+            "threshold": {"rule": "bayes", "c1_1_s": 0.5, "c2": 1.0, "drift_m_s": 6.05, "noise_m_sqrt_s": 1.0},
+            "release_m": 0.0,
+        }
+    },
+    "reversals": {
+        "decision": {"threshold": {"rule": "fixed", "zeta_m": 0.01}, "release_m": 0.005},
+        "gatekeeper": {"switching_margin": 0.0, "min_dwell_s": 0.3},
+    },
+    "small_budgets": {
+        "decision": {"threshold": {"rule": "fixed", "zeta_m": 0.01}, "release_m": 0.005},
+        "gatekeeper": {"budget_iterations": 1, "budget_nodes": 1},
+    },
+}
+METHODS = dict(zip(KINDS, "bddbccc", strict=True))
+"""Under which method each kind is tried here."""
+
+
+def drawn(method: str, kind: str, periods: int, first: int) -> Scenario:
+    """The first valid one."""
+    for number in range(first, first + 100):
+        data = draw(number)
+        if len(data["ugvs"]) > 4:
+            continue
+        data["duration_s"] = min(12.0, periods * data["control"]["period_s"])
+        data["runs"] = {method: {"method": method}}
+        for part, values in KINDS[kind].items():
+            data[part] |= values
+        try:
+            return from_data(data, f"random {number}")
+        except ScenarioError:
+            continue
+    raise AssertionError("no valid one")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_checker_agrees_with_honest_runs(kind: str) -> None:
+    assert tried(drawn(METHODS[kind], kind, 40, 1000 * [*KINDS].index(kind)))[2] == []
+
+
+def test_the_checker_agrees_with_a_run_of_one_period() -> None:
+    assert tried(drawn("c", "triggers_at_once", 1, 77))[2] == []
+
+
+def test_points_are_listed_as_the_controllers_list_them() -> None:
+    """Recursion (5) depends on what comes first: here an obstacle and a robot, both in the way of the last UGV."""
+    data = draw(326) | {"duration_s": 3.3}
+    assert data["runs"]["c"]["composition"] == "recursion_listed"
+    assert tried(from_data(data, "a crowd"))[2] == []
