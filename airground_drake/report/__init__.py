@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import sys
-
 
 def entry() -> None:
     """Console script."""
-    from airground_drake.interruption import end_on_signals
+    from airground_drake.interruption import end_on_signals, leave
 
     end_on_signals()  # before the imports, which take seconds
     from airground_drake.report.__main__ import main
 
-    sys.exit(main())
+    leave(main())

@@ -84,4 +84,4 @@ def _judge(target: str, wanted: Sequence[str]) -> list[Verdict]:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    interruption.leave(main())
