@@ -51,6 +51,14 @@ def end_on_signals() -> None:
     os.register_at_fork(before=forks.before, after_in_child=forks.in_child)
 
 
+def leave(code: int) -> NoReturn:
+    """End this process with its work done: at once, as an interpreter that winds up has no handlers any more."""
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError, ValueError, AttributeError):  # a reader that has gone, a stream that is closed
+            stream.flush()
+    os._exit(code)
+
+
 def _line(number: int, *, clear: bool) -> bytes:
     """What is said of an interruption; over a line of progress, if there may be one."""
     before = "\r\033[K" if clear else ""

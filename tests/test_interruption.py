@@ -59,3 +59,10 @@ def test_nobody_and_nothing_is_left(children: str, name: str, code: int, tmp_pat
     else:
         assert said == f"error: interrupted ({name})\n"
         assert os.listdir(tmp_path) == []
+
+
+def test_work_that_is_done_ends_at_once_with_its_code_and_its_output() -> None:
+    program = "import threading, time; from airground_drake.interruption import leave; print('done'); "
+    program += "threading.Thread(target=time.sleep, args=(600,)).start(); leave(3)"
+    ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert (ended.returncode, ended.stdout, ended.stderr) == (3, "done\n", "")

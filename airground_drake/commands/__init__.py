@@ -65,4 +65,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def entry() -> None:
     """Console script."""
     interruption.end_on_signals()  # before the imports, which take seconds
-    sys.exit(main())
+    interruption.leave(main())

@@ -94,4 +94,4 @@ def _judge(target: str, wanted: Sequence[str], *, allow_plugins: bool) -> list[V
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    interruption.leave(main())
