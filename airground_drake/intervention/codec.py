@@ -26,7 +26,8 @@ def packed(value: Any) -> Any:
     if isinstance(value, tuple):
         return [packed(each) for each in value]
     if is_dataclass(value):
-        return {type(value).__name__: {field.name: packed(getattr(value, field.name)) for field in fields(value)}}
+        given = [each.name for each in fields(value) if each.init]
+        return {type(value).__name__: {name: packed(getattr(value, name)) for name in given}}
     return value
 
 

@@ -186,5 +186,6 @@ def _fresh(value: Any) -> Any:
     if isinstance(value, tuple):
         return tuple(map(_fresh, value))
     if is_dataclass(value) and not isinstance(value, type):
-        return replace(value, **{field.name: _fresh(getattr(value, field.name)) for field in fields(value)})
+        given = [each.name for each in fields(value) if each.init]
+        return replace(value, **{name: _fresh(getattr(value, name)) for name in given})
     return value

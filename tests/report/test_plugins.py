@@ -6,11 +6,14 @@ import json
 import shutil
 import sys
 from collections.abc import Callable
+from importlib import resources
 from pathlib import Path
 
 import pytest
 from builders.hostile_policies import KINDS
 
+from airground_drake import scenarios
+from airground_drake.commands import diagram
 from airground_drake.report.__main__ import main
 from airground_drake.verify import __main__ as judge
 
@@ -83,6 +86,17 @@ def test_code_of_others_is_refused_unless_it_is_allowed(
         change = [f"{key}={name}"] if key != "claims.MINE" else [f"claims={{MINE: '{name}'}}"]
         assert main(["case_a", "-o", str(tmp_path / "out"), "--set", *change]) == 2
         assert "--allow-plugins" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_diagram_is_drawn_without_code_of_others(
+    module: Callable[[str], str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "mine.yaml").write_text(
+        resources.files(scenarios).joinpath("minimal.yaml").read_text() + f"\ngatekeeper: {{route: '{module(EVIL)}'}}\n"
+    )
+    assert diagram.main([str(tmp_path / "mine.yaml"), "-o", str(tmp_path / "out")]) == 2
+    assert "--allow-plugins" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
 
 
