@@ -234,5 +234,5 @@ def load(folder: Path) -> Trace:
             tables[name] = pd.read_parquet(io.BytesIO(data))
         signals, decisions = tables["signals.parquet"], tables["decisions.parquet"]
         return Trace(meta, signals, decisions, timings, tables["problems.parquet"], tables["proposals.parquet"])
-    except (OSError, KeyError, ValueError, AttributeError) as error:
+    except (OSError, KeyError, ValueError, AttributeError, RecursionError) as error:
         raise TraceError(f"{folder}: not a readable trace: {error}") from error

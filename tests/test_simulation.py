@@ -192,6 +192,9 @@ def test_a_trace_survives_saving_and_a_changed_file_does_not(run: Runs, tmp_path
     (tmp_path / "decisions.parquet").unlink()
     with pytest.raises(TraceError, match="not a readable trace"):
         trace.load(tmp_path / "nowhere")
+    (tmp_path / "meta.json").write_text("[" * 100_000, encoding="utf-8")
+    with pytest.raises(TraceError, match="not a readable trace"):
+        trace.load(tmp_path)
 
 
 @pytest.mark.parametrize(("period", "noise_period"), [(0.01, 0.05), (0.05, 0.01), (0.025, 0.05)])

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from builders.observations import mate, seen
 from timeline import kinds
 
 from airground_drake.errors import PluginError, UnknownNameError
 from airground_drake.intervention.database import make_policy
 from airground_drake.intervention.policy import Observation, Policy
+from airground_drake.intervention.wrong import Hostile
 from airground_drake.nsbc.motion import Motion
 from airground_drake.registry import POLICIES
 from airground_drake.scenarios.schema import Policy as PolicyEntry
@@ -38,7 +42,15 @@ class NotFinite(Policy):
         return Motion(np.array([seen.start]), np.full((1, 3), np.nan))
 
 
-@pytest.mark.parametrize("kind", [Raises, Nonsense, NotFinite])
+class NoTime(Policy):
+    """A policy whose motion has a leg that lasts as long as the times of a run are rounded."""
+
+    def propose(self, seen: Observation) -> Motion | None:
+        times = np.array([seen.start, np.nextafter(seen.start, 1e9), seen.start + 1.0])
+        return Motion(times, seen.position + np.array([[0.0, 0.0, 0.0], [1e-15, 0.0, 0.0], [1.0, 0.0, 0.0]]))
+
+
+@pytest.mark.parametrize("kind", [Raises, Nonsense, NotFinite, NoTime])
 def test_a_broken_policy_counts_as_no_intervention_and_is_reported(case_a: Scenario, kind: type[Policy]) -> None:
     case_a.intervention.policies = [PolicyEntry("broken", {})]
     case_a.duration_s = 16.0
@@ -121,3 +133,12 @@ def test_no_wrong_policy_gets_past_method_d(case_a: Scenario, name: str, paramet
     assert "proposal" in kinds(of_run, "ugv1")
     statuses = {v.claim.id: v.finding.status for v in verify(of_run)}
     assert statuses["SAFE-TRACE"] == statuses["SAFE-HYP"] == "holds"
+
+
+def test_the_hostile_policy_stays_where_it_is_hardly_away_from_its_goal() -> None:
+    """As a robot does that a rounding error parts from it (a leg of 3.6e-15 s had no velocity to speak of)."""
+    there = mate("one", [5.592841433684655, 5.2172957826435375], [9.0, 9.0])
+    sight = replace(seen([there]), others=np.array([[5.592841433684654, 5.217295782643537, 0.0]]))
+    motion = Hostile(speed_m_s=0.5).propose(sight)
+    assert motion is not None
+    assert np.diff(motion.times).min() > 1.0

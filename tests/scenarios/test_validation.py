@@ -110,6 +110,7 @@ BAD: list[tuple[str, object, list[str]]] = [
     ("gatekeeper.stages", 7, ["gatekeeper.horizon_s: 3.0", "horizon_s / stages = 0.42857"]),
     ("decision.noise_period_s", 0.01, ["decision.noise_period_s: 0.01", "multiple of control.period_s"]),
     # decision
+    ("decision.release_m", 0, ["decision.release_m: 0.0", "not below 1e-09"]),
     ("decision.release_m", 3, ["decision.release_m: 3.0", "less than the fixed threshold, 3 m"]),
     ("decision.threshold", {"rule": "bayes", "drift_m_s": 1000}, ["decision.release_m: 1.5", "the bayes threshold"]),
     # distances
