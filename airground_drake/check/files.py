@@ -166,11 +166,11 @@ def parse_json(content: bytes, name: str) -> Any:
 def _is_deep(value: Any) -> bool:
     """Whether it is nested deeper than `DEEPEST`, level by level."""
     level = [value]
-    for _ in range(DEEPEST):
-        parts = [part for each in level for part in (each.values() if isinstance(each, dict) else each)]
-        level = [part for part in parts if isinstance(part, (dict, list))]
-        if not level:
+    for _ in range(DEEPEST + 1):
+        nested = [each for each in level if isinstance(each, (dict, list))]
+        if not nested:
             return False
+        level = [part for each in nested for part in (each.values() if isinstance(each, dict) else each)]
     return True
 
 

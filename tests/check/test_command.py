@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 from check.tampering import TAMPERINGS
-from check.tampering.base import copy, write
+from check.tampering.base import copy, mend, write
 
 from airground_drake import check
 
@@ -48,6 +48,7 @@ def test_a_rejection_names_rule_time_and_both_values(
 ) -> None:
     folder = copy(report, tmp_path)
     TAMPERINGS["decision_variable_changed"].edit(folder)
+    mend(folder)
     assert check.main(["--json", str(folder)]) == 1
     checks = json.loads(capsys.readouterr().out, parse_constant=no_constants)["checks"]
     found = next(entry for entry in checks if entry["outcome"] == "DISAGREES")
@@ -69,6 +70,7 @@ def test_numbers_that_are_not_finite_stay_strict_json(
 ) -> None:
     folder = copy(report, tmp_path)
     TAMPERINGS["position_is_nan"].edit(folder)
+    mend(folder)
     assert check.main(["--json", str(folder)]) == 1
     checks = json.loads(capsys.readouterr().out, parse_constant=no_constants)["checks"]
     assert next(entry for entry in checks if entry["outcome"] == "DISAGREES")["recorded"] == "nan"

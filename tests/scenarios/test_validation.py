@@ -22,7 +22,6 @@ BAD: list[tuple[str, object, list[str]]] = [
     ("name", DELETE, ["name: missing", "text"]),
     ("ugvs", DELETE, ["ugvs: missing", "a mapping"]),
     ("uav", DELETE, ["uav: missing", "altitude_m"]),
-    ("obstacles", DELETE, ["obstacles: missing"]),
     ("runs", DELETE, ["runs: missing"]),
     ("runs.d.method", DELETE, ["runs.d.method: missing"]),
     ("ugvs.one.start_m", DELETE, ["ugvs.one.start_m: missing", "a list in m"]),
@@ -144,6 +143,7 @@ def test_bad_value(key: str, value: object, fragments: list[str], write: Write) 
 def test_the_small_scenario_is_valid_otherwise(write: Write) -> None:
     assert load(write(SMALL))[0].obstacles["rock"].known_to_uav
     load(write(SMALL.replace("rock: {position_m: [5, -5, 0]}", "{}")))
+    assert not load(write(yaml.safe_dump(edit(SMALL_DATA, "obstacles", DELETE))))[0].obstacles
 
 
 def test_a_bayes_threshold_that_cannot_be_found(monkeypatch: pytest.MonkeyPatch) -> None:
