@@ -102,6 +102,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
     draw = random.Random(options.seed)
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs, and theirs, do not heed it
     with tempfile.TemporaryDirectory() as place:
         os.environ["AIRGROUND_DRAKE_CACHE"] = f"{place}/cache"
         folder = Path(place) / "report"
