@@ -32,8 +32,8 @@ CLAIMS = (
     Mutant(
         "SAFE-TRACE forgets the UAV",
         "verify/runs/pairs.py",
-        "for other in trace.robots[i + 1 :]:",
-        "for other in trace.ugvs[i + 1 :]:",
+        "combinations(trace.robots, 2)",
+        "combinations(trace.ugvs, 2)",
         runs=BOTH,
         tests=(f"{RUNS}/test_safe_trace.py",),
     ),

@@ -14,20 +14,20 @@ from airground_drake.scenarios.schema import Scenario
 KINDS: dict[str, dict[str, dict[str, Any]]] = {
     "as_drawn": {},
     "nothing_triggers": {"decision": {"threshold": {"rule": "fixed", "zeta_m": 1e3}}},
-    "triggers_at_once": {"decision": {"threshold": {"rule": "fixed", "zeta_m": 0.01}, "release_m": 0.005}},
-    "bare": {"decision": {"trigger": "bare", "threshold": {"rule": "fixed", "zeta_m": 0.05}, "release_m": 0.0}},
+    "triggers_at_once": {"decision": {"threshold": {"rule": "fixed", "zeta_m": 0.01}, "release_m": 0.0105}},
+    "bare": {"decision": {"trigger": "bare", "threshold": {"rule": "fixed", "zeta_m": 0.05}, "release_m": 0.01}},
     "bayes": {
         "decision": {
             "threshold": {"rule": "bayes", "c1_1_s": 0.5, "c2": 1.0, "drift_m_s": 6.05, "noise_m_sqrt_s": 1.0},
-            "release_m": 0.0,
+            "release_m": 0.01,
         }
     },
     "reversals": {
-        "decision": {"threshold": {"rule": "fixed", "zeta_m": 0.01}, "release_m": 0.005},
+        "decision": {"threshold": {"rule": "fixed", "zeta_m": 0.01}, "release_m": 0.0105},
         "gatekeeper": {"switching_margin": 0.0, "min_dwell_s": 0.3},
     },
     "small_budgets": {
-        "decision": {"threshold": {"rule": "fixed", "zeta_m": 0.01}, "release_m": 0.005},
+        "decision": {"threshold": {"rule": "fixed", "zeta_m": 0.01}, "release_m": 0.0105},
         "gatekeeper": {"budget_iterations": 1, "budget_nodes": 1},
     },
 }

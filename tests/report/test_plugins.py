@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import sys
 from collections.abc import Callable
@@ -27,8 +28,8 @@ IN_A_RUN = (
 )  # fmt: skip
 
 EVIL = """
-import sys
-if sys.argv[0] != "-c":
+import os
+if os.environ["JUDGING"] == str(os.getpid()):
     raise AssertionError("imported in the process of the command line")
 from airground_drake.intervention.policy import Policy
 class It(Policy):
@@ -47,6 +48,7 @@ ROUTES = {
 def module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], str]:
     """Write a module of its own name and give `name:It`."""
     monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setenv("JUDGING", str(os.getpid()))
 
     def write(text: str) -> str:
         name = f"evil_{abs(hash(str(tmp_path)))}"

@@ -12,7 +12,7 @@ import airground_drake
 
 PACKAGE = Path(airground_drake.__file__).parent
 ALLOWED: dict[str, set[str]] = {
-    "engines": {"arrays", "registry.Status", "verify.engines", "verify.finding"},
+    "engines": {"arrays", "interruption", "registry.Status", "verify.engines", "verify.finding"},
     "runs": {"arrays", "errors", "trace", "verify.engines", "verify.runs", "verify.claim", "verify.finding"},
     "stl": {"arrays", "trace", "verify.runs", "verify.stl", "verify.claim", "verify.finding"},
 }

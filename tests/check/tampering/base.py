@@ -266,6 +266,7 @@ def mend(folder: Path) -> None:
     try:
         with edited_report(folder) as report:
             names = [path for path in folder.rglob("*") if path.is_file() and path.name != "report.json"]
+            names = [path for path in names if path.relative_to(folder).parts[0] != "proofs"]  # those are added later
             report["files"] = {
                 path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest() for path in names
             }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict
+from dataclasses import replace
 from typing import Any
 
 from airground_drake.verify.finding import Finding
@@ -12,7 +12,7 @@ from airground_drake.verify.model.avoidance.safe_gate import SafeGate
 
 def test_findings_depend_on_nothing_but_the_inputs(inputs: dict[str, Any], found: dict[str, Finding]) -> None:
     again = SafeGate().judge(json.loads(json.dumps(inputs)))
-    assert asdict(again) == asdict(found["SAFE-GATE"])
+    assert again == replace(found["SAFE-GATE"], from_cache=False)
 
 
 def test_what_is_not_finite_asks_for_nothing(found: dict[str, Finding]) -> None:
