@@ -426,6 +426,7 @@ INTERVENTION = (
         "intervention/messages.py",
         "if proposal is None or answers[2 * robot + 1] != proposal.issued:",
         "if proposal is None:",
+        proofs=("SAFE-GATE",),
     ),
     Mutant("silence counts as acceptance", "intervention/messages.py", "== ACCEPT else None", "!= REFUSE else None"),
     Mutant(
