@@ -75,12 +75,12 @@ def mutated(tactic: Tactic, random: np.random.Generator) -> Tactic:
     return replace(tactic, **{name: CHOICES[name][random.integers(len(CHOICES[name]))] for name in parts})
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class LyingPlanner(Planner):
     """Speaks to every UGV as its tactic has it; to be used for one run."""
 
-    tactic: Tactic = Tactic("true", "hold", "own", 1e4, 1e4, 0.0, False, 0.0, 1.0)
-    random: np.random.Generator = np.random.default_rng(0)  # noqa: RUF009 (of one run)
+    tactic: Tactic
+    random: np.random.Generator
 
     def watch(self, memory: PlannerMemory, t: float, positions: Array) -> PlannerMemory:
         """Speak whether anybody is intervened on or not."""
