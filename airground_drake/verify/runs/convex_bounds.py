@@ -8,10 +8,14 @@ from typing import Any
 
 import numpy as np
 from scipy import sparse
+from scipy.optimize import lsq_linear
 
 from airground_drake.arrays import Array
 from airground_drake.errors import TraceError
 from airground_drake.verify.runs.gate_record import Row
+
+WIDE = 1e-5
+"""Relative width of an enclosure above which a better omega* is looked for."""
 
 
 @dataclass(frozen=True)
@@ -22,35 +26,59 @@ class Enclosure:
     upper: float
     other_first: float
 
+    def __and__(self, other: Enclosure) -> Enclosure:
+        """The better of each bound."""
+        lower, upper = max(self.lower, other.lower), min(self.upper, other.upper)
+        return Enclosure(lower, upper, max(self.other_first, other.other_first))
+
 
 def enclose(rows: Sequence[Row]) -> list[Enclosure]:
     """Bounds of the optimum over omega in [0, 1]^N of the cost with distances along the normals.
 
     For any multipliers l_kj >= 0 of u_k >= d_j - n_kj.(rho_k - o_kj), minimising the Lagrangian over u leaves
     q(omega) - sum_k (sum_j l_kj)^2 / (4 dt b), q convex and quadratic, of which the tangent at any omega* is below
-    it everywhere, and least at a corner of the box. Both l and omega* are the solver's; neither need be good.
+    it everywhere, and least at a corner of the box. Both l and omega* are the solver's; neither need be good. Where
+    costs are tiny the solver's omega* is no minimiser to so many digits, and q's own is taken besides.
     """
     if not rows:
         return []
-    shares, multipliers = _solve(rows)
     found = []
-    for row, omega, solved in zip(rows, shares, multipliers, strict=True):
-        dt = row.dt
-        error = row.error_weight * row.lasting[:, None]
-        slack = row.slack_weight
-        normals = row["normals"]
-        multiplier = solved * row.scale if slack > 0.0 else 0.0 * solved
-        positions = row.positions(omega)
-        away = positions - row["reference_m"]
-        value = (error * np.square(away)).sum() - (multiplier * row.gaps(positions, normals)).sum()
-        value -= np.square(multiplier.sum(axis=1)).sum() / (4.0 * dt * slack) if slack > 0.0 else 0.0
-        by_position = 2.0 * error * away - np.einsum("km,kmi->ki", multiplier, normals)
-        change = dt * (row["accept_m_s"] - row["refuse_m_s"])
-        slope = np.einsum("ki,ki->k", change, np.cumsum(by_position[::-1], axis=0)[::-1])
-        corner = np.minimum(-slope * omega, slope * (1.0 - omega))
-        other = value + corner[1:].sum() + slope[0] * (1.0 - row["plan"][0] - omega[0])
-        found.append(Enclosure(float(value + corner.sum()), float(row.cost(positions, normals)), float(other)))
+    for row, omega, solved in zip(rows, *_solve(rows), strict=True):
+        multiplier = solved * row.scale if row.slack_weight > 0.0 else 0.0 * solved
+        bounds = _bounds(row, omega, multiplier)
+        if bounds.upper - bounds.lower > WIDE * row.scale:
+            bounds &= _bounds(row, _minimiser(row, multiplier), multiplier)
+        found.append(bounds)
     return found
+
+
+def _bounds(row: Row, omega: Array, multiplier: Array) -> Enclosure:
+    """Those of `enclose` for a plan (N,) and multipliers (N, m), 1/m."""
+    dt, slack, normals = row.dt, row.slack_weight, row["normals"]
+    error = row.error_weight * row.lasting[:, None]
+    positions = row.positions(omega)
+    away = positions - row["reference_m"]
+    value = (error * np.square(away)).sum() - (multiplier * row.gaps(positions, normals)).sum()
+    value -= np.square(multiplier.sum(axis=1)).sum() / (4.0 * dt * slack) if slack > 0.0 else 0.0
+    by_position = 2.0 * error * away - np.einsum("km,kmi->ki", multiplier, normals)
+    change = dt * (row["accept_m_s"] - row["refuse_m_s"])
+    slope = np.einsum("ki,ki->k", change, np.cumsum(by_position[::-1], axis=0)[::-1])
+    corner = np.minimum(-slope * omega, slope * (1.0 - omega))
+    other = value + corner[1:].sum() + slope[0] * (1.0 - row["plan"][0] - omega[0])
+    return Enclosure(float(value + corner.sum()), float(row.cost(positions, normals)), float(other))
+
+
+def _minimiser(row: Row, multiplier: Array) -> Array:
+    """Where in the box q is least: bounded least squares, the multipliers' forces being shifts of the reference."""
+    n = len(row["reference_m"])
+    weight = row.error_weight * row.lasting[:, None]
+    force = np.einsum("km,kmi->ki", multiplier, row["normals"])
+    aim = row["reference_m"] + force / (2.0 * weight) - row.positions(np.zeros(n))
+    change = row.dt * (row["accept_m_s"] - row["refuse_m_s"])
+    reached = np.tril(np.ones((n, n)))[:, None, :] * change.T  # (stage, axis, omega)
+    matrix = (np.sqrt(weight)[..., None] * reached).reshape(3 * n, n)
+    fitted = lsq_linear(matrix, (np.sqrt(weight) * aim).ravel(), (0.0, 1.0), method="bvls", tol=1e-14)
+    return np.clip(np.asarray(fitted.x), 0.0, 1.0)
 
 
 def _solve(rows: Sequence[Row]) -> tuple[list[Array], list[Array]]:

@@ -69,3 +69,20 @@ def test_the_bound_holds_whatever_the_solver_returns(data: GateData, seed: int) 
     assert found.lower <= costs.min() + 1e-12
     assert found.other_first <= costs[ALL_PLANS[:, 0] == 1.0].min() + 1e-12
     assert found.upper >= data.relaxed()[1] - 1e-9
+
+
+@examples(25, fuzz=300)
+@given(st.integers(0, 10**6), st.sampled_from([1e-4, 1e-5]), st.integers(0, 2))
+def test_it_is_narrow_where_the_solver_stops_early_because_costs_are_tiny(seed: int, off: float, count: int) -> None:
+    rng = np.random.default_rng(seed)
+    far = np.full((STAGES, count, 3), 50.0)
+    data = GateData(seed, np.zeros(3), np.zeros((STAGES, 3)), far, np.ones(count))
+    data.reference = data.positions(np.ones(STAGES)) + off * rng.uniform(-1.0, 1.0, (STAGES, 3)) * [1, 1, 0]
+    row = row_of(data, np.ones(STAGES))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(
+            convex_bounds, "_solve", lambda rows: ([rng.uniform(0.9, 1.0, STAGES)], [np.zeros((STAGES, count))])
+        )
+        (found,) = enclose([row])
+    assert found.lower <= data.relaxed()[1] + 1e-12
+    assert found.upper - found.lower <= convex_bounds.WIDE * row.scale
