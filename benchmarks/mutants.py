@@ -220,7 +220,7 @@ class Bench:
         """The first test that fails on the copy and passes on the package as it is; '' if there is none."""
         options = ("-n", "0", "-x", "-q", "--no-header", "-p", "no:cacheprovider")
         done = copy.run(sys.executable, "-m", "pytest", *options, *mutant.tests)
-        failed = re.findall(r"^(?:FAILED|ERROR) (\S+)", done.stdout, flags=re.MULTILINE)
+        failed = re.findall(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", done.stdout, flags=re.MULTILINE)
         if done.returncode == 0 or not failed:
             return ""
         passes = self.unbroken.run(sys.executable, "-m", "pytest", *options, failed[0]).returncode == 0

@@ -7,7 +7,8 @@ from dataclasses import replace
 import cvxpy
 import numpy as np
 import pytest
-from builders.problems import case_a_proposal, random_problem
+from builders.problems import INSTANCES, case_a_proposal, random_problem
+from gatekeeper.formulas import cost
 from hypothesis import example, given
 from hypothesis import strategies as st
 from properties import examples
@@ -66,6 +67,18 @@ def test_every_decision_carries_its_evidence(seed: int) -> None:
     assert solution.rounding_deviation <= problem.dt / 2 + 1e-9
     constant = [problem.evaluate(np.full(20, w)).objective for w in (0.0, 1.0)]
     assert solution.objective <= min(constant)
+
+
+@pytest.mark.parametrize("name", ["rolled out 0", "rolled out 2", "case A, stalled", "case A, on the way"])
+def test_half_planes_face_the_cheaper_constant_plan(name: str) -> None:
+    problem = INSTANCES[name]
+    plans = np.stack([np.zeros(problem.stages), np.ones(problem.stages)])
+    cheaper = plans[cost(problem, plans).argmin()]
+    away = problem.positions(cheaper)[:, None] - problem.centres
+    expected = away / np.linalg.norm(away, axis=2, keepdims=True)
+    normals = RelaxedRoute().solve(problem).normals
+    assert normals is not None
+    np.testing.assert_allclose(normals, expected, atol=1e-12)
 
 
 def test_pruned_rows_do_not_change_the_optimum() -> None:
