@@ -10,13 +10,16 @@ anything that can be imported:
 
 from __future__ import annotations
 
+import ast
 import importlib
+import importlib.util
 import re
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import entry_points
+from pathlib import Path
 from typing import Any, Literal, TypeVar, get_args
 
 from airground_drake.errors import PluginError, UnknownNameError, described
@@ -67,6 +70,23 @@ class Registry:
     def is_foreign(self, name: str) -> bool:
         """Whether a name stands for code of others that is to be imported: neither the package's own nor added here."""
         return name not in self._own and name not in self._added
+
+    def says(self, name: str) -> str:
+        """What a registered class says of itself in a line; its module is read, not imported (packages above it are).
+
+        Returns:
+            Its `statement` if it is a claim, else the first line of its docstring; '' if neither can be found.
+        """
+        if name in self._added:
+            return (self._added[name].__doc__ or "").strip().partition("\n")[0]
+        module, _, attribute = {**self._own, **_entry_points(self.group)}[name].partition(":")
+        with suppress(Exception):  # whatever an installed package does when it is looked for
+            spec = importlib.util.find_spec(module)
+            tree = ast.parse(Path(spec.origin or "").read_bytes()) if spec else ast.Module([], [])
+            for node in tree.body:
+                if isinstance(node, ast.ClassDef) and node.name == attribute:
+                    return _statement(node) or (ast.get_docstring(node) or "").partition("\n")[0]
+        return ""
 
     def load(self, name: str, of: type[T]) -> type[T]:
         """The class that a name stands for.
@@ -126,6 +146,14 @@ class Registry:
 def is_plugin(name: str) -> bool:
     """Whether a name has the form `module:Class`."""
     return re.fullmatch(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*", name) is not None
+
+
+def _statement(of: ast.ClassDef) -> str:
+    """The text of `statement = "..."` in a class; '' if there is none."""
+    for node in of.body:
+        if isinstance(node, ast.Assign) and [ast.unparse(target) for target in node.targets] == ["statement"]:
+            return str(ast.literal_eval(node.value))
+    return ""
 
 
 @cache

@@ -16,17 +16,22 @@ MODEL = "minimal"
 """The shipped scenario that is copied."""
 
 
+def parser() -> argparse.ArgumentParser:
+    """What the command line takes."""
+    parser = argparse.ArgumentParser(
+        prog="airground init", description="Write a small scenario that runs: a UGV, an obstacle in its way, a UAV."
+    )
+    parser.add_argument("file", type=Path, nargs="?", default=Path("scenario.yaml"), help="default: %(default)s")
+    return parser
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Write the file; one that is there is left alone.
 
     Returns:
         Exit code: 0, or 2 if the file exists or cannot be written.
     """
-    parser = argparse.ArgumentParser(
-        prog="airground init", description="Write a small scenario that runs: a UGV, an obstacle in its way, a UAV."
-    )
-    parser.add_argument("file", type=Path, nargs="?", default=Path("scenario.yaml"), help="default: %(default)s")
-    path: Path = parser.parse_args(arguments).file
+    path: Path = parser().parse_args(arguments).file
     if path.exists():
         print(f"error: {path} exists; name a file that does not", file=sys.stderr)
         return EXIT_USAGE

@@ -8,7 +8,9 @@ from pathlib import Path
 from airground_drake import files
 from airground_drake.errors import FolderError, one_line
 
-ENTRIES = ("report.html", "report.json", "junit.xml", "diagram.dot", "diagram.svg", "trace", "certificates")
+PAGES = {"html": "report.html", "json": "report.json", "junit": "junit.xml"}
+"""The formats of a report, and the file of each."""
+ENTRIES = (*PAGES.values(), "diagram.dot", "diagram.svg", "trace", "certificates")
 """What a report consists of."""
 RULE = "allowed: a folder that is new or empty, has a report.json of ours, or nothing but files of a report"
 

@@ -15,7 +15,6 @@ import json
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any, NoReturn, get_args, get_origin
@@ -27,6 +26,9 @@ from airground_drake import files
 from airground_drake.errors import Fault, ScenarioError
 from airground_drake.scenarios import validate
 from airground_drake.scenarios.schema import Scenario
+from airground_drake.scenarios.shipped import shipped, shipped_files
+
+__all__ = ["from_data", "load", "resolved", "shipped", "validated"]
 
 MAX_BYTES = 2**20
 MAX_VALUES = 50_000
@@ -80,11 +82,6 @@ class _Loader(yaml.BaseLoader):
 for _name, (_pattern, _) in _SCALARS.items():
     if _pattern is not None:
         _Loader.add_implicit_resolver(_TAG + _name, re.compile(rf"(?:{_pattern})\Z"), None)
-
-
-def shipped() -> list[str]:
-    """Names of the scenarios that come with the package, sorted."""
-    return sorted(name.removesuffix(".yaml") for name in _shipped_files())
 
 
 Overrides = Sequence[str] | Mapping[str, Any]
@@ -253,13 +250,9 @@ def resolved(scenario: Scenario) -> dict[str, Any]:
     return dataclasses.asdict(scenario)
 
 
-def _shipped_files() -> dict[str, Traversable]:
-    return {file.name: file for file in resources.files(__package__).iterdir() if file.name.endswith(".yaml")}
-
-
 def _read_bytes(name_or_path: str) -> tuple[str, bytes]:
     """Path and content of a scenario; a shipped scenario's name has precedence."""
-    file: Traversable = _shipped_files().get(f"{name_or_path}.yaml", Path(name_or_path))
+    file: Traversable = shipped_files().get(name_or_path, Path(name_or_path))
     source = str(file)
     try:
         with file.open("rb") as stream:

@@ -12,16 +12,29 @@ import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from airground_drake import trace
 from airground_drake.errors import AirgroundError, UnknownNameError
 from airground_drake.registry import NOT_EXERCISED, outcome
 from airground_drake.scenarios import plugins
-from airground_drake.scenarios.load import from_data, load
-from airground_drake.verify import Verdict, verify, verify_model
-from airground_drake.verify.registry import model_claims, run_claims
+
+if TYPE_CHECKING:
+    from airground_drake.verify.claim import Verdict
 
 EXIT_DIFFERS, EXIT_USAGE = 1, 2
+
+
+def parser() -> argparse.ArgumentParser:
+    """What the command line takes."""
+    parser = argparse.ArgumentParser(
+        prog="python -m airground_drake.verify",
+        description="Judge claims anew, on a saved run or about a scenario's model; nothing is taken from a cache.",
+    )
+    parser.add_argument("target", help="folder of a saved run (DIR/trace/RUN), or a scenario, shipped or a YAML file")
+    parser.add_argument("claims", nargs="*", metavar="CLAIM", help="identifiers (default: all that apply)")
+    parser.add_argument("--json", action="store_true", help="print the whole verdicts as JSON")
+    parser.add_argument(plugins.OPTION, action="store_true", help=plugins.HELP)
+    return parser
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -30,17 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         Exit code: 0 all as the scenario expects, 1 a claim differs, 2 usage, or a run or scenario that cannot be used.
     """
-    parser = argparse.ArgumentParser(
-        prog="python -m airground_drake.verify",
-        description="Judge claims anew, on a saved run or about a scenario's model; nothing is taken from a cache.",
-    )
-    parser.add_argument("target", help="folder of a saved run (DIR/trace/RUN), or a scenario, shipped or a YAML file")
-    parser.add_argument("claims", nargs="*", metavar="CLAIM", help="identifiers (default: all that apply)")
-    parser.add_argument("--json", action="store_true", help="print the whole verdicts as JSON")
-    parser.add_argument(
-        plugins.OPTION, action="store_true", help="import and run what the scenario names as module:Class"
-    )
-    options = parser.parse_args(arguments)
+    options = parser().parse_args(arguments)
     try:
         verdicts = _judge(options.target, options.claims, allow_plugins=options.allow_plugins)
     except (AirgroundError, OSError) as error:
@@ -78,6 +81,11 @@ def _judge(target: str, wanted: Sequence[str], *, allow_plugins: bool) -> list[V
         UnknownNameError: if there is no such claim.
         ScenarioError: if code of others is named that is not allowed.
     """
+    from airground_drake import trace
+    from airground_drake.scenarios.load import from_data, load
+    from airground_drake.verify import verify, verify_model
+    from airground_drake.verify.registry import model_claims, run_claims
+
     folder = Path(target)
     run = trace.load(folder) if (folder / "meta.json").is_file() else None
     scenario = load(target)[0] if run is None else from_data(run.scenario, target)
