@@ -15,6 +15,7 @@ from timeline import kinds, times
 from airground_drake import trace
 from airground_drake.errors import TraceError
 from airground_drake.report.reproduction import MEASURES
+from airground_drake.progress import Watch
 from airground_drake.runs import simulate_all
 from airground_drake.scenarios.load import load, shipped
 from airground_drake.scenarios.schema import Obstacle, Preset, Run, Scenario, Ugv
@@ -86,7 +87,11 @@ def test_same_seed_same_bytes_other_seed_other_trigger(case_a: Scenario, run: Ru
 def test_runs_in_several_processes_are_those_in_one(case_a: Scenario, run: Runs) -> None:
     case_a.runs = {name: case_a.runs[name] for name in ("a", "d")}
     case_a.reproduction = []
-    one, two = (simulate_all(case_a, jobs) for jobs in (1, 2))
+    told: list[float] = []
+    watch = Watch()
+    watch.advance = lambda amount, what="": told.append(amount)  # type: ignore[method-assign]
+    one, two = simulate_all(case_a, 1), simulate_all(case_a, 2, watch)
+    assert sum(told) == pytest.approx(2.0 * case_a.duration_s)
     for name in case_a.runs:
         assert one[name].signals.equals(two[name].signals)
         assert one[name].decisions.equals(two[name].decisions)

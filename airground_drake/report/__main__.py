@@ -23,6 +23,7 @@ from airground_drake.errors import (
     UnknownNameError,
     one_line,
 )
+from airground_drake.progress import told
 from airground_drake.report import folder
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.estimate import DEFAULT_LIMITS, GIB, Limits
@@ -68,7 +69,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         kept = None if options.no_cache else cache_folder()
         output = options.output or Path("reports") / scenario.name
         limits = Limits(options.limit_steps, options.limit_memory * GIB)
-        report = make.write_report(scenario, digest, output, options.format, shlex.join(command), kept, audited, limits)
+        with told(quiet=options.quiet, verbose=options.verbose) as watch:
+            report = make.write_report(
+                scenario, digest, output, options.format, shlex.join(command), kept, audited, limits, watch
+            )
         make.read_back(output, options.format, report)
     except LimitError as error:
         print(f"error: {error}; see --limit-steps and --limit-memory", file=sys.stderr)
@@ -80,7 +84,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"error: {one_line(str(error))}", file=sys.stderr)
         return EXIT_TOOL
     overall = report["overall"]
-    print(f"{scenario.name}: {overall['status'].replace('_', ' ')}. {overall['why']}\n{one_line(str(output))}")
+    if not options.quiet:
+        print(f"{scenario.name}: {overall['status'].replace('_', ' ')}. {overall['why']}\n{one_line(str(output))}")
     if options.open and "html" in options.format:
         webbrowser.open((output / "report.html").resolve().as_uri())
     return document.exit_code(report)
@@ -117,6 +122,9 @@ def parser() -> argparse.ArgumentParser:
     )  # fmt: skip
     parser.add_argument("--open", action="store_true", help="open the report in a browser")
     parser.add_argument("--list", action="store_true", help="list the shipped scenarios")
+    loudness = parser.add_mutually_exclusive_group()
+    loudness.add_argument("-q", "--quiet", action="store_true", help="say nothing but errors")
+    loudness.add_argument("-v", "--verbose", action="store_true", help="say what took how long")
     return parser
 
 

@@ -6,7 +6,6 @@ import json
 import platform
 import shutil
 import subprocess
-import sys
 import time
 from collections.abc import Sequence
 from datetime import UTC, datetime
@@ -17,6 +16,7 @@ from typing import Any
 from airground_drake import files, graphviz, trace
 from airground_drake.diagram import build_diagram
 from airground_drake.errors import PluginError, ReportError
+from airground_drake.progress import SILENT, Watch
 from airground_drake.report import audit, document, folder, html, junit
 from airground_drake.report.figures import zeno_refine
 from airground_drake.report.figures.draw import draw
@@ -29,7 +29,7 @@ from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify import Verdict, verify, verify_model
 from airground_drake.verify.finding import PLAIN_NAME
 from airground_drake.verify.mutants import refute_mutants
-from airground_drake.verify.registry import model_claims
+from airground_drake.verify.registry import model_claims, run_claims
 from airground_drake.verify.stl import cross_check as stl
 
 PACKAGES = ("airground_drake", "drake", "numpy", "scipy", "numba", "pandas", "matplotlib")
@@ -44,6 +44,7 @@ def write_report(
     kept: Path | None = None,
     audited: bool = False,
     limits: Limits = DEFAULT_LIMITS,
+    watch: Watch = SILENT,
 ) -> dict[str, Any]:
     """Simulate every run, judge it, and write everything to a folder.
 
@@ -56,6 +57,7 @@ def write_report(
         kept: folder of kept findings about the model, see `verify_model`; None: every proof anew.
         audited: add all findings about the paper, also those that take other runs, and the proofs' mutants.
         limits: what the scenario may ask for.
+        watch: is told what is done.
 
     Returns:
         The document, as in report.json.
@@ -72,21 +74,20 @@ def write_report(
     folder.prepare(output)
     if kept is not None and kept.is_dir():
         files.sweep(kept)
-    _progress(f"simulating {', '.join(scenario.runs)}")
-    traces = simulate_all(scenario)
-    _progress("checking claims")
-    verdicts = [verdict for of_run in traces.values() for verdict in stl.merge(verify(of_run), stl.cross_check(of_run))]
-    _progress("proving")
-    verdicts += verify_model(scenario, kept=kept)
+    traces = simulate_all(scenario, watch=watch)
+    watch.stage("checking claims", len(traces) * (1 + len(run_claims(added=scenario.claims))), "claims")
+    verdicts = [verdict for of_run in traces.values() for verdict in _judged(of_run, watch)]
+    watch.stage("proving", len(required), "proofs")
+    verdicts += verify_model(scenario, kept=kept, watch=watch)
     if audited:
-        _progress("auditing the paper")
+        watch.stage("auditing the paper")
     findings = audit.whole(scenario, verdicts) if audited else ()
-    mutants = refute_mutants(scenario, kept=kept) if audited else ()
+    mutants = refute_mutants(scenario, kept=kept, watch=watch) if audited else ()
     dot = graphviz.dot(build_diagram(plugins.without(scenario)))
     drawn = graphviz.svg(dot)
     provenance = _provenance(scenario, started, command)
 
-    _progress("writing")
+    watch.stage("writing")
     _drop_stale(output, set(traces))
     written = [f"certificates/{name}" for name in _save_certificates(output / "certificates", verdicts)]
     for name, of_run in traces.items():
@@ -108,8 +109,14 @@ def write_report(
     report = document.sealed(report, output, written)
     if "json" in formats:
         files.write_json(output / "report.json", report)
-    _progress("")
     return report
+
+
+def _judged(of_run: trace.Trace, watch: Watch) -> list[Verdict]:
+    """Verdicts on a run, with a second opinion."""
+    verdicts = verify(of_run, watch=watch)
+    with watch.item(f"second opinions {of_run.run}"):
+        return stl.merge(verdicts, stl.cross_check(of_run))
 
 
 def read_back(folder: Path, formats: Sequence[str], report: dict[str, Any]) -> None:
@@ -193,8 +200,3 @@ def _git() -> str:
     except (OSError, subprocess.CalledProcessError):
         return "not a checkout"
     return commit + ("+changes" if changed else "")
-
-
-def _progress(text: str) -> None:
-    if sys.stderr.isatty():
-        print(f"\r\033[K{text}", end="", file=sys.stderr, flush=True)

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from airground_drake.errors import AirgroundError, UnknownNameError
+from airground_drake.progress import Watch, told
 from airground_drake.registry import NOT_EXERCISED, outcome
 from airground_drake.scenarios import plugins
 
@@ -33,6 +34,7 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument("target", help="folder of a saved run (DIR/trace/RUN), or a scenario, shipped or a YAML file")
     parser.add_argument("claims", nargs="*", metavar="CLAIM", help="identifiers (default: all that apply)")
     parser.add_argument("--json", action="store_true", help="print the whole verdicts as JSON")
+    parser.add_argument("-v", "--verbose", action="store_true", help="say what took how long")
     parser.add_argument(plugins.OPTION, action="store_true", help=plugins.HELP)
     return parser
 
@@ -45,7 +47,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     options = parser().parse_args(arguments)
     try:
-        verdicts = _judge(options.target, options.claims, allow_plugins=options.allow_plugins)
+        with told(verbose=options.verbose) as watch:
+            verdicts = _judge(options.target, options.claims, watch, allow_plugins=options.allow_plugins)
     except (AirgroundError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return EXIT_USAGE
@@ -72,7 +75,7 @@ def _line(verdict: Verdict) -> str:
     return f"{name}: {found}{margin}{of}{tested}{expected}"
 
 
-def _judge(target: str, wanted: Sequence[str], *, allow_plugins: bool) -> list[Verdict]:
+def _judge(target: str, wanted: Sequence[str], watch: Watch, *, allow_plugins: bool) -> list[Verdict]:
     """Verdicts on the claims wanted (none: all), as far as they say anything about the target.
 
     Of what a saved run names, only claims of others that are wanted are imported, and nothing unless that is allowed.
@@ -97,8 +100,11 @@ def _judge(target: str, wanted: Sequence[str], *, allow_plugins: bool) -> list[V
     for name in wanted:
         if name not in (known := [*about_run, *about_model]):
             raise UnknownNameError("claim", name, known)
-    verdicts = [] if run is None else verify(run, [name for name in about_run if name in (wanted or about_run)])
-    return verdicts + verify_model(scenario, claims=[name for name in about_model if name in (wanted or about_model)])
+    about_run = [name for name in about_run if run is not None and name in (wanted or about_run)]
+    about_model = [name for name in about_model if name in (wanted or about_model)]
+    watch.stage("judging", len(about_run) + len(about_model), "claims")
+    verdicts = [] if run is None else verify(run, about_run, watch)
+    return verdicts + verify_model(scenario, claims=about_model, watch=watch)
 
 
 if __name__ == "__main__":

@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from airground_drake import files
+from airground_drake.progress import SILENT, Watch
 from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.finding import Finding
 
@@ -33,7 +34,7 @@ ENGINES = ("numpy", "scipy", "numba", "z3-solver", "cvc5", "python-flint", "symp
 
 
 def find(
-    claims: Sequence[ModelClaim], inputs: Sequence[dict[str, Any]], *, folder: Path | None = None
+    claims: Sequence[ModelClaim], inputs: Sequence[dict[str, Any]], *, folder: Path | None = None, watch: Watch = SILENT
 ) -> list[Finding]:
     """The finding of each claim for its inputs.
 
@@ -41,14 +42,23 @@ def find(
         claims: the claims.
         inputs: what each is about, strict JSON.
         folder: where findings are kept; None: computed anew, kept nowhere.
+        watch: is told of each finding.
     """
-    known = [_read(folder, claim, given) for claim, given in zip(claims, inputs, strict=True)]
+    known = []
+    for claim, given in zip(claims, inputs, strict=True):
+        known.append(_read(folder, claim, given))
+        watch.advance(float(known[-1] is not None), claim.id)
+
+    def judged(i: int) -> Finding:
+        with watch.item(claims[i].id):
+            return claims[i].judge(inputs[i])
+
     todo = [i for i, found in enumerate(known) if found is None]
     made: Mapping[int, Finding] = {}
     if todo:
         # the solvers run in processes of their own and the experiments in compiled code: threads suffice
         with ThreadPoolExecutor(max_workers=2) as pool:
-            made = dict(zip(todo, pool.map(lambda i: claims[i].judge(inputs[i]), todo), strict=True))
+            made = dict(zip(todo, pool.map(judged, todo), strict=True))
     for i, finding in made.items():
         _keep(folder, claims[i], inputs[i], finding)
     return [made[i] if found is None else found for i, found in enumerate(known)]

@@ -54,7 +54,9 @@ def test_case_b_meets_its_targets_too(report: Report) -> None:
 def test_an_unexpected_verdict_is_exit_code_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     one = ["--set", "runs={a: {method: a, expected: {SAFE-TRACE: refuted}}}", "--set", "reproduction=[]"]
     assert main(["case_a", "-o", str(tmp_path), *one, "--format", "json"]) == 1
-    assert "SAFE-TRACE" in capsys.readouterr().out
+    said = capsys.readouterr()
+    assert "SAFE-TRACE" in said.out
+    assert said.err == ""  # no terminal: no progress
     assert not (tmp_path / "report.html").exists()
 
 
@@ -136,7 +138,11 @@ def test_what_cannot_be_judged_is_exit_code_2(
     assert said in capsys.readouterr().err
 
 
-def test_a_refuted_claim_that_is_not_expected_is_exit_code_1(tmp_path: Path) -> None:
+def test_a_refuted_claim_that_is_not_expected_is_exit_code_1(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     changes = ["--set", "decision.trigger=bare", "--set", "runs={b: {method: b}}", "--set", "reproduction=[]"]
-    assert main(["case_b", "-o", str(tmp_path), *changes, "--format", "json"]) == 1
-    assert judge.main([str(tmp_path / "trace" / "b"), "ZENO-PROOF"]) == 1
+    assert main(["case_b", "-o", str(tmp_path), *changes, "--format", "json", "-q"]) == 1
+    assert capsys.readouterr() == ("", "")
+    assert judge.main([str(tmp_path / "trace" / "b"), "ZENO-PROOF", "-v"]) == 1
+    assert "ZENO-PROOF" in capsys.readouterr().err
