@@ -14,8 +14,8 @@ from timeline import kinds, times
 
 from airground_drake import trace
 from airground_drake.errors import TraceError
-from airground_drake.report.reproduction import MEASURES
 from airground_drake.progress import Watch
+from airground_drake.report.reproduction import MEASURES
 from airground_drake.runs import simulate_all
 from airground_drake.scenarios.load import load, shipped
 from airground_drake.scenarios.schema import Obstacle, Preset, Run, Scenario, Ugv

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import platform
-import shutil
 import subprocess
 import time
 from collections.abc import Sequence
@@ -51,7 +50,7 @@ def write_report(
     Args:
         scenario: validated scenario.
         digest: SHA-256 of its file.
-        output: folder, created if need be; the files of an earlier report are replaced.
+        output: folder, created if need be; nothing of an earlier report stays in it.
         formats: which of html, json and junit to write; traces and diagram are always written.
         command: how to make this report again.
         kept: folder of kept findings about the model, see `verify_model`; None: every proof anew.
@@ -64,9 +63,9 @@ def write_report(
 
     Raises:
         LimitError: if the scenario asks for more than the limits.
-        FolderError: if the folder holds something that is no report.
+        FolderError: if the folder holds something that is no report, or cannot be written; before the work.
         PluginError: if the scenario names a policy, route or task that cannot be made.
-        OSError: if the folder cannot be written.
+        OSError: if something cannot be written, after all.
     """
     within(scenario, limits)
     started, clock = datetime.now(UTC), time.perf_counter()
@@ -88,7 +87,7 @@ def write_report(
     provenance = _provenance(scenario, started, command)
 
     watch.stage("writing")
-    _drop_stale(output, set(traces))
+    folder.clear(output)
     written = [f"certificates/{name}" for name in _save_certificates(output / "certificates", verdicts)]
     for name, of_run in traces.items():
         written += [f"trace/{name}/{file}" for file in trace.save(of_run, output / "trace" / name)]
@@ -134,16 +133,6 @@ def read_back(folder: Path, formats: Sequence[str], report: dict[str, Any]) -> N
             same = False
         if not same:
             raise ReportError(f"{path}: read back, it is not what was written")
-
-
-def _drop_stale(folder: Path, current: set[str]) -> None:
-    """Remove what an earlier report has left that this one may not replace: pages, certificates, traces of others."""
-    for name in PAGES.values():
-        (folder / name).unlink(missing_ok=True)
-    shutil.rmtree(folder / "certificates", ignore_errors=True)
-    for meta in folder.glob("trace/*/meta.json"):
-        if meta.parent.name not in current:
-            shutil.rmtree(meta.parent)
 
 
 def _refinement(verdicts: Sequence[Verdict]) -> list[Figure]:

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from airground_drake import trace
+from airground_drake.report import make
 from airground_drake.report.__main__ import main
 from airground_drake.scenarios.load import load, shipped
 from airground_drake.verify import __main__ as judge
@@ -53,11 +54,13 @@ def test_case_b_meets_its_targets_too(report: Report) -> None:
 
 def test_an_unexpected_verdict_is_exit_code_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     one = ["--set", "runs={a: {method: a, expected: {SAFE-TRACE: refuted}}}", "--set", "reproduction=[]"]
+    for old in ("report.html", "junit.xml"):
+        (tmp_path / old).write_text("of an older run")
     assert main(["case_a", "-o", str(tmp_path), *one, "--format", "json"]) == 1
     said = capsys.readouterr()
     assert "SAFE-TRACE" in said.out
     assert said.err == ""  # no terminal: no progress
-    assert not (tmp_path / "report.html").exists()
+    assert not {"report.html", "junit.xml"} & {path.name for path in tmp_path.iterdir()}
 
 
 @pytest.mark.parametrize(
@@ -95,10 +98,13 @@ def test_usage_errors_are_exit_code_2(arguments: list[str]) -> None:
     assert stopped.value.code == 2
 
 
-def test_a_folder_that_cannot_be_written_is_exit_code_4(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_folder_that_cannot_be_written_is_refused_before_the_work(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(make, "simulate_all", lambda *_, **__: pytest.fail("simulated"))
     (tmp_path / "file").write_text("in the way")
-    assert main(["case_a", "--set", "duration_s=1", "-o", str(tmp_path / "file")]) == 4
-    assert capsys.readouterr().err.startswith("error: ")
+    assert main(["case_a", "-o", str(tmp_path / "file")]) == 2
+    assert "file cannot be written" in capsys.readouterr().err
 
 
 def test_a_folder_of_something_else_is_exit_code_2(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
