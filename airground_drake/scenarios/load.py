@@ -93,8 +93,8 @@ def load(name_or_path: str | Path, overrides: Overrides = ()) -> tuple[Scenario,
 
     Args:
         name_or_path: name of a shipped scenario, or path to a YAML file.
-        overrides: applied in order; list items are addressed by index. A key must be one of the schema, or an
-            entry that exists in the file.
+        overrides: applied in order; list items are addressed by index. A key must be one of the schema, an item
+            that exists, or an entry, which may be new, of a mapping whose names are free, such as `obstacles`.
 
     Returns:
         The scenario, and the SHA-256 of the file's bytes followed by a NUL byte and the text of each override.
@@ -300,6 +300,8 @@ def _replace(node: yaml.Node | None, hint: Any, parts: list[str], key: str, new:
     part, *rest = parts
     children = {} if node is None or hint in _WANTED else _children(node, hint, key, key.rpartition(".")[2])
     options = _hints(hint) if dataclasses.is_dataclass(hint) else {name: get_args(hint)[-1] for name in children}
+    if part and get_origin(hint) is dict:
+        options[part] = get_args(hint)[-1]  # what the entries of a mapping are called is the scenario's to choose
     if part not in options:
         _unknown(new, key, part, options)
     name, child = children.get(part, (None, None))
@@ -335,8 +337,10 @@ def _made(node: yaml.Node, hint: Any, key: str, name: str) -> Any:
             _unknown(name_node, key, part, hints)
     for part in (each.name for each in dataclasses.fields(hint) if "required" in each.metadata):
         if part not in children:
-            wanted = _wanted(hints[part], part)
-            raise ScenarioError(_where(node), validate.dotted(key, part), Fault("missing"), wanted)
+            new = f", as {key} is new" * _where(node).startswith("--set ")
+            raise ScenarioError(
+                _where(node), validate.dotted(key, part), Fault("missing"), _wanted(hints[part], part) + new
+            )
     values = {
         part: _made(child, hints[part], validate.dotted(key, part), part)
         for part, (_, child) in children.items()

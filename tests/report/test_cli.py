@@ -72,7 +72,6 @@ def test_an_unexpected_verdict_is_exit_code_1(tmp_path: Path, capsys: pytest.Cap
         (["case_a", "--set", "nonsense"], "nonsense"),
         (["case_a", "--seed", "-1"], "seed"),
         (["case_a", "--set", "intervention.policies.0.name=teleport"], "teleport"),
-        (["case_a", "--set", "intervention.policies.0.parameters.warp=9"], "warp"),
         (["case_a", "--set", "decision.noise_period_s=1e-9"], "allowed: 1e+07 steps, 8 GiB"),
         (["case_a", "--limit-steps", "100"], "allowed: 1e+02 steps, 8 GiB"),
         (["case_a", "--limit-memory", "0.1"], "allowed: 1e+07 steps, 0.1 GiB"),
@@ -86,6 +85,16 @@ def test_a_users_mistake_is_one_line_and_exit_code_2(
     assert said in error
     assert error.count("\n") == 1
     assert not (tmp_path / "out").exists()
+
+
+def test_a_parameter_that_a_policy_does_not_have_is_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["case_a", "-o", str(tmp_path), "--set", "intervention.policies.0.parameters.warp=9"]) == 2
+    error = capsys.readouterr().err
+    assert "warp" in error
+    assert error.count("\n") == 1
+    assert not (tmp_path / "report.json").exists()
 
 
 @pytest.mark.parametrize(
