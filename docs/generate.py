@@ -159,8 +159,8 @@ def names() -> str:
         lines += ["", f"## {title}", "", *(_entry(registry, name) for name in registry.own)]
     return _page(
         "What a scenario may name",
-        "Besides these: what installed packages register (see [extending](extending.md)), and `module:Class` for "
-        "whatever can be imported.",
+        "Besides these: what installed packages register (see [extending](extending.md)), and `module:Class` or "
+        "`file.py:Class` for whatever can be imported, also from beside the scenario file.",
         lines,
     )
 

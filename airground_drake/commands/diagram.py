@@ -41,9 +41,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     try:
         scenario, _ = load(options.scenario)
-        if not options.allow_plugins:
-            plugins.refuse(scenario, options.scenario)
-        text = graphviz.dot(build_diagram(scenario, method=options.method), options.depth)
+        with plugins.admitted(scenario, options.scenario, allow=options.allow_plugins):
+            text = graphviz.dot(build_diagram(scenario, method=options.method), options.depth)
         for kind in options.format or ("dot", "svg"):
             path = options.output / f"{scenario.name}.{kind}"
             files.write_bytes(path, text.encode() if kind == "dot" else graphviz.drawn(text, kind))

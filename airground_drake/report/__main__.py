@@ -62,14 +62,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         overrides = [*options.set, *([] if options.seed is None else [f"seed={options.seed}"])]
         audited = options.scenario == AUDIT
         scenario, digest = load(AUDITED if audited else options.scenario, overrides)
-        if not options.allow_plugins:
-            plugins.refuse(scenario, str(options.scenario))
         if audited:
             scenario.name, scenario.title, scenario.description = AUDIT, AUDIT_TITLE, AUDIT_DESCRIPTION
         kept = None if options.no_cache else cache_folder()
         output = options.output or Path("reports") / scenario.name
         limits = Limits(options.limit_steps, options.limit_memory * GIB)
-        with told(quiet=options.quiet, verbose=options.verbose) as watch:
+        with (
+            plugins.admitted(scenario, options.scenario, allow=options.allow_plugins),
+            told(quiet=options.quiet, verbose=options.verbose) as watch,
+        ):
             report = make.write_report(
                 scenario, digest, output, options.format, shlex.join(command), kept, audited, limits, watch
             )

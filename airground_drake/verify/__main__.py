@@ -93,18 +93,18 @@ def _judge(target: str, wanted: Sequence[str], watch: Watch, *, allow_plugins: b
     run = trace.load(folder) if (folder / "meta.json").is_file() else None
     scenario = load(target)[0] if run is None else from_data(run.scenario, target)
     added = {name: place for name, place in scenario.claims.items() if not wanted or name in wanted}
-    if not allow_plugins:
-        plugins.refuse(scenario, target, None if run is None else [f"claims.{name}" for name in added])
-    about_run = [claim.id for claim in run_claims(added=added)]
-    about_model = [claim.id for claim in model_claims(added=added)]
-    for name in wanted:
-        if name not in (known := [*about_run, *about_model]):
-            raise UnknownNameError("claim", name, known)
-    about_run = [name for name in about_run if run is not None and name in (wanted or about_run)]
-    about_model = [name for name in about_model if name in (wanted or about_model)]
-    watch.stage("judging", len(about_run) + len(about_model), "claims")
-    verdicts = [] if run is None else verify(run, about_run, watch)
-    return verdicts + verify_model(scenario, claims=about_model, watch=watch)
+    imported = None if run is None else [f"claims.{name}" for name in added]
+    with plugins.admitted(scenario, target, allow=allow_plugins, keys=imported):
+        about_run = [claim.id for claim in run_claims(added=added)]
+        about_model = [claim.id for claim in model_claims(added=added)]
+        for name in wanted:
+            if name not in (known := [*about_run, *about_model]):
+                raise UnknownNameError("claim", name, known)
+        about_run = [name for name in about_run if run is not None and name in (wanted or about_run)]
+        about_model = [name for name in about_model if name in (wanted or about_model)]
+        watch.stage("judging", len(about_run) + len(about_model), "claims")
+        verdicts = [] if run is None else verify(run, about_run, watch)
+        return verdicts + verify_model(scenario, claims=about_model, watch=watch)
 
 
 if __name__ == "__main__":
