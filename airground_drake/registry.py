@@ -32,6 +32,9 @@ T = TypeVar("T")
 
 PLUGIN = "module:Class or file.py:Class"
 """How anything that is not registered is named."""
+_WORD = r"[^\W\d]\w*"
+PLUGIN_PATTERN = rf"^({_WORD}(\.{_WORD})*|([\w-]+/)*[\w-]+\.py):{_WORD}$"
+"""The same as a regular expression."""
 
 
 class Registry:
@@ -150,7 +153,7 @@ class Registry:
 
 def is_plugin(name: str) -> bool:
     """Whether a name has the form `module:Class` or, with folders or without, `file.py:Class`."""
-    return re.fullmatch(r"([^\W\d]\w*(\.[^\W\d]\w*)*|([\w-]+/)*[\w-]+\.py):[^\W\d]\w*", name) is not None
+    return re.fullmatch(PLUGIN_PATTERN, name) is not None
 
 
 def _imported(module: str) -> ModuleType:

@@ -16,13 +16,19 @@ def parser() -> argparse.ArgumentParser:
     """What the command line takes."""
     parser = argparse.ArgumentParser(prog="airground list", description=__doc__.partition(": ")[2])
     parser.add_argument("kind", nargs="?", choices=KINDS, help="default: all of them")
+    parser.add_argument("--schema", action="store_true", help="the JSON Schema of scenario files instead, for editors")
     return parser
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print the kinds that were asked for."""
-    wanted = parser().parse_args(arguments).kind
-    for kind in KINDS if wanted is None else (wanted,):
+    options = parser().parse_args(arguments)
+    if options.schema:
+        from airground_drake.scenarios import json_schema
+
+        print(json_schema.text(), end="")
+        return 0
+    for kind in KINDS if options.kind is None else (options.kind,):
         found = list(KINDS[kind]())
         width = max(len(name) for name, _ in found)
         print("\n".join([f"{kind}:", *(f"  {name:{width}}  {says}".rstrip() for name, says in found)]))

@@ -19,6 +19,11 @@ def shipped_files() -> dict[str, Traversable]:
     return {file.name.removesuffix(".yaml"): file for file in found if file.name.endswith(".yaml")}
 
 
+def json_schema_file() -> Traversable:
+    """The JSON Schema of scenario files, of what comes with the package, for editors: see `json_schema.py`."""
+    return resources.files(__package__) / "scenario.schema.json"
+
+
 def title(name: str) -> str:
     """The title of a shipped scenario, which stands near its beginning: no more of the file is parsed."""
     depth, before = 0, ""
