@@ -16,7 +16,11 @@ EXIT_USAGE = 2
 
 
 class Command(NamedTuple):
-    """What `airground NAME ...` does: `main` of a module, which takes the arguments and returns the exit code."""
+    """What `airground NAME ...` does.
+
+    The module has `main`, which takes the arguments and returns the exit code, and `parser`, which makes the parser of
+    the arguments. It imports what takes long to import in `main` only.
+    """
 
     module: str
     says: str
@@ -32,6 +36,7 @@ COMMANDS: dict[str, Command] = {
     "diagram": Command("airground_drake.commands.diagram", "draw the diagram of a scenario"),
     "list": Command("airground_drake.commands.listing", "list scenarios, methods, policies, routes, tasks and claims"),
     "init": Command("airground_drake.commands.init", "write a small scenario to start from"),
+    "completion": Command("airground_drake.commands.completion", "print what completes this command line in a shell"),
 }
 
 

@@ -20,7 +20,7 @@ def parser() -> argparse.ArgumentParser:
     """What the command line takes."""
     parser = argparse.ArgumentParser(prog="airground diagram", description="Draw the diagram of a scenario.")
     parser.add_argument("scenario", help="name of a shipped scenario, or path to a YAML file")
-    parser.add_argument("--method", choices=METHODS, help="default: that of the scenario's last run")
+    parser.add_argument("--method", choices=tuple(METHODS), help="default: that of the scenario's last run")
     parser.add_argument("--depth", type=int, default=1, metavar="N", help="levels of nested diagrams (default: 1)")
     parser.add_argument("--format", action="append", choices=FORMATS, help="may be repeated (default: dot and svg)")
     parser.add_argument("-o", "--output", type=Path, default=Path(), metavar="DIR", help="default: this folder")

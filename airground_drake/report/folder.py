@@ -19,7 +19,7 @@ RULE = "allowed: a folder that is new or empty, has a report.json of ours, or no
 
 _CLAIM = r"[A-Z][A-Z0-9-]*"
 _FILES = re.compile(
-    r"report\.html|report\.json|junit\.xml|diagram\.dot|diagram\.svg|replay(_\w+)?\.html"
+    r"report\.html|report\.json|junit\.xml|diagram\.dot|diagram\.svg"
     r"|trace/\w+/(\w+\.parquet|timings\.json|meta\.json)"
     rf"|certificates/{_CLAIM}/\w[\w.-]*|proofs/(index\.json|{_CLAIM}/\w[\w.-]*)"
 )

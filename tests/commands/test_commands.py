@@ -39,7 +39,9 @@ def test_help_names_all_commands() -> None:
     assert not {command.module for command in COMMANDS.values()} & modules
 
 
-@pytest.mark.parametrize("arguments", [("--version",), ("list",), *((name, "--help") for name in COMMANDS)])
+@pytest.mark.parametrize(
+    "arguments", [("--version",), ("list",), ("completion", "bash"), *((name, "--help") for name in COMMANDS)]
+)
 def test_what_takes_long_is_imported_when_it_is_used(arguments: tuple[str, ...]) -> None:
     said, modules = imported(*arguments)
     heavy = "numpy pandas scipy numba sympy z3 cvc5 cvxpy flint matplotlib jinja2 pydrake pygraphviz rtamt"

@@ -31,7 +31,7 @@ OURS = f'{{\n "schema": "{document.SCHEMA}",\n "scenario": {{}}}}'
         {"report.json": '{"schema": "airground_drake.report/1"}', ".git": ""},
         {"report.html": "", "diagram.svg": ""},
         {"diagram.dot": "", ".report.json.999999.abcdefgh.partial": ""},
-        {"trace/d/meta.json": "", "certificates/SAFE-INV/a.smt2": "", "proofs/index.json": "", "replay_d.html": ""},
+        {"trace/d/meta.json": "", "certificates/SAFE-INV/a.smt2": "", "proofs/index.json": ""},
         {"report.json": OURS, "trace/notes.txt": "mine"},
     ],
 )
@@ -74,7 +74,7 @@ def test_nothing_stays_of_an_old_report_and_everything_else_does(tmp_path: Path)
     old = (
         "report.html", "report.json", "junit.xml", "diagram.svg", "trace/d/meta.json", "trace/d/signals.parquet",
         "trace/killed/signals.parquet", "certificates/SAFE-INV/gram.json", "proofs/index.json",
-        "proofs/SAFE-INV/a.cpc", "replay.html", "replay_d.html",
+        "proofs/SAFE-INV/a.cpc",
     )  # fmt: skip
     mine = {"notes.txt": "a", "trace/d/notes.txt": "b", "certificates/ssl/key.pem": "c", "report.html.bak": "d"}
     fill(tmp_path, {**dict.fromkeys(old, ""), **mine})
