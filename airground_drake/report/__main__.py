@@ -95,7 +95,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def parser() -> argparse.ArgumentParser:
     """What the command line takes."""
     parser = argparse.ArgumentParser(
-        prog="python -m airground_drake.report",
+        prog="airground report",
         description="Simulate all runs of a scenario, check the claims on them, and write the report.",
         epilog="exit codes: 0 as expected, 1 a claim differs, 2 usage or bad scenario, 3 inconclusive, 4 tool error, "
         "130 interrupted (SIGINT), 143 terminated (SIGTERM)",

@@ -28,7 +28,7 @@ EXIT_DIFFERS, EXIT_USAGE = 1, 2
 def parser() -> argparse.ArgumentParser:
     """What the command line takes."""
     parser = argparse.ArgumentParser(
-        prog="python -m airground_drake.verify",
+        prog="airground verify",
         description="Judge claims anew, on a saved run or about a scenario's model; nothing is taken from a cache.",
     )
     parser.add_argument("target", help="folder of a saved run (DIR/trace/RUN), or a scenario, shipped or a YAML file")

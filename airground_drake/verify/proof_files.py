@@ -87,7 +87,7 @@ def outcome(result: Result) -> str:
 def parser() -> argparse.ArgumentParser:
     """What the command line takes."""
     parser = argparse.ArgumentParser(
-        prog="python -m airground_drake.verify.proof_files",
+        prog="airground proofs",
         description="Write cvc5's own proofs of a report's scripts.",
     )
     parser.add_argument("report", type=Path, metavar="DIR", help="folder with certificates/")
