@@ -9,10 +9,11 @@ what is measured by the clock.
 from __future__ import annotations
 
 import json
+import math
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 from airground_drake.errors import ReportError, one_line
 from airground_drake.registry import outcome
@@ -33,6 +34,8 @@ ROWS: tuple[tuple[str, ...], ...] = (("reproduced",), ("calibrated",), ("ambiguo
 """Rows of the reproduction table, likewise."""
 VERDICTS = ("as_expected", "not_as_expected", "inconclusive")
 """Over all claims."""
+LONGEST_INTEGER = 18
+"""Digits of an integer that is read."""
 MEASURED = frozenset({"GATE-TIME"})
 """Claims whose margin is measured by the clock, and never the same."""
 
@@ -48,11 +51,14 @@ def read(folder: Path) -> Document:
     """
     path = folder / PAGES["json"]
     try:
-        document = json.loads(path.read_text(encoding="utf-8"), parse_constant=_refused)
+        document = json.loads(
+            path.read_text(encoding="utf-8"), parse_constant=_finite, parse_float=_finite, parse_int=_short
+        )
+        json.dumps(document, ensure_ascii=False).encode()  # no halves of characters
         if document["schema"] != REPORT:
             raise ValueError(f"its schema is not {REPORT}")
         _usable(document)
-    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
+    except (OSError, ValueError, TypeError, LookupError, AttributeError, RecursionError) as error:
         why = getattr(error, "strerror", None) or f"{type(error).__name__}: {error}"
         raise ReportError(one_line(f"{path} is no report that can be used: {why}"[:300])) from None
     return dict(document)
@@ -183,8 +189,18 @@ def _rank(order: Sequence[Sequence[str]], name: str) -> int:
 def _relative(change: Change) -> float | None:
     """The change of a number relative to what it was; None where there is no such thing."""
     was, now = change["before"], change["after"]
-    return (now - was) / abs(was) if was and now is not None else None
+    relative = (now - was) / abs(was) if was and now is not None else math.nan
+    return relative if math.isfinite(relative) else None
 
 
-def _refused(text: str) -> NoReturn:
-    raise ValueError(f"{text} is no number")
+def _finite(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(f"{text} is not finite")
+    return value
+
+
+def _short(text: str) -> int:
+    if len(text) > LONGEST_INTEGER:
+        raise ValueError(f"an integer of {len(text)} digits")
+    return int(text)

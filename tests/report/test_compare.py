@@ -99,13 +99,20 @@ def test_only_what_is_worse_is_a_regression(
     assert (found["regressions"] > 0) == bool(code)
 
 
+def test_a_change_that_is_too_large_for_a_number_is_none(before: Json) -> None:
+    small, large = copy.deepcopy(before), copy.deepcopy(before)
+    claim(small, "")["margin"], claim(large, "")["margin"] = 1e-308, 1e308
+    assert [change["relative"] for change in compare.compared(small, large)["margins"]] == [None]
+
+
 def test_margins_have_their_relative_change(before: Json) -> None:
     after = copy.deepcopy(before)
     claim(after, "")["margin"] = 0.4
     (change,) = compare.compared(before, after)["margins"]
     assert (change["before"], change["after"], change["relative"]) == (0.5, 0.4, pytest.approx(-0.2))
-    claim(after, "")["id"] = claim(before, "")["id"] = "GATE-TIME"
-    assert compare.compared(before, after)["margins"] == []
+    measured = copy.deepcopy(before)
+    claim(after, "")["id"] = claim(measured, "")["id"] = "GATE-TIME"
+    assert compare.compared(measured, after)["margins"] == []
 
 
 BAD = [
@@ -133,6 +140,11 @@ def test_what_is_no_report_is_exit_code_2(
         lambda found: found.update(provenance=3),
         lambda found: found["scenario"].update(name=["x"]),
         lambda found: found["runs"]["c"]["events"][0].update(t_s="soon"),
+        lambda found: claim(found, "a").update(exercised=10**30),
+        lambda found: claim(found, "a").update(margin=float("inf")),
+        lambda found: found["scenario"].update(title="\ud800"),
+        lambda found: found["overall"].update(status="fine"),
+        lambda found: found.pop("mutants"),
     ],
 )
 def test_values_of_another_kind_are_no_report(change: Callable[[Json], object], before: Json, tmp_path: Path) -> None:
