@@ -9,6 +9,7 @@ damaged or under another's name costs time and no more. What is not done again i
 from __future__ import annotations
 
 import contextlib
+import inspect
 import json
 import math
 import os
@@ -20,6 +21,7 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, NoReturn
+from uuid import uuid4
 
 from airground_drake import files
 from airground_drake.progress import SILENT, Watch
@@ -78,7 +80,21 @@ def key(claim: ModelClaim, inputs: Mapping[str, Any]) -> str:
 
 def content(claim: ModelClaim, inputs: Mapping[str, Any]) -> dict[str, Any]:
     """Everything that a finding depends on: the claim, its inputs, our code, the engines' versions."""
-    return {"schema": SCHEMA, "claim": claim.id, "inputs": inputs, "code": _code(), "engines": _engines()}
+    return {"schema": SCHEMA, "claim": claim.id, "inputs": inputs, "code": _code_of(type(claim)), "engines": _engines()}
+
+
+@cache
+def _code_of(kind: type[ModelClaim]) -> str:
+    """Digest of the package, and of the file that a claim of others is in; without a file, one that is never met again.
+
+    What such a claim imports besides is not looked at.
+    """
+    if kind.__module__.partition(".")[0] == __name__.partition(".")[0]:
+        return _code()
+    try:
+        return f"{_code()} {files.sha256(Path(inspect.getfile(kind)).read_bytes())}"
+    except (OSError, TypeError):
+        return f"{_code()} {uuid4().hex}"
 
 
 @cache
