@@ -2,7 +2,7 @@
 
 Validation, command line, report and documentation look names up here; what a name stands for is imported when it
 is used. A registry also knows what installed packages add through entry points, and takes `module:Class` for
-anything that can be imported:
+anything that can be imported, `file.py:Class` for what is in a file in a folder of Python's path:
 
     [project.entry-points."airground_drake.policies"]
     orbit = "my_package.orbit:Orbit"
@@ -10,25 +10,35 @@ anything that can be imported:
 
 from __future__ import annotations
 
+import ast
 import importlib
+import importlib.util
+import os
 import re
+import sys
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import entry_points
+from pathlib import Path
+from types import ModuleType
 from typing import Any, Literal, TypeVar, get_args
 
 from airground_drake.errors import PluginError, UnknownNameError, described
+from airground_drake.files import sha256
 
 T = TypeVar("T")
 
-PLUGIN = "module:Class"
+PLUGIN = "module:Class or file.py:Class"
 """How anything that is not registered is named."""
+_WORD = r"[^\W\d]\w*"
+PLUGIN_PATTERN = rf"^({_WORD}(\.{_WORD})*|([\w-]+/)*[\w-]+\.py):{_WORD}$"
+"""The same as a regular expression."""
 
 
 class Registry:
-    """Classes of one kind by name: the package's own, those of entry points, and `module:Class`."""
+    """Classes of one kind by name: the package's own, those of entry points, and `PLUGIN`."""
 
     def __init__(self, kind: str, plural: str, own: Mapping[str, str]) -> None:
         """Declare the package's own.
@@ -57,27 +67,44 @@ class Registry:
 
     @property
     def allowed(self) -> tuple[str, ...]:
-        """What may be written where a name is wanted: the names, and `module:Class`."""
+        """What may be written where a name is wanted: the names, and `PLUGIN`."""
         return (*self, PLUGIN)
 
     def accepts(self, name: str) -> bool:
-        """Whether a name is registered, or has the form `module:Class`; nothing is imported."""
+        """Whether a name is registered, or has the form of `PLUGIN`; nothing is imported."""
         return name in self or is_plugin(name)
 
     def is_foreign(self, name: str) -> bool:
         """Whether a name stands for code of others that is to be imported: neither the package's own nor added here."""
         return name not in self._own and name not in self._added
 
+    def says(self, name: str) -> str:
+        """What a registered class says of itself in a line; its module is read, not imported (packages above it are).
+
+        Returns:
+            Its `statement` if it is a claim, else the first line of its docstring; '' if neither can be found.
+        """
+        if name in self._added:
+            return (self._added[name].__doc__ or "").strip().partition("\n")[0]
+        module, _, attribute = {**self._own, **_entry_points(self.group)}[name].partition(":")
+        with suppress(Exception):  # whatever an installed package does when it is looked for
+            spec = importlib.util.find_spec(module)
+            tree = ast.parse(Path(spec.origin or "").read_bytes()) if spec else ast.Module([], [])
+            for node in tree.body:
+                if isinstance(node, ast.ClassDef) and node.name == attribute:
+                    return _statement(node) or (ast.get_docstring(node) or "").partition("\n")[0]
+        return ""
+
     def load(self, name: str, of: type[T]) -> type[T]:
         """The class that a name stands for.
 
         Args:
-            name: registered, or `module:Class`.
+            name: registered, `module:Class`, or `file.py:Class`.
             of: what it must be a subclass of (or a protocol that it must meet).
 
         Raises:
-            UnknownNameError: if the name is not registered and not of the form `module:Class`.
-            PluginError: if it cannot be imported, or is something else.
+            UnknownNameError: if the name is not registered and not of the form of `PLUGIN`.
+            PluginError: if it cannot be imported, or is something else; says where it was looked for.
         """
         found: object = self._added.get(name)
         if found is None:
@@ -86,11 +113,12 @@ class Registry:
                 raise UnknownNameError(self.kind, name, self.allowed)
             module, _, attribute = place.partition(":")
             try:
-                found = getattr(importlib.import_module(module), attribute)
+                found = getattr(_imported(module), attribute)
             except KeyboardInterrupt:
                 raise
             except BaseException as error:  # a module of others may raise anything when it is imported
-                raise PluginError(f"{self.kind} {name!r} cannot be imported: {described(error)}") from None
+                looked = f"; looked in {_places()}" if isinstance(error, ModuleNotFoundError) else ""
+                raise PluginError(f"{self.kind} {name!r} cannot be imported: {described(error)}{looked}") from None
         if not (isinstance(found, type) and issubclass(found, of)):
             raise PluginError(f"{self.kind} {name!r} is not a subclass of {of.__module__}.{of.__qualname__}")
         return found
@@ -124,8 +152,54 @@ class Registry:
 
 
 def is_plugin(name: str) -> bool:
-    """Whether a name has the form `module:Class`."""
-    return re.fullmatch(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*", name) is not None
+    """Whether a name has the form `module:Class` or, with folders or without, `file.py:Class`."""
+    return re.fullmatch(PLUGIN_PATTERN, name) is not None
+
+
+def _imported(module: str) -> ModuleType:
+    """A module by its name, or by that of a file in a folder of Python's path, the last of these first.
+
+    Raises:
+        ModuleNotFoundError: if there is none.
+        BaseException: whatever the module raises.
+    """
+    if not module.endswith(".py"):
+        return importlib.import_module(module)
+    for path in (Path(folder or ".", module).resolve() for folder in reversed(sys.path)):
+        if path.is_file():
+            return _executed(path)
+    raise ModuleNotFoundError(f"no file {module}")
+
+
+def _executed(path: Path) -> ModuleType:
+    """The module that a file is, under a name that no other file has."""
+    name = f"{path.stem}_{sha256(str(path).encode())[:12]}"
+    if name not in sys.modules:
+        spec = importlib.util.spec_from_file_location(name, path)
+        assert spec is not None
+        assert spec.loader is not None
+        sys.modules[name] = importlib.util.module_from_spec(spec)
+        try:
+            spec.loader.exec_module(sys.modules[name])
+        except BaseException:
+            del sys.modules[name]
+            raise
+    return sys.modules[name]
+
+
+def _places() -> str:
+    """Python's path in words: the folders that somebody has added, the last of them first, then Python's own."""
+    own = tuple({sys.prefix, sys.base_prefix})
+    added = [os.path.abspath(folder) for folder in reversed(sys.path) if not folder.startswith(own)]
+    return ", ".join([*dict.fromkeys(added), "Python's own folders"])
+
+
+def _statement(of: ast.ClassDef) -> str:
+    """The text of `statement = "..."` in a class; '' if there is none."""
+    for node in of.body:
+        if isinstance(node, ast.Assign) and [ast.unparse(target) for target in node.targets] == ["statement"]:
+            return str(ast.literal_eval(node.value))
+    return ""
 
 
 @cache

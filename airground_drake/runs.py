@@ -13,27 +13,34 @@ import signal
 import sys
 import warnings
 from collections import deque
+from functools import partial
 from multiprocessing.connection import wait
 from multiprocessing.process import BaseProcess
 from pathlib import Path
+from typing import Any
 
 from airground_drake import files, interruption, trace
 from airground_drake.errors import AirgroundError, PluginError, SimulationError, described, one_line
 from airground_drake.intervention.process import end_all
+from airground_drake.nsbc import kernels
+from airground_drake.progress import SILENT, Watch
 from airground_drake.scenarios.load import validated
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.simulation import simulate, warm_up
 from airground_drake.trace import Trace
 
 FAILURE = "failure.json"
+TOLD_S = 0.2
+"""How often it is told how far the runs have come, s."""
 
 
-def simulate_all(scenario: Scenario, jobs: int | None = None) -> dict[str, Trace]:
+def simulate_all(scenario: Scenario, jobs: int | None = None, watch: Watch = SILENT) -> dict[str, Trace]:
     """Simulate every run of a scenario, in its order, each in a process of its own.
 
     Args:
         scenario: from a file or made in Python.
         jobs: number of processes at a time; default: one for each processor that this process may use.
+        watch: is told the simulated time.
 
     Raises:
         ScenarioError: if the scenario is not valid.
@@ -45,19 +52,26 @@ def simulate_all(scenario: Scenario, jobs: int | None = None) -> dict[str, Trace
     most = _processors() if jobs is None else max(1, jobs)
     fork = "fork" in multiprocessing.get_all_start_methods() and sys.platform != "darwin"
     context = multiprocessing.get_context("fork") if fork else multiprocessing.get_context("spawn")
+    if not _compiled():
+        watch.stage("compiling, once, about half a minute")
     if fork:
         warm_up()
+    watch.stage(f"simulating {', '.join(scenario.runs)}", scenario.duration_s * len(scenario.runs), "s")
+    clocks = {name: context.RawValue("d") for name in scenario.runs}
     waiting, running = deque(scenario.runs), dict[str, BaseProcess]()
     traces: dict[str, Trace] = {}
+    reached = 0.0
     with files.temporary_folder() as made, warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)  # idle threads of numerical libraries survive a fork
         try:
             while waiting or running:
                 while waiting and len(running) < most:
                     name = waiting.popleft()
-                    running[name] = context.Process(target=_simulate, args=(scenario, name, made / name))
+                    running[name] = context.Process(target=_simulate, args=(scenario, name, made / name, clocks[name]))
                     running[name].start()
-                wait([process.sentinel for process in running.values()])
+                wait([process.sentinel for process in running.values()], TOLD_S)
+                reached, before = sum(clock.value for clock in clocks.values()), reached
+                watch.advance(reached - before)
                 for name, process in list(running.items()):
                     if not process.is_alive():
                         traces[name] = _result(made / name, running.pop(name), f"run {name} of {scenario.name}")
@@ -66,14 +80,14 @@ def simulate_all(scenario: Scenario, jobs: int | None = None) -> dict[str, Trace
     return {name: traces[name] for name in scenario.runs}
 
 
-def _simulate(scenario: Scenario, run: str, folder: Path) -> None:
-    """Simulate a run in this process and save it, or what has kept it from being simulated."""
+def _simulate(scenario: Scenario, run: str, folder: Path, clock: Any) -> None:
+    """Simulate a run in this process and save it, or what has kept it from being simulated; the clock goes with it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent's to heed
     signal.signal(signal.SIGTERM, _end)
     interruption.end_with_parent(signal.SIGTERM)
     folder.mkdir()
     try:
-        trace.save(simulate(scenario, run), folder)
+        trace.save(simulate(scenario, run, watch=partial(setattr, clock, "value")), folder)
     except BaseException as error:
         stopped = [error.run, error.t, error.what] if isinstance(error, SimulationError) else None
         plain = str(error) if isinstance(error, AirgroundError) else described(error)
@@ -127,6 +141,11 @@ def _stop(processes: list[BaseProcess]) -> None:
         process.kill()
         process.join()
         process.close()
+
+
+def _compiled() -> bool:
+    """Whether numba has kept what it has compiled of the control law."""
+    return any(Path(str(kernels.avoid_one.stats.cache_path)).glob("kernels.*.nbi"))
 
 
 def _processors() -> int:

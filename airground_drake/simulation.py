@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cache
 from typing import Any
 
@@ -77,12 +77,15 @@ class Recorder:
         self._root.set_name("recorded")
         warm_up()
 
-    def simulate(self, seed: int | None = None, duration: float | None = None) -> Trace:
+    def simulate(
+        self, seed: int | None = None, duration: float | None = None, watch: Callable[[float], None] | None = None
+    ) -> Trace:
         """One run from the initial state.
 
         Args:
             seed: of the decision noise; default: the scenario's.
             duration: s; default: the scenario's.
+            watch: is told the time, s, at every step.
 
         Raises:
             SimulationError: if Drake or a system stops; names the run and the time.
@@ -97,6 +100,8 @@ class Recorder:
         ApplySimulatorConfig(config, simulator)  # velocities are held between samples: Euler's method is exact
         if self._model.gatekeeper is not None:
             self._model.gatekeeper.reset_timing()
+        if watch is not None:
+            simulator.set_monitor(lambda root: watch(root.get_time()))
         started = time.perf_counter()
         try:
             simulator.Initialize()
@@ -234,20 +239,23 @@ def warm_up() -> None:
     outcomes(scene, law, Proposal("", 0.0, motion), one, 1.0, (), Outlook(longest=1.0))
 
 
-def simulate(scenario: Scenario, run: str, seed: int | None = None) -> Trace:
+def simulate(
+    scenario: Scenario, run: str, seed: int | None = None, watch: Callable[[float], None] | None = None
+) -> Trace:
     """Simulate one run of a scenario.
 
     Args:
         scenario: from a file or made in Python.
         run: name of one of its runs.
         seed: of the decision noise; default: the scenario's.
+        watch: is told the time, s, at every step.
 
     Raises:
         ScenarioError: if the scenario is not valid.
         UnknownNameError: if it has no such run.
         PluginError: if it names a policy, route or task that cannot be made.
     """
-    return Recorder(scenario, run).simulate(seed)
+    return Recorder(scenario, run).simulate(seed, watch=watch)
 
 
 def _distinct(t: Array, command: Array) -> npt.NDArray[np.intp]:

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import ast
 import inspect
+import json
 import re
 import textwrap
 from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import airground_drake
 from airground_drake import files
-from airground_drake.registry import METHODS, MODEL_CLAIMS, POLICIES, ROUTES, RUN_CLAIMS, UAV_TASKS, Registry
+from airground_drake.registry import METHODS, MODEL_CLAIMS, PLUGIN, POLICIES, ROUTES, RUN_CLAIMS, UAV_TASKS, Registry
+from airground_drake.scenarios import json_schema
 from airground_drake.verify.claim import Claim
 from airground_drake.verify.registry import mutants
 
@@ -53,6 +56,8 @@ EQUATIONS = {
 }
 """The paper's equations in words."""
 
+SCENARIO = json_schema.scenario_schema(installed=False)
+
 REALISED_IN = ("nsbc", "decision", "intervention", "gatekeeper", "systems")
 """Packages whose docstrings say which equations they realise, in their first sentence or paragraph."""
 
@@ -67,7 +72,13 @@ def main() -> None:
 
 def pages() -> dict[str, str]:
     """Generated pages by file name."""
-    return {"equations.md": equations(), "claims.md": claims(), "names.md": names()}
+    return {
+        "equations.md": equations(),
+        "claims.md": claims(),
+        "names.md": names(),
+        "scenario.md": scenario(),
+        "../airground_drake/scenarios/scenario.schema.json": json_schema.text(installed=False),
+    }
 
 
 def equations() -> str:
@@ -159,8 +170,8 @@ def names() -> str:
         lines += ["", f"## {title}", "", *(_entry(registry, name) for name in registry.own)]
     return _page(
         "What a scenario may name",
-        "Besides these: what installed packages register (see [extending](extending.md)), and `module:Class` for "
-        "whatever can be imported.",
+        "Besides these: what installed packages register (see [extending](extending.md)), and `module:Class` or "
+        "`file.py:Class` for whatever can be imported, also from beside the scenario file.",
         lines,
     )
 
@@ -171,6 +182,72 @@ def _entry(registry: Registry, name: str) -> str:
     given = [p for p in inspect.signature(kind).parameters.values() if p.kind is p.KEYWORD_ONLY]
     parameters = ", ".join(f"`{p.name}`" + ("" if p.default is p.empty else f" = {p.default}") for p in given)
     return f"- `{name}`: {says}" + (f" Parameters: {parameters}." if parameters else "")
+
+
+def scenario() -> str:
+    """Every key of a scenario file."""
+    lines: list[str] = []
+    for path, part in _parts(SCENARIO, ""):
+        entries = [f"- `{key}` ({_allowed(key, part)}): {says['description']}" for key, says in _keys(part)]
+        lines += [f"## {path}" if path else "## The file", "", part["description"], "", *entries, ""]
+    return _page(
+        "Keys of a scenario file",
+        "Section by section: key, what may stand there and its default, meaning, [unit]. NAME is a name of your own, N "
+        "the number of an item. What a policy takes as `parameters` is in [names](names.md). Keys of the file itself "
+        "that begin with an underscore are templates, for anchors and aliases. The same as JSON Schema, for editors: "
+        "`airground list --schema`. Values must also go together: a scenario in which they do not is refused with one "
+        "line that says how.",
+        lines,
+    )
+
+
+def _keys(part: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:
+    return [(key, says) for key, says in part["properties"].items() if key != "<<"]
+
+
+def _parts(part: dict[str, Any], path: str) -> Iterator[tuple[str, dict[str, Any]]]:
+    """A section of the file and those below it, each with its dotted key."""
+    yield path, part
+    for key, says in _keys(part):
+        for where, below in (
+            ("", says),
+            (".NAME", says.get("additionalProperties") or {}),
+            (".N", says.get("items") or {}),
+        ):
+            if "$ref" in below:
+                kind = SCENARIO["$defs"][below["$ref"].rpartition("/")[2]]
+                yield from _parts(kind, f"{path}.{key}{where}".lstrip("."))
+
+
+def _allowed(key: str, part: dict[str, Any]) -> str:
+    """What may stand under a key, and its default."""
+    says = part["properties"][key]
+    words = [_kind(says)]
+    if says.get("type") == "number" and "default" in says:
+        words.append("0 or more" if says["minimum"] == 0 else "above 0")
+    if says.get("type") == "integer":
+        words.append(f"{says['minimum']} to {says['maximum']}")
+    if "default" in says and says["default"] not in ({}, [], ""):
+        words.append(f"default {json.dumps(says['default'])}")
+    elif key in part["required"]:
+        words.append("needed")
+    return ", ".join(words)
+
+
+def _kind(says: dict[str, Any]) -> str:
+    if "anyOf" in says:
+        return f"{_kind(says['anyOf'][0])}, {PLUGIN}"
+    if "enum" in says:
+        return "one of " + ", ".join(f"`{name}`" for name in says["enum"])
+    if "$ref" in says:
+        return "a mapping, see below"
+    if says["type"] == "array":
+        return "a point, [x, y, z]" if says.get("maxItems") == 3 else f"a list of {_kind(says['items'])}"
+    if says["type"] == "object":
+        return "a mapping by name"
+    return {"number": "a number", "integer": "a whole number", "boolean": "true or false", "string": "text"}[
+        says["type"]
+    ]
 
 
 def _page(title: str, says: str, lines: list[str]) -> str:

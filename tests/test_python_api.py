@@ -48,7 +48,10 @@ def set_to(path: str, value: Any) -> Edit:
         (set_to("ugvs.ugv1", 3), "ugvs.ugv1: 3 is not allowed; wanted: a mapping"),
         (set_to("seed", 1.5), "seed: 1.5 is not allowed; wanted: a whole number"),
         (set_to("gatekeeper.route", "magic"), "gatekeeper.route: 'magic' is not allowed"),
-        (set_to("uav.task", "hover"), "uav.task: 'hover' is not allowed; one of formation, module:Class"),
+        (
+            set_to("uav.task", "hover"),
+            "uav.task: 'hover' is not allowed; one of formation, module:Class or",
+        ),
         (set_to("runs.d.method", "e"), "runs.d.method: 'e' is not allowed"),
         (set_to("obstacles", {"o": object()}), "obstacles.o"),
     ],

@@ -23,6 +23,18 @@ def test_every_name_stands_for_a_class(names: Registry) -> None:
         assert isinstance(names.load(name, of=object), type)
 
 
+@pytest.mark.parametrize("names", ALL, ids=lambda names: names.group)
+def test_what_a_name_stands_for_is_said_without_importing_it(names: Registry) -> None:
+    for name in names.own:
+        found = names.load(name, of=object)
+        assert names.says(name) == (getattr(found, "statement", "") or (found.__doc__ or "").partition("\n")[0])
+
+
+def test_what_cannot_be_found_says_nothing() -> None:
+    lost = Registry("policy", "policies", {"a": "no_such.module:It", "b": "math:pi", "c": "json.decoder:NoSuchClass"})
+    assert [lost.says(name) for name in lost.own] == ["", "", ""]
+
+
 def test_a_policy_that_is_added_for_the_time_being() -> None:
     class Mine(Policy):
         def propose(self, seen: Any) -> None:

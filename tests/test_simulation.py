@@ -12,8 +12,9 @@ import pytest
 from scenarios.cases import DEADLOCKS
 from timeline import kinds, times
 
-from airground_drake import trace
+from airground_drake import runs, trace
 from airground_drake.errors import TraceError
+from airground_drake.progress import Watch
 from airground_drake.report.reproduction import MEASURES
 from airground_drake.runs import simulate_all
 from airground_drake.scenarios.load import load, shipped
@@ -83,10 +84,20 @@ def test_same_seed_same_bytes_other_seed_other_trigger(case_a: Scenario, run: Ru
     assert all(verdict.as_expected for verdict in verify(other))
 
 
-def test_runs_in_several_processes_are_those_in_one(case_a: Scenario, run: Runs) -> None:
+def test_runs_in_several_processes_are_those_in_one(
+    case_a: Scenario, run: Runs, monkeypatch: pytest.MonkeyPatch
+) -> None:
     case_a.runs = {name: case_a.runs[name] for name in ("a", "d")}
     case_a.reproduction = []
-    one, two = (simulate_all(case_a, jobs) for jobs in (1, 2))
+    monkeypatch.setattr(runs, "_compiled", lambda: False)
+    told: list[float] = []
+    stages: list[str] = []
+    watch = Watch()
+    watch.advance = lambda amount, what="": told.append(amount)  # type: ignore[method-assign]
+    watch.stage = lambda name, *_: stages.append(name)  # type: ignore[method-assign]
+    one, two = simulate_all(case_a, 1), simulate_all(case_a, 2, watch)
+    assert sum(told) == pytest.approx(2.0 * case_a.duration_s)
+    assert stages == ["compiling, once, about half a minute", "simulating a, d"]
     for name in case_a.runs:
         assert one[name].signals.equals(two[name].signals)
         assert one[name].decisions.equals(two[name].decisions)

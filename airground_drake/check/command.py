@@ -1,4 +1,4 @@
-"""The command line of the checker."""
+"""The command line of the checker; what it needs to check is imported once there is something to check."""
 
 from __future__ import annotations
 
@@ -11,12 +11,10 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
-import numpy as np
-
-from .report import AGREES, DISAGREES, LIMIT_S, OPEN, Line, check_report
-from .rules import Disagreement, NotEstablished
+if TYPE_CHECKING:
+    from .report import Line
 
 SCHEMA = "airground_drake.check/1"
 EPILOG = """\
@@ -25,8 +23,8 @@ Each line says what was checked, on which run, and
   DISAGREES                  files contradict the verdict or each other: the rule, the time, both values
   cannot be re-established   a file cannot be read, or no way is known here to decide the claim
 Exit codes: 0 all agree; 1 not all; 2 usage, or no report."""
-
-
+LIMIT_S = 300.0
+"""CPU time that a check may take, s: those of a report of minutes take seconds."""
 LONGEST_INTEGER = 10_000
 """Bits of an integer that is written: Python writes none of more than 4300 digits."""
 
@@ -42,7 +40,8 @@ class _Parser(argparse.ArgumentParser):
         raise UsageError(message)
 
 
-def _parser() -> _Parser:
+def parser() -> argparse.ArgumentParser:
+    """What the command line takes; it raises `UsageError`."""
     parser = _Parser(
         prog="python -m airground_drake.check",
         description="Establish every verdict of a report again, from its files alone.",
@@ -67,11 +66,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         The exit code: 0 all agree, 1 not all, 2 usage or no report.
     """
     try:
-        options = _parser().parse_args(arguments)
+        options = parser().parse_args(arguments)
     except UsageError as error:
         return _refuse(f"{error}; usage: python -m airground_drake.check [--json] DIR")
     except SystemExit:  # --help has been printed
         return 0
+    import numpy as np
+
+    from .report import AGREES, check_report
+    from .rules import Disagreement, NotEstablished
+
     try:
         with np.errstate(all="ignore"), warnings.catch_warnings():
             warnings.simplefilter("ignore")  # numbers out of all proportion are refused by the rules, not by numpy
@@ -105,6 +109,8 @@ def _print(lines: Sequence[Line]) -> None:
 
 
 def _counts(lines: Sequence[Line]) -> dict[str, int]:
+    from .report import AGREES, DISAGREES, OPEN
+
     found = Counter(line.outcome for line in lines)
     return {outcome: found[outcome] for outcome in (AGREES, DISAGREES, OPEN)}
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from .certificates import prove
+from .command import LIMIT_S
 from .enclosures import root
 from .events import check_events
 from .execution import execution
@@ -43,8 +44,6 @@ NOT_EXERCISED = "not_exercised"
 """How a claim counts that was established because nothing put it to the test."""
 ADDED_LATER = "proofs/"
 """Folder of proofs that cvc5 has written for a report's scripts; nothing is taken from there."""
-LIMIT_S = 300.0
-"""CPU time that a check may take, s: those of a report of minutes take seconds."""
 EXIT_CODES = {"as_expected": 0, "not_as_expected": 1, "inconclusive": 3}
 
 OfRun = Callable[[Run, Json], Found]

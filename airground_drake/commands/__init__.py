@@ -16,7 +16,11 @@ EXIT_USAGE = 2
 
 
 class Command(NamedTuple):
-    """What `airground NAME ...` does: `main` of a module, which takes the arguments and returns the exit code."""
+    """What `airground NAME ...` does.
+
+    The module has `main`, which takes the arguments and returns the exit code, and `parser`, which makes the parser of
+    the arguments. It imports what takes long to import in `main` only.
+    """
 
     module: str
     says: str
@@ -26,10 +30,13 @@ COMMANDS: dict[str, Command] = {
     "report": Command("airground_drake.report.__main__", "simulate a scenario, check its claims, write the report"),
     "verify": Command("airground_drake.verify.__main__", "judge claims anew, on a saved run or about a model"),
     "check": Command("airground_drake.check.command", "go over a report with the independent checker"),
+    "compare": Command("airground_drake.commands.compare", "say what has changed from one report to another"),
+    "index": Command("airground_drake.commands.index", "list the reports in a folder on a page"),
     "proofs": Command("airground_drake.verify.proof_files", "write the proofs of a report for others' checkers"),
     "diagram": Command("airground_drake.commands.diagram", "draw the diagram of a scenario"),
     "list": Command("airground_drake.commands.listing", "list scenarios, methods, policies, routes, tasks and claims"),
     "init": Command("airground_drake.commands.init", "write a small scenario to start from"),
+    "completion": Command("airground_drake.commands.completion", "print what completes this command line in a shell"),
 }
 
 

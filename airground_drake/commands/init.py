@@ -6,14 +6,23 @@ import argparse
 import re
 import sys
 from collections.abc import Sequence
-from importlib import resources
 from pathlib import Path
 
 from airground_drake import files
+from airground_drake.scenarios.shipped import json_schema_file, shipped_files
 
 EXIT_USAGE = 2
 MODEL = "minimal"
 """The shipped scenario that is copied."""
+
+
+def parser() -> argparse.ArgumentParser:
+    """What the command line takes."""
+    parser = argparse.ArgumentParser(
+        prog="airground init", description="Write a small scenario that runs: a UGV, an obstacle in its way, a UAV."
+    )
+    parser.add_argument("file", type=Path, nargs="?", default=Path("scenario.yaml"), help="default: %(default)s")
+    return parser
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -22,19 +31,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         Exit code: 0, or 2 if the file exists or cannot be written.
     """
-    parser = argparse.ArgumentParser(
-        prog="airground init", description="Write a small scenario that runs: a UGV, an obstacle in its way, a UAV."
-    )
-    parser.add_argument("file", type=Path, nargs="?", default=Path("scenario.yaml"), help="default: %(default)s")
-    path: Path = parser.parse_args(arguments).file
+    path: Path = parser().parse_args(arguments).file
     if path.exists():
         print(f"error: {path} exists; name a file that does not", file=sys.stderr)
         return EXIT_USAGE
-    text = (resources.files("airground_drake.scenarios") / f"{MODEL}.yaml").read_text(encoding="utf-8")
+    text = shipped_files()[MODEL].read_text(encoding="utf-8")
     name = re.sub(r"^[\W\d_]+|[\W_]+$", "", re.sub(r"\W+", "_", path.stem, flags=re.ASCII)) or MODEL
-    _, _, text = text.partition("\n")  # what the first line says is so of the shipped file only
+    text = text[text.index("name:") :]  # what stands before is so of the shipped file only
+    schema = f"# yaml-language-server: $schema={json_schema_file()}\n"
     try:
-        files.write_text(path, text.replace(f"name: {MODEL}", f'name: "{name}"', 1))
+        files.write_text(path, schema + text.replace(f"name: {MODEL}", f'name: "{name}"', 1))
     except OSError as error:
         print(f"error: {path} cannot be written: {error.strerror or error}", file=sys.stderr)
         return EXIT_USAGE

@@ -3,21 +3,32 @@
 from __future__ import annotations
 
 import argparse
-import inspect
 from collections.abc import Callable, Iterator, Sequence
 
-from airground_drake.registry import METHODS, POLICIES, ROUTES, UAV_TASKS, Registry
+from airground_drake.registry import METHODS, MODEL_CLAIMS, POLICIES, ROUTES, RUN_CLAIMS, UAV_TASKS, Registry
+from airground_drake.scenarios.shipped import shipped, title
 
 Lines = Iterator[tuple[str, str]]
 """Names, and what each is."""
 
 
+def parser() -> argparse.ArgumentParser:
+    """What the command line takes."""
+    parser = argparse.ArgumentParser(prog="airground list", description=__doc__.partition(": ")[2])
+    parser.add_argument("kind", nargs="?", choices=tuple(KINDS), help="default: all of them")
+    parser.add_argument("--schema", action="store_true", help="the JSON Schema of scenario files instead, for editors")
+    return parser
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print the kinds that were asked for."""
-    parser = argparse.ArgumentParser(prog="airground list", description=__doc__.partition(": ")[2])
-    parser.add_argument("kind", nargs="?", choices=KINDS, help="default: all of them")
-    wanted = parser.parse_args(arguments).kind
-    for kind in KINDS if wanted is None else (wanted,):
+    options = parser().parse_args(arguments)
+    if options.schema:
+        from airground_drake.scenarios import json_schema
+
+        print(json_schema.text(), end="")
+        return 0
+    for kind in KINDS if options.kind is None else (options.kind,):
         found = list(KINDS[kind]())
         width = max(len(name) for name, _ in found)
         print("\n".join([f"{kind}:", *(f"  {name:{width}}  {says}".rstrip() for name, says in found)]))
@@ -25,10 +36,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _scenarios() -> Lines:
-    from airground_drake.scenarios.load import load, shipped
-
     for name in shipped():
-        yield name, load(name)[0].title
+        yield name, title(name)
 
 
 def _methods() -> Lines:
@@ -36,20 +45,13 @@ def _methods() -> Lines:
         yield name, method.says
 
 
-def _claims() -> Lines:
-    from airground_drake.verify.registry import model_claims, run_claims
-
-    for claim in (*run_claims(), *model_claims()):
-        yield claim.id, claim.statement
-
-
-def _classes(registry: Registry) -> Callable[[], Lines]:
-    """First lines of the docstrings of what is registered."""
+def _registered(*registries: Registry) -> Callable[[], Lines]:
+    """Everything in some registries."""
 
     def lines() -> Lines:
-        for name in registry:
-            says = inspect.getdoc(registry.load(name, of=object)) or ""
-            yield name, says.partition("\n")[0]
+        for registry in registries:
+            for name in registry:
+                yield name, registry.says(name)
 
     return lines
 
@@ -57,8 +59,8 @@ def _classes(registry: Registry) -> Callable[[], Lines]:
 KINDS: dict[str, Callable[[], Lines]] = {
     "scenarios": _scenarios,
     "methods": _methods,
-    "policies": _classes(POLICIES),
-    "routes": _classes(ROUTES),
-    "tasks": _classes(UAV_TASKS),
-    "claims": _claims,
+    "policies": _registered(POLICIES),
+    "routes": _registered(ROUTES),
+    "tasks": _registered(UAV_TASKS),
+    "claims": _registered(RUN_CLAIMS, MODEL_CLAIMS),
 }

@@ -36,7 +36,7 @@ def make_policy(name: str, parameters: Mapping[str, float], budget: float = 2.0)
         budget: wall-clock time for a proposal of a policy in a process of its own, s.
 
     Raises:
-        UnknownNameError: if the name is neither registered nor of the form `module:Class`.
+        UnknownNameError: if the name is neither registered nor that of code of others.
         PluginError: if it cannot be imported, is no Policy, or does not take these parameters.
     """
     if POLICIES.accepts(name) and POLICIES.is_foreign(name):

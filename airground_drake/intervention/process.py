@@ -57,7 +57,7 @@ class GuestPolicy(Policy):
         """Start the process.
 
         Args:
-            name: of an installed entry point, or `module:Class`.
+            name: of an installed entry point, `module:Class` or `file.py:Class`.
             parameters: of the policy.
             budget: wall-clock time for a proposal, s.
 

@@ -1,17 +1,29 @@
-"""The folder of a report: whose it is, and whether it can be written, asked before the work."""
+"""The folder of a report: whose it is, and whether it can be written, asked before the work; what is of an old report.
+
+What belongs to a report is told by its path. Nothing else is ever removed, and nothing else may be there unless a
+report of ours is there, too.
+"""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 from airground_drake import files
 from airground_drake.errors import FolderError, one_line
 
-ENTRIES = ("report.html", "report.json", "junit.xml", "diagram.dot", "diagram.svg", "trace", "certificates")
-"""What a report consists of."""
+PAGES = {"html": "report.html", "json": "report.json", "junit": "junit.xml"}
+"""The formats of a report, and the file of each."""
 RULE = "allowed: a folder that is new or empty, has a report.json of ours, or nothing but files of a report"
 
+_CLAIM = r"[A-Z][A-Z0-9-]*"
+_FILES = re.compile(
+    r"report\.html|report\.json|junit\.xml|diagram\.dot|diagram\.svg"
+    r"|trace/\w+/(\w+\.parquet|timings\.json|meta\.json)"
+    rf"|certificates/{_CLAIM}/\w[\w.-]*|proofs/(index\.json|{_CLAIM}/\w[\w.-]*)"
+)
+_FOLDERS = re.compile(rf"trace(/\w+)?|(certificates|proofs)(/{_CLAIM})?")
 _OURS = re.compile(rb'\s*\{\s*"schema":\s*"airground_drake\.report/')
 
 
@@ -19,20 +31,74 @@ def prepare(folder: Path) -> None:
     """Create the folder if need be, look whose it is, try to write to it, and sweep what killed runs have left in it.
 
     Raises:
-        FolderError: if it holds something that is no report.
-        OSError: if it cannot be created or written, with the path.
+        FolderError: if it holds something that is no report, or cannot be created or written.
     """
-    folder.mkdir(parents=True, exist_ok=True)
-    strange = sorted(path.name for path in folder.iterdir() if not (path.name in ENTRIES or files.is_partial(path)))
-    if strange and not _has_report(folder):
-        raise FolderError(one_line(f"{folder} holds {strange[0]!r} and no report; {RULE}"))
-    files.sweep(folder)
-    files.try_to_write(folder)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if why := _refused(folder):
+            raise FolderError(one_line(why))
+        files.sweep(folder)
+        for each in (folder, *_parts(folder)):
+            files.try_to_write(each)
+    except OSError as error:
+        why = f"{error.filename or folder} cannot be written: {error.strerror or error}"
+        raise FolderError(one_line(f"{why}; wanted: a folder for the report")) from None
 
 
-def _has_report(folder: Path) -> bool:
-    path = folder / "report.json"
-    if not path.is_file():
+def clear(folder: Path) -> None:
+    """Remove what is of an earlier report: pages of all formats first, then traces, certificates and what came later.
+
+    Raises:
+        OSError: if something cannot be removed.
+    """
+    for name in PAGES.values():
+        (folder / name).unlink(missing_ok=True)
+    for path in list(_within(folder)):
+        if not path.is_dir() and _FILES.fullmatch(path.relative_to(folder).as_posix()):
+            path.unlink()
+    for path in reversed(_parts(folder)):
+        if not any(path.iterdir()):
+            path.rmdir()
+
+
+def is_report(folder: Path) -> bool:
+    """Whether there is a report.json of ours in a folder."""
+    try:
+        with (folder / PAGES["json"]).open("rb") as file:
+            return _OURS.match(file.read(100)) is not None
+    except OSError:
         return False
-    with path.open("rb") as file:
-        return _OURS.match(file.read(100)) is not None
+
+
+def _refused(folder: Path) -> str:
+    """Why the folder may not be written to; '' if it may."""
+    ours = is_report(folder)
+    for path in _within(folder):
+        name = path.relative_to(folder).as_posix()
+        if _blocks(path, name):
+            return f"{folder} holds {name!r}, which is in the way; {RULE}"
+        if not (ours or _belongs(name) or files.is_partial(path)):
+            return f"{folder} holds {name!r} and no report; {RULE}"
+    return ""
+
+
+def _within(folder: Path) -> Iterator[Path]:
+    """What is in the folder, each folder before what is in it; of folders in it only those that a report has."""
+    for path in sorted(folder.iterdir()):
+        yield path
+        if path.is_dir() and _FOLDERS.fullmatch(path.name):
+            yield from sorted(path.rglob("*"))
+
+
+def _belongs(name: str) -> bool:
+    return bool(_FILES.fullmatch(name) or _FOLDERS.fullmatch(name))
+
+
+def _blocks(path: Path, name: str) -> bool:
+    """Whether there is a file where a report has a folder, or the other way round."""
+    return _belongs(name) and not (_FOLDERS if path.is_dir() else _FILES).fullmatch(name)
+
+
+def _parts(folder: Path) -> list[Path]:
+    """The folders of a report that there are, each before those in it."""
+    return [each for each in _within(folder) if each.is_dir() and _FOLDERS.fullmatch(str(each.relative_to(folder)))]

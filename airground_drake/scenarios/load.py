@@ -15,7 +15,6 @@ import json
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any, NoReturn, get_args, get_origin
@@ -27,6 +26,9 @@ from airground_drake import files
 from airground_drake.errors import Fault, ScenarioError
 from airground_drake.scenarios import validate
 from airground_drake.scenarios.schema import Scenario
+from airground_drake.scenarios.shipped import shipped, shipped_files
+
+__all__ = ["from_data", "load", "resolved", "shipped", "validated"]
 
 MAX_BYTES = 2**20
 MAX_VALUES = 50_000
@@ -82,11 +84,6 @@ for _name, (_pattern, _) in _SCALARS.items():
         _Loader.add_implicit_resolver(_TAG + _name, re.compile(rf"(?:{_pattern})\Z"), None)
 
 
-def shipped() -> list[str]:
-    """Names of the scenarios that come with the package, sorted."""
-    return sorted(name.removesuffix(".yaml") for name in _shipped_files())
-
-
 Overrides = Sequence[str] | Mapping[str, Any]
 """`dotted.key=value` with the value in YAML, or values by dotted key."""
 
@@ -96,8 +93,8 @@ def load(name_or_path: str | Path, overrides: Overrides = ()) -> tuple[Scenario,
 
     Args:
         name_or_path: name of a shipped scenario, or path to a YAML file.
-        overrides: applied in order; list items are addressed by index. A key must be one of the schema, or an
-            entry that exists in the file.
+        overrides: applied in order; list items are addressed by index. A key must be one of the schema, an item
+            that exists, or an entry, which may be new, of a mapping whose names are free, such as `obstacles`.
 
     Returns:
         The scenario, and the SHA-256 of the file's bytes followed by a NUL byte and the text of each override.
@@ -253,13 +250,9 @@ def resolved(scenario: Scenario) -> dict[str, Any]:
     return dataclasses.asdict(scenario)
 
 
-def _shipped_files() -> dict[str, Traversable]:
-    return {file.name: file for file in resources.files(__package__).iterdir() if file.name.endswith(".yaml")}
-
-
 def _read_bytes(name_or_path: str) -> tuple[str, bytes]:
     """Path and content of a scenario; a shipped scenario's name has precedence."""
-    file: Traversable = _shipped_files().get(f"{name_or_path}.yaml", Path(name_or_path))
+    file: Traversable = shipped_files().get(name_or_path, Path(name_or_path))
     source = str(file)
     try:
         with file.open("rb") as stream:
@@ -307,6 +300,8 @@ def _replace(node: yaml.Node | None, hint: Any, parts: list[str], key: str, new:
     part, *rest = parts
     children = {} if node is None or hint in _WANTED else _children(node, hint, key, key.rpartition(".")[2])
     options = _hints(hint) if dataclasses.is_dataclass(hint) else {name: get_args(hint)[-1] for name in children}
+    if part and get_origin(hint) is dict:
+        options[part] = get_args(hint)[-1]  # what the entries of a mapping are called is the scenario's to choose
     if part not in options:
         _unknown(new, key, part, options)
     name, child = children.get(part, (None, None))
@@ -342,8 +337,10 @@ def _made(node: yaml.Node, hint: Any, key: str, name: str) -> Any:
             _unknown(name_node, key, part, hints)
     for part in (each.name for each in dataclasses.fields(hint) if "required" in each.metadata):
         if part not in children:
-            wanted = _wanted(hints[part], part)
-            raise ScenarioError(_where(node), validate.dotted(key, part), Fault("missing"), wanted)
+            new = f", as {key} is new" * _where(node).startswith("--set ")
+            raise ScenarioError(
+                _where(node), validate.dotted(key, part), Fault("missing"), _wanted(hints[part], part) + new
+            )
     values = {
         part: _made(child, hints[part], validate.dotted(key, part), part)
         for part, (_, child) in children.items()

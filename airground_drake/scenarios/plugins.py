@@ -1,20 +1,25 @@
-"""What of a scenario is code of others: names of the form `module:Class`, which are imported when they are used."""
+"""What of a scenario is code of others: `module:Class` and `file.py:Class`, which are imported when they are used."""
 
 from __future__ import annotations
 
-from collections.abc import Collection
+import importlib
+import sys
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
+from pathlib import Path
 
 from airground_drake.errors import ScenarioError
 from airground_drake.registry import POLICIES, ROUTES, UAV_TASKS, Registry, is_plugin
 from airground_drake.scenarios.schema import Scenario
 
 OPTION = "--allow-plugins"
+HELP = "import and run what the scenario names as module:Class or file.py:Class; looked for beside its file, too"
 WANTED = f"code of others is imported and run only with {OPTION}"
 
 
 def plugins(scenario: Scenario) -> dict[str, str]:
-    """Names of the form `module:Class` in a scenario, by key; entry points of installed packages are none."""
+    """Names of code of others in a scenario, by key; entry points of installed packages are none."""
     named: list[tuple[str, str, Registry]] = [
         ("uav.task", scenario.uav.task, UAV_TASKS),
         ("gatekeeper.route", scenario.gatekeeper.route, ROUTES),
@@ -39,6 +44,34 @@ def refuse(scenario: Scenario, source: str, keys: Collection[str] | None = None)
     for key, name in plugins(scenario).items():
         if keys is None or key in keys:
             raise ScenarioError(source, key, name, WANTED)
+
+
+@contextmanager
+def admitted(scenario: Scenario, source: str, *, allow: bool, keys: Collection[str] | None = None) -> Iterator[None]:
+    """While a scenario is used, code of others is found in the folder of its file, too; or refused, if not allowed.
+
+    The folder is the last one on Python's path, so that it takes the place of nothing, and only for the time being.
+    Child processes have the path of the process that starts them.
+
+    Args:
+        scenario: validated.
+        source: name of a shipped scenario or path of a file, for messages too.
+        allow: whether code of others may be imported.
+        keys: as in `refuse`.
+
+    Raises:
+        ScenarioError: as `refuse`.
+    """
+    if not allow:
+        refuse(scenario, source, keys)
+    before, path = list(sys.path), Path(source)
+    if allow and path.is_file():
+        importlib.invalidate_caches()
+        sys.path.append(str(path.resolve().parent))
+    try:
+        yield
+    finally:
+        sys.path[:] = before
 
 
 def without(scenario: Scenario) -> Scenario:

@@ -22,7 +22,9 @@ class Preset:
     """Preset trajectory rho_rd of a UGV: a polyline travelled at constant speed from t = 0, then held."""
 
     waypoints_m: list[Vector] = field(default_factory=list, metadata=REQUIRED)
+    """Its corners, at least two, the first one at t = 0."""
     speed_m_s: float = 1.0
+    """Constant speed along it; not above the UGV's `max_speed_m_s`."""
 
 
 @dataclass
@@ -30,9 +32,13 @@ class Ugv:
     """One UGV: a planar first-order robot."""
 
     start_m: Vector = field(default_factory=list, metadata=REQUIRED)
+    """Where it starts; z = 0."""
     target_m: Vector = field(default_factory=list, metadata=REQUIRED)
+    """Where it is to end; z = 0."""
     preset: Preset = field(default_factory=Preset, metadata=REQUIRED)
+    """The trajectory that it follows."""
     max_speed_m_s: float = 6.0
+    """Commands are shortened to this speed."""
 
 
 @dataclass
@@ -43,12 +49,19 @@ class Uav:
     """
 
     name: str = "uav"
+    """What it is called in traces and reports."""
     start_m: Vector = field(default_factory=list, metadata=REQUIRED)
+    """Where it starts."""
     target_m: Vector = field(default_factory=list, metadata=REQUIRED)
+    """Where it is to end."""
     altitude_m: float = 2.0
+    """Height over the centroid of the UGVs."""
     task: str = "formation"
+    """What it does below obstacle avoidance."""
     max_speed_m_s: float = 10.0
+    """Commands are shortened to this speed."""
     phantoms_m: list[Vector] = field(default_factory=list)
+    """Obstacles on its map that are not there."""
 
 
 @dataclass
@@ -56,7 +69,9 @@ class Obstacle:
     """A point to keep away from by the safe distance of (7)-(8)."""
 
     position_m: Vector = field(default_factory=list, metadata=REQUIRED)
+    """Where it is."""
     known_to_uav: bool = True
+    """Whether it is on the UAV's map from the beginning."""
 
 
 @dataclass
@@ -64,9 +79,13 @@ class SafeDistance:
     """Safe distances d of (7)-(8), for each kind of pair, and the distance that counts as a collision."""
 
     obstacle_m: float = 2.0
+    """Of a robot to an obstacle."""
     ugv_m: float = 2.0
+    """Of two UGVs."""
     air_ground_m: float = 1.0
+    """Of the UAV to a UGV."""
     collision_m: float = 0.05
+    """What is closer than this counts as a collision; less than the others."""
 
 
 @dataclass
@@ -74,11 +93,17 @@ class Control:
     """NSBC controllers of all robots: sampled with zero-order hold."""
 
     period_s: float = 0.025
+    """Control period h of all robots."""
     avoidance_gain_1_s: float = field(default=3.0, metadata=FROM_ZERO)
+    """Of obstacle avoidance; gain times period at most 1, as for all gains."""
     motion_gain_1_s: float = field(default=2.0, metadata=FROM_ZERO)
+    """Of tracking the preset trajectory, (6)."""
     formation_gain_1_s: float = field(default=5.0, metadata=FROM_ZERO)
+    """Of the UAV's task, (10)."""
     intervention_gain_1_s: float = field(default=1.5, metadata=FROM_ZERO)
+    """Of tracking an intervention, (14)."""
     sensing_range_m: float = 4.0
+    """What is farther away is not seen; it must cover every safe distance plus a period's closing."""
 
 
 @dataclass
@@ -86,11 +111,17 @@ class Threshold:
     """Decision threshold zeta: rule 'fixed' takes zeta_m; 'bayes' minimises the Bayes risk (16)-(19)."""
 
     rule: str = "fixed"
+    """Where the threshold comes from."""
     zeta_m: float = 3.0
+    """The threshold under the rule 'fixed'."""
     c1_1_s: float = 0.5
+    """Cost of a second until the decision, in the Bayes risk (16)."""
     c2: float = 1.0
+    """Cost of an error, in the Bayes risk (16)."""
     drift_m_s: float = 6.05
+    """Drift that the Bayes risk takes."""
     noise_m_sqrt_s: float = 10.0
+    """Noise that the Bayes risk takes."""
 
 
 @dataclass
@@ -98,12 +129,19 @@ class Decision:
     """DDM (15) and event trigger: 'automaton' (hysteresis, minimum inter-event time) or 'bare' (the paper's)."""
 
     threshold: Threshold = field(default_factory=Threshold)
+    """The decision threshold zeta."""
     trigger: str = "automaton"
+    """With hysteresis and a minimum inter-event time, or without both as in the paper."""
     release_m: float = 1.5
+    """An intervention ends when the decision variable falls to it; below the threshold."""
     min_inter_event_s: float = field(default=0.5, metadata=FROM_ZERO)
+    """Minimum inter-event time: no trigger follows another sooner."""
     noise_m_sqrt_s: float = field(default=0.0, metadata=FROM_ZERO)
+    """Noise of the decision variable in the simulation."""
     leak_1_s: float = field(default=0.0, metadata=FROM_ZERO)
+    """Rate at which accumulated noise decays; 0: never."""
     noise_period_s: float = 0.025
+    """How often noise is drawn."""
 
 
 @dataclass
@@ -111,7 +149,9 @@ class Policy:
     """One entry of the UAV's behaviour database: a policy's name and its numbers."""
 
     name: str = field(default_factory=str, metadata=REQUIRED)
+    """Which policy."""
     parameters: dict[str, float] = field(default_factory=dict)
+    """Its numbers, by name."""
 
 
 @dataclass
@@ -124,10 +164,15 @@ class Intervention:
     """
 
     period_s: float = 0.05
+    """How often the UAV plans; a multiple of the control period."""
     retry_s: float = field(default=1.0, metadata=FROM_ZERO)
+    """How long it rests after a refusal, or when no policy has proposed anything."""
     ranking: str = "predicted"
+    """Which policy is asked first."""
     budget_s: float = 2.0
+    """Time that a policy may take for a proposal, by the clock."""
     policies: list[Policy] = field(default_factory=list)
+    """The behaviour database, in order."""
 
 
 @dataclass
@@ -147,24 +192,43 @@ class Gatekeeper:
     """
 
     route: str = "relaxed"
+    """How (26) is solved under method (c)."""
     period_s: float = 0.05
+    """How often it decides; a multiple of the control period."""
     horizon_s: float = 3.0
+    """How far (26) looks ahead, and how long other robots are predicted to go on."""
     stages: int = 60
+    """Stages of (26): horizon_s / stages is a multiple of the control period."""
     error_weight_1_m2_s: float = 1.0
+    """a of (25): weight of the distance to the preset trajectory."""
     slack_weight_1_m2_s: float = field(default=1000.0, metadata=FROM_ZERO)
+    """Weight of the slack of the soft constraints in (25)."""
     terminal_weight_s: float = field(default=0.0, metadata=FROM_ZERO)
+    """w of a terminal cost that the paper does not have."""
     switching_margin: float = field(default=0.05, metadata=FROM_ZERO)
+    """How much cheaper, relatively, a plan must be to reverse a decision of method (c)."""
     min_dwell_s: float = field(default=0.2, metadata=FROM_ZERO)
+    """How long a decision of method (c) stands at least."""
     budget: str = "counted"
+    """What bounds a decision's effort: counts only, or also the clock."""
     budget_iterations: int = 100
+    """Iterations of a solver."""
     budget_nodes: int = 15000
+    """Nodes of a search."""
     budget_share: float = 0.5
+    """Share of the sampling period, by the clock."""
     longest_s: float = 30.0
+    """How long an accepted proposal is executed at most."""
     settling_s: float = 10.0
+    """How far outcomes are compared past the end of motion and preset trajectory."""
     tries: int = 5
+    """Acceptances until a rest."""
     rest_s: float = 5.0
+    """How long a UGV is then on its own."""
     lag_m: float = 0.5
+    """How much farther behind than predicted is tolerated."""
     behind_s: float = 2.0
+    """For how long."""
 
 
 @dataclass
@@ -177,9 +241,13 @@ class Run:
     """
 
     method: str = field(default_factory=str, metadata=REQUIRED)
+    """How UAV and UGVs are coupled."""
     composition: str = "augmented"
+    """How avoidance is composed with the tasks below: 'augmented' or a reading of recursion (5)."""
     stalls_m: dict[str, Vector] = field(default_factory=dict)
+    """Where UGVs must end short of their target, by UGV."""
     expected: dict[str, str] = field(default_factory=dict)
+    """Expected verdicts of claims about this run, by claim; unnamed ones must hold."""
 
 
 @dataclass
@@ -191,16 +259,27 @@ class Reproduction:
     """
 
     id: str = field(default_factory=str, metadata=REQUIRED)
+    """Identifier of the row."""
     quantity: str = field(default_factory=str, metadata=REQUIRED)
+    """What is compared, in words."""
     measure: str = field(default_factory=str, metadata=REQUIRED)
+    """How our value is measured: see `report/reproduction.py`."""
     run: str = field(default_factory=str, metadata=REQUIRED)
+    """On which run."""
     robot: str = field(default_factory=str, metadata=REQUIRED)
+    """Of which robot."""
     paper: list[float] = field(default_factory=list, metadata=REQUIRED)
+    """The paper's value, one number for each component."""
     unit: str = ""
+    """Its unit."""
     tolerance: float = field(default=0.0, metadata=FROM_ZERO)
+    """How far ours may be off."""
     calibrated: bool = False
+    """Whether something was chosen so that the value comes out."""
     why: str = ""
+    """Why the row is as it is."""
     ambiguous: str = ""
+    """Another way to read the paper, in words."""
 
 
 @dataclass
@@ -208,9 +287,13 @@ class Choice:
     """Where a value that is not the paper's comes from: `source` is 'calibrated' or 'ours'."""
 
     key: str = field(default_factory=str, metadata=REQUIRED)
+    """Dotted key of the value."""
     source: str = field(default_factory=str, metadata=REQUIRED)
+    """Where it comes from."""
     paper: str = ""
+    """What the paper has instead."""
     reason: str = field(default_factory=str, metadata=REQUIRED)
+    """Why it is as it is."""
 
 
 @dataclass
@@ -223,22 +306,42 @@ class Scenario:
     """
 
     name: str = field(default_factory=str, metadata=REQUIRED)
+    """What it is called: letters, digits and underscores."""
     title: str = ""
+    """One line."""
     description: str = ""
+    """What it shows."""
     seed: int = 0
+    """Of the decision noise."""
     duration_s: float = 30.0
+    """How long each run is simulated."""
     arrival_tolerance_m: float = 0.1
+    """How close to its target a robot has arrived."""
     stall_tolerance_m: float = 0.1
+    """How close to its point in `stalls_m` a UGV must end."""
     ugvs: dict[str, Ugv] = field(default_factory=dict, metadata=REQUIRED)
+    """The UGVs, by name, in the order of all arrays."""
     uav: Uav = field(default_factory=Uav, metadata=REQUIRED)
+    """The UAV."""
     obstacles: dict[str, Obstacle] = field(default_factory=dict)
+    """The obstacles, by name."""
     safe_distance: SafeDistance = field(default_factory=SafeDistance)
+    """Distances to keep."""
     control: Control = field(default_factory=Control)
+    """The controllers."""
     decision: Decision = field(default_factory=Decision)
+    """The event trigger."""
     intervention: Intervention = field(default_factory=Intervention)
+    """What the UAV proposes, and when."""
     gatekeeper: Gatekeeper = field(default_factory=Gatekeeper)
+    """What a UGV makes of proposals."""
     runs: dict[str, Run] = field(default_factory=dict, metadata=REQUIRED)
+    """The simulations, by name."""
     claims: dict[str, str] = field(default_factory=dict)
+    """Claims of one's own, by identifier."""
     expected: dict[str, str] = field(default_factory=dict)
+    """Expected verdicts of claims about the model, by claim."""
     reproduction: list[Reproduction] = field(default_factory=list)
+    """The paper's numbers to compare with."""
     choices: list[Choice] = field(default_factory=list)
+    """Where values come from that are not the paper's."""

@@ -41,6 +41,8 @@ BUDGETS: tuple[str, ...] = ("counted", "wall_clock")
 
 MAX_UGVS, MAX_STAGES, MAX_SEED = 100, 1000, 2**31 - 1
 MAX_NAME, MAX_TEXT = 64, 10_000  # characters
+NAME_PATTERN = "^[A-Za-z_][A-Za-z0-9_]*$"  # of a UGV, an obstacle, a run, a parameter
+CLAIM_PATTERN = f"^[A-Z][A-Z0-9-]{{0,{MAX_NAME - 1}}}$"
 LARGEST, SMALLEST = 1e9, 1e-9  # of any number; of a positive number: products and quotients stay finite
 TOLERANCE = 1e-9  # m between points; relative between periods
 _SHORT = 1.0 - 1e-5  # of a limit that is printed with six digits, so that what a message allows is allowed
@@ -146,7 +148,7 @@ def _names(scenario: Scenario) -> Problems:
         others += [(f"intervention.policies.{index}.parameters.{name}", name) for name in policy.parameters]
     count = Counter(name for _, name in bodies)
     for key, name in (*bodies, *others):
-        if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", name):
+        if not re.fullmatch(NAME_PATTERN, name):
             yield key, name, "a name of letters, digits and underscores that does not begin with a digit"
         if len(name) > MAX_NAME:
             yield key, name, f"a name of at most {MAX_NAME} characters"
@@ -196,7 +198,7 @@ def _runs(scenario: Scenario) -> Problems:
         yield from _one_of(f"expected.{claim}", claim, known, "one of the claims about the model")
         yield from _expectation(f"expected.{claim}", status)
     for claim, place in scenario.claims.items():
-        if claim in (*RUN_CLAIMS, *MODEL_CLAIMS) or not re.fullmatch(rf"[A-Z][A-Z0-9-]{{,{MAX_NAME - 1}}}", claim):
+        if claim in (*RUN_CLAIMS, *MODEL_CLAIMS) or not re.fullmatch(CLAIM_PATTERN, claim):
             what = f"a new identifier of at most {MAX_NAME} capitals, digits and hyphens, such as MY-CLAIM"
             yield f"claims.{claim}", claim, what
         if not is_plugin(place):

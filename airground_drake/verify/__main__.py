@@ -12,16 +12,31 @@ import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from airground_drake import trace
 from airground_drake.errors import AirgroundError, UnknownNameError
+from airground_drake.progress import Watch, told
 from airground_drake.registry import NOT_EXERCISED, outcome
 from airground_drake.scenarios import plugins
-from airground_drake.scenarios.load import from_data, load
-from airground_drake.verify import Verdict, verify, verify_model
-from airground_drake.verify.registry import model_claims, run_claims
+
+if TYPE_CHECKING:
+    from airground_drake.verify.claim import Verdict
 
 EXIT_DIFFERS, EXIT_USAGE = 1, 2
+
+
+def parser() -> argparse.ArgumentParser:
+    """What the command line takes."""
+    parser = argparse.ArgumentParser(
+        prog="airground verify",
+        description="Judge claims anew, on a saved run or about a scenario's model; nothing is taken from a cache.",
+    )
+    parser.add_argument("target", help="folder of a saved run (DIR/trace/RUN), or a scenario, shipped or a YAML file")
+    parser.add_argument("claims", nargs="*", metavar="CLAIM", help="identifiers (default: all that apply)")
+    parser.add_argument("--json", action="store_true", help="print the whole verdicts as JSON")
+    parser.add_argument("-v", "--verbose", action="store_true", help="say what took how long")
+    parser.add_argument(plugins.OPTION, action="store_true", help=plugins.HELP)
+    return parser
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -30,19 +45,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         Exit code: 0 all as the scenario expects, 1 a claim differs, 2 usage, or a run or scenario that cannot be used.
     """
-    parser = argparse.ArgumentParser(
-        prog="python -m airground_drake.verify",
-        description="Judge claims anew, on a saved run or about a scenario's model; nothing is taken from a cache.",
-    )
-    parser.add_argument("target", help="folder of a saved run (DIR/trace/RUN), or a scenario, shipped or a YAML file")
-    parser.add_argument("claims", nargs="*", metavar="CLAIM", help="identifiers (default: all that apply)")
-    parser.add_argument("--json", action="store_true", help="print the whole verdicts as JSON")
-    parser.add_argument(
-        plugins.OPTION, action="store_true", help="import and run what the scenario names as module:Class"
-    )
-    options = parser.parse_args(arguments)
+    options = parser().parse_args(arguments)
     try:
-        verdicts = _judge(options.target, options.claims, allow_plugins=options.allow_plugins)
+        with told(verbose=options.verbose) as watch:
+            verdicts = _judge(options.target, options.claims, watch, allow_plugins=options.allow_plugins)
     except (AirgroundError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return EXIT_USAGE
@@ -69,7 +75,7 @@ def _line(verdict: Verdict) -> str:
     return f"{name}: {found}{margin}{of}{tested}{expected}"
 
 
-def _judge(target: str, wanted: Sequence[str], *, allow_plugins: bool) -> list[Verdict]:
+def _judge(target: str, wanted: Sequence[str], watch: Watch, *, allow_plugins: bool) -> list[Verdict]:
     """Verdicts on the claims wanted (none: all), as far as they say anything about the target.
 
     Of what a saved run names, only claims of others that are wanted are imported, and nothing unless that is allowed.
@@ -78,19 +84,27 @@ def _judge(target: str, wanted: Sequence[str], *, allow_plugins: bool) -> list[V
         UnknownNameError: if there is no such claim.
         ScenarioError: if code of others is named that is not allowed.
     """
+    from airground_drake import trace
+    from airground_drake.scenarios.load import from_data, load
+    from airground_drake.verify import verify, verify_model
+    from airground_drake.verify.registry import model_claims, run_claims
+
     folder = Path(target)
     run = trace.load(folder) if (folder / "meta.json").is_file() else None
     scenario = load(target)[0] if run is None else from_data(run.scenario, target)
     added = {name: place for name, place in scenario.claims.items() if not wanted or name in wanted}
-    if not allow_plugins:
-        plugins.refuse(scenario, target, None if run is None else [f"claims.{name}" for name in added])
-    about_run = [claim.id for claim in run_claims(added=added)]
-    about_model = [claim.id for claim in model_claims(added=added)]
-    for name in wanted:
-        if name not in (known := [*about_run, *about_model]):
-            raise UnknownNameError("claim", name, known)
-    verdicts = [] if run is None else verify(run, [name for name in about_run if name in (wanted or about_run)])
-    return verdicts + verify_model(scenario, claims=[name for name in about_model if name in (wanted or about_model)])
+    imported = None if run is None else [f"claims.{name}" for name in added]
+    with plugins.admitted(scenario, target, allow=allow_plugins, keys=imported):
+        about_run = [claim.id for claim in run_claims(added=added)]
+        about_model = [claim.id for claim in model_claims(added=added)]
+        for name in wanted:
+            if name not in (known := [*about_run, *about_model]):
+                raise UnknownNameError("claim", name, known)
+        about_run = [name for name in about_run if run is not None and name in (wanted or about_run)]
+        about_model = [name for name in about_model if name in (wanted or about_model)]
+        watch.stage("judging", len(about_run) + len(about_model), "claims")
+        verdicts = [] if run is None else verify(run, about_run, watch)
+        return verdicts + verify_model(scenario, claims=about_model, watch=watch)
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ damaged or under another's name costs time and no more. What is not done again i
 from __future__ import annotations
 
 import contextlib
+import inspect
 import json
 import math
 import os
@@ -20,8 +21,10 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, NoReturn
+from uuid import uuid4
 
 from airground_drake import files
+from airground_drake.progress import SILENT, Watch
 from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.finding import Finding
 
@@ -33,7 +36,7 @@ ENGINES = ("numpy", "scipy", "numba", "z3-solver", "cvc5", "python-flint", "symp
 
 
 def find(
-    claims: Sequence[ModelClaim], inputs: Sequence[dict[str, Any]], *, folder: Path | None = None
+    claims: Sequence[ModelClaim], inputs: Sequence[dict[str, Any]], *, folder: Path | None = None, watch: Watch = SILENT
 ) -> list[Finding]:
     """The finding of each claim for its inputs.
 
@@ -41,14 +44,23 @@ def find(
         claims: the claims.
         inputs: what each is about, strict JSON.
         folder: where findings are kept; None: computed anew, kept nowhere.
+        watch: is told of each finding.
     """
-    known = [_read(folder, claim, given) for claim, given in zip(claims, inputs, strict=True)]
+    known = []
+    for claim, given in zip(claims, inputs, strict=True):
+        known.append(_read(folder, claim, given))
+        watch.advance(float(known[-1] is not None), claim.id)
+
+    def judged(i: int) -> Finding:
+        with watch.item(claims[i].id):
+            return claims[i].judge(inputs[i])
+
     todo = [i for i, found in enumerate(known) if found is None]
     made: Mapping[int, Finding] = {}
     if todo:
         # the solvers run in processes of their own and the experiments in compiled code: threads suffice
         with ThreadPoolExecutor(max_workers=2) as pool:
-            made = dict(zip(todo, pool.map(lambda i: claims[i].judge(inputs[i]), todo), strict=True))
+            made = dict(zip(todo, pool.map(judged, todo), strict=True))
     for i, finding in made.items():
         _keep(folder, claims[i], inputs[i], finding)
     return [made[i] if found is None else found for i, found in enumerate(known)]
@@ -68,7 +80,21 @@ def key(claim: ModelClaim, inputs: Mapping[str, Any]) -> str:
 
 def content(claim: ModelClaim, inputs: Mapping[str, Any]) -> dict[str, Any]:
     """Everything that a finding depends on: the claim, its inputs, our code, the engines' versions."""
-    return {"schema": SCHEMA, "claim": claim.id, "inputs": inputs, "code": _code(), "engines": _engines()}
+    return {"schema": SCHEMA, "claim": claim.id, "inputs": inputs, "code": _code_of(type(claim)), "engines": _engines()}
+
+
+@cache
+def _code_of(kind: type[ModelClaim]) -> str:
+    """Digest of the package, and of the file that a claim of others is in; without a file, one that is never met again.
+
+    What such a claim imports besides is not looked at.
+    """
+    if kind.__module__.partition(".")[0] == __name__.partition(".")[0]:
+        return _code()
+    try:
+        return f"{_code()} {files.sha256(Path(inspect.getfile(kind)).read_bytes())}"
+    except (OSError, TypeError):
+        return f"{_code()} {uuid4().hex}"
 
 
 @cache

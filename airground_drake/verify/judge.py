@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from pathlib import Path
 
+from airground_drake.progress import SILENT, Watch
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.trace import Trace
 from airground_drake.verify.cache import find
@@ -12,12 +13,13 @@ from airground_drake.verify.claim import Verdict
 from airground_drake.verify.registry import model_claims, run_claims
 
 
-def verify(trace: Trace, claims: Collection[str] | None = None) -> list[Verdict]:
+def verify(trace: Trace, claims: Collection[str] | None = None, watch: Watch = SILENT) -> list[Verdict]:
     """Judge the claims that apply to the run's method.
 
     Args:
         trace: one run.
         claims: identifiers of the claims to judge; default: all.
+        watch: is told of each.
 
     Returns:
         One verdict per applicable claim, with the status that the scenario expects of this run ('holds' unless
@@ -29,15 +31,16 @@ def verify(trace: Trace, claims: Collection[str] | None = None) -> list[Verdict]
     """
     scenario, run = trace.meta.get("scenario", {}), str(trace.meta.get("run"))
     expected = scenario.get("runs", {}).get(run, {}).get("expected", {})
-    return [
-        Verdict(claim, run, claim.judge(trace), expected.get(claim.id, claim.expected))
-        for claim in run_claims(claims, scenario.get("claims"))
-        if claim.applies(trace)
-    ]
+    verdicts = []
+    for claim in run_claims(claims, scenario.get("claims")):
+        with watch.item(f"{claim.id} {run}"):
+            if claim.applies(trace):
+                verdicts.append(Verdict(claim, run, claim.judge(trace), expected.get(claim.id, claim.expected)))
+    return verdicts
 
 
 def verify_model(
-    scenario: Scenario, *, kept: Path | None = None, claims: Collection[str] | None = None
+    scenario: Scenario, *, kept: Path | None = None, claims: Collection[str] | None = None, watch: Watch = SILENT
 ) -> list[Verdict]:
     """Judge the claims about the model of a scenario.
 
@@ -46,6 +49,7 @@ def verify_model(
         kept: folder of findings that are reused if nothing that they depend on has changed (`cache_folder()`);
             None: everything anew.
         claims: identifiers of the claims to judge; default: all.
+        watch: is told of each.
 
     Returns:
         One verdict per claim, run '', with the status that the scenario expects ('proved' or 'supported' unless
@@ -57,7 +61,7 @@ def verify_model(
     """
     chosen = model_claims(claims, scenario.claims)
     inputs = [claim.judge_inputs(scenario) for claim in chosen]
-    findings = find(chosen, inputs, folder=kept)
+    findings = find(chosen, inputs, folder=kept, watch=watch)
     return [
         Verdict(claim, "", finding, scenario.expected.get(claim.id, claim.expected), given)
         for claim, given, finding in zip(chosen, inputs, findings, strict=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from airground_drake.progress import SILENT, Watch
 from airground_drake.registry import Status
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.cache import find
@@ -43,15 +44,17 @@ class MutantClaim(ModelClaim):
         return finding.status == "refuted" and finding.counterexample is not None
 
 
-def refute_mutants(scenario: Scenario, *, kept: Path | None = None) -> list[dict[str, Any]]:
+def refute_mutants(scenario: Scenario, *, kept: Path | None = None, watch: Watch = SILENT) -> list[dict[str, Any]]:
     """What became of every mutant: `claim`, `mutant`, `status`, `refuted`, `counterexample`, `error`, `from_cache`.
 
     Args:
         scenario: its constants.
         kept: folder of kept findings, see `verify_model`.
+        watch: is told how many there are, and of each.
     """
     broken = [MutantClaim(mutant) for mutant in mutants()]
-    found = find(broken, [claim.inputs(scenario) for claim in broken], folder=kept)
+    watch.stage("broken variants of proofs", len(broken), "proofs")
+    found = find(broken, [claim.inputs(scenario) for claim in broken], folder=kept, watch=watch)
     return [
         {
             "claim": claim.mutant.claim,

@@ -18,6 +18,7 @@ import argparse
 import json
 import sys
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -83,11 +84,19 @@ def outcome(result: Result) -> str:
     return "complete" if size <= LARGEST_BYTES else f"no proof: it has {size} bytes"
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Write the proofs of a report, and say by claim how many there are; 2 if the folder is no report's."""
-    parser = argparse.ArgumentParser(prog="python -m airground_drake.verify.proof_files")
+def parser() -> argparse.ArgumentParser:
+    """What the command line takes."""
+    parser = argparse.ArgumentParser(
+        prog="airground proofs",
+        description="Write cvc5's own proofs of a report's scripts.",
+    )
     parser.add_argument("report", type=Path, metavar="DIR", help="folder with certificates/")
-    folder = parser.parse_args(arguments).report
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Write the proofs of a report, and say by claim how many there are; 2 if the folder is no report's."""
+    folder = parser().parse_args(arguments).report
     if not (folder / "certificates").is_dir():
         print(f"error: {folder} has no certificates", file=sys.stderr)
         return 2

@@ -25,11 +25,28 @@ def test_every_command_says_how_it_is_used(name: str, capsys: pytest.CaptureFixt
     assert "usage:" in capsys.readouterr().out
 
 
-def test_help_names_all_commands_and_imports_none() -> None:
-    code = "import sys; from airground_drake.commands import main\ntry: main(['--help'])\nfinally: print(*sys.modules)"
-    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
-    assert all(f"  {name} " in found for name in COMMANDS)
-    assert not {"numpy", "pandas", "pydrake", "airground_drake.report"} & set(found.split())
+def imported(*arguments: str) -> tuple[str, set[str]]:
+    """What `airground ARGUMENTS` prints in a process of its own, and which modules are then imported."""
+    code = "import sys; from airground_drake.commands import main\ntry: main(sys.argv[1:])\nexcept SystemExit: pass\n"
+    code += "print(*sys.modules, file=sys.stderr)"
+    ran = subprocess.run([sys.executable, "-c", code, *arguments], capture_output=True, text=True, check=True)
+    return ran.stdout, set(ran.stderr.split())
+
+
+def test_help_names_all_commands() -> None:
+    said, modules = imported("--help")
+    assert all(f"  {name} " in said for name in COMMANDS)
+    assert not {command.module for command in COMMANDS.values()} & modules
+
+
+@pytest.mark.parametrize(
+    "arguments", [("--version",), ("list",), ("completion", "bash"), *((name, "--help") for name in COMMANDS)]
+)
+def test_what_takes_long_is_imported_when_it_is_used(arguments: tuple[str, ...]) -> None:
+    said, modules = imported(*arguments)
+    heavy = "numpy pandas scipy numba sympy z3 cvc5 cvxpy flint matplotlib jinja2 pydrake pygraphviz rtamt"
+    assert said
+    assert not set(heavy.split()) & modules
 
 
 def test_a_command_that_is_none(capsys: pytest.CaptureFixture[str]) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from airground_drake import trace
+from airground_drake.report import make
 from airground_drake.report.__main__ import main
 from airground_drake.scenarios.load import load, shipped
 from airground_drake.verify import __main__ as judge
@@ -53,9 +54,13 @@ def test_case_b_meets_its_targets_too(report: Report) -> None:
 
 def test_an_unexpected_verdict_is_exit_code_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     one = ["--set", "runs={a: {method: a, expected: {SAFE-TRACE: refuted}}}", "--set", "reproduction=[]"]
+    for old in ("report.html", "junit.xml"):
+        (tmp_path / old).write_text("of an older run")
     assert main(["case_a", "-o", str(tmp_path), *one, "--format", "json"]) == 1
-    assert "SAFE-TRACE" in capsys.readouterr().out
-    assert not (tmp_path / "report.html").exists()
+    said = capsys.readouterr()
+    assert "SAFE-TRACE" in said.out
+    assert said.err == ""  # no terminal: no progress
+    assert not {"report.html", "junit.xml"} & {path.name for path in tmp_path.iterdir()}
 
 
 @pytest.mark.parametrize(
@@ -67,7 +72,6 @@ def test_an_unexpected_verdict_is_exit_code_1(tmp_path: Path, capsys: pytest.Cap
         (["case_a", "--set", "nonsense"], "nonsense"),
         (["case_a", "--seed", "-1"], "seed"),
         (["case_a", "--set", "intervention.policies.0.name=teleport"], "teleport"),
-        (["case_a", "--set", "intervention.policies.0.parameters.warp=9"], "warp"),
         (["case_a", "--set", "decision.noise_period_s=1e-9"], "allowed: 1e+07 steps, 8 GiB"),
         (["case_a", "--limit-steps", "100"], "allowed: 1e+02 steps, 8 GiB"),
         (["case_a", "--limit-memory", "0.1"], "allowed: 1e+07 steps, 0.1 GiB"),
@@ -83,6 +87,16 @@ def test_a_users_mistake_is_one_line_and_exit_code_2(
     assert not (tmp_path / "out").exists()
 
 
+def test_a_parameter_that_a_policy_does_not_have_is_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["case_a", "-o", str(tmp_path), "--set", "intervention.policies.0.parameters.warp=9"]) == 2
+    error = capsys.readouterr().err
+    assert "warp" in error
+    assert error.count("\n") == 1
+    assert not (tmp_path / "report.json").exists()
+
+
 @pytest.mark.parametrize(
     "arguments",
     [[], ["case_a", "--format", "pdf"], ["case_a", "--seed", "x"], ["--what"], ["case_a", "--limit-steps", "-1"]],
@@ -93,10 +107,13 @@ def test_usage_errors_are_exit_code_2(arguments: list[str]) -> None:
     assert stopped.value.code == 2
 
 
-def test_a_folder_that_cannot_be_written_is_exit_code_4(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_folder_that_cannot_be_written_is_refused_before_the_work(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(make, "simulate_all", lambda *_, **__: pytest.fail("simulated"))
     (tmp_path / "file").write_text("in the way")
-    assert main(["case_a", "--set", "duration_s=1", "-o", str(tmp_path / "file")]) == 4
-    assert capsys.readouterr().err.startswith("error: ")
+    assert main(["case_a", "-o", str(tmp_path / "file")]) == 2
+    assert "file cannot be written" in capsys.readouterr().err
 
 
 def test_a_folder_of_something_else_is_exit_code_2(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -136,7 +153,11 @@ def test_what_cannot_be_judged_is_exit_code_2(
     assert said in capsys.readouterr().err
 
 
-def test_a_refuted_claim_that_is_not_expected_is_exit_code_1(tmp_path: Path) -> None:
+def test_a_refuted_claim_that_is_not_expected_is_exit_code_1(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     changes = ["--set", "decision.trigger=bare", "--set", "runs={b: {method: b}}", "--set", "reproduction=[]"]
-    assert main(["case_b", "-o", str(tmp_path), *changes, "--format", "json"]) == 1
-    assert judge.main([str(tmp_path / "trace" / "b"), "ZENO-PROOF"]) == 1
+    assert main(["case_b", "-o", str(tmp_path), *changes, "--format", "json", "-q"]) == 1
+    assert capsys.readouterr() == ("", "")
+    assert judge.main([str(tmp_path / "trace" / "b"), "ZENO-PROOF", "-v"]) == 1
+    assert "ZENO-PROOF" in capsys.readouterr().err

@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import pytest
 
 from airground_drake.errors import FolderError
 from airground_drake.report import document, folder
+
+
+def fill(folder: Path, files: dict[str, str]) -> None:
+    for name, text in files.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(text)
+
+
+def content(folder: Path) -> dict[str, str]:
+    return {str(path.relative_to(folder)): path.read_text() for path in folder.rglob("*") if path.is_file()}
+
 
 OURS = f'{{\n "schema": "{document.SCHEMA}",\n "scenario": {{}}}}'
 
@@ -21,14 +31,16 @@ OURS = f'{{\n "schema": "{document.SCHEMA}",\n "scenario": {{}}}}'
         {"report.json": '{"schema": "airground_drake.report/1"}', ".git": ""},
         {"report.html": "", "diagram.svg": ""},
         {"diagram.dot": "", ".report.json.999999.abcdefgh.partial": ""},
+        {"trace/d/meta.json": "", "certificates/SAFE-INV/a.smt2": "", "proofs/index.json": ""},
+        {"report.json": OURS, "trace/notes.txt": "mine"},
     ],
 )
 def test_new_empty_and_own_folders_are_taken(holds: dict[str, str], tmp_path: Path) -> None:
-    for name, text in holds.items():
-        (tmp_path / name).write_text(text)
+    fill(tmp_path, holds)
     folder.prepare(tmp_path)
+    assert content(tmp_path) == {name: text for name, text in holds.items() if not name.endswith(".partial")}
     folder.prepare(tmp_path / "new" / "one")
-    assert set(os.listdir(tmp_path)) == {name for name in holds if not name.endswith(".partial")} | {"new"}
+    assert (tmp_path / "new" / "one").is_dir()
 
 
 @pytest.mark.parametrize(
@@ -37,20 +49,43 @@ def test_new_empty_and_own_folders_are_taken(holds: dict[str, str], tmp_path: Pa
         {"thesis.tex": ""},
         {"report.json": "{}", "data.csv": ""},
         {"report.json": '{"schema": "other.report/1"}', "x": ""},
-        {"trace": "", "x\n\u202e": ""},
+        {"diagram.svg": "", "x\n\u202e": ""},
+        {"trace/notes.txt": "mine"},
+        {"trace/d/signals.parquet": "", "trace/d/notes.txt": "mine"},
+        {"certificates/ssl/key.pem": "mine"},
     ],
 )
 def test_what_holds_something_else_is_left_alone(holds: dict[str, str], tmp_path: Path) -> None:
-    for name, text in holds.items():
-        (tmp_path / name).write_text(text)
+    fill(tmp_path, holds)
     with pytest.raises(FolderError, match="and no report; allowed: a folder that is new or empty") as refused:
         folder.prepare(tmp_path)
     assert str(refused.value).isprintable()
-    assert {name: (tmp_path / name).read_text() for name in os.listdir(tmp_path)} == holds
+    assert content(tmp_path) == holds
+
+
+@pytest.mark.parametrize("holds", [{"trace": ""}, {"diagram.svg/x": ""}, {"certificates/SAFE-INV": ""}])
+def test_what_is_in_the_way_of_a_report_is_refused_beside_one_too(holds: dict[str, str], tmp_path: Path) -> None:
+    fill(tmp_path, {"report.json": OURS, **holds})
+    with pytest.raises(FolderError, match="which is in the way"):
+        folder.prepare(tmp_path)
+
+
+def test_nothing_stays_of_an_old_report_and_everything_else_does(tmp_path: Path) -> None:
+    old = (
+        "report.html", "report.json", "junit.xml", "diagram.svg", "trace/d/meta.json", "trace/d/signals.parquet",
+        "trace/killed/signals.parquet", "certificates/SAFE-INV/gram.json", "proofs/index.json",
+        "proofs/SAFE-INV/a.cpc",
+    )  # fmt: skip
+    mine = {"notes.txt": "a", "trace/d/notes.txt": "b", "certificates/ssl/key.pem": "c", "report.html.bak": "d"}
+    fill(tmp_path, {**dict.fromkeys(old, ""), **mine})
+    folder.clear(tmp_path)
+    assert content(tmp_path) == mine
+    assert not (tmp_path / "proofs").exists()
+    folder.clear(tmp_path)
 
 
 def test_a_folder_that_cannot_be_had_is_named(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("in the way")
     for path in (tmp_path / "file", tmp_path / "file" / "below"):
-        with pytest.raises(OSError, match="file"):
+        with pytest.raises(FolderError, match=r"file.* cannot be written: .*; wanted: a folder"):
             folder.prepare(path)

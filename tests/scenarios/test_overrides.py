@@ -30,6 +30,23 @@ def test_override(override: str, value: object) -> None:
     assert digest != base_digest
 
 
+def test_a_mapping_whose_names_are_free_takes_new_ones(write: Write) -> None:
+    changes = [
+        "runs.d.expected.LIVE-GOAL=refuted",
+        "obstacles.box.position_m=[-9, -9, 0]",
+        "obstacles.box.known_to_uav=false",
+        "intervention.policies.0.parameters.clearance_m=0.2",
+        "runs.again={method: b}",
+    ]
+    scenario, _ = load("case_a", changes)
+    assert scenario.runs["d"].expected["LIVE-GOAL"] == "refuted"
+    assert (scenario.obstacles["box"].position_m, scenario.obstacles["box"].known_to_uav) == ([-9.0, -9.0, 0.0], False)
+    assert scenario.intervention.policies[0].parameters == {"speed_m_s": 2.85, "clearance_m": 0.2}
+    assert [*scenario.obstacles][-1] == "box"
+    assert [*scenario.runs][-1] == "again"
+    assert load(write(SMALL), ["obstacles.box.position_m=[-9, -9, 0]"])[0].obstacles["box"].known_to_uav
+
+
 def test_overrides_apply_in_order_and_leave_aliases_alone(write: Write) -> None:
     first, second = "preset: {waypoints_m: [[0, 0, 0]", "preset: {waypoints_m: [[0, 5, 0], [9, 5, 0]]}"
     path = write(SMALL.replace(first, first.replace("preset:", "preset: &shared")).replace(second, "preset: *shared"))
@@ -49,10 +66,13 @@ def test_the_digest_depends_on_how_overrides_are_split(write: Write) -> None:
         ("=1", ["--set =1", "dotted.key=value"]),
         ("contrl.period_s=1", ["contrl: unknown key", "did you mean control?", "obstacles"]),
         ("control.period=1", ["control.period: unknown key", "did you mean period_s?", "avoidance_gain_1_s"]),
-        ("ugvs.ugv9.max_speed_m_s=1", ["ugvs.ugv9: unknown key", "ugv1, ugv2"]),
+        ("ugvs.ugv9.max_speed_m_s=1", ["ugvs.ugv9.start_m: missing", "a list in m, as ugvs.ugv9 is new"]),
+        ("ugvs.ugv9.max_sped_m_s=1", ["ugvs.ugv9.max_sped_m_s: unknown key", "did you mean max_speed_m_s?"]),
+        ("runs.d.expected.LIVE-GAOL=refuted", ["runs.d.expected.LIVE-GAOL", "one of the claims"]),
+        ("obstacles.box.x.position_m=[1, 2, 0]", ["obstacles.box.x: unknown key", "position_m"]),
         ("ugvs..start_m=1", ["ugvs.: unknown key"]),
         ("intervention.policies.3.name=x", ["intervention.policies.3: unknown key", "allowed: 0"]),
-        ("intervention.policies.0.parameters.sped_m_s=1", ["parameters.sped_m_s", "did you mean speed_m_s?"]),
+        ("intervention.policies.0.parameters.=1", ["parameters.: unknown key", "allowed: speed_m_s"]),
         ("seed.x=1", ["seed.x: unknown key", "allowed: none"]),
         ("control.period_s=5 km", ["--set", "control.period_s: '5 km'", "a number in s"]),
         ("control.period_s=", ["--set control.period_s=", "empty"]),

@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
+import sys
+from importlib import resources
+from pathlib import Path
+from textwrap import dedent
+
 import pytest
 
 from airground_drake import graphviz
 from airground_drake.diagram import build_diagram
-from airground_drake.errors import ScenarioError
-from airground_drake.scenarios.plugins import plugins, refuse, without
+from airground_drake.errors import PluginError, ScenarioError
+from airground_drake.intervention import policy
+from airground_drake.registry import POLICIES, ROUTES, is_plugin
+from airground_drake.runs import simulate_all
+from airground_drake.scenarios.load import load
+from airground_drake.scenarios.plugins import admitted, plugins, refuse, without
 from airground_drake.scenarios.schema import Policy, Scenario
+from airground_drake.verify import verify
 
 
 def test_what_is_registered_is_none(case_a: Scenario) -> None:
@@ -28,6 +38,91 @@ def test_all_that_can_be_named_is_looked_at(case_a: Scenario) -> None:
     with pytest.raises(ScenarioError, match=r"^mine.yaml: uav.task: 'm:Task' is not allowed; .* --allow-plugins$"):
         refuse(case_a, "mine.yaml")
     refuse(case_a, "mine.yaml", keys=[])
+
+
+BESIDE = {
+    "tricks.py": """
+        from beside_helper import MOVED
+        from airground_drake.intervention.policy import Policy
+        class Mine(Policy):
+            def propose(self, seen):
+                raise ValueError(f"asked beside, {MOVED}")
+    """,
+    "beside_helper.py": """
+        from airground_drake.gatekeeper.solution import Solution
+        from airground_drake.nsbc.tasks import FormationTask
+        MOVED = "imported beside"
+        class Route:
+            def solve(self, problem, budget):
+                return Solution(False, "refused_not_finite")
+        class Task(FormationTask):
+            pass
+    """,
+    "claims/own.py": """
+        from airground_drake.verify.claim import TraceClaim
+        from airground_drake.verify.finding import Finding
+        class Own(TraceClaim):
+            id, statement, formula, method, equations = "OWN", "It holds.", "1", "None.", "none"
+            assumptions, does_not_establish, exercised_by = (), "Anything.", "things"
+            def check(self, trace):
+                return Finding("holds", exercised=len(trace.t))
+    """,
+}
+
+
+def test_code_of_others_is_found_beside_the_scenario_file_wherever_it_runs(tmp_path: Path) -> None:
+    for name, text in BESIDE.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(dedent(text))
+    file = tmp_path / "mine.yaml"
+    file.write_text(resources.files("airground_drake.scenarios").joinpath("minimal.yaml").read_text())
+    changes = {
+        "uav.task": "beside_helper:Task",
+        "gatekeeper.route": "beside_helper.py:Route",
+        "intervention.policies": [{"name": "tricks.py:Mine"}],
+        "claims": {"OWN": "claims/own.py:Own"},
+        "runs": {"d": {"method": "d"}},
+        "duration_s": 6.0,
+        "decision.threshold.zeta_m": 0.5,
+        "decision.release_m": 0.2,
+    }
+    scenario = load(file, changes)[0]
+    before = list(sys.path)
+    with admitted(scenario, str(file), allow=True):
+        trace = simulate_all(scenario)["d"]
+        assert [verdict.finding.status for verdict in verify(trace, ["OWN"])] == ["holds"]
+        twice = [POLICIES.load("tricks.py:Mine", of=policy.Policy) for _ in range(2)]
+        assert twice[0] is twice[1]
+    assert sys.path == before
+    assert {fault["what"] for fault in trace.meta["faults"]} == {"ValueError: asked beside, imported beside"}
+
+
+def test_what_is_not_found_says_where_it_was_looked_for(case_a: Scenario, tmp_path: Path) -> None:
+    file = tmp_path / "mine.yaml"
+    file.touch()
+    for name in ("no_such_module:It", "no/such-file.py:It"):
+        with admitted(case_a, str(file), allow=True), pytest.raises(PluginError, match="looked in") as error:
+            ROUTES.load(name, of=object)
+        assert f"looked in {tmp_path}, " in str(error.value)
+        assert str(error.value).endswith("Python's own folders")
+    case_a.intervention.policies[0].name = "no/such-file.py:It"
+    with admitted(case_a, str(file), allow=True), pytest.raises(PluginError, match=f"looked in {tmp_path}"):
+        simulate_all(case_a)
+
+
+def test_without_leave_the_path_is_what_it_was(case_a: Scenario, tmp_path: Path) -> None:
+    (tmp_path / "mine.yaml").touch()
+    before = list(sys.path)
+    with admitted(case_a, str(tmp_path / "mine.yaml"), allow=False):
+        assert sys.path == before
+    case_a.uav.task = "hover.py:Hover"
+    with pytest.raises(ScenarioError, match="--allow-plugins"), admitted(case_a, "mine.yaml", allow=False):
+        pytest.fail("admitted")
+
+
+@pytest.mark.parametrize("name", ["../x.py:It", "/x.py:It", "a//x.py:It", ".py:It", "x.py", "x.py:", "a.b/x.py:It"])
+def test_a_file_is_one_below_a_folder_of_the_path(name: str) -> None:
+    assert not is_plugin(name)
 
 
 def test_the_diagram_without_it_is_the_same(case_a: Scenario) -> None:

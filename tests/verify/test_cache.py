@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import os
+import sys
 from collections.abc import Callable
 from dataclasses import asdict, replace
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +15,7 @@ import pytest
 
 import airground_drake
 from airground_drake.errors import PluginError
-from airground_drake.report.__main__ import _save_certificates
+from airground_drake.report.make import _save_certificates
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify import cache
 from airground_drake.verify.claim import ModelClaim, Verdict
@@ -193,3 +195,23 @@ def test_the_key_covers_every_file_of_the_package_where_it_is(tmp_path: Path) ->
     assert cache.code_digest(tmp_path) == digests[-1]
     package = Path(airground_drake.__file__).parent
     assert cache.code_digest(package) == cache._code()
+
+
+def test_the_file_of_a_claim_of_others_is_part_of_what_its_finding_depends_on(tmp_path: Path) -> None:
+    found = []
+    for number, text in enumerate(("class It: pass", "class It: pass  # changed", "class It: pass")):
+        path = tmp_path / f"m{number}.py"
+        path.write_text(text)
+        spec = spec_from_file_location(path.stem, path)
+        assert spec is not None
+        assert spec.loader is not None
+        module = module_from_spec(spec)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setitem(sys.modules, path.stem, module)
+            spec.loader.exec_module(module)
+            found.append(cache._code_of(module.It))
+    assert found[0] == found[2] != found[1]
+    assert cache._code_of(SafeGate) == cache._code()
+    alone = type("It", (), {"__module__": "nowhere"})
+    assert cache._code_of(alone).startswith(cache._code())
+    assert len(cache._code_of(alone)) > len(cache._code())

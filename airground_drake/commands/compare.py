@@ -1,0 +1,116 @@
+"""`airground compare BEFORE AFTER`: what has changed from one report to another."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from airground_drake import files
+from airground_drake.errors import AirgroundError, TraceError, one_line
+from airground_drake.report import compare
+
+EXIT_WORSE, EXIT_USAGE = 1, 2
+PARTS = ("verdicts", "margins", "exercised", "expectations", "reproduction", "audit", "mutants", "events")
+MOST_LINES, MOST_ROWS = 20, 200
+"""Changes of one part that are shown, in the terminal and on the page; --json has all."""
+_ABOUT = ("claim", "id", "run", "robot", "kind", "n")
+
+
+def parser() -> argparse.ArgumentParser:
+    """What the command line takes."""
+    parser = argparse.ArgumentParser(
+        prog="airground compare",
+        description="What has changed from one report to another: verdicts, margins, what was exercised, events.",
+        epilog="verdicts from the best to the worst: "
+        + "; ".join(", ".join(alike) for alike in compare.ORDER).replace("_", " ")
+        + ". One that was as expected and is no longer is worse, too. Exit codes: 0 nothing is worse than before, 1 "
+        "something is (with --exact: anything differs), 2 usage, or a folder is no report.",
+    )
+    parser.add_argument("before", type=Path, metavar="BEFORE", help="folder of a report")
+    parser.add_argument("after", type=Path, metavar="AFTER", help="folder of another")
+    parser.add_argument("--json", action="store_true", help="print all of it as JSON")
+    parser.add_argument(
+        "--html", type=Path, metavar="FILE", help="write a page, with the runs drawn one over the other"
+    )
+    parser.add_argument("--exact", action="store_true", help="exit code 1 if anything differs, to the last digit")
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Compare, and say what differs.
+
+    Returns:
+        Exit code: 0, 1 if something is worse than before (or differs, if asked for), 2 if a folder is no report.
+    """
+    options = parser().parse_args(arguments)
+    try:
+        before, after = compare.read(options.before), compare.read(options.after)
+        found = compare.compared(before, after)
+        if options.html is not None:
+            files.write_text(options.html, _page((options.before, options.after), before, after, found))
+    except (AirgroundError, OSError) as error:
+        print(f"error: {one_line(str(error))}", file=sys.stderr)
+        return EXIT_USAGE
+    if options.json:
+        places = {"schema": compare.SCHEMA, "before": str(options.before), "after": str(options.after)}
+        print(json.dumps({**places, **found}, indent=1, allow_nan=False))
+    else:
+        print("\n".join(one_line(line) for line in _lines(found)))
+    differs = any(found[part] for part in PARTS)
+    return EXIT_WORSE if found["regressions"] or (options.exact and differs) else 0
+
+
+def _lines(found: Mapping[str, Any]) -> Iterator[str]:
+    for part in PARTS:
+        changes = sorted(found[part], key=lambda change: not change.get("worse"))
+        if changes:
+            yield f"{part}:"
+        yield from (f"  {_line(change)}" for change in changes[:MOST_LINES])
+        if len(changes) > MOST_LINES:
+            yield f"  and {len(changes) - MOST_LINES} more: --json has all"
+    count = found["regressions"]
+    changed = ", ".join(f"{len(found[part])} {part}" for part in PARTS if found[part])
+    yield f"{changed or 'nothing'} changed; {count or 'no'} regression{'' if count == 1 else 's'}"
+
+
+def _line(change: Mapping[str, Any]) -> str:
+    """A change in a line: what, before, after."""
+    about = " ".join(str(change[key]) for key in _ABOUT if change.get(key))
+    unit = f" {change['unit']}" if change.get("unit") else ""
+    relative = change.get("relative")
+    percent = "" if relative is None else f" ({100.0 * relative:+.3g} %)"
+    expected = " (not as expected)" if change.get("as_expected") is False and change["after"] else ""
+    worse = "worse: " if change.get("worse") else ""
+    return f"{worse}{about}: {_side(change['before'])} -> {_side(change['after'])}{unit}{percent}{expected}"
+
+
+def _side(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return ", ".join(f"{name} {_side(item)}" for name, item in value.items())
+    return f"{value:.9g}" if isinstance(value, float) else "none" if value is None else str(value)
+
+
+def _page(
+    folders: tuple[Path, Path], before: compare.Document, after: compare.Document, found: Mapping[str, Any]
+) -> str:
+    """The comparison as a page, with the runs of which both reports have a trace."""
+    from airground_drake import trace
+    from airground_drake.report import pages
+    from airground_drake.report.figures import overlay
+
+    figures, problems = [], []
+    for position, run in enumerate(name for name in after["runs"] if name in before["runs"] and name.isidentifier()):
+        try:
+            one, two = (trace.load(folder / "trace" / run) for folder in folders)
+        except (TraceError, OSError) as error:
+            problems.append(f"Run {run} cannot be drawn: {error}")
+        else:
+            figures.append(overlay.draw(run, position, one, two))
+    return pages.render(
+        "compare.html.j2", before=before, after=after, found=found, figures=figures, problems=problems, parts=PARTS,
+        places=[str(folder) for folder in folders], most=MOST_ROWS,
+    )  # fmt: skip

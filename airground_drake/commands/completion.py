@@ -1,0 +1,78 @@
+"""`airground completion SHELL`: what completes this command line in a shell."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from importlib import import_module
+from pathlib import Path
+
+from airground_drake.scenarios.shipped import shipped
+
+SHELLS = ("bash", "zsh", "tcsh")
+EPILOG = """\
+for this session:  eval "$(airground completion bash)"
+for good:          airground completion bash > ~/.local/share/bash-completion/completions/airground
+                   airground completion zsh > a folder of $fpath/_airground
+                   airground completion tcsh > /etc/profile.d/airground.completion.csh"""
+SCENARIOS = ("scenario", "target")
+"""Arguments that are the name of a shipped scenario, or a file."""
+
+
+def parser() -> argparse.ArgumentParser:
+    """What the command line takes."""
+    parser = argparse.ArgumentParser(
+        prog="airground completion",
+        description="Print what completes commands, options, scenarios and files in a shell.",
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("shell", choices=SHELLS)
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Print it."""
+    shell = parser().parse_args(arguments).shell
+    import shtab
+
+    print(shtab.complete(tree(), shell))
+    return 0
+
+
+def tree() -> argparse.ArgumentParser:
+    """The parsers of all commands as one, with what completes each argument."""
+    from airground_drake.commands import COMMANDS
+
+    whole = argparse.ArgumentParser(prog="airground")
+    whole.add_argument("--version", action="store_true")
+    commands = whole.add_subparsers()
+    for name, command in COMMANDS.items():
+        of_command = import_module(command.module).parser()
+        for action in of_command._actions:
+            _complete(action)
+        commands.add_parser(name, help=command.says, parents=[of_command], add_help=False)
+    return whole
+
+
+def _complete(action: argparse.Action) -> None:
+    """Give an argument what shtab completes it with."""
+    import shtab
+
+    if action.dest in SCENARIOS:
+        action.complete = _scenarios()  # type: ignore[attr-defined]
+    elif action.type is Path:
+        action.complete = shtab.DIRECTORY if action.metavar == "DIR" else shtab.FILE  # type: ignore[attr-defined]
+
+
+def _scenarios() -> dict[str, str | dict[str, str]]:
+    """The shipped scenarios and files, in the words of each shell."""
+    names = " ".join(shipped())
+    bash = f'_airground_scenarios() {{\n  compgen -W "{names}" -- "$1"\n  _shtab_compgen_files "$1"\n}}'
+    zsh = f"_airground_scenarios() {{\n  _alternative 'scenarios:shipped scenario:({names})' 'files:file:_files'\n}}"
+    return {
+        "bash": "_airground_scenarios",
+        "zsh": "_airground_scenarios",
+        "tcsh": f"({names})",
+        "preamble": {"bash": bash, "zsh": zsh, "tcsh": ""},
+    }

@@ -1,0 +1,98 @@
+"""`airground index DIR`: a page that lists the reports in a folder."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+from airground_drake import files
+from airground_drake.errors import AirgroundError, FolderError, ReportError, TraceError, one_line
+from airground_drake.report import compare, folder
+
+EXIT_USAGE = 2
+PAGE = "index.html"
+MARK = "airground_drake index"
+"""By which a page of ours is known."""
+
+
+def parser() -> argparse.ArgumentParser:
+    """What the command line takes."""
+    parser = argparse.ArgumentParser(
+        prog="airground index", description=f"Write DIR/{PAGE}, which lists the reports below DIR and leads to them."
+    )
+    parser.add_argument("folder", type=Path, metavar="DIR", help="folder with folders of reports in it")
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Write the page.
+
+    Returns:
+        Exit code: 0, or 2 if there are no reports or the page cannot be written.
+    """
+    place: Path = parser().parse_args(arguments).folder
+    try:
+        print(_write(place))
+    except (AirgroundError, OSError) as error:
+        print(f"error: {one_line(str(error))}", file=sys.stderr)
+        return EXIT_USAGE
+    return 0
+
+
+def _write(place: Path) -> Path:
+    """Write the page of a folder.
+
+    Raises:
+        FolderError: if there are no reports in it, or a page of somebody else's.
+        OSError: if it cannot be written.
+    """
+    from airground_drake.report import pages
+
+    page = place / PAGE
+    if page.exists() and MARK not in page.read_text(encoding="utf-8", errors="replace"):
+        raise FolderError(f"{page} is not a list of reports that `airground index` has made; it is left alone")
+    below = sorted(path.parent for path in place.glob("**/report.json") if path.parent != place)
+    entries: list[dict[str, Any]] = []
+    problems = []
+    for each in filter(folder.is_report, below):
+        try:
+            entries.append(_entry(each, place, f"run-{len(entries)}"))
+        except ReportError as error:
+            problems.append(str(error))
+    if not entries:
+        why = f": {problems[0]}" if problems else ""
+        raise FolderError(f"there are no reports in the folders below {place}{why}")
+    entries.sort(key=lambda entry: (entry["scenario"]["name"], entry["provenance"].get("started", ""), entry["place"]))
+    name = place.resolve().name
+    files.write_text(page, pages.render("index.html.j2", entries=entries, problems=problems, name=name, mark=MARK))
+    return page
+
+
+def _entry(report: Path, place: Path, prefix: str) -> dict[str, Any]:
+    """What the page says of a report.
+
+    Raises:
+        ReportError: if it cannot be used.
+    """
+    document = compare.read(report)
+    leads_to = report / (folder.PAGES["html"] if (report / folder.PAGES["html"]).is_file() else folder.PAGES["json"])
+    where = report.relative_to(place).as_posix()
+    link = quote(leads_to.relative_to(place).as_posix())
+    kept = {part: document[part] for part in ("scenario", "overall", "provenance")}
+    return {**kept, "place": where, "link": link, "thumbnail": _thumbnail(report, document, prefix)}
+
+
+def _thumbnail(report: Path, document: Mapping[str, Any], prefix: str) -> str:
+    """The last run as a picture; '' if it has no trace that can be used."""
+    from airground_drake import trace
+    from airground_drake.report.figures import thumbnail
+
+    runs = [run for run in document["runs"] if run.isidentifier()]
+    try:
+        return thumbnail.draw(trace.load(report / "trace" / runs[-1]), prefix)
+    except (TraceError, OSError, IndexError):
+        return ""

@@ -1,0 +1,206 @@
+"""What has changed from one report to another, read from their report.json alone.
+
+A verdict is worse than before if it stands further down in `ORDER`, if it was as the scenario expected and no longer
+is, or if it is gone; so is a row of the reproduction table, by `ROWS`, a finding about the paper that is no longer
+demonstrated, and a broken variant of a proof that is no longer refuted. Numbers are compared to the last digit, but for
+what is measured by the clock.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from airground_drake.errors import ReportError, one_line
+from airground_drake.registry import outcome
+from airground_drake.report.folder import PAGES
+
+SCHEMA = "airground_drake.comparison/1"
+REPORT = "airground_drake.report/2"
+
+ORDER: tuple[tuple[str, ...], ...] = (
+    ("proved",),
+    ("holds", "supported"),
+    ("not_exercised",),
+    ("inconclusive", "error", "not_run", "gone"),
+    ("refuted",),
+)
+"""Verdicts from the best to the worst, as `registry.outcome` names them; `gone`: there is none any more."""
+ROWS: tuple[tuple[str, ...], ...] = (("reproduced",), ("calibrated",), ("ambiguous",), ("not_reproduced", "gone"))
+"""Rows of the reproduction table, likewise."""
+VERDICTS = ("as_expected", "not_as_expected", "inconclusive")
+"""Over all claims."""
+LONGEST_INTEGER = 18
+"""Digits of an integer that is read."""
+MEASURED = frozenset({"GATE-TIME"})
+"""Claims whose margin is measured by the clock, and never the same."""
+
+Document = Mapping[str, Any]
+Change = dict[str, Any]
+
+
+def read(folder: Path) -> Document:
+    """The report.json of a folder.
+
+    Raises:
+        ReportError: if there is none that can be used.
+    """
+    path = folder / PAGES["json"]
+    try:
+        document = json.loads(
+            path.read_text(encoding="utf-8"), parse_constant=_finite, parse_float=_finite, parse_int=_short
+        )
+        json.dumps(document, ensure_ascii=False).encode()  # no halves of characters
+        if document["schema"] != REPORT:
+            raise ValueError(f"its schema is not {REPORT}")
+        _usable(document)
+    except (OSError, ValueError, TypeError, LookupError, AttributeError, RecursionError) as error:
+        why = getattr(error, "strerror", None) or f"{type(error).__name__}: {error}"
+        raise ReportError(one_line(f"{path} is no report that can be used: {why}"[:300])) from None
+    return dict(document)
+
+
+def _usable(document: Document) -> None:
+    """Look at everything that a comparison looks at.
+
+    Raises:
+        ValueError, TypeError, KeyError, AttributeError: if something is of another kind.
+    """
+    compared(document, document)
+    for part, names in (("scenario", ("name", "title")), ("overall", ("why",)), ("provenance", ("started",))):
+        if not all(isinstance(document[part].get(name, ""), str) for name in names):
+            raise TypeError(f"{part} is not what it should be")
+    for status in document["overall"]["counts"]:
+        _rank(ORDER, status)
+    if not all(isinstance(document["overall"][name], int) for name in ("checks", "as_expected")):
+        raise TypeError("overall is not what it should be")
+    if document["overall"]["status"] not in VERDICTS:
+        raise ValueError(f"its overall status is none of {', '.join(VERDICTS)}")
+    for claim in document["claims"]:
+        _rank(ORDER, _outcome(claim))
+        if not isinstance(claim["margin"], float | int | None):
+            raise TypeError("a margin is no number")
+    for row in document["reproduction"]:
+        _rank(ROWS, row["status"])
+
+
+def compared(before: Document, after: Document) -> dict[str, Any]:
+    """What differs.
+
+    Returns:
+        Strict JSON: `regressions`, a count; lists of changes `verdicts`, `margins`, `exercised`, `expectations`,
+        `reproduction`, `audit`, `mutants`, `events`. Each change has `before` and `after` (None where there is none),
+        what it is about (`claim` and `run`, `id`, or `run`, `robot`, `kind` and which of its kind, `n`, from 1), and
+        whether it is `worse`; margins have their `relative` change.
+    """
+    found: dict[str, Any] = {
+        "verdicts": list(_verdicts(before, after)),
+        "margins": [{**each, "relative": _relative(each)} for each in _of_claims(before, after, "margin")],
+        "exercised": list(_of_claims(before, after, "exercised")),
+        "expectations": list(_of_claims(before, after, "expected")),
+        "reproduction": list(_rows(before, after)),
+        "audit": list(_findings(before, after, "audit", "demonstrated")),
+        "mutants": list(_findings(before, after, "mutants", "refuted")),
+        "events": list(_events(before, after)),
+    }
+    for change in (changes := [change for part in found.values() for change in part]):
+        change.setdefault("worse", False)
+    return {"regressions": sum(change["worse"] for change in changes), **found}
+
+
+def _verdicts(before: Document, after: Document) -> Iterator[Change]:
+    for (claim, run), old, new in _paired(before["claims"], after["claims"], "id", "run"):
+        was, now = _outcome(old), _outcome(new)
+        lost = bool(old and old["as_expected"] and not (new and new["as_expected"]))
+        if was != now or lost:
+            worse = old is not None and (lost or _rank(ORDER, now) > _rank(ORDER, was))
+            change = {"claim": claim, "run": run, "before": was if old else None, "after": now if new else None}
+            yield {**change, "worse": worse, "as_expected": bool(new and new["as_expected"])}
+
+
+def _of_claims(before: Document, after: Document, field: str) -> Iterator[Change]:
+    """Changes of a field of claims that are in both reports."""
+    for (claim, run), old, new in _paired(before["claims"], after["claims"], "id", "run"):
+        if old and new and old[field] != new[field] and not (field == "margin" and claim in MEASURED):
+            unit = {"unit": new["unit"]} if field == "margin" else {}
+            yield {"claim": claim, "run": run, "before": old[field], "after": new[field], **unit}
+
+
+def _rows(before: Document, after: Document) -> Iterator[Change]:
+    for (row,), old, new in _paired(before["reproduction"], after["reproduction"], "id"):
+        was, now = (each and {"status": each["status"], "ours": each["ours"]} for each in (old, new))
+        if was != now:
+            worse = old is not None and _rank(ROWS, new["status"] if new else "gone") > _rank(ROWS, old["status"])
+            yield {"id": row, "before": was, "after": now, "worse": worse}
+
+
+def _findings(before: Document, after: Document, part: str, good: str) -> Iterator[Change]:
+    """Findings about the paper, or broken variants of proofs."""
+    keys = ("id",) if part == "audit" else ("claim", "mutant")
+    kept = (good, "paper", "ours") if part == "audit" else (good, "status")
+    for key, old, new in _paired(before[part], after[part], *keys):
+        was, now = (each and {name: each[name] for name in kept} for each in (old, new))
+        if was != now:
+            worse = bool(old and old[good] and not (new and new[good]))
+            yield {"id": ": ".join(key), "before": was, "after": now, "worse": worse}
+
+
+def _events(before: Document, after: Document) -> Iterator[Change]:
+    """Times of events, the first of a kind with the first, and so on."""
+    for run in dict.fromkeys([*before["runs"], *after["runs"]]):
+        old, new = (_times(report["runs"].get(run, {"events": []})["events"]) for report in (before, after))
+        for robot, kind in dict.fromkeys([*old, *new]):
+            was, now = old.get((robot, kind), []), new.get((robot, kind), [])
+            for n in range(max(len(was), len(now))):
+                times = [each[n] if n < len(each) else None for each in (was, now)]
+                if times[0] != times[1]:
+                    about = {"run": run, "robot": robot, "kind": kind, "n": n + 1}
+                    yield {**about, "before": times[0], "after": times[1], "unit": "s"}
+
+
+def _times(events: Sequence[Mapping[str, Any]]) -> dict[tuple[str, str], list[float]]:
+    found = defaultdict(list)
+    for event in events:
+        found[str(event["robot"]), str(event["kind"])].append(float(event["t_s"]))
+    return found
+
+
+def _paired(
+    before: Sequence[Mapping[str, Any]], after: Sequence[Mapping[str, Any]], *keys: str
+) -> Iterator[tuple[tuple[str, ...], Mapping[str, Any] | None, Mapping[str, Any] | None]]:
+    """What has the same key in both lists, and what is in one of them only."""
+    old, new = ({tuple(str(each[key]) for key in keys): each for each in part} for part in (before, after))
+    for key in dict.fromkeys([*old, *new]):
+        yield key, old.get(key), new.get(key)
+
+
+def _outcome(claim: Mapping[str, Any] | None) -> str:
+    return outcome(claim["status"], claim["exercised"]) if claim else "gone"
+
+
+def _rank(order: Sequence[Sequence[str]], name: str) -> int:
+    return [name in alike for alike in order].index(True)
+
+
+def _relative(change: Change) -> float | None:
+    """The change of a number relative to what it was; None where there is no such thing."""
+    was, now = change["before"], change["after"]
+    relative = (now - was) / abs(was) if was and now is not None else math.nan
+    return relative if math.isfinite(relative) else None
+
+
+def _finite(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(f"{text} is not finite")
+    return value
+
+
+def _short(text: str) -> int:
+    if len(text) > LONGEST_INTEGER:
+        raise ValueError(f"an integer of {len(text)} digits")
+    return int(text)

@@ -1,0 +1,44 @@
+"""Pages beside the report, in its style: one offline file each, no script, everything from reports escaped."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from airground_drake.report.html import CHIPS, number
+
+POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'"
+"""Nothing is fetched and nothing runs; drawings have their styles in attributes."""
+
+
+def render(template: str, **content: Any) -> str:
+    """A page from a template of this package."""
+    return _environment().get_template(template).render(policy=Markup(POLICY), **content)
+
+
+@cache
+def _environment() -> Environment:
+    environment = Environment(
+        loader=PackageLoader("airground_drake.report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters.update(num=number, inline=Markup, shown=shown)
+    environment.globals.update(chips=CHIPS)
+    return environment
+
+
+def shown(value: Any) -> str:
+    """What a change has on one side, for reading."""
+    if isinstance(value, dict):
+        return ", ".join(f"{name} {shown(item)}" for name, item in value.items())
+    if isinstance(value, list):
+        return f"({', '.join(map(shown, value))})"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return number(value, 6) if isinstance(value, int | float) else str(value or "none").replace("_", " ")
