@@ -1,0 +1,86 @@
+"""One draw of a campaign: its scenario is simulated, its runs are judged, and what came of it are rows."""
+
+from __future__ import annotations
+
+import json
+import time
+
+from airground_drake.campaign.rows import DIED, INVALID, JUDGED, STOPPED, Row, blank
+from airground_drake.campaign.spec import Spec
+from airground_drake.errors import AirgroundError, ScenarioError, described, one_line
+from airground_drake.registry import METHODS
+from airground_drake.scenarios.estimate import Limits, within
+from airground_drake.scenarios.plugins import plugins
+from airground_drake.simulation import simulate
+from airground_drake.trace import Trace
+from airground_drake.verify import Verdict, verify
+
+
+def rows_of(spec: Spec, index: int, limits: Limits, *, allow_plugins: bool = False) -> list[Row]:
+    """Simulate and judge one draw.
+
+    Args:
+        spec: of the campaign.
+        index: of the draw.
+        limits: what its scenario may ask for; one that asks for more is `invalid`.
+        allow_plugins: whether code of others may be imported and run.
+
+    Returns:
+        A row for each run and claim, with the columns of `COLUMNS`.
+    """
+    values = spec.values(index)
+    common = blank() | {"index": index, "drawn": json.dumps(values, allow_nan=False)}
+    try:
+        scenario = spec.draw(index)
+        within(scenario, limits)
+        if not allow_plugins and (named := plugins(scenario)):
+            key, name = next(iter(named.items()))
+            raise ScenarioError(spec.source, key, name, "code of others is not allowed")
+    except AirgroundError as error:
+        return [common | {"ended": INVALID, "what": one_line(str(error))}]
+    rows: list[Row] = []
+    for run, given in scenario.runs.items():
+        here = common | {"run": run, "method": METHODS[given.method].id, "duration_s": scenario.duration_s}
+        started = time.perf_counter()
+        try:
+            trace = simulate(scenario, run)
+            verdicts = verify(trace, claims=spec.claims or None)
+        except (Exception, SystemExit) as error:
+            rows.append(here | {"ended": STOPPED, "what": described(error)})
+            continue
+        here |= {"ended": JUDGED, "wall_s": time.perf_counter() - started, **_happened(trace)}
+        rows += [here | _of_claim(verdict) for verdict in verdicts]
+    return rows
+
+
+def died(index: int) -> list[Row]:
+    """What is known of a draw whose process ended again and again."""
+    return [blank() | {"index": index, "ended": DIED, "what": "the process that simulated it died", "drawn": "{}"}]
+
+
+def _of_claim(verdict: Verdict) -> Row:
+    finding = verdict.finding
+    return {
+        "claim": verdict.claim.id,
+        "status": finding.status,
+        "as_expected": verdict.as_expected,
+        "margin": float("nan") if finding.margin is None else float(finding.margin),
+        "unit": finding.unit,
+        "exercised": float("nan") if finding.exercised is None else float(finding.exercised),
+    }
+
+
+def _happened(trace: Trace) -> Row:
+    """Triggers, arrivals of UGVs, and decisions of a run."""
+    triggers = [event["t_s"] for event in trace.events if event["kind"] == "trigger"]
+    arrivals = [event["t_s"] for event in trace.events if event["kind"] == "arrival" and event["robot"] in trace.ugvs]
+    return {
+        "ugvs": len(trace.ugvs),
+        "triggers": len(triggers),
+        "first_trigger_s": min(triggers, default=float("nan")),
+        "arrived": len(arrivals),
+        "arrival_s": max(arrivals, default=float("nan")),
+        "decisions": len(trace.decisions),
+        "accepted": int((trace.decisions["decision"] == "accept").sum()),
+        "faults": len(trace.meta["faults"]),
+    }
