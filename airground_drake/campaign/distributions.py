@@ -5,7 +5,7 @@ from __future__ import annotations
 import abc
 import math
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -204,7 +204,7 @@ def _values(given: Any) -> tuple[Any, ...]:
     return tuple(given)
 
 
-KINDS = {
+KINDS: dict[str, tuple[str, Callable[[Any], Distribution]]] = {
     "uniform": ("[low, high], numbers or lists of numbers", lambda given: Uniform(_interval(given))),
     "log_uniform": ("[low, high] with 0 < low", _log_uniform),
     "normal": ("[mean, standard deviation], and [..., low, high] to cut it", _normal),

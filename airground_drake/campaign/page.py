@@ -44,13 +44,15 @@ def _figures(found: dict[str, Any], table: pd.DataFrame) -> list[Drawing]:
     for (run, claim), rows in judged[judged["claim"].isin(SHOWN)].groupby(["run", "claim"]):
         values = rows["margin"].dropna().to_numpy()
         if len(values):
-            drawn.append(_histogram(values, f"{claim} in run {run}: margin", f"margin, {rows['unit'].iloc[0]}", 0.0))
+            drawn.append(
+                _histogram(values, f"{claim} in run {run}: margin", "margin, " + str(rows["unit"].iloc[0]), 0.0)
+            )
     runs = judged.drop_duplicates(["index", "run"])
     marks = {each["run"]: each["first_trigger_s"].get("mark") for each in found["times"]}
     for run, rows in runs.groupby("run"):
         values = rows["first_trigger_s"].dropna().to_numpy()
         if len(values):
-            drawn.append(_histogram(values, f"Run {run}: first trigger", "time, s", marks.get(str(run))))
+            drawn.append(_histogram(values, "Run " + str(run) + ": first trigger", "time, s", marks.get(str(run))))
     return [
         Drawing(title, Markup(svg.inline(text, f"figure{i}", title, title))) for i, (title, text) in enumerate(drawn)
     ]

@@ -85,13 +85,14 @@ def on_cluster(work: Work, indices: Iterable[int], scheduler: str) -> Iterator[l
         AirgroundError: if the scheduler cannot be reached, or Dask is not installed.
     """
     try:
-        from distributed import Client, as_completed
+        import distributed
     except ImportError:
         raise AirgroundError(
             "--scheduler needs the package distributed: pip install 'airground_drake[cluster]'"
         ) from None
+    dask: Any = distributed  # its types are incomplete
     try:
-        client: Any = Client(scheduler, timeout="10s", set_as_default=False)
+        client = dask.Client(scheduler, timeout="10s", set_as_default=False)
     except (OSError, ValueError) as error:
         raise AirgroundError(one_line(f"no Dask scheduler at {scheduler}: {error}")) from None
     with client:
@@ -104,7 +105,7 @@ def on_cluster(work: Work, indices: Iterable[int], scheduler: str) -> Iterator[l
             ]
 
         threads = sum(client.nthreads().values()) or 1
-        under_way = as_completed(submit(AHEAD * threads))
+        under_way = dask.as_completed(submit(AHEAD * threads), loop=client.loop)
         for future in under_way:
             index = int(future.key.rpartition("-")[2])
             yield died(index) if future.status == "error" else future.result()

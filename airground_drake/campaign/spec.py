@@ -139,7 +139,7 @@ def load_spec(path: Path) -> Spec:
         source,
     )  # fmt: skip
     _known(spec.runs, spec.base().runs, source, "runs")
-    _known(spec.claims, RUN_CLAIMS, source, "claims")
+    _known(spec.claims, tuple(RUN_CLAIMS), source, "claims")
     return spec
 
 

@@ -62,8 +62,9 @@ def _run(spec: Spec, options: argparse.Namespace, stopping: Stopping | None) -> 
     work = partial(rows_of, spec, limits=_limits(options), allow_plugins=options.allow_plugins)
     wanted = range(options.number if options.number is not None else spec.combinations)
     met = False
-    for rows in _known(store) if stopping is not None else ():
-        met = stopping.met(rows)
+    if stopping is not None:
+        for rows in _known(store):
+            met = stopping.met(rows)
     left = [] if met else [index for index in wanted if index not in store.finished]
     try:
         _all(work, left, options, store, stopping)
@@ -95,7 +96,7 @@ def _all(work: Any, left: Sequence[int], options: argparse.Namespace, store: Sto
 def _known(store: Store) -> Iterable[list[Row]]:
     """What an earlier call has finished, draw by draw."""
     for _, rows in store.table().groupby("index"):
-        yield rows.to_dict("records")
+        yield [{str(name): value for name, value in row.items()} for row in rows.to_dict("records")]
 
 
 def _only(spec: Spec, options: argparse.Namespace) -> int:
