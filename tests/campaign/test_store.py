@@ -77,7 +77,7 @@ def test_a_long_journal_becomes_a_part(tmp_path: Path, monkeypatch: pytest.Monke
 def test_a_folder_of_something_else_or_of_another_campaign_is_refused(tmp_path: Path) -> None:
     (tmp_path / "photos").mkdir()
     (tmp_path / "photos" / "me.png").write_bytes(b"")
-    with pytest.raises(FolderError, match="holds 'me.png'"):
+    with pytest.raises(FolderError, match=r"holds 'me\.png'"):
         Store(tmp_path / "photos", MANIFEST, resume=False)
     with pytest.raises(FolderError, match="another campaign"):
         Store(tmp_path / "photos", MANIFEST, resume=True)
