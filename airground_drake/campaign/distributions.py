@@ -1,4 +1,4 @@
-"""Distributions over the keys of a scenario: the value of a draw is a function of its number, the key and a seed."""
+"""Distributions over the keys of a scenario, as functions of shares in [0, 1): of random, even or searched ones."""
 
 from __future__ import annotations
 
@@ -16,52 +16,44 @@ from airground_drake.arrays import Array
 
 
 class Distribution(abc.ABC):
-    """What a key is drawn from."""
+    """What a key is drawn from, by the inverse of its distribution function."""
+
+    size: int = 1
+    """Number of shares that a value takes."""
 
     @abc.abstractmethod
-    def value(self, rng: np.random.Generator) -> Any:
-        """A value: a number, a list of numbers, or whatever a scenario file may have there."""
-
-
-@dataclass(frozen=True)
-class Interval:
-    """low <= value < high, numbers or lists of as many numbers."""
-
-    low: Any
-    high: Any
-
-    def at(self, share: Array | float) -> Any:
-        """The value a share (a number, or one for each entry) of the way from low to high."""
-        low, high = np.asarray(self.low, dtype=np.float64), np.asarray(self.high, dtype=np.float64)
-        return (low + share * (high - low)).tolist()
-
-    @property
-    def size(self) -> int:
-        """Number of entries."""
-        return int(np.size(self.low))
+    def at(self, shares: Array) -> Any:
+        """The value at these shares (size,) in [0, 1): a number, a list of numbers, or what a scenario may have."""
 
 
 @dataclass(frozen=True)
 class Uniform(Distribution):
-    """Uniform on an interval or a box."""
+    """Uniform on [low, high), or on a box: low and high are numbers, or lists of as many."""
 
-    interval: Interval
+    low: Any
+    high: Any
 
-    def value(self, rng: np.random.Generator) -> Any:
+    def at(self, shares: Array) -> Any:
         """Entries independent."""
-        return self.interval.at(rng.random(np.shape(self.interval.low)))
+        low, high = np.asarray(self.low, dtype=np.float64), np.asarray(self.high, dtype=np.float64)
+        return (low + np.reshape(shares, low.shape) * (high - low)).tolist()
+
+    @property
+    def size(self) -> int:  # type: ignore[override]
+        """One for each entry."""
+        return int(np.size(self.low))
 
 
 @dataclass(frozen=True)
 class LogUniform(Distribution):
-    """Uniform in the logarithm, for scales."""
+    """Uniform in the logarithm, between low > 0 and high: for scales."""
 
     low: float
     high: float
 
-    def value(self, rng: np.random.Generator) -> Any:
-        """Between low > 0 and high."""
-        return float(math.exp(rng.uniform(math.log(self.low), math.log(self.high))))
+    def at(self, shares: Array) -> Any:
+        """low (high / low)^share."""
+        return float(self.low * (self.high / self.low) ** shares[0])
 
 
 @dataclass(frozen=True)
@@ -73,10 +65,10 @@ class Normal(Distribution):
     low: float = -math.inf
     high: float = math.inf
 
-    def value(self, rng: np.random.Generator) -> Any:
-        """By the inverse of the distribution function."""
+    def at(self, shares: Array) -> Any:
+        """At a share of 0 without a lower end: the value at 1e-9."""
         ends = (self.low - self.mean) / self.sd, (self.high - self.mean) / self.sd
-        return float(truncnorm.rvs(*ends, loc=self.mean, scale=self.sd, random_state=rng))
+        return float(truncnorm.ppf(np.clip(shares[0], 1e-9, 1.0 - 1e-9), *ends, loc=self.mean, scale=self.sd))
 
 
 @dataclass(frozen=True)
@@ -86,9 +78,9 @@ class Integer(Distribution):
     low: int
     high: int
 
-    def value(self, rng: np.random.Generator) -> Any:
+    def at(self, shares: Array) -> Any:
         """Both ends are values."""
-        return int(rng.integers(self.low, self.high, endpoint=True))
+        return self.low + min(int(shares[0] * (self.high - self.low + 1)), self.high - self.low)
 
 
 @dataclass(frozen=True)
@@ -97,57 +89,61 @@ class Choice(Distribution):
 
     values: tuple[Any, ...]
 
-    def value(self, rng: np.random.Generator) -> Any:
-        """Any of them."""
-        return self.values[int(rng.integers(len(self.values)))]
+    def at(self, shares: Array) -> Any:
+        """In the order of the list."""
+        return self.values[min(int(shares[0] * len(self.values)), len(self.values) - 1)]
+
+
+RANDOM, EVEN, IN_TURN = "random", "even", "in turn"
 
 
 @dataclass(frozen=True)
-class Grid(Distribution):
-    """Each of some values in turn; several grids are gone through in all combinations."""
+class Key:
+    """How a key is drawn: at random, evenly (all such keys are one Halton sequence), or its values in turn."""
 
-    values: tuple[Any, ...]
-
-    def value(self, rng: np.random.Generator) -> Any:
-        """Only `values_of` knows the place in the grid."""
-        raise TypeError("a grid has no value of its own")
+    distribution: Distribution
+    how: str = RANDOM
 
 
-@dataclass(frozen=True)
-class Halton(Distribution):
-    """Low-discrepancy points of an interval or a box; all Halton keys together are one sequence."""
+def values_of(drawn: Mapping[str, Key], seed: int, index: int) -> dict[str, Any]:
+    """The values of one draw by key, in the order of the keys: a function of the seed and the index.
 
-    interval: Interval
-
-    def value(self, rng: np.random.Generator) -> Any:
-        """Only `values_of` knows the place in the sequence."""
-        raise TypeError("a Halton sequence has no value of its own")
-
-
-def values_of(drawn: Mapping[str, Distribution], seed: int, index: int) -> dict[str, Any]:
-    """The values of one draw by key, in the order of the keys.
-
-    A key's random stream depends on the seed, the key and the index: another key more or less does not change it.
+    The random numbers of a key depend on the seed, the key and the index: another key more or less changes none. Keys
+    whose values are gone through in turn are so in all combinations.
 
     Args:
-        drawn: distribution by dotted key.
+        drawn: by dotted key.
         seed: of the campaign.
         index: number of the draw, from 0.
     """
     values: dict[str, Any] = {}
     place = index
-    halton = [each.interval for each in drawn.values() if isinstance(each, Halton)]
-    shares = _halton(sum(each.size for each in halton), seed, index) if halton else np.empty(0)
-    for key, distribution in drawn.items():
-        if isinstance(distribution, Grid):
-            place, at = divmod(place, len(distribution.values))
-            values[key] = distribution.values[at]
-        elif isinstance(distribution, Halton):
-            own, shares = np.split(shares, [distribution.interval.size])
-            values[key] = distribution.interval.at(own.reshape(np.shape(distribution.interval.low)))
+    even = _halton(sum(key.distribution.size for key in drawn.values() if key.how == EVEN), seed, index)
+    for name, key in drawn.items():
+        own = key.distribution
+        if key.how == IN_TURN and isinstance(own, Choice):
+            place, at = divmod(place, len(own.values))
+            values[name] = own.values[at]
+        elif key.how == EVEN:
+            shares, even = np.split(even, [own.size])
+            values[name] = own.at(shares)
         else:
-            values[key] = distribution.value(stream(seed, key, index))
+            values[name] = own.at(stream(seed, name, index).random(own.size))
     return values
+
+
+def values_at(drawn: Mapping[str, Key], shares: Array) -> dict[str, Any]:
+    """The values by key at a point of the unit cube, (dimensions(drawn),), for a search."""
+    values: dict[str, Any] = {}
+    for name, key in drawn.items():
+        own, shares = np.split(shares, [key.distribution.size])
+        values[name] = key.distribution.at(own)
+    return values
+
+
+def dimensions(drawn: Mapping[str, Key]) -> int:
+    """Of the unit cube of all shares."""
+    return sum(key.distribution.size for key in drawn.values())
 
 
 def stream(seed: int, key: str, index: int) -> np.random.Generator:
@@ -155,30 +151,28 @@ def stream(seed: int, key: str, index: int) -> np.random.Generator:
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(zlib.crc32(key.encode()), index)))
 
 
-def combinations(drawn: Mapping[str, Distribution]) -> int:
-    """Number of combinations of all grids; 1 without any."""
-    return math.prod(len(each.values) for each in drawn.values() if isinstance(each, Grid))
+def combinations(drawn: Mapping[str, Key]) -> int:
+    """Number of combinations of the keys whose values are gone through in turn; 1 without any."""
+    kept = [key.distribution for key in drawn.values() if key.how == IN_TURN]
+    return math.prod(len(each.values) for each in kept if isinstance(each, Choice))
 
 
-def _halton(dimensions: int, seed: int, index: int) -> Array:
-    return np.asarray(qmc.Halton(dimensions, rng=np.random.default_rng(seed)).fast_forward(index).random(1)[0])
+def _halton(size: int, seed: int, index: int) -> Array:
+    if size == 0:
+        return np.empty(0)
+    return np.asarray(qmc.Halton(size, rng=np.random.default_rng(seed)).fast_forward(index).random(1)[0])
 
 
-def _interval(given: Any) -> Interval:
-    low, high = _pair(given)
-    low_, high_ = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
-    if low_.shape != high_.shape or low_.ndim > 1 or not (np.isfinite([low_, high_]).all() and (low_ <= high_).all()):
-        raise ValueError
-    return Interval(low, high)
-
-
-def _pair(given: Any) -> tuple[Any, Any]:
+def _uniform(given: Any) -> Uniform:
     low, high = given
-    return low, high
+    ends = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
+    if ends[0].shape != ends[1].shape or ends[0].ndim > 1 or not np.isfinite(ends).all() or (ends[0] > ends[1]).any():
+        raise ValueError
+    return Uniform(low, high)
 
 
 def _log_uniform(given: Any) -> LogUniform:
-    low, high = _pair(given)
+    low, high = given
     if not 0.0 < low <= high < math.inf:
         raise ValueError
     return LogUniform(float(low), float(high))
@@ -192,32 +186,33 @@ def _normal(given: Any) -> Normal:
 
 
 def _integer(given: Any) -> Integer:
-    low, high = _pair(given)
+    low, high = given
     if type(low) is not int or type(high) is not int or low > high:
         raise ValueError
     return Integer(low, high)
 
 
-def _values(given: Any) -> tuple[Any, ...]:
+def _choice(given: Any) -> Choice:
     if not isinstance(given, Sequence) or isinstance(given, str) or not given:
         raise ValueError
-    return tuple(given)
+    return Choice(tuple(given))
 
 
-KINDS: dict[str, tuple[str, Callable[[Any], Distribution]]] = {
-    "uniform": ("[low, high], numbers or lists of numbers", lambda given: Uniform(_interval(given))),
-    "log_uniform": ("[low, high] with 0 < low", _log_uniform),
-    "normal": ("[mean, standard deviation], and [..., low, high] to cut it", _normal),
-    "integer": ("[low, high], whole numbers", _integer),
-    "choice": ("a list of values", lambda given: Choice(_values(given))),
-    "grid": ("a list of values", lambda given: Grid(_values(given))),
-    "halton": ("[low, high], numbers or lists of numbers", lambda given: Halton(_interval(given))),
+_ENDS = "[low, high], numbers or lists of numbers"
+KINDS: dict[str, tuple[str, Callable[[Any], Key]]] = {
+    "uniform": (_ENDS, lambda given: Key(_uniform(given))),
+    "halton": (_ENDS, lambda given: Key(_uniform(given), EVEN)),
+    "log_uniform": ("[low, high] with 0 < low", lambda given: Key(_log_uniform(given))),
+    "normal": ("[mean, standard deviation], and [..., low, high] to cut it", lambda given: Key(_normal(given))),
+    "integer": ("[low, high], whole numbers", lambda given: Key(_integer(given))),
+    "choice": ("a list of values", lambda given: Key(_choice(given))),
+    "grid": ("a list of values, gone through in turn", lambda given: Key(_choice(given), IN_TURN)),
 }
-"""By name: what its parameters are, in words, and what makes it of them."""
+"""By name: what its parameters are, in words, and what makes a key of them."""
 
 
-def made(name: str, given: Any) -> Distribution:
-    """A distribution from its name and parameters.
+def made(name: str, given: Any) -> Key:
+    """How a key is drawn, from a name and parameters.
 
     Raises:
         KeyError: if there is none of that name.

@@ -21,10 +21,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from airground_drake.campaign.course import Course
-from airground_drake.campaign.distributions import KINDS, Distribution, combinations, made, stream, values_of
+from airground_drake.campaign.distributions import KINDS, Key, combinations, made, stream, values_of
 from airground_drake.campaign.rows import TIMES
 from airground_drake.errors import Fault, ScenarioError
 from airground_drake.registry import RUN_CLAIMS
@@ -63,7 +61,7 @@ class Spec:
     runs: tuple[str, ...]
     seed: int
     fixed: Mapping[str, Any]
-    drawn: Mapping[str, Distribution]
+    drawn: Mapping[str, Key]
     course: Course | None
     claims: tuple[str, ...]
     marks: Mapping[str, float]
@@ -85,7 +83,7 @@ class Spec:
         Raises:
             ScenarioError: if what is drawn makes no valid scenario.
         """
-        return self._with(self.values(index), f"{self.name}_{index}", stream(self.seed, COURSE, index))
+        return self.scenario_of(self.values(index), index)
 
     def base_digest(self) -> str:
         """SHA-256 of the scenario's file and of what is the same in every draw."""
@@ -99,17 +97,18 @@ class Spec:
         """
         return load(self.scenario, NOT_JUDGED | dict(self.fixed))[0]
 
-    def _with(self, values: Mapping[str, Any], name: str, rng: np.random.Generator) -> Scenario:
+    def scenario_of(self, values: Mapping[str, Any], index: int) -> Scenario:
+        """The scenario with these values by dotted key, on the course of a draw; raises as `draw`."""
         overrides = NOT_JUDGED | dict(self.fixed)
         if self.course is not None:
             distance = load(self.scenario, overrides)[0].safe_distance
             try:
-                overrides |= self.course.values(rng, distance.obstacle_m, distance.ugv_m)
+                overrides |= self.course.values(stream(self.seed, COURSE, index), distance.obstacle_m, distance.ugv_m)
             except ValueError as error:
                 raise ScenarioError(self.source, COURSE, Fault(str(error)), "wanted: a larger field") from None
         scenario = load(self.scenario, overrides | dict(values))[0]
         runs = {run: scenario.runs[run] for run in self.runs} if self.runs else scenario.runs
-        return replace(scenario, name=name, runs=runs)
+        return replace(scenario, name=f"{self.name}_{index}", runs=runs)
 
 
 def load_spec(path: Path) -> Spec:
@@ -196,11 +195,11 @@ def _keys(given: Any, source: str, key: str) -> dict[str, Any]:
     return given
 
 
-def _drawn(given: Any, source: str) -> dict[str, Distribution]:
+def _drawn(given: Any, source: str) -> dict[str, Key]:
     return {key: _distribution(each, source, f"draw.{key}") for key, each in _keys(given, source, "draw").items()}
 
 
-def _distribution(given: Any, source: str, key: str) -> Distribution:
+def _distribution(given: Any, source: str, key: str) -> Key:
     kinds = ", ".join(KINDS)
     if not isinstance(given, dict) or len(given) != 1:
         raise ScenarioError(source, key, given, f"wanted: one of {kinds} and its parameters")

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import json
 import time
+from collections.abc import Collection, Mapping
+from functools import partial
+from typing import Any
+
+import numpy as np
 
 from airground_drake.campaign.rows import DIED, INVALID, JUDGED, STOPPED, Row, blank
 from airground_drake.campaign.spec import Spec
 from airground_drake.errors import AirgroundError, ScenarioError, described, one_line
-from airground_drake.registry import METHODS
+from airground_drake.scenarios import plugins
 from airground_drake.scenarios.estimate import Limits, within
-from airground_drake.scenarios.plugins import plugins
+from airground_drake.scenarios.schema import Scenario
 from airground_drake.simulation import simulate
 from airground_drake.trace import Trace
 from airground_drake.verify import Verdict, verify
@@ -26,25 +31,46 @@ def rows_of(spec: Spec, index: int, limits: Limits, *, allow_plugins: bool = Fal
         allow_plugins: whether code of others may be imported and run.
 
     Returns:
-        A row for each run and claim, with the columns of `COLUMNS`.
+        A row for each run and claim, with the columns of `rows.COLUMNS`.
     """
-    values = spec.values(index)
-    common = blank() | {"index": index, "drawn": json.dumps(values, allow_nan=False)}
+    return rows_at(spec, spec.values(index), index, limits, allow_plugins=allow_plugins)
+
+
+def rows_at(
+    spec: Spec, values: Mapping[str, Any], index: int, limits: Limits, *, allow_plugins: bool = False
+) -> list[Row]:
+    """The same for any values by dotted key, on the course of a draw."""
+    common = blank() | {"index": index, "drawn": json.dumps(dict(values), allow_nan=False)}
     try:
-        scenario = spec.draw(index)
+        scenario = spec.scenario_of(values, index)
+    except ScenarioError as error:
+        return [common | {"ended": INVALID, "what": one_line(str(error))}]
+    return rows_of_scenario(scenario, spec.claims, limits, allow_plugins=allow_plugins, common=common)
+
+
+def rows_of_scenario(
+    scenario: Scenario,
+    claims: Collection[str],
+    limits: Limits,
+    *,
+    allow_plugins: bool = False,
+    common: Row | None = None,
+) -> list[Row]:
+    """Simulate and judge the runs of a scenario; `common`: what all rows have."""
+    common = blank() if common is None else common
+    try:
         within(scenario, limits)
-        if not allow_plugins and (named := plugins(scenario)):
-            key, name = next(iter(named.items()))
-            raise ScenarioError(spec.source, key, name, "code of others is not allowed")
+        if not allow_plugins:
+            plugins.refuse(scenario, scenario.name)
     except AirgroundError as error:
         return [common | {"ended": INVALID, "what": one_line(str(error))}]
     rows: list[Row] = []
     for run, given in scenario.runs.items():
-        here = common | {"run": run, "method": METHODS[given.method].id, "duration_s": scenario.duration_s}
+        here = common | {"run": run, "method": given.method, "duration_s": scenario.duration_s}
         started = time.perf_counter()
         try:
             trace = simulate(scenario, run)
-            verdicts = verify(trace, claims=spec.claims or None)
+            verdicts = verify(trace, claims=claims or None)
         except (Exception, SystemExit) as error:
             rows.append(here | {"ended": STOPPED, "what": described(error)})
             continue
@@ -83,4 +109,10 @@ def _happened(trace: Trace) -> Row:
         "decisions": len(trace.decisions),
         "accepted": int((trace.decisions["decision"] == "accept").sum()),
         "faults": len(trace.meta["faults"]),
+        "intervened_s": max(map(partial(_intervened, trace), trace.ugvs), default=0.0),
     }
+
+
+def _intervened(trace: Trace, ugv: str) -> float:
+    """For how long a UGV did what the UAV asked for, s; each row's state lasts until the next."""
+    return float(np.diff(trace.t) @ (trace.column(f"{ugv}.accepted")[:-1] != 0.0))

@@ -23,7 +23,7 @@ from airground_drake.campaign.rows import Row
 from airground_drake.campaign.spec import Spec, load_spec
 from airground_drake.campaign.stopping import Stopping
 from airground_drake.campaign.store import Store
-from airground_drake.campaign.work import rows_of
+from airground_drake.campaign.work import died, rows_of
 from airground_drake.errors import AirgroundError, FolderError, ScenarioError, UnknownNameError, one_line
 from airground_drake.scenarios.estimate import DEFAULT_LIMITS, Limits
 from airground_drake.scenarios.load import resolved
@@ -85,7 +85,8 @@ def _all(work: Any, left: Sequence[int], options: argparse.Namespace, store: Sto
     jobs = options.jobs or len(os.sched_getaffinity(0))
     finished = on_cluster(work, left, options.scheduler) if options.scheduler else locally(work, left, jobs)
     progress = _Progress(len(left))
-    for rows in finished:
+    for index, judged in finished:
+        rows = died(index) if judged is None else judged
         store.add(rows)
         progress.show(rows)
         if stopping is not None and stopping.met(rows):

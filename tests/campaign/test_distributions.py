@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from properties import examples
 from scipy.stats import kstest, norm
 
-from airground_drake.campaign.distributions import KINDS, Distribution, combinations, made, values_of
+from airground_drake.campaign.distributions import KINDS, Key, combinations, dimensions, made, values_at, values_of
 
 SPECIMENS: dict[str, Any] = {
     "uniform": [[0.0, -1.0], [2.0, 1.0]],
@@ -24,7 +24,7 @@ SPECIMENS: dict[str, Any] = {
 }
 
 
-def specimens() -> dict[str, Distribution]:
+def specimens() -> dict[str, Key]:
     return {kind: made(kind, given) for kind, given in SPECIMENS.items()}
 
 
@@ -60,6 +60,19 @@ def test_draws_have_the_distribution_that_is_asked_for() -> None:
     assert kstest([v["n"] for v in values], norm(5.0, 2.0).cdf).pvalue > 1e-3
     assert kstest(np.log([v["l"] for v in values]), "uniform").pvalue > 1e-3
     assert abs(np.corrcoef([v["u"] for v in values], [v["n"] for v in values])[0, 1]) < 0.15
+
+
+@examples(50, fuzz=2000)
+@given(st.integers(0, 10**6))
+def test_every_point_of_the_unit_cube_is_a_draw(seed: int) -> None:
+    drawn = specimens()
+    size = dimensions(drawn)
+    for shares in (np.zeros(size), np.nextafter(np.ones(size), 0.0), np.random.default_rng(seed).random(size)):
+        values = values_at(drawn, shares)
+        assert values.keys() == drawn.keys()
+        assert 1.0 <= values["normal"] <= 4.0
+        assert values["integer"] in range(-2, 3)
+        assert values["choice"] in SPECIMENS["choice"]
 
 
 def test_grids_are_gone_through_in_all_combinations() -> None:
