@@ -12,7 +12,7 @@ import numpy as np
 from airground_drake.arrays import Array
 from airground_drake.campaign.distributions import values_at
 from airground_drake.campaign.objective import Objective
-from airground_drake.campaign.pool import locally
+from airground_drake.campaign.pool import Pool
 from airground_drake.campaign.rows import Row
 from airground_drake.campaign.search import WORTHLESS, Sampler
 from airground_drake.campaign.spec import Spec
@@ -78,7 +78,7 @@ class Best:
 
 
 def falsify(
-    search: Search, sampler: Sampler, number: int, jobs: int, progress: Callable[[Best], None] = lambda _: None
+    search: Search, sampler: Sampler, number: int, pool: Pool, progress: Callable[[Best], None] = lambda _: None
 ) -> Best:
     """Try points until there is a counterexample, or so many were tried.
 
@@ -86,7 +86,7 @@ def falsify(
         search: what is looked for.
         sampler: where.
         number: of points, at least; the last batch is finished.
-        jobs: number of processes.
+        pool: that does the work.
         progress: is told after each batch.
     """
     best = Best(0, WORTHLESS, np.empty(0), False)
@@ -94,7 +94,7 @@ def falsify(
         points = sampler.ask()
         values = np.full(len(points), WORTHLESS)
         found = np.zeros(len(points), dtype=bool)
-        for k, judged in locally(partial(search.at, points), range(len(points)), jobs):
+        for k, judged in pool(partial(search.at, points), range(len(points))):
             if judged is not None:
                 values[k], found[k] = judged
         sampler.tell(points, values)

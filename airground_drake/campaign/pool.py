@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from functools import partial
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from airground_drake.errors import AirgroundError, one_line
 
@@ -17,18 +18,36 @@ AHEAD = 4
 T = TypeVar("T")
 
 
-def locally(work: Callable[[int], T], items: Iterable[int], jobs: int) -> Iterator[tuple[int, T | None]]:
-    """What comes of each item, as it is finished; None where its process has died again and again.
+class Pool(Protocol):
+    """Does the same work for many items."""
+
+    def __call__(self, work: Callable[[int], T], items: Iterable[int]) -> Iterator[tuple[int, T | None]]:
+        """What comes of each item, as it is finished; None where its process has died again and again.
+
+        Args:
+            work: for one item; goes to other processes, and so is pickled.
+            items: numbers, none twice.
+        """
+
+
+@contextmanager
+def local(jobs: int) -> Iterator[Pool]:
+    """So many processes of this machine, which end in the end."""
+    from joblib.externals.loky import get_reusable_executor  # takes a while, which other commands need not wait for
+
+    try:
+        yield partial(_locally, jobs)
+    finally:
+        get_reusable_executor().shutdown(wait=True, kill_workers=True)
+
+
+def _locally(jobs: int, work: Callable[[int], T], items: Iterable[int]) -> Iterator[tuple[int, T | None]]:
+    """See `Pool`.
 
     Processes whose memory grows are replaced (loky sees to it): Drake never frees a diagram with Python systems. If
     one dies, those items that it may have taken with it are done again, each in a process of its own.
-
-    Args:
-        work: for one item; goes to other processes, and so is pickled.
-        items: numbers, none twice.
-        jobs: number of processes.
     """
-    from joblib import Parallel, delayed  # takes a while, which other commands need not wait for
+    from joblib import Parallel, delayed
     from joblib.externals.loky.process_executor import BrokenProcessPool
 
     waiting, begun, numbered = iter(items), dict[int, None](), partial(_numbered, work)
@@ -69,8 +88,9 @@ def _alone(work: Callable[[int], T], item: int) -> T | None:
     return None
 
 
-def on_cluster(work: Callable[[int], T], items: Iterable[int], scheduler: str) -> Iterator[tuple[int, T | None]]:
-    """The same by workers of a Dask cluster, each of which must have this package installed.
+@contextmanager
+def cluster(scheduler: str) -> Iterator[Pool]:
+    """The workers of a Dask cluster, each of which must have this package installed.
 
     A worker that dies is Dask's to notice: its items go to others; one that has killed several is given up.
 
@@ -88,19 +108,26 @@ def on_cluster(work: Callable[[int], T], items: Iterable[int], scheduler: str) -
     except (OSError, ValueError) as error:
         raise AirgroundError(one_line(f"no Dask scheduler at {scheduler}: {error}")) from None
     with client:
-        waiting = iter(items)
+        yield partial(_on_cluster, dask, client)
 
-        def submit(count: int) -> list[Any]:
-            some = itertools.islice(waiting, count)
-            return [client.submit(work, item, key=f"item-{item}", pure=False) for item in some]
 
-        threads = sum(client.nthreads().values()) or 1
-        under_way = dask.as_completed(submit(AHEAD * threads), loop=client.loop)
-        for future in under_way:
-            item = int(future.key.rpartition("-")[2])
-            yield item, _result(dask, future)
-            for more in submit(1):
-                under_way.add(more)
+def _on_cluster(
+    dask: Any, client: Any, work: Callable[[int], T], items: Iterable[int]
+) -> Iterator[tuple[int, T | None]]:
+    """See `Pool`."""
+    waiting = iter(items)
+
+    def submit(count: int) -> list[Any]:
+        some = itertools.islice(waiting, count)
+        return [client.submit(work, item, key=f"item-{item}", pure=False) for item in some]
+
+    threads = sum(client.nthreads().values()) or 1
+    under_way = dask.as_completed(submit(AHEAD * threads), loop=client.loop)
+    for future in under_way:
+        item = int(future.key.rpartition("-")[2])
+        yield item, _result(dask, future)
+        for more in submit(1):
+            under_way.add(more)
 
 
 def _result(dask: Any, future: Any) -> Any:

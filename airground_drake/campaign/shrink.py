@@ -21,6 +21,8 @@ DIGITS = (0, 1, 2, 3)
 """Decimals that numbers are rounded to, the fewest first."""
 SPARE_S = (0.25, 0.5, 1.0, 2.0, 5.0)
 """What is left before the first trigger, or after the last event, s."""
+SEEDS = (1, 2, 3, 4)
+"""Of the noise, which are tried where a change draws other noise."""
 ROUNDED = ("ugvs", "obstacles", "uav", "control", "decision", "duration_s")
 """Keys under which numbers are made rounder."""
 
@@ -63,7 +65,16 @@ def _without_policies(data: Json) -> Iterator[Json]:
 
 def _without_robots(data: Json) -> Iterator[Json]:
     if len(data["ugvs"]) > 1:
-        yield from _without_entries(data, "ugvs")
+        yield from _with_seeds(_without_entries(data, "ugvs"))
+
+
+def _with_seeds(candidates: Iterator[Json]) -> Iterator[Json]:
+    """All with their own seed, then all with others."""
+    own = list(candidates)
+    yield from own
+    for seed in SEEDS:
+        for each in own:
+            yield copy.deepcopy(each) | {"seed": seed}
 
 
 def _without_obstacles(data: Json) -> Iterator[Json]:
@@ -98,6 +109,10 @@ def _without_items(data: Json, *keys: str) -> Iterator[Json]:
 
 def _later(data: Json) -> Iterator[Json]:
     """Begin shortly before the first trigger, where the robots are by then."""
+    yield from _with_seeds(_begun_later(data))
+
+
+def _begun_later(data: Json) -> Iterator[Json]:
     trace = _trace(data)
     first = min((event["t_s"] for event in trace.events if event["kind"] == "trigger"), default=0.0) if trace else 0.0
     for spare in SPARE_S:

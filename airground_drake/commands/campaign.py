@@ -16,9 +16,9 @@ from typing import Any
 import yaml
 
 from airground_drake import files
+from airground_drake.campaign import pool
 from airground_drake.campaign.evidence import evidence, strict
 from airground_drake.campaign.page import page
-from airground_drake.campaign.pool import locally, on_cluster
 from airground_drake.campaign.rows import Row
 from airground_drake.campaign.spec import Spec, load_spec
 from airground_drake.campaign.stopping import Stopping
@@ -83,14 +83,14 @@ def _run(spec: Spec, options: argparse.Namespace, stopping: Stopping | None) -> 
 
 def _all(work: Any, left: Sequence[int], options: argparse.Namespace, store: Store, stopping: Stopping | None) -> None:
     jobs = options.jobs or len(os.sched_getaffinity(0))
-    finished = on_cluster(work, left, options.scheduler) if options.scheduler else locally(work, left, jobs)
     progress = _Progress(len(left))
-    for index, judged in finished:
-        rows = died(index) if judged is None else judged
-        store.add(rows)
-        progress.show(rows)
-        if stopping is not None and stopping.met(rows):
-            break
+    with pool.cluster(options.scheduler) if options.scheduler else pool.local(jobs) as processes:
+        for index, judged in processes(work, left):
+            rows = died(index) if judged is None else judged
+            store.add(rows)
+            progress.show(rows)
+            if stopping is not None and stopping.met(rows):
+                break
     progress.end()
 
 

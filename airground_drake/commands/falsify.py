@@ -14,6 +14,7 @@ from typing import Any
 import yaml
 
 from airground_drake import files
+from airground_drake.campaign import pool
 from airground_drake.campaign.distributions import dimensions
 from airground_drake.campaign.falsification import Best, Search, falsify
 from airground_drake.campaign.objective import Margin, Most, Objective
@@ -57,7 +58,8 @@ def _run(spec: Spec, options: argparse.Namespace) -> int:
     search = Search(replace(spec, claims=(options.claim,)), objective, DEFAULT_LIMITS, options.allow_plugins)
     sampler = SAMPLERS[options.sampler](dimensions(spec.drawn), spec.seed)
     jobs = options.jobs or len(os.sched_getaffinity(0))
-    best = falsify(search, sampler, options.number, jobs, _show if sys.stderr.isatty() else lambda _: None)
+    with pool.local(jobs) as processes:
+        best = falsify(search, sampler, options.number, processes, _show if sys.stderr.isatty() else lambda _: None)
     what = f"least margin of {options.claim}" if options.most is None else f"largest {options.most}"
     value = best.value if options.most is None else -best.value
     print(f"{spec.name}: {best.tried} tried by {options.sampler}, {what} {value:.6g}")

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from airground_drake.campaign.pool import locally, on_cluster
+from airground_drake.campaign.pool import cluster, local
 from airground_drake.errors import AirgroundError
 
 
@@ -22,19 +22,20 @@ def work(folder: Path, always: int, item: int) -> int:
 
 
 def test_a_process_that_dies_loses_no_item_and_does_none_twice(tmp_path: Path) -> None:
-    found = list(locally(partial(work, tmp_path, 5), range(9), jobs=2))
+    with local(jobs=2) as pool:
+        found = list(pool(partial(work, tmp_path, 5), range(9)))
     assert sorted(found) == [(item, None if item == 5 else item * item) for item in range(9)]
 
 
 def test_the_same_on_a_cluster_of_two_workers(tmp_path: Path) -> None:
     distributed = pytest.importorskip("distributed")
     options = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None}
-    with distributed.LocalCluster(**options) as cluster:
-        found = list(on_cluster(partial(work, tmp_path, -1), range(9), cluster.scheduler_address))
+    with distributed.LocalCluster(**options) as here, cluster(here.scheduler_address) as pool:
+        found = list(pool(partial(work, tmp_path, -1), range(9)))
     assert sorted(found) == [(item, item * item) for item in range(9)]
 
 
 def test_no_scheduler_is_one_line() -> None:
     pytest.importorskip("distributed")
-    with pytest.raises(AirgroundError, match="no Dask scheduler at"):
-        list(on_cluster(partial(work, Path(), -1), range(1), "tcp://127.0.0.1:9"))
+    with pytest.raises(AirgroundError, match="no Dask scheduler at"), cluster("tcp://127.0.0.1:9"):
+        pass
