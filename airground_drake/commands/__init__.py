@@ -33,6 +33,8 @@ COMMANDS: dict[str, Command] = {
     "compare": Command("airground_drake.commands.compare", "say what has changed from one report to another"),
     "index": Command("airground_drake.commands.index", "list the reports in a folder on a page"),
     "proofs": Command("airground_drake.verify.proof_files", "write the proofs of a report for others' checkers"),
+    "campaign": Command("airground_drake.commands.campaign", "judge many draws of a scenario"),
+    "falsify": Command("airground_drake.commands.falsify", "search for a scenario that violates a claim"),
     "diagram": Command("airground_drake.commands.diagram", "draw the diagram of a scenario"),
     "list": Command("airground_drake.commands.listing", "list scenarios, methods, policies, routes, tasks and claims"),
     "init": Command("airground_drake.commands.init", "write a small scenario to start from"),

@@ -239,6 +239,36 @@ def _node(value: Any, source: str) -> yaml.Node:
     return yaml.ScalarNode(_TAG + kinds.get(type(value), type(value).__name__), text, mark, mark)
 
 
+def read_data(path: Path) -> tuple[Any, str]:
+    """Another YAML file of ours as nested dicts, lists and scalars, by the rules and limits of scenario files.
+
+    Returns:
+        The data, None where no value is given, and the SHA-256 of the file's bytes.
+
+    Raises:
+        ScenarioError: if it cannot be read.
+    """
+    source, data = _read_bytes(str(path))
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise ScenarioError(source, "", Fault("not UTF-8 text"), "wanted: a YAML file") from None
+    root = _compose(text, source)
+    _expanded(root)
+    return _plain(root, ""), files.sha256(data)
+
+
+def _plain(node: yaml.Node, key: str) -> Any:
+    """What a node stands for."""
+    if isinstance(node, yaml.ScalarNode):
+        value = _value(node)
+        if isinstance(value, Fault) and node.tag != f"{_TAG}null":
+            raise ScenarioError(_where(node), key, value, "wanted: plain YAML")
+        return None if isinstance(value, Fault) else value
+    entries = {name: _plain(child, validate.dotted(key, name)) for name, (_, child) in _entries(node, key).items()}
+    return list(entries.values()) if isinstance(node, yaml.SequenceNode) else entries
+
+
 def resolved(scenario: Scenario) -> dict[str, Any]:
     """The scenario as nested dicts and lists, defaults filled in.
 

@@ -1,0 +1,103 @@
+"""A campaign from beginning to end: what is left is drawn and judged, kept, and concluded from."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from functools import partial
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from airground_drake import files
+from airground_drake.campaign.evidence import evidence, strict
+from airground_drake.campaign.page import page
+from airground_drake.campaign.pool import Pool
+from airground_drake.campaign.rows import Row
+from airground_drake.campaign.spec import Spec
+from airground_drake.campaign.stopping import Stopping
+from airground_drake.campaign.store import Store
+from airground_drake.campaign.work import died, rows_of
+from airground_drake.progress import SILENT, Watch
+from airground_drake.scenarios.estimate import DEFAULT_LIMITS, Limits
+
+EVIDENCE, PAGE = "evidence.json", "campaign.html"
+
+
+def conduct(
+    spec: Spec,
+    folder: Path,
+    pool: Pool,
+    number: int | None = None,
+    *,
+    resume: bool = False,
+    stopping: Stopping | None = None,
+    limits: Limits = DEFAULT_LIMITS,
+    allow_plugins: bool = False,
+    watch: Watch = SILENT,
+) -> dict[str, Any]:
+    """Do what is left of a campaign, and write the evidence and its page.
+
+    Args:
+        spec: what is drawn.
+        folder: new or empty; with `resume`, one that has a part of the same campaign.
+        pool: that does the work.
+        number: of draws; default: all combinations of what is gone through in turn.
+        resume: go on with what the folder has.
+        stopping: when to end early.
+        limits: what the scenario of a draw may ask for.
+        allow_plugins: whether code of others may be imported and run.
+        watch: is told how far it is.
+
+    Returns:
+        The evidence, strict JSON.
+
+    Raises:
+        FolderError: if the folder cannot be used.
+        OSError: if it cannot be written.
+    """
+    store = Store(folder, _manifest(spec), resume=resume)
+    try:
+        met = False
+        if stopping is not None:
+            for known in _known(store):
+                met = stopping.met(known)
+        wanted = range(spec.combinations if number is None else number)
+        left = [] if met else [index for index in wanted if index not in store.finished]
+        watch.stage(spec.name, len(left), "draws")
+        refuted = Counter[str]()
+        for index, judged in pool(partial(rows_of, spec, limits=limits, allow_plugins=allow_plugins), left):
+            rows = died(index) if judged is None else judged
+            store.add(rows)
+            refuted.update(row["claim"] for row in rows if row["status"] == "refuted")
+            watch.advance(1.0, _refuted(refuted))
+            if stopping is not None and stopping.met(rows):
+                break
+        table = store.table()
+    finally:
+        store.close()
+    of = {"name": spec.name, "title": spec.title, "spec": spec.source}
+    found: dict[str, Any] = strict(evidence(table, spec.marks)) | of
+    files.write_json(folder / EVIDENCE, found)
+    files.write_text(folder / PAGE, page(found, table))
+    return found
+
+
+def _refuted(counts: Counter[str]) -> str:
+    return "refuted: " + (", ".join(f"{claim} {count}" for claim, count in counts.most_common(3)) or "nothing")
+
+
+def _known(store: Store) -> Iterator[list[Row]]:
+    """What an earlier call has finished, draw by draw."""
+    for _, rows in store.table().groupby("index"):
+        yield [{str(name): value for name, value in row.items()} for row in rows.to_dict("records")]
+
+
+def _manifest(spec: Spec) -> dict[str, Any]:
+    return {
+        "name": spec.name,
+        "spec_sha256": spec.digest,
+        "scenario_sha256": spec.base_digest(),
+        "package": version("airground_drake"),
+        "drake": version("drake"),
+    }

@@ -1,0 +1,100 @@
+"""Random maps and teams: robots on both sides of a field of obstacles, each with its target on the other side."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from airground_drake.arrays import Array
+
+TRIES = 10_000
+"""Places that are tried before a field counts as full."""
+BEYOND_M = 0.3
+"""What starts and targets have beyond the safe distance, m."""
+
+
+@dataclass(frozen=True)
+class Course:
+    """What a random course is drawn from.
+
+    Attributes:
+        ugvs: least and largest number of UGVs.
+        obstacles: least and largest number of obstacles.
+        length_m: distance between the two sides, m.
+        width_m: of the field, m.
+        preset_m_s: speed of the preset trajectories, m/s.
+        max_speed_m_s: of a UGV, m/s.
+        hidden: share of the obstacles that are not on the UAV's map.
+    """
+
+    ugvs: tuple[int, int] = (1, 4)
+    obstacles: tuple[int, int] = (4, 9)
+    length_m: float = 20.0
+    width_m: float = 16.0
+    preset_m_s: float = 1.0
+    max_speed_m_s: float = 3.0
+    hidden: float = 0.0
+
+    def values(self, rng: np.random.Generator, obstacle_m: float, ugv_m: float) -> dict[str, Any]:
+        """The keys of a scenario that a course replaces: `ugvs`, `obstacles`, start and target of the UAV.
+
+        Args:
+            rng: of the draw.
+            obstacle_m: safe distance of a UGV and an obstacle, m.
+            ugv_m: of two UGVs, m.
+
+        Raises:
+            ValueError: if the field is too small for what is drawn.
+        """
+        n, m = (int(rng.integers(low, high, endpoint=True)) for low, high in (self.ugvs, self.obstacles))
+        eastward = rng.permutation(np.arange(n) % 2 == 0)
+        side = np.where(eastward, 0.0, self.length_m)
+        starts = self._apart(rng, side, ugv_m + BEYOND_M)
+        targets = self._apart(rng, self.length_m - side, ugv_m + BEYOND_M)
+        places = self._field(rng, m, np.concatenate([starts, targets]), obstacle_m + BEYOND_M)
+        hidden = rng.random(m) < self.hidden
+        ugvs = {
+            f"ugv{i + 1}": {
+                "start_m": _ground(start), "target_m": _ground(target), "max_speed_m_s": self.max_speed_m_s,
+                "preset": {"waypoints_m": [_ground(start), _ground(target)], "speed_m_s": self.preset_m_s},
+            }
+            for i, (start, target) in enumerate(zip(starts, targets, strict=True))
+        }  # fmt: skip
+        obstacles = {
+            f"obstacle{k + 1}": {"position_m": _ground(place), "known_to_uav": not hidden[k]}
+            for k, place in enumerate(places)
+        }
+        return {"ugvs": ugvs, "obstacles": obstacles}
+
+    def _apart(self, rng: np.random.Generator, side: Array, least: float) -> Array:
+        """Places (n, 2), m, at these x, any two on the same side with at least that distance."""
+        places: list[Array] = []
+        for x in side:
+            for _ in range(TRIES):
+                place = np.array([x, rng.uniform(-0.5, 0.5) * self.width_m])
+                if all(np.linalg.norm(place - each) >= least for each in places):
+                    places.append(place)
+                    break
+            else:
+                raise ValueError(f"{len(side)} UGVs have no room on a field {self.width_m:g} m wide")
+        return np.reshape(places, (-1, 2))
+
+    def _field(self, rng: np.random.Generator, count: int, ends: Array, least: float) -> Array:
+        """Places (count, 2), m, no nearer than that to starts and targets."""
+        places: list[Array] = []
+        for _ in range(TRIES):
+            if len(places) == count:
+                break
+            place = rng.uniform([0.0, -0.5 * self.width_m], [self.length_m, 0.5 * self.width_m])
+            if np.linalg.norm(ends - place, axis=1).min(initial=np.inf) >= least:
+                places.append(place)
+        if len(places) < count:
+            raise ValueError(f"{count} obstacles have no room between starts and targets")
+        return np.reshape(places, (-1, 2))
+
+
+def _ground(place: Sequence[float] | Array) -> list[float]:
+    return [*np.round(np.asarray(place, dtype=np.float64), 6).tolist(), 0.0]

@@ -1,0 +1,216 @@
+"""What the rows of a campaign say: bounds for each claim, where it fails, what the draws cover, the worst runs."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from itertools import combinations
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+from scipy.stats import chi2_contingency, qmc
+
+from airground_drake.arrays import Array
+from airground_drake.campaign.rows import JUDGED, TIMES
+from airground_drake.campaign.statistics import CONFIDENCE, clopper_pearson, confidence_sequence
+
+WORST = 5
+"""Runs of least margin that are listed for each claim."""
+BINS = 4
+"""Of a key, in maps of where a claim fails: quarters of its draws."""
+MOST_POINTS = 1000
+"""Draws that the discrepancy is computed from: its cost grows with their square."""
+QUANTILES = (0.0, 0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 1.0)
+OPEN = ("inconclusive", "error", "not_run")
+"""Statuses that decide nothing; they count as violations in every upper bound."""
+
+Json = dict[str, Any]
+
+
+class Counts(NamedTuple):
+    """Of one claim in one run of the scenario, over all draws that put it to the test.
+
+    Attributes:
+        tested: judged and exercised, or judged by a claim that does not count how often it was.
+        refuted: violations.
+        undecided: of these.
+        idle: judged, but nothing could have refuted the claim: these count for nothing.
+    """
+
+    tested: int
+    refuted: int
+    undecided: int
+    idle: int
+
+    @classmethod
+    def of(cls, rows: pd.DataFrame) -> Counts:
+        """From the rows of one claim and run."""
+        tested = _tested(rows)
+        status = rows.loc[tested, "status"]
+        refuted, undecided = int((status == "refuted").sum()), int(status.isin(OPEN).sum())
+        return cls(int(tested.sum()), refuted, undecided, int((~tested).sum()))
+
+    def interval(self, *, anytime: bool, confidence: float = CONFIDENCE) -> tuple[float, float]:
+        """Bounds of the probability of a violation; what is undecided is none for the lower, one for the upper."""
+        bounds = confidence_sequence if anytime else clopper_pearson
+        low = bounds(self.refuted, self.tested, confidence).low
+        return low, bounds(self.refuted + self.undecided, self.tested, confidence).high
+
+
+def _tested(rows: pd.DataFrame) -> pd.Series:
+    return (rows["exercised"] > 0) | rows["exercised"].isna() | rows["status"].isin([*OPEN, "refuted"])
+
+
+def evidence(table: pd.DataFrame, marks: Mapping[str, float] | None = None) -> Json:
+    """Everything that a campaign's page says, strict JSON.
+
+    Args:
+        table: rows of `rows.COLUMNS`.
+        marks: values to be found in the distributions of `TIMES`, by column.
+    """
+    first = table.drop_duplicates("index")
+    judged = table[table["ended"] == JUDGED]
+    runs = judged.drop_duplicates(["index", "run"])
+    drawn = drawn_keys(first)
+    failed = table[table["ended"] != JUDGED]
+    return {
+        "confidence": CONFIDENCE,
+        "draws": len(first),
+        "ended": {str(name): int(count) for name, count in first["ended"].value_counts().items()},
+        "not_judged": failed[["index", "run", "ended", "what"]].head(50).to_dict("records"),
+        "runs": len(runs),
+        "simulated_s": float(runs["duration_s"].sum()),
+        "claims": sorted(
+            (_claim(str(run), str(claim), rows, drawn) for (run, claim), rows in judged.groupby(["run", "claim"])),
+            key=lambda claim: (not claim["not_as_expected"], not claim["refuted"], not claim["undecided"]),
+        ),
+        "times": [_times(str(run), rows, marks or {}) for run, rows in runs.groupby("run")],
+        "space": _space(drawn),
+    }
+
+
+def drawn_keys(first: pd.DataFrame) -> pd.DataFrame:
+    """What was drawn, by index and key: numbers as they are, an entry of a list as key.0, other values as text."""
+    found = {}
+    for index, text in zip(first["index"], first["drawn"], strict=True):
+        row: Json = {}
+        for key, value in json.loads(text).items():
+            if isinstance(value, list) and all(isinstance(each, int | float) for each in value):
+                row |= {f"{key}.{i}": each for i, each in enumerate(value)}
+            else:
+                row[key] = (
+                    value if isinstance(value, int | float) and not isinstance(value, bool) else json.dumps(value)
+                )
+        found[index] = row
+    return pd.DataFrame.from_dict(found, orient="index")
+
+
+def _claim(run: str, claim: str, rows: pd.DataFrame, drawn: pd.DataFrame) -> Json:
+    counts = Counts.of(rows)
+    tested = rows[_tested(rows)]
+    margins = tested[tested["margin"].notna()]
+    worst = margins.nsmallest(WORST, "margin")
+    violated = tested.set_index("index")["status"] == "refuted"
+    return {
+        "run": run,
+        "method": str(rows["method"].iloc[0]),
+        "claim": claim,
+        **counts._asdict(),
+        "not_as_expected": int((~rows["as_expected"]).sum()),
+        "fixed": list(counts.interval(anytime=False)),
+        "anytime": list(counts.interval(anytime=True)),
+        "unit": str(rows["unit"].iloc[0]),
+        "margins": _quantiles(margins["margin"].to_numpy()),
+        "worst": worst[["index", "margin", "status"]].to_dict("records"),
+        "refuted_draws": tested.loc[tested["status"] == "refuted", "index"].head(WORST).tolist(),
+        "fails_where": _where(violated, drawn) if 0 < violated.sum() < len(violated) else None,
+    }
+
+
+def _times(run: str, rows: pd.DataFrame, marks: Mapping[str, float]) -> Json:
+    found: Json = {
+        "run": run,
+        "runs": len(rows),
+        "arrived": int(rows["arrived"].sum()),
+        "ugvs": int(rows["ugvs"].sum()),
+    }
+    for name in TIMES:
+        values = rows[name].dropna().to_numpy()
+        found[name] = {"count": len(values), "quantiles": _quantiles(values)}
+        if name in marks and len(values):
+            found[name]["mark"] = marks[name]
+            found[name]["share_below_mark"] = float((values < marks[name]).mean())
+    return found
+
+
+def _quantiles(values: Array) -> dict[str, float]:
+    return {f"{q:g}": float(np.quantile(values, q)) for q in QUANTILES} if len(values) else {}
+
+
+def _where(violated: pd.Series, drawn: pd.DataFrame) -> Json | None:
+    """A map of the two keys by which violations differ most: of each pair of quarters, violations and runs."""
+    keys = drawn.loc[violated.index]
+    parts = {str(key): part for key in keys if (part := _parts(keys[key])) is not None}
+    tables = {
+        pair: pd.crosstab([parts[key] for key in pair], violated.to_numpy())
+        for pair in ([(key,) for key in parts] if len(parts) == 1 else combinations(parts, 2))
+    }
+    if not tables:
+        return None
+    pair = min(tables, key=lambda pair: _by_chance(tables[pair].to_numpy()))
+    cells = [
+        {"where": dict(zip(pair, at if isinstance(at, tuple) else (at,), strict=True)),
+         "refuted": int(row.get(True, 0)), "runs": int(row.sum())}
+        for at, row in tables[pair].iterrows()
+    ]  # fmt: skip
+    return {"keys": list(pair), "by_chance": _by_chance(tables[pair].to_numpy()), "cells": cells}
+
+
+def _by_chance(table: Array) -> float:
+    """How likely differences as large are if the keys do not matter (chi-squared test)."""
+    return float(chi2_contingency(table).pvalue) if min(table.shape) > 1 else 1.0
+
+
+def _parts(values: pd.Series) -> pd.Series | None:
+    """The quarter, or the value, that each draw of a key is in, as text; None if they are all in one."""
+    if values.dtype == object or values.nunique() <= BINS:
+        found = values.astype(str)
+    else:
+        found = (
+            pd.qcut(values, BINS, duplicates="drop")
+            .map(lambda part: f"{part.left:.4g} to {part.right:.4g}")
+            .astype(str)
+        )
+    return found.reset_index(drop=True) if len(found.unique()) > 1 else None
+
+
+def _space(drawn: pd.DataFrame) -> Json:
+    """How evenly the numbers that were drawn fill the box that they span."""
+    numbers = drawn.select_dtypes("number").dropna(axis="columns").head(MOST_POINTS)
+    numbers = numbers.loc[:, numbers.max() > numbers.min()]
+    found: Json = {"keys": [str(key) for key in drawn.columns], "numbers": [str(key) for key in numbers.columns]}
+    if len(numbers) < 2 or not len(numbers.columns):
+        return found
+    low, high = numbers.min().to_numpy(float), numbers.max().to_numpy(float)
+    points = (numbers.to_numpy(float) - low) / (high - low)
+    random = np.random.default_rng(0).random(points.shape)
+    return found | {
+        "low": low.tolist(),
+        "high": high.tolist(),
+        "points": len(points),
+        "discrepancy": float(qmc.discrepancy(points)),
+        "discrepancy_of_random_points": float(qmc.discrepancy(random)),
+    }
+
+
+def strict(value: Any) -> Any:
+    """With None for what is no number, so that it is JSON."""
+    if isinstance(value, dict):
+        return {str(key): strict(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [strict(each) for each in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,0 +1,104 @@
+"""Looking for a violation: points of the unit cube that a sampler asks for are simulated and judged."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from airground_drake.arrays import Array
+from airground_drake.campaign.distributions import values_at
+from airground_drake.campaign.objective import Objective
+from airground_drake.campaign.pool import Pool
+from airground_drake.campaign.rows import Row
+from airground_drake.campaign.search import WORTHLESS, Sampler
+from airground_drake.campaign.spec import Spec
+from airground_drake.campaign.work import rows_at, rows_of_scenario
+from airground_drake.errors import ScenarioError
+from airground_drake.progress import SILENT, Watch
+from airground_drake.scenarios.estimate import Limits
+from airground_drake.scenarios.load import from_data
+
+
+@dataclass(frozen=True)
+class Search:
+    """What is looked for, and where: goes to the processes that look.
+
+    Attributes:
+        spec: of the scenarios; the course, if there is one, is that of draw 0.
+        objective: what is made least.
+        limits: what a scenario may ask for.
+        allow_plugins: whether code of others may be imported and run.
+    """
+
+    spec: Spec
+    objective: Objective
+    limits: Limits
+    allow_plugins: bool = False
+
+    def values(self, point: Array) -> dict[str, Any]:
+        """By dotted key, at a point of the unit cube."""
+        return values_at(self.spec.drawn, point)
+
+    def at(self, points: Array, k: int) -> tuple[float, bool]:
+        """The objective at one of some points (., n), and whether it is a counterexample."""
+        return self._judge(rows_at(self.spec, self.values(points[k]), 0, self.limits, allow_plugins=self.allow_plugins))
+
+    def fails(self, data: dict[str, Any]) -> bool:
+        """Whether a scenario, as nested dicts and lists, is valid and a counterexample."""
+        try:
+            scenario = from_data(data, "smaller scenario")
+        except ScenarioError:
+            return False
+        return self._judge(rows_of_scenario(self.spec, scenario, self.limits, allow_plugins=self.allow_plugins))[1]
+
+    def _judge(self, rows: list[Row]) -> tuple[float, bool]:
+        return self.objective.value(rows), self.objective.found(rows)
+
+
+@dataclass(frozen=True)
+class Best:
+    """What a search has come to.
+
+    Attributes:
+        tried: points.
+        value: the least of the objective; `WORTHLESS` if it could be measured nowhere.
+        point: where, (n,); (0,) if nowhere.
+        found: whether it is a counterexample.
+    """
+
+    tried: int
+    value: float
+    point: Array
+    found: bool
+
+
+def falsify(search: Search, sampler: Sampler, number: int, pool: Pool, watch: Watch = SILENT) -> Best:
+    """Try points until there is a counterexample, or so many were tried.
+
+    Args:
+        search: what is looked for.
+        sampler: where.
+        number: of points, at least; the last batch is finished.
+        pool: that does the work.
+        watch: is told how far it is.
+    """
+    best = Best(0, WORTHLESS, np.empty(0), False)
+    while best.tried < number and not best.found:
+        points = sampler.ask()
+        values = np.full(len(points), WORTHLESS)
+        found = np.zeros(len(points), dtype=bool)
+        for k, judged in pool(partial(search.at, points), range(len(points))):
+            if judged is not None:
+                values[k], found[k] = judged
+        sampler.tell(points, values)
+        k = int(np.argmin(np.where(found, values, np.inf))) if found.any() else int(values.argmin())
+        tried = best.tried + len(points)
+        if found.any() or values[k] < best.value:
+            best = Best(tried, float(values[k]), points[k], bool(found[k]))
+        else:
+            best = replace(best, tried=tried)
+        watch.advance(len(points), f"least {best.value:.6g}")
+    return best

@@ -1,0 +1,31 @@
+"""The dataset of a campaign: a row is what a claim says of a run."""
+
+from __future__ import annotations
+
+from typing import Any
+
+COLUMNS: dict[str, str] = {
+    "index": "int64", "run": "str", "method": "str", "ended": "str", "what": "str", "claim": "str", "status": "str",
+    "as_expected": "bool", "margin": "float64", "unit": "str", "exercised": "float64", "ugvs": "int64",
+    "triggers": "int64", "first_trigger_s": "float64", "arrived": "int64", "arrival_s": "float64",
+    "decisions": "int64", "accepted": "int64", "faults": "int64", "duration_s": "float64",
+    "intervened_s": "float64", "wall_s": "float64",
+    "drawn": "str",
+}  # fmt: skip
+"""Columns of the dataset and their types: a row is what a claim says of a run; NaN where there is no such number.
+
+`ended` is `judged`, or what kept a draw from it, explained in `what`: `invalid` (no valid scenario), `stopped` (the
+simulation), `died` (its process); such a row has no claim. `drawn` is strict JSON: values by key."""
+
+JUDGED, INVALID, STOPPED, DIED = "judged", "invalid", "stopped", "died"
+
+TIMES = ("first_trigger_s", "arrival_s", "intervened_s", "wall_s")
+"""Columns whose distributions are shown, s."""
+
+Row = dict[str, Any]
+
+
+def blank() -> Row:
+    """A row of which nothing is known."""
+    kinds: dict[str, Any] = {"int64": 0, "float64": float("nan"), "str": "", "bool": False}
+    return {name: kinds[kind] for name, kind in COLUMNS.items()}

@@ -1,0 +1,96 @@
+"""Points of the unit cube, asked for and told about: at random, evenly, or by CMA-ES towards what is least."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Callable
+from typing import Any, Protocol
+
+import numpy as np
+from scipy.stats import qmc
+
+from airground_drake.arrays import Array
+
+BATCH = 16
+"""Points at a time, of samplers that learn nothing from one to the next."""
+WORTHLESS = 1e6
+"""Value of a point at which nothing can be measured."""
+
+
+class Sampler(Protocol):
+    """Where to look next."""
+
+    def ask(self) -> Array:
+        """Points (k, n) in [0, 1)."""
+
+    def tell(self, points: Array, values: Array) -> None:
+        """What was found there, (k,); less is better."""
+
+
+class Uniform:
+    """Independent points: the baseline."""
+
+    def __init__(self, dimensions: int, seed: int) -> None:
+        """For points (n,)."""
+        self._rng, self._dimensions = np.random.default_rng(seed), dimensions
+
+    def ask(self) -> Array:
+        """See `Sampler`."""
+        return self._rng.random((BATCH, self._dimensions))
+
+    def tell(self, points: Array, values: Array) -> None:
+        """Nothing is learnt."""
+
+
+class Halton:
+    """Points of low discrepancy."""
+
+    def __init__(self, dimensions: int, seed: int) -> None:
+        """For points (n,)."""
+        self._sequence = qmc.Halton(dimensions, rng=np.random.default_rng(seed))
+
+    def ask(self) -> Array:
+        """See `Sampler`."""
+        return np.asarray(self._sequence.random(BATCH))
+
+    def tell(self, points: Array, values: Array) -> None:
+        """Nothing is learnt."""
+
+
+class CmaEs:
+    """Evolution strategy with covariance matrix adaptation (Hansen 2016), begun anew elsewhere when it settles."""
+
+    def __init__(self, dimensions: int, seed: int) -> None:
+        """For points (n,)."""
+        self._dimensions, self._rng, self.restarts = dimensions, np.random.default_rng(seed), -1
+        self._begin()
+
+    def ask(self) -> Array:
+        """See `Sampler`; the strategy needs two dimensions, so that a single one has one without effect beside it."""
+        self._asked = self._strategy.ask()
+        return np.clip(np.array(self._asked)[:, : self._dimensions], 0.0, np.nextafter(1.0, 0.0))
+
+    def tell(self, points: Array, values: Array) -> None:
+        """See `Sampler`."""
+        self._strategy.tell(self._asked, np.nan_to_num(values, nan=WORTHLESS, posinf=WORTHLESS).tolist())
+        if self._strategy.stop():
+            self._begin()
+
+    def _begin(self) -> None:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # about packages for plots that it can do without
+            import cma
+
+        self.restarts += 1
+        size = max(2, self._dimensions)
+        options = {
+            "bounds": [0.0, 1.0], "seed": int(self._rng.integers(1, 2**31)), "verbose": -9, "tolfun": 1e-9,
+            "popsize": (4 + int(3 * math.log(size))) * min(2**self.restarts, 8),
+        }  # fmt: skip
+        start = self._rng.uniform(0.2, 0.8, size)
+        self._strategy: Any = cma.CMAEvolutionStrategy(start, 0.3, options)
+
+
+SAMPLERS: dict[str, Callable[[int, int], Sampler]] = {"cma": CmaEs, "halton": Halton, "random": Uniform}
+"""By name: made for a number of dimensions and a seed."""

@@ -1,0 +1,176 @@
+"""From a counterexample to a small one: fewer robots and obstacles, a later start, an earlier end, rounder numbers.
+
+Greedy: each change is kept if the scenario is still valid and still fails; until nothing more can go.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+
+from airground_drake.errors import AirgroundError
+from airground_drake.nsbc.motion import Motion
+from airground_drake.scenarios.load import from_data
+from airground_drake.simulation import simulate
+from airground_drake.trace import Trace
+
+DIGITS = (0, 1, 2, 3)
+"""Decimals that numbers are rounded to, the fewest first."""
+SPARE_S = (0.25, 0.5, 1.0, 2.0, 5.0)
+"""What is left before the first trigger, or after the last event, s."""
+SEEDS = (1, 2, 3, 4)
+"""Of the noise, which are tried where a change draws other noise."""
+ROUNDED = ("ugvs", "obstacles", "uav", "control", "decision", "duration_s")
+"""Keys under which numbers are made rounder."""
+
+Json = dict[str, Any]
+Fails = Callable[[Json], bool]
+"""Whether a scenario is valid and fails, as before."""
+
+
+def shrink(data: Json, fails: Fails, tests: int) -> tuple[Json, int]:
+    """A smaller scenario that fails, too.
+
+    Args:
+        data: of a scenario that fails, as `scenarios.load.resolved` gives it; with a single run.
+        fails: the test.
+        tests: how often it may be used.
+
+    Returns:
+        The smallest one found, and how many tests it took.
+    """
+    used, changed = 0, True
+    while changed and used < tests:
+        changed = False
+        for smaller in (_without_policies, _without_robots, _without_obstacles, _later, _shorter, _rounder):
+            again = True
+            while again and used < tests:
+                again = False
+                for candidate in smaller(data):
+                    used += 1
+                    if fails(candidate):
+                        data, again, changed = candidate, True, True
+                        break
+                    if used >= tests:
+                        break
+    return data, used
+
+
+def _without_policies(data: Json) -> Iterator[Json]:
+    yield from _without_items(data, "intervention", "policies")
+
+
+def _without_robots(data: Json) -> Iterator[Json]:
+    if len(data["ugvs"]) > 1:
+        yield from _with_seeds(_without_entries(data, "ugvs"))
+
+
+def _with_seeds(candidates: Iterator[Json]) -> Iterator[Json]:
+    """All with their own seed, then all with others."""
+    own = list(candidates)
+    yield from own
+    for seed in SEEDS:
+        for each in own:
+            yield copy.deepcopy(each) | {"seed": seed}
+
+
+def _without_obstacles(data: Json) -> Iterator[Json]:
+    yield from _without_items(data, "uav", "phantoms_m")
+    yield from _without_entries(data, "obstacles")
+
+
+def _without_entries(data: Json, key: str) -> Iterator[Json]:
+    for name in data[key]:
+        smaller = copy.deepcopy(data)
+        del smaller[key][name]
+        for run in smaller["runs"].values():
+            run["stalls_m"].pop(name, None)
+        yield smaller
+
+
+def _without_items(data: Json, *keys: str) -> Iterator[Json]:
+    def held(whole: Json) -> list[Any]:
+        found: Any = whole
+        for key in keys:
+            found = found[key]
+        return list(found)
+
+    for at in range(len(held(data))):
+        smaller = copy.deepcopy(data)
+        inner: Any = smaller
+        for key in keys[:-1]:
+            inner = inner[key]
+        del inner[keys[-1]][at]
+        yield smaller
+
+
+def _later(data: Json) -> Iterator[Json]:
+    """Begin shortly before the first trigger, where the robots are by then."""
+    yield from _with_seeds(_begun_later(data))
+
+
+def _begun_later(data: Json) -> Iterator[Json]:
+    trace = _trace(data)
+    first = min((event["t_s"] for event in trace.events if event["kind"] == "trigger"), default=0.0) if trace else 0.0
+    for spare in SPARE_S:
+        if trace is not None and first > 1.5 * spare:
+            yield _from(data, trace, first - spare)
+
+
+def _from(data: Json, trace: Trace, t: float) -> Json:
+    """The scenario from a time of its run on."""
+    later = copy.deepcopy(data)
+    row = int(np.searchsorted(trace.t, t))
+    t = float(trace.t[row])
+    for name, ugv in later["ugvs"].items():
+        waypoints = np.asarray(ugv["preset"]["waypoints_m"], dtype=np.float64)
+        motion = Motion.at_speed(waypoints, ugv["preset"]["speed_m_s"], start=0.0)
+        here = trace.signals.loc[row, [f"{name}.ref_{axis}_m" for axis in "xyz"]].to_numpy(np.float64)
+        ahead = motion.positions[motion.times > t + 1e-6]
+        ugv["preset"]["waypoints_m"] = [here.tolist(), *ahead.tolist()] if len(ahead) else [here.tolist()] * 2
+        ugv["start_m"] = trace.position(name)[row].tolist()
+    uav = later["uav"]
+    uav["start_m"] = trace.position(uav["name"])[row].tolist()
+    later["duration_s"] = data["duration_s"] - t
+    return later
+
+
+def _shorter(data: Json) -> Iterator[Json]:
+    """End soon after the last event but arrivals, or in half the time."""
+    trace = _trace(data)
+    ends = [data["duration_s"] * share for share in (0.25, 0.5, 0.75, 0.9)]
+    if trace is not None:
+        events = [event["t_s"] for event in trace.events if event["kind"] != "arrival"]
+        ends += [event + spare for event in events[:20] for spare in SPARE_S]
+    for end in sorted(ends):
+        if 0.0 < end < 0.95 * data["duration_s"]:
+            yield copy.deepcopy(data) | {"duration_s": end}
+
+
+def _rounder(data: Json) -> Iterator[Json]:
+    """All numbers at once, then those under each key, then one at a time."""
+    groups = [ROUNDED, *((key,) for key in ROUNDED)]
+    for digits in DIGITS:
+        for group in groups:
+            rounded = {key: _round(data[key], digits) for key in group}
+            if any(rounded[key] != data[key] for key in group):
+                yield copy.deepcopy(data) | rounded
+
+
+def _round(value: Any, digits: int) -> Any:
+    if isinstance(value, dict):
+        return {key: _round(each, digits) for key, each in value.items()}
+    if isinstance(value, list):
+        return [_round(each, digits) for each in value]
+    return round(value, digits) + 0.0 if isinstance(value, float) else value
+
+
+def _trace(data: Json) -> Trace | None:
+    try:
+        scenario = from_data(data, "shrunk")
+        return simulate(scenario, next(iter(scenario.runs)))
+    except AirgroundError:
+        return None

@@ -1,0 +1,65 @@
+"""When a campaign may end early: `SAFE-TRACE < 1e-4`, as soon as the anytime-valid bound is below that."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from airground_drake.campaign.evidence import OPEN
+from airground_drake.campaign.rows import Row
+from airground_drake.campaign.statistics import confidence_sequence
+from airground_drake.errors import UnknownNameError
+from airground_drake.registry import RUN_CLAIMS
+
+_RULE = re.compile(r"\s*(?P<claim>[A-Za-z0-9_.-]+)\s*(?P<sign>[<>])\s*(?P<value>[0-9.eE+-]+)\s*")
+
+
+@dataclass
+class Stopping:
+    """Stop when a claim's probability of a violation is known to be below, or above, a value.
+
+    Attributes:
+        claim: its identifier.
+        below: whether the upper bound must be below `value`; otherwise the lower bound above.
+        value: of the probability.
+    """
+
+    claim: str
+    below: bool
+    value: float
+
+    def __post_init__(self) -> None:
+        self._counts: dict[str, list[int]] = {}
+
+    @classmethod
+    def parse(cls, text: str) -> Stopping:
+        """A rule from its text.
+
+        Raises:
+            ValueError: if it is none.
+            UnknownNameError: if there is no such claim about runs.
+        """
+        found = _RULE.fullmatch(text)
+        value = float(found["value"]) if found else 0.0
+        if found is None or not 0.0 < value < 1.0:
+            raise ValueError(f"{text!r} is not allowed; wanted: CLAIM < PROBABILITY or CLAIM > PROBABILITY")
+        if found["claim"] not in RUN_CLAIMS:
+            raise UnknownNameError("claim about runs", found["claim"], RUN_CLAIMS)
+        return cls(found["claim"], found["sign"] == "<", value)
+
+    def met(self, rows: list[Row]) -> bool:
+        """Count the rows of one more draw; whether every run of the scenario now meets the rule."""
+        for row in rows:
+            idle = row["exercised"] == 0.0 and row["status"] == "holds"
+            if row["claim"] == self.claim and not idle:
+                counts = self._counts.setdefault(row["run"], [0, 0, 0])
+                counts[0] += row["status"] == "refuted"
+                counts[1] += row["status"] in OPEN
+                counts[2] += 1
+        return bool(self._counts) and all(map(self._decides, self._counts.values()))
+
+    def _decides(self, counts: list[int]) -> bool:
+        refuted, undecided, tested = counts
+        if self.below:
+            return confidence_sequence(refuted + undecided, tested).high < self.value
+        return confidence_sequence(refuted, tested).low > self.value

@@ -1,0 +1,160 @@
+"""The folder of a campaign: what is finished stays finished, whatever is killed, and counts once.
+
+    campaign.json     what is run: whoever goes on must go on with the same
+    parts/*.parquet   finished draws, written whole or not at all: a dataset that any reader of Parquet takes
+    journal.jsonl     draws finished since the last part, a line of strict JSON each
+
+A draw is finished when its line is in the journal. From time to time the journal becomes a part; if the command is
+killed between the two, the same draws are in both, and the part counts. A last line that is torn is none.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import io
+import json
+import math
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from airground_drake import files
+from airground_drake.campaign.rows import COLUMNS, Row
+from airground_drake.errors import FolderError, one_line
+
+SCHEMA = "airground_drake.campaign/1"
+MANIFEST, JOURNAL, PARTS = "campaign.json", "journal.jsonl", "parts"
+DRAWS_IN_A_PART = 500
+
+
+class Store:
+    """The open folder of a campaign; one command at a time has it."""
+
+    def __init__(self, folder: Path, manifest: dict[str, Any], *, resume: bool) -> None:
+        """Open the folder, and read what is finished.
+
+        Args:
+            folder: new or empty; with `resume`, one that has the same campaign.
+            manifest: what identifies the campaign, strict JSON.
+            resume: go on with what the folder has.
+
+        Raises:
+            FolderError: if the folder has another campaign, or something else, or another command has it open.
+            OSError: if it cannot be read or written.
+        """
+        folder.mkdir(parents=True, exist_ok=True)
+        self.folder = folder
+        manifest = {"schema": SCHEMA, **manifest}
+        there = sorted(path.name for path in folder.iterdir() if not files.is_partial(path))
+        if there and not resume:
+            raise FolderError(one_line(f"{folder} holds {there[0]!r}; allowed: a new or empty folder, or --resume"))
+        if there and _manifest(folder) != manifest:
+            raise FolderError(one_line(f"{folder} has another campaign, or another version of it; allowed: the same"))
+        files.sweep(folder)
+        if not there:
+            files.write_json(folder / MANIFEST, manifest)
+        self._journal = os.open(folder / JOURNAL, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
+        try:
+            fcntl.flock(self._journal, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            os.close(self._journal)
+            raise FolderError(one_line(f"{folder} is in use by another campaign command")) from None
+        self._in_parts = _read_parts(folder)
+        self._lately, whole = _read_journal(folder / JOURNAL, set(self._in_parts["index"]))
+        os.ftruncate(self._journal, whole)
+        self.finished = {*self._in_parts["index"].tolist(), *self._lately}
+
+    def add(self, rows: Sequence[Row]) -> None:
+        """Keep the rows of a draw: when this returns, it is finished."""
+        (index,) = {row["index"] for row in rows}
+        if index in self.finished:
+            return
+        plain = [{k: None if isinstance(v, float) and math.isnan(v) else v for k, v in row.items()} for row in rows]
+        os.write(self._journal, (json.dumps(plain, allow_nan=False) + "\n").encode())
+        self._lately[index] = list(rows)
+        self.finished.add(index)
+        if len(self._lately) >= DRAWS_IN_A_PART:
+            self.flush()
+
+    def flush(self) -> None:
+        """Make a part of the journal."""
+        if not self._lately:
+            return
+        part = _table([row for rows in self._lately.values() for row in rows])
+        buffer = io.BytesIO()
+        part.to_parquet(buffer, index=False)
+        number = len(list((self.folder / PARTS).glob("*.parquet")))
+        files.write_bytes(self.folder / PARTS / f"part-{number:06d}.parquet", buffer.getvalue())
+        os.ftruncate(self._journal, 0)
+        self._in_parts = pd.concat([self._in_parts, part], ignore_index=True)
+        self._lately = {}
+
+    def table(self) -> pd.DataFrame:
+        """All rows of all finished draws, by index."""
+        lately = _table([row for rows in self._lately.values() for row in rows])
+        both = pd.concat([self._in_parts, lately], ignore_index=True)
+        return both.sort_values("index", kind="stable", ignore_index=True)
+
+    def close(self) -> None:
+        """Make a part of what is left, and let others have the folder."""
+        self.flush()
+        os.close(self._journal)
+
+
+def read(folder: Path) -> tuple[dict[str, Any], pd.DataFrame]:
+    """What identifies a campaign, and all rows of its finished draws, also while it runs.
+
+    Raises:
+        FolderError: if the folder has no campaign.
+    """
+    manifest = _manifest(folder)
+    if manifest is None:
+        raise FolderError(one_line(f"{folder} has no campaign: no {MANIFEST} of ours"))
+    parts = _read_parts(folder)
+    lately, _ = _read_journal(folder / JOURNAL, set(parts["index"]))
+    both = pd.concat([parts, _table([row for rows in lately.values() for row in rows])], ignore_index=True)
+    return manifest, both.sort_values("index", kind="stable", ignore_index=True)
+
+
+def _manifest(folder: Path) -> dict[str, Any] | None:
+    try:
+        found = json.loads((folder / MANIFEST).read_bytes())
+    except (OSError, ValueError):
+        return None
+    return found if isinstance(found, dict) and found.get("schema") == SCHEMA else None
+
+
+def _read_parts(folder: Path) -> pd.DataFrame:
+    """Rows of all parts, of each index those of the first part that has it."""
+    parts = [pd.read_parquet(path) for path in sorted((folder / PARTS).glob("*.parquet"))]
+    seen: set[int] = set()
+    kept = [_table([])]
+    for part in parts:
+        kept.append(part[~part["index"].isin(seen)])
+        seen |= set(part["index"])
+    return pd.concat(kept, ignore_index=True)
+
+
+def _read_journal(path: Path, known: set[int]) -> tuple[dict[int, list[Row]], int]:
+    """Rows by index, without those that are known, and the number of bytes up to the last whole line."""
+    found: dict[int, list[Row]] = {}
+    whole = 0
+    for line in path.read_bytes().splitlines(keepends=True) if path.exists() else ():
+        try:
+            rows = json.loads(line)
+        except ValueError:
+            break
+        if not line.endswith(b"\n"):
+            break
+        whole += len(line)
+        index = rows[0]["index"]
+        if index not in known:
+            found[index] = rows
+    return found, whole
+
+
+def _table(rows: Sequence[Row]) -> pd.DataFrame:
+    return pd.DataFrame(list(rows), columns=list(COLUMNS)).astype(COLUMNS)

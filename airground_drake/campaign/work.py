@@ -1,0 +1,112 @@
+"""One draw of a campaign: its scenario is simulated, its runs are judged, and what came of it are rows."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Collection, Mapping
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from airground_drake.campaign.rows import DIED, INVALID, JUDGED, STOPPED, Row, blank
+from airground_drake.campaign.spec import Spec
+from airground_drake.errors import AirgroundError, ScenarioError, described, one_line
+from airground_drake.scenarios import plugins
+from airground_drake.scenarios.estimate import Limits, within
+from airground_drake.scenarios.schema import Scenario
+from airground_drake.simulation import simulate
+from airground_drake.trace import Trace
+from airground_drake.verify import Verdict, verify
+
+
+def rows_of(spec: Spec, index: int, limits: Limits, *, allow_plugins: bool = False) -> list[Row]:
+    """Simulate and judge one draw.
+
+    Args:
+        spec: of the campaign.
+        index: of the draw.
+        limits: what its scenario may ask for; one that asks for more is `invalid`.
+        allow_plugins: whether code of others may be imported and run.
+
+    Returns:
+        A row for each run and claim, with the columns of `rows.COLUMNS`.
+    """
+    return rows_at(spec, spec.values(index), index, limits, allow_plugins=allow_plugins)
+
+
+def rows_at(
+    spec: Spec, values: Mapping[str, Any], index: int, limits: Limits, *, allow_plugins: bool = False
+) -> list[Row]:
+    """The same for any values by dotted key, on the course of a draw."""
+    common = blank() | {"index": index, "drawn": json.dumps(dict(values), allow_nan=False)}
+    try:
+        scenario = spec.scenario_of(values, index)
+    except ScenarioError as error:
+        return [common | {"ended": INVALID, "what": one_line(str(error))}]
+    return rows_of_scenario(spec, scenario, limits, allow_plugins=allow_plugins, common=common)
+
+
+def rows_of_scenario(
+    spec: Spec, scenario: Scenario, limits: Limits, *, allow_plugins: bool = False, common: Row | None = None
+) -> list[Row]:
+    """Simulate and judge the runs of a scenario by the claims of a campaign; `common`: what all rows have."""
+    common = blank() if common is None else common
+    try:
+        within(scenario, limits)
+        with plugins.admitted(scenario, spec.scenario, allow=allow_plugins):
+            return [row for run in scenario.runs for row in _rows_of_run(scenario, run, spec.claims, common)]
+    except AirgroundError as error:
+        return [common | {"ended": INVALID, "what": one_line(str(error))}]
+
+
+def _rows_of_run(scenario: Scenario, run: str, claims: Collection[str], common: Row) -> list[Row]:
+    common = common | {"run": run, "method": scenario.runs[run].method, "duration_s": scenario.duration_s}
+    started = time.perf_counter()
+    try:
+        trace = simulate(scenario, run)
+        verdicts = verify(trace, claims=claims or None)
+    except (Exception, SystemExit) as error:
+        return [common | {"ended": STOPPED, "what": described(error)}]
+    common |= {"ended": JUDGED, "wall_s": time.perf_counter() - started, **_happened(trace)}
+    return [common | _of_claim(verdict) for verdict in verdicts]
+
+
+def died(index: int) -> list[Row]:
+    """What is known of a draw whose process ended again and again."""
+    return [blank() | {"index": index, "ended": DIED, "what": "the process that simulated it died", "drawn": "{}"}]
+
+
+def _of_claim(verdict: Verdict) -> Row:
+    finding = verdict.finding
+    return {
+        "claim": verdict.claim.id,
+        "status": finding.status,
+        "as_expected": verdict.as_expected,
+        "margin": float("nan") if finding.margin is None else float(finding.margin),
+        "unit": finding.unit,
+        "exercised": float("nan") if finding.exercised is None else float(finding.exercised),
+    }
+
+
+def _happened(trace: Trace) -> Row:
+    """Triggers, arrivals of UGVs, and decisions of a run."""
+    triggers = [event["t_s"] for event in trace.events if event["kind"] == "trigger"]
+    arrivals = [event["t_s"] for event in trace.events if event["kind"] == "arrival" and event["robot"] in trace.ugvs]
+    return {
+        "ugvs": len(trace.ugvs),
+        "triggers": len(triggers),
+        "first_trigger_s": min(triggers, default=float("nan")),
+        "arrived": len(arrivals),
+        "arrival_s": max(arrivals, default=float("nan")),
+        "decisions": len(trace.decisions),
+        "accepted": int((trace.decisions["decision"] == "accept").sum()),
+        "faults": len(trace.meta["faults"]),
+        "intervened_s": max(map(partial(_intervened, trace), trace.ugvs), default=0.0),
+    }
+
+
+def _intervened(trace: Trace, ugv: str) -> float:
+    """For how long a UGV did what the UAV asked for, s; each row's state lasts until the next."""
+    return float(np.diff(trace.t) @ (trace.column(f"{ugv}.accepted")[:-1] != 0.0))

@@ -1,0 +1,134 @@
+"""`airground campaign SPEC -n 1000`: many draws of a scenario, and what can be concluded from them."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from airground_drake import files
+from airground_drake.errors import AirgroundError, FolderError, ScenarioError, UnknownNameError, one_line
+from airground_drake.progress import told
+from airground_drake.scenarios import plugins
+from airground_drake.scenarios.estimate import DEFAULT_LIMITS, Limits
+
+if TYPE_CHECKING:
+    from airground_drake.campaign.spec import Spec
+
+EXIT_REFUTED, EXIT_USAGE, EXIT_UNDECIDED, EXIT_TOOL = 1, 2, 3, 4
+
+
+def parser() -> argparse.ArgumentParser:
+    """What the command line takes."""
+    parser = argparse.ArgumentParser(
+        prog="airground campaign",
+        description="Simulate and judge many draws of a scenario, and bound how likely a violation is.",
+        epilog="exit codes: 0 every claim as expected in every draw, 1 one differs, 2 usage, bad spec or folder, "
+        "3 undecided, 4 tool error, 130 and 143 interrupted; what is finished is kept: --resume goes on with it",
+    )
+    parser.add_argument("spec", type=Path, help="YAML file: a scenario, and distributions over its keys")
+    parser.add_argument("-n", "--number", type=_count, metavar="N", help="draws (default: all combinations of grids)")
+    parser.add_argument("-o", "--output", type=Path, metavar="DIR", help="default: campaigns/<name>; new, or --resume")
+    parser.add_argument("--resume", action="store_true", help="go on with what the folder has")
+    parser.add_argument("--only", type=int, metavar="INDEX", help="this draw alone; its scenario is written as YAML")
+    parser.add_argument("--jobs", type=_count, metavar="N", help="processes (default: one for each processor)")
+    parser.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster, such as tcp://host:8786")
+    parser.add_argument("--stop-when", metavar="RULE", help="such as 'SAFE-TRACE < 1e-3': the anytime-valid bound")
+    parser.add_argument("--limit-steps", type=float, default=DEFAULT_LIMITS.work, metavar="N", help="of one draw")
+    parser.add_argument("-q", "--quiet", action="store_true", help="no progress")
+    parser.add_argument(plugins.OPTION, action="store_true", help=plugins.HELP)
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line.
+
+    Returns:
+        Exit code: 0 every claim as expected in every draw, 1 one differs, 2 usage, bad spec or folder, 3 something
+        was undecided or a draw could not be judged, 4 tool error.
+    """
+    options = parser().parse_args(arguments)
+    from airground_drake.campaign.spec import load_spec
+
+    try:
+        spec = load_spec(options.spec)
+        return _all(spec, options) if options.only is None else _only(spec, options)
+    except (ScenarioError, FolderError, UnknownNameError, ValueError) as error:
+        print(f"error: {one_line(str(error))}", file=sys.stderr)
+        return EXIT_USAGE
+    except (AirgroundError, OSError) as error:
+        print(f"error: {one_line(str(error))}", file=sys.stderr)
+        return EXIT_TOOL
+
+
+def _all(spec: Spec, options: argparse.Namespace) -> int:
+    from airground_drake.campaign import pool
+    from airground_drake.campaign.conduct import conduct
+    from airground_drake.campaign.stopping import Stopping
+
+    stopping = Stopping.parse(options.stop_when) if options.stop_when else None
+    folder = options.output or Path("campaigns") / spec.name
+    jobs = options.jobs or len(os.sched_getaffinity(0))
+    with (
+        told(quiet=options.quiet) as watch,
+        pool.cluster(options.scheduler) if options.scheduler else pool.local(jobs) as processes,
+    ):
+        found = conduct(
+            spec, folder, processes, options.number, resume=options.resume, stopping=stopping,
+            limits=_limits(options), allow_plugins=options.allow_plugins, watch=watch,
+        )  # fmt: skip
+    print(f"{_summary(found)}\n{one_line(str(folder))}")
+    return _code(found)
+
+
+def _only(spec: Spec, options: argparse.Namespace) -> int:
+    """One draw alone: its verdicts, and its scenario as a file that `report` takes."""
+    import yaml
+
+    from airground_drake.campaign.work import rows_of
+    from airground_drake.scenarios.load import resolved
+
+    scenario = spec.draw(options.only)
+    path = options.output or Path(f"{scenario.name}.yaml")
+    files.write_text(path, yaml.safe_dump(resolved(scenario), sort_keys=False, allow_unicode=True))
+    rows = rows_of(spec, options.only, _limits(options), allow_plugins=options.allow_plugins)
+    for row in rows:
+        margin = "" if math.isnan(row["margin"]) else f" {row['margin']:.6g} {row['unit']}"
+        print(f"{row['run']:12} {row['claim'] or row['ended']:12} {row['status'] or row['what']}{margin}")
+    print(f"airground report {one_line(str(path))}")
+    return 0 if all(row["as_expected"] for row in rows) else EXIT_REFUTED
+
+
+def _limits(options: argparse.Namespace) -> Limits:
+    return Limits(options.limit_steps, DEFAULT_LIMITS.memory)
+
+
+def _code(found: dict[str, Any]) -> int:
+    claims = found["claims"]
+    if any(claim["not_as_expected"] and claim["refuted"] for claim in claims):
+        return EXIT_REFUTED
+    open_ = any(claim["undecided"] for claim in claims) or found["ended"].keys() - {"judged", "invalid"}
+    return EXIT_UNDECIDED if open_ or not claims else 0
+
+
+def _summary(found: dict[str, Any]) -> str:
+    ended = ", ".join(f"{count} {name}" for name, count in found["ended"].items())
+    lines = [f"{found['name']}: {found['draws']} draws ({ended}), {found['simulated_s']:.0f} s simulated"]
+    for claim in found["claims"]:
+        low, high = claim["fixed"]
+        bounds = f"probability of a violation {low:.2g} to {high:.2g}" if claim["tested"] else "never put to the test"
+        lines.append(
+            f"  {claim['run']:10} {claim['claim']:12} {claim['refuted']} of {claim['tested']} refuted, {bounds}"
+        )
+    return "\n".join(lines)
+
+
+def _count(text: str) -> int:
+    value = int(text)
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"{text} is not allowed; wanted: a whole number from 1 on")
+    return value

@@ -1,0 +1,134 @@
+"""`airground falsify SPEC --claim SAFE-TRACE`: look for a scenario that violates a claim, and make it small."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import os
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from airground_drake import files
+from airground_drake.campaign.rows import COLUMNS
+from airground_drake.errors import AirgroundError, Fault, ScenarioError, UnknownNameError, one_line
+from airground_drake.progress import told
+from airground_drake.registry import RUN_CLAIMS
+from airground_drake.scenarios import plugins
+from airground_drake.scenarios.estimate import DEFAULT_LIMITS
+
+if TYPE_CHECKING:
+    from airground_drake.campaign.falsification import Best, Search
+    from airground_drake.campaign.objective import Objective
+    from airground_drake.campaign.spec import Spec
+
+EXIT_FOUND, EXIT_USAGE, EXIT_TOOL = 1, 2, 4
+SAMPLERS = ("cma", "halton", "random")
+"""As in `campaign.search`, which takes a while to import."""
+TIMES = tuple(name for name in COLUMNS if name.endswith("_s") and name not in ("wall_s", "duration_s"))
+
+
+def parser() -> argparse.ArgumentParser:
+    """What the command line takes."""
+    parser = argparse.ArgumentParser(
+        prog="airground falsify",
+        description="Search the space of a campaign for a scenario that violates a claim, and make it small.",
+        epilog="exit codes: 0 no counterexample, 1 one was found, 2 usage or bad spec, 4 tool error",
+    )
+    parser.add_argument("spec", type=Path, help="YAML file of a campaign")
+    parser.add_argument("--claim", default="SAFE-TRACE", metavar="ID", help="claim about runs (default: %(default)s)")
+    parser.add_argument("--most", choices=TIMES, help="make this time as long as can be, instead of a margin small")
+    parser.add_argument(
+        "--limit", type=float, default=math.inf, metavar="S", help="of --most: longer is a counterexample"
+    )
+    parser.add_argument("--sampler", choices=SAMPLERS, default="cma", help="default: %(default)s")
+    parser.add_argument(
+        "-n", "--number", type=int, default=200, metavar="N", help="scenarios to try (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--shrink",
+        type=int,
+        default=300,
+        metavar="N",
+        help="runs to make a counterexample small (default: %(default)s)",
+    )
+    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="default: <name>_<sampler>.yaml")
+    parser.add_argument("--jobs", type=int, metavar="N", help="processes (default: one for each processor)")
+    parser.add_argument("-q", "--quiet", action="store_true", help="no progress")
+    parser.add_argument(plugins.OPTION, action="store_true", help=plugins.HELP)
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line.
+
+    Returns:
+        Exit code: 0 no counterexample, 1 one was found, 2 usage or bad spec, 4 tool error.
+    """
+    options = parser().parse_args(arguments)
+    from airground_drake.campaign.spec import load_spec
+
+    try:
+        return _run(load_spec(options.spec), options)
+    except (ScenarioError, UnknownNameError) as error:
+        print(f"error: {error}", file=sys.stderr)
+        return EXIT_USAGE
+    except (AirgroundError, OSError) as error:
+        print(f"error: {one_line(str(error))}", file=sys.stderr)
+        return EXIT_TOOL
+
+
+def _run(spec: Spec, options: argparse.Namespace) -> int:
+    from airground_drake.campaign import pool
+    from airground_drake.campaign.distributions import dimensions
+    from airground_drake.campaign.falsification import Search, falsify
+    from airground_drake.campaign.objective import Margin, Most
+    from airground_drake.campaign.search import SAMPLERS as KINDS
+
+    objective: Objective = Margin(options.claim) if options.most is None else Most(options.most, options.limit)
+    if options.claim not in RUN_CLAIMS:
+        raise UnknownNameError("claim about runs", options.claim, RUN_CLAIMS)
+    if not dimensions(spec.drawn):
+        raise ScenarioError(spec.source, "draw", Fault("nothing is drawn"), "wanted: keys to search over")
+    search = Search(replace(spec, claims=(options.claim,)), objective, DEFAULT_LIMITS, options.allow_plugins)
+    sampler = KINDS[options.sampler](dimensions(spec.drawn), spec.seed)
+    jobs = options.jobs or len(os.sched_getaffinity(0))
+    with told(quiet=options.quiet) as watch, pool.local(jobs) as processes:
+        watch.stage(spec.name, options.number, "scenarios")
+        best = falsify(search, sampler, options.number, processes, watch)
+    what = f"least margin of {options.claim}" if options.most is None else f"largest {options.most}"
+    value = best.value if options.most is None else -best.value
+    print(f"{spec.name}: {best.tried} tried by {options.sampler}, {what} {value:.6g}")
+    if len(best.point):
+        _save(search, best, options.output or Path(f"{spec.name}_{options.sampler}.yaml"), options.shrink)
+    return EXIT_FOUND if best.found else 0
+
+
+def _save(search: Search, best: Best, path: Path, tests: int) -> None:
+    """Write the scenario of the best point; beside it a small one, if it is a counterexample."""
+    from airground_drake.campaign.shrink import shrink
+    from airground_drake.scenarios.load import resolved
+
+    scenario = search.spec.scenario_of(search.values(best.point), 0)
+    data = resolved(scenario)
+    _write(path, data)
+    for run in scenario.runs if best.found else ():
+        alone = data | {"runs": {run: data["runs"][run]}}
+        if search.fails(alone):
+            smaller, used = shrink(alone, search.fails, tests)
+            small = path.with_stem(f"{path.stem}_small")
+            _write(small, smaller | {"name": f"{scenario.name}_small"})
+            print(
+                f"made small with {used} runs: {len(smaller['ugvs'])} UGVs, {len(smaller['obstacles'])} obstacles, "
+                f"{smaller['duration_s']:g} s: airground report {one_line(str(small))}"
+            )
+            return
+
+
+def _write(path: Path, data: dict[str, Any]) -> None:
+    import yaml
+
+    files.write_text(path, yaml.safe_dump(data, sort_keys=False, allow_unicode=True))
+    print(one_line(str(path)))

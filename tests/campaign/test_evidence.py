@@ -1,0 +1,118 @@
+"""What is concluded from rows, on rows that were made up."""
+
+from __future__ import annotations
+
+import json
+import re
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from airground_drake.campaign.evidence import evidence, strict
+from airground_drake.campaign.page import page
+from airground_drake.campaign.rows import COLUMNS, DIED, JUDGED, Row, blank
+from airground_drake.campaign.statistics import clopper_pearson, confidence_sequence
+from airground_drake.campaign.stopping import Stopping
+from airground_drake.campaign.work import died
+from airground_drake.errors import UnknownNameError
+
+NAN = float("nan")
+
+
+def row(index: int, status: str = "holds", **more: Any) -> Row:
+    common = {"index": index, "run": "d", "method": "d", "ended": JUDGED, "claim": "SAFE-TRACE", "status": status}
+    filled = {"as_expected": status == "holds", "exercised": 1.0, "margin": 0.1 * index, "unit": "m", "ugvs": 1}
+    return blank() | common | filled | {"drawn": json.dumps({"gain": index, "start": [0.0, float(index % 7)]})} | more
+
+
+def conclude(rows: list[Row], **marks: float) -> dict[str, Any]:
+    found = strict(evidence(pd.DataFrame(rows, columns=list(COLUMNS)).astype(COLUMNS), marks))
+    json.dumps(found, allow_nan=False)
+    return dict(found)
+
+
+def test_untested_runs_count_for_nothing_and_undecided_ones_against_the_claim() -> None:
+    rows = [row(i) for i in range(90)] + [
+        row(90, "refuted"),
+        row(91, "inconclusive"),
+        row(92, exercised=0.0, margin=NAN),
+    ]
+    (claim,) = conclude(rows)["claims"]
+    assert [claim[name] for name in ("tested", "refuted", "undecided", "idle")] == [92, 1, 1, 1]
+    assert claim["fixed"] == pytest.approx([clopper_pearson(1, 92).low, clopper_pearson(2, 92).high])
+    assert claim["anytime"] == pytest.approx([confidence_sequence(1, 92).low, confidence_sequence(2, 92).high])
+    assert claim["not_as_expected"] == 2
+    assert [each["index"] for each in claim["worst"]] == [0, 1, 2, 3, 4]
+
+
+def test_a_claim_that_nothing_tested_has_no_bound_but_the_whole_interval() -> None:
+    (claim,) = conclude([row(i, exercised=0.0, margin=NAN) for i in range(5)])["claims"]
+    assert (claim["tested"], claim["fixed"], claim["anytime"]) == (0, [0.0, 1.0], [0.0, 1.0])
+
+
+def test_it_finds_the_keys_by_which_a_claim_fails() -> None:
+    rng = np.random.default_rng(0)
+    rows = []
+    for i in range(400):
+        gain, noise, other = rng.random(3).tolist()
+        bad = gain > 0.75 and noise > 0.5
+        rows.append(
+            row(i, "refuted" if bad else "holds", drawn=json.dumps({"gain": gain, "other": other, "noise": noise}))
+        )
+    (claim,) = conclude(rows)["claims"]
+    where = claim["fails_where"]
+    assert set(where["keys"]) == {"gain", "noise"}
+    assert where["by_chance"] < 1e-6
+    assert sum(cell["runs"] for cell in where["cells"]) == 400
+    assert sum(cell["refuted"] for cell in where["cells"]) == claim["refuted"]
+
+
+def test_draws_that_were_not_judged_are_listed() -> None:
+    found = conclude([row(0), *died(1)])
+    assert found["ended"] == {JUDGED: 1, DIED: 1}
+    assert found["not_judged"][0]["index"] == 1
+
+
+def test_marks_are_found_in_distributions() -> None:
+    rows = [row(i, first_trigger_s=float(i)) for i in range(10)] + [row(10, first_trigger_s=NAN)]
+    (times,) = conclude(rows, first_trigger_s=7.5)["times"]
+    assert times["first_trigger_s"]["share_below_mark"] == 0.8
+    assert times["first_trigger_s"]["count"] == 10
+
+
+def test_no_draw_at_all() -> None:
+    found = conclude([])
+    assert (found["draws"], found["claims"]) == (0, [])
+
+
+def test_the_page_escapes_what_was_drawn_and_has_no_scripts() -> None:
+    rows = [
+        row(i, "refuted" if i % 2 else "holds", drawn=json.dumps({"x": i % 2, "<script>": "<img src=x>"}))
+        for i in range(20)
+    ]
+    table = pd.DataFrame(rows, columns=list(COLUMNS)).astype(COLUMNS)
+    text = page(conclude(rows) | {"name": "<b>", "title": "", "spec": "a.yaml"}, table)
+    assert "<script" not in text
+    assert "<img" not in text
+    assert "<b>" not in text
+    assert not re.search(r'(?:src|href)="(?!#)', text)
+
+
+def test_a_campaign_stops_when_the_bound_is_low_or_high_enough() -> None:
+    rule = Stopping.parse("SAFE-TRACE < 0.1")
+    met = [rule.met([row(i)]) for i in range(100)]
+    first = met.index(True)
+    assert all(met[first:])
+    assert confidence_sequence(0, first + 1).high < 0.1 <= confidence_sequence(0, first).high
+    assert not any(Stopping.parse("SAFE-TRACE < 0.1").met([row(i, exercised=0.0)]) for i in range(100))
+    assert any(map(Stopping.parse("SAFE-TRACE > 0.5").met, [[row(i, "refuted")] for i in range(50)]))
+
+
+def test_rules_that_are_none() -> None:
+    for text in ("SAFE-TRACE", "SAFE-TRACE = 0.1", "SAFE-TRACE < 2", "SAFE-TRACE < x"):
+        with pytest.raises(ValueError, match="wanted: CLAIM < PROBABILITY"):
+            Stopping.parse(text)
+    with pytest.raises(UnknownNameError):
+        Stopping.parse("SAFE-INV < 0.1")

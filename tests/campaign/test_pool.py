@@ -1,0 +1,41 @@
+"""Processes die; what they were to do is done."""
+
+from __future__ import annotations
+
+import os
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from airground_drake.campaign.pool import cluster, local
+from airground_drake.errors import AirgroundError
+
+
+def work(folder: Path, always: int, item: int) -> int:
+    """Item 2 kills its process the first time, one item every time."""
+    seen = folder / str(item)
+    if item == always or (item == 2 and not seen.exists()):
+        seen.touch()
+        os._exit(1)
+    return item * item
+
+
+def test_a_process_that_dies_loses_no_item_and_does_none_twice(tmp_path: Path) -> None:
+    with local(jobs=2) as pool:
+        found = list(pool(partial(work, tmp_path, 5), range(9)))
+    assert sorted(found) == [(item, None if item == 5 else item * item) for item in range(9)]
+
+
+def test_the_same_on_a_cluster_of_two_workers(tmp_path: Path) -> None:
+    distributed = pytest.importorskip("distributed")
+    options = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None}
+    with distributed.LocalCluster(**options) as here, cluster(here.scheduler_address) as pool:
+        found = list(pool(partial(work, tmp_path, -1), range(9)))
+    assert sorted(found) == [(item, item * item) for item in range(9)]
+
+
+def test_no_scheduler_is_one_line() -> None:
+    pytest.importorskip("distributed")
+    with pytest.raises(AirgroundError, match="no Dask scheduler at"), cluster("tcp://127.0.0.1:9"):
+        pass

@@ -1,0 +1,97 @@
+"""Samplers, objectives and shrinking, without simulations."""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+import numpy as np
+import pytest
+
+from airground_drake.campaign import shrink as module
+from airground_drake.campaign.objective import Margin, Most
+from airground_drake.campaign.rows import JUDGED, Row, blank
+from airground_drake.campaign.search import SAMPLERS, WORTHLESS
+from airground_drake.campaign.shrink import shrink
+from airground_drake.commands import falsify
+from airground_drake.errors import ScenarioError
+from airground_drake.scenarios.load import from_data, load, resolved
+
+
+@pytest.mark.parametrize("name", SAMPLERS)
+@pytest.mark.parametrize("dimensions", [1, 5])
+def test_samplers_stay_in_the_cube_and_depend_on_nothing_but_the_seed(name: str, dimensions: int) -> None:
+    found = []
+    for _ in range(2):
+        sampler = SAMPLERS[name](dimensions, 7)
+        batches = []
+        for _ in range(4):
+            points = sampler.ask()
+            assert points.shape[1] == dimensions
+            assert ((points >= 0.0) & (points < 1.0)).all()
+            sampler.tell(points, ((points - 0.3) ** 2).sum(axis=1))
+            batches.append(points)
+        found.append(np.concatenate(batches))
+    np.testing.assert_array_equal(*found)
+
+
+def test_the_strategy_goes_where_it_is_least_and_the_baselines_do_not() -> None:
+    least = {}
+    for name in SAMPLERS:
+        sampler, tried, best = SAMPLERS[name](4, 1), 0, np.inf
+        while tried < 400:
+            points = sampler.ask()
+            values = ((points - np.array([0.9, 0.1, 0.5, 0.7])) ** 2).sum(axis=1)
+            values[points[:, 0] < 0.2] = WORTHLESS
+            sampler.tell(points, values)
+            tried, best = tried + len(points), min(best, values.min())
+        least[name] = best
+    assert least["cma"] < 1e-4 < min(least["random"], least["halton"])
+
+
+def test_the_command_offers_all_samplers() -> None:
+    assert tuple(SAMPLERS) == falsify.SAMPLERS
+
+
+def row(**more: Any) -> Row:
+    return (
+        blank() | {"ended": JUDGED, "claim": "SAFE-TRACE", "status": "holds", "margin": 0.5, "intervened_s": 2.0} | more
+    )
+
+
+def test_objectives() -> None:
+    margin = Margin("SAFE-TRACE")
+    assert margin.value([row(), row(margin=0.2)]) == 0.2
+    assert margin.value([row(margin=float("nan")), row(claim="EXEC", margin=-3.0)]) == WORTHLESS
+    assert margin.value([row(status="refuted", margin=float("nan"))]) < 0.0
+    assert margin.value([blank()]) == WORTHLESS
+    assert (margin.found([row(margin=0.0)]), margin.found([row(status="refuted")])) == (False, True)
+    most = Most("intervened_s", 3.0)
+    assert most.value([row(), row(intervened_s=2.5), row(intervened_s=float("nan"))]) == -2.5
+    assert (most.found([row()]), most.found([row(intervened_s=3.5)])) == (False, True)
+
+
+def test_what_does_not_matter_goes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "_trace", lambda data: None)
+    data = resolved(load("warehouse")[0])
+    data["runs"] = {"d": data["runs"]["d"]}
+    matters = sorted(data["obstacles"])[2]
+    data["obstacles"][matters]["position_m"][0] += 0.123456
+    needed = data["obstacles"][matters]["position_m"][0]
+
+    def fails(candidate: dict[str, Any]) -> bool:
+        try:
+            from_data(copy.deepcopy(candidate), "candidate")
+        except ScenarioError:
+            return False
+        there = candidate["obstacles"].get(matters)
+        return there is not None and abs(there["position_m"][0] - needed) < 0.05 and candidate["duration_s"] > 3.0
+
+    small, used = shrink(data, fails, 300)
+    assert fails(small)
+    assert used <= 300
+    assert list(small["obstacles"]) == [matters]
+    assert len(small["ugvs"]) == 1
+    assert small["intervention"]["policies"] == []
+    assert 3.0 < small["duration_s"] < 12.0
+    assert round(small["obstacles"][matters]["position_m"][0], 1) == small["obstacles"][matters]["position_m"][0]

@@ -1,0 +1,92 @@
+"""Specs: what is drawn, and what is refused with a line that says where and what is allowed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from airground_drake.campaign.spec import Spec, load_spec
+from airground_drake.errors import ScenarioError
+
+TEXT = """
+scenario: minimal
+seed: 3
+draw:
+  seed: {integer: [0, 1000]}
+  control.motion_gain_1_s: {uniform: [1.0, 3.0]}
+"""
+
+
+def spec_of(tmp_path: Path, text: str) -> Spec:
+    path = tmp_path / "mine.yaml"
+    path.write_text(text, encoding="utf-8")
+    return load_spec(path)
+
+
+def test_a_draw_is_a_validated_scenario_named_by_its_index(tmp_path: Path) -> None:
+    spec = spec_of(tmp_path, TEXT)
+    scenario, values = spec.draw(4711), spec.values(4711)
+    assert scenario.name == "mine_4711"
+    assert scenario.seed == values["seed"]
+    assert scenario.control.motion_gain_1_s == values["control.motion_gain_1_s"]
+    assert scenario == spec_of(tmp_path, TEXT).draw(4711)
+    assert scenario != spec.draw(4712)
+
+
+def test_what_is_set_is_so_in_every_draw_and_runs_can_be_chosen(tmp_path: Path) -> None:
+    spec = spec_of(tmp_path, "scenario: case_a\nruns: [d]\nset: {duration_s: 3.5}\n")
+    assert spec.draw(1).duration_s == 3.5
+    assert list(spec.draw(1).runs) == ["d"]
+    assert spec.combinations == 1
+
+
+def test_a_scenario_beside_the_spec(tmp_path: Path) -> None:
+    own = (Path(__file__).parents[2] / "airground_drake/scenarios/minimal.yaml").read_text(encoding="utf-8")
+    (tmp_path / "own.yaml").write_text(own, encoding="utf-8")
+    assert spec_of(tmp_path, "scenario: own.yaml\n").draw(0).ugvs
+
+
+def test_random_courses_are_valid_and_have_the_counts_that_are_asked_for(tmp_path: Path) -> None:
+    spec = spec_of(tmp_path, "scenario: minimal\ncourse: {ugvs: [2, 3], obstacles: [1, 4], hidden: 0.5}\n")
+    scenarios = [spec.draw(i) for i in range(12)]
+    assert {len(each.ugvs) for each in scenarios} == {2, 3}
+    assert {len(each.obstacles) for each in scenarios} == {1, 2, 3, 4}
+    assert {o.known_to_uav for each in scenarios for o in each.obstacles.values()} == {True, False}
+
+
+def test_a_course_without_room_is_a_draw_that_cannot_be_made(tmp_path: Path) -> None:
+    spec = spec_of(tmp_path, "scenario: minimal\ncourse: {ugvs: 9, width_m: 3}\n")
+    with pytest.raises(ScenarioError, match="have no room"):
+        spec.draw(0)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("[]", "wanted: a mapping"),
+        ("draw: {}", "scenario"),
+        ("scenario: nowhere.yaml", "no such scenario or file"),
+        ("scenario: minimal\ndraws: {}", "did you mean draw?"),
+        ("scenario: minimal\nruns: [z]", "runs: 'z' is not allowed"),
+        ("scenario: minimal\nseed: -1", "wanted: a whole number"),
+        ("scenario: minimal\nname: ../x", "name"),
+        ("scenario: minimal\nclaims: [SAFE-TRAC]", "did you mean SAFE-TRACE?"),
+        ("scenario: minimal\ndraw: {seed: 3}", "draw.seed"),
+        ("scenario: minimal\ndraw: {seed: {unifrom: [0, 1]}}", "did you mean uniform?"),
+        ("scenario: minimal\ndraw: {seed: {uniform: [1, 0]}}", "draw.seed.uniform: [1, 0] is not allowed; wanted"),
+        ("scenario: minimal\ncourse: {ugvs: 0}", "course.ugvs"),
+        ("scenario: minimal\ncourse: {hidden: 2}", "a share, 0 to 1"),
+        ("scenario: minimal\ncourse: {width: 2}", "did you mean width_m?"),
+        ("scenario: minimal\nmarks: {arrival: 2}", "did you mean arrival_s?"),
+        ("scenario: minimal\nset: [1]", "dotted keys"),
+        ("scenario: minimal\nset: {contrl.period_s: 1}", "did you mean control?"),
+        ("a: &a [*a]", ""),
+        ("\tx", "not YAML"),
+    ],
+)
+def test_mistakes_are_one_line(tmp_path: Path, text: str, says: str) -> None:
+    with pytest.raises(ScenarioError) as caught:
+        spec_of(tmp_path, text)
+    assert says in str(caught.value)
+    assert "\n" not in str(caught.value)

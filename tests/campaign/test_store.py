@@ -1,0 +1,103 @@
+"""What is finished stays finished, and counts once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from airground_drake.campaign import store as module
+from airground_drake.campaign.rows import COLUMNS, JUDGED, Row, blank
+from airground_drake.campaign.store import JOURNAL, Store, read
+from airground_drake.errors import FolderError
+
+MANIFEST = {"name": "x", "spec_sha256": "0"}
+
+
+def draw(index: int) -> list[Row]:
+    return [blank() | {"index": index, "run": "d", "ended": JUDGED, "claim": claim, "drawn": "{}"} for claim in "AB"]
+
+
+def indices(store: Store) -> list[int]:
+    return store.table()["index"].tolist()
+
+
+def test_draws_come_back_by_index_with_their_types(tmp_path: Path) -> None:
+    store = Store(tmp_path / "c", MANIFEST, resume=False)
+    for index in (3, 1):
+        store.add(draw(index))
+    store.close()
+    manifest, table = read(tmp_path / "c")
+    assert manifest["name"] == "x"
+    assert table["index"].tolist() == [1, 1, 3, 3]
+    assert {name: str(kind) for name, kind in table.dtypes.items() if COLUMNS[str(name)] == "int64"}["index"] == "int64"
+    assert table["margin"].isna().all()
+
+
+def test_what_was_not_flushed_is_there_after_a_kill(tmp_path: Path) -> None:
+    store = Store(tmp_path / "c", MANIFEST, resume=False)
+    store.add(draw(1))
+    store.flush()
+    store.add(draw(2))
+    assert read(tmp_path / "c")[1]["index"].tolist() == [1, 1, 2, 2]  # while it runs
+    killed(store)
+    with (tmp_path / "c" / JOURNAL).open("a") as file:
+        file.write('[{"index": 7, "run"')  # a torn line
+    again = Store(tmp_path / "c", MANIFEST, resume=True)
+    assert again.finished == {1, 2}
+    again.add(draw(7))
+    killed(again)
+    assert indices(Store(tmp_path / "c", MANIFEST, resume=True)) == [1, 1, 2, 2, 7, 7]
+
+
+def test_a_kill_between_a_part_and_the_journal_counts_nothing_twice(tmp_path: Path) -> None:
+    store = Store(tmp_path / "c", MANIFEST, resume=False)
+    store.add(draw(1))
+    journal = (tmp_path / "c" / JOURNAL).read_bytes()
+    store.flush()
+    killed(store)
+    (tmp_path / "c" / JOURNAL).write_bytes(journal)
+    again = Store(tmp_path / "c", MANIFEST, resume=True)
+    assert indices(again) == [1, 1]
+    again.add(draw(1))
+    assert indices(again) == [1, 1]
+
+
+def test_a_long_journal_becomes_a_part(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "DRAWS_IN_A_PART", 3)
+    store = Store(tmp_path / "c", MANIFEST, resume=False)
+    for index in range(7):
+        store.add(draw(index))
+    parts = sorted((tmp_path / "c" / "parts").iterdir())
+    assert [len(pd.read_parquet(path)) for path in parts] == [6, 6]
+    assert indices(store) == sorted(2 * list(range(7)))
+
+
+def test_a_folder_of_something_else_or_of_another_campaign_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "photos").mkdir()
+    (tmp_path / "photos" / "me.png").write_bytes(b"")
+    with pytest.raises(FolderError, match=r"holds 'me\.png'"):
+        Store(tmp_path / "photos", MANIFEST, resume=False)
+    with pytest.raises(FolderError, match="another campaign"):
+        Store(tmp_path / "photos", MANIFEST, resume=True)
+    Store(tmp_path / "c", MANIFEST, resume=False).close()
+    with pytest.raises(FolderError, match="--resume"):
+        Store(tmp_path / "c", MANIFEST, resume=False)
+    with pytest.raises(FolderError, match="another campaign"):
+        Store(tmp_path / "c", MANIFEST | {"spec_sha256": "1"}, resume=True)
+    with pytest.raises(FolderError, match="no campaign"):
+        read(tmp_path / "photos")
+
+
+def test_one_command_at_a_time(tmp_path: Path) -> None:
+    store = Store(tmp_path / "c", MANIFEST, resume=False)
+    with pytest.raises(FolderError, match="in use"):
+        Store(tmp_path / "c", MANIFEST, resume=True)
+    store.close()
+    Store(tmp_path / "c", MANIFEST, resume=True).close()
+
+
+def killed(store: Store) -> None:
+    """As far as its files go: the lock goes with the process."""
+    module.os.close(store._journal)

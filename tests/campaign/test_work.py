@@ -1,0 +1,67 @@
+"""One draw: its rows, whatever comes of it."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from airground_drake.campaign import work
+from airground_drake.campaign.rows import COLUMNS, INVALID, JUDGED, STOPPED
+from airground_drake.campaign.spec import Spec, load_spec
+from airground_drake.errors import SimulationError
+from airground_drake.scenarios.estimate import DEFAULT_LIMITS, Limits
+
+TEXT = """
+scenario: minimal
+set: {duration_s: 2.0}
+draw: {seed: {integer: [0, 1000]}}
+claims: [SAFE-TRACE, ZENO-TRACE]
+"""
+
+
+@pytest.fixture
+def spec(tmp_path: Path) -> Spec:
+    path = tmp_path / "mine.yaml"
+    path.write_text(TEXT, encoding="utf-8")
+    return load_spec(path)
+
+
+def test_a_row_for_each_run_and_claim(spec: Spec) -> None:
+    rows = work.rows_of(spec, 5, DEFAULT_LIMITS)
+    assert {row["claim"] for row in rows} == {"SAFE-TRACE", "ZENO-TRACE"}
+    for row in rows:
+        assert row.keys() == COLUMNS.keys()
+        assert (row["ended"], row["index"], row["status"]) == (JUDGED, 5, "holds")
+        assert json.loads(row["drawn"]) == spec.values(5)
+        assert row["wall_s"] > 0.0
+    safe = next(row for row in rows if row["claim"] == "SAFE-TRACE")
+    assert safe["margin"] >= 0.0
+    assert math.isnan(safe["first_trigger_s"])
+
+
+def test_a_draw_that_makes_no_scenario_is_counted_as_such(spec: Spec) -> None:
+    (row,) = work.rows_of(replace(spec, fixed={"duration_s": -1.0}), 5, DEFAULT_LIMITS)
+    assert (row["ended"], row["claim"]) == (INVALID, "")
+    assert "duration_s" in row["what"]
+    (row,) = work.rows_of(spec, 5, Limits(work=1.0))
+    assert row["ended"] == INVALID
+
+
+def test_code_of_others_is_not_imported(spec: Spec) -> None:
+    own = replace(spec, fixed={"intervention.policies": [{"name": "no_such_module:Policy"}]})
+    (row,) = work.rows_of(own, 0, DEFAULT_LIMITS)
+    assert (row["ended"], "code of others" in row["what"]) == (INVALID, True)
+
+
+def test_a_run_that_stops_is_a_row(spec: Spec, monkeypatch: pytest.MonkeyPatch) -> None:
+    def stop(*_: object) -> None:
+        raise SimulationError("d", 1.5, "t0 < ti")
+
+    monkeypatch.setattr(work, "simulate", stop)
+    rows = work.rows_of(spec, 5, DEFAULT_LIMITS)
+    assert [row["ended"] for row in rows] == [STOPPED] * len(spec.draw(5).runs)
+    assert "t0 < ti" in rows[0]["what"]

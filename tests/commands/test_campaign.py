@@ -1,0 +1,104 @@
+"""`airground campaign`, from outside."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from airground_drake.campaign.store import JOURNAL, read
+from airground_drake.commands.campaign import main
+from airground_drake.scenarios.load import load
+
+SPEC = """
+name: small
+scenario: minimal
+set: {duration_s: 1.0}
+draw:
+  seed: {integer: [0, 1000]}
+  control.motion_gain_1_s: {uniform: [1.0, 3.0]}
+claims: [SAFE-TRACE, THR-TRIG]
+"""
+
+
+@pytest.fixture
+def spec(tmp_path: Path) -> Path:
+    path = tmp_path / "small.yaml"
+    path.write_text(SPEC, encoding="utf-8")
+    return path
+
+
+def test_it_runs_goes_on_and_says_what_it_found(spec: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = str(tmp_path / "out")
+    assert main([str(spec), "-n", "2", "-o", out, "--jobs", "1"]) == 0
+    assert main([str(spec), "-n", "2", "-o", out]) == 2
+    assert "--resume" in capsys.readouterr().err
+    assert main([str(spec), "-n", "4", "-o", out, "--jobs", "1", "--resume"]) == 0
+    found = json.loads((tmp_path / "out" / "evidence.json").read_text())
+    assert (found["draws"], found["ended"]) == (4, {"judged": 4})
+    assert "small: 4 draws (4 judged)" in capsys.readouterr().out
+    assert (tmp_path / "out" / "campaign.html").stat().st_size > 5000
+    spec.write_text(SPEC.replace("3.0", "2.0"), encoding="utf-8")
+    assert main([str(spec), "-n", "5", "-o", out, "--resume"]) == 2
+    assert "another campaign" in capsys.readouterr().err
+
+
+def test_one_draw_alone_is_the_same_draw_and_a_scenario(
+    spec: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([str(spec), "--only", "1", "-o", str(tmp_path / "one.yaml")]) == 0
+    assert "SAFE-TRACE" in capsys.readouterr().out
+    scenario = load(tmp_path / "one.yaml")[0]
+    assert scenario.name == "small_1"
+    assert scenario.duration_s == 1.0
+
+
+@pytest.mark.parametrize("arguments", [["-n", "0"], ["--only", "x"], ["-n", "2", "--jobs", "-1"]])
+def test_usage(spec: Path, arguments: list[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        main([str(spec), *arguments])
+    assert end.value.code == 2
+
+
+def test_a_rule_that_is_none(spec: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([str(spec), "--stop-when", "x"]) == 2
+    assert "wanted: CLAIM < PROBABILITY" in capsys.readouterr().err
+
+
+def test_killed_in_the_midst_it_loses_nothing_that_was_finished(spec: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    command = [
+        sys.executable,
+        "-m",
+        "airground_drake",
+        "campaign",
+        str(spec),
+        "-n",
+        "400",
+        "-o",
+        str(out),
+        "--jobs",
+        "1",
+    ]
+    process = subprocess.Popen(command, start_new_session=True, stderr=subprocess.DEVNULL)
+    try:
+        while process.poll() is None and (
+            not (out / JOURNAL).exists() or not (out / JOURNAL).read_bytes().count(b"\n")
+        ):
+            time.sleep(0.05)
+    finally:
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+    before = read(out)[1]
+    assert len(before)
+    assert main([str(spec), "-n", str(before["index"].max() + 2), "-o", str(out), "--jobs", "1", "--resume"]) == 0
+    after = read(out)[1]
+    same = after[after["index"].isin(set(before["index"]))].reset_index(drop=True)
+    assert same.drop(columns="wall_s").equals(before.drop(columns="wall_s"))
+    assert not after.duplicated(["index", "run", "claim"]).any()

@@ -1,0 +1,58 @@
+"""`airground falsify`, from outside."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from airground_drake.commands.falsify import main
+from airground_drake.scenarios.load import load
+from airground_drake.simulation import simulate
+from airground_drake.verify import verify
+
+SPEC = """
+name: pushed
+scenario: minimal
+set:
+  duration_s: 8.0
+  decision.threshold.zeta_m: 1.6
+  intervention.policies: [{name: towards, parameters: {speed_m_s: 2.0, x_m: 5.0, y_m: 0.0}}]
+  runs: {METHOD: {method: METHOD}}
+draw:
+  obstacles.rock.position_m: {uniform: [[4.0, -1.0, 0.0], [6.0, 1.0, 0.0]]}
+"""
+
+
+def falsified(tmp_path: Path, method: str, *more: str) -> int:
+    path = tmp_path / "pushed.yaml"
+    path.write_text(SPEC.replace("METHOD", method), encoding="utf-8")
+    return main([str(path), "--jobs", "1", "-n", "2", "--shrink", "12", "-o", str(tmp_path / "found.yaml"), *more])
+
+
+def test_a_violation_is_found_and_made_small(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert falsified(tmp_path, "b", "--sampler", "halton") == 1
+    assert "made small" in capsys.readouterr().out
+    for name in ("found", "found_small"):
+        scenario = load(tmp_path / f"{name}.yaml")[0]
+        (verdict,) = verify(simulate(scenario, "b"), claims=["SAFE-TRACE"])
+        assert verdict.finding.status == "refuted"
+    assert scenario.duration_s < 8.0
+
+
+def test_where_there_is_none_the_worst_is_kept(tmp_path: Path) -> None:
+    assert falsified(tmp_path, "d") == 0
+    assert load(tmp_path / "found.yaml")[0].name == "pushed_0"
+    assert not (tmp_path / "found_small.yaml").exists()
+
+
+def test_a_time_is_made_long(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert falsified(tmp_path, "b", "--most", "intervened_s", "--limit", "0.1") == 1
+    assert "largest intervened_s" in capsys.readouterr().out
+
+
+def test_usage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert falsified(tmp_path, "b", "--claim", "SAFE-INV") == 2
+    (tmp_path / "none.yaml").write_text("scenario: minimal\n", encoding="utf-8")
+    assert main([str(tmp_path / "none.yaml")]) == 2
+    assert "nothing is drawn" in capsys.readouterr().err
