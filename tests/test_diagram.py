@@ -27,7 +27,7 @@ LAYERS = (
     ("diagram", "events"),
     ("simulation", "graphviz", "verify"),
     ("runs",),
-    ("report",),
+    ("report", "replay"),
     ("commands", "__main__"),
 )
 """From left to right: a module imports from its own layer or from those before it."""

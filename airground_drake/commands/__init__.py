@@ -27,6 +27,7 @@ COMMANDS: dict[str, Command] = {
     "verify": Command("airground_drake.verify.__main__", "judge claims anew, on a saved run or about a model"),
     "check": Command("airground_drake.check.command", "go over a report with the independent checker"),
     "proofs": Command("airground_drake.verify.proof_files", "write the proofs of a report for others' checkers"),
+    "replay": Command("airground_drake.commands.replay", "show the runs of a report: a page each, or a video"),
     "diagram": Command("airground_drake.commands.diagram", "draw the diagram of a scenario"),
     "list": Command("airground_drake.commands.listing", "list scenarios, methods, policies, routes, tasks and claims"),
     "init": Command("airground_drake.commands.init", "write a small scenario to start from"),
