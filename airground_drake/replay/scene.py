@@ -99,7 +99,7 @@ def scene(trace: Trace, scenario: Scenario) -> Scene:
             "UGV" if name in scenario.ugvs else "UAV",
             max(mark, radius_m(specs[name])),
             np.column_stack([np.interp(times, trace.t, axis) for axis in trace.position(name).T]),
-            _states(trace, name, times) if name in scenario.ugvs else np.zeros(len(times), dtype=np.intp),
+            states(trace, name, times) if name in scenario.ugvs else np.zeros(len(times), dtype=np.intp),
             np.array(specs[name].target_m),
         )
         for name in trace.robots
@@ -141,8 +141,8 @@ def safe_m(scenario: Scenario, obstacle: Obstacle) -> float:
     return scenario.safe_distance.obstacle_m + radius_m(obstacle) + max(map(radius_m, scenario.ugvs.values()))
 
 
-def _states(trace: Trace, ugv: str, times: Array) -> npt.NDArray[np.intp]:
-    """Indices of STATES (F,): what was in force just before each frame."""
+def states(trace: Trace, ugv: str, times: Array) -> npt.NDArray[np.intp]:
+    """Indices of STATES (F,) at times (F,), s: what was in force just before each."""
     rows = np.minimum(np.searchsorted(trace.t, times - 1e-9), len(trace.t) - 1)
     accepted, mode = trace.column(f"{ugv}.accepted")[rows], trace.column(f"{ugv}.mode")[rows]
     return np.where(accepted > 0, INTERVENED, np.where(mode == 1, TRIGGERED, OWN))

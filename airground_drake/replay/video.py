@@ -32,6 +32,8 @@ PICTURES_PER_S = 15
 WIDTH_PX, DPI, MOST_PX = 640, 100, 1000
 SUFFIXES = (".webp", ".mp4")
 
+_BOX = {"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 1.0}
+
 Update = Callable[[int], None]
 """Brings a part of the picture to a frame of the scene, by its index."""
 
@@ -43,10 +45,10 @@ def write(scene: Scene, path: Path, speed: float) -> None:
         ReplayError: if there is no encoder for files of this name.
         OSError: if it cannot be written.
     """
-    encoder = _encoder(path)
     shown = np.arange(0.0, scene.times_s[-1], speed / PICTURES_PER_S)
     frames = [*np.searchsorted(scene.times_s, shown - 1e-9), len(scene.times_s) - 1]
     with canvas.style(), files.temporary_folder() as folder:
+        encoder = _encoder(path)
         figure, updates = _picture(scene)
         part = folder / f"video{path.suffix}"
         try:
@@ -108,15 +110,17 @@ def _robot(axes: Axes, body: Body) -> Update:
         axes.plot(*body.target_m[:2], marker="x", markersize=7, color=PATH_COLOR)
     shape = Circle((0.0, 0.0), body.radius_m, zorder=4, linewidth=2.0, fill=body.kind == "UGV")
     axes.add_patch(shape)
-    name = axes.annotate("", (0.0, 0.0), (0, 8), textcoords="offset points", ha="center", fontweight="bold", zorder=5)
+    name = axes.annotate(
+        "", (0.0, 0.0), (0, 4), textcoords="offset points", ha="center", fontweight="bold", zorder=5, bbox=_BOX
+    )
 
     def update(frame: int) -> None:
         place, state = body.positions[frame, :2], body.states[frame]
         color = STATE_COLORS[state] if body.kind == "UGV" else UAV_COLOR
         shape.set_center((float(place[0]), float(place[1])))
         shape.set(facecolor=color, edgecolor=color)
-        name.xy = (float(place[0]), float(place[1]))
-        name.set(text=f"{body.name} {STATE_MARKS[state]}".rstrip(), color=color)
+        name.xy = (float(place[0]), float(place[1]) + body.radius_m)
+        name.set_text(f"{body.name} {STATE_MARKS[state]}".rstrip())
 
     return update
 
