@@ -120,7 +120,7 @@ def build_model(
         gatekeeper = Gatekeeper(gatekeepers, n, period=scenario.gatekeeper.period_s, control=scenario.control.period_s)
     ugvs = _ugvs(presets, UgvController(team, law), gatekeeper if gatekeeper is not None else DirectAcceptance(n))
     uav = _uav(planner, _uav_controller(scenario, team))
-    parts = {"decision": decision, "world": world, "ugvs": ugvs, "uav": uav}
+    parts = {"decision": decision, "uav": uav, "ugvs": ugvs, "world": world}
     if monitor is not None:
         parts["monitor"] = monitor
     named = {port.get_name(): port for part in parts.values() for port in _outputs(part)}
@@ -156,7 +156,7 @@ def _ugvs(presets: Sequence[Motion], controller: UgvController, gatekeeper: Gate
         "answers": gatekeeper.GetOutputPort("answers"),
         "reports": gatekeeper.GetOutputPort("reports"),
     }
-    return _assembled("ugvs", {"reference": reference, "ugv_controller": controller, "gatekeeper": gatekeeper}, named)
+    return _assembled("ugvs", {"reference": reference, "gatekeeper": gatekeeper, "ugv_controller": controller}, named)
 
 
 def _uav(planner: InterventionPlanner, controller: UavController) -> Diagram:
@@ -169,12 +169,12 @@ def _world(team: Team, plants: Mapping[str, System]) -> Diagram:
     """Where the robots are, and what moves them: commands, disturbances, plants."""
     n = len(team.ugvs)
     builder = DiagramBuilder()
-    for robot, plant in plants.items():
-        builder.AddNamedSystem(f"{robot}_plant", plant)
-    team_position = builder.AddNamedSystem("team_position", Multiplexer([3] * (n + 1)))
     team_command = builder.AddNamedSystem("team_command", Multiplexer([3 * n, 3]))
     disturbance = builder.AddNamedSystem("velocity_disturbance", VelocityDisturbance(team.robots))
     velocities = builder.AddNamedSystem("team_velocity", Demultiplexer(3 * (n + 1), 3))
+    for robot, plant in plants.items():
+        builder.AddNamedSystem(f"{robot}_plant", plant)
+    team_position = builder.AddNamedSystem("team_position", Multiplexer([3] * (n + 1)))
     for i, plant in enumerate(plants.values()):
         builder.Connect(plant.get_output_port(0), team_position.get_input_port(i))
         builder.Connect(velocities.get_output_port(i), plant.get_input_port(0))

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from airground_drake import files, graphviz
 from airground_drake.diagram import build_diagram
-from airground_drake.errors import AirgroundError
+from airground_drake.errors import AirgroundError, UnknownNameError
 from airground_drake.registry import METHODS
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.load import load
@@ -27,7 +27,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="airground diagram", description="Draw the diagram of a scenario.")
     parser.add_argument("scenario", help="name of a shipped scenario, or path to a YAML file")
     parser.add_argument("--method", choices=METHODS, help="default: that of the scenario's last run")
-    parser.add_argument("--depth", type=int, default=1, metavar="N", help="levels of nested diagrams (default: 1)")
+    parser.add_argument("--part", metavar="NAME", help="only the diagram inside it of that name")
+    parser.add_argument(
+        "--depth", type=_depth, default=1, metavar="N",
+        help="levels in one graph (default: 1); dot and svg have the diagrams below that, too, as graphs of their own",
+    )  # fmt: skip
     parser.add_argument("--format", action="append", choices=FORMATS, help="may be repeated (default: dot and svg)")
     parser.add_argument("-o", "--output", type=Path, default=Path(), metavar="DIR", help="default: this folder")
     parser.add_argument(
@@ -38,12 +42,25 @@ def main(arguments: Sequence[str] | None = None) -> int:
         scenario, _ = load(options.scenario)
         if not options.allow_plugins:
             plugins.refuse(scenario, options.scenario)
-        text = graphviz.dot(build_diagram(scenario, method=options.method), options.depth)
+        diagram = build_diagram(scenario, method=options.method)
+        if options.part is not None:
+            parts = [system.get_name() for system in diagram.GetSystems()]
+            if options.part not in parts:
+                raise UnknownNameError("part", options.part, parts)
+            diagram = diagram.GetSubsystemByName(options.part)
+        name = scenario.name if options.part is None else f"{scenario.name}_{options.part}"
+        text = graphviz.dot(diagram, options.depth)
         for kind in options.format or ("dot", "svg"):
-            path = options.output / f"{scenario.name}.{kind}"
-            files.write_bytes(path, text.encode() if kind == "dot" else graphviz.drawn(text, kind))
+            path = options.output / f"{name}.{kind}"
+            files.write_bytes(path, graphviz.drawn(text, kind))
             print(path)
     except (AirgroundError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return EXIT_USAGE
     return 0
+
+
+def _depth(text: str) -> int:
+    if not text.isdigit() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is not allowed; wanted: a whole number from 1 on")
+    return int(text)
