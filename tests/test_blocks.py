@@ -122,3 +122,4 @@ def test_blocks_lead_to_their_diagrams_also_on_a_page(diagram: Diagram) -> None:
     inlined = svg.inline(picture, "diagram", "Diagram", "of blocks", natural_size=True)
     assert re.findall(r'[ :]href="#([^"]*)"', inlined) == [f"diagram-{each}" for each in ids[1:]]
     assert all(f'id="diagram-{each}"' in inlined for each in ids[1:])
+    assert 'role="group"' in inlined  # what is an image has no links, for who hears it

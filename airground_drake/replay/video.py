@@ -29,6 +29,8 @@ from airground_drake.report.figures import canvas
 
 PICTURES_PER_S = 15
 """Pictures in a second of the video."""
+MOST_PICTURES = 600
+"""In a video: an encoder of WebP wants them all at once, 1.6 MB each."""
 WIDTH_PX, DPI, MOST_PX = 640, 100, 1000
 SUFFIXES = (".webp", ".mp4")
 
@@ -42,10 +44,13 @@ def write(scene: Scene, path: Path, speed: float) -> None:
     """Write the video of a run, `speed` times as fast as it was.
 
     Raises:
-        ReplayError: if there is no encoder for files of this name.
+        ReplayError: if there is no encoder for files of this name, or the video would be too long.
         OSError: if it cannot be written.
     """
     shown = np.arange(0.0, scene.times_s[-1], speed / PICTURES_PER_S)
+    if len(shown) > MOST_PICTURES:
+        least = np.ceil(scene.times_s[-1] * PICTURES_PER_S / MOST_PICTURES)
+        raise ReplayError(f"{path}: {len(shown)} pictures at speed {speed:g}; allowed: {MOST_PICTURES}, at {least:g}")
     frames = [*np.searchsorted(scene.times_s, shown - 1e-9), len(scene.times_s) - 1]
     with canvas.style(), files.temporary_folder() as folder:
         encoder = _encoder(path)

@@ -30,6 +30,11 @@ def test_a_run_shorter_than_a_picture(scene: Scene, tmp_path: Path) -> None:
     assert (tmp_path / "run.webp").stat().st_size > 1000
 
 
+def test_a_video_that_is_too_long(scene: Scene, tmp_path: Path) -> None:
+    with pytest.raises(ReplayError, match=r"4500 pictures at speed 0.1; allowed: 600, at 1$"):
+        video.write(scene, tmp_path / "run.webp", 0.1)
+
+
 @pytest.mark.parametrize(
     ("name", "says"), [("run.gif", "allowed: names that end in .webp or .mp4"), ("run", "allowed")]
 )
