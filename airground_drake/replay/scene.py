@@ -43,7 +43,7 @@ class Body:
 
 @dataclass(frozen=True)
 class Pillar:
-    """An obstacle: `radius_m` as drawn; centres of UGVs have to stay `safe_m` away from its own."""
+    """An obstacle: `radius_m` as drawn; UGVs have to stay `safe_m` away from its centre, with their whole bodies."""
 
     name: str
     centre_m: Array
@@ -137,8 +137,8 @@ def radius_m(spec: object) -> float:
 
 
 def safe_m(scenario: Scenario, obstacle: Obstacle) -> float:
-    """How far the centre of any UGV has to stay from that of an obstacle, m: d and the radii."""
-    return scenario.safe_distance.obstacle_m + radius_m(obstacle) + max(map(radius_m, scenario.ugvs.values()))
+    """How far UGVs have to stay from the centre of an obstacle, with their whole bodies, m: d and its radius."""
+    return scenario.safe_distance.obstacle_m + radius_m(obstacle)
 
 
 def states(trace: Trace, ugv: str, times: Array) -> npt.NDArray[np.intp]:

@@ -55,11 +55,13 @@ def test_safe_cylinders_and_bounds(scene: Scene, scenario: Scenario) -> None:
         assert body.radius_m > 0.0
 
 
-def test_radii_add_to_the_safe_distance() -> None:
+def test_bodies_are_drawn_as_large_as_they_are(trace: Trace) -> None:
     wide = make_scenario()
-    for spec, radius in ((wide.obstacles["obstacle_1"], 1.5), (wide.ugvs["ugv2"], 0.25)):
-        object.__setattr__(spec, "radius_m", radius)
-    assert scenes.safe_m(wide, wide.obstacles["obstacle_1"]) == wide.safe_distance.obstacle_m + 1.75
+    for spec, radius in ((wide.obstacles["obstacle_1"], 1.5), (wide.ugvs["ugv2"], 1.25)):
+        setattr(spec, "radius_m", radius)  # noqa: B010
+    made = scenes.scene(trace, wide)
+    assert (made.obstacles[0].radius_m, made.obstacles[0].safe_m) == (1.5, wide.safe_distance.obstacle_m + 1.5)
+    assert [body.radius_m for body in made.robots] == [made.mark_m, 1.25, made.mark_m]
 
 
 def test_without_obstacles(trace: Trace) -> None:
