@@ -14,26 +14,22 @@ import pytest
 from report.cases import FINE, built
 
 from airground_drake.report import html, scrubber
-from airground_drake.report.figures import canvas, maps
 from airground_drake.report.figures.panels import Figure
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.trace import Trace
 
 
-def test_places_are_those_of_the_drawing(traces: dict[str, Trace]) -> None:
-    """The path of a robot, as matplotlib draws it, goes through the places of its mark."""
-    trace = traces["c"]
-    with canvas.style():
-        picture = maps.plane(trace, trace.ugvs, maps.frame_of([trace], trace.robots))
-        text = canvas.svg(picture)
-    found = scrubber.tracks(picture, trace, trace.ugvs)
-    for robot, color in zip(found["robots"], ("#0060a8", "#b34700"), strict=False):
-        path = re.search(rf'<path d="([^"]*)"[^>]*stroke: {color}', text)
-        assert path
-        corners = np.array(re.findall(r"[ML] (\S+) (\S+)", path[1]), dtype=np.float64)
-        dense = np.concatenate([np.linspace(*pair, 200) for pair in pairwise(corners)])
-        places = np.reshape(robot["places"], (-1, 2)) / scrubber.PER_UNIT
-        assert np.abs(dense[:, None] - places).max(axis=2).min(axis=0).max() < 1.0
+def test_places_are_those_of_the_drawing(drawn: list[Figure]) -> None:
+    """The path of a robot, as it is drawn, goes through the places of its mark."""
+    for panel in drawn[0].panels:
+        assert panel.tracks is not None
+        for robot, color in zip(panel.tracks["robots"], ("#0060a8", "#b34700"), strict=False):
+            path = re.search(rf'<path d="([^"]*)"[^>]*stroke(?:="|: ){color}', panel.svg)
+            assert path
+            corners = np.array(re.findall(r"[ML] (\S+) (\S+)", path[1]), dtype=np.float64)
+            dense = np.concatenate([np.linspace(*pair, 200) for pair in pairwise(corners)])
+            places = np.reshape(robot["places"], (-1, 2)) / scrubber.PER_UNIT
+            assert np.abs(dense[:, None] - places).max(axis=2).min(axis=0).max() < 1.0
 
 
 def test_tracks_are_small_and_of_the_whole_run(drawn: list[Figure], traces: dict[str, Trace]) -> None:
