@@ -64,8 +64,10 @@ def test_the_policy_admits_each_script_and_no_other(page: str) -> None:
     assert scrubber.SCRIPT in scripts
 
 
-def test_without_the_script_the_picture_is_as_it_was(page: str) -> None:
-    assert page.count('<div class="scrubber" hidden>') == 1
+def test_without_the_script_the_picture_is_as_it_was(page: str, drawn: list[Figure]) -> None:
+    found = re.findall(r'<div class="scrubber" data-tracks="([^"]*)" hidden>', page)
+    assert len(found) == 1
+    assert json.loads(unescape(found[0])) == [panel.tracks for panel in drawn[0].panels]
     assert 'class="scrubbed"' not in page
     slider = re.findall(r"<label>Time, s <input ([^>]*)>", page)
     assert len(slider) == 1

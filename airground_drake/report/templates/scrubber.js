@@ -8,9 +8,9 @@ for (const scrubber of document.querySelectorAll(".scrubber")) {
     return element;
   };
 
-  const marks = [...scrubber.closest("figure").querySelectorAll("[data-tracks]")].flatMap((panel) => {
-    const { end, scale, robots } = JSON.parse(panel.dataset.tracks);
-    const svg = panel.querySelector("svg");
+  const drawings = scrubber.closest("figure").querySelectorAll(".panel > svg");
+  const marks = JSON.parse(scrubber.dataset.tracks).flatMap(({ end, scale, robots }, panel) => {
+    const svg = drawings[panel];
     return robots.map(({ color, states, places }) => {
       const group = drawn(svg, "g", { class: "scrubbed", "aria-hidden": "true" });
       drawn(group, "circle", { r: 4.2, fill: color, stroke: "#ffffff", "stroke-width": 1 });
