@@ -7,15 +7,28 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from airground_drake import files, graphviz
-from airground_drake.diagram import build_diagram
+from airground_drake import files
 from airground_drake.errors import AirgroundError, UnknownNameError
 from airground_drake.registry import METHODS
 from airground_drake.scenarios import plugins
-from airground_drake.scenarios.load import load
 
 EXIT_USAGE = 2
 FORMATS = ("dot", "svg", "pdf", "png")
+
+
+def parser() -> argparse.ArgumentParser:
+    """What the command line takes."""
+    parser = argparse.ArgumentParser(prog="airground diagram", description="Draw the diagram of a scenario.")
+    parser.add_argument("scenario", help="name of a shipped scenario, or path to a YAML file")
+    parser.add_argument("--method", choices=tuple(METHODS), help="default: that of the scenario's last run")
+    parser.add_argument("--part", metavar="NAME", help="only the diagram inside it of that name")
+    parser.add_argument("--depth", type=_depth, default=1, metavar="N", help="levels of the first graph (default: 1)")
+    parser.add_argument("--format", action="append", choices=FORMATS, help="may be repeated (default: dot and svg)")
+    parser.add_argument("-o", "--output", type=Path, default=Path(), metavar="DIR", help="default: this folder")
+    parser.add_argument(
+        plugins.OPTION, action="store_true", help="import and run what the scenario names as module:Class"
+    )
+    return parser
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -24,31 +37,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         Exit code: 0, or 2 if the scenario or the folder cannot be used.
     """
-    parser = argparse.ArgumentParser(prog="airground diagram", description="Draw the diagram of a scenario.")
-    parser.add_argument("scenario", help="name of a shipped scenario, or path to a YAML file")
-    parser.add_argument("--method", choices=METHODS, help="default: that of the scenario's last run")
-    parser.add_argument("--part", metavar="NAME", help="only the diagram inside it of that name")
-    parser.add_argument(
-        "--depth", type=_depth, default=1, metavar="N",
-        help="levels in one graph (default: 1); dot and svg have the diagrams below that, too, as graphs of their own",
-    )  # fmt: skip
-    parser.add_argument("--format", action="append", choices=FORMATS, help="may be repeated (default: dot and svg)")
-    parser.add_argument("-o", "--output", type=Path, default=Path(), metavar="DIR", help="default: this folder")
-    parser.add_argument(
-        plugins.OPTION, action="store_true", help="import and run what the scenario names as module:Class"
-    )
-    options = parser.parse_args(arguments)
+    options = parser().parse_args(arguments)
+    from airground_drake import graphviz
+    from airground_drake.diagram import build_diagram
+    from airground_drake.scenarios.load import load
+
     try:
         scenario, _ = load(options.scenario)
         if not options.allow_plugins:
             plugins.refuse(scenario, options.scenario)
-        diagram = build_diagram(scenario, method=options.method)
+        diagram, name = build_diagram(scenario, method=options.method), scenario.name
         if options.part is not None:
             parts = [system.get_name() for system in diagram.GetSystems()]
             if options.part not in parts:
                 raise UnknownNameError("part", options.part, parts)
-            diagram = diagram.GetSubsystemByName(options.part)
-        name = scenario.name if options.part is None else f"{scenario.name}_{options.part}"
+            diagram, name = diagram.GetSubsystemByName(options.part), f"{name}_{options.part}"
         text = graphviz.dot(diagram, options.depth)
         for kind in options.format or ("dot", "svg"):
             path = options.output / f"{name}.{kind}"

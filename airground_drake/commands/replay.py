@@ -7,13 +7,13 @@ import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from airground_drake import files, trace
+from airground_drake import files
 from airground_drake.errors import AirgroundError, FolderError, UnknownNameError, one_line
-from airground_drake.replay import live, video
-from airground_drake.replay.page import page
-from airground_drake.replay.scene import Scene, scene
-from airground_drake.scenarios.load import from_data
+
+if TYPE_CHECKING:
+    from airground_drake.replay.scene import Scene
 
 EXIT_USAGE = 2
 SCHEMA = "airground_drake.report/"
@@ -21,12 +21,8 @@ SLOWEST, FASTEST = 0.1, 100.0
 """How fast a video may be."""
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Write or serve the replays.
-
-    Returns:
-        Exit code: 0, or 2 if the folder, the run or the output cannot be used.
-    """
+def parser() -> argparse.ArgumentParser:
+    """What the command line takes."""
     parser = argparse.ArgumentParser(
         prog="airground replay",
         description="Write replay_RUN.html for the runs of a report: one file each, which works offline.",
@@ -39,9 +35,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--live", action="store_true", help="write nothing; serve the pages on this machine")
     parser.add_argument("--video", type=Path, metavar="FILE", help="write RUN as a video instead: .webp or .mp4")
     parser.add_argument("--speed", type=_speed, default=4.0, metavar="X", help="of the video (default: 4)")
-    options = parser.parse_args(arguments)
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Write or serve the replays.
+
+    Returns:
+        Exit code: 0, or 2 if the folder, the run or the output cannot be used.
+    """
+    of_command = parser()
+    options = of_command.parse_args(arguments)
     if options.video and not options.run:
-        parser.error("a video is of one RUN: name it")
+        of_command.error("a video is of one RUN: name it")
+    from airground_drake.replay import live, video
+    from airground_drake.replay.page import page
+
     try:
         runs = _runs(options.folder)
         if options.run not in (None, *runs):
@@ -109,5 +118,9 @@ def _keep_out(folder: Path) -> None:
 
 
 def _scene(folder: Path, run: str) -> Scene:
+    from airground_drake import trace
+    from airground_drake.replay.scene import scene
+    from airground_drake.scenarios.load import from_data
+
     saved = trace.load(folder / "trace" / run)
     return scene(saved, from_data(saved.scenario, str(folder / "trace" / run)))
