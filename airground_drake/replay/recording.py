@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -168,11 +167,8 @@ def _move(meshcat: Meshcat, animation: MeshcatAnimation, path: str, positions: A
     meshcat.SetTransform(path, RigidTransform(positions[0]))
 
 
-def _show(
-    meshcat: Meshcat, animation: MeshcatAnimation, path: str, shown: npt.NDArray[np.bool_] | Sequence[bool]
-) -> None:
+def _show(meshcat: Meshcat, animation: MeshcatAnimation, path: str, shown: npt.NDArray[np.bool_]) -> None:
     """Keyframes where a body comes and goes."""
-    values = np.asarray(shown)
-    for k in np.flatnonzero(np.append(True, values[1:] != values[:-1])):
-        animation.SetProperty(int(k), path, "visible", bool(values[k]))
-    meshcat.SetProperty(path, "visible", bool(values[0]))
+    for k in np.flatnonzero(np.append(True, shown[1:] != shown[:-1])):
+        animation.SetProperty(int(k), path, "visible", bool(shown[k]))
+    meshcat.SetProperty(path, "visible", bool(shown[0]))
