@@ -1,19 +1,20 @@
-"""From a scenario to a Drake Diagram: one named system per component, wired by port names."""
+"""From a scenario to a Drake Diagram of four: the decision layer, the world, the UGVs, the UAV; wired by port names."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TypeVar
 
 from pydrake.common import RandomDistribution
-from pydrake.systems.framework import Diagram, DiagramBuilder, System
+from pydrake.systems.framework import Diagram, DiagramBuilder, InputPort, OutputPort, System
 from pydrake.systems.primitives import Demultiplexer, Multiplexer, RandomSource, TrajectorySource
 
 from airground_drake import components
 from airground_drake.arrays import Array
+from airground_drake.decision.trigger import Trigger
 from airground_drake.errors import PluginError, UnknownNameError
 from airground_drake.nsbc.avoidance import COMPOSITIONS, Composition
+from airground_drake.nsbc.motion import Motion
 from airground_drake.nsbc.task import Task
 from airground_drake.nsbc.team import Team
 from airground_drake.registry import UAV_TASKS, Method, method_of
@@ -31,8 +32,6 @@ from airground_drake.systems import (
     UgvController,
     VelocityDisturbance,
 )
-
-S = TypeVar("S", bound=System)
 
 RECORDED = (
     "team_position", "team_command", "reference", "noise", "decision_variable", "status", "accepted",
@@ -110,94 +109,133 @@ def build_model(
     n = len(team.ugvs)
     zeta = components.threshold(scenario)
     law = components.make_law(scenario, chosen, composition)
-    decision = scenario.decision
-
-    builder = DiagramBuilder()
-
-    def add(name: str, system: S) -> S:
-        builder.AddNamedSystem(name, system)
-        return system
-
-    # first, so that its seed does not depend on what a plant may draw
-    noise_source = add("noise_source", RandomSource(RandomDistribution.kGaussian, n, decision.noise_period_s))
-    starts = components.make_starts(scenario)
-    bodies = [
-        add(f"{robot}_plant", _checked(robot, plants(robot, start)))
-        for robot, start in zip(team.robots, starts, strict=True)
-    ]
-    team_position = add("team_position", Multiplexer([3] * (n + 1)))
-    team_command = add("team_command", Multiplexer([3 * n, 3]))
-    disturbance = add("velocity_disturbance", VelocityDisturbance(team.robots))
-    velocities = add("team_velocity", Demultiplexer(3 * (n + 1), 3))
-    reference = add("reference", TrajectorySource(components.stack_presets(presets), output_derivative_order=1))
-    noise = add(
-        "decision_noise",
-        components.integrated_noise(n, decision.noise_m_sqrt_s, decision.leak_1_s, decision.noise_period_s),
-    )
-    decision_variable = add("decision_variable", DecisionVariable(n))
-    trigger = add("event_trigger", EventTrigger(n, components.make_trigger(scenario, zeta), presets))
-    planning = components.make_planner(scenario, chosen)
-    planner = add("intervention_planner", InterventionPlanner(planning, scenario.control.period_s))
-    ugv_controller = add("ugv_controller", UgvController(team, law))
-    uav_controller = add("uav_controller", _uav_controller(scenario, team))
+    # first, so that the seed of its noise does not depend on what a plant may draw
+    decision = _decision(scenario, n, components.make_trigger(scenario, zeta), presets)
+    starts = dict(zip(team.robots, components.make_starts(scenario), strict=True))
+    world = _world(team, {robot: _checked(robot, plants(robot, start)) for robot, start in starts.items()})
+    planner = InterventionPlanner(components.make_planner(scenario, chosen), scenario.control.period_s)
     gatekeeper = None
     if chosen.gated:
         gatekeepers = components.make_gatekeepers(scenario, law)
         gatekeeper = Gatekeeper(gatekeepers, n, period=scenario.gatekeeper.period_s, control=scenario.control.period_s)
-    gate = add("gatekeeper", gatekeeper if gatekeeper is not None else DirectAcceptance(n))
+    ugvs = _ugvs(presets, UgvController(team, law), gatekeeper if gatekeeper is not None else DirectAcceptance(n))
+    uav = _uav(planner, _uav_controller(scenario, team))
+    parts = {"decision": decision, "uav": uav, "ugvs": ugvs, "world": world}
+    if monitor is not None:
+        parts["monitor"] = monitor
+    named = {port.get_name(): port for part in parts.values() for port in _outputs(part)}
+    exported = [*RECORDED, *(["violation"] if monitor is not None else [])]
+    diagram = _assembled(f"{scenario.name}_method_{chosen.id}", parts, named, exported)
+    return Model(diagram, chosen, team, zeta, planner, gatekeeper)
 
-    def connect(source: System, output: str, target: System, port: str) -> None:
-        builder.Connect(source.GetOutputPort(output), target.GetInputPort(port))
 
-    for i, plant in enumerate(bodies):
+def _decision(scenario: Scenario, n: int, trigger: Trigger, presets: Sequence[Motion]) -> Diagram:
+    """The decision layer of n UGVs: noise, decision variables, triggers."""
+    given = scenario.decision
+    source = RandomSource(RandomDistribution.kGaussian, n, given.noise_period_s)
+    noise = components.integrated_noise(n, given.noise_m_sqrt_s, given.leak_1_s, given.noise_period_s)
+    variable, events = DecisionVariable(n), EventTrigger(n, trigger, presets)
+    systems = {
+        "noise_source": source, "decision_noise": noise, "decision_variable": variable, "event_trigger": events,
+    }  # fmt: skip
+    named = {
+        "noise": noise.get_output_port(),
+        "decision_variable": variable.GetOutputPort("decision_variable"),
+        "status": events.GetOutputPort("status"),
+    }
+    return _assembled("decision", systems, named, wires=[(source.get_output_port(), noise.get_input_port())])
+
+
+def _ugvs(presets: Sequence[Motion], controller: UgvController, gatekeeper: Gatekeeper | DirectAcceptance) -> Diagram:
+    """The UGVs: preset trajectories, controllers, gatekeepers."""
+    reference = TrajectorySource(components.stack_presets(list(presets)), output_derivative_order=1)
+    named = {
+        "reference": reference.get_output_port(),
+        "ugv_command": controller.GetOutputPort("command"),
+        "accepted": controller.GetOutputPort("accepted"),
+        "answers": gatekeeper.GetOutputPort("answers"),
+        "reports": gatekeeper.GetOutputPort("reports"),
+    }
+    return _assembled("ugvs", {"reference": reference, "gatekeeper": gatekeeper, "ugv_controller": controller}, named)
+
+
+def _uav(planner: InterventionPlanner, controller: UavController) -> Diagram:
+    """The UAV: planner and controller."""
+    named = {"proposals": planner.GetOutputPort("proposals"), "uav_command": controller.GetOutputPort("command")}
+    return _assembled("uav", {"intervention_planner": planner, "uav_controller": controller}, named)
+
+
+def _world(team: Team, plants: Mapping[str, System]) -> Diagram:
+    """Where the robots are, and what moves them: commands, disturbances, plants."""
+    n = len(team.ugvs)
+    builder = DiagramBuilder()
+    team_command = builder.AddNamedSystem("team_command", Multiplexer([3 * n, 3]))
+    disturbance = builder.AddNamedSystem("velocity_disturbance", VelocityDisturbance(team.robots))
+    velocities = builder.AddNamedSystem("team_velocity", Demultiplexer(3 * (n + 1), 3))
+    for robot, plant in plants.items():
+        builder.AddNamedSystem(f"{robot}_plant", plant)
+    team_position = builder.AddNamedSystem("team_position", Multiplexer([3] * (n + 1)))
+    for i, plant in enumerate(plants.values()):
         builder.Connect(plant.get_output_port(0), team_position.get_input_port(i))
         builder.Connect(velocities.get_output_port(i), plant.get_input_port(0))
-    builder.Connect(ugv_controller.GetOutputPort("command"), team_command.get_input_port(0))
-    builder.Connect(uav_controller.GetOutputPort("command"), team_command.get_input_port(1))
     builder.Connect(team_command.get_output_port(), disturbance.GetInputPort("command"))
     builder.Connect(disturbance.GetOutputPort("velocity"), velocities.get_input_port())
-    builder.Connect(noise_source.get_output_port(), noise.get_input_port())
-    for target in (decision_variable, trigger, ugv_controller, uav_controller, planner, gatekeeper):
-        if target is not None:
-            builder.Connect(team_position.get_output_port(), target.GetInputPort("team_position"))
-    for target in (decision_variable, trigger, ugv_controller):
-        builder.Connect(reference.get_output_port(), target.GetInputPort("reference"))
-    for target in (decision_variable, trigger):
-        builder.Connect(noise.get_output_port(), target.GetInputPort("noise"))
-    connect(trigger, "status", planner, "status")
-    connect(planner, "proposals", ugv_controller, "proposals")
-    connect(planner, "proposals", gate, "proposals")
-    connect(gate, "answers", ugv_controller, "answers")
-    connect(gate, "answers", planner, "answers")
-    connect(gate, "reports", planner, "reports")
-    connect(ugv_controller, "command", uav_controller, "ugv_command")
-    if gatekeeper is not None:
-        connect(ugv_controller, "command", gatekeeper, "ugv_command")
-        connect(uav_controller, "command", gatekeeper, "uav_command")
-
-    sources = {
-        "team_position": team_position.get_output_port(),
-        "team_command": team_command.get_output_port(),
-        "reference": reference.get_output_port(),
-        "noise": noise.get_output_port(),
-        "decision_variable": decision_variable.GetOutputPort("decision_variable"),
-        "status": trigger.GetOutputPort("status"),
-        "accepted": ugv_controller.GetOutputPort("accepted"),
-    }
-    if monitor is not None:
-        add("monitor", monitor)
-        for name in ("team_position", "team_command", "reference"):
-            builder.Connect(sources[name], monitor.GetInputPort(name))
-        connect(planner, "proposals", monitor, "proposals")
-        connect(gate, "answers", monitor, "answers")
-        builder.ExportOutput(monitor.GetOutputPort("violation"), "violation")
-    for name in RECORDED:
-        builder.ExportOutput(sources[name], name)
+    for i, robots in enumerate(("ugv", "uav")):
+        builder.ExportInput(team_command.get_input_port(i), f"{robots}_command")
     for robot in team.robots:
         builder.ExportInput(disturbance.GetInputPort(f"disturbance_{robot}"), f"disturbance_{robot}")
+    builder.ExportOutput(team_position.get_output_port(), "team_position")
+    builder.ExportOutput(team_command.get_output_port(), "team_command")
+    return _built("world", builder)
+
+
+def _assembled(
+    name: str,
+    systems: Mapping[str, System],
+    named: Mapping[str, OutputPort],
+    exported: Iterable[str] | None = None,
+    wires: Iterable[tuple[OutputPort, InputPort]] = (),
+) -> Diagram:
+    """A Diagram of systems by name, in which input ports are fed by name.
+
+    Args:
+        name: of the diagram.
+        systems: what is in it, in the order in which Drake goes through them.
+        named: output ports. Each feeds the input ports of its name; an input port of another name becomes one of the
+            diagram, together with all that have the same.
+        exported: which of `named` are output ports of the diagram; default: all.
+        wires: what else feeds what.
+    """
+    builder = DiagramBuilder()
+    for each, system in systems.items():
+        builder.AddNamedSystem(each, system)
+    for source, target in wires:
+        builder.Connect(source, target)
+    inputs = set()
+    for port in (system.get_input_port(i) for system in systems.values() for i in range(system.num_input_ports())):
+        wanted = port.get_name()
+        if builder.IsConnectedOrExported(port):
+            continue
+        if wanted in named:
+            builder.Connect(named[wanted], port)
+        elif wanted in inputs:
+            builder.ConnectInput(wanted, port)
+        else:
+            builder.ExportInput(port, wanted)
+            inputs.add(wanted)
+    for each in named if exported is None else exported:
+        builder.ExportOutput(named[each], each)
+    return _built(name, builder)
+
+
+def _built(name: str, builder: DiagramBuilder) -> Diagram:
     diagram = builder.Build()
-    diagram.set_name(f"{scenario.name}_method_{chosen.id}")
-    return Model(diagram, chosen, team, zeta, planner, gatekeeper)
+    diagram.set_name(name)
+    return diagram
+
+
+def _outputs(system: System) -> list[OutputPort]:
+    return [system.get_output_port(i) for i in range(system.num_output_ports())]
 
 
 def make_monitor(

@@ -87,6 +87,10 @@ class ReportError(AirgroundError):
     """A report that is not there, or differs from what was written, when it is read back."""
 
 
+class ReplayError(AirgroundError):
+    """A replay that cannot be made here: no port for Meshcat, no encoder for a video."""
+
+
 class SimulationError(AirgroundError):
     """A simulation that stopped before its end.
 

@@ -14,46 +14,60 @@ from pathlib import Path
 import pygraphviz
 from pydrake.systems.framework import Diagram
 
-from airground_drake import files
+from airground_drake import blocks, files
 from airground_drake.diagram import build_diagram
 from airground_drake.scenarios.load import load, shipped
 
-_NODE = re.compile(r"\b(cluster|clusters|s|_)(\d+)(?=[a-z]*\b)")
+_GAP_PT = 24.0
+"""Between the graphs of a picture."""
+_GRAPH = re.compile(r"^(?=digraph )", re.MULTILINE)
+_PICTURE = re.compile(r'<svg width="(\d+)pt" height="(\d+)pt".*?>\s*(<g .*</g>)\s*</svg>', re.DOTALL)
+_ID = re.compile(r' id="[^"]*"')
 
 
 def dot(diagram: Diagram, depth: int = 1) -> str:
-    """Graphviz text of a diagram: its systems and wires, diagrams inside of it opened to so many levels.
+    """Graphviz text of a diagram: a graph of it to that depth, then one of each diagram that is closed there.
 
-    Drake numbers systems in the order in which the process made them, and lists wires in the order of memory
-    addresses; here systems are numbered from 1 and wires sorted, so that a diagram always gives the same text.
+    The same diagram always gives the same text.
     """
-    text = str(diagram.GetGraphvizString(max_depth=depth))
-    numbers = sorted({int(found) for _, found in _NODE.findall(text)})
-    rank = {str(number): str(i) for i, number in enumerate(numbers, start=1)}
-    lines = _NODE.sub(lambda match: match[1] + rank[match[2]], text).splitlines(keepends=True)
-    wires = [i for i, line in enumerate(lines) if " -> " in line]
-    for i, line in zip(wires, sorted((lines[i] for i in wires), key=_natural), strict=True):
-        lines[i] = line
-    return "".join(lines)
-
-
-def _natural(line: str) -> list[tuple[int, str]]:
-    """Sort key by which s2 comes before s10."""
-    return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", line)]
+    return "".join(blocks.overview(diagram, depth))
 
 
 def svg(dot_text: str) -> str:
-    """Lay out Graphviz text as SVG.
+    """Lay out Graphviz text as SVG, its graphs below each other; a block that has a graph is a link to it.
 
     The same text gives the same bytes on the same machine; box sizes depend on its fonts. The digest of the text
     is in the picture, so that it can be told whether a picture is current.
     """
-    text = re.sub(r"<!--.*?-->\n?", "", drawn(dot_text, "svg").decode(), flags=re.DOTALL)
-    return text.replace("<svg ", f"<!-- {_digest(dot_text)} -->\n<svg ", 1)
+    width, height, groups = 0.0, 0.0, []
+    for text in _GRAPH.split(dot_text)[1:]:
+        found = _PICTURE.search(re.sub(r"<!--.*?-->\n?", "", _laid_out(text, "svg").decode(), flags=re.DOTALL))
+        if found is None:
+            raise ValueError("this version of Graphviz writes SVG of another form")
+        name = re.match(r'digraph "([^"]*)"', text)
+        inner = _ID.sub("", found[3])
+        groups.append(f'<g id="{name[1] if name else ""}" transform="translate(0 {height:g})">\n{inner}\n</g>')
+        width, height = max(width, float(found[1])), height + float(found[2]) + _GAP_PT
+    size = f"{width:g} {height - _GAP_PT:g}"
+    return "\n".join([
+        '<?xml version="1.0" encoding="UTF-8" standalone="no"?>',
+        f"<!-- {_digest(dot_text)} -->",
+        '<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" '
+        f'width="{width:g}pt" height="{height - _GAP_PT:g}pt" viewBox="0 0 {size}">',
+        *groups,
+        "</svg>",
+        "",
+    ])  # fmt: skip
 
 
 def drawn(dot_text: str, kind: str) -> bytes:
-    """Lay out Graphviz text as a picture: svg, pdf, png, or what else Graphviz knows."""
+    """Graphviz text as a file: dot, svg (all graphs), or of the first graph a pdf, png, or what else Graphviz knows."""
+    if kind == "dot":
+        return dot_text.encode()
+    return svg(dot_text).encode() if kind == "svg" else _laid_out(dot_text, kind)
+
+
+def _laid_out(dot_text: str, kind: str) -> bytes:
     with _silent_stderr(), warnings.catch_warnings():
         warnings.simplefilter("ignore")  # Graphviz and fontconfig remark on fonts; errors still raise
         picture: bytes = pygraphviz.AGraph(string=dot_text).draw(format=kind, prog="dot")

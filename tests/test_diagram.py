@@ -25,9 +25,9 @@ LAYERS = (
     ("systems",),
     ("components", "trace"),
     ("diagram", "events"),
-    ("simulation", "graphviz", "verify"),
+    ("simulation", "blocks", "graphviz", "verify"),
     ("runs",),
-    ("report",),
+    ("report", "replay"),
     ("commands", "__main__"),
 )
 """From left to right: a module imports from its own layer or from those before it."""
@@ -35,11 +35,20 @@ LAYERS = (
 
 def test_every_system_and_port_has_a_name() -> None:
     diagram = build_diagram(load("case_a")[0], "d")
-    names = [system.get_name() for system in diagram.GetSystems()]
-    assert len(names) == len(set(names))
-    assert {"ugv_controller", "uav_controller", "event_trigger", "intervention_planner", "gatekeeper"} <= set(names)
+    inside = {part.get_name(): [system.get_name() for system in part.GetSystems()] for part in diagram.GetSystems()}
+    assert inside == {
+        "decision": ["noise_source", "decision_noise", "decision_variable", "event_trigger"],
+        "uav": ["intervention_planner", "uav_controller"],
+        "ugvs": ["reference", "gatekeeper", "ugv_controller"],
+        "world": [
+            "team_command", "velocity_disturbance", "team_velocity", "ugv1_plant", "ugv2_plant", "uav_plant",
+            "team_position",
+        ],
+    }  # fmt: skip
     assert [diagram.get_output_port(i).get_name() for i in range(diagram.num_output_ports())] == list(RECORDED)
-    for system in diagram.GetSystems():
+    inputs = [diagram.get_input_port(i).get_name() for i in range(diagram.num_input_ports())]
+    assert inputs == [f"disturbance_{robot}" for robot in ("ugv1", "ugv2", "uav")]
+    for system in (system for part in diagram.GetSystems() for system in part.GetSystems()):
         if isinstance(system, LeafSystem) and type(system).__module__.startswith("airground_drake"):
             for i in range(system.num_input_ports()):
                 assert not system.get_input_port(i).get_name().startswith("u0")

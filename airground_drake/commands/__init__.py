@@ -35,6 +35,7 @@ COMMANDS: dict[str, Command] = {
     "proofs": Command("airground_drake.verify.proof_files", "write the proofs of a report for others' checkers"),
     "campaign": Command("airground_drake.commands.campaign", "judge many draws of a scenario"),
     "falsify": Command("airground_drake.commands.falsify", "search for a scenario that violates a claim"),
+    "replay": Command("airground_drake.commands.replay", "show the runs of a report: a page each, or a video"),
     "diagram": Command("airground_drake.commands.diagram", "draw the diagram of a scenario"),
     "list": Command("airground_drake.commands.listing", "list scenarios, methods, policies, routes, tasks and claims"),
     "init": Command("airground_drake.commands.init", "write a small scenario to start from"),

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from airground_drake import files
-from airground_drake.errors import AirgroundError
+from airground_drake.errors import AirgroundError, UnknownNameError
 from airground_drake.registry import METHODS
 from airground_drake.scenarios import plugins
 
@@ -21,7 +21,8 @@ def parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="airground diagram", description="Draw the diagram of a scenario.")
     parser.add_argument("scenario", help="name of a shipped scenario, or path to a YAML file")
     parser.add_argument("--method", choices=tuple(METHODS), help="default: that of the scenario's last run")
-    parser.add_argument("--depth", type=int, default=1, metavar="N", help="levels of nested diagrams (default: 1)")
+    parser.add_argument("--part", metavar="NAME", help="only the diagram inside it of that name")
+    parser.add_argument("--depth", type=_depth, default=1, metavar="N", help="levels of the first graph (default: 1)")
     parser.add_argument("--format", action="append", choices=FORMATS, help="may be repeated (default: dot and svg)")
     parser.add_argument("-o", "--output", type=Path, default=Path(), metavar="DIR", help="default: this folder")
     parser.add_argument(plugins.OPTION, action="store_true", help=plugins.HELP)
@@ -42,12 +43,24 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         scenario, _ = load(options.scenario)
         with plugins.admitted(scenario, options.scenario, allow=options.allow_plugins):
-            text = graphviz.dot(build_diagram(scenario, method=options.method), options.depth)
+            diagram, name = build_diagram(scenario, method=options.method), scenario.name
+        if options.part is not None:
+            parts = [system.get_name() for system in diagram.GetSystems()]
+            if options.part not in parts:
+                raise UnknownNameError("part", options.part, parts)
+            diagram, name = diagram.GetSubsystemByName(options.part), f"{name}_{options.part}"
+        text = graphviz.dot(diagram, options.depth)
         for kind in options.format or ("dot", "svg"):
-            path = options.output / f"{scenario.name}.{kind}"
-            files.write_bytes(path, text.encode() if kind == "dot" else graphviz.drawn(text, kind))
+            path = options.output / f"{name}.{kind}"
+            files.write_bytes(path, graphviz.drawn(text, kind))
             print(path)
     except (AirgroundError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return EXIT_USAGE
     return 0
+
+
+def _depth(text: str) -> int:
+    if not text.isdigit() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is not allowed; wanted: a whole number from 1 on")
+    return int(text)

@@ -1,4 +1,7 @@
-"""report.html: one self-contained page that renders report.json, the figures and the diagram; no JavaScript."""
+"""report.html: one self-contained page that renders report.json, the figures and the diagram.
+
+Its one script moves marks over the trajectories; the content security policy admits nothing else.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +15,7 @@ from markupsafe import Markup
 
 from airground_drake.errors import one_line
 from airground_drake.registry import outcome
+from airground_drake.report import scrubber
 from airground_drake.report.figures import svg
 from airground_drake.report.figures.panels import Figure
 from airground_drake.report.reproduction import YES_NO
@@ -83,6 +87,7 @@ def _environment() -> Environment:
     )
     environment.filters.update(num=number, value=value, pretty=pretty, together=faults_together, inline=Markup)
     environment.globals.update(chips=CHIPS, outcome=outcome, max_faults=MAX_FAULTS)
+    environment.globals.update(policy=Markup(scrubber.POLICY), script=Markup(scrubber.SCRIPT))
     return environment
 
 

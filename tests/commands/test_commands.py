@@ -104,5 +104,9 @@ def test_diagram_writes_what_was_asked_for(tmp_path: Path, capsys: pytest.Captur
     assert (tmp_path / "minimal.dot").read_text(encoding="utf-8").startswith("digraph")
     assert (tmp_path / "minimal.png").read_bytes().startswith(b"\x89PNG")
     assert "minimal_method_b" in (tmp_path / "minimal.dot").read_text(encoding="utf-8")
+    assert main(["diagram", "minimal", "--part", "ugvs", "--format", "svg", "-o", str(tmp_path)]) == 0
+    assert "ugv_controller" in (tmp_path / "minimal_ugvs.svg").read_text(encoding="utf-8")
+    assert main(["diagram", "minimal", "--part", "nothing", "-o", str(tmp_path)]) == 2
+    assert "allowed: decision, uav, ugvs, world" in capsys.readouterr().err
     assert main(["diagram", "nowhere.yaml"]) == 2
     assert "no such scenario" in capsys.readouterr().err

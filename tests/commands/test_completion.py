@@ -33,7 +33,7 @@ def script(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.parametrize(
     ("typed", "offered"),
     [
-        (["re"], "report"),
+        (["re"], "report replay"),
         (["report", "case_b"], "case_b"),
         (["report", "case_a", "--allow"], "--allow-plugins"),
         (["verify", "minim"], "minimal"),

@@ -36,7 +36,7 @@ class Page(HTMLParser):
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         self.tags.append((tag, dict(attrs)))
         self.parents.append((tag, self.open[-1] if self.open else ""))
-        if tag not in ("meta", "br", "link", "wbr"):
+        if tag not in ("meta", "br", "link", "wbr", "input"):
             self.open.append(tag)
 
     def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
@@ -93,13 +93,13 @@ def text(request: pytest.FixtureRequest) -> str:
 
 
 def test_hostile_names_are_escaped(hostile_page: str) -> None:
-    assert "<script" not in hostile_page
+    assert hostile_page.count("<script") == 1  # the page's own; tests of the scrubber look at its policy
     assert hostile_page.count("&lt;script&gt;") > 30
     assert not any(name.startswith("on") for _, attributes in Page(hostile_page).tags for name in attributes)
 
 
 def test_self_contained(text: str) -> None:
-    assert not any(tag in ("script", "link", "iframe", "img", "object", "embed") for tag, _ in Page(text).tags)
+    assert not any(tag in ("link", "iframe", "img", "object", "embed") for tag, _ in Page(text).tags)
     targets = [a[name] for _, a in Page(text).tags for name in ("href", "src", "data", "action") if name in a]
     assert targets
     assert all(target and target.startswith("#") for target in targets)

@@ -16,6 +16,7 @@ from airground_drake.report.figures import canvas, comparison, maps, timelines
 from airground_drake.report.figures.panels import MAX_TABLE_ROWS, Figure, Table, per_run, series
 from airground_drake.report.metrics import closest_obstacle, events_of, place
 from airground_drake.report.reproduction import MEASURES
+from airground_drake.report.scrubber import tracks
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.trace import Trace
 
@@ -112,6 +113,7 @@ def _trajectories(chosen: _Selection) -> Figure:
         lambda trace: series(
             trace, "Positions, m", {f"{r} {a}": trace.position(r)[:, k] for r in robots for k, a in enumerate("xy")}
         ),
+        lambda drawing, trace: tracks(drawing, trace, chosen.ugvs),
     )
     return Figure("trajectories", "Trajectories", caption, panels)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure as Drawing
@@ -33,6 +34,8 @@ class Panel:
     heading: str
     svg: str
     table: Table
+    tracks: Mapping[str, Any] | None = None
+    """Of a drawing of the ground plane: where the robots are in it, see `report.scrubber`."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +54,7 @@ def per_run(
     drawing: Callable[[Trace], Drawing],
     describe: Callable[[Trace], str],
     table: Callable[[Trace], Table],
+    tracks: Callable[[Drawing, Trace], Mapping[str, Any]] | None = None,
 ) -> tuple[Panel, ...]:
     """One panel per run."""
     panels = []
@@ -58,8 +62,9 @@ def per_run(
         method = str(trace.meta["method"])
         heading = f"Run {name}: method ({method}), {METHODS[method].says}"
         title = f"{kind} of run {name}"
-        text = canvas.svg(drawing(trace))
-        panels.append(Panel(heading, svg.inline(text, f"{kind}-{position}", title, describe(trace)), table(trace)))
+        picture = drawing(trace)
+        text = svg.inline(canvas.svg(picture), f"{kind}-{position}", title, describe(trace))
+        panels.append(Panel(heading, text, table(trace), tracks(picture, trace) if tracks else None))
     return tuple(panels)
 
 

@@ -46,7 +46,7 @@ def inline(svg: str, prefix: str, title: str, description: str, *, natural_size:
         _clean(element, prefix, used)
     for name in ("version",) if natural_size else ("version", "width", "height"):
         root.attrib.pop(name, None)
-    root.set("role", "img")
+    root.set("role", "img" if root.find(f".//{_TAG}a") is None else "group")
     root.set("aria-labelledby", f"{prefix}-title {prefix}-desc")
     for position, (name, text) in enumerate((("title", title), ("desc", description))):
         child = ET.Element(f"{_TAG}{name}", {"id": f"{prefix}-{name}"})

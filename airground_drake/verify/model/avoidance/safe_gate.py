@@ -59,7 +59,8 @@ class SafeGate(ModelClaim):
     def inputs(self, scenario: Scenario) -> Inputs:
         """Those of SAFE-INV, and what the diagram of method (d) was built with."""
         given = built_from(scenario)
-        controller = build_model(from_data(given, "the scenario"), "d").diagram.GetSubsystemByName("ugv_controller")
+        ugvs = build_model(from_data(given, "the scenario"), "d").diagram.GetSubsystemByName("ugvs")
+        controller = ugvs.GetSubsystemByName("ugv_controller")
         built = {
             "intervention_on_top": bool(controller.law.intervention_on_top),
             "compositions": compositions_of(scenario),

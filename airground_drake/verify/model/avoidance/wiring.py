@@ -208,8 +208,9 @@ class _Probe:
         diagram = build_model(from_data(inputs["scenario"], "the scenario of the inputs"), "d", composition).diagram
         self._root = diagram.CreateDefaultContext()
         self._root.SetTime(TIME_S)
-        self._plants = [diagram.GetSubsystemByName(f"{robot}_plant") for robot in views.robots]
-        self._ugvs, self._uav = (diagram.GetSubsystemByName(f"{each}_controller") for each in ("ugv", "uav"))
+        world, ugvs, uav = (diagram.GetSubsystemByName(each) for each in ("world", "ugvs", "uav"))
+        self._plants = [world.GetSubsystemByName(f"{robot}_plant") for robot in views.robots]
+        self._ugvs, self._uav = ugvs.GetSubsystemByName("ugv_controller"), uav.GetSubsystemByName("uav_controller")
 
     def sampling(self) -> dict[str, tuple[float, float]]:
         """Period and offset of each controller's updates, s."""

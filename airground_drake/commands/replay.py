@@ -1,0 +1,126 @@
+"""`airground replay DIR [RUN]`: show what happened in the runs of a report, from their saved traces."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from airground_drake import files
+from airground_drake.errors import AirgroundError, FolderError, UnknownNameError, one_line
+
+if TYPE_CHECKING:
+    from airground_drake.replay.scene import Scene
+
+EXIT_USAGE = 2
+SCHEMA = "airground_drake.report/"
+SLOWEST, FASTEST = 0.1, 100.0
+"""How fast a video may be."""
+
+
+def parser() -> argparse.ArgumentParser:
+    """What the command line takes."""
+    parser = argparse.ArgumentParser(
+        prog="airground replay",
+        description="Write replay_RUN.html for the runs of a report: one file each, which works offline.",
+    )
+    parser.add_argument("folder", type=Path, metavar="DIR", help="folder of a report")
+    parser.add_argument("run", nargs="?", metavar="RUN", help="default: all runs, a file each")
+    parser.add_argument(
+        "-o", "--output", type=Path, default=Path(), metavar="DIR", help="for the pages; default: this folder"
+    )
+    parser.add_argument("--live", action="store_true", help="write nothing; serve the pages on this machine")
+    parser.add_argument("--video", type=Path, metavar="FILE", help="write RUN as a video instead: .webp or .mp4")
+    parser.add_argument("--speed", type=_speed, default=4.0, metavar="X", help="of the video (default: 4)")
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Write or serve the replays.
+
+    Returns:
+        Exit code: 0, or 2 if the folder, the run or the output cannot be used.
+    """
+    of_command = parser()
+    options = of_command.parse_args(arguments)
+    if options.video and not options.run:
+        of_command.error("a video is of one RUN: name it")
+    from airground_drake.replay import live, video
+    from airground_drake.replay.page import page
+
+    try:
+        runs = _runs(options.folder)
+        if options.run not in (None, *runs):
+            raise UnknownNameError("run", options.run, runs)
+        chosen = [options.run] if options.run else runs
+        if options.live:
+            live.serve(chosen, lambda name: page(_scene(options.folder, name)))
+        elif options.video:
+            _keep_out(options.video.parent)
+            video.write(_scene(options.folder, options.run), options.video, options.speed)
+            print(options.video)
+        else:
+            _keep_out(options.output)
+            for name in chosen:
+                path = options.output / f"replay_{name}.html"
+                files.write_text(path, page(_scene(options.folder, name)))
+                print(path)
+    except (AirgroundError, OSError) as error:
+        print(f"error: {error}", file=sys.stderr)
+        return EXIT_USAGE
+    return 0
+
+
+def _speed(text: str) -> float:
+    try:
+        speed = float(text)
+    except ValueError:
+        speed = 0.0
+    if not SLOWEST <= speed <= FASTEST:
+        raise argparse.ArgumentTypeError(f"{text!r} is not allowed; wanted: a number from {SLOWEST:g} to {FASTEST:g}")
+    return speed
+
+
+def _is_report(folder: Path) -> bool:
+    try:
+        schema = json.loads((folder / "report.json").read_text(encoding="utf-8"))["schema"]
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        return False
+    return isinstance(schema, str) and schema.startswith(SCHEMA)
+
+
+def _runs(folder: Path) -> list[str]:
+    """Names of the runs of a report that have left a trace.
+
+    Raises:
+        FolderError: if it is no report, or one without runs.
+    """
+    found = sorted(path.parent.name for path in folder.glob("trace/*/meta.json"))
+    if not _is_report(folder):
+        raise FolderError(one_line(f"{folder} is no report; allowed: a folder that `airground report` has written"))
+    if not found:
+        raise FolderError(one_line(f"{folder} has no runs to replay; allowed: a report with trace/RUN/meta.json"))
+    return found
+
+
+def _keep_out(folder: Path) -> None:
+    """Leave reports as they are: they say of each of their files what is in it, and the checker refuses others.
+
+    Raises:
+        FolderError: if the folder is one of a report.
+    """
+    for each in (folder.resolve(), *folder.resolve().parents):
+        if _is_report(each):
+            raise FolderError(one_line(f"{folder} is in the report {each}, which is complete; name another, with -o"))
+
+
+def _scene(folder: Path, run: str) -> Scene:
+    from airground_drake import trace
+    from airground_drake.replay.scene import scene
+    from airground_drake.scenarios.load import from_data
+
+    saved = trace.load(folder / "trace" / run)
+    return scene(saved, from_data(saved.scenario, str(folder / "trace" / run)))

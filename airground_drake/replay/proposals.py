@@ -1,0 +1,75 @@
+"""What became of each proposal of a run, and from when to when: from the trace alone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+
+from airground_drake.arrays import Array
+from airground_drake.trace import Trace
+
+Outcome = Literal["asked", "accepted", "refused"]
+
+LINGER_S = 1.0
+"""For so long a proposal is still shown that has been refused, or that nobody has answered."""
+
+_ANSWERS: dict[str, Outcome] = {"accept": "accepted", "refuse": "refused"}
+
+
+class Span(NamedTuple):
+    """A stretch of time, s, in which a proposal stands as it does."""
+
+    start_s: float
+    end_s: float
+    outcome: Outcome
+
+
+class Sent(NamedTuple):
+    """A proposal: for which UGV, by which policy, the corners of its motion (M, 3), m, and how it stood when."""
+
+    robot: str
+    policy: str
+    path: Array
+    spans: tuple[Span, ...]
+
+
+def sent(trace: Trace) -> tuple[Sent, ...]:
+    """All proposals of a run, in the order of the trace.
+
+    Where a gatekeeper decides, a proposal stands as decided last, up to the last decision on it. Without one (method
+    (b)) it is accepted while the UGV carries out an intervention. The next proposal to the same UGV takes its place.
+    """
+    return tuple(
+        Sent(str(row["robot"]), str(row["policy"]), np.reshape(row["positions_m"], (-1, 3)), tuple(_spans(trace, row)))
+        for row in trace.proposals.to_dict("records")
+    )
+
+
+def _spans(trace: Trace, row: Mapping[Any, Any]) -> Iterator[Span]:
+    robot, issued = row["robot"], float(row["issued_s"])
+    issues = trace.proposals["issued_s"][trace.proposals["robot"] == robot].to_numpy(dtype=np.float64)
+    until = float(min(issues[issues > issued], default=trace.t[-1]))
+    changes, last_s = _answers(trace, robot, issued, until)
+    ends = [change for change, _ in changes[1:]]
+    ends.append(last_s if changes[-1][1] == "accepted" else max(last_s, changes[-1][0] + LINGER_S))
+    for (start, outcome), end in zip(changes, ends, strict=True):
+        if start < min(end, until):
+            yield Span(start, min(end, until), outcome)
+
+
+def _answers(trace: Trace, robot: str, issued: float, until: float) -> tuple[list[tuple[float, Outcome]], float]:
+    """From when on a proposal stood how, and the last time that anything is known of it, s."""
+    changes: list[tuple[float, Outcome]] = [(issued, "asked")]
+    ours = (trace.decisions["robot"] == robot) & (trace.decisions["issued_s"] == issued)
+    decided = trace.decisions[ours]
+    for t, decision in zip(decided["t_s"], decided["decision"], strict=True):
+        if changes[-1][1] != _ANSWERS[decision]:
+            changes.append((float(t), _ANSWERS[decision]))
+    if len(decided):
+        return changes, float(decided["t_s"].iloc[-1])
+    carried_out = trace.t[(trace.column(f"{robot}.accepted") > 0) & (trace.t > issued) & (trace.t <= until)]
+    if not len(carried_out):
+        return changes, issued
+    return [*changes, (float(carried_out[0]), "accepted")], float(carried_out[-1])

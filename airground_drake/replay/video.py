@@ -1,0 +1,143 @@
+"""A replay seen from above as a video: animated WebP, or MP4 where ffmpeg is installed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+
+from airground_drake import files
+from airground_drake.errors import ReplayError
+from airground_drake.replay.looks import (
+    OBSTACLE_COLOR,
+    OUTCOME_COLORS,
+    PATH_COLOR,
+    SAFE_COLOR,
+    STATE_COLORS,
+    STATE_MARKS,
+    UAV_COLOR,
+    UNSEEN_COLOR,
+)
+from airground_drake.replay.proposals import Sent
+from airground_drake.replay.scene import MAX_NAMED_OBSTACLES, Body, Pillar, Scene
+from airground_drake.report.figures import canvas
+
+PICTURES_PER_S = 15
+"""Pictures in a second of the video."""
+MOST_PICTURES = 600
+"""In a video: an encoder of WebP wants them all at once, 1.6 MB each."""
+WIDTH_PX, DPI, MOST_PX = 640, 100, 1000
+SUFFIXES = (".webp", ".mp4")
+
+_BOX = {"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 1.0}
+
+Update = Callable[[int], None]
+"""Brings a part of the picture to a frame of the scene, by its index."""
+
+
+def write(scene: Scene, path: Path, speed: float) -> None:
+    """Write the video of a run, `speed` times as fast as it was.
+
+    Raises:
+        ReplayError: if there is no encoder for files of this name, or the video would be too long.
+        OSError: if it cannot be written.
+    """
+    shown = np.arange(0.0, scene.times_s[-1], speed / PICTURES_PER_S)
+    if len(shown) > MOST_PICTURES:
+        least = np.ceil(scene.times_s[-1] * PICTURES_PER_S / MOST_PICTURES)
+        raise ReplayError(f"{path}: {len(shown)} pictures at speed {speed:g}; allowed: {MOST_PICTURES}, at {least:g}")
+    frames = [*np.searchsorted(scene.times_s, shown - 1e-9), len(scene.times_s) - 1]
+    with canvas.style(), files.temporary_folder() as folder:
+        encoder = _encoder(path)
+        figure, updates = _picture(scene)
+        part = folder / f"video{path.suffix}"
+        try:
+            with encoder.saving(figure, str(part), DPI):
+                for frame in frames:
+                    for update in updates:
+                        update(int(frame))
+                    encoder.grab_frame()
+        except ValueError as error:  # what Pillow says if it was built without WebP
+            raise ReplayError(f"{path}: no encoder here for {path.suffix}: {error}") from error
+        files.write_bytes(path, part.read_bytes())
+
+
+def _encoder(path: Path) -> AbstractMovieWriter:
+    """The encoder for a file, by its name."""
+    if path.suffix not in SUFFIXES:
+        raise ReplayError(f"{path}: no video of this kind; allowed: names that end in {' or '.join(SUFFIXES)}")
+    if path.suffix == ".webp":
+        return PillowWriter(fps=PICTURES_PER_S)
+    if not FFMpegWriter.isAvailable():
+        raise ReplayError(f"{path}: MP4 needs the program ffmpeg, which is not installed; allowed: .webp")
+    return FFMpegWriter(fps=PICTURES_PER_S, extra_args=["-pix_fmt", "yuv420p"])
+
+
+def _picture(scene: Scene) -> tuple[Figure, list[Update]]:
+    """The picture before anything has moved, and what moves it."""
+    low, high = scene.low_m[:2] - 3.0 * scene.mark_m, scene.high_m[:2] + 3.0 * scene.mark_m
+    width, height = high - low
+    scale = min(WIDTH_PX / width, MOST_PX / height)
+    size = 2 * np.round(np.array([max(width * scale, 240.0), height * scale + 50.0]) / 2.0)  # even, as codecs want it
+    figure = Figure(figsize=tuple(size / DPI), dpi=DPI)
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0 - 50.0 / size[1]))
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
+    axes.set_axis_off()
+    for obstacle in scene.obstacles:
+        _pillar(axes, obstacle, named=len(scene.obstacles) <= MAX_NAMED_OBSTACLES)
+    axes.plot(*scene.phantoms_m[:, :2].T, linestyle="none", marker="x", color=UNSEEN_COLOR)
+    updates = [_proposal(axes, scene, proposal) for proposal in scene.proposals]
+    updates += [_robot(axes, body) for body in scene.robots]
+    figure.text(8.0 / size[0], 1.0 - 10.0 / size[1], f"{scene.scenario}, run {scene.run}: {scene.says}", va="top")
+    clock = figure.text(8.0 / size[0], 1.0 - 30.0 / size[1], "", va="top", fontweight="bold")
+    updates.append(lambda frame: clock.set_text(f"{scene.times_s[frame]:.2f} s"))
+    return figure, updates
+
+
+def _pillar(axes: Axes, obstacle: Pillar, *, named: bool) -> None:
+    place = (float(obstacle.centre_m[0]), float(obstacle.centre_m[1]))
+    axes.add_patch(Circle(place, obstacle.safe_m, facecolor=f"{SAFE_COLOR}22", edgecolor=SAFE_COLOR, linewidth=0.8))
+    axes.add_patch(Circle(place, obstacle.radius_m, color=OBSTACLE_COLOR if obstacle.known_to_uav else UNSEEN_COLOR))
+    if named:
+        offset = (0.0, -4.0)
+        axes.annotate(obstacle.name, (place[0], place[1] - obstacle.radius_m), offset, textcoords="offset points",
+                      ha="center", va="top", fontsize=7.5)  # fmt: skip
+
+
+def _robot(axes: Axes, body: Body) -> Update:
+    axes.plot(*body.positions[:, :2].T, color=PATH_COLOR, linewidth=0.7)
+    if body.kind == "UGV":
+        axes.plot(*body.target_m[:2], marker="x", markersize=7, color=PATH_COLOR)
+    shape = Circle((0.0, 0.0), body.radius_m, zorder=4, linewidth=2.0, fill=body.kind == "UGV")
+    axes.add_patch(shape)
+    name = axes.annotate(
+        "", (0.0, 0.0), (0, 4), textcoords="offset points", ha="center", fontweight="bold", zorder=5, bbox=_BOX
+    )
+
+    def update(frame: int) -> None:
+        place, state = body.positions[frame, :2], body.states[frame]
+        color = STATE_COLORS[state] if body.kind == "UGV" else UAV_COLOR
+        shape.set_center((float(place[0]), float(place[1])))
+        shape.set(facecolor=color, edgecolor=color)
+        name.xy = (float(place[0]), float(place[1]) + body.radius_m)
+        name.set_text(f"{body.name} {STATE_MARKS[state]}".rstrip())
+
+    return update
+
+
+def _proposal(axes: Axes, scene: Scene, proposal: Sent) -> Update:
+    (line,) = axes.plot(*proposal.path[:, :2].T, linewidth=2.2, visible=False, zorder=2)
+
+    def update(frame: int) -> None:
+        now = scene.times_s[frame]
+        outcome = next((span.outcome for span in proposal.spans if span.start_s <= now < span.end_s), None)
+        line.set_visible(outcome is not None)
+        if outcome is not None:
+            line.set(color=OUTCOME_COLORS[outcome], linestyle="-" if outcome == "accepted" else (0, (3, 2)))
+
+    return update

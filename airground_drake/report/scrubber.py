@@ -1,0 +1,67 @@
+"""The scrubber of the trajectory figure: where each robot is in its drawing, at any time, for a script of the page.
+
+The drawings are complete without it. `templates/scrubber.js` moves marks over them.
+"""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from collections.abc import Sequence
+from hashlib import sha256
+from importlib import resources
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure as Drawing
+
+from airground_drake.arrays import Array
+from airground_drake.replay.scene import states
+from airground_drake.report.figures.canvas import UAV_LOOK, look
+from airground_drake.trace import Trace
+
+SAMPLES = 121
+"""Times at which a robot's place is in the page, evenly spread over the run; in between it is interpolated."""
+PER_UNIT = 10
+"""Places are in so many parts of a unit of the drawing, as whole numbers."""
+
+SCRIPT = resources.files("airground_drake.report").joinpath("templates/scrubber.js").read_text(encoding="utf-8")
+
+_DIGEST = b64encode(sha256(SCRIPT.encode()).digest()).decode()
+POLICY = (
+    f"default-src 'none'; style-src 'unsafe-inline'; script-src 'sha256-{_DIGEST}'; base-uri 'none'; form-action 'none'"
+)
+"""Content security policy of a page with this script and no other."""
+
+
+def tracks(drawing: Drawing, trace: Trace, ugvs: Sequence[str]) -> dict[str, Any]:
+    """Places of the UAV and of some UGVs in a drawing of the ground plane, as JSON that `scrubber.js` reads.
+
+    Args:
+        drawing: with one pair of axes, over x and y in m; drawn, so that the axes have their final place.
+        trace: the run.
+        ugvs: their names, in the order of their looks.
+    """
+    t = np.linspace(0.0, float(trace.t[-1]), SAMPLES)
+    robots = [*zip(ugvs, map(look, range(len(ugvs))), strict=True), (trace.robots[-1], UAV_LOOK)]
+    return {
+        "end": round(float(trace.t[-1]), 3),
+        "scale": PER_UNIT,
+        "robots": [
+            {
+                "name": name,
+                "color": appearance.color,
+                "states": "".join(map(str, states(trace, name, t))) if name in trace.ugvs else "0" * SAMPLES,
+                "places": _places(drawing, np.column_stack([np.interp(t, trace.t, x) for x in trace.position(name).T])),
+            }
+            for name, appearance in robots
+        ],
+    }
+
+
+def _places(drawing: Drawing, positions: Array) -> list[int]:
+    """Positions (T, 3), m, in the drawing as SVG: x and y in turn, PER_UNIT parts of a point, y downwards."""
+    pixels = drawing.axes[0].transData.transform(positions[:, :2])
+    points = pixels * 72.0 / drawing.dpi
+    points[:, 1] = drawing.get_figheight() * 72.0 - points[:, 1]
+    places: list[int] = np.round(points * PER_UNIT).astype(int).ravel().tolist()
+    return places

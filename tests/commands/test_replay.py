@@ -1,0 +1,82 @@
+"""`airground replay`: pages and videos of a report's runs, and what it refuses."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+from report.cases import GOING_ROUND, SUCCESS, make_scenario, make_trace
+
+from airground_drake import trace
+from airground_drake.commands import main
+from airground_drake.scenarios.load import resolved
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """As much of a report as a replay looks at."""
+    made = make_trace(make_scenario(), "c", GOING_ROUND, SUCCESS)
+    made.meta["scenario"] = resolved(make_scenario())
+    made.meta["schema"] = trace.SCHEMA
+    for run in ("c", "d"):
+        trace.save(made, tmp_path / "report" / "trace" / run)
+    (tmp_path / "report" / "report.json").write_text(json.dumps({"schema": "airground_drake.report/2"}))
+    return tmp_path / "report"
+
+
+def test_a_page_for_each_run(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["replay", str(folder), "-o", str(tmp_path / "out")]) == 0
+    written = sorted((tmp_path / "out").iterdir())
+    assert [path.name for path in written] == ["replay_c.html", "replay_d.html"]
+    assert capsys.readouterr().out.split() == [str(path) for path in written]
+    assert all("Meshcat" in path.read_text() for path in written)
+
+
+def test_one_run_in_this_folder(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["replay", str(folder), "d"]) == 0
+    assert [path.name for path in tmp_path.glob("*.html")] == ["replay_d.html"]
+
+
+def test_a_video(folder: Path, tmp_path: Path) -> None:
+    assert main(["replay", str(folder), "d", "--video", str(tmp_path / "d.webp"), "--speed", "100"]) == 0
+    assert (tmp_path / "d.webp").read_bytes()[8:12] == b"WEBP"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["{folder}", "x"], "unknown run 'x'; allowed: c, d"),
+        (["{folder}/trace"], "is no report"),
+        (["{folder}/missing"], "is no report"),
+        (["{folder}", "-o", "{folder}"], "is in the report"),
+        (["{folder}", "d", "--video", "{folder}/trace/d.webp"], "is in the report"),
+        (["{folder}", "d", "--video", "d.avi"], "allowed: names that end in .webp or .mp4"),
+    ],
+)
+def test_what_is_refused(folder: Path, arguments: list[str], says: str, capsys: pytest.CaptureFixture[str]) -> None:
+    before = sorted(folder.rglob("*"))
+    assert main(["replay", *(each.format(folder=folder) for each in arguments)]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("error: ")
+    assert error.count("\n") == 1
+    assert says in error
+    assert sorted(folder.rglob("*")) == before
+
+
+@pytest.mark.parametrize("extra", [["--video", "x.webp"], ["d", "--video", "x.webp", "--speed", "nan"]])
+def test_usage(folder: Path, extra: list[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["replay", str(folder), *extra])
+    assert ended.value.code == 2
+
+
+def test_a_report_without_runs_and_a_trace_that_was_changed(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (folder / "trace" / "d" / "signals.parquet").write_bytes(b"else")
+    assert main(["replay", str(folder), "d", "-o", str(folder.parent)]) == 2
+    assert "SHA-256" in capsys.readouterr().err
+    shutil.rmtree(folder / "trace")
+    assert main(["replay", str(folder), "-o", str(folder.parent)]) == 2
+    assert "has no runs to replay" in capsys.readouterr().err

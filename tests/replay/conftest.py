@@ -1,0 +1,43 @@
+"""A small scene: case A in small, with a proposal that is refused and one that is accepted."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from report.cases import GOING_ROUND, SUCCESS, make_scenario, make_trace
+
+from airground_drake.replay import scene as scenes
+from airground_drake.replay.scene import Scene
+from airground_drake.scenarios.schema import Scenario
+from airground_drake.trace import DECISION_COLUMNS, PROPOSAL_COLUMNS, Trace
+
+
+def with_proposals(trace: Trace, issued: list[float], decisions: list[tuple[float, float, str]]) -> Trace:
+    """A trace with proposals to ugv1 issued at some times, s, and decisions (time, time of issue, decision)."""
+    path = np.array([[3.4, 5.1, 0.0], [6.5, 5.0, 0.0], [6.5, 5.0, 0.0], [6.5, 9.0, 0.0]]).ravel()
+    rows = [{"robot": "ugv1", "policy": "p", "issued_s": at, "positions_m": path, "cause": "ugv1"} for at in issued]
+    found = [{"t_s": t, "robot": "ugv1", "issued_s": at, "decision": what} for t, at, what in decisions]
+    return replace(
+        trace,
+        proposals=pd.DataFrame(rows, columns=list(PROPOSAL_COLUMNS)),
+        decisions=pd.DataFrame(found, columns=list(DECISION_COLUMNS)),
+    )
+
+
+@pytest.fixture(scope="session")
+def scenario() -> Scenario:
+    return make_scenario()
+
+
+@pytest.fixture(scope="session")
+def trace(scenario: Scenario) -> Trace:
+    made = make_trace(scenario, "c", GOING_ROUND, SUCCESS)
+    return with_proposals(made, [12.0, 14.5], [(12.1, 12.0, "refuse"), (14.6, 14.5, "accept"), (16.9, 14.5, "accept")])
+
+
+@pytest.fixture(scope="session")
+def scene(trace: Trace, scenario: Scenario) -> Scene:
+    return scenes.scene(trace, scenario)

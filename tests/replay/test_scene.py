@@ -1,0 +1,68 @@
+"""What is where at each frame."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from report.cases import make_scenario
+
+from airground_drake.replay import scene as scenes
+from airground_drake.replay.scene import FRAMES_PER_S, INTERVENED, OWN, TRIGGERED, Scene
+from airground_drake.scenarios.schema import Scenario
+from airground_drake.trace import Trace
+
+
+@given(st.floats(0.01, 100.0))
+def test_frames_go_from_0_to_the_end(end: float) -> None:
+    times = scenes.frame_times(np.array([0.0, end]))
+    assert (times[0], times[-1]) == (0.0, end)
+    assert (np.diff(times) > 0).all()
+    assert np.diff(times).max() <= 1.0 / FRAMES_PER_S + 1e-6
+
+
+def test_robots_are_where_the_trace_has_them(scene: Scene, trace: Trace) -> None:
+    assert [(body.name, body.kind) for body in scene.robots] == [("ugv1", "UGV"), ("ugv2", "UGV"), ("uav", "UAV")]
+    for body in scene.robots:
+        for k in (0, 437, len(scene.times_s) - 1):
+            there = [np.interp(scene.times_s[k], trace.t, axis) for axis in trace.position(body.name).T]
+            assert body.positions[k] == pytest.approx(there, abs=1e-12)
+
+
+def test_states(scene: Scene) -> None:
+    by_time = dict(zip(scene.times_s.round(3), scene.robots[0].states, strict=True))
+    assert [by_time[t] for t in (14.0, 15.0, 18.0)] == [OWN, INTERVENED, OWN]
+    assert not scene.robots[-1].states.any()
+
+
+def test_triggered_without_help(trace: Trace, scenario: Scenario) -> None:
+    alone = replace(trace, signals=trace.signals.assign(**{"ugv1.accepted": 0.0}))
+    states = scenes.scene(alone, scenario).robots[0].states
+    assert set(states) == {OWN, TRIGGERED}
+
+
+def test_safe_cylinders_and_bounds(scene: Scene, scenario: Scenario) -> None:
+    assert {obstacle.safe_m for obstacle in scene.obstacles} == {scenario.safe_distance.obstacle_m}
+    for obstacle in scene.obstacles:
+        assert (obstacle.centre_m[:2] - obstacle.safe_m >= scene.low_m[:2]).all()
+        assert (obstacle.centre_m[:2] + obstacle.safe_m <= scene.high_m[:2]).all()
+    for body in scene.robots:
+        assert (body.positions >= scene.low_m - 1e-12).all()
+        assert (body.positions <= scene.high_m + 1e-12).all()
+        assert body.radius_m > 0.0
+
+
+def test_bodies_are_drawn_as_large_as_they_are(trace: Trace) -> None:
+    wide = make_scenario()
+    for spec, radius in ((wide.obstacles["obstacle_1"], 1.5), (wide.ugvs["ugv2"], 1.25)):
+        setattr(spec, "radius_m", radius)  # noqa: B010
+    made = scenes.scene(trace, wide)
+    assert (made.obstacles[0].radius_m, made.obstacles[0].safe_m) == (1.5, wide.safe_distance.obstacle_m + 1.5)
+    assert [body.radius_m for body in made.robots] == [made.mark_m, 1.25, made.mark_m]
+
+
+def test_without_obstacles(trace: Trace) -> None:
+    assert scenes.scene(trace, replace(make_scenario(), obstacles={})).obstacles == ()

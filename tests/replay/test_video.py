@@ -1,0 +1,50 @@
+"""Videos: as many pictures as the speed asks for, that differ; and what is said where there is no encoder."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from matplotlib.animation import FFMpegWriter
+from PIL import Image
+
+from airground_drake.errors import ReplayError
+from airground_drake.replay import video
+from airground_drake.replay.scene import Scene
+
+
+def test_an_animated_webp(scene: Scene, tmp_path: Path) -> None:
+    video.write(scene, tmp_path / "run.webp", speed=60.0)
+    with Image.open(tmp_path / "run.webp") as picture:
+        assert picture.n_frames == 9  # 30 s, 60 times as fast, 15 pictures per s, and the end
+        first = picture.convert("RGB").tobytes()
+        picture.seek(5)
+        assert picture.convert("RGB").tobytes() != first
+        assert max(picture.size) <= video.MOST_PX + 60
+
+
+def test_a_run_shorter_than_a_picture(scene: Scene, tmp_path: Path) -> None:
+    short = replace(scene, times_s=scene.times_s[:2])
+    video.write(short, tmp_path / "run.webp", speed=4.0)
+    assert (tmp_path / "run.webp").stat().st_size > 1000
+
+
+def test_a_video_that_is_too_long(scene: Scene, tmp_path: Path) -> None:
+    with pytest.raises(ReplayError, match=r"4500 pictures at speed 0.1; allowed: 600, at 1$"):
+        video.write(scene, tmp_path / "run.webp", 0.1)
+
+
+@pytest.mark.parametrize(
+    ("name", "says"), [("run.gif", "allowed: names that end in .webp or .mp4"), ("run", "allowed")]
+)
+def test_another_kind_of_file(scene: Scene, tmp_path: Path, name: str, says: str) -> None:
+    with pytest.raises(ReplayError, match=says):
+        video.write(scene, tmp_path / name, 4.0)
+
+
+def test_without_ffmpeg(scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(FFMpegWriter, "isAvailable", lambda: False)
+    with pytest.raises(ReplayError, match="needs the program ffmpeg"):
+        video.write(scene, tmp_path / "run.mp4", 4.0)
+    assert list(tmp_path.iterdir()) == []
