@@ -91,9 +91,10 @@ def _closest_call(trace: Trace) -> dict[str, Any] | None:
 
 
 def closest_obstacle(trace: Trace, robot: str) -> Closest | None:
-    """Smallest distance of a robot to any obstacle over continuous time, exact; None without obstacles."""
+    """Where a robot is closest to the surface of any obstacle over continuous time, exact; None without obstacles."""
     found = _distances(trace, robot, trace.scenario["obstacles"])
-    return min((Closest(at["value"], at["t_s"], name) for name, at in found.items()), default=None)
+    closest = (Closest(at["value"], at["t_s"], name) for name, at in found.items())
+    return min(closest, key=lambda at: (at.value - radius_m(trace, at.other), *at), default=None)
 
 
 def place(trace: Trace, name: str) -> Array:
@@ -104,12 +105,18 @@ def place(trace: Trace, name: str) -> Array:
 
 
 def safe_distance_m(trace: Trace, robot: str, other: str) -> float:
-    """The safe distance d that the scenario sets for a robot and an obstacle or another robot, m."""
+    """The safe distance of centres that the scenario sets for a robot and an obstacle or another robot, m."""
     if other in trace.scenario["obstacles"]:
         kind = "obstacle_m"
     else:
         kind = "ugv_m" if {robot, other} <= set(trace.ugvs) else "air_ground_m"
-    return float(trace.scenario["safe_distance"][kind])
+    return float(trace.scenario["safe_distance"][kind]) + (radius_m(trace, robot) + radius_m(trace, other))
+
+
+def radius_m(trace: Trace, name: str) -> float:
+    """Radius of a robot or an obstacle, m."""
+    scenario = trace.scenario
+    return float({**scenario["obstacles"], **scenario["ugvs"]}.get(name, scenario["uav"])["radius_m"])
 
 
 def events_of(trace: Trace, robot: str, *kinds: str) -> list[dict[str, Any]]:

@@ -27,19 +27,21 @@ class Preset:
 
 @dataclass
 class Ugv:
-    """One UGV: a planar first-order robot."""
+    """One UGV: a planar first-order robot, a disc of radius `radius_m` on the ground."""
 
     start_m: Vector = field(default_factory=list, metadata=REQUIRED)
     target_m: Vector = field(default_factory=list, metadata=REQUIRED)
     preset: Preset = field(default_factory=Preset, metadata=REQUIRED)
     max_speed_m_s: float = 6.0
+    radius_m: float = field(default=0.0, metadata=FROM_ZERO)
 
 
 @dataclass
 class Uav:
     """The UAV: a spatial first-order robot whose `task` is to fly over the centroid of the UGVs, eqs (9)-(10).
 
-    Another task is named as `module:Class`. `phantoms_m` are obstacles on its map that are not there.
+    Another task is named as `module:Class`. `phantoms_m` are obstacles on its map that are not there, points without a
+    radius. Its own body is a ball of radius `radius_m`.
     """
 
     name: str = "uav"
@@ -49,19 +51,25 @@ class Uav:
     task: str = "formation"
     max_speed_m_s: float = 10.0
     phantoms_m: list[Vector] = field(default_factory=list)
+    radius_m: float = field(default=0.0, metadata=FROM_ZERO)
 
 
 @dataclass
 class Obstacle:
-    """A point to keep away from by the safe distance of (7)-(8)."""
+    """A ball to keep away from by the safe distance of (7)-(8); a point with the default radius."""
 
     position_m: Vector = field(default_factory=list, metadata=REQUIRED)
     known_to_uav: bool = True
+    radius_m: float = field(default=0.0, metadata=FROM_ZERO)
 
 
 @dataclass
 class SafeDistance:
-    """Safe distances d of (7)-(8), for each kind of pair, and the distance that counts as a collision."""
+    """Safe distances d of (7)-(8), for each kind of pair, and the distance that counts as a collision.
+
+    They are kept between surfaces: the centres of a pair keep d + (radius + radius), and collide at `collision_m` +
+    (radius + radius). All other distances, `control.sensing_range_m` among them, are of centres.
+    """
 
     obstacle_m: float = 2.0
     ugv_m: float = 2.0
