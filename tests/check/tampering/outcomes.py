@@ -51,6 +51,19 @@ def map_in_a_message_exchanged(folder: Path) -> None:
     with edited_table(folder, "proposals") as frame:
         walls = [3.3, 9.5, 0.0, 5.0, 9.0, 0.0, 6.5, 7.5, 0.0]
         frame["mapped_m"] = [np.array(walls) for _ in range(len(frame))]
+        frame["mapped_radius_m"] = [np.zeros(3) for _ in range(len(frame))]
+
+
+@refused_by("GATE-MODEL", "accept: ")
+def obstacles_of_a_message_made_larger(folder: Path) -> None:
+    with edited_table(folder, "proposals") as frame:
+        frame["mapped_radius_m"] = [radii + 5.0 for radii in frame["mapped_radius_m"]]
+
+
+@refused_by("GATE-MODEL", "a proposal is a motion")
+def radius_left_out_of_a_message(folder: Path) -> None:
+    with edited_table(folder, "proposals") as frame:
+        frame["mapped_radius_m"] = [radii[:-1] for radii in frame["mapped_radius_m"]]
 
 
 @refused_by("LIVE-PROG", "answer and its reason")
