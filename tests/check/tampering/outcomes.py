@@ -55,9 +55,11 @@ def map_in_a_message_exchanged(folder: Path) -> None:
 
 
 @refused_by("GATE-MODEL", "accept: ")
-def obstacles_of_a_message_made_larger(folder: Path) -> None:
+def large_obstacle_added_to_a_message(folder: Path) -> None:
+    """Where a point would be out of the way."""
     with edited_table(folder, "proposals") as frame:
-        frame["mapped_radius_m"] = [radii + 5.0 for radii in frame["mapped_radius_m"]]
+        frame["mapped_m"] = [np.append(points, [9.5, 9.0, 0.0]) for points in frame["mapped_m"]]
+        frame["mapped_radius_m"] = [np.append(radii, 5.0) for radii in frame["mapped_radius_m"]]
 
 
 @refused_by("GATE-MODEL", "a proposal is a motion")
