@@ -63,23 +63,31 @@ def make_planner(scenario: Scenario, method: Method) -> Planner:
     Raises:
         UnknownNameError, PluginError: if the scenario names a policy that cannot be made.
     """
+    mapped, radii = make_map(scenario)
     return Planner(
         ugvs=tuple(scenario.ugvs),
         database=make_database(scenario, method),
         period=scenario.intervention.period_s,
         presets=tuple(make_presets(scenario)),
         targets=positions([ugv.target_m for ugv in scenario.ugvs.values()]),
-        mapped=make_map(scenario),
+        mapped=mapped,
+        mapped_radii=radii,
         safe_distance=scenario.safe_distance.obstacle_m,
         robot_distance=scenario.safe_distance.ugv_m,
         max_speed=np.array([ugv.max_speed_m_s for ugv in scenario.ugvs.values()]),
+        radius=np.array([ugv.radius_m for ugv in scenario.ugvs.values()]),
     )
 
 
-def make_map(scenario: Scenario) -> Array:
-    """The obstacles on the UAV's map, (m, 3), m: those that it knows, and those that are only there."""
-    known = [obstacle.position_m for obstacle in scenario.obstacles.values() if obstacle.known_to_uav]
-    return positions([*known, *scenario.uav.phantoms_m])
+def make_map(scenario: Scenario) -> tuple[Array, Array]:
+    """The obstacles on the UAV's map: those that it knows, and those that are only there, without a radius.
+
+    Returns:
+        Centres, (m, 3), m, and radii, (m,), m.
+    """
+    known = [obstacle for obstacle in scenario.obstacles.values() if obstacle.known_to_uav]
+    centres = [*(obstacle.position_m for obstacle in known), *scenario.uav.phantoms_m]
+    return positions(centres), np.array([*(o.radius_m for o in known), *(0.0 for _ in scenario.uav.phantoms_m)])
 
 
 def make_route(scenario: Scenario) -> Route:
@@ -105,8 +113,9 @@ def make_starts(scenario: Scenario) -> Array:
 
 
 def make_team(scenario: Scenario) -> Team:
-    """Names, safe distances and speed limits of the scenario's robots."""
+    """Names, safe distances, radii and speed limits of the scenario's robots."""
     speeds = [ugv.max_speed_m_s for ugv in scenario.ugvs.values()]
+    radii = [ugv.radius_m for ugv in scenario.ugvs.values()]
     return Team(
         ugvs=tuple(scenario.ugvs),
         uav=scenario.uav.name,
@@ -115,6 +124,8 @@ def make_team(scenario: Scenario) -> Team:
         ugv_distance=scenario.safe_distance.ugv_m,
         air_ground_distance=scenario.safe_distance.air_ground_m,
         max_speed=np.array([*speeds, scenario.uav.max_speed_m_s]),
+        radius=np.array([*radii, scenario.uav.radius_m]),
+        obstacle_radius=np.array([obstacle.radius_m for obstacle in scenario.obstacles.values()]),
     )
 
 

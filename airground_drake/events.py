@@ -55,9 +55,11 @@ def _add_arrival(trace: Trace, robot: str, add: Any) -> None:
 
 
 def _add_collisions(trace: Trace, robot: str, add: Any) -> None:
-    """The first row of each visit within collision distance of an obstacle."""
-    for name, obstacle in trace.scenario["obstacles"].items():
+    """The first row of each visit within collision distance of an obstacle, from surface to surface."""
+    scenario = trace.scenario
+    own = scenario["ugvs"].get(robot, scenario["uav"])["radius_m"]
+    for name, obstacle in scenario["obstacles"].items():
         distance = np.linalg.norm(trace.position(robot) - np.array(obstacle["position_m"]), axis=1)
-        hit = distance < trace.scenario["safe_distance"]["collision_m"]
+        hit = distance < scenario["safe_distance"]["collision_m"] + (own + obstacle["radius_m"])
         for k in np.flatnonzero(hit & ~np.append(False, hit[:-1])):
             add(trace.t[k], robot, "collision", obstacle=name)

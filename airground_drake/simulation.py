@@ -197,7 +197,8 @@ def _proposals(sent: Sequence[tuple[str, Proposal]]) -> pd.DataFrame:
             robot, proposal.policy, float(proposal.issued), proposal.motion.times.tolist(),
             proposal.motion.positions.ravel().tolist(),
             np.asarray(proposal.selection, dtype=np.float64).ravel().tolist(),
-            np.asarray(proposal.mapped, dtype=np.float64).ravel().tolist(), proposal.cause or robot,
+            np.asarray(proposal.mapped, dtype=np.float64).ravel().tolist(),
+            np.broadcast_to(proposal.mapped_radii, len(proposal.mapped)).tolist(), proposal.cause or robot,
         )
         for robot, proposal in sent
     ]  # fmt: skip

@@ -36,7 +36,7 @@ from airground_drake import files
 from airground_drake.arrays import Array
 from airground_drake.errors import TraceError
 
-SCHEMA = "airground_drake.trace/4"
+SCHEMA = "airground_drake.trace/5"
 
 DECISION_COLUMNS = {
     "t_s": "float64",
@@ -83,10 +83,12 @@ found, row by row as in `decisions`. Arrays are flattened in C order: initial (3
 centres and normals (N x m x 3), distances (m), plan, relaxed and rounded omega (N), positions of the plan (N x 3);
 empty where the route has none. Normals are those of the half-planes that `route_bound` is about."""
 
-PROPOSAL_COLUMNS = ("robot", "policy", "issued_s", "times_s", "positions_m", "selection", "mapped_m", "cause")
+PROPOSAL_COLUMNS = (
+    "robot", "policy", "issued_s", "times_s", "positions_m", "selection", "mapped_m", "mapped_radius_m", "cause",
+)  # fmt: skip
 """Columns of `Trace.proposals`, one row per proposal sent: for which UGV, by which policy, when; the vertices of the
 motion that it asks for, times (M) and positions (M x 3, flattened in C order), and J_int of (12)-(14), (m x 3, ditto):
-the directions that it concerns, and the obstacles that the UAV knows, (k x 3, ditto); and the UGV
+the directions that it concerns, and the obstacles that the UAV knows, centres (k x 3, ditto) and radii (k); and the UGV
 whose trigger it was sent for: this one, or another one that it is to make way for."""
 
 

@@ -35,8 +35,8 @@ from mutation.page import page
 ROOT = Path(__file__).resolve().parents[1]
 COPIED = (PACKAGE, "tests", "benchmarks", "docs", "pyproject.toml", "README.md")
 MUTANTS: tuple[Mutant, ...] = (
-    *of_code.TEAM, *of_code.KERNELS, *of_code.LAW, *of_code.DECISION, *of_code.INTERVENTION, *of_code.GATEKEEPER,
-    *of_checkers.CLAIMS, *of_checkers.CHECKER,
+    *of_code.TEAM, *of_code.BODIES, *of_code.KERNELS, *of_code.LAW, *of_code.DECISION, *of_code.INTERVENTION,
+    *of_code.GATEKEEPER, *of_checkers.CLAIMS, *of_checkers.CHECKER,
 )  # fmt: skip
 NOT_COMPARED = ("GATE-TIME",)
 """Claims that depend on what else the machine does."""

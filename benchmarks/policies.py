@@ -27,7 +27,7 @@ def observation() -> Observation:
     scenario = load("case_a")[0]
     places = np.array([[3.37, 5.1, 0.0], [-2.6, 8.0, 0.0], [0.0, 6.5, 2.0]])
     targets = np.array([ugv.target_m for ugv in scenario.ugvs.values()])
-    presets, known = make_presets(scenario), make_map(scenario)
+    presets, (known, _) = make_presets(scenario), make_map(scenario)
     team = tuple(
         Teammate(name, places[i], targets[i], presets[i], 3.0, triggered=i == 0, standing=i == 0)
         for i, name in enumerate(scenario.ugvs)

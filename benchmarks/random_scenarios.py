@@ -91,8 +91,11 @@ def draw(number: int) -> dict[str, Any]:
     h = float(rng.choice([0.01, 0.025, 0.05, 0.1, 0.3]))
     speed = float(rng.choice([0.5, 1.0, 3.0]))
     d, between = float(rng.choice([0.5, 1.0, 2.0])), float(rng.choice([0.5, 1.0, 2.0]))
-    extent = 4.0 + 2.0 * (n + m) ** 0.5 * max(d, between)
-    points = _apart(rng, n + m, extent, max(d, between))
+    radii = _radii(number, n + m + 1)
+    both = sum(sorted(radii)[-2:])
+    apart = max(d, between) + both
+    extent = 4.0 + 2.0 * (n + m) ** 0.5 * apart
+    points = _apart(rng, n + m, extent, apart)
     method = str(rng.choice(list(METHODS)))
     decision = _decision(rng, h)
     ugvs = {}
@@ -100,9 +103,10 @@ def draw(number: int) -> dict[str, Any]:
         way = [points[i], *rng.uniform(-extent, extent, (int(rng.integers(1, 4)), 2)).tolist()]
         ugvs[f"u{i}"] = {
             "start_m": [*points[i], 0.0],
-            "target_m": [*(np.array([i * 3.0 * between, 3.0 * extent])).tolist(), 0.0],
+            "target_m": [*(np.array([i * 3.0 * (between + both), 3.0 * extent])).tolist(), 0.0],
             "preset": {"waypoints_m": [[*p, 0.0] for p in way], "speed_m_s": speed * float(rng.choice([0.3, 1.0]))},
             "max_speed_m_s": speed,
+            "radius_m": radii[i],
         }
     kinds = ["detour", "towards", "hostile", "noisy", "stale_map"]
     parameters: dict[str, dict[str, float]] = {
@@ -113,19 +117,23 @@ def draw(number: int) -> dict[str, Any]:
     air_ground = float(rng.choice([0.4, 1.0]))
     stages, stage = int(rng.choice([2, 6, 20])), h * int(rng.choice([1, 2]))
     low = bool(rng.random() < 0.5)  # over the middle of the team, so that it comes near the UGVs
-    start = [0.0, 0.0, 1.5 * air_ground] if low else [-3.0 * extent, 0.0, 3.0]
-    reach = max(d, between, air_ground) + 4.0 * speed * h
+    height = (1.5 * air_ground if low else 3.0) + both
+    start = [0.0, 0.0, height] if low else [-3.0 * extent, 0.0, height]
+    reach = max(d, between, air_ground) + both + 4.0 * speed * h
     return {
         "name": f"random_{number}",
         "seed": number,
         "duration_s": float(rng.choice([20, 60])) * (1.0 if h >= 0.05 else 0.25),
         "ugvs": ugvs,
         "uav": {
-            "start_m": start, "target_m": [0.0, 3.0 * extent, 3.0], "altitude_m": 1.5 * air_ground if low else 3.0,
-            "max_speed_m_s": 2.0 * speed,
+            "start_m": start, "target_m": [0.0, 3.0 * extent, 3.0 + both], "altitude_m": height,
+            "max_speed_m_s": 2.0 * speed, "radius_m": radii[-1],
         },
         "obstacles": {
-            f"o{k}": {"position_m": [*points[n + k], 0.0], "known_to_uav": bool(rng.random() < 0.7)} for k in range(m)
+            f"o{k}": {
+                "position_m": [*points[n + k], 0.0], "known_to_uav": bool(rng.random() < 0.7), "radius_m": radii[n + k],
+            }
+            for k in range(m)
         },
         "safe_distance": {"obstacle_m": d, "ugv_m": between, "air_ground_m": air_ground},
         "control": {
@@ -146,6 +154,13 @@ def draw(number: int) -> dict[str, Any]:
         },
         "runs": {method: {"method": method, "composition": _composition(rng, method)}},
     }  # fmt: skip
+
+
+def _radii(number: int, count: int) -> list[float]:
+    """Radii of UGVs, obstacles and the UAV, m: points in every other scenario."""
+    rng = np.random.default_rng([20261123, number])
+    largest = rng.choice([0.0, 0.0, 0.3, 3.0])
+    return [round(float(r), 3) for r in largest * rng.random(count) * (rng.random(count) < 0.7)]
 
 
 def _decision(rng: np.random.Generator, h: float) -> dict[str, Any]:

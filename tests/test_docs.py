@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from airground_drake.report.__main__ import main
+from airground_drake.scenarios.load import load
 
 ROOT = Path(__file__).parent.parent
 PAGES = sorted([ROOT / "README.md", ROOT / "CHANGELOG.md", ROOT / "SECURITY.md", *(ROOT / "docs").glob("*.md")])
@@ -53,6 +54,7 @@ def test_everything_that_can_be_added_works_from_a_folder_of_its_own(
         path = tmp_path / block.splitlines()[0].removeprefix("# file: ")
         path.parent.mkdir(exist_ok=True)
         path.write_text(block, encoding="utf-8")
+    assert load(str(tmp_path / "shelves.yaml"))[0].obstacles["shelf"].radius_m == 3.0
     monkeypatch.syspath_prepend(str(tmp_path))
     assert (
         main([str(tmp_path / "mine.yaml"), "-o", str(tmp_path / "report"), "--format", "json", "--allow-plugins"]) == 0

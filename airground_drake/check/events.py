@@ -13,6 +13,7 @@ from .files import Json
 from .proposals import proposals_of
 from .rules import SMALL, Disagreement, close, holds
 from .run import Run
+from .scenario import apart_m
 
 
 class Event(NamedTuple):
@@ -97,11 +98,11 @@ def _arrivals(run: Run) -> Iterator[Event]:
 
 
 def _collisions(run: Run) -> Iterator[Event]:
-    """The first row of each visit within collision distance of an obstacle."""
-    for robot in run.robots:
-        for obstacle in run.scenario["obstacles"]:
+    """The first row of each visit within collision distance of an obstacle, from surface to surface."""
+    for robot, body in run.robots.items():
+        for obstacle, other in run.scenario["obstacles"].items():
             distance = np.linalg.norm(run.position_m[robot] - run.position_m[obstacle], axis=1)
-            hit = distance < run.scenario["safe_distance"]["collision_m"]
+            hit = distance < apart_m(run.scenario, "collision_m", body, other)
             begins = hit & ~np.append(False, hit[:-1])
             yield from (Event(float(when), robot, "collision") for when in run.t_s[begins])
 

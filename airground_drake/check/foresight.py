@@ -11,6 +11,7 @@ from .law import PLANE, avoiding, inequalities, limited
 from .proposals import Proposal, proposals_of
 from .rules import SMALL, Array, Found, at_most, close, holds, same
 from .run import Run
+from .scenario import apart_m
 
 STILL_M = 0.05
 """Less than this within the last second is at rest."""
@@ -35,6 +36,7 @@ class Foreseen(NamedTuple):
         integral_m2_s: of the squared distance from the preset trajectory.
         goal_m: end of the preset trajectory, (3,).
         discs_m: obstacles that are known, (k, 3).
+        safe_m: distances to keep from them, (k,).
     """
 
     places_m: Array
@@ -43,6 +45,7 @@ class Foreseen(NamedTuple):
     integral_m2_s: float
     goal_m: Array
     discs_m: Array
+    safe_m: Array
 
 
 def rows_of(run: Run) -> list[dict[str, Any]]:
@@ -67,7 +70,7 @@ def outcomes(run: Run) -> Found:
         for choice, found in zip(CHOICES, foreseen(run, row["robot"], row["t_s"], row["issued_s"]), strict=True):
             left, recorded = row[f"{choice}_left_m"], row[f"{choice}_outcome_m2_s"]
             same(f"{choice}: stalls", row[f"{choice}_stalls"], float(found.stalls), **about)
-            _way_left(found, run.scenario["safe_distance"]["obstacle_m"], left, choice, about)
+            _way_left(found, left, choice, about)
             due = left**3 / (3.0 * speed) + (0.0 if found.stalls else found.integral_m2_s)
             allowed = OUTCOME * max(1.0, due)
             close(f"{choice}: outcome", recorded, due, within=allowed, **about)
@@ -92,7 +95,7 @@ def foreseen(run: Run, ugv: str, t_s: float, issued_s: float) -> tuple[Foreseen,
     until = min(float(asked.times_s[-1]), t_s + gate["longest_s"])
     ends = min(max(until, arrives), t_s + gate["longest_s"]) + gate["settling_s"]
     after = h * np.arange(np.ceil((ends - t_s) / h) + 1.0)
-    discs = _known_m(run, ugv, t_s, asked)
+    discs, distances = _known_m(run, ugv, t_s, asked)
     fixed, over = np.tile(discs, (len(after), 1, 1)), [until, arrives, float(t_s + gate["horizon_s"])]
     ways: tuple[list[Array], list[Array]] = ([fixed], [fixed])  # if it is refused, if it is accepted
     views = [pair for pair in run.views if pair.robot == ugv and pair.other in run.robots]
@@ -101,7 +104,7 @@ def foreseen(run: Run, ugv: str, t_s: float, issued_s: float) -> tuple[Foreseen,
         ways[0].append(refused[:, None])
         ways[1].append(accepted[:, None])
         over.append(way_over)
-    safe = np.append(np.full(len(discs), run.scenario["safe_distance"]["obstacle_m"]), [p.safe_m for p in views])
+    safe = np.append(distances, [p.safe_m for p in views])
     share = np.append(np.ones(len(discs)), [pair.share for pair in views])
     settled = int(np.ceil((max(over) - t_s) / h - SMALL))
     start, goal = run.place_m(ugv, t_s), preset.corners_m[-1]
@@ -122,7 +125,7 @@ def foreseen(run: Run, ugv: str, t_s: float, issued_s: float) -> tuple[Foreseen,
         end, earlier = places[-1], places[max(0, len(places) - 1 - max(1, round(1.0 / h)))]
         home = bool(np.linalg.norm(end - goal) <= run.scenario["arrival_tolerance_m"])
         stalls = not home and bool(np.linalg.norm(end - earlier) < STILL_M)
-        found.append(Foreseen(np.array(places), stalls, home, integral, goal, discs))
+        found.append(Foreseen(np.array(places), stalls, home, integral, goal, discs, distances))
     return found[0], found[1]
 
 
@@ -146,17 +149,24 @@ def _resting(run: Run, places: list[Array], goal: Array, h: float) -> bool:
     return len(places) > second and bool(np.linalg.norm(places[-1] - places[-1 - second]) < 0.1 * STILL_M)
 
 
-def _known_m(run: Run, ugv: str, t_s: float, asked: Proposal) -> Array:
-    """Obstacles within sensing range at a sample of the gatekeeper up to now, the nearest of the message out of it."""
+def _known_m(run: Run, ugv: str, t_s: float, asked: Proposal) -> tuple[Array, Array]:
+    """Obstacles within sensing range at a sample of the gatekeeper up to now, the nearest of the message out of it.
+
+    Of the message none that has a negative radius. Centres, (k, 3), and distances to keep from them, (k,).
+    """
     reach, gate_s = run.scenario["control"]["sensing_range_m"], run.scenario["gatekeeper"]["period_s"]
     samples = np.minimum(gate_s * np.arange(round(t_s / gate_s) + 1.0), t_s)
     was = np.stack([np.interp(samples, run.t_s, axis) for axis in run.position_m[ugv].T], axis=1)
-    places = [np.array(o["position_m"], dtype=np.float64) for o in run.scenario["obstacles"].values()]
-    known = [place for place in places if (np.linalg.norm(was - place, axis=1) <= reach).any()]
+    bodies = list(run.scenario["obstacles"].values())
+    bodies = [o for o in bodies if (np.linalg.norm(was - np.array(o["position_m"]), axis=1) <= reach).any()]
+    known = [np.array(o["position_m"], dtype=np.float64) for o in bodies]
     away = np.linalg.norm(asked.mapped_m - was[-1], axis=1)
     new = [k for k in np.flatnonzero(away > reach) if all(np.linalg.norm(asked.mapped_m[k] - o) > SMALL for o in known)]
+    new = [k for k in new if asked.mapped_radius_m[k] >= 0.0]
     nearest = sorted(sorted(new, key=lambda k: away[k])[:MOST_CLAIMED])
-    return np.concatenate([np.array(known).reshape(-1, 3), asked.mapped_m[nearest]])
+    bodies += [{"radius_m": asked.mapped_radius_m[k]} for k in nearest]
+    distances = [apart_m(run.scenario, "obstacle_m", run.robots[ugv], body) for body in bodies]
+    return np.concatenate([np.array(known).reshape(-1, 3), asked.mapped_m[nearest]]), np.array(distances)
 
 
 def _way_of(run: Run, robot: str, t_s: float, after: Array) -> tuple[Array, Array, float]:
@@ -190,7 +200,7 @@ def _asked_of(run: Run, ugv: str, t_s: float) -> tuple[Proposal | None, bool]:
     return None, False
 
 
-def _way_left(found: Foreseen, safe_m: float, left_m: float, choice: str, about: dict[str, Any]) -> None:
+def _way_left(found: Foreseen, left_m: float, choice: str, about: dict[str, Any]) -> None:
     """The way that is left is no shorter than straight, and no longer than one over points around the circles."""
     if found.home:
         same(f"{choice}: way left", left_m, 0.0, **about)
@@ -199,11 +209,11 @@ def _way_left(found: Foreseen, safe_m: float, left_m: float, choice: str, about:
     direct = float(np.linalg.norm((goal - end)[:2]))
     at_most(f"{choice}: straight way", direct, left_m, within=LEFT_M, **about)
     if left_m > direct + LEFT_M:
-        around = _way_around_m(end, goal, found.discs_m, safe_m)
+        around = _way_around_m(end, goal, found.discs_m, found.safe_m)
         at_most(f"{choice}: way left", left_m, around, within=LEFT_M, **about)
 
 
-def _way_around_m(start: Array, goal: Array, discs_m: Array, safe_m: float) -> float:
+def _way_around_m(start: Array, goal: Array, discs_m: Array, safe_m: Array) -> float:
     """Length of a way outside the safe circles, infinite if none is found: Dijkstra over points around them."""
     squared = safe_m**2 - (discs_m[:, 2] - start[2]) ** 2
     centres, radii = discs_m[squared > 0.0, :2], np.sqrt(squared[squared > 0.0])

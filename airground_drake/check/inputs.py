@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from .files import Json
-from .scenario import disturbance_m_s, extent_m, levels_of, robots_of, threshold_m
+from .scenario import apart_m, disturbance_m_s, extent_m, levels_of, robots_of, threshold_m
 
 
 def inputs_of(claim: str, scenario: Json) -> Json:
@@ -47,8 +47,15 @@ def _tracking(scenario: Json) -> Json:
         **{name: control[name] for name in names},
         "control_period_s": control["period_s"],
         "max_speed_m_s": max(float(ugv["max_speed_m_s"]) for ugv in scenario["ugvs"].values()),
-        "obstacle_m": scenario["safe_distance"]["obstacle_m"],
+        "obstacle_m": _widest_m(scenario),
     }
+
+
+def _widest_m(scenario: Json) -> float:
+    """The largest distance that a UGV has to keep from an obstacle."""
+    of_ugvs = max(float(ugv["radius_m"]) for ugv in scenario["ugvs"].values())
+    of_obstacles = max((float(obstacle["radius_m"]) for obstacle in scenario["obstacles"].values()), default=0.0)
+    return apart_m(scenario, "obstacle_m", {"radius_m": of_ugvs}, {"radius_m": of_obstacles})
 
 
 def _avoidance(scenario: Json) -> Json:
@@ -70,6 +77,8 @@ def _avoidance(scenario: Json) -> Json:
             "ugv_distance": safe["ugv_m"],
             "air_ground_distance": safe["air_ground_m"],
             "max_speed": speeds,
+            "radius": [float(robot["radius_m"]) for robot in robots.values()],
+            "obstacle_radius": [float(obstacle["radius_m"]) for obstacle in scenario["obstacles"].values()],
         },
     }
 

@@ -25,6 +25,7 @@ class Proposal:
         positions_m: the same, (M, 3).
         jacobian: J_int, (m, 3).
         mapped_m: obstacles that the UAV says it knows, (k, 3).
+        mapped_radius_m: their radii, (k,).
         cause: UGV whose trigger it is sent for.
     """
 
@@ -35,6 +36,7 @@ class Proposal:
     positions_m: Array
     jacobian: Array
     mapped_m: Array
+    mapped_radius_m: Array
     cause: str
 
     @cached_property
@@ -69,23 +71,22 @@ def proposals_of(run: Run) -> list[Proposal]:
 
 
 def _proposal(run: Run, row: dict[Any, Any]) -> Proposal:
-    times, places, jacobian, mapped = (
-        np.asarray(row[name], dtype=np.float64).ravel() for name in ("times_s", "positions_m", "selection", "mapped_m")
-    )
+    names = ("times_s", "positions_m", "selection", "mapped_m", "mapped_radius_m")
+    times, places, jacobian, mapped, radii = (np.asarray(row[name], dtype=np.float64).ravel() for name in names)
     at: Json = {"about": f"proposal to {row['robot']}", "t_s": float(row["issued_s"])}
-    numbers = np.concatenate([times, places, jacobian, mapped, [row["issued_s"]]])
+    numbers = np.concatenate([times, places, jacobian, mapped, radii, [row["issued_s"]]])
     holds("numbers of a proposal are finite", np.isfinite(numbers), numbers, "a number", **at)
     holds("a proposal is to a UGV", row["robot"] in run.ugvs, row["robot"], "a UGV of the run", **at)
     holds("a proposal is for a UGV's trigger", row["cause"] in run.ugvs, row["cause"], "a UGV of the run", **at)
     shaped = len(times) > 0 and len(places) == 3 * len(times) and len(jacobian) > 0 and len(jacobian) % 3 == 0
-    shaped = shaped and len(mapped) % 3 == 0
-    sizes = [len(times), len(places), len(jacobian), len(mapped)]
-    holds("a proposal is a motion", shaped, sizes, "M times, 3 M coordinates, 3 m of J, 3 k of the map", **at)
+    shaped = shaped and len(mapped) == 3 * len(radii)
+    sizes = [len(times), len(places), len(jacobian), len(mapped), len(radii)]
+    holds("a proposal is a motion", shaped, sizes, "M times, 3 M coordinates, 3 m of J, 3 k and k of the map", **at)
     holds("times of a motion increase", (np.diff(times) > 0.0).all(), times, "later than the one before", **at)
     _is_for_whom_it_says(run, row, at)
     return Proposal(
         str(row["robot"]), str(row["policy"]), at["t_s"], times, places.reshape(-1, 3), jacobian.reshape(-1, 3),
-        mapped.reshape(-1, 3), str(row["cause"]),
+        mapped.reshape(-1, 3), radii, str(row["cause"]),
     )  # fmt: skip
 
 

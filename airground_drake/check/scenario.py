@@ -19,7 +19,7 @@ class Pair(NamedTuple):
     Attributes:
         robot: name.
         other: name.
-        safe_m: safe distance d.
+        safe_m: safe distance of the centres: d of the kind of pair, and both radii.
         closing_m_s: largest speed at which they can approach each other.
         share: part of the inequality that each robot takes: 1 beside an obstacle, 1/2 beside a robot.
     """
@@ -82,18 +82,23 @@ def robots_of(scenario: Json) -> dict[str, Json]:
 
 def pairs_of(scenario: Json) -> list[Pair]:
     """Every robot with every obstacle, and every two robots once."""
-    safe, uav, robots = scenario["safe_distance"], scenario["uav"]["name"], robots_of(scenario)
+    uav, robots = scenario["uav"]["name"], robots_of(scenario)
     limit = {name: float(robot["max_speed_m_s"]) for name, robot in robots.items()}
     beside_obstacles = [
-        Pair(robot, obstacle, safe["obstacle_m"], limit[robot], 1.0)
+        Pair(robot, obstacle, apart_m(scenario, "obstacle_m", robots[robot], body), limit[robot], 1.0)
         for robot in robots
-        for obstacle in scenario["obstacles"]
+        for obstacle, body in scenario["obstacles"].items()
     ]
-    beside_robots = [
-        Pair(one, other, safe["air_ground_m" if other == uav else "ugv_m"], limit[one] + limit[other], 0.5)
-        for one, other in combinations(robots, 2)
-    ]
+    beside_robots = []
+    for one, other in combinations(robots, 2):
+        safe = apart_m(scenario, "air_ground_m" if other == uav else "ugv_m", robots[one], robots[other])
+        beside_robots.append(Pair(one, other, safe, limit[one] + limit[other], 0.5))
     return beside_obstacles + beside_robots
+
+
+def apart_m(scenario: Json, kind: str, one: Json, other: Json) -> float:
+    """A distance of surfaces, of a kind of pair, as one of centres: with both radii."""
+    return float(scenario["safe_distance"][kind]) + (float(one["radius_m"]) + float(other["radius_m"]))
 
 
 def views_of(scenario: Json) -> list[Pair]:
@@ -144,7 +149,7 @@ def bayes_threshold_m(drift_m_s: float, noise_m_sqrt_s: float, ratio_s: float) -
 
 
 class Kind(NamedTuple):
-    """A kind of pairs, of which the scenario has at least one: its fastest members, and the names of obligations."""
+    """A kind of pairs, of which the scenario has at least one, and the names of obligations."""
 
     name: str
     safe_m: float
@@ -153,14 +158,27 @@ class Kind(NamedTuple):
 
 
 def kinds_of(scenario: Json) -> list[Kind]:
-    """The kinds of pairs of a scenario, in the order of the report."""
-    safe, uav = scenario["safe_distance"], float(scenario["uav"]["max_speed_m_s"])
-    ugvs = sorted((float(ugv["max_speed_m_s"]) for ugv in scenario["ugvs"].values()), reverse=True)
-    found = [Kind("uav_ugv", safe["air_ground_m"], uav + ugvs[0], 0.5)]
-    if scenario["obstacles"]:
-        found.insert(0, Kind("obstacle", safe["obstacle_m"], max(uav, ugvs[0]), 1.0))
-    if len(ugvs) > 1:
-        found.append(Kind("ugv_ugv", safe["ugv_m"], ugvs[0] + ugvs[1], 0.5))
+    """The kinds of pairs of a scenario, in the order of the report.
+
+    Of each those that no other pair has at as large a distance and as fast, from the largest distance on, and one at
+    the least distance; numbered if that makes several.
+    """
+    pairs, uav, found = pairs_of(scenario), scenario["uav"]["name"], []
+    for name in ("obstacle", "uav_ugv", "ugv_ugv"):
+        share = 1.0 if name == "obstacle" else 0.5
+        of_kind = {
+            (pair.safe_m, pair.closing_m_s)
+            for pair in pairs
+            if pair.share == share and (share == 1.0 or (pair.other == uav) == (name == "uav_ugv"))
+        }
+        kept: list[tuple[float, float]] = []
+        for safe, closing in sorted(of_kind, reverse=True):
+            if not kept or closing > max(fast for _, fast in kept):
+                kept.append((safe, closing))
+        if kept and (nearest := min(of_kind, key=lambda each: (each[0], -each[1]))) not in kept:
+            kept.append(nearest)
+        names = [name] if len(kept) == 1 else [f"{name}_{k}" for k in range(1, len(kept) + 1)]
+        found += [Kind(each, *values, share) for each, values in zip(names, kept, strict=True)]
     return found
 
 

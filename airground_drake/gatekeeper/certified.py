@@ -44,7 +44,6 @@ class CertifiedGatekeepers(Gatekeepers):
         """Of the UGVs of a team: their law, their preset trajectories, how far they look and how long they wait."""
         super().__init__(team, law, presets)
         self._outlook, self._patience = outlook, patience
-        self._distance, self._names = team.obstacle_distance, team.ugvs
 
     def idle(self, proposals: Proposals, positions: Array, memory: Memory) -> bool:
         """Whether a sample changes nothing."""
@@ -97,7 +96,7 @@ class CertifiedGatekeepers(Gatekeepers):
         if self._patience.exhausted(turn):
             return Decision(seen.t, i, proposal, False, "exhausted", Foreseen(tries=turn.tries)), turn, None
         refuse, accept = self.foresee(seen, i, proposal)
-        reason = reason_of(refuse, accept, favour=proposal.cause not in ("", self._names[i]))
+        reason = reason_of(refuse, accept, favour=proposal.cause not in ("", self._team.ugvs[i]))
         if reason not in ACCEPTING:
             return Decision(seen.t, i, proposal, False, reason, Foreseen(refuse, accept, tries=turn.tries)), turn, None
         turn = self._patience.accept(turn, seen.t, proposal.motion.end)
@@ -125,7 +124,7 @@ class CertifiedGatekeepers(Gatekeepers):
     def foresee(self, seen: Situation, i: int, proposal: Proposal) -> tuple[Outcome, Outcome]:
         """What comes of refusing and of accepting, with what the UGV knows."""
         scene = self._scene(seen, i)
-        discs = self._known(seen, i, proposal)
+        discs, distances = self._known(seen, i, proposal)
         first = len(self._neighbourhood.obstacles)
         others = []
         for k, j in enumerate(self._neighbourhood.others[i], start=first):
@@ -138,20 +137,27 @@ class CertifiedGatekeepers(Gatekeepers):
                     float(scene.distances[k]), float(scene.shares[k]),
                 )
             )  # fmt: skip
-        return outcomes(scene, self._law, proposal, discs, self._distance, others, self._outlook)
+        return outcomes(scene, self._law, proposal, discs, distances, others, self._outlook)
 
-    def _known(self, seen: Situation, i: int, proposal: Proposal) -> Array:
-        """Obstacles that a UGV has sensed, and those of the UAV's map that are out of its sight, (k, 3), m.
+    def _known(self, seen: Situation, i: int, proposal: Proposal) -> tuple[Array, Array]:
+        """Obstacles that a UGV has sensed, and those of the UAV's map that are out of its sight.
 
-        Of the latter the `MOST_CLAIMED` that are nearest, so that no map makes a decision take long.
+        Of the latter the `MOST_CLAIMED` that are nearest, so that no map makes a decision take long; none whose radius
+        is no length.
+
+        Returns:
+            Centres, (k, 3), and safe distances, (k,), m.
         """
-        sensed = self._neighbourhood.obstacles[seen.before.sensed[i]]
-        claimed = proposal.mapped
+        was = seen.before.sensed[i]
+        sensed, claimed = self._team.obstacles[was], proposal.mapped
+        radii = np.broadcast_to(proposal.mapped_radii, len(claimed))
         hidden = np.linalg.norm(claimed - seen.positions[i], axis=1) > self._law.avoidance.sensing_range
         apart = np.linalg.norm(claimed[:, None] - sensed, axis=2)
-        new = claimed[hidden & (apart > SAME_M).all(axis=1)]
-        nearest = np.argsort(np.linalg.norm(new - seen.positions[i], axis=1), kind="stable")[:MOST_CLAIMED]
-        return np.concatenate([sensed, new[np.sort(nearest)]])
+        new = np.flatnonzero(hidden & (apart > SAME_M).all(axis=1) & np.isfinite(radii) & (radii >= 0.0))
+        nearest = np.argsort(np.linalg.norm(claimed[new] - seen.positions[i], axis=1), kind="stable")[:MOST_CLAIMED]
+        new = new[np.sort(nearest)]
+        bodies = np.concatenate([self._team.obstacle_radii[was], radii[new]])
+        return np.concatenate([sensed, claimed[new]]), self._team.distance_to(bodies)[i]
 
 
 def reason_of(refuse: Outcome, accept: Outcome, *, favour: bool) -> Reason:

@@ -116,7 +116,13 @@ class Other:
 
 
 def outcomes(
-    scene: Scene, law: UgvLaw, proposal: Proposal, discs: Array, distance: float, others: Sequence[Other], look: Outlook
+    scene: Scene,
+    law: UgvLaw,
+    proposal: Proposal,
+    discs: Array,
+    distances: Array | float,
+    others: Sequence[Other],
+    look: Outlook,
 ) -> tuple[Outcome, Outcome]:
     """What comes of refusing and of accepting.
 
@@ -125,18 +131,19 @@ def outcomes(
         law: the UGV's control law.
         proposal: in question.
         discs: centres of the obstacles that are known, (m, 3), m.
-        distance: safe distance to them, m.
+        distances: safe distances to them, (m,), m, or one for all.
         others: the other robots.
         look: how far to look.
     """
     h = law.avoidance.period
+    distances = np.broadcast_to(distances, len(discs))
     until = min(proposal.motion.end, scene.t + look.longest)
     ends = min(max(until, scene.preset.end), scene.t + look.longest) + look.past
     after = h * np.arange(0.0, np.ceil((ends - scene.t) / h) + 1.0)
     fixed = np.broadcast_to(discs, (len(after), len(discs), 3))
     known = Scene(
         scene.t, scene.position, scene.preset, scene.centres, scene.velocities,
-        np.concatenate([np.full(len(discs), distance), [each.distance for each in others]]),
+        np.concatenate([distances, [each.distance for each in others]]),
         np.concatenate([np.ones(len(discs)), [each.share for each in others]]),
         scene.max_speed,
     )  # fmt: skip
@@ -151,29 +158,30 @@ def outcomes(
         points = np.ascontiguousarray(np.concatenate([fixed, *places], axis=1))  # the layout that is compiled for
         loop = loop_among(known, law, proposal, after, points)
         positions, cost = _rolled_out(loop, accepted, goal, steps, look.near, look.still)
-        found.append(_outcome(positions, cost, goal, scene.preset.max_speed, discs, distance, h, look))
+        found.append(_outcome(positions, cost, goal, scene.preset.max_speed, discs, distances, h, look))
     return found[0], found[1]
 
 
 def _outcome(
-    positions: Array, cost: float, goal: Array, speed: float, discs: Array, distance: float, h: float, look: Outlook
+    positions: Array, cost: float, goal: Array, speed: float, discs: Array, distances: Array, h: float, look: Outlook
 ) -> Outcome:
     end = positions[-1]
     if np.linalg.norm(end - goal) <= look.near:
         return Outcome(positions, False, 0.0, cost)
     before = positions[max(0, len(positions) - 1 - max(1, round(1.0 / h)))]
     stalls = bool(np.linalg.norm(end - before) < look.still)
-    left = way_left(end, goal, discs, distance)
+    left = way_left(end, goal, discs, distances)
     ahead = left**3 / (3.0 * max(speed, 1e-9))
     return Outcome(positions, stalls, left, ahead if stalls else cost + ahead)
 
 
-def way_left(place: Array, goal: Array, discs: Array, distance: float) -> float:
+def way_left(place: Array, goal: Array, discs: Array, distances: Array | float) -> float:
     """Length of the shortest way to the goal among circles around discs (m, 3), m; straight if there is none.
 
-    Of more than `MOST_CIRCLES` those nearest to the straight way count, so that no map makes it take long.
+    The circles are where balls of radii `distances`, (m,) or one for all, m, meet the plane of the way. Of
+    more than `MOST_CIRCLES` those nearest to the straight way count, so that no map makes it take long.
     """
-    squared = distance**2 - np.square(discs[:, 2] - place[2])
+    squared = np.square(distances) - np.square(discs[:, 2] - place[2])
     near = squared > 0.0
     centres, radii = discs[near, :2], np.sqrt(squared[near])
     leg = goal[:2] - place[:2]

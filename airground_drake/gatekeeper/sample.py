@@ -17,7 +17,7 @@ from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.patience import Turn
 from airground_drake.gatekeeper.prediction import Horizon, Scene, predicted_problem
 from airground_drake.gatekeeper.routes.route import Route
-from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT, Point, Proposals, Report, Reports, answer_to
+from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT, Disc, Proposals, Report, Reports, answer_to
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.law import UgvLaw
 from airground_drake.nsbc.motion import Motion
@@ -120,6 +120,7 @@ class Gatekeepers(abc.ABC):
         """Of the UGVs of a team, with their control law and preset trajectories."""
         self._law = law
         self._presets = tuple(presets)
+        self._team = team
         self._neighbourhood = team.neighbourhood(slice(0, len(team.ugvs)))
         self._max_speed = team.max_speed
         self.times_s: list[float] = []
@@ -147,9 +148,10 @@ class Gatekeepers(abc.ABC):
 
     def _report(self, position: Array, decision: Decision) -> Report:
         """What goes with an answer."""
-        near = self._neighbourhood.obstacles[self._sensed(position)]
-        points: tuple[Point, ...] = tuple((x, y, z) for x, y, z in near.tolist())
-        return Report(points, decision.reason, in_words(decision))
+        near = self._sensed(position)
+        found = np.column_stack([self._team.obstacles, self._team.obstacle_radii])[near]
+        discs: tuple[Disc, ...] = tuple((x, y, z, radius) for x, y, z, radius in found.tolist())
+        return Report(discs, decision.reason, in_words(decision))
 
     def _scene(self, seen: Situation, i: int) -> Scene:
         """What a UGV has around it: all obstacles and robots, whether within sensing range or not."""

@@ -12,7 +12,7 @@ import numpy as np
 from airground_drake.arrays import Array
 from airground_drake.intervention.coordination.joint import Effort, Plan, plan
 from airground_drake.intervention.coordination.roadmap import Errand, Space
-from airground_drake.intervention.coordination.single import Way
+from airground_drake.intervention.coordination.single import Body, Way
 from airground_drake.intervention.coordination.timed import at_rest, distance, speed, timed, without_repeats
 from airground_drake.intervention.policy import Observation, Policy, Teammate
 from airground_drake.nsbc.motion import Motion
@@ -90,7 +90,7 @@ class Coordinate(Policy):
 
     def _plan(self, seen: Observation, space: Space, group: Sequence[int]) -> Plan:
         team = seen.team
-        fixed = [predicted(mate, seen.start) for i, mate in enumerate(team) if i not in group]
+        fixed = [Body(predicted(mate, seen.start), mate.radius) for i, mate in enumerate(team) if i not in group]
         errands = [errand(team[i], seen.start) for i in group]
         speeds = [min(self.speed, SHARE * team[i].max_speed) for i in group]
         return plan(space, errands, speeds, fixed, follow=self.follow, effort=Effort())
@@ -99,7 +99,6 @@ class Coordinate(Policy):
         """Willing UGVs that keep triggered ones of a group, that found no way, from the way they would have alone."""
         others = [i for i, mate in enumerate(seen.team) if i not in group and _is_willing(mate, seen.t)]
         ahead = {i: predicted(seen.team[i], seen.start) for i in others}
-        near = self.spacing + space.apart
         more = set()
         for i, way in zip(group, found.ways, strict=True):
             if way is not None or not seen.team[i].triggered:
@@ -109,7 +108,8 @@ class Coordinate(Policy):
             (alone,) = plan(space, [errand(mate, seen.start)], [pace], follow=self.follow).ways
             if alone is None:
                 continue
-            more |= {j for j in others if distance(alone.motion, ahead[j]) < near}
+            near = {j: self.spacing + space.apart + (mate.radius + seen.team[j].radius) for j in others}
+            more |= {j for j in others if distance(alone.motion, ahead[j]) < near[j]}
         return sorted(more or others)
 
     def _proposals(self, seen: Observation, group: Sequence[int], found: Plan) -> dict[str, Motion] | None:
@@ -123,19 +123,17 @@ class Coordinate(Policy):
         return motions if helped else None
 
     def _space(self, seen: Observation) -> Space:
-        """What UGVs keep away from in the plane of the one that is planned for."""
-        height = float(seen.position[2])
-        squared = seen.safe_distance**2 - np.square(seen.obstacles[:, 2] - height)
-        near = squared > 0.0
-        radii = np.sqrt(squared[near])
-        return Space(seen.obstacles[near, :2], radii, self.clearance, seen.robot_distance, self.spacing)
+        """What UGVs without bodies keep away from in the plane of the one that is planned for."""
+        radii = seen.safe_distance + np.broadcast_to(seen.obstacle_radii, len(seen.obstacles))
+        above = seen.obstacles[:, 2] - float(seen.position[2])
+        return Space(seen.obstacles[:, :2], radii, self.clearance, seen.robot_distance, self.spacing, above)
 
 
 def errand(mate: Teammate, start: float) -> Errand:
     """From where a UGV is to its preset, from time `start`, s, on."""
     preset = mate.preset
     times = np.append(start, preset.times[preset.times > start + 1e-6])
-    return Errand(mate.position[:2].copy(), timed(times - start, preset.sample(times)[:, :2]))
+    return Errand(mate.position[:2].copy(), timed(times - start, preset.sample(times)[:, :2]), mate.radius)
 
 
 def predicted(mate: Teammate, start: float) -> Array:

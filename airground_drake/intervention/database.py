@@ -161,7 +161,9 @@ class BehaviourDatabase:
         for robot, motion in motions.items():
             before = desk if robot == seen.robot else Desk(refusals=_mate(seen, robot).refusals)
             cause = robot if robot == seen.robot or _mate(seen, robot).triggered else seen.robot
-            proposal = Proposal(name, seen.t, motion, cause=cause, mapped=seen.obstacles)
+            proposal = Proposal(
+                name, seen.t, motion, cause=cause, mapped=seen.obstacles, mapped_radii=seen.obstacle_radii
+            )
             asked[robot] = replace(before, proposal=proposal, turn=turn, cause=cause, party=party)
         own = asked.pop(seen.robot, replace(desk, proposal=None, party=(), retry_at=seen.t + self.retry))
         return Planned(own, asked, faults)
@@ -210,14 +212,14 @@ def predicted_cost(motions: Mapping[str, Motion], seen: Observation) -> float:
     positions = own.sample(t) if own is not None else np.tile(seen.position, (len(t), 1))
     cost = np.square(positions - seen.preset.sample(t)).sum()
     if len(seen.obstacles):
-        distance = np.linalg.norm(positions[:, None] - seen.obstacles, axis=2).min(axis=1)
-        cost += INTRUSION * np.square(np.maximum(0.0, seen.safe_distance - distance)).sum()
+        lacking = (seen.obstacle_distances - np.linalg.norm(positions[:, None] - seen.obstacles, axis=2)).max(axis=1)
+        cost += INTRUSION * np.square(np.maximum(0.0, lacking)).sum()
     for mate in seen.team:
         motion = motions.get(mate.name, mate.proposal.motion if mate.proposal and mate.answered == "accepted" else None)
         if mate.name == seen.robot or (motion is None and not mate.standing):
             continue
         distance = np.linalg.norm(positions - (mate.position if motion is None else motion.sample(t)), axis=1)
-        cost += INTRUSION * np.square(np.maximum(0.0, seen.robot_distance - distance)).sum()
+        cost += INTRUSION * np.square(np.maximum(0.0, seen.distance_to(mate) - distance)).sum()
     return float(0.05 * cost)
 
 

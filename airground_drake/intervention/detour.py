@@ -79,12 +79,9 @@ class Detour(Policy):
         places = np.array([mate.position for mate in robots]).reshape(-1, 3)
         # two targets may be as near to each other as the safe distance allows
         parked = np.array([np.linalg.norm(mate.position - seen.target) for mate in robots])
-        least = seen.robot_distance
+        least = np.array([seen.distance_to(mate) for mate in robots])
         reach = np.concatenate(
-            [
-                np.full(len(seen.obstacles), seen.safe_distance + self.clearance),
-                np.clip(parked, least, least + self.clearance),
-            ]
+            [seen.obstacle_distances + self.clearance, np.clip(parked, least, least + self.clearance)]
         )
         around = np.concatenate([seen.obstacles, places])
         squared = reach**2 - (around[:, 2] - height) ** 2

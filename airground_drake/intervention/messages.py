@@ -16,7 +16,10 @@ from airground_drake.intervention.policy import Proposal
 ACCEPT, SILENT, REFUSE = 1.0, 0.0, -1.0
 
 Point = tuple[float, float, float]
-"""Centre of an obstacle, m, world frame."""
+"""A place, m, world frame."""
+
+Disc = tuple[float, float, float, float]
+"""An obstacle: its centre, world frame, and its radius, m."""
 
 
 class Report(NamedTuple):
@@ -28,7 +31,7 @@ class Report(NamedTuple):
         words: the same as a sentence.
     """
 
-    sensed: tuple[Point, ...] = ()
+    sensed: tuple[Disc, ...] = ()
     reason: str = ""
     words: str = ""
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from airground_drake.arrays import Array
 from airground_drake.intervention.database import BehaviourDatabase, Desk, Fault
-from airground_drake.intervention.messages import ACCEPT, REFUSE, Point, Proposals, Reports, answer_to
+from airground_drake.intervention.messages import ACCEPT, REFUSE, Disc, Point, Proposals, Reports, answer_to
 from airground_drake.intervention.policy import Answered, Observation, Proposal, Teammate
 from airground_drake.nsbc.motion import Motion
 
@@ -47,7 +47,7 @@ class PlannerMemory:
     """
 
     desks: tuple[Desk, ...]
-    learnt: tuple[Point, ...] = ()
+    learnt: tuple[Disc, ...] = ()
     sent: tuple[tuple[int, Proposal], ...] = ()
     faults: tuple[Fault, ...] = ()
     halts: tuple[Halt, ...] = ()
@@ -82,6 +82,8 @@ class Planner:
         safe_distance: d to obstacles, m.
         robot_distance: d between UGVs, m.
         max_speed: of the UGVs, (n,), m/s.
+        radius: of the UGVs' bodies, (n,), m, or one for all.
+        mapped_radii: of the obstacles on the map, (m,), m, or one for all.
     """
 
     ugvs: tuple[str, ...]
@@ -93,6 +95,13 @@ class Planner:
     safe_distance: float
     robot_distance: float
     max_speed: Array
+    radius: Array | float = 0.0
+    mapped_radii: Array | float = 0.0
+
+    @property
+    def radii(self) -> Array:
+        """Radii of the UGVs' bodies, (n,), m."""
+        return np.broadcast_to(self.radius, len(self.ugvs))
 
     def start(self) -> PlannerMemory:
         """What is remembered at the beginning: nothing."""
@@ -138,10 +147,11 @@ class Planner:
             reports: what they sensed, see `messages`.
         """
         refused = [answer_to(desk.proposal, answers, i) == REFUSE for i, desk in enumerate(memory.desks)]
-        reported = {point for i, report in enumerate(reports) if refused[i] for point in report.sensed}
-        fresh = tuple(sorted(reported - set(memory.learnt) - set(map(tuple, self.mapped.tolist()))))
+        reported = {disc for i, report in enumerate(reports) if refused[i] for disc in report.sensed}
+        mapped = np.column_stack([self.mapped, np.broadcast_to(self.mapped_radii, len(self.mapped))])
+        fresh = tuple(sorted(reported - set(memory.learnt) - set(map(tuple, mapped.tolist()))))
         learnt = memory.learnt + fresh
-        obstacles = np.concatenate([self.mapped, np.array(learnt).reshape(-1, 3)])
+        discs = np.concatenate([mapped, np.array(learnt).reshape(-1, 4)])
         let_down = self._let_down(memory.desks, refused)
         desks = self._after_answers(memory.desks, t, intervening, refused, learnt=bool(fresh))
         sent, faults = list(memory.sent), list(memory.faults)
@@ -157,13 +167,16 @@ class Planner:
                 position=positions[i],
                 target=self.targets[i],
                 preset=self.presets[i],
-                obstacles=obstacles,
+                obstacles=np.ascontiguousarray(discs[:, :3]),
                 mapped=self.mapped,
                 others=np.delete(positions, i, axis=0),
                 safe_distance=self.safe_distance,
                 refusals=desks[i].refusals,
                 team=self._team(t, positions, intervening, answers, desks, memory.halts),
                 robot_distance=self.robot_distance,
+                radius=float(self.radii[i]),
+                obstacle_radii=discs[:, 3],
+                mapped_radii=mapped[:, 3],
             )
             planned = self.database.plan(desks[i], seen)
             faults += planned.faults
@@ -225,6 +238,7 @@ class Planner:
                 answered=_answered(desks[i].proposal, answers, i),
                 refusals=desks[i].refusals,
                 resting=desks[i].proposal is None and t < desks[i].retry_at,
+                radius=float(self.radii[i]),
             )
             for i, name in enumerate(self.ugvs)
         )

@@ -34,6 +34,7 @@ class Teammate:
         answered: what the UGV says to it.
         refusals: proposals that it has refused since its trigger, or since that of the UGV that it was asked for.
         resting: whether it has refused so recently that it gets no proposal now.
+        radius: of its body, m.
     """
 
     name: str
@@ -47,6 +48,7 @@ class Teammate:
     answered: Answered = "silent"
     refusals: int = 0
     resting: bool = False
+    radius: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -64,10 +66,13 @@ class Observation:
             (m, 3), m.
         mapped: those of its own map alone, (k, 3), m.
         others: positions of the other robots, (n, 3), m.
-        safe_distance: distance d to keep from them, m.
+        safe_distance: distance d to keep from obstacles, between surfaces, m.
         refusals: number of proposals that the UGV has refused since the trigger.
         team: every UGV, this one among them, in array order.
-        robot_distance: distance that two UGVs have to keep, m.
+        robot_distance: distance that two UGVs have to keep, between surfaces, m.
+        radius: of the UGV's body, m.
+        obstacle_radii: of the obstacles, (m,), m, or one for all.
+        mapped_radii: of those of its own map, (k,), m, or one for all.
     """
 
     t: float
@@ -83,6 +88,18 @@ class Observation:
     refusals: int
     team: tuple[Teammate, ...] = ()
     robot_distance: float = 0.0
+    radius: float = 0.0
+    obstacle_radii: Array | float = 0.0
+    mapped_radii: Array | float = 0.0
+
+    @property
+    def obstacle_distances(self) -> Array:
+        """Distances to keep from the obstacles, of the UGV's centre from theirs, (m,), m."""
+        return self.safe_distance + (self.radius + np.broadcast_to(self.obstacle_radii, len(self.obstacles)))
+
+    def distance_to(self, mate: Teammate) -> float:
+        """Distance that the UGV has to keep from another one, of its centre from its, m."""
+        return self.robot_distance + (self.radius + mate.radius)
 
     def fresh(self) -> Self:
         """A copy whose arrays are its own and read-only: whatever becomes of it, nothing else changes."""
@@ -102,6 +119,7 @@ class Proposal:
             else rests on them.
         cause: name of the UGV whose trigger it is sent for: another one's, if this UGV is asked to make way for it;
             empty: its own.
+        mapped_radii: of the obstacles that the UAV knows, (k,), m, or one for all.
     """
 
     policy: str
@@ -110,6 +128,7 @@ class Proposal:
     selection: Array = field(default_factory=lambda: np.eye(3))
     mapped: Array = field(default_factory=lambda: np.empty((0, 3)))
     cause: str = ""
+    mapped_radii: Array | float = 0.0
 
     @cached_property
     def chosen(self) -> Array:

@@ -30,7 +30,7 @@ class StaleMap(Detour):
 
     def propose(self, seen: Observation) -> Motion | None:
         """The detour round the obstacles of the original map."""
-        return super().propose(replace(seen, obstacles=seen.mapped))
+        return super().propose(replace(seen, obstacles=seen.mapped, obstacle_radii=seen.mapped_radii))
 
 
 class Noisy(Detour):

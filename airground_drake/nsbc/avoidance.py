@@ -8,7 +8,8 @@ that point, the velocity v of one control period h must satisfy
 
 with share = 1 for an obstacle and 1/2 for each robot of a pair. As ||x + s v|| >= ||x|| + s (x.v)/||x||, the
 distance is then at least d during the whole period, whatever velocity the lower priorities ask for: v = 0
-satisfies all of them, so a safe choice always exists.
+satisfies all of them, so a safe choice always exists. Of bodies, D and d are distances of centres: `team.py` puts both
+radii into d.
 """
 
 from __future__ import annotations

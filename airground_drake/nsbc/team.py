@@ -20,10 +20,12 @@ class Team:
         ugvs: names of the UGVs.
         uav: name of the UAV.
         obstacles: centres, (m, 3), m.
-        obstacle_distance: safe distance of every robot to every obstacle, m.
-        ugv_distance: safe distance between UGVs, m.
-        air_ground_distance: safe distance between the UAV and each UGV, m.
+        obstacle_distance: safe distance between the surfaces of every robot and every obstacle, m.
+        ugv_distance: safe distance between the surfaces of UGVs, m.
+        air_ground_distance: safe distance between the surfaces of the UAV and each UGV, m.
         max_speed: (n + 1,), m/s.
+        radius: of the robots' bodies, (n + 1,), m, or one for all.
+        obstacle_radius: of the obstacles, (m,), m, or one for all.
     """
 
     ugvs: tuple[str, ...]
@@ -33,6 +35,8 @@ class Team:
     ugv_distance: float
     air_ground_distance: float
     max_speed: Array
+    radius: Array | float = 0.0
+    obstacle_radius: Array | float = 0.0
 
     @property
     def robots(self) -> tuple[str, ...]:
@@ -46,18 +50,33 @@ class Team:
         mobility[:-1, 2] = 0.0
         return mobility
 
+    @property
+    def radii(self) -> Array:
+        """Radii of the robots' bodies, (n + 1,), m."""
+        return np.broadcast_to(self.radius, len(self.robots))
+
+    @property
+    def obstacle_radii(self) -> Array:
+        """Radii of the obstacles, (m,), m."""
+        return np.broadcast_to(self.obstacle_radius, len(self.obstacles))
+
     def pair_distance(self) -> Array:
-        """Safe distances between robots, (n + 1, n + 1), m; the diagonal means nothing."""
+        """Safe distances between the centres of robots, (n + 1, n + 1), m; the diagonal means nothing."""
         distance = np.full((len(self.robots), len(self.robots)), self.ugv_distance)
         distance[-1, :] = distance[:, -1] = self.air_ground_distance
-        return distance
+        return distance + (self.radii[:, None] + self.radii)
+
+    def distance_to(self, obstacle_radii: Array) -> Array:
+        """Safe distances of every robot to obstacles of radii (k,), m, between centres: (n + 1, k), m."""
+        return self.obstacle_distance + (self.radii[:, None] + obstacle_radii)
 
     def neighbourhood(self, rows: slice) -> Neighbourhood:
         """The surroundings of the robots in `rows`, ready to be filled with positions."""
         count, m = len(self.robots), len(self.obstacles)
         members = np.arange(count)[rows]
         others = np.array([[j for j in range(count) if j != i] for i in members], dtype=np.intp)
-        distance = np.full((len(members), m + count - 1), self.obstacle_distance)
+        distance = np.empty((len(members), m + count - 1))
+        distance[:, :m] = self.distance_to(self.obstacle_radii)[members]
         distance[:, m:] = np.take_along_axis(self.pair_distance()[members], others, axis=1)
         share = np.ones_like(distance)
         share[:, m:] = 0.5
@@ -72,7 +91,7 @@ class Neighbourhood:
         members: indices of the robots, (k,).
         others: indices of the other robots, (k, n).
         obstacles: (m, 3), m.
-        distance: (k, K), m.
+        distance: between centres, (k, K), m.
         share: (k, K).
     """
 

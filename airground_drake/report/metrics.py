@@ -14,7 +14,7 @@ from airground_drake.verify.engines.segments import closest_approach
 
 
 class Closest(NamedTuple):
-    """Smallest distance over continuous time: its value in m, when (s), and to what."""
+    """Smallest distance of surfaces over continuous time: its value in m, when (s), and to what."""
 
     value: float
     t_s: float
@@ -93,7 +93,14 @@ def _closest_call(trace: Trace) -> dict[str, Any] | None:
 def closest_obstacle(trace: Trace, robot: str) -> Closest | None:
     """Smallest distance of a robot to any obstacle over continuous time, exact; None without obstacles."""
     found = _distances(trace, robot, trace.scenario["obstacles"])
-    return min((Closest(at["value"], at["t_s"], name) for name, at in found.items()), default=None)
+    closest = (Closest(at["value"] - radii_m(trace, robot, name), at["t_s"], name) for name, at in found.items())
+    return min(closest, default=None)
+
+
+def gap_m(trace: Trace, robot: str, other: str) -> Array:
+    """Distance of the surfaces of a robot and an obstacle or another robot at the rows, (T,), m."""
+    apart: Array = np.linalg.norm(trace.position(robot) - place(trace, other), axis=1)
+    return apart - radii_m(trace, robot, other)
 
 
 def place(trace: Trace, name: str) -> Array:
@@ -104,12 +111,23 @@ def place(trace: Trace, name: str) -> Array:
 
 
 def safe_distance_m(trace: Trace, robot: str, other: str) -> float:
-    """The safe distance d that the scenario sets for a robot and an obstacle or another robot, m."""
+    """The safe distance of centres that the scenario sets for a robot and an obstacle or another robot, m."""
     if other in trace.scenario["obstacles"]:
         kind = "obstacle_m"
     else:
         kind = "ugv_m" if {robot, other} <= set(trace.ugvs) else "air_ground_m"
-    return float(trace.scenario["safe_distance"][kind])
+    return float(trace.scenario["safe_distance"][kind]) + radii_m(trace, robot, other)
+
+
+def radii_m(trace: Trace, one: str, other: str) -> float:
+    """Both radii of a robot or an obstacle and another one, m."""
+    return radius_m(trace, one) + radius_m(trace, other)
+
+
+def radius_m(trace: Trace, name: str) -> float:
+    """Radius of a robot or an obstacle, m."""
+    scenario = trace.scenario
+    return float({**scenario["obstacles"], **scenario["ugvs"]}.get(name, scenario["uav"])["radius_m"])
 
 
 def events_of(trace: Trace, robot: str, *kinds: str) -> list[dict[str, Any]]:

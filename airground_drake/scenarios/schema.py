@@ -29,7 +29,7 @@ class Preset:
 
 @dataclass
 class Ugv:
-    """One UGV: a planar first-order robot."""
+    """One UGV: a planar first-order robot, a disc of radius `radius_m` on the ground."""
 
     start_m: Vector = field(default_factory=list, metadata=REQUIRED)
     """Where it starts; z = 0."""
@@ -39,13 +39,16 @@ class Ugv:
     """The trajectory that it follows."""
     max_speed_m_s: float = 6.0
     """Commands are shortened to this speed."""
+    radius_m: float = field(default=0.0, metadata=FROM_ZERO)
+    """Of its body, added to the safe distances of its pairs; 0: a point."""
 
 
 @dataclass
 class Uav:
     """The UAV: a spatial first-order robot whose `task` is to fly over the centroid of the UGVs, eqs (9)-(10).
 
-    Another task is named as `module:Class`. `phantoms_m` are obstacles on its map that are not there.
+    Another task is named as `module:Class`. `phantoms_m` are obstacles on its map that are not there, points without a
+    radius. Its own body is a ball of radius `radius_m`.
     """
 
     name: str = "uav"
@@ -62,21 +65,29 @@ class Uav:
     """Commands are shortened to this speed."""
     phantoms_m: list[Vector] = field(default_factory=list)
     """Obstacles on its map that are not there."""
+    radius_m: float = field(default=0.0, metadata=FROM_ZERO)
+    """Of its body, added to the safe distances of its pairs; 0: a point."""
 
 
 @dataclass
 class Obstacle:
-    """A point to keep away from by the safe distance of (7)-(8)."""
+    """A ball to keep away from by the safe distance of (7)-(8); a point with the default radius."""
 
     position_m: Vector = field(default_factory=list, metadata=REQUIRED)
     """Where it is."""
     known_to_uav: bool = True
     """Whether it is on the UAV's map from the beginning."""
+    radius_m: float = field(default=0.0, metadata=FROM_ZERO)
+    """Of its body, added to the safe distances of its pairs; 0: a point."""
 
 
 @dataclass
 class SafeDistance:
-    """Safe distances d of (7)-(8), for each kind of pair, and the distance that counts as a collision."""
+    """Safe distances d of (7)-(8), for each kind of pair, and the distance that counts as a collision.
+
+    They are kept between surfaces: the centres of a pair keep d + (radius + radius), and collide at `collision_m` +
+    (radius + radius). All other distances, `control.sensing_range_m` among them, are of centres.
+    """
 
     obstacle_m: float = 2.0
     """Of a robot to an obstacle."""

@@ -13,6 +13,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import fields, is_dataclass
 from itertools import combinations, pairwise
+from typing import NamedTuple
 
 from airground_drake.decision.bayes import optimal_threshold
 from airground_drake.errors import Fault, ScenarioError
@@ -285,31 +286,52 @@ def _distances(scenario: Scenario) -> Problems:
         if not safe.collision_m < getattr(safe, name):
             allowed = f"less than safe_distance.{name} = {getattr(safe, name):.9g} m"
             yield "safe_distance.collision_m", safe.collision_m, allowed
-    if not altitude > safe.air_ground_m:
-        allowed = f"more than safe_distance.air_ground_m = {safe.air_ground_m:.9g} m, for the UAV to fly over a UGV"
-        yield "uav.altitude_m", altitude, allowed
+    radii = scenario.uav.radius_m + max(ugv.radius_m for ugv in scenario.ugvs.values())
+    if not altitude > safe.air_ground_m + radii:
+        least = f"safe_distance.air_ground_m = {safe.air_ground_m:.9g} m{_and(radii)}"
+        yield "uav.altitude_m", altitude, f"more than {least}, for the UAV to fly over a UGV"
 
 
-def _fastest_pairs(scenario: Scenario) -> list[tuple[float, str, float, str, str]]:
-    """Of each kind of pairs the fastest: safe distance m, its key, closing speed m/s, and the two."""
-    safe = scenario.safe_distance
-    ugvs = sorted(((ugv.max_speed_m_s, name) for name, ugv in scenario.ugvs.items()), reverse=True)
-    uav = (scenario.uav.max_speed_m_s, scenario.uav.name)
-    pairs = [(safe.air_ground_m, "air_ground_m", uav, ugvs[0])]
-    pairs += [(safe.ugv_m, "ugv_m", one, other) for one, other in pairwise(ugvs[:2])]
-    pairs += [(safe.obstacle_m, "obstacle_m", max(uav, ugvs[0]), (0.0, name)) for name in scenario.obstacles]
-    return [(d, kind, v + w, one, other) for d, kind, (v, one), (w, other) in pairs]
+def _and(radii: float) -> str:
+    """What two radii add to a distance, m, as a message has it."""
+    return f" + radii {radii:.9g} m" if radii else ""
+
+
+class _Body(NamedTuple):
+    """What keeps apart from others: how far it reaches in a control period m, its speed m/s, radius m and name."""
+
+    reach: float
+    speed: float
+    radius: float
+    name: str
+
+    @classmethod
+    def of(cls, name: str, radius: float, speed: float, period: float) -> _Body:
+        return cls(radius + speed * period, speed, radius, name)
+
+
+def _nearest_pairs(scenario: Scenario) -> list[tuple[str, _Body, _Body]]:
+    """Of each kind of pairs, named by the key of its safe distance, the one that needs the most room in a period."""
+    h, uav = scenario.control.period_s, scenario.uav
+    ugvs = [_Body.of(name, ugv.radius_m, ugv.max_speed_m_s, h) for name, ugv in scenario.ugvs.items()]
+    ugvs.sort(reverse=True)
+    flier = _Body.of(uav.name, uav.radius_m, uav.max_speed_m_s, h)
+    fixed = [_Body.of(name, obstacle.radius_m, 0.0, h) for name, obstacle in scenario.obstacles.items()]
+    pairs = [("air_ground_m", flier, ugvs[0]), *(("ugv_m", one, other) for one, other in pairwise(ugvs[:2]))]
+    return [*pairs, *(("obstacle_m", max(flier, ugvs[0]), each) for each in fixed)]
 
 
 def _sensing(scenario: Scenario) -> Problems:
     """What is farther than the sensing range must not come within the safe distance in one control period."""
     period = scenario.control.period_s
-    needed, distance, closing, kind, one, other = max(
-        (d + v * period, d, v, kind, one, other) for d, kind, v, one, other in _fastest_pairs(scenario)
+    needed, kind, one, other = max(
+        (getattr(scenario.safe_distance, kind) + (a.radius + b.radius) + (a.speed + b.speed) * period, kind, a, b)
+        for kind, a, b in _nearest_pairs(scenario)
     )
     if scenario.control.sensing_range_m < needed - TOLERANCE:
-        total = f"safe_distance.{kind} {distance:.9g} m + closing {closing:.9g} m/s * control.period_s {period:.9g} s"
-        allowed = f"at least {needed:.9g} m for {one} and {other}: {total}"
+        apart = f"safe_distance.{kind} {getattr(scenario.safe_distance, kind):.9g} m{_and(one.radius + other.radius)}"
+        total = f"{apart} + closing {one.speed + other.speed:.9g} m/s * control.period_s {period:.9g} s"
+        allowed = f"at least {needed:.9g} m for {one.name} and {other.name}: {total}"
         yield "control.sensing_range_m", scenario.control.sensing_range_m, allowed
 
 
@@ -321,21 +343,19 @@ def _extent(scenario: Scenario) -> Problems:
     control, duration = scenario.control, scenario.duration_s
     if control.avoidance_gain_1_s == 0.0:
         return
-    pairs = [
-        Rounding(max(control.sensing_range_m, safe), closing, control.period_s, control.avoidance_gain_1_s)
-        for safe, _, closing, _, _ in _fastest_pairs(scenario)
-    ]
+    speeds = sorted([scenario.uav.max_speed_m_s, *(ugv.max_speed_m_s for ugv in scenario.ugvs.values())])
+    speed, closing = speeds[-1], speeds[-2] + speeds[-1]
+    loss = Rounding(control.sensing_range_m, closing, control.period_s, control.avoidance_gain_1_s)
     points = [each for each in _ugv_points(scenario) if each[0].startswith("ugvs.")]
     points.append(("uav.start_m", scenario.uav.start_m))
     points += [(f"obstacles.{name}.position_m", each.position_m) for name, each in scenario.obstacles.items()]
     key, point = max(points, key=lambda entry: max(map(abs, entry[1])))
     farthest = max(map(abs, point))
-    speed = max(scenario.uav.max_speed_m_s, *(ugv.max_speed_m_s for ugv in scenario.ugvs.values()))
-    allowed = min(pair.largest_extent(duration) for pair in pairs) - speed * duration
+    allowed = loss.largest_extent(duration) - speed * duration
     if farthest <= allowed:
         return
     why = f"for rounding to take less than {TOLERANCE_M:g} m from a safe distance"
-    longest = min(pair.longest(farthest, speed) for pair in pairs)
+    longest = loss.longest(farthest, speed)
     if allowed > 0.0 and farthest > speed * duration:
         yield (
             key,
@@ -345,24 +365,26 @@ def _extent(scenario: Scenario) -> Problems:
     elif longest > 0.0:
         yield "duration_s", duration, f"at most {longest * _SHORT:.6g} s at {speed:.9g} m/s, {why}"
     else:
-        gain = max(pair.least_gain(farthest + speed * duration, duration) for pair in pairs)
+        gain = loss.least_gain(farthest + speed * duration, duration)
         yield "control.avoidance_gain_1_s", control.avoidance_gain_1_s, f"0, or at least {gain / _SHORT:.6g} 1/s, {why}"
 
 
 def _clearances(scenario: Scenario) -> Problems:
     """Robots that start, or are to end, within the safe distance of an obstacle or of each other."""
     for attribute, verb in (("start_m", "starts"), ("target_m", "would end")):
-        ugvs = [(f"ugvs.{name}", name, getattr(ugv, attribute)) for name, ugv in scenario.ugvs.items()]
-        uav = ("uav", scenario.uav.name, getattr(scenario.uav, attribute))
+        ugvs = [(f"ugvs.{name}", name, getattr(ugv, attribute), ugv.radius_m) for name, ugv in scenario.ugvs.items()]
+        uav = ("uav", scenario.uav.name, getattr(scenario.uav, attribute), scenario.uav.radius_m)
+        fixed = [(name, obstacle.position_m, obstacle.radius_m) for name, obstacle in scenario.obstacles.items()]
         pairs = [
-            *((r, (name, o.position_m), "obstacle_m") for r in (*ugvs, uav) for name, o in scenario.obstacles.items()),
+            *((robot, other, "obstacle_m") for robot in (*ugvs, uav) for other in fixed),
             *((robot, other[1:], "ugv_m") for other, robot in combinations(ugvs, 2)),
             *((uav, ugv[1:], "air_ground_m") for ugv in ugvs),
         ]
-        for (key, name, point), (other_name, other_point), kind in pairs:
-            distance, least = math.dist(point, other_point), getattr(scenario.safe_distance, kind)
-            if distance < least - TOLERANCE:
-                allowed = f"at least safe_distance.{kind} = {least:.9g} m is needed"
+        for (key, name, point, radius), (other_name, other_point, other_radius), kind in pairs:
+            distance, radii = math.dist(point, other_point), radius + other_radius
+            least = getattr(scenario.safe_distance, kind)
+            if distance < least + radii - TOLERANCE:
+                allowed = f"at least safe_distance.{kind} = {least:.9g} m{_and(radii)} is needed"
                 yield f"{key}.{attribute}", point, f"{name} {verb} {distance:.9g} m from {other_name}, {allowed}"
 
 

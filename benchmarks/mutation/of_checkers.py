@@ -38,6 +38,13 @@ CLAIMS = (
         tests=(f"{RUNS}/test_safe_trace.py",),
     ),
     Mutant(
+        "claims forget radii",
+        "verify/runs/pairs.py",
+        'float(body["radius_m"]) for name',
+        '0.0 * float(body["radius_m"]) for name',
+        runs=("bodies d",),
+    ),
+    Mutant(
         "SAFE-TRACE looks at the ends of segments only",
         "verify/engines/segments.py",
         "fraction = np.clip(np.divide(along",
@@ -203,6 +210,13 @@ CLAIMS = (
 )
 
 CHECKER = (
+    Mutant(
+        "checker: no radii",
+        "check/scenario.py",
+        '(float(one["radius_m"]) + float(other["radius_m"]))',
+        '0.0 * (float(one["radius_m"]) + float(other["radius_m"]))',
+        runs=("bodies d",),
+    ),
     Mutant(
         "checker: distances within 5 cm",
         "check/safety.py",

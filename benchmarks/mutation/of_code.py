@@ -7,6 +7,8 @@ from mutation.mutant import Mutant
 WIRING = ("SAFE-INV",)
 """The proof that compares the built diagram with the scenario."""
 
+AMONG_BODIES = ("bodies d", "bodies c")
+
 TEAM = (
     Mutant(
         "safe distance air/ground at 0.9 of its value",
@@ -93,6 +95,67 @@ TEAM = (
         "velocity[3 * i : 3 * i + 3] -= port.Eval(context)",
         proofs=WIRING,
         tests=("tests/test_simulation.py", "tests/test_python_api.py"),
+    ),
+)
+
+BODIES = (
+    Mutant(
+        "obstacles have no radius",
+        "nsbc/team.py",
+        "(self.radii[:, None] + obstacle_radii)",
+        "(self.radii[:, None] + 0.0 * obstacle_radii)",
+        runs=AMONG_BODIES,
+    ),
+    Mutant(
+        "robots have no radius beside obstacles",
+        "nsbc/team.py",
+        "(self.radii[:, None] + obstacle_radii)",
+        "(0.0 * self.radii[:, None] + obstacle_radii)",
+        runs=AMONG_BODIES,
+    ),
+    Mutant(
+        "the other robot has no radius",
+        "nsbc/team.py",
+        "(self.radii[:, None] + self.radii)",
+        "(self.radii[:, None] + 0.0 * self.radii)",
+        runs=AMONG_BODIES,
+    ),
+    Mutant(
+        "the UAV has the first UGV's radius",
+        "components.py",
+        "radius=np.array([*radii, scenario.uav.radius_m])",
+        "radius=np.array([*radii, radii[0]])",
+        runs=AMONG_BODIES,
+    ),
+    Mutant(
+        "obstacles have no radius in foresight only",
+        "gatekeeper/certified.py",
+        "self._team.distance_to(bodies)[i]",
+        "self._team.distance_to(0.0 * bodies)[i]",
+        runs=AMONG_BODIES,
+    ),
+    Mutant(
+        "collisions are of centres",
+        "events.py",
+        '["collision_m"] + (own + obstacle["radius_m"])',
+        '["collision_m"]',
+        runs=("bodies b",),
+    ),
+    Mutant(
+        "the map in a message is one of points",
+        "intervention/database.py",
+        "mapped_radii=seen.obstacle_radii",
+        "mapped_radii=0.0",
+        runs=AMONG_BODIES,
+        tests=("tests/intervention/test_planner.py",),
+    ),
+    Mutant(
+        "plans take robots for points",
+        "intervention/coordination/single.py",
+        "return space.apart + other.radius + space.spacing",
+        "return space.apart + space.spacing",
+        runs=(),
+        tests=("tests/intervention/coordination",),
     ),
 )
 
@@ -483,8 +546,8 @@ INTERVENTION = (
     Mutant(
         "detours inside the safe distance",
         "intervention/detour.py",
-        "np.full(len(seen.obstacles), seen.safe_distance + self.clearance)",
-        "np.full(len(seen.obstacles), 0.8 * seen.safe_distance)",
+        "[seen.obstacle_distances + self.clearance, ",
+        "[0.8 * seen.obstacle_distances, ",
         tests=PLANNER,
     ),
     Mutant(
@@ -637,8 +700,8 @@ GATEKEEPER = (
     Mutant(
         "what is sensed does not come with a refusal",
         "gatekeeper/sample.py",
-        "near = self._neighbourhood.obstacles[self._sensed(position)]",
-        "near = self._neighbourhood.obstacles[:0]",
+        "near = self._sensed(position)",
+        "near = self._sensed(position) & False",
         tests=("tests/intervention", "tests/systems", "tests/test_simulation.py"),
     ),
     Mutant(

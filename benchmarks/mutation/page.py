@@ -18,9 +18,9 @@ STAGES = {
 }
 HEAD = """\
 Made by `python benchmarks/mutants.py --json mutants.json --page docs/mutants.md`: each mutant is one edit of the
-package in a temporary copy. Short runs (scenarios `crowd`, `case_a`, `case_b`, `soft_gate`) are judged by their
-claims and by the independent checker; where they say nothing else than on the package as it is, the proofs that are
-about the edited code, tampered reports (mutants of the checker), and at last the tests of the file. A mutant counts
+package in a temporary copy. Short runs (scenarios `crowd`, `bodies`, `case_a`, `case_b`, `soft_gate`) are judged by
+their claims and by the independent checker; where they say nothing else than on the package as it is, the proofs that
+are about the edited code, tampered reports (mutants of the checker), and at last the tests of the file. A mutant counts
 for the first of these that catches it. What demands less (mutants of claims and of the checker) says the same on
 honest runs: it takes a run, or a report, that must be refused.
 """

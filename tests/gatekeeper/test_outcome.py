@@ -139,3 +139,11 @@ def test_outcomes_are_compared_by_stalling_first() -> None:
     assert not far.better_than(home)
     assert near.better_than(far)
     assert not near.better_than(replace(near, cost=near.cost * (1.0 + 1e-7)))
+
+
+def test_the_way_left_goes_round_circles_of_different_sizes() -> None:
+    discs = np.array([[4.0, 0.0, 0.0], [4.0, 9.0, 0.0], [4.0, -9.0, 2.5]])
+    left = way_left(np.zeros(3), np.array([8.0, 0.0, 0.0]), discs, np.array([2.0, 5.0, 2.5]))
+    assert left == pytest.approx(2.0 * np.sqrt(12.0) + 2.0 * np.pi / 3.0)
+    wide = way_left(np.zeros(3), np.array([8.0, 0.0, 0.0]), discs[:1], np.array([3.0]))
+    assert wide == pytest.approx(2.0 * np.sqrt(7.0) + 6.0 * (np.pi / 2.0 - np.arccos(0.75)))

@@ -5,12 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from builders.observations import mate, seen
 
 from airground_drake.components import make_planner
+from airground_drake.intervention.database import predicted_cost
 from airground_drake.intervention.detour import Detour
 from airground_drake.intervention.planner import STANDS_S, PlannerMemory
 from airground_drake.intervention.policy import Observation, Proposal
+from airground_drake.intervention.wrong import StaleMap
 from airground_drake.nsbc.motion import Motion
 from airground_drake.registry import METHODS
 from airground_drake.scenarios.load import load
@@ -52,3 +55,37 @@ def test_who_keeps_to_one_place_stands() -> None:
     assert planner.watch(memory, 0.5, places + 0.05) is memory
     later = planner.watch(memory, STANDS_S, places + np.array([[0.0], [1.0], [0.0]]))
     assert [halt.since for halt in later.halts] == [0.0, STANDS_S]
+
+
+def test_bodies_are_gone_round_by_both_radii() -> None:
+    stuck = mate("ugv1", [0.0, 0.0], [12.0, 0.0])
+    parked = mate("ugv2", [6.0, 0.1], [6.0, 0.1], triggered=False, radius=0.5)
+    what = replace(seen([stuck, parked]), radius=0.25)
+    assert least_distance(what, 1) >= 2.05 + 0.75 - 1e-3
+    shelf = replace(seen([stuck], [(6.0, 0.5)]), radius=0.25, obstacle_radii=np.array([1.5]))
+    motion = DETOUR.propose(shelf)
+    assert motion is not None
+    least = np.linalg.norm(motion.positions - [6.0, 0.5, 0.0], axis=1).min()
+    assert least == pytest.approx(2.05 + 1.75, abs=1e-3)
+
+
+def test_a_map_of_the_beginning_has_the_radii_of_the_beginning() -> None:
+    stuck = mate("ugv1", [0.0, 0.0], [12.0, 0.0])
+    learnt = seen([stuck], [(6.0, 0.5), (6.0, 3.0)])
+    stale = replace(learnt, mapped=learnt.mapped[:1], mapped_radii=np.array([1.5]), obstacle_radii=np.array([1.5, 0.0]))
+    motion, known = StaleMap(speed_m_s=1.0).propose(stale), replace(seen([stuck], [(6.0, 0.5)]), obstacle_radii=1.5)
+    found = DETOUR.propose(known)
+    assert motion is not None
+    assert found is not None
+    assert np.array_equal(motion.positions, found.positions)
+
+
+def test_the_predicted_cost_counts_intrusion_into_what_radii_demand() -> None:
+    stuck = mate("ugv1", [0.0, 0.0], [12.0, 0.0])
+    motions = {"ugv1": Motion(np.array([0.0]), np.array([[0.0, 0.0, 0.0]]))}
+    costs = [
+        predicted_cost(motions, replace(seen([stuck], [(2.5, 0.0), (0.0, 9.0)]), radius=own, obstacle_radii=each))
+        for own, each in ((0.0, 0.0), (0.0, np.array([0.5, 5.0])), (0.25, np.array([0.25, 0.0])), (0.5, 0.5))
+    ]
+    assert costs[0] == costs[1] == costs[2]
+    assert costs[3] > costs[0]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -142,3 +143,27 @@ def test_nonsense_is_no_intervention(proposed: object, said: str) -> None:
     assert in_force(memory) == {"one": (1.0, "one")}
     assert [fault.robot for fault in memory.faults] == ["two"]
     assert said in memory.faults[0].what
+
+
+def test_radii_come_with_a_refusal_and_go_out_with_a_proposal() -> None:
+    policy = Scripted({"one": wait(9.0)}, {"one": wait(9.0)})
+    uav = replace(
+        planner(policy),
+        mapped=np.array([[2.0, 9.0, 0.0]]),
+        mapped_radii=np.array([3.0]),
+        radius=np.array([0.5, 0.1, 0.0]),
+    )
+    memory = step(uav, uav.start(), 1.0, "one")
+    sensed = Report(sensed=((2.0, 9.0, 0.0, 3.0), (5.0, 5.0, 0.0, 0.7)))
+    answers = np.array([REFUSE, 1.0, SILENT, -1.0, SILENT, -1.0])
+    memory = uav.plan(memory, 1.1, PLACES, [True, False, False], answers, (sensed, *NOBODY[1:]))
+    assert memory.learnt == ((5.0, 5.0, 0.0, 0.7),)  # the other one is on the map
+    memory = step(uav, memory, 3.0, "one")
+    first, second = policy.seen
+    assert (first.radius, [each.radius for each in first.team]) == (0.5, [0.5, 0.1, 0.0])
+    assert first.obstacle_distances.tolist() == [1.0 + (0.5 + 3.0)]
+    assert second.obstacle_distances.tolist() == [1.0 + (0.5 + 3.0), 1.0 + (0.5 + 0.7)]
+    assert second.distance_to(second.team[1]) == 1.0 + (0.5 + 0.1)
+    sent = memory.proposals[0]
+    assert sent is not None
+    assert np.array_equal(sent.mapped_radii, [3.0, 0.7])

@@ -20,23 +20,29 @@ D = 2.0
 SEEDS = st.integers(0, 2**31)
 
 
-def scene(seed: int, robots: int = 3, obstacles: int = 6, spread: float = 8.0) -> tuple[Team, np.ndarray]:
-    """A team at safe random positions, UAV included; many pairs at exactly the safe distance."""
+def scene(
+    seed: int, robots: int = 3, obstacles: int = 6, spread: float = 8.0, *, largest: float = 0.0
+) -> tuple[Team, np.ndarray]:
+    """A team at safe random positions, UAV included; many pairs at exactly the safe distance; radii up to `largest`."""
     rng = np.random.default_rng(seed)
     centres = np.column_stack([rng.uniform(-spread, spread, (obstacles, 2)), rng.choice([0.0, 0.5], obstacles)])
+    own, fixed = (largest * np.random.default_rng([seed, k]).random(n) for k, n in enumerate((robots + 1, obstacles)))
     positions: list[np.ndarray] = []
     while len(positions) < robots:
+        i, spread = len(positions), spread + largest
         trial = np.array([*rng.uniform(-spread, spread, 2), 0.0])
         if rng.random() < 0.5:  # onto the safe circle of an obstacle
-            o = centres[rng.integers(obstacles)]
-            radius = np.sqrt(D**2 - o[2] ** 2)
+            k = rng.integers(obstacles)
+            o = centres[k]
+            radius = np.sqrt((D + own[i] + fixed[k]) ** 2 - o[2] ** 2)
             angle = rng.uniform(0, 2 * np.pi)
             trial = np.array([o[0] + radius * np.cos(angle), o[1] + radius * np.sin(angle), 0.0])
-        if all(np.linalg.norm(trial - q) >= D for q in [*centres, *positions]):
+        bodies = zip([*centres, *positions], [*fixed, *own[:i]], strict=True)
+        if all(np.linalg.norm(trial - place) >= D + own[i] + radius for place, radius in bodies):
             positions.append(trial)
-    positions.append(np.array([*rng.uniform(-spread, spread, 2), 3.0]))
-    team = Team(tuple(f"u{i}" for i in range(robots)), "uav", centres, D, D, 1.0, np.full(robots + 1, 6.0))
-    return team, np.array(positions)
+    positions.append(np.array([*rng.uniform(-spread, spread, 2), 3.0 + 3.0 * largest]))
+    names, speeds = tuple(f"u{i}" for i in range(robots)), np.full(robots + 1, 6.0)
+    return Team(names, "uav", centres, D, D, 1.0, speeds, own, fixed), np.array(positions)
 
 
 def closest(position: np.ndarray, velocity: np.ndarray, centre: np.ndarray, other: np.ndarray, h: float) -> float:
@@ -47,22 +53,24 @@ def closest(position: np.ndarray, velocity: np.ndarray, centre: np.ndarray, othe
 
 
 def worst_margin(team: Team, positions: np.ndarray, velocities: np.ndarray, h: float) -> float:
-    pairs = team.pair_distance()
+    n, own, fixed = len(positions), team.radii, team.obstacle_radii
     margins = [
-        closest(p, v, o, np.zeros(3), h) - D for p, v in zip(positions, velocities, strict=True) for o in team.obstacles
+        closest(positions[i], velocities[i], o, np.zeros(3), h) - (D + own[i] + radius)
+        for i in range(n)
+        for o, radius in zip(team.obstacles, fixed, strict=True)
     ]
-    n = len(positions)
     margins += [
-        closest(positions[i], velocities[i], positions[j], velocities[j], h) - pairs[i, j]
+        closest(positions[i], velocities[i], positions[j], velocities[j], h)
+        - ((1.0 if i == n - 1 else D) + own[i] + own[j])
         for i in range(n)
         for j in range(i)
     ]
     return min(margins)
 
 
-def attack(seed: int, steps: int, avoidance: Avoidance, *, share: float | None = None) -> float:
+def attack(seed: int, steps: int, avoidance: Avoidance, *, share: float | None = None, largest: float = 0.0) -> float:
     """Drive a team by hostile velocities through the avoidance layer; the worst continuous-time margin, m."""
-    team, positions = scene(seed)
+    team, positions = scene(seed, largest=largest)
     rng = np.random.default_rng(seed + 1)
     neighbourhood = team.neighbourhood(slice(None))
     if share is not None:
@@ -84,6 +92,12 @@ def attack(seed: int, steps: int, avoidance: Avoidance, *, share: float | None =
 @given(SEEDS, st.sampled_from([0.01, 0.05, 0.2]))
 def test_no_velocity_breaks_the_safe_distance_in_continuous_time(seed: int, h: float) -> None:
     assert attack(seed, 60, Avoidance(gain=3.0, period=h)) >= -1e-12
+
+
+@examples(20, fuzz=2000)
+@given(SEEDS, st.sampled_from([0.05, 0.2]), st.sampled_from([0.01, 1.0, 5.0]))
+def test_bodies_of_any_size_keep_both_radii_more(seed: int, h: float, largest: float) -> None:
+    assert attack(seed, 40, Avoidance(gain=3.0, period=h), largest=largest) >= -1e-9
 
 
 @pytest.mark.parametrize("composition", ["recursion_nearest", "recursion_listed"])

@@ -24,7 +24,7 @@ def plane(points: list[list[float]]) -> np.ndarray:
 def everything(scenario: Scenario) -> np.ndarray:
     """All obstacles, and those that are only on the map, (m, 2), m."""
     real = positions([each.position_m for each in scenario.obstacles.values()])
-    return np.concatenate([real, make_map(scenario)])[:, :2]
+    return np.concatenate([real, make_map(scenario)[0]])[:, :2]
 
 
 @pytest.mark.parametrize("name", DEADLOCKS)
@@ -68,7 +68,7 @@ def test_under_method_d_everybody_arrives_and_every_claim_holds(name: str) -> No
 def test_the_map_of_the_warehouse_is_wrong() -> None:
     scenario = load("warehouse")[0]
     real = {tuple(each.position_m) for each in scenario.obstacles.values()}
-    on_map = set(map(tuple, make_map(scenario).tolist()))
+    on_map = set(map(tuple, make_map(scenario)[0].tolist()))
     assert len(real - on_map) == 1
     assert len(on_map - real) == 1
 

@@ -129,6 +129,11 @@ BAD: list[tuple[str, object, list[str]]] = [
     ("ugvs.one.target_m", [5, -4, 0], ["ugvs.one.target_m", "one would end 1 m from rock"]),
     ("uav.target_m", [5, -4, 0], ["uav.target_m", "uav would end 1 m from rock"]),
     ("ugvs.two.target_m", [9, 1, 0], ["ugvs.two.target_m", "two would end 1 m from one"]),
+    # radii
+    ("obstacles.rock.radius_m", -1, ["obstacles.rock.radius_m: -1.0", "a number in m, not below 0"]),
+    ("ugvs.one.radius_m", "wide", ["ugvs.one.radius_m"]),
+    ("obstacles.rock.radius_m", 1.9, ["sensing_range_m: 4.0", "4.15 m for uav and rock", "m + radii 1.9 m + closing"]),
+    ("uav.radius_m", 1.5, ["uav.altitude_m: 2.0", "air_ground_m = 1 m + radii 1.5 m, for the UAV"]),
 ]
 
 
@@ -138,6 +143,13 @@ def test_bad_value(key: str, value: object, fragments: list[str], write: Write) 
     text = message(write(yaml.safe_dump(data, sort_keys=False)))
     assert re.search(r"bad\.yaml:\d+: ", text), text
     assert all(fragment in text for fragment in fragments), text
+
+
+def test_bodies_start_as_far_apart_as_their_radii_demand(write: Write) -> None:
+    data = edit(edit(SMALL_DATA, "ugvs.one.radius_m", 0.5), "ugvs.two.radius_m", 0.25)
+    load(write(yaml.safe_dump(edit(data, "ugvs.two.start_m", [0.0, 2.75, 0.0]))))
+    text = message(write(yaml.safe_dump(edit(data, "ugvs.two.start_m", [0.0, 2.7, 0.0]))))
+    assert "two starts 2.7 m from one, at least safe_distance.ugv_m = 2 m + radii 0.75 m is needed" in text
 
 
 def test_the_small_scenario_is_valid_otherwise(write: Write) -> None:

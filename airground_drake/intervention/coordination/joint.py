@@ -8,9 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from airground_drake.arrays import Array
-from airground_drake.intervention.coordination.roadmap import Errand, Roadmap, Space, weave
-from airground_drake.intervention.coordination.single import Brief, Mover, Way, find
+from airground_drake.intervention.coordination.roadmap import Errand, Space, weave
+from airground_drake.intervention.coordination.single import Body, Mover, Way, find
 from airground_drake.intervention.coordination.smoothing import smooth
 from airground_drake.intervention.coordination.timed import at_rest
 
@@ -63,7 +62,7 @@ def plan(
     space: Space,
     errands: Sequence[Errand],
     speeds: Sequence[float],
-    fixed: Sequence[Array] = (),
+    fixed: Sequence[Body] = (),
     *,
     follow: float = math.inf,
     effort: Effort | None = None,
@@ -76,35 +75,38 @@ def plan(
     that find none stay where they are, and the others go round them.
 
     Args:
-        space: what is to be kept away from.
+        space: what a robot without a body keeps away from.
         errands: one per robot.
         speeds: m/s, one per robot.
-        fixed: motions (M, 3) of others from t = 0 on.
+        fixed: others, with their motions from t = 0 on.
         follow: for how long a robot must be able to follow its preset after it has joined it, s.
         effort: None: the default.
     """
     effort = effort or Effort()
-    roadmap = weave(space, errands, [motion[0, 1:] for motion in fixed])
+    spaces = [space.of(errand.body) for errand in errands]
+    roadmap = weave(spaces, errands, [other.motion[0, 1:] for other in fixed])
+    least = min(each.apart for each in spaces)
     movers = [
-        Mover.on(roadmap, space, errand, speed, own)
-        for errand, speed, own in zip(errands, speeds, roadmap.woven, strict=True)
+        Mover.on(roadmap if each.apart == least else roadmap.within(each, own), each, errand, speed, own)
+        for each, errand, speed, own in zip(spaces, errands, speeds, roadmap.woven, strict=True)
     ]
-    task = _Search(roadmap, space, movers, tuple(fixed), follow, effort)
+    task = _Search(movers, tuple(fixed), follow, effort)
     ways = task.in_orders()
     if ways is None:
         ways = task.partly()
-    return Plan(tuple(smooth(space, ways, [at_rest(e.start) for e in errands], fixed)), task.orders, task.spent)
+    return Plan(tuple(smooth(spaces, ways, [_resting(e) for e in errands], fixed)), task.orders, task.spent)
+
+
+def _resting(errand: Errand) -> Body:
+    """A robot that stays where it is."""
+    return Body(at_rest(errand.start), errand.body)
 
 
 class _Search:
     """One call of `plan`: what it is about, and what it has spent."""
 
-    def __init__(
-        self, roadmap: Roadmap, space: Space, movers: list[Mover], fixed: tuple[Array, ...], follow: float,
-        effort: Effort,
-    ) -> None:  # fmt: skip
-        self._roadmap, self._space, self._movers, self._fixed = roadmap, space, movers, fixed
-        self._follow, self._effort = follow, effort
+    def __init__(self, movers: list[Mover], fixed: tuple[Body, ...], follow: float, effort: Effort) -> None:
+        self._movers, self._fixed, self._follow, self._effort = movers, fixed, follow, effort
         self.orders, self.searches, self.spent = 0, 0, 0
         self._limit = effort.expansions
 
@@ -150,23 +152,24 @@ class _Search:
     ) -> tuple[list[Way | None], int | None]:
         """Ways of the robots, planned for in this order, and the first that has none."""
         ways: list[Way | None] = [None] * len(self._movers)
-        taken = [*self._fixed, *(at_rest(self._movers[i].errand.start) for i in staying)]
+        taken = [*self._fixed, *(_resting(self._movers[i].errand) for i in staying)]
         for k, i in enumerate(order):
             brief = [self._leaving(j) for j in order[k + 1 :]] if considerate else []
             budget = self._limit - self.spent
-            way, spent = find(self._roadmap, self._space, self._movers[i], taken, self._follow, budget, brief)
+            way, spent = find(self._movers[i], taken, self._follow, budget, brief)
             self.searches += 1
             self.spent += spent
             if way is None:
                 return ways, i
             ways[i] = way
-            taken.append(way.motion)
+            taken.append(Body(way.motion, self._movers[i].errand.body))
         return ways, None
 
-    def _leaving(self, robot: int) -> Brief:
-        """The place of a robot, and until when it may need it."""
+    def _leaving(self, robot: int) -> Body:
+        """A robot at its place, until when it may need it."""
         mover = self._movers[robot]
-        return at_rest(mover.errand.start), LEAVING * (self._space.apart + self._space.spacing) / mover.speed
+        until = LEAVING * (mover.space.apart + mover.space.spacing) / mover.speed
+        return _resting(mover.errand)._replace(until=until)
 
     def partly(self) -> list[Way | None]:
         """Ways of as many robots as find one while the others stay, dropped one by one."""

@@ -253,11 +253,11 @@ def search(
 
 
 @njit(cache=True)
-def straight_is_free(motion: Array, i: int, j: int, discs: Array, others: Array, begins: Indices, apart: float) -> bool:
+def straight_is_free(motion: Array, i: int, j: int, discs: Array, others: Array, begins: Indices, apart: Array) -> bool:
     """Whether a timed motion may go straight from row i to row j.
 
     Nothing may come nearer than it has to be, or than it is at one of the two rows: discs (m, 3) of centre and radius,
-    and other timed motions, stacked, with `begins` their first rows and the number of all, to the distance `apart`.
+    and other timed motions, stacked, with `begins` their first rows and the number of all, to the distances `apart`.
     """
     t, x, y = motion[i, 0], motion[i, 1], motion[i, 2]
     until, u, v = motion[j, 0], motion[j, 1], motion[j, 2]
@@ -273,14 +273,14 @@ def straight_is_free(motion: Array, i: int, j: int, discs: Array, others: Array,
         other = others[begins[k] : begins[k + 1]]
         ax, ay, h = place(other, t, 0)
         bx, by, h = place(other, until, h)
-        least = min(apart, np.hypot(x - ax, y - ay), np.hypot(u - bx, v - by))
+        least = min(apart[k], np.hypot(x - ax, y - ay), np.hypot(u - bx, v - by))
         if closest(straight, other, t, until) < least - 1e-9:
             return False
     return True
 
 
 @njit(cache=True)
-def straightened(motion: Array, upto: int, discs: Array, others: Array, begins: Indices, apart: float) -> Array:
+def straightened(motion: Array, upto: int, discs: Array, others: Array, begins: Indices, apart: Array) -> Array:
     """The same timed motion with every detour between its first `upto` rows left out that is not needed.
 
     From each row kept it goes straight, at constant speed, to the last row that `straight_is_free` allows, found by

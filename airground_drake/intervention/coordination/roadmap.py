@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -38,14 +38,15 @@ ROUNDING_M = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Space:
-    """What robots have to keep away from.
+    """What a robot has to keep away from: one without a body, until it is made for a radius (`of`).
 
     Attributes:
         centres: of the obstacles, (m, 2), m.
         radii: distance to keep from them, (m,), m.
         clearance: wished for beyond that, m; nodes keep it all (where they can), edges half of it.
-        apart: distance that robots have to keep from each other, m.
+        apart: distance that the robot's centre has to keep from the surfaces of others, m.
         spacing: wished for beyond that, m; not 0.
+        above: how far the obstacles are from the robot's plane, (m,), m; `radii` are those of balls then.
     """
 
     centres: Array
@@ -53,16 +54,24 @@ class Space:
     clearance: float
     apart: float
     spacing: float
+    above: Array | float = 0.0
 
-    def wide(self, longest: float) -> float:
-        """Distance of robots from both ends of an edge, m, that keeps them as far from the edge as is wished.
+    def of(self, body: float) -> Space:
+        """The same in the plane, for the centre of a robot of such a radius, m."""
+        squared = np.square(self.radii + body) - np.square(self.above)
+        near = squared > 0.0
+        return Space(self.centres[near], np.sqrt(squared[near]), self.clearance, self.apart + body, self.spacing)
+
+    def wide(self, longest: float, body: float = 0.0) -> float:
+        """Distance of a robot from both ends of an edge, m, that keeps it as far from the edge as is wished.
 
         The squared distance to a point of an edge of length L is a mean of those to the ends less s (1 - s) L^2.
 
         Args:
             longest: edge, m.
+            body: radius of that robot, m.
         """
-        return math.sqrt((self.apart + self.spacing) ** 2 + longest**2 / 4.0)
+        return math.sqrt((self.apart + body + self.spacing) ** 2 + longest**2 / 4.0)
 
     @property
     def discs(self) -> Array:
@@ -144,6 +153,15 @@ class Roadmap:
         found: Array = dijkstra(graph, indices=targets, min_only=True)
         return found
 
+    def within(self, space: Space, own: Woven) -> Roadmap:
+        """The same with the edges alone that a larger robot can use: one that has to keep away from more."""
+        tails = np.repeat(np.arange(len(self.nodes)), np.diff(self.first_edge))
+        free = space.points_are_free(self.nodes, CHORDS * space.clearance)
+        free[np.append(own.preset[own.usable], own.start)] = True
+        kept = free[tails] & free[self.heads] & space.segments_are_free(self.nodes[tails], self.nodes[self.heads])
+        first = np.append(0, np.cumsum(kept))[self.first_edge].astype(np.int64)
+        return replace(self, first_edge=first, heads=self.heads[kept], lengths=self.lengths[kept])
+
 
 @dataclass(frozen=True, eq=False)
 class Errand:
@@ -152,22 +170,26 @@ class Errand:
     Attributes:
         start: (2,), m.
         preset: rest of its preset, a timed motion (M, 3) from t = 0 on, which ends at its target.
+        body: its radius, m.
     """
 
     start: Array
     preset: Array
+    body: float = 0.0
 
 
-def weave(space: Space, errands: Sequence[Errand], others: Sequence[Array] = ()) -> Roadmap:
-    """The roadmap of some robots.
+def weave(spaces: Sequence[Space], errands: Sequence[Errand], others: Sequence[Array] = ()) -> Roadmap:
+    """The roadmap of some robots. Its lattice and edges are those of the smallest: see `Roadmap.within`.
 
     Args:
-        space: what they have to keep away from.
+        spaces: what each has to keep away from.
         errands: where they are and where they are to go.
         others: places of robots that are to be gone round, (2,) each, m: they only widen the area.
     """
+    by_size = sorted(spaces, key=lambda each: each.apart)
+    space = by_size[0]
     pitch = PITCH * space.apart
-    low, high = _area(space, errands, others)
+    low, high = _area(by_size[-1], errands, others)
     extent = high - low
     pitch = max(pitch, math.sqrt(float(np.prod(extent)) / MOST_NODES))
     columns, rows = (math.ceil(length / pitch) + 1 for length in extent)
@@ -179,20 +201,20 @@ def weave(space: Space, errands: Sequence[Errand], others: Sequence[Array] = ())
     reach = REACH * pitch
     far = FAR * math.sqrt(space.wide(reach) ** 2 - space.apart**2)
     count, woven = int(free.sum()), []
-    for errand in errands:
+    for own, errand in zip(spaces, errands, strict=True):
         preset, times = _preset_nodes(errand.preset, pitch)
-        path = np.concatenate([_path_nodes(space, errand.start, preset[-1], pitch), _fan(space, errand.start, far)])
+        path = np.concatenate([_path_nodes(own, errand.start, preset[-1], pitch), _fan(own, errand.start, far)])
         nodes += [errand.start[None], preset, path]
         along = np.arange(count + 1, count + 1 + len(preset))
-        woven.append(Woven(count, int(along[-1]), along, times, space.points_are_free(preset, 0.0)))
+        woven.append(Woven(count, int(along[-1]), along, times, own.points_are_free(preset, 0.0)))
         count += 1 + len(preset) + len(path)
     points = np.concatenate(nodes)
     radii = np.full(len(points) - int(free.sum()), reach)
-    for own in woven:
-        radii[np.array([own.start, own.target]) - int(free.sum())] = max(far, reach)
+    for each in woven:
+        radii[np.array([each.start, each.target]) - int(free.sum())] = max(far, reach)
     pairs = np.concatenate([_lattice_edges(number), _other_edges(points, radii)])
     pairs = pairs[~_is_short_cut(points, pairs, woven)]
-    shut = np.concatenate([own.preset[~own.usable] for own in woven])
+    shut = np.concatenate([each.preset[~each.usable] for each in woven])
     pairs = pairs[~np.isin(pairs, shut).any(axis=1)]
     pairs = pairs[space.segments_are_free(points[pairs[:, 0]], points[pairs[:, 1]])]
     first, heads, lengths = _in_rows(points, pairs)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -18,8 +19,12 @@ ROUNDING_M = 1e-9
 """Robots may be nearer to each other than asked for by this, m."""
 
 
-Brief = tuple[Array, float]
-"""A motion (M, 3) that counts up to a time, s."""
+class Body(NamedTuple):
+    """Another robot: its motion, (M, 3), how long that counts, s, and its radius, m."""
+
+    motion: Array
+    radius: float = 0.0
+    until: float = math.inf
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +50,8 @@ class Mover:
         errand: where it is and where it is to go.
         speed: m/s.
         woven: its nodes.
+        roadmap: what it can use of it.
+        space: what it has to keep away from.
         to_go: lower bound of the time from every node to its preset, (N,), s.
         clear: which pieces of its preset between neighbouring nodes no disc blocks, (K - 1,).
     """
@@ -52,6 +59,8 @@ class Mover:
     errand: Errand
     speed: float
     woven: Woven
+    roadmap: Roadmap
+    space: Space
     to_go: Array
     clear: npt.NDArray[np.bool_]
 
@@ -60,17 +69,12 @@ class Mover:
         """A robot with a speed, m/s, on a roadmap."""
         places = roadmap.nodes[woven.preset]
         clear = woven.usable[:-1] & woven.usable[1:] & space.segments_are_free(places[:-1], places[1:])
-        return cls(errand, speed, woven, roadmap.distances_to(woven.preset[woven.usable]) / speed, clear)
+        to_go = roadmap.distances_to(woven.preset[woven.usable]) / speed
+        return cls(errand, speed, woven, roadmap, space, to_go, clear)
 
 
 def find(
-    roadmap: Roadmap,
-    space: Space,
-    mover: Mover,
-    fixed: Sequence[Array],
-    follow: float,
-    budget: int,
-    brief: Sequence[Brief] = (),
+    mover: Mover, fixed: Sequence[Body], follow: float, budget: int, brief: Sequence[Body] = ()
 ) -> tuple[Way | None, int]:
     """The way on which a robot is back on its preset as early as possible.
 
@@ -82,10 +86,8 @@ def find(
     sqrt(R^2 - d^2), so that the distance grows on them from the first.
 
     Args:
-        roadmap: a graph.
-        space: what is to be kept away from.
         mover: the robot.
-        fixed: motions of the other robots, (M, 3) each.
+        fixed: the other robots.
         follow: how long the preset must be free, s.
         budget: of expanded intervals.
         brief: places that others need for a time.
@@ -93,25 +95,24 @@ def find(
     Returns:
         The way, None if there is none or the budget is spent; and what was spent.
     """
-    own = mover.woven
-    wide = space.wide(roadmap.longest)
+    own, roadmap, space = mover.woven, mover.roadmap, mover.space
     start, target = roadmap.nodes[own.start], roadmap.nodes[own.target]
     nodes, times = [np.zeros(0, np.int64)], [np.zeros((0, 2))]
     ends = np.array([own.start, own.target])
-    for motion, until in [*((motion, math.inf) for motion in fixed), *brief]:
-        first = float(np.hypot(*(start - motion[0, 1:])))
-        last = float(np.hypot(*(target - motion[-1, 1:])))
-        near = np.minimum([first, last], space.apart) - ROUNDING_M
+    for other in [*fixed, *brief]:
+        first = float(np.hypot(*(start - other.motion[0, 1:])))
+        last = float(np.hypot(*(target - other.motion[-1, 1:])))
+        near = np.minimum([first, last], space.apart + other.radius) - ROUNDING_M
         found = kernels.blocked_times(
-            motion, roadmap.nodes, roadmap.cells, roadmap.members, roadmap.corner, roadmap.size, roadmap.shape,
-            wide, ends, near,
+            other.motion, roadmap.nodes, roadmap.cells, roadmap.members, roadmap.corner, roadmap.size, roadmap.shape,
+            space.wide(roadmap.longest, other.radius), ends, near,
         )  # fmt: skip
         nodes.append(found[0])
-        times.append(np.minimum(found[1], until))
+        times.append(np.minimum(found[1], other.until))
     blocked, spans = np.concatenate(nodes), np.concatenate(times)
     order = np.lexsort((spans[:, 0], blocked))
     first_interval, intervals = kernels.safe_intervals(len(roadmap.nodes), blocked[order], spans[order])
-    joins = _joins(roadmap, space, mover, fixed, follow)
+    joins = _joins(mover, fixed, follow)
     route, arrivals, joined, spent = kernels.search(
         roadmap.first_edge, roadmap.heads, roadmap.lengths / mover.speed, first_interval, intervals, own.start,
         joins, mover.to_go, budget,
@@ -121,18 +122,18 @@ def find(
     return _way(roadmap, mover, route, arrivals, joined), int(spent)
 
 
-def _joins(roadmap: Roadmap, space: Space, mover: Mover, fixed: Sequence[Array], follow: float) -> Array:
+def _joins(mover: Mover, fixed: Sequence[Body], follow: float) -> Array:
     """First and last time at which the preset can be joined at each node, (N, 2), s; see `kernels.search`."""
-    own = mover.woven
+    own, roadmap, space = mover.woven, mover.roadmap, mover.space
     times, places = own.preset_times, roadmap.nodes[own.preset]
     clear = mover.clear.copy()
-    for motion in fixed:
-        clear &= _apart(space, timed(times, places), motion)
+    for other in fixed:
+        clear &= _apart(space, timed(times, places), other)
     stays = timed(times[-1:], places[-1:])
-    in_the_end = np.array([np.hypot(*(places[-1] - motion[-1, 1:])) for motion in fixed])
+    in_the_end = np.array([np.hypot(*(places[-1] - other.motion[-1, 1:])) for other in fixed])
     held = all(
-        distance(stays, motion, float(times[-1])) >= min(space.apart + space.spacing, end) - ROUNDING_M
-        for motion, end in zip(fixed, in_the_end.tolist(), strict=True)
+        distance(stays, other.motion, float(times[-1])) >= min(_wished(space, other), end) - ROUNDING_M
+        for other, end in zip(fixed, in_the_end.tolist(), strict=True)
     )
     # when the preset is next blocked, seen from each of its nodes
     blocked = np.append(np.where(clear, np.inf, times[:-1]), np.inf if held else times[-1])
@@ -144,13 +145,18 @@ def _joins(roadmap: Roadmap, space: Space, mover: Mover, fixed: Sequence[Array],
     return joins
 
 
-def _apart(space: Space, preset: Array, motion: Array) -> npt.NDArray[np.bool_]:
-    """Which pieces of a preset (K, 3) another robot's motion leaves free, (K - 1,)."""
-    wished = space.apart + space.spacing
+def _wished(space: Space, other: Body) -> float:
+    """Distance that a robot wishes to keep from another one, m."""
+    return space.apart + other.radius + space.spacing
+
+
+def _apart(space: Space, preset: Array, other: Body) -> npt.NDArray[np.bool_]:
+    """Which pieces of a preset (K, 3) another robot leaves free, (K - 1,)."""
+    wished = _wished(space, other)
     found = np.ones(len(preset) - 1, dtype=bool)
     for k in range(len(found)):
         begin, end = float(preset[k, 0]), float(preset[k + 1, 0])
-        found[k] = distance(preset[k : k + 2], motion, begin, end) >= wished - ROUNDING_M
+        found[k] = distance(preset[k : k + 2], other.motion, begin, end) >= wished - ROUNDING_M
     return found
 
 

@@ -9,12 +9,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from airground_drake.arrays import Array
 from airground_drake.report.figures import canvas, comparison, maps, timelines
 from airground_drake.report.figures.panels import MAX_TABLE_ROWS, Figure, Table, per_run, series
-from airground_drake.report.metrics import closest_obstacle, events_of, place
+from airground_drake.report.metrics import closest_obstacle, events_of, gap_m, radius_m
 from airground_drake.report.reproduction import MEASURES
 from airground_drake.report.scrubber import tracks
 from airground_drake.scenarios.schema import Scenario
@@ -73,11 +71,7 @@ def _select(scenario: Scenario, traces: Mapping[str, Trace]) -> _Selection:
     busy = [name for name in first.ugvs if any(events_of(trace, name, *_HAPPENINGS) for trace in runs.values())]
     ugvs = [*busy, *(name for name in first.ugvs if name not in busy)][:MAX_UGVS]
     gap = {
-        name: min(
-            np.linalg.norm(trace.position(ugv) - place(trace, name), axis=1).min()
-            for trace in runs.values()
-            for ugv in ugvs
-        )
+        name: min(gap_m(trace, ugv, name).min() for trace in runs.values() for ugv in ugvs)
         for name in first.scenario["obstacles"]
     }
     near = sorted(gap, key=gap.__getitem__)[:MAX_OBSTACLES]
@@ -98,10 +92,13 @@ def _trajectories(chosen: _Selection) -> Figure:
         if (at := MEASURES["stall_position"](trace, ugv))
     ]
     reach = first.scenario["safe_distance"]["obstacle_m"]
+    circles = "their safe circles"
+    if _has_bodies(chosen):
+        circles = "dark discs as large as they are (robots: at their starts and ends), with safe circles round them"
     caption = (
         f"{_sentence('; '.join(stalls)) if stalls else 'No UGV shown stands still short of its target. '}"
         "○ start, \N{MULTIPLICATION SIGN} target, ▲ trigger, □ stands still, ✖ collision. Hexagons are obstacles "
-        f"(hollow: not on the UAV's map) in their safe circles of {reach:g} m. The thin dashed line is the UAV's path, "
+        f"(hollow: not on the UAV's map) in {circles} of {reach:g} m. The thin dashed line is the UAV's path, "
         f"projected onto the ground. Equal scales, in m.{_left_out(chosen)}"
     )
     robots = [*chosen.ugvs, first.robots[-1]]
@@ -116,6 +113,12 @@ def _trajectories(chosen: _Selection) -> Figure:
         lambda drawing, trace: tracks(drawing, trace, chosen.ugvs),
     )
     return Figure("trajectories", "Trajectories", caption, panels)
+
+
+def _has_bodies(chosen: _Selection) -> bool:
+    """Whether a robot or an obstacle is more than a point."""
+    first = next(iter(chosen.runs.values()))
+    return any(radius_m(first, name) > 0.0 for name in (*first.robots, *first.scenario["obstacles"]))
 
 
 def _decision(chosen: _Selection) -> Figure:
@@ -147,17 +150,14 @@ def _decision(chosen: _Selection) -> Figure:
 
 def _distances(chosen: _Selection) -> Figure:
     gaps: dict[str, dict[str, Array]] = {
-        run: {
-            f"{ugv} to {name}": np.linalg.norm(trace.position(ugv) - place(trace, name), axis=1)
-            for ugv in chosen.ugvs
-            for name in chosen.obstacles
-        }
+        run: {f"{ugv} to {name}": gap_m(trace, ugv, name) for ugv in chosen.ugvs for name in chosen.obstacles}
         for run, trace in chosen.runs.items()
     }
     top = 1.05 * max(float(gap.max()) for each in gaps.values() for gap in each.values())
     caption = (
         "No line may enter the hatched band below the safe distance d. The circle marks the smallest distance, which "
-        "is exact in continuous time: robots move on straight lines between samples." + _left_out(chosen)
+        "is exact in continuous time: robots move on straight lines between samples."
+        f"{' Distances are of surfaces.' if _has_bodies(chosen) else ''}{_left_out(chosen)}"
     )
 
     def describe(trace: Trace) -> str:

@@ -24,7 +24,7 @@ from airground_drake.report.figures.canvas import (
     size_in,
     thin,
 )
-from airground_drake.report.metrics import events_of
+from airground_drake.report.metrics import events_of, radius_m
 from airground_drake.report.reproduction import MEASURES
 from airground_drake.trace import Trace
 
@@ -43,10 +43,11 @@ class Frame(NamedTuple):
 
 def frame_of(traces: Sequence[Trace], robots: Sequence[str]) -> Frame:
     """What has to be in the picture: robots, targets, obstacles with their safe circles."""
-    points = [trace.position(robot)[:, :2] for trace in traces for robot in robots]
     scenario = traces[0].scenario
+    ways = [(trace.position(robot)[:, :2], radius_m(trace, robot)) for trace in traces for robot in robots]
+    points = [way + side * radius for way, radius in ways for side in ((-1.0, 1.0) if radius else (0.0,))]
     points += [np.array([scenario["ugvs"][robot]["target_m"][:2] for robot in robots if robot in scenario["ugvs"]])]
-    reach = scenario["safe_distance"]["obstacle_m"]
+    reach = np.array([_safe_circle_m(scenario, obstacle) for obstacle in scenario["obstacles"].values()])[:, None]
     centres = np.array([obstacle["position_m"][:2] for obstacle in scenario["obstacles"].values()])
     points += [centres - reach, centres + reach] if len(centres) else []
     every = np.concatenate(points)
@@ -63,6 +64,8 @@ def plane(trace: Trace, ugvs: Sequence[str], frame: Frame) -> Figure:
         appearance = UAV_LOOK if robot == uav else look(position)
         _path(axes, trace.position(robot), appearance, linewidth=1.1 if robot == uav else 1.9)
         start, end = trace.position(robot)[0], trace.position(robot)[-1]
+        for at in (start, end):
+            _body(axes, at, radius_m(trace, robot), appearance.color)
         axes.plot(*start[:2], marker="o", markersize=6, color=appearance.color, markerfacecolor="white", zorder=4)
         target = targets[robot] or end
         if robot != uav:
@@ -110,10 +113,11 @@ def _map(trace: Trace, frame: Frame, width_in: float, above_in: float = 0.1) -> 
     axes.set_ylim(frame.bottom, frame.top)
     axes.set_aspect("equal")
     rule(axes, "x, m", "y, m")
-    reach = float(trace.scenario["safe_distance"]["obstacle_m"])
     for name, obstacle in trace.scenario["obstacles"].items():
         x, y = obstacle["position_m"][:2]
+        reach = _safe_circle_m(trace.scenario, obstacle)
         axes.add_patch(Circle((x, y), reach, facecolor="#f3f3f3", edgecolor=MUTED, linestyle=(0, (2, 2)), zorder=1.0))
+        _body(axes, obstacle["position_m"], obstacle["radius_m"], INK)
         if not (frame.left < x < frame.right and frame.bottom < y < frame.top):
             continue
         known = obstacle["known_to_uav"]
@@ -126,6 +130,17 @@ def _map(trace: Trace, frame: Frame, width_in: float, above_in: float = 0.1) -> 
         text = "(only on the UAV's map)"
         axes.annotate(text, (x, y), (0, -6), textcoords="offset points", ha="center", va="top", fontsize=7.5)
     return figure, axes
+
+
+def _safe_circle_m(scenario: Mapping[str, Any], obstacle: Mapping[str, Any]) -> float:
+    """Radius of the circle round an obstacle that no robot's surface may enter, m."""
+    return float(scenario["safe_distance"]["obstacle_m"] + obstacle["radius_m"])
+
+
+def _body(axes: Axes, at: Sequence[float] | Array, radius: float, color: str) -> None:
+    """A robot or an obstacle as large as it is."""
+    if radius:
+        axes.add_patch(Circle((at[0], at[1]), radius, facecolor=color, edgecolor=color, alpha=0.35, zorder=1.5))
 
 
 def _path(axes: Axes, path: Array, appearance: Look, **options: Any) -> None:

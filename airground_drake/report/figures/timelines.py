@@ -23,7 +23,7 @@ from airground_drake.report.figures.canvas import (
     short,
     time_line,
 )
-from airground_drake.report.metrics import closest_obstacle, events_of, place
+from airground_drake.report.metrics import closest_obstacle, events_of, gap_m
 from airground_drake.trace import Trace
 
 _MARKS = {"trigger": "^", "release": "v", "proposal": "D", "accept": "o", "refuse": "X"}
@@ -56,7 +56,7 @@ def decision(trace: Trace, ugvs: Sequence[str], top: float) -> Figure:
 
 
 def distances(trace: Trace, ugvs: Sequence[str], obstacles: Sequence[str], top: float) -> Figure:
-    """Distances of each UGV to the obstacles, the safe distance d, and the exact minimum."""
+    """Distances of each UGV to the obstacles, of surfaces, the safe distance d, and the exact minimum."""
     d = float(trace.scenario["safe_distance"]["obstacle_m"])
     figure, every = _time_axes(len(ugvs), 0.5 + 1.75 * len(ugvs), trace)
     for axes, ugv in zip(every, ugvs, strict=True):
@@ -64,7 +64,7 @@ def distances(trace: Trace, ugvs: Sequence[str], obstacles: Sequence[str], top: 
         axes.axhspan(0.0, d, **_FORBIDDEN)
         labels = [(d, f"d = {d:g}", INK)]
         for position, name in enumerate(obstacles):
-            gap = np.linalg.norm(trace.position(ugv) - place(trace, name), axis=1)
+            gap = gap_m(trace, ugv, name)
             time_line(axes, trace.t, gap, look(position))
             labels.append((float(gap[-1]), short(name, 12), look(position).color))
         axes.set_ylim(0.0, top)
@@ -144,10 +144,8 @@ def compared_distances(runs: Mapping[str, Trace], robot: str) -> Figure:
 
 
 def nearest_distance(trace: Trace, robot: str) -> Array:
-    """Distance to the nearest obstacle at the rows, (T,), m."""
-    position = trace.position(robot)
-    gaps = [np.linalg.norm(position - place(trace, name), axis=1) for name in trace.scenario["obstacles"]]
-    nearest: Array = np.min(gaps, axis=0)
+    """Distance to the nearest obstacle at the rows, of surfaces, (T,), m."""
+    nearest: Array = np.min([gap_m(trace, robot, name) for name in trace.scenario["obstacles"]], axis=0)
     return nearest
 
 

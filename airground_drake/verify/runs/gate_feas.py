@@ -163,14 +163,17 @@ def compare_situation(trace: Trace, row: Row) -> Iterator[Off]:
 
 def _sensed(trace: Trace, robot: str, t: float, own: Array, after: Array) -> list[tuple[str, Array, float]]:
     """Obstacles and other robots within sensing range: name, places (N, 3) at times `after` t, safe distance, m."""
-    scenario, safe = trace.scenario, trace.scenario["safe_distance"]
+    scenario = trace.scenario
     held = min(int(np.searchsorted(trace.t, t - TIME_TOLERANCE_S)), len(trace.t) - 1)
-    fixed = scenario["obstacles"].items()
-    things = [(name, np.array(o["position_m"]), np.zeros(3), safe["obstacle_m"]) for name, o in fixed]
-    for other in trace.robots:
-        if other != robot:
-            distance = safe["ugv_m"] if other in trace.ugvs else safe["air_ground_m"]
-            things.append((other, interpolate(trace.t, trace.position(other), t), trace.command(other)[held], distance))
+    things = []
+    for pair in pairs_of(trace):
+        if robot in (pair.first, pair.second):
+            other = pair.second if pair.first == robot else pair.first
+            if other in trace.robots:
+                place, velocity = interpolate(trace.t, trace.position(other), t), trace.command(other)[held]
+            else:
+                place, velocity = np.array(scenario["obstacles"][other]["position_m"]), np.zeros(3)
+            things.append((other, place, velocity, pair.safe_m))
     return [
         (name, place + after[:, None] * velocity, float(distance))
         for name, place, velocity, distance in things

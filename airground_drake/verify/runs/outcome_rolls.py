@@ -18,7 +18,7 @@ from airground_drake.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.segments import corner_times, interpolate, travelled
 from airground_drake.verify.runs.control_law import Asked, avoiding, inequalities, intervened, tracking
-from airground_drake.verify.runs.pairs import pairs_of
+from airground_drake.verify.runs.pairs import pairs_of, radii_of
 from airground_drake.verify.runs.proposals import Sent
 
 STILL_M = 0.05
@@ -66,11 +66,11 @@ def foreseen(trace: Trace, given: dict[str, Any], sent: Sequence[Sent]) -> tuple
     ends = min(max(until, arrives), t + longest) + gate["settling_s"]
     after = h * np.arange(np.ceil((ends - t) / h) + 1.0)
     here = interpolate(trace.t, trace.position(robot), t)
-    discs = known_discs(trace, robot, t, on[0])
+    discs, distances = known_discs(trace, robot, t, on[0])
     others = [_other(trace, robot, t, after, pair, sent) for pair in pairs_of(trace) if _between(trace, pair, robot)]
     fixed = np.tile(discs, (len(after), 1, 1))
     points = [np.concatenate([fixed, *(one[0][choice][:, None] for one in others)], axis=1) for choice in (0, 1)]
-    safe = np.array([scenario["safe_distance"]["obstacle_m"]] * len(discs) + [one[1] for one in others])
+    safe = np.array([*distances, *(one[1] for one in others)])
     share = np.array([1.0] * len(discs) + [one[2] for one in others])
     settled = max(until, arrives, t + gate["horizon_s"], *(end for _, _, _, end in others))
     goal = corners[-1]
@@ -105,7 +105,7 @@ def foreseen(trace: Trace, given: dict[str, Any], sent: Sequence[Sent]) -> tuple
     found = []
     for choice in (0, 1):
         k = int(done[choice])
-        found.append(_concluded(way[: k + 1, choice], float(integral[k, choice]), goal, discs, scenario, h))
+        found.append(_concluded(way[: k + 1, choice], float(integral[k, choice]), goal, discs, distances, scenario, h))
     return found[0], found[1]
 
 
@@ -114,21 +114,24 @@ def _between(trace: Trace, pair: Any, robot: str) -> bool:
 
 
 def _concluded(
-    places: Array, integral: float, goal: Array, discs: Array, scenario: dict[str, Any], h: float
+    places: Array, integral: float, goal: Array, discs: Array, distances: Array, scenario: dict[str, Any], h: float
 ) -> Foreseen:
     end = places[-1]
     if np.linalg.norm(end - goal) <= scenario["arrival_tolerance_m"]:
         return Foreseen(places, False, integral, 0.0, 0.0)
     before = places[max(0, len(places) - 1 - max(1, round(1.0 / h)))]
     stalls = bool(np.linalg.norm(end - before) < STILL_M)
-    least, most = bounds_of_way_left(end, goal, discs, scenario["safe_distance"]["obstacle_m"])
+    least, most = bounds_of_way_left(end, goal, discs, distances)
     return Foreseen(places, stalls, integral, least, most)
 
 
-def known_discs(trace: Trace, robot: str, t: float, on: Sent) -> Array:
-    """Obstacles that a UGV has sensed up to a time, and those of the message that it would not sense, (k, 3), m.
+def known_discs(trace: Trace, robot: str, t: float, on: Sent) -> tuple[Array, Array]:
+    """Obstacles that a UGV has sensed up to a time, and those of the message that it would not sense.
 
-    Of the latter no more than the `MOST_CLAIMED` nearest.
+    Of the latter no more than the `MOST_CLAIMED` nearest, and none with a negative radius.
+
+    Returns:
+        Centres, (k, 3), and the distances that the UGV keeps from them, (k,), m.
     """
     sensing, gate_s = trace.scenario["control"]["sensing_range_m"], trace.scenario["gatekeeper"]["period_s"]
     samples = gate_s * np.arange(round(t / gate_s) + 1.0)
@@ -137,11 +140,14 @@ def known_discs(trace: Trace, robot: str, t: float, on: Sent) -> Array:
     obstacles = np.array(places, dtype=np.float64).reshape(-1, 3)
     seen = (np.linalg.norm(was[:, None] - obstacles, axis=2) <= sensing).any(axis=0)
     hidden = np.linalg.norm(on.mapped_m - was[-1], axis=1) > sensing
-    claimed = on.mapped_m[hidden]
-    apart = np.linalg.norm(claimed[:, None] - obstacles[seen], axis=2)
-    new = claimed[(apart > 1e-9).all(axis=1)]
-    order = np.linalg.norm(new - was[-1], axis=1).argsort(kind="stable")
-    return np.concatenate([obstacles[seen], new[order.argsort() < MOST_CLAIMED]])
+    told = np.column_stack([on.mapped_m, on.mapped_radius_m])[hidden & (on.mapped_radius_m >= 0.0)]
+    apart = np.linalg.norm(told[:, None, :3] - obstacles[seen], axis=2)
+    new = told[(apart > 1e-9).all(axis=1)]
+    order = np.linalg.norm(new[:, :3] - was[-1], axis=1).argsort(kind="stable")
+    radius = radii_of(trace)
+    own = np.array([radius[name] for name in trace.scenario["obstacles"]])
+    known = np.concatenate([np.column_stack([obstacles, own])[seen], new[order.argsort() < MOST_CLAIMED]])
+    return known[:, :3], trace.scenario["safe_distance"]["obstacle_m"] + (radius[robot] + known[:, 3])
 
 
 def _other(
@@ -179,12 +185,12 @@ def asked_of(trace: Trace, ugv: str, t: float, sent: Sequence[Sent]) -> tuple[Se
     return next((one for one in sent if (one.ugv, one.issued_s) == (ugv, issued)), None), answer == "accept"
 
 
-def bounds_of_way_left(place: Array, goal: Array, discs: Array, distance: float) -> tuple[float, float]:
+def bounds_of_way_left(place: Array, goal: Array, discs: Array, distances: Array | float) -> tuple[float, float]:
     """Bounds of the length of the shortest way among safe circles, m: straight, and over points around the circles.
 
     The latter is infinite where no way between those points is found.
     """
-    squared = distance**2 - np.square(discs[:, 2] - place[2])
+    squared = np.square(distances) - np.square(discs[:, 2] - place[2])
     centres, radii = discs[squared > 0.0, :2], np.sqrt(squared[squared > 0.0])
     direct = float(np.linalg.norm(goal[:2] - place[:2]))
     if not len(centres):

@@ -14,7 +14,10 @@ from airground_drake.verify.engines.segments import MERGE_S, interpolate
 
 
 class Pair(NamedTuple):
-    """Two things to keep apart: a robot, and an obstacle or robot; `share` is the part that each robot takes."""
+    """Two things to keep apart: a robot, and an obstacle or robot; `share` is the part that each robot takes.
+
+    `safe_m` is the safe distance between centres: that of the kind of pair and both radii.
+    """
 
     first: str
     second: str
@@ -27,12 +30,19 @@ def pairs_of(trace: Trace) -> Iterator[Pair]:
 
     Those of one robot come in the order in which its controller lists them: obstacles, then robots in array order.
     """
-    safe, uav = trace.scenario["safe_distance"], trace.scenario["uav"]["name"]
+    safe, uav, radius = trace.scenario["safe_distance"], trace.scenario["uav"]["name"], radii_of(trace)
     for robot in trace.robots:
         for obstacle in trace.scenario["obstacles"]:
-            yield Pair(robot, obstacle, safe["obstacle_m"], 1.0)
+            yield Pair(robot, obstacle, safe["obstacle_m"] + (radius[robot] + radius[obstacle]), 1.0)
     for robot, other in combinations(trace.robots, 2):
-        yield Pair(robot, other, safe["air_ground_m"] if uav in (robot, other) else safe["ugv_m"], 0.5)
+        kind = "air_ground_m" if uav in (robot, other) else "ugv_m"
+        yield Pair(robot, other, safe[kind] + (radius[robot] + radius[other]), 0.5)
+
+
+def radii_of(trace: Trace) -> dict[str, float]:
+    """Radius of each robot and obstacle, m."""
+    robots = {**trace.scenario["ugvs"], trace.scenario["uav"]["name"]: trace.scenario["uav"]}
+    return {name: float(body["radius_m"]) for name, body in {**robots, **trace.scenario["obstacles"]}.items()}
 
 
 def speed_limits(trace: Trace) -> dict[str, float]:

@@ -28,6 +28,7 @@ class Sent:
         positions_m: where they are, (M, 3).
         chosen: J_int^+ J_int, (3, 3).
         mapped_m: obstacles that the UAV says it knows, (k, 3).
+        mapped_radius_m: their radii, (k,).
         cause: UGV whose trigger it is for: this one, or another one that it is to make way for.
     """
 
@@ -38,6 +39,7 @@ class Sent:
     positions_m: Array
     chosen: Array
     mapped_m: Array
+    mapped_radius_m: Array
     cause: str
 
     def place(self, t: float | Array) -> Array:
@@ -65,15 +67,16 @@ def proposals_of(trace: Trace) -> list[Sent]:
     """
     found = []
     for row in trace.proposals.to_dict("records"):
-        times, places, selection, mapped = (
+        times, places, selection, mapped, radii = (
             np.asarray(row[name], dtype=np.float64).ravel()
-            for name in ("times_s", "positions_m", "selection", "mapped_m")
+            for name in ("times_s", "positions_m", "selection", "mapped_m", "mapped_radius_m")
         )
         label = f"proposal to {row['robot']} at t = {row['issued_s']} s"
-        numbers = np.concatenate([times, places, selection, mapped, [row["issued_s"]]])
+        numbers = np.concatenate([times, places, selection, mapped, radii, [row["issued_s"]]])
         if not np.isfinite(numbers).all() or not len(times) or not (np.diff(times) > 0.0).all():
             raise TraceError(f"{label}: numbers that are not finite, or times that do not increase")
-        shaped = len(places) == 3 * len(times) and len(selection) and not len(selection) % 3 and not len(mapped) % 3
+        shaped = len(places) == 3 * len(times) and len(selection) and not len(selection) % 3
+        shaped = shaped and len(mapped) == 3 * len(radii)
         if not shaped or row["robot"] not in trace.ugvs:
             raise TraceError(f"{label}: no motion of a UGV of the trace")
         if row["cause"] not in trace.ugvs or not _is_cause(trace, row["robot"], row["cause"], row["issued_s"]):
@@ -81,7 +84,7 @@ def proposals_of(trace: Trace) -> list[Sent]:
         found.append(
             Sent(
                 str(row["robot"]), str(row["policy"]), float(row["issued_s"]), times, places.reshape(-1, 3),
-                selected(selection), mapped.reshape(-1, 3), str(row["cause"]),
+                selected(selection), mapped.reshape(-1, 3), radii, str(row["cause"]),
             )
         )  # fmt: skip
     recorded = sorted((s.ugv, s.issued_s, s.policy) for s in found)

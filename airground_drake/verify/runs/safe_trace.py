@@ -25,7 +25,8 @@ class SafeTrace(TraceClaim):
     equations = "(7)-(8), (11)"
     assumptions = (
         "Between two rows every robot moves on a straight line at constant speed (integrator plant, zero-order hold).",
-        "Robots and obstacles are points; their extent must be contained in the safe distances.",
+        "Robots and obstacles are balls of the scenario's radii (`radius_m`; by default points): d_ij is the safe "
+        "distance of the kind of pair and both radii, and distances are of centres.",
         "Obstacles stand still for the whole run, as the scenario lists them.",
     )
     does_not_establish = (

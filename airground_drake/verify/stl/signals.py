@@ -43,14 +43,17 @@ class Signals(NamedTuple):
 
 def _pairs(trace: Trace) -> Iterator[tuple[str, str, Array, float, float]]:
     """Robot, other, offset (T, 3) from the other to the robot, safe distance, share of the robot; each pair once."""
-    safe, ugvs = trace.scenario["safe_distance"], set(trace.ugvs)
+    scenario, safe, ugvs = trace.scenario, trace.scenario["safe_distance"], set(trace.ugvs)
     place = {robot: trace.position(robot) for robot in trace.robots}
+    size = {name: body["radius_m"] for name, body in scenario["ugvs"].items()}
+    size[scenario["uav"]["name"]] = scenario["uav"]["radius_m"]
     for robot in place:
-        for name, obstacle in trace.scenario["obstacles"].items():
-            yield robot, name, place[robot] - obstacle["position_m"], safe["obstacle_m"], 1.0
+        for name, obstacle in scenario["obstacles"].items():
+            apart = safe["obstacle_m"] + (size[robot] + obstacle["radius_m"])
+            yield robot, name, place[robot] - obstacle["position_m"], apart, 1.0
     for robot, other in combinations(place, 2):
-        both_on_the_ground = {robot, other} <= ugvs
-        yield robot, other, place[robot] - place[other], safe["ugv_m" if both_on_the_ground else "air_ground_m"], 0.5
+        kind = "ugv_m" if {robot, other} <= ugvs else "air_ground_m"
+        yield robot, other, place[robot] - place[other], safe[kind] + (size[robot] + size[other]), 0.5
 
 
 def clearance(trace: Trace) -> Signals:

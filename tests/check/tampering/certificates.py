@@ -274,6 +274,12 @@ def obstacle_left_out_of_a_proof(folder: Path) -> None:
         del claim["inputs"]["team"]["obstacles"][0]
 
 
+@refused_by("SAFE-INV", "inputs", run="")
+def obstacle_made_larger_in_a_proof(folder: Path) -> None:
+    with edited_claim(folder, "SAFE-INV", "") as claim:
+        claim["inputs"]["team"]["obstacle_radius"][0] = 0.5
+
+
 @refused_by("SAFE-DIST", "inputs", run="")
 def disturbance_lowered(folder: Path) -> None:
     with edited_claim(folder, "SAFE-DIST", "") as claim:

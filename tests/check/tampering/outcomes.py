@@ -51,6 +51,21 @@ def map_in_a_message_exchanged(folder: Path) -> None:
     with edited_table(folder, "proposals") as frame:
         walls = [3.3, 9.5, 0.0, 5.0, 9.0, 0.0, 6.5, 7.5, 0.0]
         frame["mapped_m"] = [np.array(walls) for _ in range(len(frame))]
+        frame["mapped_radius_m"] = [np.zeros(3) for _ in range(len(frame))]
+
+
+@refused_by("GATE-MODEL", "accept: ")
+def large_obstacle_added_to_a_message(folder: Path) -> None:
+    """Where a point would be out of the way."""
+    with edited_table(folder, "proposals") as frame:
+        frame["mapped_m"] = [np.append(points, [9.5, 9.0, 0.0]) for points in frame["mapped_m"]]
+        frame["mapped_radius_m"] = [np.append(radii, 5.0) for radii in frame["mapped_radius_m"]]
+
+
+@refused_by("GATE-MODEL", "a proposal is a motion")
+def radius_left_out_of_a_message(folder: Path) -> None:
+    with edited_table(folder, "proposals") as frame:
+        frame["mapped_radius_m"] = [radii[:-1] for radii in frame["mapped_radius_m"]]
 
 
 @refused_by("LIVE-PROG", "answer and its reason")

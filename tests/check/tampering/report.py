@@ -304,6 +304,26 @@ def safe_distance_changed_everywhere(folder: Path) -> None:
             scenario["safe_distance"]["obstacle_m"] = 1.5
 
 
+@refused_by("trace", "scenario of the trace")
+def obstacle_made_larger_in_the_report(folder: Path) -> None:
+    with edited_report(folder) as report:
+        report["scenario"]["resolved"]["obstacles"]["obstacle_1"]["radius_m"] = 0.3
+
+
+@refused_by("SAFE-TRACE", "margin of a pair")
+def obstacle_made_larger_everywhere(folder: Path) -> None:
+    with edited_scenarios(folder) as scenarios:
+        for scenario in scenarios:
+            scenario["obstacles"]["obstacle_1"]["radius_m"] = 0.01
+
+
+@refused_by("metrics", "safe distance")
+def robot_made_larger_everywhere(folder: Path) -> None:
+    with edited_scenarios(folder) as scenarios:
+        for scenario in scenarios:
+            scenario["ugvs"]["ugv1"]["radius_m"] = 0.01
+
+
 @refused_by("SAFE-INV", "inputs", run="")
 def gain_changed_everywhere(folder: Path) -> None:
     with edited_scenarios(folder) as scenarios:

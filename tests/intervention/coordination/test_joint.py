@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -14,6 +15,7 @@ from properties import examples
 
 from airground_drake.intervention.coordination.joint import Effort, Plan, plan
 from airground_drake.intervention.coordination.roadmap import Errand, Space
+from airground_drake.intervention.coordination.single import Body
 
 CORRIDOR = [(x, y) for x in np.arange(-6.0, 6.1, 1.5) for y in (-2.3, 2.3)]
 
@@ -33,7 +35,8 @@ def distances(one: Array, other: Array) -> Array:
     return np.sqrt(np.append(inner, np.square(offset[-1]).sum()))
 
 
-def assert_keeps_distances(room: Space, errands: list[Errand], found: Plan, speed: float, fixed: list[Array]) -> None:
+def assert_keeps_distances(room: Space, errands: list[Errand], found: Plan, speed: float, fixed: list[Body]) -> None:
+    """From obstacles and from each other, radii included; less only where they begin or, of robots, end nearer."""
     ways = motions(found, errands)
     for way, one in zip(ways, errands, strict=True):
         assert way[0].tolist() == [0.0, *one.start]
@@ -41,18 +44,28 @@ def assert_keeps_distances(room: Space, errands: list[Errand], found: Plan, spee
         legs = np.diff(way, axis=0)
         assert (np.hypot(legs[:, 1], legs[:, 2]) <= speed * legs[:, 0] * (1.0 + 1e-9) + 1e-9).all()
         for centre, radius in zip(room.centres, room.radii, strict=True):
-            least = min(radius, float(np.hypot(*(one.start - centre))))
+            least = min(radius + one.body, float(np.hypot(*(one.start - centre))))
             assert distances(way, np.array([[0.0, *centre]])).min() >= least - 2e-9
-    for one, other in [*combinations(ways, 2), *((way, motion) for way in ways for motion in fixed)]:
-        least = min(room.apart, float(np.hypot(*(one[0, 1:] - other[0, 1:]))))
-        assert distances(one, other).min() >= least - 2e-9
+    bodies = [Body(way, one.body) for way, one in zip(ways, errands, strict=True)]
+    moved = [body for body, way in zip(bodies, found.ways, strict=True) if way is not None]  # others may be run into
+    for one, other in [*combinations(bodies, 2), *((body, each) for body in moved for each in fixed)]:
+        ends = [float(np.hypot(*(one.motion[k, 1:] - other.motion[k, 1:]))) for k in (0, -1)]
+        least = min(room.apart + one.radius + other.radius, *ends)
+        assert distances(one.motion, other.motion).min() >= least - 2e-9
 
 
-@given(seed=st.integers(0, 10**6), count=st.integers(1, 5), obstacles=st.integers(0, 6), extent=st.floats(9.0, 20.0))
-@examples(15, fuzz=1000)
-def test_every_distance_is_kept_at_all_times(seed: int, count: int, obstacles: int, extent: float) -> None:
+@given(
+    seed=st.integers(0, 10**6), count=st.integers(1, 5), obstacles=st.integers(0, 6), extent=st.floats(9.0, 20.0),
+    bodies=st.sampled_from([(0.0,), (0.0, 0.7), (0.3, 0.1, 1.0)]),
+)  # fmt: skip
+@examples(20, fuzz=1000)
+def test_every_distance_is_kept_at_all_times(
+    seed: int, count: int, obstacles: int, extent: float, bodies: tuple[float, ...]
+) -> None:
     room, errands = random_team(seed, min(count, 1 + int(extent / 4.0)), min(obstacles, int(extent / 3.0)), extent)
-    fixed = [np.array([[0.0, -30.0, extent / 2.0], [30.0, 2.0 * extent, extent / 2.0]])]
+    errands = [replace(one, body=bodies[k % len(bodies)]) for k, one in enumerate(errands)]
+    room = replace(room, radii=room.radii + np.arange(len(room.radii)) % 2 * bodies[-1])
+    fixed = [Body(np.array([[0.0, -30.0, extent / 2.0], [30.0, 2.0 * extent, extent / 2.0]]), bodies[-1])]
     found = plan(room, errands, [1.0] * len(errands), fixed, effort=Effort(orders=6))
     assert_keeps_distances(room, errands, found, 1.0, fixed)
     for way, one in zip(found.ways, errands, strict=True):
@@ -126,3 +139,21 @@ def test_an_effort_bounds_what_is_spent() -> None:
     assert found.orders <= 1
     assert found.expansions <= 50
     assert_keeps_distances(room, errands, found, 1.0, [])
+
+
+def test_a_small_robot_goes_where_a_large_one_cannot() -> None:
+    """A wall with a gap of 4.6 m between centres, and nothing else to get through by."""
+    wall = [(0.0, y) for y in (2.3, 4.0, 5.7, -2.3, -4.0, -5.7)]
+    errands = [errand((-4.0, 0.0), (4.0, 0.0)), replace(errand((-4.0, 4.0), (4.0, 4.0)), body=0.5)]
+    found = plan(space(wall), errands, [1.0, 1.0])
+    assert found.complete
+    assert_keeps_distances(space(wall), errands, found, 1.0, [])
+    small, large = motions(found, errands)
+    assert np.abs(small[:, 2]).max() < 1.0
+    assert np.abs(large[:, 2]).max() > 8.0
+
+
+def test_a_ball_above_the_ground_is_as_wide_as_it_is_there() -> None:
+    room = replace(space([(0.0, 0.0)]), above=np.array([2.1]))
+    assert len(room.of(0.0).radii) == 0
+    assert room.of(0.5).radii == pytest.approx(np.sqrt(2.5**2 - 2.1**2))

@@ -60,8 +60,8 @@ def test_of_a_map_without_end_the_nearest_obstacles_count() -> None:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(outcome_rolls, "MOST_CLAIMED", 0)
         sent = proposals_of(trace)[0]
-        assert len(outcome_rolls.known_discs(trace, "ugv1", sent.issued_s, sent)) <= len(scenario.obstacles)
-    assert len(outcome_rolls.known_discs(trace, "ugv1", sent.issued_s, sent)) >= 64
+        assert len(outcome_rolls.known_discs(trace, "ugv1", sent.issued_s, sent)[0]) <= len(scenario.obstacles)
+    assert len(outcome_rolls.known_discs(trace, "ugv1", sent.issued_s, sent)[0]) >= 64
 
 
 # ------------------------------------------------------------------------------------- mutants of the running code

@@ -82,6 +82,7 @@ def test_a_map_that_was_not_sent_is_noticed(decided: Trace) -> None:
     proposals = decided.proposals.copy()
     walls = [[3.3, 9.5, 0.0], [5.0, 9.0, 0.0], [6.5, 7.5, 0.0]]
     proposals["mapped_m"] = [np.ravel(walls).tolist() for _ in range(len(proposals))]
+    proposals["mapped_radius_m"] = [[0.0] * len(walls) for _ in range(len(proposals))]
     assert CLAIMS["GATE-MODEL"].judge(replace(decided, proposals=proposals)).status == "refuted"
 
 

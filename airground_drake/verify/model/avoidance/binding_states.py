@@ -113,14 +113,13 @@ def beside(inputs: Inputs, views: Views, pairs: Sequence[tuple[int, int]], how: 
     for i, j in pairs:
         if j < 0:
             centre = views.obstacles[-1 - j]
-            reach = _distance(inputs, how, views.obstacle_distance, 1.0, views.max_speed[i], rng)
+            reach = _distance(inputs, how, views.apart(i, j), 1.0, views.max_speed[i], rng)
             positions[i] = _clear_of_others(views, centre, reach, i == uav, rng)
             drawn_to[i] = centre
         else:
             i, j = min(i, j), max(i, j)
-            safe = views.air_ground_distance if j == uav else views.ugv_distance
             speed = min(views.max_speed[i], views.max_speed[j])
-            reach = _distance(inputs, how, safe, 0.5, speed, rng)
+            reach = _distance(inputs, how, views.apart(i, j), 0.5, speed, rng)
             steep = 0.5 * np.pi if rng.random() < 0.1 else rng.uniform(0.0, 1.2)
             positions[j] = positions[i] + reach * _direction(rng.uniform(0.0, 2.0 * np.pi), steep if j == uav else 0.0)
             drawn_to[i], drawn_to[j] = positions[j], positions[i]
@@ -142,7 +141,7 @@ def _clear_of_others(views: Views, centre: Array, reach: float, flies: bool, rng
             place = centre + across * _direction(rng.uniform(0.0, 2.0 * np.pi), 0.0)
             found.append(np.array([place[0], place[1], 0.0]))
     places = np.array(found)
-    between = np.linalg.norm(places[:, None] - views.obstacles, axis=-1)
+    between = np.linalg.norm(places[:, None] - views.obstacles, axis=-1) - views.obstacle_radius
     between[:, np.linalg.norm(views.obstacles - centre, axis=-1) == 0.0] = np.inf
     return places[int(np.argmax(between.min(axis=1)))]
 

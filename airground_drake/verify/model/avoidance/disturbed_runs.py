@@ -13,7 +13,7 @@ from airground_drake.arrays import Array
 from airground_drake.nsbc.avoidance import HalfSpaces, Surroundings, limit_speed
 from airground_drake.verify.engines.rounding import SEED, nearest, rates, unit
 from airground_drake.verify.model.avoidance.constants import Inputs, running_avoidance
-from airground_drake.verify.model.avoidance.scenario_pairs import WHOLE, Views
+from airground_drake.verify.model.avoidance.scenario_pairs import WHOLE, Views, as_points
 
 TOLERANCE = 1e-9
 """For distances, m, and inequalities, m/s, of the disturbed runs: thousands of rounded steps err by 1e-12."""
@@ -33,15 +33,15 @@ class SafeStart:
 
 
 def scenes(inputs: Inputs) -> list[SafeStart]:
-    """Safe starts, from one obstacle to a field of them.
+    """Safe starts, from one obstacle to a field of them, of points that keep the least distance of each kind of pair.
 
     In `squeezed` a UGV has no room between another and an obstacle: there the inequalities contradict each other.
     """
-    team, far = Views.of(inputs["team"], ugvs=2), np.array([0.0, 0.0, 1e3])
+    team, far = Views.of(as_points(inputs["team"]), ugvs=2), np.array([0.0, 0.0, 1e3])
     d = team.obstacle_distance
     dd = team.ugv_distance
     low = team.air_ground_distance
-    first = replace(team, ugvs=team.ugvs[:1], max_speed=team.max_speed[[0, -1]])
+    first = replace(team, ugvs=team.ugvs[:1], max_speed=team.max_speed[[0, -1]], radius=np.zeros(2))
     turn = np.deg2rad([90.0, 210.0, 330.0])
     triangle = d * np.column_stack([np.cos(turn), np.sin(turn), np.zeros(3)])
     rng = np.random.default_rng(SEED)
@@ -50,7 +50,7 @@ def scenes(inputs: Inputs) -> list[SafeStart]:
 
     def alone(name: str, obstacles: list[list[float]] | Array, ugv: list[float], uav: Array = far) -> SafeStart:
         around = np.array(obstacles, dtype=np.float64).reshape(-1, 3)
-        return SafeStart(name, replace(first, obstacles=around), np.array([ugv, uav]))
+        return SafeStart(name, _among(first, around), np.array([ugv, uav]))
 
     found = [
         alone("obstacle", [[0.0, 0.0, 0.0]], [1.01 * d, 0.0, 0.0]),
@@ -61,10 +61,15 @@ def scenes(inputs: Inputs) -> list[SafeStart]:
     ]
     if len(team.ugvs) == 2:
         two = np.array([[0.0, 0.0, 0.0], [1.1 * dd, 0.0, 0.0], far])
-        found.append(SafeStart("ugv_pair", replace(team, obstacles=np.zeros((0, 3))), two))
+        found.append(SafeStart("ugv_pair", team, two))
         between = np.array([[d, 0.0, 0.0], [d + dd, 0.0, 0.0], far])
-        found.append(SafeStart("squeezed", replace(team, obstacles=np.zeros((1, 3))), between))
+        found.append(SafeStart("squeezed", _among(team, np.zeros((1, 3))), between))
     return [*found, alone("field", field, [0.0, 0.0, 0.0], np.array([0.0, 0.0, max(d, low)]))]
+
+
+def _among(team: Views, points: Array) -> Views:
+    """A team among obstacles (m, 3), m, without a radius."""
+    return replace(team, obstacles=points, obstacle_radius=np.zeros(len(points)))
 
 
 def attack(

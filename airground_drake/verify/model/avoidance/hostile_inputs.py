@@ -130,7 +130,7 @@ def hostile_team(inputs: Inputs, count: int, composition: Composition, on_top: b
     rng = np.random.default_rng(SEED)
     team = Views.of(inputs["team"], ugvs=3)
     if not len(team.obstacles):
-        team = replace(team, obstacles=np.zeros((1, 3)))
+        team = replace(team, obstacles=np.zeros((1, 3)), obstacle_radius=np.zeros(1))
     n, avoidance = len(team.ugvs), running_avoidance(inputs, composition)
     mobility = team.mobility[:n]
     law = UgvLaw(avoidance, inputs["motion_gain_1_s"], inputs["intervention_gain_1_s"], on_top)
@@ -242,22 +242,22 @@ def _around(team: Views, positions: Array, rows: slice) -> Surroundings:
 
 def _safe_team(team: Views, rng: np.random.Generator) -> Array:
     """A random safe state of a team, (n + 1, 3), m: UGVs close to obstacles, the UAV above one of them."""
-    n = len(team.ugvs)
+    n, m = len(team.ugvs), len(team.obstacles)
     spread = 3.0
     placed: list[Array] = []
     while len(placed) <= n:
         i, spread = len(placed), spread * 1.001  # so that there will be room
         if i < n:
-            centre = team.obstacles[rng.integers(len(team.obstacles))]
-            reach = team.obstacle_distance * (1.0 + rng.choice([1e-9, 0.1, spread]) * rng.random())
+            k = int(rng.integers(m))
+            centre = team.obstacles[k]
+            reach = team.apart(i, -1 - k) * (1.0 + rng.choice([1e-9, 0.1, spread]) * rng.random())
             angle = rng.uniform(0.0, 2.0 * np.pi)
             trial = np.array([centre[0] + reach * np.cos(angle), centre[1] + reach * np.sin(angle), 0.0])
         else:
-            trial = placed[0] + np.array([*rng.uniform(-1.0, 1.0, 2), team.air_ground_distance + rng.random()])
+            trial = placed[0] + np.array([*rng.uniform(-1.0, 1.0, 2), team.apart(n, 0) + rng.random()])
             trial[2] += rng.choice([0.0, spread / 3.0]) * team.obstacle_distance
-        clear = [np.linalg.norm(trial - o) >= team.obstacle_distance for o in team.obstacles]
-        apart = team.ugv_distance if i < n else team.air_ground_distance
-        clear += [np.linalg.norm(trial - other) >= apart for other in placed]
+        clear = [np.linalg.norm(trial - o) >= team.apart(i, -1 - k) for k, o in enumerate(team.obstacles)]
+        clear += [np.linalg.norm(trial - other) >= team.apart(i, j) for j, other in enumerate(placed)]
         if all(clear):
             placed.append(trial)
         elif i == n and rng.random() < 0.05:

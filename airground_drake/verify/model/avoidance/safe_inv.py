@@ -63,7 +63,8 @@ class SafeInv(ModelClaim):
     equations = "(7)-(8), (11) in the inequality form of the package (set-based avoidance)"
     assumptions = (
         "SAFE-LEMMA; integrator plant with zero-order hold, both robots of a pair sampled at the same instants.",
-        "Obstacles stand still; robots are points and obey their speed limits (what is out of range counts on that).",
+        "Obstacles stand still; robots obey their speed limits (what is out of range counts on that). Distances are of "
+        "centres; what is not a point is a ball, and both radii are part of d.",
         "A UGV's velocity has no z component.",
         "Rounding: binary64, a period cut into at most 64 integration steps, coordinates <= start + speed * duration.",
     )

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import combinations, product
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,10 @@ WHOLE, HALF = 1.0, 0.5
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of pair: safe distance m, largest closing speed m/s, share of the inequality that each robot takes."""
+    """A kind of pair: safe distance m, largest closing speed m/s, share of the inequality that each robot takes.
+
+    Distances are those of centres, radii included.
+    """
 
     name: str
     safe: float
@@ -33,7 +37,7 @@ class Kind:
 
 
 def team_of(scenario: Scenario) -> Inputs:
-    """Names, obstacles m, safe distances m and speed limits m/s of a scenario, strict JSON."""
+    """Names, obstacles m, safe distances m, speed limits m/s and radii m of a scenario, strict JSON."""
     safe, uav = scenario.safe_distance, scenario.uav
     return {
         "ugvs": list(scenario.ugvs),
@@ -43,19 +47,50 @@ def team_of(scenario: Scenario) -> Inputs:
         "ugv_distance": safe.ugv_m,
         "air_ground_distance": safe.air_ground_m,
         "max_speed": [*(ugv.max_speed_m_s for ugv in scenario.ugvs.values()), uav.max_speed_m_s],
+        "radius": [*(ugv.radius_m for ugv in scenario.ugvs.values()), uav.radius_m],
+        "obstacle_radius": [obstacle.radius_m for obstacle in scenario.obstacles.values()],
     }
 
 
 def kinds_of(team: Inputs) -> list[Kind]:
-    """The kinds of pairs in a team (`team_of`), each with its fastest members."""
-    *ugvs, uav = team["max_speed"]
-    ugvs = sorted(ugvs, reverse=True)
-    found = [Kind("uav_ugv", team["air_ground_distance"], uav + ugvs[0], HALF)]
-    if team["obstacles"]:
-        found.insert(0, Kind("obstacle", team["obstacle_distance"], max(uav, ugvs[0]), WHOLE))
-    if len(ugvs) > 1:
-        found.append(Kind("ugv_ugv", team["ugv_distance"], ugvs[0] + ugvs[1], HALF))
+    """The kinds of pairs in a team (`team_of`).
+
+    With radii there are many distances of a kind. What matters are pairs than which no other one is as far apart and as
+    fast, from the farthest on, and the nearest; they are numbered if that makes several.
+    """
+    found = []
+    for name, values in _distances_and_speeds(team).items():
+        kept: list[tuple[float, float]] = []
+        for safe, closing in sorted(values, reverse=True):
+            if not kept or closing > kept[-1][1]:
+                kept.append((safe, closing))
+        nearest = min(values, key=lambda each: (each[0], -each[1]))
+        kept += [nearest] if nearest not in kept else []
+        numbered = [f"{name}_{k}" for k in range(1, len(kept) + 1)] if len(kept) > 1 else [name]
+        share = WHOLE if name == "obstacle" else HALF
+        found += [Kind(each, *pair, share) for each, pair in zip(numbered, kept, strict=True)]
     return found
+
+
+def as_points(team: Inputs) -> Inputs:
+    """The team without bodies or obstacles, as far apart as the nearest pairs of each kind are."""
+    least = {name: min(values)[0] for name, values in _distances_and_speeds(team).items()}
+    keys = {"obstacle": "obstacle_distance", "uav_ugv": "air_ground_distance", "ugv_ugv": "ugv_distance"}
+    bare = {"obstacles": [], "obstacle_radius": [], "radius": [0.0] * len(team["radius"])}
+    return team | bare | {keys[name]: safe for name, safe in least.items()}
+
+
+def _distances_and_speeds(team: Inputs) -> dict[str, set[tuple[float, float]]]:
+    """Of each kind of pairs that there is, safe distances of centres, m, and closing speeds, m/s."""
+    *ugvs, uav = zip(team["radius"], team["max_speed"], strict=True)
+    obstacles = [(radius, 0.0) for radius in set(team["obstacle_radius"])]
+    pairs = {
+        "obstacle": (team["obstacle_distance"], product({*ugvs, uav}, obstacles)),
+        "uav_ugv": (team["air_ground_distance"], product([uav], ugvs)),
+        "ugv_ugv": (team["ugv_distance"], combinations(ugvs, 2)),
+    }
+    found = {name: {(d + (r + s), v + w) for (r, v), (s, w) in both} for name, (d, both) in pairs.items()}
+    return {name: values for name, values in found.items() if values}
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,10 +101,12 @@ class Views:
         ugvs: names.
         uav: name.
         obstacles: (m, 3), m.
-        obstacle_distance: safe distance of every robot to every obstacle, m.
-        ugv_distance: safe distance between UGVs, m.
-        air_ground_distance: safe distance between the UAV and each UGV, m.
+        obstacle_distance: safe distance of every robot to every obstacle, surface to surface, m.
+        ugv_distance: safe distance between UGVs, ditto.
+        air_ground_distance: safe distance between the UAV and each UGV, ditto.
         max_speed: (n + 1,), m/s.
+        radius: of the robots, (n + 1,), m.
+        obstacle_radius: (m,), m.
     """
 
     ugvs: tuple[str, ...]
@@ -79,15 +116,21 @@ class Views:
     ugv_distance: float
     air_ground_distance: float
     max_speed: Array
+    radius: Array
+    obstacle_radius: Array
 
     @classmethod
     def of(cls, team: Inputs, ugvs: int | None = None) -> Views:
         """Of a team (`team_of`), or of its first so many UGVs and the UAV."""
         count = len(team["ugvs"]) if ugvs is None else min(ugvs, len(team["ugvs"]))
-        speed = np.array([*team["max_speed"][:count], team["max_speed"][-1]], dtype=np.float64)
-        obstacles = np.array(team["obstacles"], dtype=np.float64).reshape(-1, 3)
-        changed = {"ugvs": tuple(team["ugvs"][:count]), "obstacles": obstacles, "max_speed": speed}
-        return cls(**(team | changed))
+        of_robots = {
+            key: np.array([*team[key][:count], team[key][-1]], dtype=np.float64) for key in ("max_speed", "radius")
+        }
+        of_obstacles = {
+            "obstacles": np.array(team["obstacles"], dtype=np.float64).reshape(-1, 3),
+            "obstacle_radius": np.array(team["obstacle_radius"], dtype=np.float64),
+        }
+        return cls(**(team | of_robots | of_obstacles | {"ugvs": tuple(team["ugvs"][:count])}))
 
     @property
     def robots(self) -> tuple[str, ...]:
@@ -107,11 +150,17 @@ class Views:
 
     @cached_property
     def safe(self) -> Array:
-        """Safe distances, (n + 1, m + n), m."""
-        n = len(self.ugvs)
-        beside_obstacles = np.full((n + 1, len(self.obstacles)), self.obstacle_distance)
+        """Safe distances of centres, (n + 1, m + n), m."""
+        n, own = len(self.ugvs), self.radius[:, None]
         with_uav = (self.others == n) | (np.arange(n + 1)[:, None] == n)
-        return np.hstack([beside_obstacles, np.where(with_uav, self.air_ground_distance, self.ugv_distance)])
+        of_kind = np.where(with_uav, self.air_ground_distance, self.ugv_distance)
+        beside_obstacles = self.obstacle_distance + (own + self.obstacle_radius)
+        return np.hstack([beside_obstacles, of_kind + (own + self.radius[self.others])])
+
+    def apart(self, robot: int, other: int) -> float:
+        """Safe distance of the centres of a robot and another one, or obstacle -1 - other, m."""
+        view = -1 - other if other < 0 else len(self.obstacles) + other - (other > robot)
+        return float(self.safe[robot, view])
 
     @cached_property
     def share(self) -> Array:

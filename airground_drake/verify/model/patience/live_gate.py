@@ -68,7 +68,7 @@ class LiveGate(ModelClaim):
             "sensing_range_m": float(law.avoidance.sensing_range),
             "period_s": float(scenario.gatekeeper.period_s),
             "max_speed_m_s": max(float(ugv.max_speed_m_s) for ugv in scenario.ugvs.values()),
-            "obstacle_m": float(scenario.safe_distance.obstacle_m),
+            "obstacle_m": _widest_m(scenario),
             "tries": int(patience.most),
             "rest_s": float(patience.rest),
             "longest_s": float(patience.longest),
@@ -83,6 +83,13 @@ class LiveGate(ModelClaim):
     def takes(self, inputs: dict[str, Any], finding: Finding) -> bool:
         """The obligations once more, by expansion."""
         return proved_again(finding, obligations(Tracking(), Patience))
+
+
+def _widest_m(scenario: Scenario) -> float:
+    """The largest distance that the centre of a UGV has to keep from that of an obstacle, m."""
+    of_ugvs = max(ugv.radius_m for ugv in scenario.ugvs.values())
+    of_obstacles = max((obstacle.radius_m for obstacle in scenario.obstacles.values()), default=0.0)
+    return float(scenario.safe_distance.obstacle_m + (of_ugvs + of_obstacles))
 
 
 def judge(tracking: Tracking, kind: type[Patience], inputs: dict[str, Any]) -> Finding:

@@ -16,20 +16,22 @@ from verify.test_layers import imported, within
 
 from airground_drake import components, diagram
 from airground_drake.arrays import Array
+from airground_drake.check.scenario import kinds_of
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc import team as team_module
 from airground_drake.nsbc.avoidance import Avoidance, HalfSpaces, Surroundings
 from airground_drake.nsbc.law import UgvLaw
 from airground_drake.nsbc.team import Neighbourhood, Team
-from airground_drake.scenarios.load import load
+from airground_drake.scenarios.load import load, resolved
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.systems import controllers
 from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.model.avoidance import binding_states, scenario_pairs, wiring
-from airground_drake.verify.model.avoidance.constants import kinds
+from airground_drake.verify.model.avoidance.constants import constants, kinds
+from airground_drake.verify.model.avoidance.disturbed_runs import scenes
 from airground_drake.verify.model.avoidance.safe_gate import SafeGate
 from airground_drake.verify.model.avoidance.safe_inv import SafeInv
-from airground_drake.verify.model.avoidance.scenario_pairs import Views
+from airground_drake.verify.model.avoidance.scenario_pairs import Views, as_points
 
 Patch = Callable[[pytest.MonkeyPatch], None]
 
@@ -316,3 +318,74 @@ def test_in_a_large_team_every_pair_binds(case_a: Scenario) -> None:
     assert seen["agrees"]
     assert seen["views"] == {"obstacle": 23 * 3, "uav_ugv": 44, "ugv_ugv": 22 * 21}
     assert seen["never_bound_count"] == 0
+
+
+@pytest.fixture
+def bodies(case_a: Scenario) -> Scenario:
+    """Case A with bodies of different sizes."""
+    for body, radius in zip([*case_a.ugvs.values(), case_a.uav], (0.25, 0.1, 0.2), strict=True):
+        body.radius_m = radius
+    for obstacle, radius in zip(case_a.obstacles.values(), (0.5, 0.0, 0.3), strict=True):
+        obstacle.radius_m = radius
+    case_a.safe_distance.ugv_m = 1.5  # they start 2 m apart
+    return case_a
+
+
+def test_demands_on_bodies_are_met_by_the_running_team(bodies: Scenario) -> None:
+    inputs = SafeInv().inputs(bodies)
+    views = Views.of(inputs["team"])
+    assert np.array_equal(views.safe, components.make_team(bodies).neighbourhood(slice(None)).distance)
+    assert [views.apart(0, other) for other in (-1, -2, 1, 2)] == [2.75, 2.25, 1.85, 1.45]
+    assert wiring.compare(inputs)["agrees"]
+
+
+def test_disturbed_points_are_as_far_apart_as_the_nearest_bodies(bodies: Scenario) -> None:
+    given = constants(bodies)
+    points = Views.of(as_points(given["team"]))
+    assert (points.obstacle_distance, points.ugv_distance, points.air_ground_distance) == (2.1, 1.85, 1.0 + (0.2 + 0.1))
+    assert min(kind.safe for kind in kinds(given)) == points.air_ground_distance
+    for start in scenes(given):
+        apart = np.linalg.norm(start.positions[:, None] - start.team.centres(start.positions), axis=-1)
+        assert (apart >= start.team.safe - 1e-9).all(), start.name
+
+
+@pytest.mark.parametrize("claim", [SafeInv(), SafeGate()], ids=lambda claim: claim.id)
+def test_bodies_are_proved(claim: ModelClaim, bodies: Scenario) -> None:
+    assert claim.judge(claim.inputs(bodies)).status == "proved"
+
+
+FORGETFUL: dict[str, Callable[[Team], Team]] = {
+    "obstacles are points": lambda team: replace(team, obstacle_radius=0.0),
+    "robots are points": lambda team: replace(team, radius=0.0),
+    "the UAV is a point": lambda team: replace(team, radius=team.radii * [1.0, 1.0, 0.0]),
+    "radii in another order": lambda team: replace(team, radius=np.roll(team.radii, 1)),
+    "radii 1e-5 of themselves too small": lambda team: replace(team, radius=(1.0 - 1e-5) * team.radii),
+}
+
+
+@pytest.mark.parametrize("name", FORGETFUL)
+def test_a_team_that_forgets_radii_is_refuted(name: str, bodies: Scenario, monkeypatch: pytest.MonkeyPatch) -> None:
+    given, right = SafeInv().inputs(bodies), components.make_team
+    monkeypatch.setattr(components, "make_team", lambda scenario: FORGETFUL[name](right(scenario)))
+    found = wiring.compare(given)
+    assert not found["agrees"]
+    assert found["first_difference"]["what"] != "a proposal is executed without leave, or not with it"
+
+
+def test_only_the_other_robot_is_taken_for_a_point(bodies: Scenario, monkeypatch: pytest.MonkeyPatch) -> None:
+    right = Team.pair_distance
+    monkeypatch.setattr(Team, "pair_distance", lambda team: right(team) - team.radii)
+    assert not wiring.compare(SafeInv().inputs(bodies))["agrees"]
+
+
+def test_kinds_of_bodies_are_the_farthest_fastest_and_nearest(bodies: Scenario) -> None:
+    bodies.ugvs["ugv2"].max_speed_m_s = 9.0
+    found = [(kind.name, round(kind.safe, 9), kind.closing) for kind in kinds(SafeInv().inputs(bodies))]
+    speed = bodies.uav.max_speed_m_s
+    one, two = (bodies.ugvs[name].max_speed_m_s for name in ("ugv1", "ugv2"))
+    assert found == [
+        ("obstacle_1", 2.75, one), ("obstacle_2", 2.7, speed), ("obstacle_3", 2.1, two),
+        ("uav_ugv_1", 1.45, speed + one), ("uav_ugv_2", 1.3, speed + two), ("ugv_ugv", 1.85, one + two),
+    ]  # fmt: skip
+    data = resolved(bodies)
+    assert [(kind.name, round(kind.safe_m, 9), kind.closing_m_s) for kind in kinds_of(data)] == found

@@ -1,0 +1,137 @@
+"""Runs with bodies: radii are part of every distance, whoever keeps it, foresees it or judges it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from copy import deepcopy
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from airground_drake import components, events
+from airground_drake.arrays import Array
+from airground_drake.gatekeeper.certified import CertifiedGatekeepers
+from airground_drake.nsbc.team import Team
+from airground_drake.report import metrics
+from airground_drake.scenarios.load import load, validated
+from airground_drake.scenarios.schema import Scenario
+from airground_drake.simulation import simulate
+from airground_drake.trace import Trace
+from airground_drake.verify import verify
+
+ROCK, OWN, FLIER = 0.5, 0.25, 0.25
+"""Radii, m, whose sums are exact."""
+
+
+def scenario(*, points: bool = False) -> Scenario:
+    """The minimal scenario with bodies, or with points that keep as much more."""
+    found = load("minimal", ["duration_s=11"])[0]
+    safe = found.safe_distance
+    safe.obstacle_m, safe.air_ground_m, safe.ugv_m = 1.25, 0.75, 1.75
+    found.ugvs["ugv1"].radius_m, found.uav.radius_m, found.obstacles["rock"].radius_m = OWN, FLIER, ROCK
+    if points:
+        safe.obstacle_m, safe.air_ground_m, safe.ugv_m = 1.25 + OWN + ROCK, 0.75 + OWN + FLIER, 1.75 + OWN
+        found.ugvs["ugv1"].radius_m = found.uav.radius_m = found.obstacles["rock"].radius_m = 0.0
+    return validated(found)
+
+
+@pytest.fixture(scope="module")
+def bodies() -> Trace:
+    """The run of bodies under method (d)."""
+    return simulate(scenario(), "d")
+
+
+def statuses(trace: Trace) -> dict[str, str]:
+    return {verdict.claim.id: verdict.finding.status for verdict in verify(trace)}
+
+
+def test_bodies_move_as_points_that_keep_as_much_more(bodies: Trace) -> None:
+    points = simulate(scenario(points=True), "d")
+    assert bodies.signals.equals(points.signals)
+    assert bodies.decisions.equals(points.decisions)
+    assert bodies.events == points.events
+    assert "accept" in set(bodies.decisions["decision"])
+    for one, other in zip(verify(bodies), verify(points), strict=True):
+        if one.claim.id != "GATE-TIME":
+            assert (one.finding.status, one.finding.margin) == (other.finding.status, other.finding.margin)
+        assert one.finding.status in ("holds", "refuted" if one.claim.id == "LIVE-GOAL" else "holds")
+
+
+def test_distances_are_of_surfaces_and_the_required_ones_of_centres(bodies: Trace) -> None:
+    nearest = metrics.of_run(bodies)["min_distance_m"]["ugv1"]["rock"]
+    assert nearest["safe_distance_m"] == 2.0
+    closest = metrics.closest_obstacle(bodies, "ugv1")
+    assert closest is not None
+    assert closest.value == nearest["value"] - 0.75
+    assert list(bodies.proposals["mapped_radius_m"].iloc[0]) == [ROCK]
+
+
+def larger(trace: Trace, name: str, by: float) -> Trace:
+    """The same signals of a scenario in which one body is larger."""
+    meta = deepcopy(trace.meta)
+    known = {**meta["scenario"]["ugvs"], **meta["scenario"]["obstacles"], "uav": meta["scenario"]["uav"]}
+    known[name]["radius_m"] += by
+    return replace(trace, meta=meta)
+
+
+@pytest.mark.parametrize("name", ["ugv1", "rock"])
+def test_larger_bodies_were_too_near(bodies: Trace, name: str) -> None:
+    found = statuses(larger(bodies, name, 0.01))
+    for claim in ("SAFE-TRACE", "SAFE-HYP", "EXEC", "GATE-MODEL"):
+        assert found[claim] == "refuted", claim
+
+
+def test_a_collision_is_of_surfaces(bodies: Trace) -> None:
+    def collisions(of_run: Trace) -> list[dict[str, Any]]:
+        return [event for event in events.extract(of_run, ()) if event["kind"] == "collision"]
+
+    assert not collisions(bodies)
+    least = np.linalg.norm(bodies.position("ugv1") - [5.0, 0.0, 0.0], axis=1).min()
+    needed = least - bodies.scenario["safe_distance"]["collision_m"] - OWN - ROCK
+    assert not collisions(larger(bodies, "rock", needed - 1e-6))
+    assert collisions(larger(bodies, "rock", needed + 1e-6))
+    assert collisions(larger(bodies, "ugv1", needed + 1e-6))
+
+
+def points_in_mind(self: CertifiedGatekeepers, *args: Any) -> tuple[Array, Array]:
+    """What a gatekeeper knows that takes obstacles for points."""
+    discs, distances = KNOWN(self, *args)
+    return discs, np.full_like(distances, self._team.obstacle_distance)
+
+
+KNOWN = CertifiedGatekeepers._known
+PAIRS, TEAM = Team.pair_distance, components.make_team
+
+FORGETFUL: dict[str, tuple[Callable[[pytest.MonkeyPatch], None], set[str]]] = {
+    "an obstacle's radius": (
+        lambda patch: patch.setattr(components, "make_team", lambda given: replace(TEAM(given), obstacle_radius=0.0)),
+        {"SAFE-TRACE", "SAFE-HYP", "EXEC", "GATE-MODEL"},
+    ),
+    "the other robot's radius": (
+        lambda patch: patch.setattr(Team, "pair_distance", lambda team: PAIRS(team) - team.radii),
+        {"SAFE-TRACE", "SAFE-HYP", "EXEC"},
+    ),
+    "radii in the gatekeeper only": (
+        lambda patch: patch.setattr(CertifiedGatekeepers, "_known", points_in_mind),
+        {"GATE-MODEL"},
+    ),
+}
+
+
+@pytest.mark.parametrize("name", FORGETFUL)
+def test_running_code_that_forgets_radii_is_refuted(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    edit, refuting = FORGETFUL[name]
+    given = scenario()
+    if name == "the other robot's radius":
+        given.uav.start_m, given.uav.altitude_m, given.duration_s = [1.3, 0.0, 0.1], 1.3, 2.0  # the UGV is in its way
+    if name == "radii in the gatekeeper only":  # a gap that is wide enough for points
+        given.obstacles = {
+            f"rock_{k}": replace(given.obstacles["rock"], position_m=[5.0, k - 1.5, 0.0]) for k in (0, 3)
+        }
+    edit(monkeypatch)
+    found = {claim for claim, status in statuses(simulate(given, "d")).items() if status == "refuted"} - {"LIVE-GOAL"}
+    assert refuting <= found
+    if name == "radii in the gatekeeper only":
+        assert not found & {"SAFE-TRACE", "SAFE-HYP", "EXEC"}
