@@ -10,7 +10,6 @@ import json
 import multiprocessing
 import os
 import signal
-import sys
 import warnings
 from collections import deque
 from multiprocessing.connection import wait
@@ -22,6 +21,7 @@ from airground_drake.errors import AirgroundError, PluginError, SimulationError,
 from airground_drake.intervention.process import end_all
 from airground_drake.scenarios.load import validated
 from airground_drake.scenarios.schema import Scenario
+from airground_drake.side_by_side import forks, processors
 from airground_drake.simulation import simulate, warm_up
 from airground_drake.trace import Trace
 
@@ -42,10 +42,9 @@ def simulate_all(scenario: Scenario, jobs: int | None = None) -> dict[str, Trace
         AirgroundError: if its process dies.
     """
     scenario = validated(scenario)
-    most = _processors() if jobs is None else max(1, jobs)
-    fork = "fork" in multiprocessing.get_all_start_methods() and sys.platform != "darwin"
-    context = multiprocessing.get_context("fork") if fork else multiprocessing.get_context("spawn")
-    if fork:
+    most = processors() if jobs is None else max(1, jobs)
+    context = multiprocessing.get_context("fork") if forks() else multiprocessing.get_context("spawn")
+    if forks():
         warm_up()
     waiting, running = deque(scenario.runs), dict[str, BaseProcess]()
     traces: dict[str, Trace] = {}
@@ -127,7 +126,3 @@ def _stop(processes: list[BaseProcess]) -> None:
         process.kill()
         process.join()
         process.close()
-
-
-def _processors() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -43,11 +43,10 @@ from airground_drake.scenarios import plugins
 from airground_drake.scenarios.estimate import DEFAULT_LIMITS, GIB, Limits, within
 from airground_drake.scenarios.load import load, shipped
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.verify import Verdict, cache_folder, verify, verify_model
+from airground_drake.verify import Verdict, cache_folder, verify_all
 from airground_drake.verify.finding import PLAIN_NAME
 from airground_drake.verify.mutants import refute_mutants
 from airground_drake.verify.registry import model_claims
-from airground_drake.verify.stl import cross_check as stl
 
 EXIT_USAGE, EXIT_TOOL = 2, 4
 FORMATS = ("html", "json", "junit")
@@ -144,10 +143,8 @@ def write_report(
         files.sweep(kept)
     _progress(f"simulating {', '.join(scenario.runs)}")
     traces = simulate_all(scenario)
-    _progress("checking claims")
-    verdicts = [verdict for of_run in traces.values() for verdict in stl.merge(verify(of_run), stl.cross_check(of_run))]
-    _progress("proving")
-    verdicts += verify_model(scenario, kept=kept)
+    _progress("checking claims and proving")
+    verdicts = verify_all(scenario, traces.values(), kept=kept)
     if audited:
         _progress("auditing the paper")
     findings = audit.whole(scenario, verdicts) if audited else ()

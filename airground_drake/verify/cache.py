@@ -14,14 +14,14 @@ import math
 import os
 import platform
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, replace
-from functools import cache
+from functools import cache, partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, NoReturn
 
 from airground_drake import files
+from airground_drake.side_by_side import side_by_side
 from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.finding import Finding
 
@@ -42,16 +42,17 @@ def find(
         inputs: what each is about, strict JSON.
         folder: where findings are kept; None: computed anew, kept nowhere.
     """
-    known = [_read(folder, claim, given) for claim, given in zip(claims, inputs, strict=True)]
-    todo = [i for i, found in enumerate(known) if found is None]
-    made: Mapping[int, Finding] = {}
-    if todo:
-        # the solvers run in processes of their own and the experiments in compiled code: threads suffice
-        with ThreadPoolExecutor(max_workers=2) as pool:
-            made = dict(zip(todo, pool.map(lambda i: claims[i].judge(inputs[i]), todo), strict=True))
-    for i, finding in made.items():
-        _keep(folder, claims[i], inputs[i], finding)
-    return [made[i] if found is None else found for i, found in enumerate(known)]
+    return side_by_side([partial(found, claim, given, folder) for claim, given in zip(claims, inputs, strict=True)])
+
+
+def found(claim: ModelClaim, inputs: dict[str, Any], folder: Path | None = None) -> Finding:
+    """The finding of one claim for its inputs, see `find`."""
+    kept = _read(folder, claim, inputs)
+    if kept is not None:
+        return kept
+    made = claim.judge(inputs)
+    _keep(folder, claim, inputs, made)
+    return made
 
 
 def cache_folder() -> Path:
