@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
 from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSystem, State
@@ -58,7 +60,7 @@ class Gatekeeper(LeafSystem):
         """Forget the measured decision times."""
         self._gatekeepers.times_s = []
 
-    def decisions(self, context: Context) -> tuple[Decision, ...]:
+    def decisions(self, context: Context) -> Sequence[Decision]:
         """Every decision up to the context's time."""
         return self._memory(context).decisions
 
