@@ -87,7 +87,7 @@ _Blocks = tuple[Any, Any, Any, Any, Any]
 
 
 def _program(rows: Sequence[Row]) -> tuple[tuple[_Blocks, Array], ...]:
-    """Minimise ||weighted variables||^2: blocks of rows of a matrix, and what they equal (the first three) or exceed not.
+    """Minimise ||weighted variables||^2: blocks of rows of a matrix, and what is equal (three) or bounded by what.
 
     Variables, stage by stage of row by row: task errors e = rho - reference and u, both weighted, then e, u, omega.
     """
