@@ -62,6 +62,15 @@ def distances(points: Array, position: Array) -> Array:
 
 
 @njit(cache=True)
+def within(points: Array, positions: Array, reach: float) -> npt.NDArray[np.bool_]:
+    """Which of the points (m, 3) are no farther than that, m, from each of n positions (n, 3): (n, m)."""
+    found = np.empty((len(positions), len(points)), dtype=np.bool_)
+    for i in range(len(positions)):
+        found[i] = distances(points, positions[i]) <= reach
+    return found
+
+
+@njit(cache=True)
 def avoid_one(lower: Array, normal: Array, bound: Array, composition: int) -> Array:
     """Velocity of one robot, (3,) m/s: the avoidance tasks above `lower`; see `avoid`.
 
