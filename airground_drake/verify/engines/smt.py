@@ -2,9 +2,9 @@
 
     python -m airground_drake.verify.engines.smt z3 < scripts
 
-reads a script a line, as a JSON text, and prints a line of JSON for each. `solve` keeps such a process for the next
-scripts and enforces the time limit from outside, because solvers do not always keep theirs. Nothing of one script is
-left for the next: each has a context of its own.
+says that it is ready, reads a script a line, as a JSON text, and prints a line of JSON for each. `solve` keeps such a
+process for the next scripts and enforces the time limit from outside, because solvers do not always keep theirs.
+Nothing of one script is left for the next: each has a context of its own.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import sys
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from importlib import import_module
 from select import select
 from typing import Any, Literal
 
@@ -65,6 +66,8 @@ def solve(scripts: Sequence[str], solver: Solver = "z3", limit_s: float = 20.0) 
     return [found.get(script) or _DECIDED[solver, script] for script in scripts]
 
 
+START_S = 60.0
+"""A process that has not loaded its solver by then, s, is asked all the same."""
 _Process = subprocess.Popen[bytes]
 _idle: dict[tuple[int, Solver], _Process] = {}
 """A solver's process that waits for a script, by the process that has started it: forked ones have their own."""
@@ -76,6 +79,7 @@ def _ask(solver: Solver, script: str, limit_s: float) -> Result:
     process = _idle.pop(key, None)
     if process is None or process.poll() is not None:
         process = _started(solver)
+        _line(process, b"", START_S)  # when it has loaded the solver
     line = _line(process, json.dumps(script).encode() + b"\n", limit_s)
     if line is not None and line.endswith(b"\n"):
         if _idle.setdefault(key, process) is not process:  # another thread's
@@ -95,7 +99,10 @@ def _started(solver: Solver) -> _Process:
 
 
 def _line(process: _Process, script: bytes, limit_s: float) -> bytes | None:
-    """A line of answer; what there was of it if the process has ended; None if time is over."""
+    """The next line that a process says, to a script if one is sent.
+
+    What there was of it if the process has ended; None if time is over.
+    """
     assert process.stdin is not None
     assert process.stdout is not None
     try:
@@ -195,6 +202,8 @@ def main() -> None:
     """Answer the scripts on stdin, for as long as somebody may ask."""
     end_with_parent()
     decide = {"z3": _z3, "cvc5": _cvc5, "cvc5_proof": _cvc5_proof}[sys.argv[1]]
+    import_module("z3" if decide is _z3 else "cvc5")
+    print("ready", flush=True)
     for line in sys.stdin:
         try:
             answer = decide(json.loads(line))
