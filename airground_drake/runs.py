@@ -10,7 +10,6 @@ import json
 import multiprocessing
 import os
 import signal
-import sys
 import warnings
 from collections import deque
 from functools import partial
@@ -26,6 +25,7 @@ from airground_drake.nsbc import kernels
 from airground_drake.progress import SILENT, Watch
 from airground_drake.scenarios.load import validated
 from airground_drake.scenarios.schema import Scenario
+from airground_drake.side_by_side import forks, processors
 from airground_drake.simulation import simulate, warm_up
 from airground_drake.trace import Trace
 
@@ -49,12 +49,11 @@ def simulate_all(scenario: Scenario, jobs: int | None = None, watch: Watch = SIL
         AirgroundError: if its process dies.
     """
     scenario = validated(scenario)
-    most = _processors() if jobs is None else max(1, jobs)
-    fork = "fork" in multiprocessing.get_all_start_methods() and sys.platform != "darwin"
-    context = multiprocessing.get_context("fork") if fork else multiprocessing.get_context("spawn")
+    most = processors() if jobs is None else max(1, jobs)
+    context = multiprocessing.get_context("fork") if forks() else multiprocessing.get_context("spawn")
     if not _compiled():
         watch.stage("compiling, once, about half a minute")
-    if fork:
+    if forks():
         warm_up()
     watch.stage(f"simulating {', '.join(scenario.runs)}", scenario.duration_s * len(scenario.runs), "s")
     clocks = {name: context.RawValue("d") for name in scenario.runs}
@@ -146,7 +145,3 @@ def _stop(processes: list[BaseProcess]) -> None:
 def _compiled() -> bool:
     """Whether numba has kept what it has compiled of the control law."""
     return any(Path(str(kernels.avoid_one.stats.cache_path)).glob("kernels.*.nbi"))
-
-
-def _processors() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -25,9 +25,10 @@ from __future__ import annotations
 
 import io
 import json
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -35,6 +36,8 @@ import pandas as pd
 from airground_drake import files
 from airground_drake.arrays import Array
 from airground_drake.errors import TraceError
+
+T = TypeVar("T")
 
 SCHEMA = "airground_drake.trace/5"
 
@@ -121,6 +124,7 @@ class Trace:
     problems: pd.DataFrame = field(default_factory=lambda: pd.DataFrame(columns=[*PROBLEM_SCALARS, *PROBLEM_ARRAYS]))
     proposals: pd.DataFrame = field(default_factory=no_proposals)
     _read: dict[str, Array] = field(default_factory=dict, init=False, repr=False, compare=False)
+    _derived: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @property
     def run(self) -> str:
@@ -169,6 +173,13 @@ class Trace:
         values.setflags(write=False)
         self._read[name] = values
         return values
+
+    def derived(self, key: Any, work_out: Callable[[], T]) -> T:
+        """What follows from the run and a key, worked out once: several claims ask for the same."""
+        if key not in self._derived:
+            self._derived[key] = work_out()
+        found: T = self._derived[key]
+        return found
 
     def vector(self, robot: str, stem: str = "", unit: str = "m") -> Array:
         """Three columns as (T, 3): positions by default; stem 'v' and unit 'm_s' for commands, 'ref_' for presets."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from itertools import combinations
+import hashlib
+from itertools import combinations, islice
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +19,12 @@ CONTRADICTION_M_S = 1e-9
 """Inequalities that every velocity misses by more contradict each other."""
 SINGULAR = 1e-12
 """Normals of which the squared volume, relative, is below this are dependent: fewer of them say the same."""
+
+NUMBERS = 300_000
+"""Inequalities of candidates that are looked at together, so that they fit into the memory."""
+
+MOST_KNOWN = 100_000
+"""Velocities that are remembered at most."""
 
 
 class Inequalities(NamedTuple):
@@ -90,7 +97,24 @@ def _recursion(wanted_m_s: Array, given: Inequalities, composition: str) -> Arra
     return v
 
 
+_known: dict[bytes, Array] = {}
+"""Closest velocities by the SHA-256 of all that they follow from: roll-outs of a run have much in common."""
+
+
 def _closest(wanted_m_s: Array, given: Inequalities, _: str) -> Array:
+    """The closest velocities, each worked out once."""
+    parts = zip(wanted_m_s, given.normal, given.bound, strict=True)
+    keys = [hashlib.sha256(b"".join(part.tobytes() for part in row)).digest() for row in parts]
+    if len(_known) > MOST_KNOWN:
+        _known.clear()
+    new = np.array([key not in _known for key in keys])
+    if new.any():
+        found = _worked_out(wanted_m_s[new], given.rows(new))
+        _known.update(zip((key for key, is_new in zip(keys, new, strict=True) if is_new), found, strict=True))
+    return np.array([_known[key] for key in keys])
+
+
+def _worked_out(wanted_m_s: Array, given: Inequalities) -> Array:
     """The closest velocities; where inequalities contradict each other, the slowest that miss them least.
 
     The latter are shortened until the inequalities hold that standing still meets.
@@ -128,29 +152,42 @@ def _by_active_sets(wanted_m_s: Array, given: Inequalities) -> tuple[Array, Arra
     needed as there are directions. Where no candidate meets all, the one that misses least is returned.
     """
     normal, bound = _relevant(wanted_m_s, given)
-    most = 3 if normal[:, :, 2].any() else 2
     best, lacking = wanted_m_s.copy(), np.maximum(0.0, -_spare(wanted_m_s, given)).max(axis=1)
     length = np.where(lacking <= MET_M_S, 0.0, np.inf)
-    for size in range(1, most + 1):
-        for active in combinations(range(bound.shape[1]), size):
-            n, b = normal[:, active], bound[:, active]
-            gram = np.einsum("bid,bjd->bij", n, n)
-            scale = np.einsum("bii->bi", gram).prod(axis=1)
-            usable = np.isfinite(b).all(axis=1) & (scale > 0.0)
-            usable &= np.linalg.det(gram) > SINGULAR * scale
-            if not usable.any():
-                continue
-            u, n = wanted_m_s[usable], n[usable]
-            gap = b[usable] - np.einsum("bkd,bd->bk", n, u)
-            step = np.einsum("bkd,bk->bd", n, np.linalg.solve(gram[usable], gap[..., None])[..., 0])
-            lacks = np.maximum(0.0, -_spare(u + step, Inequalities(normal[usable], bound[usable]))).max(axis=1)
-            size_of = np.linalg.norm(step, axis=1)
-            met, before = lacks <= MET_M_S, lacking[usable] <= MET_M_S
-            better = np.where(met & before, size_of < length[usable], met | (~before & (lacks < lacking[usable])))
-            rows = np.flatnonzero(usable)[better]
-            best[rows] = (u + step)[better]
-            lacking[rows], length[rows] = lacks[better], size_of[better]
+    at_once = max(1, NUMBERS // bound.size)
+    for size in range(1, 4 if normal[:, :, 2].any() else 3):
+        every = combinations(range(bound.shape[1]), size)
+        while active := [*islice(every, at_once)]:
+            step, lacks = _candidates(wanted_m_s, Inequalities(normal, bound), np.array(active))
+            size_of, met = np.linalg.norm(step, axis=2), lacks <= MET_M_S
+            first = np.argmin(np.where(met, size_of, np.inf), axis=1)
+            pick = np.arange(len(best)), np.where(met.any(axis=1), first, np.argmin(lacks, axis=1))
+            lacks, size_of, met = lacks[pick], size_of[pick], met[pick]
+            before = lacking <= MET_M_S
+            better = np.where(met & before, size_of < length, met | (~before & (lacks < lacking)))
+            best[better] = (wanted_m_s + step[pick])[better]
+            lacking[better], length[better] = lacks[better], size_of[better]
     return best, lacking
+
+
+def _candidates(wanted_m_s: Array, given: Inequalities, active: Array) -> tuple[Array, Array]:
+    """How far from what is wanted the velocities are that meet the active inequalities (C, size) exactly.
+
+    Returns:
+        Their differences from it (B, C, 3), and what they lack (B, C): infinitely much where the active ones depend on
+        each other or ask for nothing.
+    """
+    n, b = given.normal[:, active], given.bound[:, active]
+    gram = np.einsum("bcid,bcjd->bcij", n, n)
+    scale = np.einsum("bcii->bci", gram).prod(axis=2)
+    usable = np.isfinite(b).all(axis=2) & (scale > 0.0)
+    usable &= np.linalg.det(gram) > SINGULAR * scale
+    gap = np.where(usable[..., None], b - np.einsum("bckd,bd->bck", n, wanted_m_s), 0.0)
+    gram = np.where(usable[..., None, None], gram, np.eye(active.shape[1]))
+    step = np.einsum("bckd,bck->bcd", n, np.linalg.solve(gram, gap[..., None])[..., 0])
+    rate = np.einsum("bkd,bcd->bck", given.normal, wanted_m_s[:, None] + step)
+    lacks = np.maximum(0.0, given.bound[:, None] - rate).max(axis=2)
+    return step, np.where(usable, lacks, np.inf)
 
 
 def _relevant(wanted_m_s: Array, given: Inequalities) -> Inequalities:

@@ -52,6 +52,18 @@ def extremes(before: Array, after: Array) -> tuple[Array, Array]:
 
 
 @njit(cache=True)
+def gathered(t: float, position: Array, reference: Array, noise: Array) -> Array:
+    """Signals of n UGVs as `task_errors` takes them, from positions and references of which theirs are the first, m."""
+    n = len(noise)
+    signals = np.empty(1 + 7 * n)
+    signals[0] = t
+    signals[1 : 1 + 3 * n] = position[: 3 * n]
+    signals[1 + 3 * n : 1 + 6 * n] = reference[: 3 * n]
+    signals[1 + 6 * n :] = noise
+    return signals
+
+
+@njit(cache=True)
 def task_errors(signals: Array) -> Array:
     """Task error, m, and noise, m, of every UGV, (n, 4).
 
@@ -97,3 +109,10 @@ def transitions_due(
         else:
             due[j] = t >= (triggered_at + dwell if triggers else 0.0)
     return due
+
+
+@njit(cache=True)
+def anything_due(status: Array, begun: Array, now: Array, levels: tuple[float, float, float]) -> bool:
+    """Whether a transition is due for any UGV in a step without corners, see `transitions_due`."""
+    least, most = excursions(begun, now)
+    return bool(transitions_due(status, now[0], least, most, levels).any())

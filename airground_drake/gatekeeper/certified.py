@@ -10,6 +10,7 @@ Nothing here has a part in safety: whatever is accepted is executed below the av
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from time import thread_time
@@ -23,6 +24,7 @@ from airground_drake.gatekeeper.patience import Patience, Turn
 from airground_drake.gatekeeper.sample import Commitment, Gatekeepers, Memory, Situation
 from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT, Proposals, Report, answer_to
 from airground_drake.intervention.policy import Proposal
+from airground_drake.nsbc.kernels import within
 from airground_drake.nsbc.law import UgvLaw
 from airground_drake.nsbc.motion import Motion
 from airground_drake.nsbc.team import Team
@@ -56,7 +58,7 @@ class CertifiedGatekeepers(Gatekeepers):
         answers: list[float] = []
         reports: list[Report] = []
         turns, commitments = list(memory.turns), list(memory.commitments)
-        decisions = list(memory.decisions)
+        decisions: list[Decision] = []
         for i, proposal in enumerate(proposals):
             standing = answer_to(proposal, memory.answers, i)
             if turns[i].executing and standing != ACCEPT:  # withdrawn
@@ -78,16 +80,17 @@ class CertifiedGatekeepers(Gatekeepers):
             answers += [ACCEPT if decision.accepted else REFUSE, proposal.issued]
             reports.append(self._report(positions[i], decision))
         return replace(
-            memory, answers=tuple(answers), reports=tuple(reports), decisions=tuple(decisions),
-            turns=tuple(turns), commitments=tuple(commitments), sensed=sensed,
+            memory, answers=tuple(answers), reports=tuple(reports),
+            decisions=memory.decisions.extended(decisions), turns=tuple(turns),
+            commitments=tuple(commitments), sensed=sensed,
         )  # fmt: skip
 
     def _remembered(self, positions: Array, memory: Memory) -> np.ndarray:
         """Which obstacles each UGV has sensed up to now, (n, m); the very same array if nothing is new."""
-        now = np.array([self._sensed(position) for position in positions[:-1]])
+        now = within(self._neighbourhood.obstacles, positions[:-1], self._law.avoidance.sensing_range)
         if memory.sensed.shape != now.shape:
             return now
-        return memory.sensed if not (now & ~memory.sensed).any() else memory.sensed | now
+        return memory.sensed | now if (now > memory.sensed).any() else memory.sensed
 
     def _judge(
         self, seen: Situation, i: int, proposal: Proposal, turn: Turn
@@ -112,7 +115,7 @@ class CertifiedGatekeepers(Gatekeepers):
         assert commitment is not None
         k = min(round((t - turn.since) / self._law.avoidance.period), len(commitment.lags) - 1)
         predicted = float(commitment.lags[k])
-        lag = float(lags_of(proposal, np.array([t]), seen.positions[i][None])[0])
+        lag = lag_of(proposal, t, seen.positions[i])
         on_time = t if lag <= predicted + patience.lag else commitment.on_time
         grounds = Foreseen(lag=lag, predicted_lag=predicted, tries=turn.tries)
         late = patience.late(on_time, t)
@@ -179,3 +182,9 @@ def lags_of(proposal: Proposal, t: Array, positions: Array) -> Array:
     """Distance of positions (K, 3), m, at times (K,), s, from where the UGV is asked to be, (K,), m."""
     away = positions - proposal.motion.sample(t)
     return np.asarray(np.linalg.norm(away @ proposal.chosen.T, axis=1))
+
+
+def lag_of(proposal: Proposal, t: float, position: Array) -> float:
+    """`lags_of` at one time, s, m."""
+    x, y, z = ((position - proposal.motion.at(t)[0])[None] @ proposal.chosen.T)[0].tolist()
+    return math.sqrt(x * x + y * y + z * z)

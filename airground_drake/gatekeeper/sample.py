@@ -14,11 +14,13 @@ import numpy.typing as npt
 from airground_drake.arrays import Array
 from airground_drake.gatekeeper.answer import Decision, Planned, Rules, costs_throughout, in_words, settle
 from airground_drake.gatekeeper.budget import Budget
+from airground_drake.gatekeeper.history import History
 from airground_drake.gatekeeper.patience import Turn
 from airground_drake.gatekeeper.prediction import Horizon, Scene, predicted_problem
 from airground_drake.gatekeeper.routes.route import Route
 from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT, Disc, Proposals, Report, Reports, answer_to
 from airground_drake.intervention.policy import Proposal
+from airground_drake.nsbc.kernels import distances
 from airground_drake.nsbc.law import UgvLaw
 from airground_drake.nsbc.motion import Motion
 from airground_drake.nsbc.team import Team
@@ -54,7 +56,7 @@ class Memory:
     answers: tuple[float, ...]
     since: tuple[float, ...]
     reports: Reports
-    decisions: tuple[Decision, ...] = ()
+    decisions: History[Decision] = field(default_factory=History)
     turns: tuple[Turn, ...] = ()
     commitments: tuple[Commitment | None, ...] = ()
     sensed: npt.NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 0), dtype=bool))
@@ -143,7 +145,7 @@ class Gatekeepers(abc.ABC):
 
     def _sensed(self, position: Array) -> npt.NDArray[np.bool_]:
         """Which obstacles are within sensing range, (m,)."""
-        away = np.linalg.norm(self._neighbourhood.obstacles - position, axis=1)
+        away = distances(self._neighbourhood.obstacles, position)
         return np.asarray(away <= self._law.avoidance.sensing_range)
 
     def _report(self, position: Array, decision: Decision) -> Report:
@@ -182,7 +184,7 @@ class PaperGatekeepers(Gatekeepers):
         answers: list[float] = []
         since: list[float] = []
         reports: list[Report] = []
-        decisions = list(memory.decisions)
+        decisions: list[Decision] = []
         budgets = self._judging.rules.budgets(sum(p is not None for p in proposals), self._judging.period)
         for i, proposal in enumerate(proposals):
             if proposal is None:
@@ -197,8 +199,9 @@ class PaperGatekeepers(Gatekeepers):
             since.append(memory.since[i] if answer == answer_to(proposal, memory.answers, i) else t)
             reports.append(self._report(positions[i], decision))
         return replace(
-            memory, answers=tuple(answers), since=tuple(since), reports=tuple(reports), decisions=tuple(decisions)
-        )
+            memory, answers=tuple(answers), since=tuple(since), reports=tuple(reports),
+            decisions=memory.decisions.extended(decisions),
+        )  # fmt: skip
 
     def _decide(self, seen: Situation, i: int, proposal: Proposal, budgets: Iterator[Budget]) -> Decision:
         started = thread_time()

@@ -52,6 +52,25 @@ def fill_half_spaces(
 
 
 @njit(cache=True)
+def distances(points: Array, position: Array) -> Array:
+    """Of points (m, 3) from a position (3,), m: (m,), m."""
+    found = np.empty(len(points))
+    for k in range(len(points)):
+        x, y, z = points[k, 0] - position[0], points[k, 1] - position[1], points[k, 2] - position[2]
+        found[k] = np.sqrt(x * x + y * y + z * z)
+    return found
+
+
+@njit(cache=True)
+def within(points: Array, positions: Array, reach: float) -> npt.NDArray[np.bool_]:
+    """Which of the points (m, 3) are no farther than that, m, from each of n positions (n, 3): (n, m)."""
+    found = np.empty((len(positions), len(points)), dtype=np.bool_)
+    for i in range(len(positions)):
+        found[i] = distances(points, positions[i]) <= reach
+    return found
+
+
+@njit(cache=True)
 def avoid_one(lower: Array, normal: Array, bound: Array, composition: int) -> Array:
     """Velocity of one robot, (3,) m/s: the avoidance tasks above `lower`; see `avoid`.
 

@@ -25,11 +25,10 @@ from airground_drake.runs import simulate_all
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.estimate import DEFAULT_LIMITS, Limits, within
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.verify import Verdict, verify, verify_model
+from airground_drake.verify import Verdict, verify_all
 from airground_drake.verify.finding import PLAIN_NAME
 from airground_drake.verify.mutants import refute_mutants
-from airground_drake.verify.registry import model_claims, run_claims
-from airground_drake.verify.stl import cross_check as stl
+from airground_drake.verify.registry import model_claims
 
 PACKAGES = ("airground_drake", "drake", "numpy", "scipy", "numba", "pandas", "matplotlib")
 
@@ -74,10 +73,7 @@ def write_report(
     if kept is not None and kept.is_dir():
         files.sweep(kept)
     traces = simulate_all(scenario, watch=watch)
-    watch.stage("checking claims", len(traces) * (1 + len(run_claims(added=scenario.claims))), "claims")
-    verdicts = [verdict for of_run in traces.values() for verdict in _judged(of_run, watch)]
-    watch.stage("proving", len(required), "proofs")
-    verdicts += verify_model(scenario, kept=kept, watch=watch)
+    verdicts = verify_all(scenario, traces.values(), kept=kept, watch=watch)
     if audited:
         watch.stage("auditing the paper")
     findings = audit.whole(scenario, verdicts) if audited else ()
@@ -109,13 +105,6 @@ def write_report(
     if "json" in formats:
         files.write_json(output / "report.json", report)
     return report
-
-
-def _judged(of_run: trace.Trace, watch: Watch) -> list[Verdict]:
-    """Verdicts on a run, with a second opinion."""
-    verdicts = verify(of_run, watch=watch)
-    with watch.item(f"second opinions {of_run.run}"):
-        return stl.merge(verdicts, stl.cross_check(of_run))
 
 
 def read_back(folder: Path, formats: Sequence[str], report: dict[str, Any]) -> None:

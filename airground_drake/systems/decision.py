@@ -19,7 +19,14 @@ from pydrake.systems.framework import (
 )
 
 from airground_drake.arrays import Array
-from airground_drake.decision.excursion import excursions, extremes, task_errors, transitions_due
+from airground_drake.decision.excursion import (
+    anything_due,
+    excursions,
+    extremes,
+    gathered,
+    task_errors,
+    transitions_due,
+)
 from airground_drake.decision.trigger import Mode, Trigger, TriggerState
 from airground_drake.nsbc.motion import Motion
 
@@ -55,11 +62,10 @@ class DecisionVariable(LeafSystem):
 
     def _calc(self, context: Context, output: BasicVector) -> None:
         # Evaluated several times a step, for few UGVs: plain floats are twice as fast as arrays here.
-        reference, position = self._reference.Eval(context).tolist(), self._position.Eval(context).tolist()
+        wanted, there = iter(self._reference.Eval(context).tolist()), iter(self._position.Eval(context).tolist())
         noise = self._noise.Eval(context).tolist()
-        for j in range(self._count):
-            axes = slice(3 * j, 3 * j + 3)
-            output[j] = math.dist(reference[axes], position[axes]) + noise[j]
+        away = map(math.dist, zip(wanted, wanted, wanted, strict=False), zip(there, there, there, strict=False))
+        output.SetFromVector(list(map(float.__add__, noise, away)))
 
 
 class EventTrigger(LeafSystem):
@@ -108,9 +114,8 @@ class EventTrigger(LeafSystem):
 
     def _signals(self, context: Context) -> Array:
         """Time, s, positions and references, m, and noise, m, of the UGVs now, (1 + 7n,)."""
-        n = 3 * self._count
-        position, reference = self._position.Eval(context)[:n], self._reference.Eval(context)[:n]
-        return np.concatenate([[context.get_time()], position, reference, self._noise.Eval(context)])
+        position, reference = self._position.Eval(context), self._reference.Eval(context)
+        return gathered(context.get_time(), position, reference, self._noise.Eval(context))
 
     def _start(self, context: Context, state: State) -> EventStatus:
         signals = self._signals(context)
@@ -125,25 +130,25 @@ class EventTrigger(LeafSystem):
         begun = context.get_discrete_state(1).value()
         if context.get_time() - begun[0] < SHORTEST_S:
             return 1.0
-        now = self._signals(context)
-        least, most = self._excursions(begun, now)
-        due = transitions_due(context.get_discrete_state(0).value(), now[0], least, most, self._levels)
-        return -1.0 if due.any() else 1.0
+        return -1.0 if self._anything_due(context.get_discrete_state(0).value(), begun, self._signals(context)) else 1.0
 
     def update(self, context: Context, discrete: DiscreteValues) -> EventStatus:
         """Make the transitions that have become due in the step that ends, and begin another: the per-step update."""
-        now = self._signals(context)
-        least, most = self._excursions(context.get_discrete_state(1).value(), now)
-        before = context.get_discrete_state(0).value()
-        due = transitions_due(before, now[0], least, most, self._levels)
-        if due.any():
+        now, begun, before = self._signals(context), *(context.get_discrete_state(k).value() for k in (1, 0))
+        if self._anything_due(before, begun, now):
+            least, most = self._excursions(begun, now)
             status = before.reshape(-1, FIELDS).copy()
             t, x = float(now[0]), _norms(now)
-            for j in np.flatnonzero(due):
+            for j in np.flatnonzero(transitions_due(before, t, least, most, self._levels)):
                 status[j] = _pack([self._moved(_unpack(status[j]), t, float(x[j]), float(least[j]), float(most[j]))])
             discrete.set_value(0, status.ravel())
         discrete.set_value(1, now)
         return EventStatus.Succeeded()
+
+    def _anything_due(self, status: Array, begun: Array, now: Array) -> bool:
+        if self._bends(begun, now):
+            return bool(transitions_due(status, now[0], *self._excursions(begun, now), self._levels).any())
+        return anything_due(status, begun, now, self._levels)
 
     def _moved(self, before: TriggerState, t: float, x: float, least: float, most: float) -> TriggerState:
         """State at the end of a step in which a transition became due: x now, and how far it went, m."""
@@ -151,15 +156,17 @@ class EventTrigger(LeafSystem):
         after = self._trigger.step(before, t, seen)
         return after if after.mode is before.mode else self._trigger.step(after, t, x)  # x may have come back already
 
+    def _bends(self, begun: Array, now: Array) -> list[tuple[float, int]]:
+        """When references bend in a step, s, and whose."""
+        return self._corners[bisect_right(self._corner_times, begun[0]) : bisect_right(self._corner_times, now[0])]
+
     def _excursions(self, begun: Array, now: Array) -> tuple[Array, Array]:
         """Least and largest x since the step began, (n,) each, m."""
         least, most = excursions(begun, now)
-        first, last = bisect_right(self._corner_times, begun[0]), bisect_right(self._corner_times, now[0])
-        if first == last:
-            return least, most
+        corners = self._bends(begun, now)
         before, after = task_errors(begun), task_errors(now)
-        for j in {robot for _, robot in self._corners[first:last]}:
-            times = [t for t, robot in self._corners[first:last] if robot == j and t < now[0]]
+        for j in {robot for _, robot in corners}:
+            times = [t for t, robot in corners if robot == j and t < now[0]]
             share = (np.array(times) - begun[0]) / (now[0] - begun[0])
             own = slice(1 + 3 * j, 4 + 3 * j)
             position = begun[own] + share[:, None] * (now[own] - begun[own])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
 from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSystem, State
@@ -37,8 +39,9 @@ class Gatekeeper(LeafSystem):
         self._ugv_command = self.DeclareVectorInputPort("ugv_command", 3 * n)
         self._uav_command = self.DeclareVectorInputPort("uav_command", 3)
         self._proposals = self.DeclareAbstractInputPort("proposals", Value(object()))
-        self._state = self.DeclareAbstractState(Value(Memory.empty(n)))
-        held = {self.abstract_state_ticket(self._state)}
+        state = self.DeclareAbstractState(Value(Memory.empty(n)))
+        self._state = int(state)
+        held = {self.abstract_state_ticket(state)}
         self.DeclareVectorOutputPort("answers", 2 * n, self._calc_answers, prerequisites_of_calc=held)
         self.DeclareAbstractOutputPort(
             "reports", lambda: Value(object()), self._calc_reports, prerequisites_of_calc=held
@@ -58,12 +61,12 @@ class Gatekeeper(LeafSystem):
         """Forget the measured decision times."""
         self._gatekeepers.times_s = []
 
-    def decisions(self, context: Context) -> tuple[Decision, ...]:
+    def decisions(self, context: Context) -> Sequence[Decision]:
         """Every decision up to the context's time."""
         return self._memory(context).decisions
 
     def _memory(self, context: Context) -> Memory:
-        memory: Memory = context.get_abstract_state(int(self._state)).get_value()
+        memory: Memory = context.get_abstract_state(self._state).get_value()
         return memory
 
     def _calc_answers(self, context: Context, output: BasicVector) -> None:
@@ -81,7 +84,7 @@ class Gatekeeper(LeafSystem):
             return EventStatus.DidNothing()
         velocities = np.concatenate([self._ugv_command.Eval(context), self._uav_command.Eval(context)]).reshape(-1, 3)
         new = self._gatekeepers.sample(context.get_time(), proposals, positions, velocities, memory)
-        state.get_mutable_abstract_state(int(self._state)).set_value(new)
+        state.get_mutable_abstract_state(self._state).set_value(new)
         return EventStatus.Succeeded()
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pydrake.common.value import AbstractValue, Value
 from pydrake.systems.framework import Context, EventStatus, LeafSystem, State
 
-from airground_drake.decision.trigger import Mode
+from airground_drake.decision.excursion import INTERVENING
 from airground_drake.intervention.planner import Planner, PlannerMemory
 from airground_drake.systems.decision import FIELDS
 from airground_drake.systems.ticks import Ticks
@@ -30,19 +30,20 @@ class InterventionPlanner(LeafSystem):
         self._status = self.DeclareVectorInputPort("status", FIELDS * n)
         self._answers = self.DeclareVectorInputPort("answers", 2 * n)
         self._reports = self.DeclareAbstractInputPort("reports", Value(object()))
-        self._memory = self.DeclareAbstractState(Value(planner.start()))
+        held = self.DeclareAbstractState(Value(planner.start()))
+        self._memory = int(held)
         self.DeclareAbstractOutputPort(
             "proposals",
             lambda: Value(object()),
             self._calc_proposals,
-            prerequisites_of_calc={self.abstract_state_ticket(self._memory)},
+            prerequisites_of_calc={self.abstract_state_ticket(held)},
         )
         self._ticks = Ticks(planner.period, planner.period if control_period is None else control_period)
         self.DeclarePeriodicUnrestrictedUpdateEvent(self._ticks.period, 0.0, self._update)
 
     def memory(self, context: Context) -> PlannerMemory:
         """What was sent and what went wrong, up to the context's time."""
-        memory: PlannerMemory = context.get_abstract_state(int(self._memory)).get_value()
+        memory: PlannerMemory = context.get_abstract_state(self._memory).get_value()
         return memory
 
     def close(self) -> None:
@@ -57,11 +58,11 @@ class InterventionPlanner(LeafSystem):
             return EventStatus.DidNothing()
         before, positions = self.memory(context), self._position.Eval(context).reshape(-1, 3)
         memory = self._planner.watch(before, context.get_time(), positions)
-        intervening = [mode == Mode.INTERVENING for mode in self._status.Eval(context)[::FIELDS]]
+        intervening = [mode == INTERVENING for mode in self._status.Eval(context)[::FIELDS].tolist()]
         if any(intervening) or any(memory.proposals):
             answers, reports = self._answers.Eval(context), self._reports.Eval(context)
             memory = self._planner.plan(memory, context.get_time(), positions, intervening, answers, reports)
         if memory is before:
             return EventStatus.DidNothing()
-        state.get_mutable_abstract_state(int(self._memory)).set_value(memory)
+        state.get_mutable_abstract_state(self._memory).set_value(memory)
         return EventStatus.Succeeded()

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from airground_drake.verify.cache import cache_folder
     from airground_drake.verify.claim import Claim, ModelClaim, TraceClaim, Verdict
     from airground_drake.verify.finding import Finding
-    from airground_drake.verify.judge import verify, verify_model
+    from airground_drake.verify.judge import verify, verify_all, verify_model
 
     MODEL_CLAIMS: tuple[ModelClaim, ...]
     TRACE_CLAIMS: tuple[TraceClaim, ...]
@@ -33,12 +33,14 @@ __all__ = [
     "Verdict",
     "cache_folder",
     "verify",
+    "verify_all",
     "verify_model",
 ]
 
 _HOME = {
     "cache_folder": "cache",
     "verify": "judge",
+    "verify_all": "judge",
     "verify_model": "judge",
     **dict.fromkeys(("Claim", "ModelClaim", "TraceClaim", "Verdict"), "claim"),
     "Finding": "finding",

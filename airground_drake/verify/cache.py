@@ -15,9 +15,8 @@ import math
 import os
 import platform
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, replace
-from functools import cache
+from functools import cache, partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, NoReturn
@@ -25,6 +24,7 @@ from uuid import uuid4
 
 from airground_drake import files
 from airground_drake.progress import SILENT, Watch
+from airground_drake.side_by_side import side_by_side
 from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.finding import Finding
 
@@ -46,24 +46,18 @@ def find(
         folder: where findings are kept; None: computed anew, kept nowhere.
         watch: is told of each finding.
     """
-    known = []
-    for claim, given in zip(claims, inputs, strict=True):
-        known.append(_read(folder, claim, given))
-        watch.advance(float(known[-1] is not None), claim.id)
+    pieces = [partial(found, claim, given, folder) for claim, given in zip(claims, inputs, strict=True)]
+    return side_by_side(pieces, names=[claim.id for claim in claims], watch=watch)
 
-    def judged(i: int) -> Finding:
-        with watch.item(claims[i].id):
-            return claims[i].judge(inputs[i])
 
-    todo = [i for i, found in enumerate(known) if found is None]
-    made: Mapping[int, Finding] = {}
-    if todo:
-        # the solvers run in processes of their own and the experiments in compiled code: threads suffice
-        with ThreadPoolExecutor(max_workers=2) as pool:
-            made = dict(zip(todo, pool.map(judged, todo), strict=True))
-    for i, finding in made.items():
-        _keep(folder, claims[i], inputs[i], finding)
-    return [made[i] if found is None else found for i, found in enumerate(known)]
+def found(claim: ModelClaim, inputs: dict[str, Any], folder: Path | None = None) -> Finding:
+    """The finding of one claim for its inputs, see `find`."""
+    kept = _read(folder, claim, inputs)
+    if kept is not None:
+        return kept
+    made = claim.judge(inputs)
+    _keep(folder, claim, inputs, made)
+    return made
 
 
 def cache_folder() -> Path:

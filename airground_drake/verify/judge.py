@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable, Sequence
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 from airground_drake.progress import SILENT, Watch
 from airground_drake.scenarios.schema import Scenario
+from airground_drake.side_by_side import side_by_side
 from airground_drake.trace import Trace
-from airground_drake.verify.cache import find
-from airground_drake.verify.claim import Verdict
+from airground_drake.verify.cache import find, found
+from airground_drake.verify.claim import ModelClaim, TraceClaim, Verdict
+from airground_drake.verify.finding import Finding
 from airground_drake.verify.registry import model_claims, run_claims
+from airground_drake.verify.stl.cross_check import cross_check, merge
 
 
 def verify(trace: Trace, claims: Collection[str] | None = None, watch: Watch = SILENT) -> list[Verdict]:
@@ -29,14 +34,26 @@ def verify(trace: Trace, claims: Collection[str] | None = None, watch: Watch = S
         UnknownNameError: if an identifier is not that of a claim about a run.
         PluginError: if a claim of the scenario cannot be made.
     """
-    scenario, run = trace.meta.get("scenario", {}), str(trace.meta.get("run"))
-    expected = scenario.get("runs", {}).get(run, {}).get("expected", {})
-    verdicts = []
-    for claim in run_claims(claims, scenario.get("claims")):
-        with watch.item(f"{claim.id} {run}"):
-            if claim.applies(trace):
-                verdicts.append(Verdict(claim, run, claim.judge(trace), expected.get(claim.id, claim.expected)))
-    return verdicts
+    chosen = _applicable(trace, claims)
+    findings = []
+    for claim in chosen:
+        with watch.item(f"{claim.id} {trace.meta.get('run')}"):
+            findings.append(claim.judge(trace))
+    return _verdicts(trace, chosen, findings)
+
+
+def _applicable(trace: Trace, claims: Collection[str] | None = None) -> list[TraceClaim]:
+    added = trace.meta.get("scenario", {}).get("claims")
+    return [claim for claim in run_claims(claims, added) if claim.applies(trace)]
+
+
+def _verdicts(trace: Trace, claims: Sequence[TraceClaim], findings: Sequence[Finding]) -> list[Verdict]:
+    run = str(trace.meta.get("run"))
+    expected = trace.meta.get("scenario", {}).get("runs", {}).get(run, {}).get("expected", {})
+    return [
+        Verdict(claim, run, finding, expected.get(claim.id, claim.expected))
+        for claim, finding in zip(claims, findings, strict=True)
+    ]
 
 
 def verify_model(
@@ -61,8 +78,52 @@ def verify_model(
     """
     chosen = model_claims(claims, scenario.claims)
     inputs = [claim.judge_inputs(scenario) for claim in chosen]
-    findings = find(chosen, inputs, folder=kept, watch=watch)
+    return _model_verdicts(scenario, chosen, inputs, find(chosen, inputs, folder=kept, watch=watch))
+
+
+def verify_all(
+    scenario: Scenario, traces: Iterable[Trace], *, kept: Path | None = None, watch: Watch = SILENT
+) -> list[Verdict]:
+    """Judge every claim: on runs of a scenario, with the second opinion of `stl`, and then about its model.
+
+    What `verify`, `cross_check` and `verify_model` find, side by side in processes of their own.
+
+    Args:
+        scenario: its constants.
+        traces: its runs.
+        kept: see `verify_model`.
+        watch: is told of each claim about the model and of the claims about each run.
+
+    Raises:
+        PluginError: if a claim of the scenario cannot be made.
+        AirgroundError: if a process dies.
+    """
+    chosen = model_claims(added=scenario.claims)
+    inputs = [claim.judge_inputs(scenario) for claim in chosen]
+    of_runs = [(trace, _applicable(trace)) for trace in traces]
+    pieces = [partial(_found, claim, given, kept) for claim, given in zip(chosen, inputs, strict=True)]
+    pieces += [partial(_judged, trace, claims) for trace, claims in of_runs]
+    names = [*(claim.id for claim in chosen), *(f"claims about run {trace.run}" for trace, _ in of_runs)]
+    watch.stage("judging", len(pieces), "claims about the model or a run")
+    findings = side_by_side(pieces, names=names, watch=watch)
+    about_runs = zip(of_runs, findings[len(chosen) :], strict=True)
+    verdicts = [verdict for (trace, claims), of_run in about_runs for verdict in _verdicts(trace, claims, of_run)]
+    return verdicts + _model_verdicts(scenario, chosen, inputs, [finding for (finding,) in findings[: len(chosen)]])
+
+
+def _found(claim: ModelClaim, inputs: dict[str, Any], kept: Path | None) -> list[Finding]:
+    return [found(claim, inputs, kept)]
+
+
+def _judged(trace: Trace, claims: Sequence[TraceClaim]) -> list[Finding]:
+    own = _verdicts(trace, claims, [claim.judge(trace) for claim in claims])
+    return [verdict.finding for verdict in merge(own, cross_check(trace))]
+
+
+def _model_verdicts(
+    scenario: Scenario, claims: Sequence[ModelClaim], inputs: Sequence[dict[str, Any]], findings: Sequence[Finding]
+) -> list[Verdict]:
     return [
         Verdict(claim, "", finding, scenario.expected.get(claim.id, claim.expected), given)
-        for claim, given, finding in zip(chosen, inputs, findings, strict=True)
+        for claim, given, finding in zip(claims, inputs, findings, strict=True)
     ]

@@ -422,16 +422,18 @@ DECISION = (
     Mutant(
         "events come at the ends of steps",
         "systems/decision.py",
-        "return -1.0 if due.any() else 1.0",
-        "return 1.0",
+        "return -1.0 if self._anything_due(",
+        "return 1.0 if self._anything_due(",
         proofs=("THR-ISO",),
         tests=TRIGGER,
     ),
     Mutant(
         "extremes at the ends of steps only",
-        "systems/decision.py",
-        "least, most = excursions(begun, now)\n        first",
-        "least, most = np.minimum(_norms(begun), _norms(now)), np.maximum(_norms(begun), _norms(now))\n        first",
+        "decision/excursion.py",
+        "    return extremes(task_errors(begun), task_errors(now))",
+        "    first, last = task_errors(begun), task_errors(now)\n"
+        "    first, last = extremes(first, first)[0], extremes(last, last)[0]\n"
+        "    return np.minimum(first, last), np.maximum(first, last)",
         proofs=("THR-ISO",),
         tests=TRIGGER,
     ),
@@ -454,8 +456,8 @@ DECISION = (
     Mutant(
         "noise is no part of the decision variable",
         "systems/decision.py",
-        "output[j] = math.dist(reference[axes], position[axes]) + noise[j]",
-        "output[j] = math.dist(reference[axes], position[axes])",
+        "map(float.__add__, noise, away)",
+        "map(float, away)",
         tests=TRIGGER,
     ),
     Mutant(
@@ -504,8 +506,8 @@ INTERVENTION = (
     Mutant(
         "proposals while refractory",
         "systems/intervention.py",
-        "[mode == Mode.INTERVENING for mode in",
-        "[mode != Mode.SUPERVISING for mode in",
+        "[mode == INTERVENING for mode in",
+        "[mode != 0 for mode in",
     ),
     Mutant(
         "the UAV learns nothing from refusals",

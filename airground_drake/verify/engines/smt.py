@@ -1,20 +1,23 @@
 """SMT solvers in processes of their own, which can be killed: z3 and cvc5 on SMT-LIB 2 scripts.
 
-    python -m airground_drake.verify.engines.smt z3 < scripts.json
+    python -m airground_drake.verify.engines.smt z3 < scripts
 
-reads a JSON list of scripts and prints a line of JSON for each as it is decided. `solve` runs that and enforces
-the time limit from outside, because solvers do not always keep theirs.
+says that it is ready, reads a script a line, as a JSON text, and prints a line of JSON for each. `solve` keeps such a
+process for the next scripts and enforces the time limit from outside, because solvers do not always keep theirs.
+Nothing of one script is left for the next: each has a context of its own.
 """
 
 from __future__ import annotations
 
 import json
-import queue
+import os
 import subprocess
 import sys
-import threading
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from importlib import import_module
+from select import select
 from typing import Any, Literal
 
 from airground_drake.interruption import end_with_parent
@@ -55,59 +58,82 @@ def solve(scripts: Sequence[str], solver: Solver = "z3", limit_s: float = 20.0) 
     Returns:
         One result per script, in order; never raises for what a solver does.
     """
-    results: list[Result] = []
-    open_ones = [script for script in dict.fromkeys(scripts) if (solver, script) not in _DECIDED]
-    while len(results) < len(open_ones):
-        results += _attempt(open_ones[len(results) :], solver, limit_s)
-    found = dict(zip(open_ones, results, strict=True))
+    found: dict[str, Result] = {}
+    for script in dict.fromkeys(scripts):
+        if (solver, script) not in _DECIDED:
+            found[script] = _ask(solver, script, limit_s)
     _DECIDED.update({(solver, script): each for script, each in found.items() if each.answer in ("sat", "unsat")})
     return [found.get(script) or _DECIDED[solver, script] for script in scripts]
 
 
-def _attempt(scripts: Sequence[str], solver: Solver, limit_s: float) -> list[Result]:
-    """Results up to the first script that has to be killed, at least one."""
-    command = [sys.executable, "-m", "airground_drake.verify.engines.smt", solver]
+START_S = 60.0
+"""A process that has not loaded its solver by then, s, is asked all the same."""
+_Process = subprocess.Popen[bytes]
+_idle: dict[tuple[int, Solver], _Process] = {}
+"""A solver's process that waits for a script, by the process that has started it: forked ones have their own."""
+
+
+def _ask(solver: Solver, script: str, limit_s: float) -> Result:
+    """What a solver says of a script; a process that has not answered in time, or has ended, is done with."""
+    key = os.getpid(), solver
+    process = _idle.pop(key, None)
+    if process is None or process.poll() is not None:
+        process = _started(solver)
+        _line(process, b"", START_S)  # when it has loaded the solver
+    line = _line(process, json.dumps(script).encode() + b"\n", limit_s)
+    if line is not None and line.endswith(b"\n"):
+        if _idle.setdefault(key, process) is not process:  # another thread's
+            _end(process)
+        return Result(**json.loads(line))
+    if line is None:
+        _end(process)
+        return Result("timeout", detail=f"{solver}: no answer in {limit_s:g} s")
+    last = (_end(process).decode(errors="replace").strip().splitlines() or ["no message"])[-1]
+    return Result("error", detail=f"{solver} ended: {last}")
+
+
+def _started(solver: Solver) -> _Process:
     pipe = subprocess.PIPE
-    with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, text=True) as process:
-        assert process.stdin is not None
-        assert process.stdout is not None
-        assert process.stderr is not None
-        lines: queue.Queue[str] = queue.Queue()
-        reader = threading.Thread(target=_forward, args=(process.stdout, lines), daemon=True)
-        reader.start()
-        try:
-            process.stdin.write(json.dumps(list(scripts)))
-            process.stdin.close()
-        except BrokenPipeError:
-            pass
-        results: list[Result] = []
-        try:
-            while len(results) < len(scripts):
-                line = lines.get(timeout=limit_s)
-                if not line:
-                    last = (process.stderr.read().strip().splitlines() or ["no message"])[-1]
-                    results.append(Result("error", detail=f"{solver} ended: {last}"))
-                    break
-                results.append(Result(**json.loads(line)))
-        except queue.Empty:
-            results.append(Result("timeout", detail=f"{solver}: no answer in {limit_s:g} s"))
-        finally:
-            process.kill()
-    return results
+    command = [sys.executable, "-m", "airground_drake.verify.engines.smt", solver]
+    return subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, bufsize=0)
 
 
-def _forward(stream: Any, lines: queue.Queue[str]) -> None:
-    """Lines of a stream into a queue, then '' for its end."""
-    for line in stream:
-        lines.put(line)
-    lines.put("")
+def _line(process: _Process, script: bytes, limit_s: float) -> bytes | None:
+    """The next line that a process says, to a script if one is sent.
+
+    What there was of it if the process has ended; None if time is over.
+    """
+    assert process.stdin is not None
+    assert process.stdout is not None
+    try:
+        rest = memoryview(script)
+        while rest:
+            rest = rest[process.stdin.write(rest) :]
+    except BrokenPipeError:
+        return b""
+    line = b""
+    end = time.monotonic() + limit_s
+    while not line.endswith(b"\n"):
+        if not select([process.stdout], [], [], max(0.0, end - time.monotonic()))[0]:
+            return None
+        if not (part := process.stdout.read(1 << 16)):
+            return line
+        line += part
+    return line
+
+
+def _end(process: _Process) -> bytes:
+    """Kill a process; its last words."""
+    process.kill()
+    return process.communicate()[1]
 
 
 def _z3(script: str) -> dict[str, Any]:
     import z3
 
     logic = next((line[11:-1] for line in script.splitlines() if line.startswith("(set-logic ")), "")
-    solver = z3.SolverFor(logic) if logic else z3.Solver()
+    context = z3.Context()
+    solver = z3.SolverFor(logic, context) if logic else z3.Solver(ctx=context)
     solver.from_string(script)
     answer = str(solver.check())
     if answer == "unknown":
@@ -173,12 +199,14 @@ def _text(value: str | bytes) -> str:
 
 
 def main() -> None:
-    """Answer the scripts on stdin one by one, for as long as somebody waits for the answers."""
+    """Answer the scripts on stdin, for as long as somebody may ask."""
     end_with_parent()
     decide = {"z3": _z3, "cvc5": _cvc5, "cvc5_proof": _cvc5_proof}[sys.argv[1]]
-    for script in json.load(sys.stdin):
+    import_module("z3" if decide is _z3 else "cvc5")
+    print("ready", flush=True)
+    for line in sys.stdin:
         try:
-            answer = decide(script)
+            answer = decide(json.loads(line))
         except Exception as error:  # the solvers raise many kinds
             answer = {"answer": "error", "detail": f"{type(error).__name__}: {error}"}
         print(json.dumps(answer), flush=True)

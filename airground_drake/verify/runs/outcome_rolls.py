@@ -53,9 +53,14 @@ def foreseen(trace: Trace, given: dict[str, Any], sent: Sequence[Sent]) -> tuple
     Raises:
         TraceError: if the decision is on a proposal that was not sent.
     """
+    t, robot, issued = float(given["t_s"]), str(given["robot"]), float(given["issued_s"])
+    return trace.derived(("foreseen", robot, t, issued), lambda: _rolled_out(trace, t, robot, issued, sent))
+
+
+def _rolled_out(trace: Trace, t: float, robot: str, issued: float, sent: Sequence[Sent]) -> tuple[Foreseen, Foreseen]:
     scenario, control, gate = trace.scenario, trace.scenario["control"], trace.scenario["gatekeeper"]
-    t, robot, h = float(given["t_s"]), str(given["robot"]), trace.scenario["control"]["period_s"]
-    on = [one for one in sent if (one.ugv, one.issued_s) == (robot, float(given["issued_s"]))]
+    h = control["period_s"]
+    on = [one for one in sent if (one.ugv, one.issued_s) == (robot, issued)]
     if not on:
         raise TraceError(f"the decision of {robot} at t = {t} s is on no proposal that was sent")
     spec = scenario["ugvs"][robot]

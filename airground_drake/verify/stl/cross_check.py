@@ -11,6 +11,7 @@ from __future__ import annotations
 import importlib
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from importlib.metadata import version
 from typing import Any, Literal
 
@@ -178,20 +179,24 @@ def _robustness(rtamt: Any, text: str, semantics: str, sets: Sequence[dict[str, 
     """
     if not sets or not all(np.isfinite(part).all() for one in sets for samples in one.values() for part in samples):
         raise ValueError("there are no signals, or some have values that are not finite")
-    if semantics == "dense":
-        specification = rtamt.StlDenseTimeOfflineSpecification()
-        evaluate = _dense
-    else:
-        specification = rtamt.StlDiscreteTimeOfflineSpecification()
-        evaluate = _discrete
-    for name in sets[0]:
-        specification.declare_var(name, "float")
-    specification.spec = text
-    specification.parse()
+    specification = _specification(rtamt, text, semantics, tuple(sets[0]))
+    evaluate = _dense if semantics == "dense" else _discrete
     found = [evaluate(specification, signals) for signals in sets]
     if np.isnan(found).any():
         raise ValueError(f"robustness {found}")
     return min(found)
+
+
+@lru_cache(maxsize=64)
+def _specification(rtamt: Any, text: str, semantics: str, signals: tuple[str, ...]) -> Any:
+    """A formula as rtamt has parsed it."""
+    dense = semantics == "dense"
+    specification = rtamt.StlDenseTimeOfflineSpecification() if dense else rtamt.StlDiscreteTimeOfflineSpecification()
+    for name in signals:
+        specification.declare_var(name, "float")
+    specification.spec = text
+    specification.parse()
+    return specification
 
 
 def _dense(specification: Any, signals: dict[str, Samples]) -> float:

@@ -10,6 +10,7 @@ import sys
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from builders.simulation import simulate
 from sharing import once
 
 from airground_drake.scenarios.schema import Decision, Threshold
+from airground_drake.side_by_side import side_by_side
 from airground_drake.trace import Trace
 from airground_drake.verify import verify
 from airground_drake.verify.claim import Verdict
@@ -156,7 +158,8 @@ def judgements(shared: Path) -> list[Judgement]:
 
     def make(folder: Path) -> None:
         folder.mkdir()
-        (folder / "pickled").write_bytes(pickle.dumps([judged(seed) for seed in range(200)]))
+        made = side_by_side([partial(judged, seed) for seed in range(200)])
+        (folder / "pickled").write_bytes(pickle.dumps(made))
 
     made: list[Judgement]
     made = pickle.loads((once(shared / "random_traces", make) / "pickled").read_bytes())

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.claim import ModelClaim
-from airground_drake.verify.engines.prover import discharge, finding
+from airground_drake.verify.engines.prover import discharge, finding, proved_again
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.model.avoidance.constants import Inputs
 from airground_drake.verify.model.avoidance.lemma import gram_certificate, lemma
@@ -37,7 +37,6 @@ class SafeLemma(ModelClaim):
     does_not_establish = "Anything about velocities that change within the period, or about rounding (see SAFE-INV)."
 
     exercised_by = "obligations of the proof"
-    kept = False
 
     def inputs(self, scenario: Scenario) -> Inputs:
         """None: it is about no constants."""
@@ -48,3 +47,7 @@ class SafeLemma(ModelClaim):
         gram = gram_certificate()
         found = finding(discharge(lemma(), LIMIT_S), gram_matrix="expands exactly, positive semidefinite by exact LDL")
         return replace(found, certificates=found.certificates | {"gram.json": gram})
+
+    def takes(self, inputs: Inputs, finding: Finding) -> bool:
+        """The obligations once more, by expansion, and the Gram matrix."""
+        return proved_again(finding, lemma()) and finding.certificates["gram.json"] == gram_certificate()

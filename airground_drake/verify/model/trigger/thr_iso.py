@@ -14,7 +14,7 @@ from airground_drake.components import make_trigger, threshold
 from airground_drake.decision.trigger import Trigger
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.claim import ModelClaim
-from airground_drake.verify.engines.prover import LIMIT_S, discharge, finding
+from airground_drake.verify.engines.prover import LIMIT_S, discharge, finding, proved_again
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.model.trigger.isolation import conformance, obligations
 
@@ -53,7 +53,6 @@ class ThrIso(ModelClaim):
     )
 
     exercised_by = "obligations of the proof"
-    kept = False
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
         """The running trigger's levels, m, and dwell, s."""
@@ -64,6 +63,10 @@ class ThrIso(ModelClaim):
     def check(self, inputs: dict[str, Any]) -> Finding:
         """Discharge the obligations, compare the running system."""
         return judge(Trigger(inputs["zeta_m"], inputs["released_below_m"], inputs["dwell_s"]))
+
+    def takes(self, inputs: dict[str, Any], finding: Finding) -> bool:
+        """The obligations once more, by expansion."""
+        return proved_again(finding, obligations())
 
 
 def judge(trigger: Trigger) -> Finding:
