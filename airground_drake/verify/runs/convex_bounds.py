@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import clarabel
 import numpy as np
 from scipy import sparse
 from scipy.optimize import lsq_linear
@@ -85,40 +84,14 @@ def _minimiser(row: Row, multiplier: Array) -> Array:
 def _solve(rows: Sequence[Row]) -> tuple[list[Array], list[Array]]:
     """Relaxed plans (N,) and multipliers (N, m) >= 0, costs relative to `Row.scale`, of all rows as one program.
 
-    Where the solver stops short of an optimum, what it has so far.
+    Variables, stage by stage of row by row: task errors e = rho - reference, omega and u.
 
     Raises:
-        TraceError: if it has nothing.
+        TraceError: if the solver gives no solution at all.
     """
-    program = _program(rows)
-    matrix = sparse.block_array([blocks for blocks, _ in program], format="csc")
-    matrix.eliminate_zeros()
-    bounds = np.concatenate([bound for _, bound in program])
-    sizes = [len(bound) for _, bound in program]
-    weighted, equations, count = sum(sizes[:2]), sum(sizes[:3]), sizes[-1]
-    cost = sparse.diags_array(np.where(np.arange(matrix.shape[1]) < weighted, 2.0, 0.0), format="csc")
-    cost.eliminate_zeros()
-    cones = [clarabel.ZeroConeT(equations), clarabel.NonnegativeConeT(len(bounds) - equations)]
-    settings = clarabel.DefaultSettings()
-    settings.verbose = False
-    solved = clarabel.DefaultSolver(cost, np.zeros(matrix.shape[1]), matrix, bounds, cones, settings).solve()
-    omega, dual = np.array(solved.x)[-sizes[3] :], np.maximum(0.0, np.array(solved.z)[len(bounds) - count :])
-    if not (np.isfinite(omega).all() and np.isfinite(dual).all()):
-        raise TraceError("the independent solver gave no solution")
-    shares = [np.clip(part, 0.0, 1.0) for part in np.split(omega, len(rows))]
-    shapes = [(len(row["reference_m"]), len(row["distances_m"])) for row in rows]
-    parts = np.split(dual, np.cumsum([stages * m for stages, m in shapes])[:-1])
-    return shares, [part.reshape(shape) for part, shape in zip(parts, shapes, strict=True)]
+    import cvxpy  # takes a second, which other claims need not wait for
 
-
-_Blocks = tuple[Any, Any, Any, Any, Any]
-
-
-def _program(rows: Sequence[Row]) -> tuple[tuple[_Blocks, Array], ...]:
-    """Minimise ||weighted variables||^2: blocks of rows of a matrix, and what is equal (three) or bounded by what.
-
-    Variables, stage by stage of row by row: task errors e = rho - reference and u, both weighted, then e, u, omega.
-    """
+    cp: Any = cvxpy  # its types are incomplete
     stages = len(rows[0]["reference_m"])
     total = stages * len(rows)
     change = np.concatenate([row.dt * (row["accept_m_s"] - row["refuse_m_s"]) for row in rows])
@@ -134,15 +107,19 @@ def _program(rows: Sequence[Row]) -> tuple[tuple[_Blocks, Array], ...]:
     facing = sparse.bsr_matrix((normals, at, np.arange(count + 1)), shape=(count, 3 * total)).tocsr()
     picks = sparse.csr_matrix((np.ones(count), at, np.arange(count + 1)), shape=(count, total))
     least = np.concatenate([-row.gaps(row["reference_m"], row["normals"]).ravel() for row in rows])
-    of_error = np.repeat(np.sqrt(np.concatenate([row.error_weight * row.lasting / row.scale for row in rows])), 3)
-    of_slack = np.repeat(np.sqrt([row.dt * row.slack_weight / row.scale for row in rows]), stages)
-    each, errors = sparse.eye(total), sparse.eye(3 * total)
-    return (
-        ((-errors, None, sparse.diags(of_error), None, None), np.zeros(3 * total)),
-        ((None, -each, None, sparse.diags(of_slack), None), np.zeros(total)),
-        ((None, None, dynamics, None, -steering), drift.ravel()),
-        ((None, None, None, None, -each), np.zeros(total)),
-        ((None, None, None, None, each), np.ones(total)),
-        ((None, None, None, -each, None), np.zeros(total)),
-        ((None, None, -facing, -picks, None), -least),
-    )
+    of_error = np.sqrt(np.concatenate([row.error_weight * row.lasting / row.scale for row in rows]))
+    of_slack = np.sqrt([row.dt * row.slack_weight / row.scale for row in rows])
+    e = cp.Variable(3 * total)
+    omega = cp.Variable(total)
+    u = cp.Variable(total)
+    constraints = [dynamics @ e - steering @ omega == drift.ravel(), omega >= 0.0, omega <= 1.0, u >= 0.0]
+    constraints += [facing @ e + picks @ u >= least] if count else []
+    error = cp.sum_squares(cp.multiply(np.repeat(of_error, 3), e))
+    slack = cp.sum_squares(cp.multiply(np.repeat(of_slack, stages), u))
+    cp.Problem(cp.Minimize(error + slack), constraints).solve(solver=cp.CLARABEL)
+    if omega.value is None:
+        raise TraceError("the independent solver gave no solution")
+    shares = [np.clip(part, 0.0, 1.0) for part in np.split(omega.value, len(rows))]
+    dual = np.maximum(0.0, constraints[-1].dual_value) if count else np.empty(0)
+    parts = np.split(dual, np.cumsum(stages * np.array(points))[:-1])
+    return shares, [part.reshape(stages, m) for part, m in zip(parts, points, strict=True)]

@@ -67,7 +67,7 @@ class GateOpt(ProblemClaim):
     )
     method = (
         "Route 'relaxed': the half-plane relaxations of all decisions, from recorded data and normals, are stacked "
-        "into one program in multiple-shooting form and solved by Clarabel (OSQP reaches the same only to "
+        "into one program in multiple-shooting form and solved by cvxpy and Clarabel (OSQP reaches the same only to "
         "2e-5, in three to ten times the time). No solver is trusted: its plan, evaluated, is the upper "
         "bound U; its multipliers give L by weak duality, evaluated in numpy, whatever their quality. Routes "
         "'enumeration' and 'branch_and_bound': all plans of 10 blocks are evaluated. Other routes bound nothing, "
