@@ -35,7 +35,7 @@ from airground_drake.errors import (
     one_line,
 )
 from airground_drake.report import audit, document, folder, html, junit
-from airground_drake.report.figures import zeno_refine
+from airground_drake.report.figures import moments, zeno_refine
 from airground_drake.report.figures.draw import draw
 from airground_drake.report.figures.panels import Figure
 from airground_drake.runs import simulate_all
@@ -172,7 +172,7 @@ def write_report(
         files.write_text(output / "junit.xml", junit.render(report))
         written.append("junit.xml")
     if "html" in formats:
-        plates = [*draw(scenario, traces), *_refinement(verdicts)]
+        plates = [*draw(scenario, traces), *_refinement(verdicts), *moments.draw(report, traces)]
         files.write_text(output / "report.html", html.render(report, plates, drawn))
         written.append("report.html")
     report = document.sealed(report, output, written)

@@ -69,6 +69,17 @@ LOOKS = (
 """Six looks, distinct for colour-blind readers and in greyscale through dash and marker; reused in turn."""
 UAV_LOOK = Look("#666666", (0, (3, 2)), "d")
 
+DARK = {
+    INK: "#e8e8e8", MUTED: "#b0b4bb", ALARM: "#ff8a9a",
+    "#ffffff": "#16181c", "#f3f3f3": "#22252b", "#eeeeee": "#2a2d34", "#dddddd": "#3a3e46", "#d4d4d4": "#4a4e57",
+    "#cfe6dc": "#1f4436",
+    "#0060a8": "#6db8ff", "#b34700": "#ff9d5c", "#00705a": "#4fd1b0", "#8b3a8b": "#e08ee0", "#6b5900": "#d9c24d",
+    "#303030": "#d0d0d0", "#666666": "#a8a8a8",
+    "black": "#e8e8e8", "white": "#16181c", "lightgrey": "#4a4e57", "grey": "#a8a8a8", "green": "#8fe3a1",
+    "blue": "#8ec5ff",
+}  # fmt: skip
+"""What each colour of a drawing, and of the block diagram, becomes on a dark page."""
+
 
 def look(position: int) -> Look:
     """The look of the line at a position."""

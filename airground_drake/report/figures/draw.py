@@ -7,7 +7,7 @@ panel comes with a table of its data.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -57,9 +57,7 @@ def draw(scenario: Scenario, traces: Mapping[str, Trace]) -> list[Figure]:
     numbers = next((paper for name, paper in _PAPER.items() if scenario.name.startswith(name)), ())
     order = {"trajectories": 0, "decision": 1, "distances": 2, "events": 3}
     numbered = [
-        Figure(
-            f.id, f"{f.title} (the paper's Figure {numbers[order[f.id]]})" if numbers else f.title, f.caption, f.panels
-        )
+        replace(f, title=f"{f.title} (the paper's Figure {numbers[order[f.id]]})") if numbers else replace(f, wide=True)
         for f in drawn
     ]
     return numbered + ([compared] if compared else [])

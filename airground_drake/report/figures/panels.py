@@ -37,12 +37,24 @@ class Panel:
 
 @dataclass(frozen=True)
 class Figure:
-    """A figure: `id` is unique in the page, `caption` says what to see."""
+    """A figure.
+
+    Attributes:
+        id: unique in the page.
+        title: its heading.
+        caption: what to see.
+        panels: its drawings.
+        beside: what it is shown beside, a claim's identifier, `audit-<item>` or `attention-<item>`; '' for the
+            section of figures.
+        wide: whether each panel takes the whole width.
+    """
 
     id: str
     title: str
     caption: str
     panels: tuple[Panel, ...]
+    beside: str = ""
+    wide: bool = False
 
 
 def per_run(
