@@ -64,9 +64,10 @@ FORMULAS: dict[int, tuple[tuple[str, ...], tuple[str, ...]]] = {
         (r"v = J^+ (\dot\sigma_{md} + B (\sigma_{md} - \sigma_m))",),
     ),
     13: (
-        (r"\sigma = \frac{1}{n} \sum_j \rho_j, \quad \frac{\partial \sigma}{\partial \rho_{\text{UAV}}} = 0",),
+        (r"\sigma = \frac{1}{n} \sum_j \rho_j", r"\frac{\partial \sigma}{\partial \rho_{\text{UAV}}} = 0"),
         (
-            r"\sigma = \rho_{\text{UAV}} - \frac{1}{n} \sum_j \rho_j, \quad \frac{\partial \sigma}{\partial \rho_{\text{UAV}}} = I",
+            r"\sigma = \rho_{\text{UAV}} - \frac{1}{n} \sum_j \rho_j",
+            r"\frac{\partial \sigma}{\partial \rho_{\text{UAV}}} = I",
         ),
     ),
     14: (
@@ -83,9 +84,10 @@ FORMULAS: dict[int, tuple[tuple[str, ...], tuple[str, ...]]] = {
     ),
     18: (
         (
-            r"T = \frac{\zeta}{\mu} \tanh \frac{\zeta \mu}{\sigma^2}, \quad E = \frac{1}{1 + e^{2 \zeta \mu / \sigma^2}}",
+            r"T = \frac{\zeta}{\mu} \tanh \frac{\zeta \mu}{\sigma^2}",
+            r"E = \frac{1}{1 + e^{2 \zeta \mu / \sigma^2}}",
         ),
-        (r"T = \frac{\zeta}{\mu}, \quad E = 0 \quad \text{(one threshold, } \mu > 0 \text{)}",),
+        (r"T = \frac{\zeta}{\mu} \quad \text{(one threshold, } \mu > 0 \text{)}", r"E = 0"),
     ),
 }
 """By number of the finding; what is about numbers alone has none."""

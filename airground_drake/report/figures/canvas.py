@@ -19,8 +19,11 @@ from airground_drake.arrays import Array
 MAX_POINTS = 600
 """Points of a line at most: two per pixel of a panel, the extremes of each stretch among them."""
 
-WIDE_IN = 4.4
-"""Width of a panel of full width; smaller ones print the same type larger on a page."""
+MAP_IN, WIDE_IN, FULL_IN, TALLEST_IN = 3.3, 4.4, 11.6, 8.0
+"""Widths of a map among others, of a panel of half the page, of one of the whole page; height of a map at most."""
+
+SCALE = 1.45
+"""CSS pixels per point of a panel that takes the whole width: its type is as large as that of the text."""
 
 INK, MUTED, ALARM = "#1a1a1a", "#5a5a5a", "#b00020"
 _POINTS_PER_INCH = 72.0

@@ -19,8 +19,9 @@ from airground_drake.report.reproduction import MEASURES
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.trace import Trace
 
-MAX_RUNS, MAX_UGVS, MAX_OBSTACLES = 6, 3, 4
-"""What a figure shows at most; the rest is in the trace, and the caption says so."""
+MAX_RUNS, MAX_UGVS, MAX_TEAM, MAX_OBSTACLES = 6, 3, 12, 4
+"""What a figure shows at most; the rest is in the trace, and the caption says so. A map, or lines in one panel, of full
+width have room for a team."""
 
 _PAPER = {"case_a": (3, 4, 5, 6), "case_b": (7, 8, 9, 10)}
 """Numbers of the paper's figures, by the beginning of a scenario's name."""
@@ -32,8 +33,20 @@ class _Selection:
     """What the figures show."""
 
     runs: dict[str, Trace]
+    team: list[str]
     ugvs: list[str]
     obstacles: list[str]
+    wide: bool
+
+    @property
+    def width_in(self) -> float:
+        """Width of a panel over time."""
+        return canvas.FULL_IN if self.wide else canvas.WIDE_IN
+
+    @property
+    def scale(self) -> float:
+        """CSS pixels per point, 0 where the page decides."""
+        return canvas.SCALE if self.wide else 0.0
 
 
 def draw(scenario: Scenario, traces: Mapping[str, Trace]) -> list[Figure]:
@@ -48,13 +61,13 @@ def draw(scenario: Scenario, traces: Mapping[str, Trace]) -> list[Figure]:
     """
     if not traces:
         return []
+    numbers = next((paper for name, paper in _PAPER.items() if scenario.name.startswith(name)), ())
     with canvas.style():
-        chosen = _select(scenario, traces)
+        chosen = _select(scenario, traces, wide=not numbers)
         drawn = [_trajectories(chosen), _decision(chosen)]
         drawn += [_distances(chosen)] if chosen.obstacles else []
         drawn += [_events(chosen)]
         compared = comparison.draw(scenario, traces)
-    numbers = next((paper for name, paper in _PAPER.items() if scenario.name.startswith(name)), ())
     order = {"trajectories": 0, "decision": 1, "distances": 2, "events": 3}
     numbered = [
         replace(f, title=f"{f.title} (the paper's Figure {numbers[order[f.id]]})") if numbers else replace(f, wide=True)
@@ -63,12 +76,13 @@ def draw(scenario: Scenario, traces: Mapping[str, Trace]) -> list[Figure]:
     return numbered + ([compared] if compared else [])
 
 
-def _select(scenario: Scenario, traces: Mapping[str, Trace]) -> _Selection:
+def _select(scenario: Scenario, traces: Mapping[str, Trace], *, wide: bool) -> _Selection:
     plain = {name: trace for name, trace in traces.items() if scenario.runs[name].composition == "augmented"}
     runs = dict(list((plain or dict(traces)).items())[:MAX_RUNS])
     first = next(iter(runs.values()))
     busy = [name for name in first.ugvs if any(events_of(trace, name, *_HAPPENINGS) for trace in runs.values())]
-    ugvs = [*busy, *(name for name in first.ugvs if name not in busy)][:MAX_UGVS]
+    ranked = [*busy, *(name for name in first.ugvs if name not in busy)]
+    team, ugvs = ranked[: MAX_TEAM if wide else MAX_UGVS], ranked[:MAX_UGVS]
     gap = {
         name: min(
             np.linalg.norm(trace.position(ugv) - place(trace, name), axis=1).min()
@@ -80,18 +94,21 @@ def _select(scenario: Scenario, traces: Mapping[str, Trace]) -> _Selection:
     near = sorted(gap, key=gap.__getitem__)[:MAX_OBSTACLES]
     return _Selection(
         runs,
+        [name for name in first.ugvs if name in team],
         [name for name in first.ugvs if name in ugvs],
         [name for name in first.scenario["obstacles"] if name in near],
+        wide,
     )
 
 
 def _trajectories(chosen: _Selection) -> Figure:
     first = next(iter(chosen.runs.values()))
-    frame = maps.frame_of(list(chosen.runs.values()), [*chosen.ugvs, first.robots[-1]])
+    frame = maps.frame_of(list(chosen.runs.values()), [*chosen.team, first.robots[-1]])
+    width_in = frame.width_in(canvas.FULL_IN, canvas.TALLEST_IN) if chosen.wide else canvas.MAP_IN
     stalls = [
         f"in run {name} {ugv} stands still at ({at[0]:.2f}, {at[1]:.2f}) m"
         for name, trace in chosen.runs.items()
-        for ugv in chosen.ugvs
+        for ugv in chosen.team
         if (at := MEASURES["stall_position"](trace, ugv))
     ]
     reach = first.scenario["safe_distance"]["obstacle_m"]
@@ -99,24 +116,25 @@ def _trajectories(chosen: _Selection) -> Figure:
         f"{_sentence('; '.join(stalls)) if stalls else 'No UGV shown stands still short of its target. '}"
         "○ start, \N{MULTIPLICATION SIGN} target, ▲ trigger, □ stands still, ✖ collision. Hexagons are obstacles "
         f"(hollow: not on the UAV's map) in their safe circles of {reach:g} m. The thin dashed line is the UAV's path, "
-        f"projected onto the ground. Equal scales, in m.{_left_out(chosen)}"
+        f"projected onto the ground. Equal scales, in m.{_left_out(chosen, chosen.team)}"
     )
-    robots = [*chosen.ugvs, first.robots[-1]]
+    robots = [*chosen.team, first.robots[-1]]
     panels = per_run(
         "trajectories",
         chosen.runs,
-        lambda trace: maps.plane(trace, chosen.ugvs, frame),
+        lambda trace: maps.plane(trace, chosen.team, frame, width_in),
         lambda trace: f"Paths of {', '.join(robots)} in the ground plane; final positions: {_finals(trace, robots)}.",
         lambda trace: series(
             trace, "Positions, m", {f"{r} {a}": trace.position(r)[:, k] for r in robots for k, a in enumerate("xy")}
         ),
+        chosen.scale,
     )
     return Figure("trajectories", "Trajectories", caption, panels)
 
 
 def _decision(chosen: _Selection) -> Figure:
     columns = {
-        name: {ugv: trace.column(f"{ugv}.decision_variable_m") for ugv in chosen.ugvs}
+        name: {ugv: trace.column(f"{ugv}.decision_variable_m") for ugv in chosen.team}
         for name, trace in chosen.runs.items()
     }
     first = next(iter(chosen.runs.values()))
@@ -125,18 +143,19 @@ def _decision(chosen: _Selection) -> Figure:
     caption = (
         "A UGV that stands still falls behind its moving reference, so its decision variable grows; ▲ marks where it "
         "reaches the threshold (solid line) and an intervention is triggered. A helped UGV falls below it again, and "
-        "the intervention ends at the release level (dotted)." + _left_out(chosen)
+        "the intervention ends at the release level (dotted)." + _left_out(chosen, chosen.team)
     )
     panels = per_run(
         "decision",
         chosen.runs,
-        lambda trace: timelines.decision(trace, chosen.ugvs, top),
+        lambda trace: timelines.decision(trace, chosen.team, top, chosen.width_in),
         lambda trace: (
             "Decision variable over time; largest values: "
             + ", ".join(f"{ugv} {x.max():.2f} m" for ugv, x in columns[trace.run].items())
             + f"; threshold {float(trace.meta['zeta_m']):.3g} m."
         ),
         lambda trace: series(trace, "Decision variables, m", columns[trace.run]),
+        chosen.scale,
     )
     return Figure("decision", "Decision variables", caption, panels)
 
@@ -153,7 +172,7 @@ def _distances(chosen: _Selection) -> Figure:
     top = 1.05 * max(float(gap.max()) for each in gaps.values() for gap in each.values())
     caption = (
         "No line may enter the hatched band below the safe distance d. The circle marks the smallest distance, which "
-        "is exact in continuous time: robots move on straight lines between samples." + _left_out(chosen)
+        "is exact in continuous time: robots move on straight lines between samples." + _left_out(chosen, chosen.ugvs)
     )
 
     def describe(trace: Trace) -> str:
@@ -165,9 +184,10 @@ def _distances(chosen: _Selection) -> Figure:
     panels = per_run(
         "distances",
         chosen.runs,
-        lambda trace: timelines.distances(trace, chosen.ugvs, chosen.obstacles, top),
+        lambda trace: timelines.distances(trace, chosen.ugvs, chosen.obstacles, top, chosen.width_in),
         describe,
         lambda trace: series(trace, "Distances, m", gaps[trace.run]),
+        chosen.scale,
     )
     return Figure("distances", "Distances to the obstacles", caption, panels)
 
@@ -196,14 +216,19 @@ def _events(chosen: _Selection) -> Figure:
     caption = (
         "▲ trigger and ▼ release, with the grey bar between them: the UAV is called upon (under method (a) it does not "
         "come). ◆ proposal of the UAV. ● accepted and ✖ refused by the UGV's gatekeeper (method (b) has none). The "
-        "hatched bar: the UGV carries out an intervention." + _left_out(chosen)
+        "hatched bar: the UGV carries out an intervention." + _left_out(chosen, chosen.ugvs)
     )
     panels = per_run(
         "events",
         chosen.runs,
-        lambda trace: timelines.events(trace, busy(trace)) if busy(trace) else timelines.nothing_happened(trace),
+        lambda trace: (
+            timelines.events(trace, busy(trace), chosen.width_in)
+            if busy(trace)
+            else timelines.nothing_happened(trace, chosen.width_in)
+        ),
         describe,
         table,
+        chosen.scale,
     )
     return Figure("events", "Triggers, proposals and decisions", caption, panels)
 
@@ -216,7 +241,7 @@ def _sentence(text: str) -> str:
     return f"{text[0].upper()}{text[1:]}. "
 
 
-def _left_out(chosen: _Selection) -> str:
+def _left_out(chosen: _Selection, drawn: Sequence[str]) -> str:
     first = next(iter(chosen.runs.values()))
-    hidden: Sequence[str] = [name for name in first.ugvs if name not in chosen.ugvs]
+    hidden = [name for name in first.ugvs if name not in drawn]
     return f" {len(hidden)} more UGVs are not drawn; their data are in the trace." if hidden else ""

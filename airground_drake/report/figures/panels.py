@@ -63,15 +63,16 @@ def per_run(
     drawing: Callable[[Trace], Drawing],
     describe: Callable[[Trace], str],
     table: Callable[[Trace], Table],
+    scale: float = 0.0,
 ) -> tuple[Panel, ...]:
-    """One panel per run."""
+    """One panel per run; `scale` as of `svg.inline`."""
     panels = []
     for position, (name, trace) in enumerate(runs.items()):
         method = str(trace.meta["method"])
         heading = f"Run {name}: method ({method}), {METHODS[method].says}"
         title = f"{kind} of run {name}"
-        text = canvas.svg(drawing(trace))
-        panels.append(Panel(heading, svg.inline(text, f"{kind}-{position}", title, describe(trace)), table(trace)))
+        drawn = svg.inline(canvas.svg(drawing(trace)), f"{kind}-{position}", title, describe(trace), scale=scale)
+        panels.append(Panel(heading, drawn, table(trace)))
     return tuple(panels)
 
 

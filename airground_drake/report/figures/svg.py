@@ -24,7 +24,9 @@ _FONT = re.compile(r"(?:(\w+) )?([\d.]+px) (.+)")
 _ROUNDED = {"d", "points", "transform", "x", "y", "width", "height", "cx", "cy", "rx", "ry", "r"}
 
 
-def inline(svg: str, prefix: str, title: str, description: str, *, natural_size: bool = False) -> str:
+def inline(
+    svg: str, prefix: str, title: str, description: str, *, natural_size: bool = False, scale: float = 0.0
+) -> str:
     """An SVG document as an element to be placed in HTML.
 
     Scripts, style sheets, handlers and references to anything outside the document are removed (style sheets
@@ -37,6 +39,7 @@ def inline(svg: str, prefix: str, title: str, description: str, *, natural_size:
         title: the accessible name.
         description: what it shows.
         natural_size: whether to keep the size of the document; otherwise it is left to the page.
+        scale: CSS pixels per unit of the drawing, if it is to have a width of its own; 0: it is left to the page.
 
     Raises:
         ValueError: if it is not an SVG document.
@@ -55,6 +58,8 @@ def inline(svg: str, prefix: str, title: str, description: str, *, natural_size:
         _clean(element, prefix, used)
     for name in ("version",) if natural_size else ("version", "width", "height"):
         root.attrib.pop(name, None)
+    if scale:
+        root.set("width", f"{scale * float(root.get('viewBox', '0 0 0 0').split()[2]):.0f}")
     root.set("role", "img")
     root.set("aria-labelledby", f"{prefix}-title {prefix}-desc")
     for position, (name, text) in enumerate((("title", title), ("desc", description))):
