@@ -167,7 +167,9 @@ def value(x: Any, unit: str = "") -> str:
 def brief(x: Any, unit: str = "") -> str:
     """A finding about the paper in a line: numbers with their units, named where there are several."""
     if isinstance(x, Mapping):
-        return "; ".join(f"{name} {brief(item, of)}" for key, item in x.items() for name, of in [evidence.split(key)])
+        return "; ".join(
+            f"{name} {brief(item, of or unit)}" for key, item in x.items() for name, of in [evidence.split(key)]
+        )
     if isinstance(x, list):
         return ", ".join(brief(item, unit) for item in x)
     if isinstance(x, bool):

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Browser, Page, sync_playwright
-from report.cases import FINE, built, verdict
+from report.cases import FINE, verdict
 
 from airground_drake.report import audit, document, html
 from airground_drake.report.figures import draw, moments
@@ -27,7 +27,7 @@ pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on the pat
 
 @pytest.fixture(scope="module")
 def page_file(scenario: Scenario, traces: dict[str, Trace], tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A page with everything on it: what differs, what is missing, faults, findings about the paper, broken variants."""
+    """A page with everything on it: what differs or is missing, faults, findings about the paper, broken variants."""
     failed = verdict(
         "c", "refuted", margin=-0.25, unit="m",
         where={"first": "ugv1", "second": "obstacle_1", "t_s": 9.0},

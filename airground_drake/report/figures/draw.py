@@ -105,12 +105,7 @@ def _trajectories(chosen: _Selection) -> Figure:
     first = next(iter(chosen.runs.values()))
     frame = maps.frame_of(list(chosen.runs.values()), [*chosen.team, first.robots[-1]])
     width_in = frame.width_in(canvas.FULL_IN, canvas.TALLEST_IN) if chosen.wide else canvas.MAP_IN
-    stalls = [
-        f"in run {name} {ugv} stands still at ({at[0]:.2f}, {at[1]:.2f}) m"
-        for name, trace in chosen.runs.items()
-        for ugv in chosen.team
-        if (at := MEASURES["stall_position"](trace, ugv))
-    ]
+    stalls = list(filter(None, (_standing(name, trace, chosen.team) for name, trace in chosen.runs.items())))
     reach = first.scenario["safe_distance"]["obstacle_m"]
     caption = (
         f"{_sentence('; '.join(stalls)) if stalls else 'No UGV shown stands still short of its target. '}"
@@ -231,6 +226,14 @@ def _events(chosen: _Selection) -> Figure:
         chosen.scale,
     )
     return Figure("events", "Triggers, proposals and decisions", caption, panels)
+
+
+def _standing(run: str, trace: Trace, ugvs: Sequence[str]) -> str:
+    """Which UGVs stand still short of their targets, and where, if they are few."""
+    found = {ugv: at for ugv in ugvs if (at := MEASURES["stall_position"](trace, ugv))}
+    listed = ", ".join(f"{ugv} stands still at ({at[0]:.2f}, {at[1]:.2f}) m" for ugv, at in found.items())
+    many = f"{len(found)} UGVs stand still"
+    return f"in run {run} {listed if len(found) <= MAX_UGVS else many}" if found else ""
 
 
 def _finals(trace: Trace, robots: Iterable[str]) -> str:

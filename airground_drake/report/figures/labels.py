@@ -32,15 +32,17 @@ def place(axes: Axes, labels: Sequence[Label], lines: Sequence[Array]) -> None:
 
     Args:
         axes: with their final limits.
-        labels: what to write.
+        labels: what to write; what is about a point outside the axes is left out.
         lines: (T, 2) each, in the coordinates of the axes.
     """
+    (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
+    labels = [label for label in labels if left < label.at[0] < right and bottom < label.at[1] < top]
     if not labels:
         return
     at = np.array([label.at[:2] for label in labels])
     kept = [line[thin(line, MAX_LINE_POINTS), :2] for line in lines]
     textalloc.allocate(
-        axes, *at.T, [label.text for label in labels], x_scatter=at[:, 0], y_scatter=at[:, 1],
+        axes, at[:, 0], at[:, 1], [label.text for label in labels], x_scatter=at[:, 0], y_scatter=at[:, 1],
         x_lines=[line[:, 0] for line in kept], y_lines=[line[:, 1] for line in kept],
         textsize=[label.size_pt for label in labels], textcolor=[label.color for label in labels],
         fontweight=[label.weight for label in labels], linecolor=MUTED, linewidth=0.6, max_distance=0.15,

@@ -77,7 +77,7 @@ def plane(trace: Trace, ugvs: Sequence[str], frame: Frame, width_in: float) -> F
         labels.append(_name(robot, target, appearance))
     for ugv in ugvs:
         labels += _happenings(axes, trace, ugv)
-    place(axes, [*labels, *_obstacles(trace, frame)], [trace.position(robot) for robot in (*ugvs, uav)])
+    place(axes, [*labels, *_obstacles(trace.scenario)], [trace.position(robot) for robot in (*ugvs, uav)])
     return figure
 
 
@@ -96,7 +96,7 @@ def compared_paths(runs: Mapping[str, Trace], robot: str, frame: Frame) -> Figur
         if MEASURES["stall_position"](trace, robot):
             axes.plot(*path[-1, :2], marker="s", markersize=11, markerfacecolor="none", color=INK, markeredgewidth=1.6)
             labels.append(Label(path[-1], "stands still"))
-    place(axes, [*labels, *_obstacles(first, frame)], [trace.position(robot) for trace in runs.values()])
+    place(axes, [*labels, *_obstacles(first.scenario)], [trace.position(robot) for trace in runs.values()])
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False, handlelength=4.0, borderaxespad=0.0)
     return figure
 
@@ -125,24 +125,18 @@ def _map(trace: Trace, frame: Frame, width_in: float, above_in: float = 0.1) -> 
     return figure, axes
 
 
-def _obstacles(trace: Trace, frame: Frame) -> list[Label]:
-    """Names of the obstacles in the frame, if they are few, and of what is on the UAV's map only."""
-    scenario = trace.scenario
+def _obstacles(scenario: Mapping[str, Any]) -> list[Label]:
+    """Names of the obstacles, if they are few, and of what is on the UAV's map only."""
     named = scenario["obstacles"] if len(scenario["obstacles"]) <= MAX_NAMED_OBSTACLES else {}
-    found = [
-        Label(
-            np.array(obstacle["position_m"]),
-            short(name, 12) + ("" if obstacle["known_to_uav"] else "\n(unseen by the UAV)"),
-            size_pt=7.5,
-        )
-        for name, obstacle in named.items()
+    hint = {True: "", False: "\n(unseen by the UAV)"}
+    places = [
+        *(
+            (obstacle["position_m"], short(name, 12) + hint[obstacle["known_to_uav"]])
+            for name, obstacle in named.items()
+        ),
+        *((at, "(only on the UAV's map)") for at in scenario["uav"].get("phantoms_m", [])),
     ]
-    found += [
-        Label(np.array(at), "(only on the UAV's map)", size_pt=7.5) for at in scenario["uav"].get("phantoms_m", [])
-    ]
-    return [
-        label for label in found if frame.left < label.at[0] < frame.right and frame.bottom < label.at[1] < frame.top
-    ]
+    return [Label(np.array(at), text, size_pt=7.5) for at, text in places]
 
 
 def _path(axes: Axes, path: Array, appearance: Look, **options: Any) -> None:
