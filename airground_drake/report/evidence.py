@@ -52,7 +52,7 @@ def _records(value: Any) -> list[tuple[str, Mapping[str, Any]]]:
     if isinstance(value, list) and value and all(isinstance(each, Mapping) and each for each in value):
         return [(str(position + 1), each) for position, each in enumerate(value)]
     if isinstance(value, Mapping) and value and all(isinstance(each, Mapping) and each for each in value.values()):
-        return [(str(key).replace("_", " "), each) for key, each in value.items()]
+        return [(str(key), each) for key, each in value.items()]
     return []
 
 

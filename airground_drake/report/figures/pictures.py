@@ -88,7 +88,11 @@ def _intrusion(item: Mapping[str, Any]) -> Lines:
     lines = {name.removesuffix("_m"): (t, np.array(gap)) for name, gap in known.items() if name != "t_s"}
     d = item["evidence"]["safe_distance_m"]
     return Lines(
-        "Distance to the nearest obstacle", "time, s", "distance, m", lines | {"d": (t, np.full(len(t), d))}, {}
+        "Distance to the nearest obstacle",
+        "time, s",
+        "distance, m",
+        lines | {"safe distance": (t, np.full(len(t), d))},
+        {},
     )
 
 
