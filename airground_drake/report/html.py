@@ -174,7 +174,7 @@ def brief(x: Any, unit: str = "") -> str:
         return ", ".join(brief(item, unit) for item in x)
     if isinstance(x, bool):
         return "yes" if x else "no"
-    return f"{number(x, 6)} {unit}".strip() if isinstance(x, int | float) else str(x)
+    return f"{number(x, 5)} {unit}".strip() if isinstance(x, int | float) else str(x)
 
 
 def pretty(x: Any, limit: int = MAX_JSON_CHARS) -> str:

@@ -24,6 +24,8 @@ def mathml(latex: str) -> Markup:
     except Exception:  # the library has an exception for each mistake, without a common base
         return Markup("<code>{}</code>").format(escape(latex))
     for element in root.iter():
+        if element.tag == "mover":
+            element.set("accent", "true")  # a dot over a letter is no smaller than the letter's own
         element.text = unescape(element.text or "") or None
         for name in ("href", "style"):
             element.attrib.pop(name, None)
