@@ -21,6 +21,7 @@ from airground_drake.report.figures.canvas import (
     look,
     rule,
     short,
+    size_in,
     time_line,
 )
 from airground_drake.report.metrics import closest_obstacle, events_of, place
@@ -87,14 +88,12 @@ def distances(trace: Trace, ugvs: Sequence[str], obstacles: Sequence[str], top: 
 def events(trace: Trace, ugvs: Sequence[str], width_in: float) -> Figure:
     """Triggers, proposals and decisions over time, a row each per UGV."""
     rows = [(ugv, row) for ugv in ugvs for row in ("trigger", "proposal", "decision")]
-    figure, (axes,) = _time_axes(
-        1, 0.55 + 0.33 * len(rows), trace, width_in, left_in=1.25, right_in=0.15, above_in=0.05
-    )
+    figure, (axes,) = _time_axes(1, 0.55 + 0.33 * len(rows), trace, width_in, left_in=1.4, right_in=0.15, above_in=0.05)
     axes.set_ylim(len(rows) - 0.4, -0.6)
     rule(axes, "time, s", "")
     for y, (ugv, row) in enumerate(rows):
         name = f"{short(ugv, 9)} {row}"
-        axes.text(-0.02, y, name, transform=axes.get_yaxis_transform(), ha="right", va="center")
+        axes.text(-0.1 / size_in(axes)[0], y, name, transform=axes.get_yaxis_transform(), ha="right", va="center")
         if row == "trigger":
             _bars(axes, trace, trace.column(f"{ugv}.mode") == 1, y, facecolor="#dddddd")
         if row == "decision":
@@ -109,7 +108,7 @@ def events(trace: Trace, ugvs: Sequence[str], width_in: float) -> Figure:
 
 def nothing_happened(trace: Trace, width_in: float) -> Figure:
     """The event panel of a run without events."""
-    figure, (axes,) = _time_axes(1, 0.9, trace, width_in, left_in=1.25, right_in=0.15, above_in=0.05)
+    figure, (axes,) = _time_axes(1, 0.9, trace, width_in, left_in=1.4, right_in=0.15, above_in=0.05)
     rule(axes, "time, s", "")
     axes.text(0.5, 0.5, "no trigger, no proposal, no decision", transform=axes.transAxes, ha="center", va="center")
     return figure
