@@ -7,7 +7,7 @@ from typing import Any
 
 from airground_drake.report.figures.panels import Table
 
-MAX_ROWS, MAX_COLUMNS, MAX_CELL_CHARS = 40, 10, 120
+MAX_ROWS, MAX_COLUMNS, MAX_CELL_CHARS = 40, 10, 200
 """What a table shows at most; all of it is in report.json."""
 UNITS = ("1_m2_s", "1_m_s", "m_sqrt_s", "m2_s", "m_s", "1_s", "1_m", "m", "s")
 """Units with which the names of quantities end, the longest first."""

@@ -121,7 +121,8 @@ def _in_the_dark() -> str:
     rules = "\n".join(
         f'[{name}="{light}"] {{ {name}: {dark}; }}' for light, dark in DARK.items() for name in ("fill", "stroke")
     )
-    return f"@media screen and (prefers-color-scheme: dark) {{\n{rules}\n}}\n"
+    text = f"svg text:not([fill]) {{ fill: {DARK['black']}; }}"
+    return f"@media screen and (prefers-color-scheme: dark) {{\n{rules}\n{text}\n}}\n"
 
 
 def evidence_tables(claim: Mapping[str, Any]) -> list[Table]:

@@ -79,7 +79,7 @@ DARK = {
     "#0060a8": "#6db8ff", "#b34700": "#ff9d5c", "#00705a": "#4fd1b0", "#8b3a8b": "#e08ee0", "#6b5900": "#d9c24d",
     "#303030": "#d0d0d0", "#666666": "#a8a8a8",
     "black": "#e8e8e8", "white": "#16181c", "lightgrey": "#4a4e57", "grey": "#a8a8a8", "green": "#8fe3a1",
-    "blue": "#8ec5ff",
+    "blue": "#8ec5ff", "#444444": "#b0b4bb", "#dfe8f1": "#20303f",
 }  # fmt: skip
 """What each colour of a drawing, and of the block diagram, becomes on a dark page."""
 
