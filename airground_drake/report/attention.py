@@ -81,19 +81,20 @@ def _of_claim(claim: Mapping[str, Any], run: Mapping[str, Any]) -> Item:
 def _words(claim: Mapping[str, Any], place: Mapping[str, Any], bodies: Sequence[str]) -> str:
     """What came of a claim: who, how far from what was allowed, when; whatever of it is known."""
     who = " and ".join(bodies)
-    at = f", {place['t_s']:.3f} s" if isinstance(place.get("t_s"), float | int) else ""
+    known = {name: value for name, value in place.items() if isinstance(value, float | int)}
+    at = f", {known['t_s']:.3f} s" if "t_s" in known else ""
     if claim["status"] in PASSING:
         idle = claim["exercised"] == 0
         return f"nothing put it to the test: no {claim['exercised_by']}" if idle else f"{claim['status']} all the same"
     if claim["status"] != "refuted":
-        known = claim["evidence"].get("reason") or claim["evidence"].get("error")
-        return str(known) if isinstance(known, str) else "could not be decided"
-    if {"min_distance_m", "safe_distance_m"} <= place.keys():
-        return f"{who} at {place['min_distance_m']:.2f} m, {place['safe_distance_m']:g} m needed{at}"
-    if {"distance_m", "margin_m", "condition"} <= place.keys():
-        allowed = place["distance_m"] + place["margin_m"]
-        return f"{who} ended {place['distance_m']:.2f} m from where it must end, {allowed:g} m allowed"
-    margin, unit = place.get("margin", claim["margin"]), place.get("unit", claim["unit"])
+        why = claim["evidence"].get("reason") or claim["evidence"].get("error")
+        return why if isinstance(why, str) else "could not be decided"
+    if {"min_distance_m", "safe_distance_m"} <= known.keys():
+        return f"{who} at {known['min_distance_m']:.2f} m, {known['safe_distance_m']:g} m needed{at}"
+    if {"distance_m", "margin_m"} <= known.keys() and "condition" in place:
+        allowed = known["distance_m"] + known["margin_m"]
+        return f"{who} ended {known['distance_m']:.2f} m from where it must end, {allowed:g} m allowed"
+    margin, unit = known.get("margin", claim["margin"]), place.get("unit", claim["unit"])
     if margin is not None:
         quantity = place.get("hypothesis") or place.get("condition") or claim["quantity"] or "margin"
         missed = f"missed by {-margin:.3g} {unit}" if margin < 0.0 else f"{margin:.3g} {unit} left"

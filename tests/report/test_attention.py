@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from report.cases import FINE, built, verdict
 
 from airground_drake.report import attention
@@ -86,6 +88,20 @@ def test_the_moment_is_drawn_where_there_is_one(scenario: Scenario, traces: dict
     assert [figure.beside for figure in drawn] == ["attention-1"]
     assert "ugv1 and obstacle_1 at 7.717 s" in drawn[0].caption
     assert [row[0] for row in drawn[0].panels[0].table.rows] == ["ugv1", "obstacle_1"]
+
+
+KEYS = st.sampled_from([*attention._NAMES, *TOO_NEAR, *END, "t_s", "hypothesis", "margin", "unit", "kind"])
+VALUES = st.none() | st.booleans() | st.floats() | st.text() | st.sampled_from(["ugv1", "uav", "obstacle_1"])
+
+
+@settings(max_examples=30)
+@given(found=st.dictionaries(KEYS, VALUES | st.lists(VALUES)), margin=st.none() | st.floats(allow_nan=False))
+def test_whatever_a_claim_of_others_found_is_told(
+    scenario: Scenario, traces: dict[str, Trace], found: dict[str, Any], margin: float | None
+) -> None:
+    report = built(scenario, {"c": traces["c"]}, [verdict("c", "refuted", margin=margin, counterexample=found)])
+    assert attention.items(report)[0].words
+    moments.draw(report, traces)
 
 
 def test_many_moments_are_not_all_drawn(scenario: Scenario, traces: dict[str, Trace]) -> None:
