@@ -58,7 +58,7 @@ def test_every_colour_has_another_one_in_the_dark(drawn: list[Figure]) -> None:
 
 def test_own_scenarios_are_drawn_at_full_width_with_the_whole_team(scenario: Scenario) -> None:
     fifth = {f"ugv{k}": replace(scenario.ugvs["ugv1"]) for k in range(1, 6)}
-    own = replace(scenario, name="mine", ugvs=fifth, runs={"a": scenario.runs["a"]})
+    own = replace(scenario, name="mine", reproduction=[], ugvs=fifth, runs={"a": scenario.runs["a"]})
     ways: list[Corners] = [[(0, 2.0 * k, 0.5), (30, 2.0 * k, 13.0)] for k in range(5)]
     trajectories, decision, distances, *_ = draw.draw(own, {"a": along(asdict(own), "a", [*ways, FLIGHT])})
     assert all(figure.wide for figure in (trajectories, decision, distances))

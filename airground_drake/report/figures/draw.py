@@ -63,14 +63,16 @@ def draw(scenario: Scenario, traces: Mapping[str, Trace]) -> list[Figure]:
         return []
     numbers = next((paper for name, paper in _PAPER.items() if scenario.name.startswith(name)), ())
     with canvas.style():
-        chosen = _select(scenario, traces, wide=not numbers)
+        chosen = _select(scenario, traces, wide=not scenario.reproduction)
         drawn = [_trajectories(chosen), _decision(chosen)]
         drawn += [_distances(chosen)] if chosen.obstacles else []
         drawn += [_events(chosen)]
         compared = comparison.draw(scenario, traces)
     order = {"trajectories": 0, "decision": 1, "distances": 2, "events": 3}
     numbered = [
-        replace(f, title=f"{f.title} (the paper's Figure {numbers[order[f.id]]})") if numbers else replace(f, wide=True)
+        replace(
+            f, title=f"{f.title} (the paper's Figure {numbers[order[f.id]]})" if numbers else f.title, wide=chosen.wide
+        )
         for f in drawn
     ]
     return numbered + ([compared] if compared else [])
