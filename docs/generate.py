@@ -143,7 +143,7 @@ def claims() -> str:
             f"About {about}; usually `{claim.expected}`. Equations: {claim.equations}. "
             f"Code: `{claim.__module__.removeprefix('airground_drake.')}`.",
             "",
-            claim.statement,
+            f"**{claim.summary}** {claim.statement}",
             "",
             *(f"    {line}" for line in textwrap.wrap(claim.formula, WIDTH - 4)),
             "",

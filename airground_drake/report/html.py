@@ -1,25 +1,32 @@
 """report.html: one self-contained page that renders report.json, the figures and the diagram.
 
-Its one script moves marks over the trajectories; the content security policy admits nothing else.
+Its content security policy admits its own style sheet and scripts, by their digests, and nothing else; without scripts
+it has everything but the filter of claims and the marks that move over the trajectories.
 """
 
 from __future__ import annotations
 
 import json
+from base64 import b64encode
 from collections.abc import Mapping, Sequence
-from functools import cache
+from functools import cache, partial
+from hashlib import sha256
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from airground_drake.errors import one_line
-from airground_drake.registry import outcome
-from airground_drake.report import scrubber
+from airground_drake.registry import NOT_EXERCISED, outcome
+from airground_drake.report import attention, evidence
 from airground_drake.report.figures import svg
-from airground_drake.report.figures.panels import Figure
+from airground_drake.report.figures.canvas import DARK
+from airground_drake.report.figures.panels import Figure, Table
+from airground_drake.report.mathml import mathml
 from airground_drake.report.reproduction import YES_NO
 
+STYLE, SCRIPTS = "report.css", ("report.js", "scrubber.js")
+"""The style sheet and the scripts of the page, among the templates."""
 MAX_DIAGRAM_CHARS = 500_000
 MAX_JSON_CHARS = 4_000
 LINE_CHARS = 110
@@ -54,22 +61,20 @@ def render(document: Mapping[str, Any], figures: Sequence[Figure], diagram_svg: 
 
     Args:
         document: report.json, as built by `document.build`.
-        figures: as drawn by `figures.draw`, in the order of the page.
+        figures: as drawn by `figures.draw` and the like, in the order of the page.
         diagram_svg: the exported block diagram; left out if it is not an SVG or too large to inline.
     """
     distances = _distances(document["runs"])
+    claims = document["claims"]
     return _environment().get_template("report.html.j2").render(
         report=document,
-        figures=[figure for figure in figures if figure.id not in ("recursion", "refinement")],
-        comparison=next((figure for figure in figures if figure.id == "recursion"), None),
-        refinement=next((figure for figure in figures if figure.id == "refinement"), None),
+        figures=[figure for figure in figures if not figure.beside],
+        beside=_beside(figures),
         diagram=_diagram(diagram_svg, str(document["scenario"]["name"])),
-        groups=_by_claim(document["claims"]),
-        attention=sorted(
-            (claim for claim in document["claims"] if not claim["as_expected"]),
-            key=lambda claim: CHIPS[claim["status"]][2] == "open",
-        ),
-        assumptions=_assumptions(document["claims"]),
+        groups=_by_claim(claims),
+        outcomes=list(dict.fromkeys(outcome(claim["status"], claim["exercised"]) for claim in claims)),
+        attention=attention.items(document),
+        assumptions=_assumptions(claims),
         tightest=_tightest(distances),
         distances=sorted(distances, key=_margin)[:MAX_DISTANCE_ROWS],
         left_out=max(0, len(distances) - MAX_DISTANCE_ROWS),
@@ -78,17 +83,65 @@ def render(document: Mapping[str, Any], figures: Sequence[Figure], diagram_svg: 
 
 @cache
 def _environment() -> Environment:
+    loader = PackageLoader("airground_drake.report")
     environment = Environment(
-        loader=PackageLoader("airground_drake.report"),
+        loader=loader,
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters.update(num=number, value=value, pretty=pretty, together=faults_together, inline=Markup)
-    environment.globals.update(chips=CHIPS, outcome=outcome, max_faults=MAX_FAULTS)
-    environment.globals.update(policy=Markup(scrubber.POLICY), script=Markup(scrubber.SCRIPT))
+    style = f"{loader.get_source(environment, STYLE)[0]}{_in_the_dark()}"
+    scripts = [loader.get_source(environment, name)[0] for name in SCRIPTS]
+    environment.filters.update(
+        num=number, value=value, pretty=pretty, together=faults_together, inline=Markup, mathml=mathml,
+        evidence=evidence_tables, records=partial(evidence.tables, number=number), brief=brief,
+    )  # fmt: skip
+    environment.globals.update(
+        chips=CHIPS, outcome=outcome, max_faults=MAX_FAULTS, policy=Markup(security_policy(style, scripts)),
+        style=Markup(style), scripts=list(map(Markup, scripts)),
+    )  # fmt: skip
     return environment
+
+
+def security_policy(style: str, scripts: Sequence[str]) -> str:
+    """The page's content security policy: nothing but this style sheet and these scripts, from nowhere else."""
+    return (
+        f"default-src 'none'; style-src {_digest(style)}; script-src {' '.join(map(_digest, scripts))}; "
+        "base-uri 'none'; form-action 'none'"
+    )
+
+
+def _digest(text: str) -> str:
+    return f"'sha256-{b64encode(sha256(text.encode()).digest()).decode()}'"
+
+
+def _in_the_dark() -> str:
+    """Rules that give the drawings other colours on a dark page; an ancestor in a selector is not seen from <use>."""
+    rules = "\n".join(
+        f'[{name}="{light}"] {{ {name}: {dark}; }}' for light, dark in DARK.items() for name in ("fill", "stroke")
+    )
+    text = f"svg text:not([fill]) {{ fill: {DARK['black']}; }}"
+    return f"@media screen and (prefers-color-scheme: dark) {{\n{rules}\n{text}\n}}\n"
+
+
+def evidence_tables(claim: Mapping[str, Any]) -> list[Table]:
+    """Counterexample and evidence of a claim as tables; what has a table of its own on the page is left out."""
+    found = {key: item for key, item in claim["evidence"].items() if key != "stl"}
+    on = f", run {claim['run']}" if claim["run"] else ""
+    return [
+        *evidence.tables(claim["counterexample"] or {}, f"{claim['id']}, counterexample{on}", number),
+        *evidence.tables(found, f"{claim['id']}, evidence{on}", number),
+    ]
+
+
+def _beside(figures: Sequence[Figure]) -> dict[str, list[Figure]]:
+    """Figures by what they are shown beside."""
+    found: dict[str, list[Figure]] = {}
+    for figure in figures:
+        if figure.beside:
+            found.setdefault(figure.beside, []).append(figure)
+    return found
 
 
 def number(x: Any, digits: int = 4) -> str:
@@ -110,6 +163,19 @@ def value(x: Any, unit: str = "") -> str:
         return "yes" if x else "no"
     text = f"({', '.join(number(each) for each in x)})" if isinstance(x, list) else number(x)
     return f"{text} {unit}".strip()
+
+
+def brief(x: Any, unit: str = "") -> str:
+    """A finding about the paper in a line: numbers with their units, named where there are several."""
+    if isinstance(x, Mapping):
+        return "; ".join(
+            f"{name} {brief(item, of or unit)}" for key, item in x.items() for name, of in [evidence.split(key)]
+        )
+    if isinstance(x, list):
+        return ", ".join(brief(item, unit) for item in x)
+    if isinstance(x, bool):
+        return "yes" if x else "no"
+    return f"{number(x, 5)} {unit}".strip() if isinstance(x, int | float) else str(x)
 
 
 def pretty(x: Any, limit: int = MAX_JSON_CHARS) -> str:
@@ -167,7 +233,12 @@ def _by_claim(claims: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     for claim in claims:
         groups.setdefault(claim["id"], []).append(claim)
     grouped = [
-        {"id": name, "claims": members, "fine": all(claim["as_expected"] for claim in members)}
+        {
+            "id": name,
+            "claims": members,
+            "fine": all(claim["as_expected"] for claim in members),
+            "idle": all(outcome(claim["status"], claim["exercised"]) == NOT_EXERCISED for claim in members),
+        }
         for name, members in groups.items()
     ]
     return sorted(grouped, key=lambda group: bool(group["fine"]))

@@ -7,6 +7,7 @@ import platform
 import subprocess
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -17,7 +18,7 @@ from airground_drake.diagram import build_diagram
 from airground_drake.errors import PluginError, ReportError
 from airground_drake.progress import SILENT, Watch
 from airground_drake.report import audit, document, folder, html, junit
-from airground_drake.report.figures import zeno_refine
+from airground_drake.report.figures import moments, pictures, zeno_refine
 from airground_drake.report.figures.draw import draw
 from airground_drake.report.figures.panels import Figure
 from airground_drake.report.folder import PAGES
@@ -98,7 +99,8 @@ def write_report(
         files.write_text(output / "junit.xml", junit.render(report))
         written.append("junit.xml")
     if "html" in formats:
-        plates = [*draw(scenario, traces), *_refinement(verdicts)]
+        plates = [*draw(scenario, traces), *_refinement(verdicts, audited), *moments.draw(report, traces)]
+        plates += pictures.draw(report["audit"])
         files.write_text(output / "report.html", html.render(report, plates, drawn))
         written.append("report.html")
     report = document.sealed(report, output, written)
@@ -124,10 +126,10 @@ def read_back(folder: Path, formats: Sequence[str], report: dict[str, Any]) -> N
             raise ReportError(f"{path}: read back, it is not what was written")
 
 
-def _refinement(verdicts: Sequence[Verdict]) -> list[Figure]:
-    """The figure of ZENO-REFINE, if there is such a verdict."""
+def _refinement(verdicts: Sequence[Verdict], audited: bool) -> list[Figure]:
+    """The figure of ZENO-REFINE, if there is such a verdict: beside finding 9, where that is in the report."""
     drawn = [zeno_refine.draw(verdict.finding.evidence) for verdict in verdicts if verdict.claim.id == "ZENO-REFINE"]
-    return [figure for figure in drawn if figure is not None]
+    return [replace(figure, beside="audit-9") if audited else figure for figure in drawn if figure is not None]
 
 
 def _save_certificates(folder: Path, verdicts: Sequence[Verdict]) -> list[str]:

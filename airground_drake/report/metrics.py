@@ -49,7 +49,8 @@ def gatekeeper(trace: Trace) -> dict[str, Any] | None:
     """Summary of the gatekeeper's decisions, None if it made none.
 
     Returns:
-        `calls`, `decisions` (decision -> count), `max_gap` (largest optimality gap), `time_s` (p50, p99, max
+        `calls`, `decisions` (decision -> count), `refusals` (robot -> reason -> proposals refused at the first
+        answer), `max_gap` (largest optimality gap), `time_s` (p50, p99, max
         of the wall-clock times) and `closest_call`: where the costs of accepting and refusing were closest,
         relative to the smaller one, so that nobody has to trust a knife edge. None where not recorded.
     """
@@ -62,9 +63,20 @@ def gatekeeper(trace: Trace) -> dict[str, Any] | None:
     return {
         "calls": len(table),
         "decisions": {str(name): int(count) for name, count in table["decision"].value_counts().sort_index().items()},
+        "refusals": _refusals(trace),
         "max_gap": float(gaps.max()) if len(gaps) else None,
         "time_s": {name: float(value) for name, value in time_s.items()} or None,
         "closest_call": _closest_call(trace),
+    }
+
+
+def _refusals(trace: Trace) -> dict[str, dict[str, int]]:
+    """How many proposals each robot refused at its first answer, by reason."""
+    first = trace.decisions.drop_duplicates(["robot", "issued_s"])
+    refused = first[first["decision"] == "refuse"]
+    return {
+        str(robot): {str(reason): int(count) for reason, count in rows["reason"].value_counts().items()}
+        for robot, rows in refused.groupby("robot")
     }
 
 

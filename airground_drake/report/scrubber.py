@@ -5,9 +5,7 @@ The drawings are complete without it. `templates/scrubber.js` moves marks over t
 
 from __future__ import annotations
 
-from base64 import b64encode
 from collections.abc import Sequence
-from hashlib import sha256
 from importlib import resources
 from typing import Any
 
@@ -25,12 +23,6 @@ PER_UNIT = 10
 """Places are in so many parts of a unit of the drawing, as whole numbers."""
 
 SCRIPT = resources.files("airground_drake.report").joinpath("templates/scrubber.js").read_text(encoding="utf-8")
-
-_DIGEST = b64encode(sha256(SCRIPT.encode()).digest()).decode()
-POLICY = (
-    f"default-src 'none'; style-src 'unsafe-inline'; script-src 'sha256-{_DIGEST}'; base-uri 'none'; form-action 'none'"
-)
-"""Content security policy of a page with this script and no other."""
 
 
 def tracks(drawing: Drawing, trace: Trace, ugvs: Sequence[str]) -> dict[str, Any]:

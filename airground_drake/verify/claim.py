@@ -41,8 +41,10 @@ class Claim(abc.ABC):
 
     Attributes (all of the class):
         id: stable identifier.
-        statement: the claim in words.
+        summary: one plain sentence for a reader who knows no formula; '' if the statement is plain enough.
+        statement: the claim in words, precisely.
         formula: the claim as a formula (plain text).
+        latex: the same typeset, a row each; () if the plain text is to be shown.
         method: how it is decided.
         equations: equation numbers of the paper that it is about.
         assumptions: what is taken for granted.
@@ -60,6 +62,8 @@ class Claim(abc.ABC):
     does_not_establish: str
     expected: Status
     exercised_by: str = ""
+    summary: str = ""
+    latex: tuple[str, ...] = ()
 
 
 class ModelClaim(Claim):
@@ -181,11 +185,21 @@ class Verdict:
 
     def to_json(self) -> dict[str, Any]:
         """The entry of `claims` in report.json; of certificates, their names and SHA-256."""
-        described = ("id", "statement", "formula", "method", "equations", "does_not_establish", "exercised_by")
+        described = (
+            "id",
+            "summary",
+            "statement",
+            "formula",
+            "method",
+            "equations",
+            "does_not_establish",
+            "exercised_by",
+        )
         digests = {name: files.sha256(text.encode()) for name, text in self.finding.certificates.items()}
         return {
             **{name: getattr(self.claim, name) for name in described},
             "assumptions": list(self.claim.assumptions),
+            "latex": list(self.claim.latex),
             "run": self.run,
             "expected": self.expected,
             "as_expected": self.as_expected,

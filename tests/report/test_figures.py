@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import re
 import xml.etree.ElementTree as ET
+from dataclasses import asdict, replace
+from pathlib import Path
 
 import matplotlib
+import matplotlib.figure
 import numpy as np
 import pytest
-from report.cases import make_trace
+from builders.paths import Corners, along
+from report.cases import FLIGHT, make_trace
 
-from airground_drake.report.figures import canvas, draw, svg
+from airground_drake.report.figures import canvas, draw, labels, svg
 from airground_drake.report.figures.panels import Figure
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.trace import Trace
@@ -43,11 +48,45 @@ def test_named_small_and_with_data(drawn: list[Figure]) -> None:
     assert sum(len(panel.svg) for panel in panels) < 600_000
 
 
+def test_every_colour_has_another_one_in_the_dark(drawn: list[Figure]) -> None:
+    used = {color for f in drawn for p in f.panels for color in re.findall(r'(?:fill|stroke)="([^"(]+)"', p.svg)}
+    assert len(used) > 8
+    diagram = Path(__file__).parents[2] / "diagrams" / "case_a.svg"
+    used.update(re.findall(r'(?:fill|stroke)="([^"]+)"', diagram.read_text(encoding="utf-8")))
+    assert used - {"none", "transparent"} <= canvas.DARK.keys()
+
+
+def test_own_scenarios_are_drawn_at_full_width_with_the_whole_team(scenario: Scenario) -> None:
+    fifth = {f"ugv{k}": replace(scenario.ugvs["ugv1"]) for k in range(1, 6)}
+    own = replace(scenario, name="mine", reproduction=[], ugvs=fifth, runs={"a": scenario.runs["a"]})
+    ways: list[Corners] = [[(0, 2.0 * k, 0.5), (30, 2.0 * k, 13.0)] for k in range(5)]
+    trajectories, decision, distances, *_ = draw.draw(own, {"a": along(asdict(own), "a", [*ways, FLIGHT])})
+    assert all(figure.wide for figure in (trajectories, decision, distances))
+    assert all(f">{name}</text>" in figure.panels[0].svg for name in fifth for figure in (trajectories, decision))
+    assert "2 more UGVs are not drawn" in distances.caption
+    width = ET.fromstring(decision.panels[0].svg).get("width")
+    assert width is not None
+    assert 1100 < int(width) < 1240
+
+
+def test_labels_keep_off_each_other() -> None:
+    at = np.random.default_rng(3).uniform(0.3, 0.7, (9, 2))
+    with canvas.style():
+        drawing = matplotlib.figure.Figure(figsize=(5.0, 5.0))
+        axes = drawing.add_axes((0.0, 0.0, 1.0, 1.0))
+        labels.place(axes, [labels.Label(each, f"label {k}") for k, each in enumerate(at)], [at])
+        labels.place(axes, [labels.Label(np.array([2.0, 0.0]), "outside")], [])
+        drawing.draw_without_rendering()
+        boxes = [text.get_window_extent() for text in axes.texts]
+    assert [text.get_text() for text in axes.texts] == [f"label {k}" for k in range(9)]
+    assert not any(one.overlaps(other) for k, one in enumerate(boxes) for other in boxes[:k])
+
+
 def test_labels_carry_units(drawn: list[Figure]) -> None:
-    for figure, labels in zip(
+    for figure, wanted in zip(
         drawn[:3], (["x, m", "y, m"], ["time, s", "decision variable, m"], ["time, s", "distance, m"]), strict=True
     ):
-        assert all(f">{label}</text>" in panel.svg for panel in figure.panels for label in labels)
+        assert all(f">{label}</text>" in panel.svg for panel in figure.panels for label in wanted)
 
 
 def test_without_traces_there_are_none(scenario: Scenario) -> None:

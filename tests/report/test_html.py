@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+import re
+from base64 import b64encode
 from collections.abc import Callable
 from dataclasses import replace
+from hashlib import sha256
 from html.parser import HTMLParser
 
 import pytest
@@ -12,7 +15,7 @@ from report.cases import FINE, Kept, built, event, make_scenario, make_trace, ma
 
 from airground_drake.registry import STATUSES
 from airground_drake.report import document, html
-from airground_drake.report.figures import draw
+from airground_drake.report.figures import draw, moments
 from airground_drake.report.figures.panels import Figure
 from airground_drake.scenarios.schema import Run, Scenario
 from airground_drake.trace import Trace
@@ -64,12 +67,18 @@ def hostile_page() -> str:
     traces[HOSTILE] = make_trace(scenario, HOSTILE, events=[event(1.0, HOSTILE, HOSTILE)])
     traces[HOSTILE].meta["faults"].append({"t_s": 1.0, "robot": HOSTILE, "policy": HOSTILE, "what": HOSTILE})
     claim = type(
-        "Hostile", (Kept,), {"id": HOSTILE, "statement": HOSTILE, "formula": HOSTILE, "assumptions": (HOSTILE,)}
+        "Hostile",
+        (Kept,),
+        {
+            **dict.fromkeys(("id", "summary", "statement", "formula", "method", "exercised_by"), HOSTILE),
+            "latex": (HOSTILE, rf"\text{{{HOSTILE}}} \href{{javascript:alert(1)}}{{x}}"),
+            "assumptions": (HOSTILE,),
+        },
     )
     finding = Finding("refuted", -1.0, HOSTILE, {HOSTILE: HOSTILE}, {"x": HOSTILE}, {HOSTILE: [HOSTILE]})
     report = built(scenario, traces, [*FINE, Verdict(claim(), HOSTILE, finding, "holds")])
     report["provenance"][HOSTILE] = report["provenance"]["command"] = HOSTILE
-    return html.render(report, draw.draw(scenario, traces), DIAGRAM)
+    return html.render(report, [*draw.draw(scenario, traces), *moments.draw(report, traces)], DIAGRAM)
 
 
 def test_faults_are_told_once_each_cut_and_without_what_turns_or_breaks_lines() -> None:
@@ -93,19 +102,36 @@ def text(request: pytest.FixtureRequest) -> str:
 
 
 def test_hostile_names_are_escaped(hostile_page: str) -> None:
-    assert hostile_page.count("<script") == 1  # the page's own; tests of the scrubber look at its policy
+    assert hostile_page.count("<script") == len(html.SCRIPTS)
+    assert "javascript:" not in hostile_page
     assert hostile_page.count("&lt;script&gt;") > 30
     assert not any(name.startswith("on") for _, attributes in Page(hostile_page).tags for name in attributes)
 
 
 def test_self_contained(text: str) -> None:
-    assert not any(tag in ("link", "iframe", "img", "object", "embed") for tag, _ in Page(text).tags)
+    page = Page(text)
+    assert not any(tag in ("link", "iframe", "img", "object", "embed") for tag, _ in page.tags)
+    assert not any("style" in attributes for _, attributes in page.tags)
+    assert page.of("script") == [{}] * len(html.SCRIPTS)
     targets = [a[name] for _, a in Page(text).tags for name in ("href", "src", "data", "action") if name in a]
     assert targets
     assert all(target and target.startswith("#") for target in targets)
     assert "@import" not in text
     assert "url(http" not in text.replace(" ", "").replace('"', "")
     assert len(text.encode()) < 1_500_000
+
+
+def test_the_policy_admits_the_style_sheet_and_the_scripts_of_the_page_and_nothing_else(text: str) -> None:
+    (policy,) = (str(meta["content"]) for meta in Page(text).of("meta") if "http-equiv" in meta)
+    allowed = dict(part.split(" ", 1) for part in policy.split("; "))
+    assert {name: allowed.pop(name) for name in ("default-src", "base-uri", "form-action")} == dict.fromkeys(
+        ("default-src", "base-uri", "form-action"), "'none'"
+    )
+    for tag, directive in (("style", "style-src"), ("script", "script-src")):
+        blocks = re.findall(rf"<{tag}>(.*?)</{tag}>", text, re.DOTALL)
+        digests = [b64encode(sha256(block.encode()).digest()).decode() for block in blocks]
+        assert allowed.pop(directive) == " ".join(f"'sha256-{digest}'" for digest in digests)
+    assert not allowed
 
 
 def test_well_formed_with_unique_ids_and_live_links(text: str) -> None:
@@ -154,15 +180,14 @@ def test_an_unexpected_refutation_is_in_the_banner(
     assert "Not as expected" in banner
     assert "SAFE-TRACE on run c (refuted, expected holds)" in banner
     attention = text[text.index("What needs attention") : text.index('aria-label="Contents"')]
-    assert "\N{MINUS SIGN}0.25 m at robot ugv1" in attention
-    assert "4.25" in attention
+    assert '<a href="#claim-SAFE-TRACE">ugv1: margin missed by 0.25 m, 4.250 s</a>' in attention
 
 
 def test_what_had_nothing_to_check_has_a_chip_of_its_own_that_needs_no_colour(
     scenario: Scenario, traces: dict[str, Trace], page: str
 ) -> None:
     text = html.render(built(scenario, traces, [*FINE, verdict("c", exercised=0), verdict("c", exercised=12)]), [])
-    table = text[text.index("Every claim on every run") : text.index('<details class="claim"')]
+    table = text[text.index("Claims about runs, on every run") : text.index('<p id="tools"')]
     assert table.count("holds, nothing to check") == 1
     assert "\N{EMPTY SET}" in table
     banner = text[text.index('class="banner') : text.index("</section>")]

@@ -28,3 +28,17 @@ def test_inert_and_prefixed() -> None:
 def test_refuses_what_is_no_svg(source: str) -> None:
     with pytest.raises(ValueError, match=r"XML|root element"):
         svg.inline(source, "n", "t", "d")
+
+
+def test_styles_become_attributes_of_the_same_meaning() -> None:
+    style = "fill: #123456; font: 700 9px 'A', sans-serif; text-anchor: middle; background: url(http://e); x: y"
+    source = SOURCE.replace('<rect fill="url(http://e)"/>', f'<text style="{style}">t</text>')
+    text = svg.inline(source, "n", "T", "D")
+    assert "style" not in text
+    assert "background" not in text
+    for attribute in ('fill="#123456"', 'font-weight="700"', 'font-size="9px"', 'text-anchor="middle"'):
+        assert attribute in text
+
+
+def test_a_drawing_may_have_a_width_of_its_own() -> None:
+    assert 'width="18"' in svg.inline(SOURCE, "n", "T", "D", scale=2.0)

@@ -6,17 +6,24 @@ from the formulas alone: `python -m airground_drake.report audit`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from airground_drake.report.audit.companions import companion_findings
 from airground_drake.report.audit.formulas import formula_findings
-from airground_drake.report.audit.runs import findings as of_runs
+from airground_drake.report.audit.runs import findings
 from airground_drake.report.audit.thresholds import threshold_findings
+from airground_drake.report.audit.typeset import typeset
 from airground_drake.scenarios.schema import Scenario
+from airground_drake.trace import Trace
 from airground_drake.verify import Verdict
 
 __all__ = ["of_runs", "whole"]
+
+
+def of_runs(scenario: Scenario, traces: Mapping[str, Trace]) -> list[dict[str, Any]]:
+    """The findings that the runs demonstrate by themselves."""
+    return typeset(findings(scenario, traces))
 
 
 def whole(scenario: Scenario, verdicts: Sequence[Verdict]) -> list[dict[str, Any]]:
@@ -27,4 +34,4 @@ def whole(scenario: Scenario, verdicts: Sequence[Verdict]) -> list[dict[str, Any
         verdicts: on its model; findings that rest on a proof quote them.
     """
     proofs = {verdict.claim.id: verdict.finding for verdict in verdicts if not verdict.run}
-    return [*threshold_findings(scenario, proofs), *formula_findings(scenario), *companion_findings()]
+    return typeset([*threshold_findings(scenario, proofs), *formula_findings(scenario), *companion_findings()])

@@ -10,12 +10,17 @@ from pydrake.solvers import ClarabelSolver, MathematicalProgram
 
 from airground_drake.gatekeeper.certified import CertifiedGatekeepers
 from airground_drake.report.audit.item import Item
+from airground_drake.report.figures.canvas import thin
+from airground_drake.report.figures.timelines import nearest_distance
 from airground_drake.report.metrics import closest_obstacle
 from airground_drake.report.reproduction import MEASURES
 from airground_drake.scenarios.load import load
 from airground_drake.simulation import simulate
 from airground_drake.trace import Trace
 from airground_drake.verify.model.patience.attack import Believing
+
+WAY_POINTS = 120
+"""Points of a line that a finding keeps for its picture."""
 
 
 def companion_findings() -> list[Item]:
@@ -43,6 +48,7 @@ def _sign() -> Item:
         evidence[sign] = {
             "preset_x_m": x,
             "ends_at_m": trace.position("ugv2")[-1].tolist(),
+            "way_m": trace.position("ugv2")[thin(trace.position("ugv2")[:, :2], WAY_POINTS), :2].round(3).tolist(),
             "stalls_at_m": MEASURES["stall_position"](trace, "ugv2"),
             "arrives": bool(MEASURES["arrives"](trace, "ugv2")[0]),
             "command": f"case_a with --set {changes[0]}, run a",
@@ -64,10 +70,14 @@ def _sign() -> Item:
 def _soft_gate() -> Item:
     """Item 10: an intervention that (c) accepts with a predicted distance below d, and (d) renders harmless."""
     evidence: dict[str, Any] = {}
+    gaps: dict[str, Any] = {}
     for name, run in (("c", "c"), ("d", "d"), ("d, accepting everything", "d")):
         trace = _run("soft_gate", run) if name == run else _accepting("soft_gate", run)
         nearest = closest_obstacle(trace, "ugv1")
         accepted = trace.decisions[trace.decisions["decision"] == "accept"]
+        gap = nearest_distance(trace, "ugv1")
+        shown = gaps.setdefault("t_s", np.linspace(trace.t[0], trace.t[-1], WAY_POINTS).round(3).tolist())
+        gaps[f"{name}_m"] = np.interp(shown, trace.t, gap).round(4).tolist()
         evidence[name] = {
             "accepted": len(accepted),
             "least_predicted_clearance_of_accepted_m": (
@@ -93,7 +103,9 @@ def _soft_gate() -> Item:
         and paper["min_distance_m"] < d
         and ours["accepted"] > 0
         and ours["min_distance_m"] >= d - 1e-9,
-        "evidence": evidence | {"safe_distance_m": d, "command": "python -m airground_drake.report soft_gate"},
+        "evidence": evidence
+        | {"safe_distance_m": d, "command": "python -m airground_drake.report soft_gate"}
+        | {"distance_to_the_nearest_obstacle": gaps},
     }
 
 

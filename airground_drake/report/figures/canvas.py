@@ -19,8 +19,11 @@ from airground_drake.arrays import Array
 MAX_POINTS = 600
 """Points of a line at most: two per pixel of a panel, the extremes of each stretch among them."""
 
-WIDE_IN = 4.4
-"""Width of a panel of full width; smaller ones print the same type larger on a page."""
+MAP_IN, WIDE_IN, FULL_IN, TALLEST_IN = 3.3, 4.4, 11.6, 8.0
+"""Widths of a map among others, of a panel of half the page, of one of the whole page; height of a map at most."""
+
+SCALE = 1.45
+"""CSS pixels per point of a panel that takes the whole width: its type is as large as that of the text."""
 
 INK, MUTED, ALARM = "#1a1a1a", "#5a5a5a", "#b00020"
 _POINTS_PER_INCH = 72.0
@@ -68,6 +71,17 @@ LOOKS = (
 )
 """Six looks, distinct for colour-blind readers and in greyscale through dash and marker; reused in turn."""
 UAV_LOOK = Look("#666666", (0, (3, 2)), "d")
+
+DARK = {
+    INK: "#e8e8e8", MUTED: "#b0b4bb", ALARM: "#ff8a9a",
+    "#ffffff": "#16181c", "#f3f3f3": "#22252b", "#eeeeee": "#2a2d34", "#dddddd": "#3a3e46", "#d4d4d4": "#4a4e57",
+    "#cfe6dc": "#1f4436",
+    "#0060a8": "#6db8ff", "#b34700": "#ff9d5c", "#00705a": "#4fd1b0", "#8b3a8b": "#e08ee0", "#6b5900": "#d9c24d",
+    "#303030": "#d0d0d0", "#666666": "#a8a8a8",
+    "black": "#e8e8e8", "white": "#16181c", "lightgrey": "#4a4e57", "grey": "#a8a8a8", "green": "#8fe3a1",
+    "blue": "#8ec5ff", "#444444": "#b0b4bb", "#dfe8f1": "#20303f",
+}  # fmt: skip
+"""What each colour of a drawing, and of the block diagram, becomes on a dark page."""
 
 
 def look(position: int) -> Look:

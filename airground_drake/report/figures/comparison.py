@@ -53,9 +53,7 @@ def draw(scenario: Scenario, traces: Mapping[str, Trace]) -> Figure | None:
         )
         for (key, heading, drawing), columns in zip(drawings, tables, strict=True)
     )
-    return Figure(
-        "recursion", "Recursion (5) against the augmented projector", f"{text} Audit item 1 says why.", panels
-    )
+    return Figure("recursion", "Recursion (5) against the augmented projector", text, panels, beside="audit-1")
 
 
 def _how(scenario: Scenario, run: str) -> str:

@@ -7,7 +7,7 @@ panel comes with a table of its data.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from airground_drake.arrays import Array
 from airground_drake.report.figures import canvas, comparison, maps, timelines
@@ -18,8 +18,9 @@ from airground_drake.report.scrubber import tracks
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.trace import Trace
 
-MAX_RUNS, MAX_UGVS, MAX_OBSTACLES = 6, 3, 4
-"""What a figure shows at most; the rest is in the trace, and the caption says so."""
+MAX_RUNS, MAX_UGVS, MAX_TEAM, MAX_OBSTACLES = 6, 3, 12, 4
+"""What a figure shows at most; the rest is in the trace, and the caption says so. A map, or lines in one panel, of full
+width have room for a team."""
 
 _PAPER = {"case_a": (3, 4, 5, 6), "case_b": (7, 8, 9, 10)}
 """Numbers of the paper's figures, by the beginning of a scenario's name."""
@@ -31,8 +32,20 @@ class _Selection:
     """What the figures show."""
 
     runs: dict[str, Trace]
+    team: list[str]
     ugvs: list[str]
     obstacles: list[str]
+    wide: bool
+
+    @property
+    def width_in(self) -> float:
+        """Width of a panel over time."""
+        return canvas.FULL_IN if self.wide else canvas.WIDE_IN
+
+    @property
+    def scale(self) -> float:
+        """CSS pixels per point, 0 where the page decides."""
+        return canvas.SCALE if self.wide else 0.0
 
 
 def draw(scenario: Scenario, traces: Mapping[str, Trace]) -> list[Figure]:
@@ -47,29 +60,30 @@ def draw(scenario: Scenario, traces: Mapping[str, Trace]) -> list[Figure]:
     """
     if not traces:
         return []
+    numbers = next((paper for name, paper in _PAPER.items() if scenario.name.startswith(name)), ())
     with canvas.style():
-        chosen = _select(scenario, traces)
+        chosen = _select(scenario, traces, wide=not scenario.reproduction)
         drawn = [_trajectories(chosen), _decision(chosen)]
         drawn += [_distances(chosen)] if chosen.obstacles else []
         drawn += [_events(chosen)]
         compared = comparison.draw(scenario, traces)
-    numbers = next((paper for name, paper in _PAPER.items() if scenario.name.startswith(name)), ())
     order = {"trajectories": 0, "decision": 1, "distances": 2, "events": 3}
     numbered = [
-        Figure(
-            f.id, f"{f.title} (the paper's Figure {numbers[order[f.id]]})" if numbers else f.title, f.caption, f.panels
+        replace(
+            f, title=f"{f.title} (the paper's Figure {numbers[order[f.id]]})" if numbers else f.title, wide=chosen.wide
         )
         for f in drawn
     ]
     return numbered + ([compared] if compared else [])
 
 
-def _select(scenario: Scenario, traces: Mapping[str, Trace]) -> _Selection:
+def _select(scenario: Scenario, traces: Mapping[str, Trace], *, wide: bool) -> _Selection:
     plain = {name: trace for name, trace in traces.items() if scenario.runs[name].composition == "augmented"}
     runs = dict(list((plain or dict(traces)).items())[:MAX_RUNS])
     first = next(iter(runs.values()))
     busy = [name for name in first.ugvs if any(events_of(trace, name, *_HAPPENINGS) for trace in runs.values())]
-    ugvs = [*busy, *(name for name in first.ugvs if name not in busy)][:MAX_UGVS]
+    ranked = [*busy, *(name for name in first.ugvs if name not in busy)]
+    team, ugvs = ranked[: MAX_TEAM if wide else MAX_UGVS], ranked[:MAX_UGVS]
     gap = {
         name: min(gap_m(trace, ugv, name).min() for trace in runs.values() for ugv in ugvs)
         for name in first.scenario["obstacles"]
@@ -77,20 +91,18 @@ def _select(scenario: Scenario, traces: Mapping[str, Trace]) -> _Selection:
     near = sorted(gap, key=gap.__getitem__)[:MAX_OBSTACLES]
     return _Selection(
         runs,
+        [name for name in first.ugvs if name in team],
         [name for name in first.ugvs if name in ugvs],
         [name for name in first.scenario["obstacles"] if name in near],
+        wide,
     )
 
 
 def _trajectories(chosen: _Selection) -> Figure:
     first = next(iter(chosen.runs.values()))
-    frame = maps.frame_of(list(chosen.runs.values()), [*chosen.ugvs, first.robots[-1]])
-    stalls = [
-        f"in run {name} {ugv} stands still at ({at[0]:.2f}, {at[1]:.2f}) m"
-        for name, trace in chosen.runs.items()
-        for ugv in chosen.ugvs
-        if (at := MEASURES["stall_position"](trace, ugv))
-    ]
+    frame = maps.frame_of(list(chosen.runs.values()), [*chosen.team, first.robots[-1]])
+    width_in = frame.width_in(canvas.FULL_IN, canvas.TALLEST_IN) if chosen.wide else canvas.MAP_IN
+    stalls = list(filter(None, (_standing(name, trace, chosen.team) for name, trace in chosen.runs.items())))
     reach = first.scenario["safe_distance"]["obstacle_m"]
     circles = "their safe circles"
     if _has_bodies(chosen):
@@ -99,18 +111,19 @@ def _trajectories(chosen: _Selection) -> Figure:
         f"{_sentence('; '.join(stalls)) if stalls else 'No UGV shown stands still short of its target. '}"
         "○ start, \N{MULTIPLICATION SIGN} target, ▲ trigger, □ stands still, ✖ collision. Hexagons are obstacles "
         f"(hollow: not on the UAV's map) in {circles} of {reach:g} m. The thin dashed line is the UAV's path, "
-        f"projected onto the ground. Equal scales, in m.{_left_out(chosen)}"
+        f"projected onto the ground. Equal scales, in m.{_left_out(chosen, chosen.team)}"
     )
-    robots = [*chosen.ugvs, first.robots[-1]]
+    robots = [*chosen.team, first.robots[-1]]
     panels = per_run(
         "trajectories",
         chosen.runs,
-        lambda trace: maps.plane(trace, chosen.ugvs, frame),
+        lambda trace: maps.plane(trace, chosen.team, frame, width_in),
         lambda trace: f"Paths of {', '.join(robots)} in the ground plane; final positions: {_finals(trace, robots)}.",
         lambda trace: series(
             trace, "Positions, m", {f"{r} {a}": trace.position(r)[:, k] for r in robots for k, a in enumerate("xy")}
         ),
-        lambda drawing, trace: tracks(drawing, trace, chosen.ugvs),
+        chosen.scale,
+        lambda drawing, trace: tracks(drawing, trace, chosen.team),
     )
     return Figure("trajectories", "Trajectories", caption, panels)
 
@@ -123,7 +136,7 @@ def _has_bodies(chosen: _Selection) -> bool:
 
 def _decision(chosen: _Selection) -> Figure:
     columns = {
-        name: {ugv: trace.column(f"{ugv}.decision_variable_m") for ugv in chosen.ugvs}
+        name: {ugv: trace.column(f"{ugv}.decision_variable_m") for ugv in chosen.team}
         for name, trace in chosen.runs.items()
     }
     first = next(iter(chosen.runs.values()))
@@ -132,18 +145,19 @@ def _decision(chosen: _Selection) -> Figure:
     caption = (
         "A UGV that stands still falls behind its moving reference, so its decision variable grows; ▲ marks where it "
         "reaches the threshold (solid line) and an intervention is triggered. A helped UGV falls below it again, and "
-        "the intervention ends at the release level (dotted)." + _left_out(chosen)
+        "the intervention ends at the release level (dotted)." + _left_out(chosen, chosen.team)
     )
     panels = per_run(
         "decision",
         chosen.runs,
-        lambda trace: timelines.decision(trace, chosen.ugvs, top),
+        lambda trace: timelines.decision(trace, chosen.team, top, chosen.width_in),
         lambda trace: (
             "Decision variable over time; largest values: "
             + ", ".join(f"{ugv} {x.max():.2f} m" for ugv, x in columns[trace.run].items())
             + f"; threshold {float(trace.meta['zeta_m']):.3g} m."
         ),
         lambda trace: series(trace, "Decision variables, m", columns[trace.run]),
+        chosen.scale,
     )
     return Figure("decision", "Decision variables", caption, panels)
 
@@ -157,7 +171,7 @@ def _distances(chosen: _Selection) -> Figure:
     caption = (
         "No line may enter the hatched band below the safe distance d. The circle marks the smallest distance, which "
         "is exact in continuous time: robots move on straight lines between samples."
-        f"{' Distances are of surfaces.' if _has_bodies(chosen) else ''}{_left_out(chosen)}"
+        f"{' Distances are of surfaces.' if _has_bodies(chosen) else ''}{_left_out(chosen, chosen.ugvs)}"
     )
 
     def describe(trace: Trace) -> str:
@@ -169,9 +183,10 @@ def _distances(chosen: _Selection) -> Figure:
     panels = per_run(
         "distances",
         chosen.runs,
-        lambda trace: timelines.distances(trace, chosen.ugvs, chosen.obstacles, top),
+        lambda trace: timelines.distances(trace, chosen.ugvs, chosen.obstacles, top, chosen.width_in),
         describe,
         lambda trace: series(trace, "Distances, m", gaps[trace.run]),
+        chosen.scale,
     )
     return Figure("distances", "Distances to the obstacles", caption, panels)
 
@@ -200,16 +215,29 @@ def _events(chosen: _Selection) -> Figure:
     caption = (
         "▲ trigger and ▼ release, with the grey bar between them: the UAV is called upon (under method (a) it does not "
         "come). ◆ proposal of the UAV. ● accepted and ✖ refused by the UGV's gatekeeper (method (b) has none). The "
-        "hatched bar: the UGV carries out an intervention." + _left_out(chosen)
+        "hatched bar: the UGV carries out an intervention." + _left_out(chosen, chosen.ugvs)
     )
     panels = per_run(
         "events",
         chosen.runs,
-        lambda trace: timelines.events(trace, busy(trace)) if busy(trace) else timelines.nothing_happened(trace),
+        lambda trace: (
+            timelines.events(trace, busy(trace), chosen.width_in)
+            if busy(trace)
+            else timelines.nothing_happened(trace, chosen.width_in)
+        ),
         describe,
         table,
+        chosen.scale,
     )
     return Figure("events", "Triggers, proposals and decisions", caption, panels)
+
+
+def _standing(run: str, trace: Trace, ugvs: Sequence[str]) -> str:
+    """Which UGVs stand still short of their targets, and where, if they are few."""
+    found = {ugv: at for ugv in ugvs if (at := MEASURES["stall_position"](trace, ugv))}
+    listed = ", ".join(f"{ugv} stands still at ({at[0]:.2f}, {at[1]:.2f}) m" for ugv, at in found.items())
+    many = f"{len(found)} UGVs stand still"
+    return f"in run {run} {listed if len(found) <= MAX_UGVS else many}" if found else ""
 
 
 def _finals(trace: Trace, robots: Iterable[str]) -> str:
@@ -220,7 +248,7 @@ def _sentence(text: str) -> str:
     return f"{text[0].upper()}{text[1:]}. "
 
 
-def _left_out(chosen: _Selection) -> str:
+def _left_out(chosen: _Selection, drawn: Sequence[str]) -> str:
     first = next(iter(chosen.runs.values()))
-    hidden: Sequence[str] = [name for name in first.ugvs if name not in chosen.ugvs]
+    hidden = [name for name in first.ugvs if name not in drawn]
     return f" {len(hidden)} more UGVs are not drawn; their data are in the trace." if hidden else ""

@@ -21,15 +21,16 @@ from airground_drake.report.figures.canvas import (
     look,
     rule,
     short,
-    size_in,
     thin,
 )
+from airground_drake.report.figures.labels import Label, place
 from airground_drake.report.metrics import events_of, radius_m
 from airground_drake.report.reproduction import MEASURES
 from airground_drake.trace import Trace
 
-MAX_NAMED_OBSTACLES = 8
-_BOX = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 1.0}
+MAX_NAMED_OBSTACLES = 12
+_LEFT_IN, _BESIDE_IN = 0.5, 0.65
+"""What is left of a map, and on both sides together, inches."""
 
 
 class Frame(NamedTuple):
@@ -39,6 +40,10 @@ class Frame(NamedTuple):
     right: float
     bottom: float
     top: float
+
+    def width_in(self, widest: float, tallest: float) -> float:
+        """Width of a map of it that is neither wider nor taller than these, inches."""
+        return min(widest, tallest * (self.right - self.left) / (self.top - self.bottom) + _BESIDE_IN)
 
 
 def frame_of(traces: Sequence[Trace], robots: Sequence[str]) -> Frame:
@@ -55,9 +60,10 @@ def frame_of(traces: Sequence[Trace], robots: Sequence[str]) -> Frame:
     return Frame(left, right, bottom - 0.6, top + 0.8)
 
 
-def plane(trace: Trace, ugvs: Sequence[str], frame: Frame) -> Figure:
+def plane(trace: Trace, ugvs: Sequence[str], frame: Frame, width_in: float) -> Figure:
     """Trajectories of a run in the plane: starts o, targets x, obstacles with safe circles, the UAV dashed."""
-    figure, axes = _map(trace, frame, width_in=3.3)
+    figure, axes = _map(trace, frame, width_in)
+    labels = list[Label]()
     uav = trace.robots[-1]
     targets = {**{name: ugv["target_m"] for name, ugv in trace.scenario["ugvs"].items()}, uav: None}
     for position, robot in enumerate([*ugvs, uav]):
@@ -70,21 +76,19 @@ def plane(trace: Trace, ugvs: Sequence[str], frame: Frame) -> Figure:
         target = targets[robot] or end
         if robot != uav:
             axes.plot(*target[:2], marker="x", markersize=7, markeredgewidth=2, color=appearance.color, zorder=4)
-            _name(axes, robot, start, appearance, -11)
-        _name(axes, robot, target, appearance, 6)
-    centres = np.array([obstacle["position_m"][:2] for obstacle in trace.scenario["obstacles"].values()])
-    labels = [np.array([right, -down]) for right in (-1.0, -0.5, 0.0, 0.5, 1.0) for down in (0.0, 0.35, 0.7)]
-    written = [np.repeat(centres + label, 10, axis=0) for label in labels if len(centres)]
-    paths = [*(trace.position(ugv)[:, :2] for ugv in ugvs), *written]
+            labels.append(_name(robot, start, appearance))
+        labels.append(_name(robot, target, appearance))
     for ugv in ugvs:
-        for at, lines in _happenings(axes, trace, ugv):
-            _note(axes, frame, at, lines, paths)
+        labels += _happenings(axes, trace, ugv)
+    place(axes, [*labels, *_obstacles(trace.scenario)], [trace.position(robot) for robot in (*ugvs, uav)])
     return figure
 
 
 def compared_paths(runs: Mapping[str, Trace], robot: str, frame: Frame) -> Figure:
     """Trajectories of one robot in several runs, near the obstacles."""
-    figure, axes = _map(next(iter(runs.values())), frame, WIDE_IN, above_in=0.22 * len(runs))
+    first = next(iter(runs.values()))
+    figure, axes = _map(first, frame, WIDE_IN, above_in=0.22 * len(runs))
+    labels = list[Label]()
     for position, (name, trace) in enumerate(runs.items()):
         path, appearance = trace.position(robot), look(position)
         _path(axes, path, appearance, linewidth=2.0, label=f"run {short(name, 24)}")
@@ -94,26 +98,24 @@ def compared_paths(runs: Mapping[str, Trace], robot: str, frame: Frame) -> Figur
         axes.plot(*path[marked, :2].T, linestyle="none", marker=appearance.marker, markersize=5, color=appearance.color)
         if MEASURES["stall_position"](trace, robot):
             axes.plot(*path[-1, :2], marker="s", markersize=11, markerfacecolor="none", color=INK, markeredgewidth=1.6)
-            _note(
-                axes, frame, path[-1, :2], ["stands still"], [other.position(robot)[:, :2] for other in runs.values()]
-            )
+            labels.append(Label(path[-1], "stands still"))
+    place(axes, [*labels, *_obstacles(first.scenario)], [trace.position(robot) for trace in runs.values()])
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False, handlelength=4.0, borderaxespad=0.0)
     return figure
 
 
 def _map(trace: Trace, frame: Frame, width_in: float, above_in: float = 0.1) -> tuple[Figure, Axes]:
     """Axes over a part of the ground plane, at equal scales, with the obstacles drawn."""
-    left_in, rest_in = 0.5, 0.15
-    inner_in = width_in - left_in - rest_in
+    inner_in = width_in - _BESIDE_IN
     inner_height_in = inner_in * (frame.top - frame.bottom) / (frame.right - frame.left)
     height_in = inner_height_in + 0.42 + above_in
     figure = Figure(figsize=(width_in, height_in))
-    axes = figure.add_axes((left_in / width_in, 0.42 / height_in, inner_in / width_in, inner_height_in / height_in))
+    axes = figure.add_axes((_LEFT_IN / width_in, 0.42 / height_in, inner_in / width_in, inner_height_in / height_in))
     axes.set_xlim(frame.left, frame.right)
     axes.set_ylim(frame.bottom, frame.top)
     axes.set_aspect("equal")
     rule(axes, "x, m", "y, m")
-    for name, obstacle in trace.scenario["obstacles"].items():
+    for obstacle in trace.scenario["obstacles"].values():
         x, y = obstacle["position_m"][:2]
         reach = _safe_circle_m(trace.scenario, obstacle)
         axes.add_patch(Circle((x, y), reach, facecolor="#f3f3f3", edgecolor=MUTED, linestyle=(0, (2, 2)), zorder=1.0))
@@ -122,14 +124,23 @@ def _map(trace: Trace, frame: Frame, width_in: float, above_in: float = 0.1) -> 
             continue
         known = obstacle["known_to_uav"]
         axes.plot(x, y, marker="h", markersize=6, color=INK, markerfacecolor=INK if known else "white", zorder=3)
-        if len(trace.scenario["obstacles"]) <= MAX_NAMED_OBSTACLES:
-            text = short(name, 12) + ("" if known else "\n(unseen by the UAV)")
-            axes.annotate(text, (x, y), (0, -6), textcoords="offset points", ha="center", va="top", fontsize=7.5)
     for x, y, _ in trace.scenario["uav"].get("phantoms_m", []):
         axes.plot(x, y, marker="x", markersize=6, color=MUTED, zorder=3)
-        text = "(only on the UAV's map)"
-        axes.annotate(text, (x, y), (0, -6), textcoords="offset points", ha="center", va="top", fontsize=7.5)
     return figure, axes
+
+
+def _obstacles(scenario: Mapping[str, Any]) -> list[Label]:
+    """Names of the obstacles, if they are few, and of what is on the UAV's map only."""
+    named = scenario["obstacles"] if len(scenario["obstacles"]) <= MAX_NAMED_OBSTACLES else {}
+    hint = {True: "", False: "\n(unseen by the UAV)"}
+    places = [
+        *(
+            (obstacle["position_m"], short(name, 12) + hint[obstacle["known_to_uav"]])
+            for name, obstacle in named.items()
+        ),
+        *((at, "(only on the UAV's map)") for at in scenario["uav"].get("phantoms_m", [])),
+    ]
+    return [Label(np.array(at), text, size_pt=7.5) for at, text in places]
 
 
 def _safe_circle_m(scenario: Mapping[str, Any], obstacle: Mapping[str, Any]) -> float:
@@ -148,15 +159,12 @@ def _path(axes: Axes, path: Array, appearance: Look, **options: Any) -> None:
     axes.plot(*path[rows, :2].T, color=appearance.color, linestyle=appearance.dash, **options)
 
 
-def _name(axes: Axes, robot: str, at: Array, appearance: Look, offset_pt: float) -> None:
-    axes.annotate(
-        short(robot, 9), (float(at[0]), float(at[1])), (0, offset_pt), textcoords="offset points",
-        ha="center", va="bottom", color=appearance.color, fontweight="bold", fontsize=8,
-    )  # fmt: skip
+def _name(robot: str, at: Array, appearance: Look) -> Label:
+    return Label(np.asarray(at), short(robot, 9), appearance.color, weight="bold")
 
 
-def _happenings(axes: Axes, trace: Trace, ugv: str) -> list[tuple[Array, list[str]]]:
-    """Mark where a UGV triggered, collided or stands still; the places with what to write beside them."""
+def _happenings(axes: Axes, trace: Trace, ugv: str) -> list[Label]:
+    """Mark where a UGV triggered, collided or stands still; what to write there."""
     found: list[tuple[Array, list[str]]] = []
 
     def mark(at: Array, text: str, **options: Any) -> None:
@@ -174,23 +182,4 @@ def _happenings(axes: Axes, trace: Trace, ugv: str) -> list[tuple[Array, list[st
     if MEASURES["stall_position"](trace, ugv):
         at = trace.position(ugv)[-1, :2]
         mark(at, "stands still", marker="s", markerfacecolor="none", color=INK, markeredgewidth=1.4)
-    return found
-
-
-def _note(axes: Axes, frame: Frame, at: Array, lines: Sequence[str], paths: Sequence[Array]) -> None:
-    """Write beside a point, on the side where the text covers the least of the paths."""
-    scale_pt = 72.0 * size_in(axes)[0] / (frame.right - frame.left)
-    size = np.array([0.55 * 8.0 * max(map(len, lines)), 11.0 * len(lines)]) / scale_pt
-    points = np.concatenate([path[thin(path, 400)] for path in paths])
-    corner = np.array([[frame.left, frame.bottom], [frame.right, frame.top]])
-
-    def covered(side: tuple[int, int]) -> float:
-        centre = at + np.array(side) * (size / 2 + 10.0 / scale_pt)
-        outside = (centre - size / 2 < corner[0]).any() or (centre + size / 2 > corner[1]).any()
-        return float((np.abs(points - centre) < size / 2).all(axis=1).sum() + 10_000 * outside)
-
-    right, up = min(((1, 0), (-1, 0), (1, -1), (-1, 1), (1, 1), (-1, -1), (0, 1), (0, -1)), key=covered)
-    axes.annotate(
-        "\n".join(lines), (float(at[0]), float(at[1])), (10 * right, 10 * up), textcoords="offset points", fontsize=8,
-        ha=("center", "left", "right")[right], va=("center", "bottom", "top")[up], bbox=_BOX, zorder=5,
-    )  # fmt: skip
+    return [Label(at, "\n".join(lines)) for at, lines in found]

@@ -40,12 +40,24 @@ class Panel:
 
 @dataclass(frozen=True)
 class Figure:
-    """A figure: `id` is unique in the page, `caption` says what to see."""
+    """A figure.
+
+    Attributes:
+        id: unique in the page.
+        title: its heading.
+        caption: what to see.
+        panels: its drawings.
+        beside: what it is shown beside, a claim's identifier, `audit-<item>` or `attention-<item>`; '' for the
+            section of figures.
+        wide: whether each panel takes the whole width.
+    """
 
     id: str
     title: str
     caption: str
     panels: tuple[Panel, ...]
+    beside: str = ""
+    wide: bool = False
 
 
 def per_run(
@@ -54,16 +66,17 @@ def per_run(
     drawing: Callable[[Trace], Drawing],
     describe: Callable[[Trace], str],
     table: Callable[[Trace], Table],
+    scale: float = 0.0,
     tracks: Callable[[Drawing, Trace], Mapping[str, Any]] | None = None,
 ) -> tuple[Panel, ...]:
-    """One panel per run."""
+    """One panel per run; `scale` as of `svg.inline`."""
     panels = []
     for position, (name, trace) in enumerate(runs.items()):
         method = str(trace.meta["method"])
         heading = f"Run {name}: method ({method}), {METHODS[method].says}"
         title = f"{kind} of run {name}"
         picture = drawing(trace)
-        text = svg.inline(canvas.svg(picture), f"{kind}-{position}", title, describe(trace))
+        text = svg.inline(canvas.svg(picture), f"{kind}-{position}", title, describe(trace), scale=scale)
         panels.append(Panel(heading, text, table(trace), tracks(picture, trace) if tracks else None))
     return tuple(panels)
 

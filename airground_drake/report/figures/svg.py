@@ -1,4 +1,8 @@
-"""SVG made fit for inlining in an HTML page: named for screen readers, with unique ids, small, and inert."""
+"""SVG made fit for inlining in an HTML page: named for screen readers, with unique ids, small, inert, unstyled.
+
+Styles become presentation attributes: a page whose content security policy admits no inline style shows them all the
+same, and its style sheet can give each colour another one in the dark.
+"""
 
 from __future__ import annotations
 
@@ -14,15 +18,20 @@ _DROPPED = {
 }
 _REFERENCE = re.compile(r"url\(\s*['\"]?#([^'\")\s]+)['\"]?\s*\)")
 _LONG_NUMBER = re.compile(r"-?\d+\.\d{3,}")
+_STYLED = re.compile(r"(?:fill|stroke|font|opacity|text-anchor|dominant-baseline)[a-z-]*")
+_FONT = re.compile(r"(?:(\w+) )?([\d.]+px) (.+)")
+"""The shorthand `font` of older releases of matplotlib: weight, size, families."""
 _ROUNDED = {"d", "points", "transform", "x", "y", "width", "height", "cx", "cy", "rx", "ry", "r"}
 
 
-def inline(svg: str, prefix: str, title: str, description: str, *, natural_size: bool = False) -> str:
+def inline(
+    svg: str, prefix: str, title: str, description: str, *, natural_size: bool = False, scale: float = 0.0
+) -> str:
     """An SVG document as an element to be placed in HTML.
 
     Scripts, style sheets, handlers and references to anything outside the document are removed (style sheets
-    would apply to the whole page), ids get a prefix, and unused ones are removed, so that several drawings can
-    share a page; coordinates are rounded to 0.01 units.
+    would apply to the whole page), inline styles become attributes, ids get a prefix, and unused ones are removed,
+    so that several drawings can share a page; coordinates are rounded to 0.01 units.
 
     Args:
         svg: the document; `viewBox` must be set.
@@ -30,6 +39,7 @@ def inline(svg: str, prefix: str, title: str, description: str, *, natural_size:
         title: the accessible name.
         description: what it shows.
         natural_size: whether to keep the size of the document; otherwise it is left to the page.
+        scale: CSS pixels per unit of the drawing, if it is to have a width of its own; 0: it is left to the page.
 
     Raises:
         ValueError: if it is not an SVG document.
@@ -41,11 +51,15 @@ def inline(svg: str, prefix: str, title: str, description: str, *, natural_size:
     if root.tag != f"{_TAG}svg":
         raise ValueError(f"the root element is {root.tag!r}, not an SVG")
     _drop(root)
+    for element in root.iter():
+        element.attrib.update(_presentation(element.attrib.pop("style", "")))
     used = {name for element in root.iter() for value in element.attrib.values() for name in _references(value)}
     for element in root.iter():
         _clean(element, prefix, used)
     for name in ("version",) if natural_size else ("version", "width", "height"):
         root.attrib.pop(name, None)
+    if scale:
+        root.set("width", f"{scale * float(root.get('viewBox', '0 0 0 0').split()[2]):.0f}")
     root.set("role", "img" if root.find(f".//{_TAG}a") is None else "group")
     root.set("aria-labelledby", f"{prefix}-title {prefix}-desc")
     for position, (name, text) in enumerate((("title", title), ("desc", description))):
@@ -62,6 +76,16 @@ def _drop(element: ET.Element) -> None:
             element.remove(child)
         else:
             _drop(child)
+
+
+def _presentation(style: str) -> dict[str, str]:
+    """The declarations of an inline style, those that SVG has attributes for."""
+    declared = dict(part.strip().split(":", 1) for part in style.split(";") if ":" in part)
+    found = {name.strip(): value.strip() for name, value in declared.items() if _STYLED.fullmatch(name.strip())}
+    if shorthand := _FONT.fullmatch(found.pop("font", "")):
+        given = zip(("font-weight", "font-size", "font-family"), shorthand.groups(), strict=True)
+        found |= {name: value for name, value in given if value}
+    return found
 
 
 def _references(value: str) -> list[str]:

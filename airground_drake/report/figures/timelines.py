@@ -21,6 +21,7 @@ from airground_drake.report.figures.canvas import (
     look,
     rule,
     short,
+    size_in,
     time_line,
 )
 from airground_drake.report.metrics import closest_obstacle, events_of, gap_m
@@ -33,9 +34,9 @@ _FORBIDDEN: dict[str, Any] = {
 """Look of the band below the safe distance."""
 
 
-def decision(trace: Trace, ugvs: Sequence[str], top: float) -> Figure:
+def decision(trace: Trace, ugvs: Sequence[str], top: float, width_in: float) -> Figure:
     """Decision variables of a run with the threshold and the release level."""
-    figure, (axes,) = _time_axes(1, 2.5, trace, above_in=0.08)
+    figure, (axes,) = _time_axes(1, 2.5, trace, width_in, above_in=0.08)
     zeta, release = float(trace.meta["zeta_m"]), float(trace.scenario["decision"]["release_m"])
     labels = [(zeta, f"threshold {zeta:.3g}", INK)]
     level(axes, zeta, "-")
@@ -55,10 +56,10 @@ def decision(trace: Trace, ugvs: Sequence[str], top: float) -> Figure:
     return figure
 
 
-def distances(trace: Trace, ugvs: Sequence[str], obstacles: Sequence[str], top: float) -> Figure:
+def distances(trace: Trace, ugvs: Sequence[str], obstacles: Sequence[str], top: float, width_in: float) -> Figure:
     """Distances of each UGV to the obstacles, of surfaces, the safe distance d, and the exact minimum."""
     d = float(trace.scenario["safe_distance"]["obstacle_m"])
-    figure, every = _time_axes(len(ugvs), 0.5 + 1.75 * len(ugvs), trace)
+    figure, every = _time_axes(len(ugvs), 0.5 + 1.75 * len(ugvs), trace, width_in)
     for axes, ugv in zip(every, ugvs, strict=True):
         level(axes, d, "-")
         axes.axhspan(0.0, d, **_FORBIDDEN)
@@ -84,15 +85,15 @@ def distances(trace: Trace, ugvs: Sequence[str], obstacles: Sequence[str], top: 
     return figure
 
 
-def events(trace: Trace, ugvs: Sequence[str]) -> Figure:
+def events(trace: Trace, ugvs: Sequence[str], width_in: float) -> Figure:
     """Triggers, proposals and decisions over time, a row each per UGV."""
     rows = [(ugv, row) for ugv in ugvs for row in ("trigger", "proposal", "decision")]
-    figure, (axes,) = _time_axes(1, 0.55 + 0.33 * len(rows), trace, left_in=1.25, right_in=0.15, above_in=0.05)
+    figure, (axes,) = _time_axes(1, 0.55 + 0.33 * len(rows), trace, width_in, left_in=1.4, right_in=0.15, above_in=0.05)
     axes.set_ylim(len(rows) - 0.4, -0.6)
     rule(axes, "time, s", "")
     for y, (ugv, row) in enumerate(rows):
         name = f"{short(ugv, 9)} {row}"
-        axes.text(-0.02, y, name, transform=axes.get_yaxis_transform(), ha="right", va="center")
+        axes.text(-0.1 / size_in(axes)[0], y, name, transform=axes.get_yaxis_transform(), ha="right", va="center")
         if row == "trigger":
             _bars(axes, trace, trace.column(f"{ugv}.mode") == 1, y, facecolor="#dddddd")
         if row == "decision":
@@ -105,9 +106,9 @@ def events(trace: Trace, ugvs: Sequence[str]) -> Figure:
     return figure
 
 
-def nothing_happened(trace: Trace) -> Figure:
+def nothing_happened(trace: Trace, width_in: float) -> Figure:
     """The event panel of a run without events."""
-    figure, (axes,) = _time_axes(1, 0.9, trace, left_in=1.25, right_in=0.15, above_in=0.05)
+    figure, (axes,) = _time_axes(1, 0.9, trace, width_in, left_in=1.4, right_in=0.15, above_in=0.05)
     rule(axes, "time, s", "")
     axes.text(0.5, 0.5, "no trigger, no proposal, no decision", transform=axes.transAxes, ha="center", va="center")
     return figure
@@ -150,17 +151,24 @@ def nearest_distance(trace: Trace, robot: str) -> Array:
 
 
 def _time_axes(
-    count: int, height_in: float, trace: Trace, *, left_in: float = 0.55, right_in: float = 1.05, above_in: float = 0.24
+    count: int,
+    height_in: float,
+    trace: Trace,
+    width_in: float = WIDE_IN,
+    *,
+    left_in: float = 0.55,
+    right_in: float = 1.05,
+    above_in: float = 0.24,
 ) -> tuple[Figure, list[Axes]]:
     """Axes over time, one above the other, with room for labels on the right."""
-    figure = Figure(figsize=(WIDE_IN, height_in))
+    figure = Figure(figsize=(width_in, height_in))
     below_in, between_in = 0.42, 0.32
     inner_in = (height_in - below_in - above_in - between_in * (count - 1)) / count
     every = []
     for row in range(count):
         bottom_in = below_in + (count - 1 - row) * (inner_in + between_in)
-        width_in = WIDE_IN - left_in - right_in
-        box = (left_in / WIDE_IN, bottom_in / height_in, width_in / WIDE_IN, inner_in / height_in)
+        inner_width_in = width_in - left_in - right_in
+        box = (left_in / width_in, bottom_in / height_in, inner_width_in / width_in, inner_in / height_in)
         axes = figure.add_axes(box)
         axes.set_xlim(float(trace.t[0]), float(trace.t[-1]) if len(trace.t) > 1 else float(trace.t[0]) + 1.0)
         every.append(axes)

@@ -46,7 +46,7 @@ def draw(evidence: Mapping[str, Any]) -> Figure | None:
         "The task error stays at the threshold; each step to the right halves the noise step. The bare threshold's "
         f"count grows like one over the square root of the step, ours levels off. {text[0].upper()}{text[1:]}."
     )
-    return Figure("refinement", title, caption, (panel,))
+    return Figure("refinement", title, caption, (panel,), beside="ZENO-REFINE")
 
 
 def _counts(steps: Any, evidence: Mapping[str, Any]) -> Drawing:

@@ -19,6 +19,7 @@ class Comm(TraceClaim):
     """COMM."""
 
     id = "COMM"
+    summary = "The UAV talked only while it was needed, and less than if it always talked."
     statement = (
         "Messages and gatekeeper solves were spent only while the UGV concerned, or the one that it was asked to make "
         "way for, was being intervened on, and no more of them than an always-on scheme would have spent."
@@ -26,6 +27,11 @@ class Comm(TraceClaim):
     formula = (
         "every proposal and decision in [trigger, release + intervention period + gatekeeper period]; "
         "proposals <= n floor(duration / intervention period), decisions <= n floor(duration / gatekeeper period)"
+    )
+    latex = (
+        r"t_{\text{message}} \in [t_{\text{trigger}}, t_{\text{release}} + h_{\text{UAV}} + h_{\text{gate}}]",
+        r"\text{proposals} \le n \lfloor T / h_{\text{UAV}} \rfloor, \quad \text{decisions} \le n \lfloor T / "
+        r"h_{\text{gate}} \rfloor",
     )
     method = (
         "Counts of proposal events and of decisions (each one solve and one answer), each looked up in the intervals "

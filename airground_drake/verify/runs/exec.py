@@ -66,6 +66,7 @@ class Exec(TraceClaim):
     """EXEC."""
 
     id = "EXEC"
+    summary = "Each robot was commanded what its control law says, in every control period."
     statement = (
         "At every control sample of the run each robot was commanded what the control law says: a UGV its own task (6) "
         "and, from when it accepted a proposal until that was over, the intervention (14), composed with the avoidance "
@@ -76,6 +77,20 @@ class Exec(TraceClaim):
         "nothing accepted: v = avoid(own); accepted: v = int(avoid(own)) under (b), (c), v = avoid(int(own)) under "
         "(d); UAV: v = avoid(lim(mean v_j + C (mean rho_j + altitude - rho))); avoid(u) = argmin ||v - u||^2 s.t. "
         "n_k.v >= b_k (recursion_*: (5) as printed); |recorded - v| <= 1e-6 m/s; accepted = what the messages say"
+    )
+    latex = (
+        r"u_{\text{own}} = \operatorname{lim}(\dot\rho_{rd} + B (\rho_{rd} - \rho))",
+        r"\operatorname{int}(v) = \operatorname{lim}(v + J^+ J (\dot\rho_{int} + \Lambda (\rho_{int} - \rho) "
+        r"- v))",
+        r"v = \operatorname{avoid}(u_{\text{own}}) \quad \text{where nothing is accepted}",
+        r"v = \operatorname{int}(\operatorname{avoid}(u_{\text{own}})) \quad \text{accepted, methods (b) and "
+        r"(c)}",
+        r"v = \operatorname{avoid}(\operatorname{int}(u_{\text{own}})) \quad \text{accepted, method (d)}",
+        r"v_{\text{UAV}} = \operatorname{avoid}(\operatorname{lim}(\bar v + C (\bar\rho + z_{\text{UAV}} - "
+        r"\rho)))",
+        r"\operatorname{avoid}(u) = \operatorname{argmin}_v \lVert v - u \rVert^2 \text{ subject to } "
+        r"n_k^\top v \ge b_k",
+        r"\lVert v_{\text{recorded}} - v \rVert \le 10^{-6} \text{ m/s}",
     )
     method = (
         "Evaluated again in plain numpy at each multiple of the control period, at the recorded positions, from "

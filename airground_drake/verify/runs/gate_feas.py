@@ -33,6 +33,7 @@ class GateFeas(GateClaim):
     """GATE-FEAS."""
 
     id = "GATE-FEAS"
+    summary = "Every decision was about the situation that the UGV was in, and its answer follows from its numbers."
     statement = (
         "Every gatekeeper decision was about the UGV's situation at that time, its plan satisfies (26b)-(26e) at the "
         "recorded cost, the answer given is the one that follows from the costs, and no UGV did anything but its own "
@@ -43,6 +44,14 @@ class GateFeas(GateClaim):
         "d_j - ||rho_k - o_jk||); objective = dt sum_k a ||rho_rd - rho_k||^2 + b u_k^2, and the terminal "
         "cost w a ||rho_rd - rho_N||^2 (w = 0 unless the scenario says so); reference, centres, distances and weights "
         "as the scenario and the signals at t have them; answer = rules(costs, standing answer)"
+    )
+    latex = (
+        r"\rho_k = \rho_{k-1} + \Delta t (\omega_k a_k + (1 - \omega_k) b_k), \quad \rho_0 = p(t), \quad "
+        r"\omega_k \in \{0, 1\}",
+        r"u_k = \max(0, \max_j (d_j - \lVert \rho_k - o_{jk} \rVert))",
+        r"J = \Delta t \sum_k (a \lVert \rho_{rd} - \rho_k \rVert^2 + b u_k^2) + w a \lVert \rho_{rd} - "
+        r"\rho_N \rVert^2",
+        r"\text{answer} = \text{rules}(\text{costs}, \text{standing answer})",
     )
     method = (
         "All recomputed in numpy from the scenario, the signals and the recorded mode velocities. A sensed obstacle or "

@@ -85,6 +85,7 @@ class GateModel(GateClaim):
     """GATE-MODEL."""
 
     id = "GATE-MODEL"
+    summary = "What the gatekeeper predicted for yes and for no is what the UGV would have done."
     statement = (
         "The mode velocities that every gatekeeper decision rests on are those of the UGV's closed loop, "
         "with the proposal accepted throughout and refused throughout, rolled out again from what it sensed."
@@ -92,6 +93,11 @@ class GateModel(GateClaim):
     formula = (
         "a_k, b_k = mean velocity over stage k of rho+ = rho + h law(rho; accepted | refused), rho(0) = p(t), others "
         "at their velocities at t; |recorded - recomputed| <= 1e-6 m/s"
+    )
+    latex = (
+        r"\rho^+ = \rho + h \, \text{law}(\rho; \text{accepted or refused}), \quad \rho(0) = p(t)",
+        r"a_k, b_k = \text{mean velocity over stage } k, \quad |\text{recorded} - \text{recomputed}| \le "
+        r"10^{-6} \text{ m/s}",
     )
     method = (
         "The control law in numpy as for EXEC, with code of its own, from the signals, the scenario and the table of "

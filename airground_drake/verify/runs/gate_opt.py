@@ -54,6 +54,7 @@ class GateOpt(ProblemClaim):
     """Width of an enclosure of the optimum, relative, up to which it decides anything."""
 
     id = "GATE-OPT"
+    summary = "Every plan of the gatekeeper was within 5 % of the best that there was."
     statement = (
         "Every gatekeeper decision that rests on a plan costs at most 5 % of the cheaper constant plan's cost more "
         "than the optimum of the problem that its route solves, and neither its lower bound nor its gap is recorded "
@@ -64,6 +65,11 @@ class GateOpt(ProblemClaim):
         "(J(plan) - L) / C <= 0.05; J(plan) <= J(0), J(1); C = min(J(0), J(1)); J is (25) and the "
         "terminal cost w a ||rho_rd - rho_N||^2 (w = 0 unless the scenario says so), J_n >= J with distances along "
         "unit normals n"
+    )
+    latex = (
+        r"L \le \min_\omega J_n(\omega) \le U, \quad U - L \le 10^{-5} C, \quad C = \min(J(0), J(1))",
+        r"\frac{J(\omega_{\text{plan}}) - L}{C} \le 0.05, \quad J(\omega_{\text{plan}}) \le C",
+        r"\text{bound of the route} \le U + 10^{-5} C, \quad \ge L - 10^{-3} C \text{ (relaxed)}",
     )
     method = (
         "Route 'relaxed': the half-plane relaxations of all decisions, from recorded data and normals, are stacked "

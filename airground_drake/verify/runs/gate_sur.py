@@ -22,10 +22,16 @@ class GateSur(ProblemClaim):
     """GATE-SUR."""
 
     id = "GATE-SUR"
+    summary = "Fractional plans were rounded to yes or no by the paper's rule, and stayed close to them."
     statement = "Every relaxed plan was rounded by sum-up rounding, with an integrated error of at most half a stage."
     formula = (
         "rounded_k = 1 if D_k >= 1 - D_k else 0, D_k = sum_{r <= k} relaxed_r - sum_{r < k} rounded_r; "
         "max_k |dt sum_{r <= k} (relaxed_r - rounded_r)| <= dt / 2"
+    )
+    latex = (
+        r"D_k = \sum_{r \le k} \tilde\omega_r - \sum_{r < k} \omega_r, \quad \omega_k = \begin{cases} 1 & D_k "
+        r"\ge 1 - D_k \\ 0 & \text{otherwise} \end{cases}",
+        r"\max_k \left| \Delta t \sum_{r \le k} (\tilde\omega_r - \omega_r) \right| \le \frac{\Delta t}{2}",
     )
     method = (
         "Running sums of the recorded relaxed and rounded plans. Each stage is judged by the deficits that the "

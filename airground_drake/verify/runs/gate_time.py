@@ -15,8 +15,10 @@ class GateTime(TraceClaim):
     """GATE-TIME."""
 
     id = "GATE-TIME"
+    summary = "The gatekeeper was fast enough: it decided within its sampling period."
     statement = "The gatekeeper decided within its sampling period in at least 99 % of its decisions."
     formula = "p99 of the CPU time per decision < gatekeeper period"
+    latex = (r"t_{99} < h_{\text{gate}}, \quad t_{99} \text{ the 99th percentile of the time per decision}",)
     method = "Order statistics (no interpolation, rounded up) of the times measured around every decision of the run."
     equations = "(26)-(29)"
     assumptions = (

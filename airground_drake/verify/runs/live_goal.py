@@ -24,11 +24,18 @@ class LiveGoal(TraceClaim):
     """LIVE-GOAL."""
 
     id = "LIVE-GOAL"
+    summary = "Every robot ended where it must: at its target, or where the scenario says that it stalls."
     statement = "Every robot ended the run at its target, or standing where the scenario declares that it stalls."
     formula = (
         "||p_i(end) - target_i|| <= arrival tolerance; for a declared stall ||p_i(end) - s_i|| <= stall tolerance, "
         "farther than the arrival tolerance from the target, and within 1e-3 m of p_i(end) during the last second; "
         "the UAV then within the arrival tolerance of the UGVs' centroid raised by its altitude"
+    )
+    latex = (
+        r"\lVert p_i(T) - \text{target}_i \rVert \le \varepsilon_{\text{arrival}}",
+        r"\text{declared stall: } \lVert p_i(T) - s_i \rVert \le \varepsilon_{\text{stall}}, \quad \lVert "
+        r"p_i(T) - \text{target}_i \rVert > \varepsilon_{\text{arrival}}",
+        r"\text{and } \lVert p_i(t) - p_i(T) \rVert \le 10^{-3} \text{ m for } t \ge T - 1 \text{ s}",
     )
     method = "The last row of the trace, and for stalls the rows of the last second (straight motion in between)."
     equations = "(6), (9)-(10)"

@@ -47,6 +47,7 @@ class LiveProg(GateClaim):
     """LIVE-PROG."""
 
     id = "LIVE-PROG"
+    summary = "An accepted intervention went as predicted, or was given back in time."
     statement = (
         "Every accepted intervention stayed as near to where it was to be as predicted at its acceptance, or was given "
         "back after the time that the UGV waits, or at the end of its time; no UGV went along more often without a "
@@ -57,6 +58,15 @@ class LiveProg(GateClaim):
         "predicted + lag_m; accepted(t0) to min(end of motion, t0 + longest_s); tries <= most, 0 after rest_s on its "
         "own; first answer: accept iff tries left and (stalls, cost) of accepting is better than of refusing by 1e-6, "
         "or it is another UGV's trigger and accepting does not stall"
+    )
+    latex = (
+        r"\text{lag}(t) = \lVert J^+ J (p(t) - \rho_{int}(t)) \rVert",
+        r"\text{lag} > \text{lag}_{\text{predicted}} + \ell \quad \text{for no longer than } "
+        r"\tau_{\text{behind}}",
+        r"\text{accepted from } t_0 \text{ to } \min(t_{\text{motion}}, t_0 + \tau_{\text{longest}}), \quad "
+        r"\text{tries} \le N",
+        r"\text{accept} \Leftrightarrow (\text{stalls}, V)_{\text{accept}} < (\text{stalls}, "
+        r"V)_{\text{refuse}} \text{ and tries are left, or it makes way}",
     )
     method = (
         "The decisions of each UGV are gone through by time; lags from the signals and the table of proposals, "

@@ -56,11 +56,19 @@ class SafeHyp(TraceClaim):
     """SAFE-HYP."""
 
     id = "SAFE-HYP"
+    summary = "Every command of the run met the conditions under which the safety proof (SAFE-INV) holds."
     statement = "At every control sample of the run the hypotheses of the invariance proof (SAFE-INV) held."
     formula = (
         "n.v >= share A (d - D) where D <= d, else n.v >= -share (D - d) / h, for every pair with D <= sensing range "
         "(share 1 obstacle, 1/2 robot; z of n dropped for a UGV), tolerance 1e-9 m/s; D(0) >= d; A h <= 1; "
         "||v|| <= v_max; v_z = 0 for a UGV; range >= d + (closing speed) h; v constant over at most h"
+    )
+    latex = (
+        r"n^\top v \ge \begin{cases} q A (d - D) & D \le d \\ -q (D - d) / h & D > d \end{cases} \quad "
+        r"\text{for every pair with } D \le R",
+        r"q = 1 \text{ (obstacle)}, \quad q = 1/2 \text{ (robot)}; \quad \text{tolerance } 10^{-9} \text{ m/s}",
+        r"D(0) \ge d, \quad A h \le 1, \quad \lVert v \rVert \le v_{\max}, \quad v_z = 0 \text{ (UGV)}, \quad "
+        r"R \ge d + c h",
     )
     method = (
         "Runtime monitor: positions at each multiple of the control period and the command of the row after it are put "

@@ -15,8 +15,13 @@ class SafeTrace(TraceClaim):
     """SAFE-TRACE."""
 
     id = "SAFE-TRACE"
+    summary = "No robot came closer to an obstacle or to another robot than the safe distance."
     statement = "During the whole run every robot kept the safe distance from every obstacle and every other robot."
     formula = "min over t in [0, duration] of ||p_i(t) - q_j(t)|| >= d_ij for every pair (i, j), tolerance 1e-9 m"
+    latex = (
+        r"\min_{t \in [0, T]} \lVert p_i(t) - q_j(t) \rVert \ge d_{ij} - 10^{-9} \text{ m} \quad \text{for "
+        r"every pair } (i, j)",
+    )
     method = (
         "Exact minimum of the distance on every segment between two rows (closest point of a relative straight motion "
         "to the origin, closed form): nothing is sampled. Before that, each recorded step must equal command times "

@@ -42,6 +42,7 @@ class ThrTrig(TraceClaim):
     """THR-TRIG."""
 
     id = "THR-TRIG"
+    summary = "The UAV stepped in exactly when the error reached the threshold: never late, never without cause."
     statement = (
         "The UAV triggered exactly when the decision variable reached the threshold, none missing and none spurious; "
         "a crossing inside the minimum inter-event time triggers at its end if the variable is still above."
@@ -49,6 +50,11 @@ class ThrTrig(TraceClaim):
     formula = (
         "recorded triggers and releases = those of the automaton run on x(t) = ||rho_rd(t) - rho(t)|| + n(t), "
         "times equal within 1e-5 s; recorded x equal within 1e-6 m at every row"
+    )
+    latex = (
+        r"x(t) = \lVert \rho_{rd}(t) - \rho(t) \rVert + n(t)",
+        r"\text{recorded triggers and releases} = \text{automaton}(x), \quad |\Delta t| \le 10^{-5} \text{ "
+        r"s}, \quad |\Delta x| \le 10^{-6} \text{ m}",
     )
     method = (
         "x is rebuilt from positions, noise and the scenario's preset, cut at the preset's corners and at its turning "

@@ -35,6 +35,7 @@ class SafeDist(ModelClaim):
     """SAFE-DIST."""
 
     id = "SAFE-DIST"
+    summary = "Where velocities are disturbed a little, distances fall short of the safe one by a little at most."
     statement = (
         "If velocities are disturbed by at most w and A h <= 1, no distance falls below d - w/A (obstacle) or "
         "d - 2 w/A (two disturbed robots), as long as its own inequality is met at every sample. Starting at D >= d it "
@@ -43,6 +44,11 @@ class SafeDist(ModelClaim):
         "with n.g >= m > 0 for every point with D < d + h W/m; then all these bounds are kept together."
     )
     formula = "A h <= 1, ||e|| <= w, D(0) >= d - W/A, inequality met at each sample => D(t) >= d - W/A for all t"
+    latex = (
+        r"A h \le 1, \; \lVert e \rVert \le w, \; D(0) \ge d - \frac{W}{A} \; \Rightarrow \; D(t) \ge d - "
+        r"\frac{W}{A} \text{ for all } t",
+        r"W = w \text{ (obstacle)}, \quad W = 2 w \text{ (two disturbed robots)}",
+    )
     method = (
         "Polynomial certificates in D, r, s, A, h, d, W, and again with the scenario's numbers; z3 and cvc5 on the "
         "negations. Besides, disturbed runs of the running layer from safe starts in several geometries, pinned, "

@@ -26,6 +26,7 @@ class SafeGate(ModelClaim):
     """SAFE-GATE."""
 
     id = "SAFE-GATE"
+    summary = "Under method (d) nothing that the UAV asks for can bring a robot closer than the safe distance."
     statement = (
         "Under method (d) no intervention, accepted or not, leaves the safe set: the avoidance layer is applied last, "
         "to whatever velocity comes from below, and from a safe state its output meets every inequality "
@@ -33,6 +34,10 @@ class SafeGate(ModelClaim):
         "adviser, nor its intervention is trusted; as a robot the UAV must keep its own share of each inequality."
     )
     formula = "b_k <= 0 as computed, for all k => for every u: v = avoid(u) has n_k.v >= b_k for all k, as floats"
+    latex = (
+        r"b_k \le 0 \text{ for all } k \; \Rightarrow \; n_k^\top \operatorname{avoid}(u) \ge b_k \text{ for "
+        r"all } k \text{ and every } u",
+    )
     method = (
         "v = 0 meets all inequalities from a safe state, and the last step of the layer shortens the velocity until "
         "none that v = 0 meets is broken; its loop ends only when a comparison of floats finds none, which is the "

@@ -38,6 +38,7 @@ class SafeInv(ModelClaim):
     """SAFE-INV."""
 
     id = "SAFE-INV"
+    summary = "A robot that obeys the avoidance inequalities and starts at a safe distance keeps it."
     statement = (
         "One control period under the avoidance inequalities keeps the distance: if D >= d at a sample and the "
         "velocities held until the next meet their inequality, the distance is >= d all the time in between; if D <= d "
@@ -51,6 +52,14 @@ class SafeInv(ModelClaim):
         "D >= d, n.v >= -q (D - d)/h (sum over the pair: q = 1) => ||x + s v|| >= d for all s in [0, h]; "
         "D <= d, n.v >= q A (d - D) => ||x + s v|| >= D and d - ||x + h v|| <= (1 - A h)(d - D); "
         "D > R, R >= d + c h => ||x + s v|| >= d"
+    )
+    latex = (
+        r"D \ge d, \; n^\top v \ge -q (D - d) / h \; \Rightarrow \; \lVert x + s v \rVert \ge d \quad "
+        r"\text{for all } s \in [0, h]",
+        r"D \le d, \; n^\top v \ge q A (d - D) \; \Rightarrow \; \lVert x + s v \rVert \ge D, \; d - \lVert x "
+        r"+ h v \rVert \le (1 - A h) (d - D)",
+        r"D > R, \; R \ge d + c h \; \Rightarrow \; \lVert x + s v \rVert \ge d",
+        r"q = 1 \text{ in sum over the pair}",
     )
     method = (
         "In D, r = n.v and s through SAFE-LEMMA: polynomial certificates, symbolic in A, h, d and again with the "

@@ -21,12 +21,17 @@ class SafeLemma(ModelClaim):
     """SAFE-LEMMA."""
 
     id = "SAFE-LEMMA"
+    summary = "On a straight line the distance from a point never falls faster than it does at the start."
     statement = (
         "On a straight line the distance from a point is at least its value at the start plus the time times its rate "
         "of change at the start: ||x + s v|| >= ||x|| + s (x.v)/||x|| for x other than 0 and s >= 0, in space and in "
         "the plane."
     )
     formula = "||x + s v|| >= ||x|| + s (x.v)/||x||, x != 0, s >= 0"
+    latex = (
+        r"\lVert x + s v \rVert \ge \lVert x \rVert + s \frac{x^\top v}{\lVert x \rVert}, \quad x \ne 0, "
+        r"\quad s \ge 0",
+    )
     method = (
         "Lagrange's identity ||x||^2 ||v||^2 - (x.v)^2 = sum over i < j of (x_i v_j - x_j v_i)^2, expanded exactly, "
         "and as a rational Gram matrix with exact LDL; the step from squares to norms by polynomial certificates for "

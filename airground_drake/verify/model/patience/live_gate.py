@@ -25,6 +25,7 @@ class LiveGate(ModelClaim):
     """LIVE-GATE."""
 
     id = "LIVE-GATE"
+    summary = "Given room, an intervention that a UGV has accepted is carried through to its end."
     statement = (
         "Under method (d) an accepted intervention is never given back before its time, and is over when its motion "
         "is, as long as there is room along the predicted way, disturbances are bounded and the speed limit is not "
@@ -34,6 +35,14 @@ class LiveGate(ModelClaim):
         "predicted distances >= d + v h + lag_m (robots: d + 2 v h + lag_m), |disturbance| <= Lambda lag_m: |p - "
         "predicted| <= lag_m at every sample, so lag <= predicted lag + lag_m: never late; over by t0 + length / speed "
         "+ h for a motion of that length at that speed, if that is no more than longest_s"
+    )
+    latex = (
+        r"D_{\text{predicted}} \ge d + v h + \ell \text{ (robots: } d + 2 v h + \ell \text{)}, \quad \lVert e "
+        r"\rVert \le \Lambda \ell",
+        r"\Rightarrow \; \lVert p - p_{\text{predicted}} \rVert \le \ell \text{ at every sample}, \quad "
+        r"\text{lag} \le \text{lag}_{\text{predicted}} + \ell",
+        r"t_{\text{over}} \le t_0 + \frac{\text{length}}{\text{speed}} + h \quad \text{if that is no more "
+        r"than } t_0 + \tau_{\text{longest}}",
     )
     method = (
         "The difference e between run and prediction obeys e' = (1 - Lambda h) e + h w, w the disturbance: it never "

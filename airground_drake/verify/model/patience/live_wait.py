@@ -23,6 +23,7 @@ class LiveWait(ModelClaim):
     """LIVE-WAIT."""
 
     id = "LIVE-WAIT"
+    summary = "No UAV can keep a UGV from its own task for ever."
     statement = (
         "Under method (d) no UAV keeps a UGV from its own task for longer than a bound, whatever it proposes, "
         "withdraws or says of its map: after so long the UGV is on its own until it has rested."
@@ -31,6 +32,11 @@ class LiveWait(ModelClaim):
         "between two rests of rest_s on its own: time executed <= tries (longest_s + h), h the period of the "
         "gatekeeper; without progress: given back by (last on time) + behind_s + h; exhausted: tries = 0 again by "
         "(last executed) + rest_s + h"
+    )
+    latex = (
+        r"\text{time executed between two rests} \le N (\tau_{\text{longest}} + h)",
+        r"\text{without progress: given back by } t_{\text{on time}} + \tau_{\text{behind}} + h",
+        r"\text{exhausted: tries} = 0 \text{ again by } t_{\text{executed}} + \tau_{\text{rest}} + h",
     )
     method = (
         "The transitions are read off the running `Patience` by running its methods on symbols. That they keep the "

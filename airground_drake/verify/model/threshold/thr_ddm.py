@@ -49,11 +49,16 @@ class ThrDdm(ModelClaim):
     """THR-DDM."""
 
     id = "THR-DDM"
+    summary = "Simulated decisions take as long, and err as often, as the formulas say."
     statement = (
         "Simulated paths of the decision variable, with and without initial deviation, have the mean decision time and "
         "the error rate of the formulas that the threshold rests on."
     )
     formula = "E[min t: |x(t)| >= zeta] = T of (17), P[x(t) = -zeta] = E of (18), dx = drift dt + noise dW, x(0) = y0"
+    latex = (
+        r"\mathbb{E}[\min \{t : |x(t)| \ge \zeta\}] = T_{(17)}, \quad \mathbb{P}[x(t) = -\zeta] = E_{(18)}",
+        r"d x = \mu \, d t + \sigma \, d W, \quad x(0) = y_0",
+    )
     method = (
         "Monte Carlo on the project's Drake systems (random source, integrated noise, decision variable) with a fixed "
         "seed: six experiments, 36000 paths, barriers corrected for sampling. Supported if all simultaneous 99 % "

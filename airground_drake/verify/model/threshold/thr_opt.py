@@ -48,6 +48,7 @@ class ThrOpt(ModelClaim):
     """THR-OPT."""
 
     id = "THR-OPT"
+    summary = "The threshold in use is the one of least Bayes risk; that of the printed equation is not."
     statement = (
         "Without initial deviation the root of the threshold equation is the only minimiser of the Bayes risk over all "
         "zeta > 0; the root of the printed equation is not one. With initial deviations of +-zeta/2 the risk is not "
@@ -56,6 +57,13 @@ class ThrOpt(ModelClaim):
     formula = (
         "dB/dzeta = (c1 drift/noise^2) / (1 + cosh u) f(u), so dB/dzeta < 0 below the root and > 0 above it; "
         "B(printed root) > B(root); dB/dzeta = (c1/drift) (1 - exp(-2 y0 drift/noise^2)) coth(u/2) at the root for y0"
+    )
+    latex = (
+        r"\frac{d B}{d \zeta} = \frac{c_1 \mu / \sigma^2}{1 + \cosh u} f(u) \quad \text{is negative below the "
+        r"root, positive above it}",
+        r"B(\zeta_{\text{printed}}) > B(\zeta_{\text{root}})",
+        r"\frac{d B}{d \zeta} = \frac{c_1}{\mu} (1 - e^{-2 y_0 \mu / \sigma^2}) \coth \frac{u}{2} \quad "
+        r"\text{at the root for } y_0",
     )
     method = (
         "The factorisation of dB/du is an identity of rational functions in u and exp(u), shown by symbolic "

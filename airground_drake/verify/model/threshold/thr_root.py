@@ -38,8 +38,13 @@ class ThrRoot(ModelClaim):
     """THR-ROOT."""
 
     id = "THR-ROOT"
+    summary = "The threshold equation has exactly one solution, and the program finds it."
     statement = "The threshold equation, with c2/c1 on the right, has exactly one root, and the code returns it."
     formula = "noise^2/drift^2 (sinh u + u) = c2/c1 for one u > 0 only; zeta = u noise^2/(2 drift)"
+    latex = (
+        r"\frac{\sigma^2}{\mu^2} (\sinh u + u) = \frac{c_2}{c_1} \text{ for one } u > 0 \text{ only}, \quad "
+        r"\zeta = \frac{u \sigma^2}{2 \mu}",
+    )
     method = (
         "Ball arithmetic (256 bits) decides the signs of f(u) = k (sinh u + u) - r at two rational points at most "
         "1e-12 apart (relative); f' = k (cosh u + 1) > 0 leaves no second root. The value of `optimal_threshold` "

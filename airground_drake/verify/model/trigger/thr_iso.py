@@ -23,6 +23,7 @@ class ThrIso(ModelClaim):
     """THR-ISO."""
 
     id = "THR-ISO"
+    summary = "No crossing of the threshold slips through between two updates, and none is invented."
     statement = (
         "Between two updates no crossing of a level is missed, however briefly the decision variable is beyond it, and "
         "none is invented: at the end of a simulation step the trigger knows the least and the largest value that the "
@@ -32,6 +33,12 @@ class ThrIso(ModelClaim):
         "x(s) = ||e0 + s (e1 - e0)|| + n0 + s (n1 - n0), s in [0, 1]: max x = max(x(0), x(1)); min x is the least of "
         "x(0), x(1) and p w + const where that lies in the step, p the distance of the line from the origin, "
         "w = sqrt(1 - k^2), k = (n1 - n0)/||e1 - e0||"
+    )
+    latex = (
+        r"x(s) = \lVert e_0 + s (e_1 - e_0) \rVert + n_0 + s (n_1 - n_0), \quad s \in [0, 1]",
+        r"\max x = \max(x(0), x(1)), \quad \min x = \min(x(0), x(1), p w + \text{const})",
+        r"w = \sqrt{1 - k^2}, \quad k = \frac{n_1 - n_0}{\lVert e_1 - e_0 \rVert}, \quad p \text{ the "
+        r"distance of the line from the origin}",
     )
     method = (
         "Convexity and Cauchy's inequality as polynomial implications with exact certificates; z3 and cvc5 on the "

@@ -43,6 +43,7 @@ class ZenoProof(ModelClaim):
     """ZENO-PROOF."""
 
     id = "ZENO-PROOF"
+    summary = "Triggers never pile up: two are at least the minimum inter-event time apart, whatever the noise."
     statement = (
         "Two triggers of a UGV are never closer than the minimum inter-event time, whatever the decision variable "
         "does, so that no run is Zeno."
@@ -50,6 +51,10 @@ class ZenoProof(ModelClaim):
     formula = (
         "for every x: [0, inf) -> R, consecutive triggers satisfy t_(k+1) - t_k >= min_inter_event_s - e, where e, "
         "about 1e-15 s, is the rounding error of triggered_at + dwell"
+    )
+    latex = (
+        r"x : [0, \infty) \to \mathbb{R} \text{ arbitrary} \; \Rightarrow \; t_{k+1} - t_k \ge \tau_{\min} - "
+        r"e, \quad e \approx 10^{-15} \text{ s}",
     )
     method = (
         "The transition relation is read off the running `Trigger` by running its methods on symbols. Its invariant "

@@ -60,6 +60,7 @@ class ZenoRefine(ModelClaim):
 
     id = "ZENO-REFINE"
     expected = "supported"
+    summary = "With ever finer noise a bare threshold triggers ever more often; the trigger in use does not."
     statement = (
         "As the step of the decision noise is refined, the number of events of the bare threshold grows without bound, "
         "like one over the square root of the step; that of the trigger in use tends to a limit."
@@ -67,6 +68,11 @@ class ZenoRefine(ModelClaim):
     formula = (
         "E[triggers of x >= zeta] ~ dt^p with p = -1/2; E[triggers of the automaton] ~ dt^0, and never more than "
         "duration / min_inter_event_s + 1"
+    )
+    latex = (
+        r"\mathbb{E}[N_{\text{bare}}] \sim \Delta t^{p}, \; p = -\frac{1}{2}; \quad "
+        r"\mathbb{E}[N_{\text{automaton}}] \sim \Delta t^{0}, \quad N_{\text{automaton}} \le "
+        r"\frac{T}{\tau_{\min}} + 1",
     )
     method = (
         f"{PATHS} Wiener paths with the task error held at the threshold, each at {HALVINGS + 1} noise steps that "

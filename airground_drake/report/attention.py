@@ -1,0 +1,137 @@
+"""What needs a person's attention in a report, each in one line of words, with the moment that shows it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from airground_drake.registry import PASSING, outcome
+
+REFUSED = {
+    "cheaper": "the plan that it preferred began by waiting",
+    "not_cheaper": "waiting always looked cheaper",
+    "no_difference": "it would have changed nothing",
+    "no_plan": "no outcome could be computed",
+    "stalls": "with the proposal it would have come to rest short of its goal, no nearer than without",
+    "exhausted": "it had gone along as often as it does without a rest",
+}
+"""Why a proposal was refused, for a reader who knows no reason's name."""
+_NAMES = ("first", "second", "robot", "other")
+
+
+@dataclass(frozen=True)
+class Item:
+    """One thing.
+
+    Attributes:
+        chip: the status to show.
+        words: what happened, in one line.
+        claim: whose claim it is, '' if none.
+        run: in which run, '' if none.
+        about: what ought to have been, in words.
+        bodies: robots and obstacles that it is about.
+        t_s: when, s; None: no one moment.
+        anchor: where in the page there is more about it.
+    """
+
+    chip: str
+    words: str
+    claim: str = ""
+    run: str = ""
+    about: str = ""
+    bodies: tuple[str, ...] = ()
+    t_s: float | None = None
+    anchor: str = "claims"
+
+
+def items(document: Mapping[str, Any]) -> list[Item]:
+    """All of a report, in the order of the page: what is refuted first, then what is open, then the rest."""
+    unexpected = [claim for claim in document["claims"] if not claim["as_expected"]]
+    unexpected.sort(key=lambda claim: claim["status"] in ("inconclusive", "error", "not_run"))
+    return [
+        *(_of_claim(claim, document["runs"].get(claim["run"], {})) for claim in unexpected),
+        *(Item("not_run", f"{each['why']}", each["id"], each["run"]) for each in document["overall"]["missing"]),
+        *_of_the_paper(document),
+        *_of_faults(document["runs"]),
+    ]
+
+
+def _of_claim(claim: Mapping[str, Any], run: Mapping[str, Any]) -> Item:
+    place = {**claim["where"], **(claim["counterexample"] or {})}
+    bodies = tuple(dict.fromkeys(str(place[name]) for name in _NAMES if isinstance(place.get(name), str)))
+    t_s = place.get("t_s")
+    at_the_end = "condition" in place and run
+    words = _words(claim, place, bodies)
+    if at_the_end and bodies:
+        t_s = run["metrics"]["duration_s"]
+        words += _refused(run, bodies[0])
+    return Item(
+        outcome(claim["status"], claim["exercised"]),
+        words,
+        claim["id"],
+        claim["run"],
+        about=f"expected: {str(claim['expected']).replace('_', ' ')}",
+        bodies=bodies,
+        t_s=t_s if isinstance(t_s, float | int) else None,
+        anchor=f"claim-{claim['id']}",
+    )
+
+
+def _words(claim: Mapping[str, Any], place: Mapping[str, Any], bodies: Sequence[str]) -> str:
+    """What came of a claim: who, how far from what was allowed, when; whatever of it is known."""
+    who = " and ".join(bodies)
+    known = {name: value for name, value in place.items() if isinstance(value, float | int)}
+    at = f", {known['t_s']:.3f} s" if "t_s" in known else ""
+    if claim["status"] in PASSING:
+        idle = claim["exercised"] == 0
+        return f"nothing put it to the test: no {claim['exercised_by']}" if idle else f"{claim['status']} all the same"
+    if claim["status"] != "refuted":
+        why = claim["evidence"].get("reason") or claim["evidence"].get("error")
+        return why if isinstance(why, str) else "could not be decided"
+    if {"min_distance_m", "safe_distance_m"} <= known.keys():
+        return f"{who} at {known['min_distance_m']:.2f} m, {known['safe_distance_m']:g} m needed{at}"
+    if {"distance_m", "margin_m"} <= known.keys() and "condition" in place:
+        allowed = known["distance_m"] + known["margin_m"]
+        return f"{who} ended {known['distance_m']:.2f} m from where it must end, {allowed:g} m allowed"
+    margin, unit = known.get("margin", claim["margin"]), place.get("unit", claim["unit"])
+    if margin is not None:
+        quantity = place.get("hypothesis") or place.get("condition") or claim["quantity"] or "margin"
+        missed = f"missed by {-margin:.3g} {unit}" if margin < 0.0 else f"{margin:.3g} {unit} left"
+        return f"{who + ': ' if who else ''}{quantity} {missed}{at}"
+    what = next((str(place[key]) for key in ("quantity", "what", "kind", "reason") if place.get(key)), "refuted")
+    return f"{who + ': ' if who else ''}{what}{at}"
+
+
+def _refused(run: Mapping[str, Any], robot: str) -> str:
+    """What became of the proposals to a robot that did not get where it must."""
+    gate = run["metrics"]["gatekeeper"] or {}
+    reasons: Mapping[str, int] = gate.get("refusals", {}).get(robot, {})
+    if not reasons:
+        return ""
+    why = "; ".join(
+        f"{REFUSED.get(reason, reason.replace('_', ' '))}{f' ({count})' if len(reasons) > 1 else ''}"
+        for reason, count in sorted(reasons.items(), key=lambda item: -item[1])
+    )
+    count = sum(reasons.values())
+    return f"; refused {count} {'time' if count == 1 else 'times'}: {why}"
+
+
+def _of_the_paper(document: Mapping[str, Any]) -> Iterator[Item]:
+    for row in document["reproduction"]:
+        if row["status"] == "not_reproduced":
+            yield Item(
+                "not_reproduced", f"{row['id']}, {row['quantity']}: {row['why']}", run=row["run"], anchor="reproduction"
+            )
+    for number in document["overall"]["undemonstrated"]:
+        yield Item("not_demonstrated", f"finding {number} about the paper", anchor="audit")
+    for mutant in document["overall"]["surviving_mutants"]:
+        yield Item("not_as_expected", f"a broken variant was not refuted: {mutant}", anchor="mutants")
+
+
+def _of_faults(runs: Mapping[str, Mapping[str, Any]]) -> Iterator[Item]:
+    for name, run in runs.items():
+        if run["faults"]:
+            count, policies = len(run["faults"]), sorted({str(fault["policy"]) for fault in run["faults"]})
+            words = f"{count} {'fault' if count == 1 else 'faults'} of {', '.join(policies)}"
+            yield Item("error", words, run=name, anchor="runs")

@@ -1,0 +1,50 @@
+"""Labels beside their points, off each other, the lines and the points of a drawing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import textalloc
+from matplotlib.axes import Axes
+
+from airground_drake.arrays import Array
+from airground_drake.report.figures.canvas import INK, MUTED, thin
+
+MAX_LINE_POINTS = 80
+"""Points of a line that labels keep off."""
+_BOX = {"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 0.5}
+
+
+class Label(NamedTuple):
+    """A text beside a point of the plane."""
+
+    at: Array
+    text: str
+    color: str = INK
+    size_pt: float = 8.0
+    weight: str = "normal"
+
+
+def place(axes: Axes, labels: Sequence[Label], lines: Sequence[Array]) -> None:
+    """Write the labels, the first ones nearest to their points; one that had to move away is tied by a thin line.
+
+    Args:
+        axes: with their final limits.
+        labels: what to write; what is about a point outside the axes is left out.
+        lines: (T, 2) each, in the coordinates of the axes.
+    """
+    (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
+    labels = [label for label in labels if left < label.at[0] < right and bottom < label.at[1] < top]
+    if not labels:
+        return
+    at = np.array([label.at[:2] for label in labels])
+    kept = [line[thin(line, MAX_LINE_POINTS), :2] for line in lines]
+    textalloc.allocate(
+        axes, at[:, 0], at[:, 1], [label.text for label in labels], x_scatter=at[:, 0], y_scatter=at[:, 1],
+        x_lines=[line[:, 0] for line in kept], y_lines=[line[:, 1] for line in kept],
+        textsize=[label.size_pt for label in labels], textcolor=[label.color for label in labels],
+        fontweight=[label.weight for label in labels], linecolor=MUTED, linewidth=0.6, max_distance=0.15,
+        zorder=5, bbox=_BOX,
+    )  # fmt: skip

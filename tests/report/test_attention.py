@@ -1,0 +1,109 @@
+"""What needs attention: in words, with who and when, and a picture of the moment."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from report.cases import FINE, built, verdict
+
+from airground_drake.report import attention
+from airground_drake.report.figures import moments
+from airground_drake.scenarios.schema import Scenario
+from airground_drake.trace import Trace
+
+AT = {"first": "ugv1", "second": "obstacle_1", "t_s": 7.717}
+TOO_NEAR = {"min_distance_m": 0.0, "safe_distance_m": 2.0, "margin_m": -2.0}
+END = {"robot": "ugv1", "condition": "at its target", "distance_m": 4.2, "margin_m": -4.1}
+
+
+@pytest.mark.parametrize(
+    ("status", "finding", "words"),
+    [
+        (
+            "refuted",
+            {"where": AT, "counterexample": AT | TOO_NEAR},
+            "ugv1 and obstacle_1 at 0.00 m, 2 m needed, 7.717 s",
+        ),
+        ("refuted", {"counterexample": END}, "ugv1 ended 4.20 m from where it must end, 0.1 m allowed"),
+        (
+            "refuted",
+            {"margin": -3.0, "unit": "m/s", "counterexample": AT | {"hypothesis": "avoidance", "margin": -0.5}},
+            "ugv1 and obstacle_1: avoidance missed by 0.5 m/s, 7.717 s",
+        ),
+        ("refuted", {"counterexample": {"kind": "stray", "t_s": 1.0}}, "stray, 1.000 s"),
+        ("refuted", {}, "refuted"),
+        ("error", {"evidence": {"error": "TraceError: no"}}, "TraceError: no"),
+        ("not_run", {"evidence": {"reason": "no bound"}}, "no bound"),
+        ("inconclusive", {}, "could not be decided"),
+    ],
+)
+def test_in_words(
+    scenario: Scenario, traces: dict[str, Trace], status: Any, finding: dict[str, Any], words: str
+) -> None:
+    report = built(scenario, traces, [*FINE[1:], verdict("a", status, **finding)])
+    (item,) = attention.items(report)
+    assert (item.words, item.claim, item.run, item.anchor) == (words, "SAFE-TRACE", "a", "claim-SAFE-TRACE")
+
+
+def test_a_pass_that_was_not_wanted(scenario: Scenario, traces: dict[str, Trace]) -> None:
+    unwanted = [verdict("a", expected="refuted"), verdict("c", expected="exercised", exercised=0), FINE[2]]
+    words = {item.run: item.words for item in attention.items(built(scenario, traces, unwanted))}
+    assert words == {"a": "holds all the same", "c": "nothing put it to the test: no pairs"}
+
+
+def test_why_a_robot_was_not_helped(scenario: Scenario, traces: dict[str, Trace]) -> None:
+    report = built(scenario, traces, [FINE[0], verdict("c", "refuted", counterexample=END), FINE[2]])
+    refusals = report["runs"]["c"]["metrics"]["gatekeeper"]["refusals"]
+    assert refusals == {}
+    refusals["ugv1"] = {"not_cheaper": 53}
+    (item,) = attention.items(report)
+    assert item.words.endswith("; refused 53 times: waiting always looked cheaper")
+    refusals["ugv1"] = {"not_cheaper": 1, "a_new_one": 2}
+    assert attention.items(report)[0].words.endswith(
+        "; refused 3 times: a new one (2); waiting always looked cheaper (1)"
+    )
+
+
+def test_what_is_missing_faulty_or_not_the_paper_s(scenario: Scenario, traces: dict[str, Trace]) -> None:
+    report = built(scenario, traces, FINE[:2])
+    report["runs"]["c"]["faults"] = [{"t_s": 1.0, "policy": "detour"}] * 2
+    report["reproduction"][0] |= {"status": "not_reproduced", "why": "differs by 3 m"}
+    report["overall"] |= {"undemonstrated": [7], "surviving_mutants": ["SAFE-INV: half"]}
+    assert [(item.words, item.anchor) for item in attention.items(report)] == [
+        ("no claim was checked on the run", "claims"),
+        ("A1, stalls at: differs by 3 m", "reproduction"),
+        ("finding 7 about the paper", "audit"),
+        ("a broken variant was not refuted: SAFE-INV: half", "mutants"),
+        ("2 faults of detour", "runs"),
+    ]
+
+
+def test_the_moment_is_drawn_where_there_is_one(scenario: Scenario, traces: dict[str, Trace]) -> None:
+    somewhere = verdict("c", "refuted", where=AT, counterexample=AT | TOO_NEAR)
+    nowhere = verdict("a", "refuted", counterexample={"kind": "stray"})
+    drawn = moments.draw(built(scenario, traces, [nowhere, somewhere, FINE[2]]), traces)
+    assert [figure.beside for figure in drawn] == ["attention-1"]
+    assert "ugv1 and obstacle_1 at 7.717 s" in drawn[0].caption
+    assert [row[0] for row in drawn[0].panels[0].table.rows] == ["ugv1", "obstacle_1"]
+
+
+KEYS = st.sampled_from([*attention._NAMES, *TOO_NEAR, *END, "t_s", "hypothesis", "margin", "unit", "kind"])
+VALUES = st.none() | st.booleans() | st.floats() | st.text() | st.sampled_from(["ugv1", "uav", "obstacle_1"])
+
+
+@settings(max_examples=30)
+@given(found=st.dictionaries(KEYS, VALUES | st.lists(VALUES)), margin=st.none() | st.floats(allow_nan=False))
+def test_whatever_a_claim_of_others_found_is_told(
+    scenario: Scenario, traces: dict[str, Trace], found: dict[str, Any], margin: float | None
+) -> None:
+    report = built(scenario, {"c": traces["c"]}, [verdict("c", "refuted", margin=margin, counterexample=found)])
+    assert attention.items(report)[0].words
+    moments.draw(report, traces)
+
+
+def test_many_moments_are_not_all_drawn(scenario: Scenario, traces: dict[str, Trace]) -> None:
+    many = [verdict("c", "refuted", counterexample=AT | TOO_NEAR)] * (2 * moments.MAX_MOMENTS)
+    assert len(moments.draw(built(scenario, traces, many), traces)) == moments.MAX_MOMENTS

@@ -1,0 +1,137 @@
+"""The page in a real browser: no violation that axe-core finds, folds that links open, a filter, no script needed."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+from playwright.sync_api import Browser, Page, sync_playwright
+from report.cases import FINE, verdict
+
+from airground_drake.report import audit, document, html
+from airground_drake.report.figures import draw, moments
+from airground_drake.scenarios.schema import Scenario
+from airground_drake.trace import Trace
+
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+NARROW, WIDE = 390, 1280
+
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on the path: apt-get install chromium")
+
+
+@pytest.fixture(scope="module")
+def page_file(scenario: Scenario, traces: dict[str, Trace], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A page with everything on it: what differs or is missing, faults, findings about the paper, broken variants."""
+    failed = verdict(
+        "c", "refuted", margin=-0.25, unit="m",
+        where={"first": "ugv1", "second": "obstacle_1", "t_s": 9.0},
+        counterexample={
+            "first": "ugv1", "second": "obstacle_1", "t_s": 9.0, "min_distance_m": 1.75, "safe_distance_m": 2.0,
+        },
+        evidence={"pairs": [{"first": "ugv1", "second": "obstacle_1", "min_distance_m": 1.75}], "tolerance_m": 1e-9},
+    )  # fmt: skip
+    failed.claim.latex = (r"\min_t \lVert p_i(t) - q_j(t) \rVert \ge d_{ij}",)
+    idle = replace(FINE[0], finding=replace(FINE[0].finding, exercised=0))
+    faulty = {**traces, "c": replace(traces["c"], meta={**traces["c"].meta, "faults": [FAULT]})}
+    items = [{**item, "id": 90 + k} for k, item in enumerate(4 * audit.of_runs(scenario, traces))]
+    report = document.build(
+        scenario, "ab" * 32, faulty, [idle, failed, FINE[2]], {"package": "0.1.0"}, audit=items, mutants=[MUTANT],
+        required=["SAFE-INV"],
+    )  # fmt: skip
+    path = tmp_path_factory.mktemp("page") / "report.html"
+    path.write_text(html.render(report, [*draw.draw(scenario, traces), *moments.draw(report, traces)]), "utf-8")
+    return path
+
+
+FAULT = {"t_s": 1.0, "robot": "ugv1", "policy": "detour", "what": "ValueError: no"}
+MUTANT: dict[str, Any] = {
+    "claim": "SAFE-INV", "mutant": "half the bound", "status": "refuted", "refuted": True, "counterexample": {"x": 1.0},
+    "error": None, "from_cache": False,
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with sync_playwright() as playwright:
+        sandbox = [] if os.getuid() else ["--no-sandbox"]
+        started = playwright.chromium.launch(executable_path=CHROMIUM, args=sandbox)
+        yield started
+        started.close()
+
+
+def opened(browser: Browser, file: Path, anchor: str = "", width: int = WIDE, **options: Any) -> Page:
+    page = browser.new_context(viewport={"width": width, "height": 900}, **options).new_page()
+    page.goto(f"{file.as_uri()}{anchor}")
+    return page
+
+
+def open_folds(page: Page) -> None:
+    page.evaluate("document.querySelectorAll('details').forEach((fold) => { fold.open = true; })")
+
+
+@pytest.mark.parametrize("folds", ["closed", "open"])
+@pytest.mark.parametrize(("width", "scheme"), [(WIDE, "light"), (NARROW, "light"), (WIDE, "dark")])
+def test_axe_finds_nothing(browser: Browser, page_file: Path, width: int, scheme: str, folds: str) -> None:
+    page = opened(browser, page_file, width=width, color_scheme=scheme)
+    if folds == "open":
+        open_folds(page)
+    found = Axe().run(page, options={"resultTypes": ["violations"]})
+    assert found.violations_count == 0, found.generate_report()
+    assert page.evaluate("document.documentElement.scrollWidth") == width
+
+
+def test_the_policy_blocks_nothing_of_the_page_and_whatever_else_is_slipped_in(
+    browser: Browser, page_file: Path, tmp_path: Path
+) -> None:
+    said: list[str] = []
+    page = browser.new_page()
+    page.on("console", lambda message: said.append(message.text))
+    page.goto(page_file.as_uri())
+    assert said == []
+    spoilt = tmp_path / "spoilt.html"
+    slipped_in = "<script>document.title = 'taken'</script><img src='https://example.org/x.png'></main>"
+    spoilt.write_text(page_file.read_text("utf-8").replace("</main>", slipped_in), "utf-8")
+    page.goto(spoilt.as_uri())
+    assert page.title() != "taken"
+    assert sum("Content Security Policy" in line for line in said) == 2
+
+
+def test_a_link_opens_the_fold_that_it_leads_into(browser: Browser, page_file: Path) -> None:
+    page = opened(browser, page_file)
+    page.click("#close-all")
+    assert not page.is_visible("#claim-SAFE-TRACE")
+    page.click(".attention a[href='#claim-SAFE-TRACE']")
+    assert page.is_visible("#claim-SAFE-TRACE")
+
+
+def test_claims_are_filtered_by_status_and_run(browser: Browser, page_file: Path) -> None:
+    page = opened(browser, page_file)
+    page.click("#open-all")
+    rows = "details.claim tr[data-status]:not([hidden])"
+    assert page.locator(rows).count() == 3
+    page.select_option("#by-status", "not_exercised")
+    assert page.locator(rows).count() == 1
+    page.select_option("#by-run", "c")
+    assert page.locator(rows).count() == 0
+    assert page.inner_text("#shown") == "0 of 1 claims"
+
+
+def test_it_reads_without_scripts(browser: Browser, page_file: Path) -> None:
+    page = opened(browser, page_file, "#claim-SAFE-TRACE", java_script_enabled=False)
+    assert not page.is_visible("#tools")
+    assert page.locator("math").count() > 0
+    assert page.is_visible("#claim-SAFE-TRACE")
+
+
+def test_what_is_folded_is_not_printed(browser: Browser, page_file: Path) -> None:
+    closed, everything = opened(browser, page_file), opened(browser, page_file)
+    closed.click("#close-all")
+    open_folds(everything)
+    pages = [page.pdf().count(b"/Type /Page\n") for page in (closed, everything)]
+    assert 0 < pages[0] < pages[1]

@@ -1,0 +1,57 @@
+"""Evidence as tables."""
+
+from __future__ import annotations
+
+import json
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from airground_drake.report import evidence, html
+
+JSON = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(), inner, max_size=4),
+    max_leaves=30,
+)
+
+
+def test_names_of_keys_in_words() -> None:
+    keys = ("min_distance_m", "gain_1_s", "speed_m_s", "noise_m_sqrt_s", "refuse_outcome_m2_s", "pairs", "m")
+    assert [evidence.in_words(key) for key in keys] == [
+        "min distance, m", "gain, 1/s", "speed, m/s", "noise, m/√s", "refuse outcome, m²s", "pairs", "m",
+    ]  # fmt: skip
+
+
+def test_values_records_and_records_by_name() -> None:
+    found = evidence.tables(
+        {
+            "tolerance_m": 0.125,
+            "agrees": True,
+            "point_m": [1.0, 2.0],
+            "pairs": [{"first": "a", "gap_m": 0.5}, {"first": "b", "row": 3}],
+            "robots": {"ugv_1": {"count": 2}},
+        },
+        "X",
+        html.number,
+    )
+    assert [table.caption for table in found] == ["X", "X: pairs", "X: robots"]
+    assert found[0].rows == (("tolerance, m", "0.125"), ("agrees", "yes"), ("point, m", "(1, 2)"))
+    assert found[1].columns == ("", "first", "gap, m", "row")
+    assert found[1].rows == (("1", "a", "0.5", ""), ("2", "b", "", "3"))
+    assert found[2].rows == (("ugv_1", "2"),)
+
+
+def test_what_is_cut_is_said() -> None:
+    (table,) = evidence.tables({"rows": [{"x": k} for k in range(90)]}, "X", html.number)
+    assert len(table.rows) == evidence.MAX_ROWS
+    assert table.caption == "X: rows (50 more rows in report.json)"
+    (cell,) = evidence.tables({"x": "y" * 500}, "X", html.number)[0].rows
+    assert cell[1].endswith("…")
+
+
+@given(st.dictionaries(st.text(), JSON, max_size=5))
+def test_any_json_is_shown(found: dict[str, object]) -> None:
+    for table in evidence.tables(json.loads(json.dumps(found)), "X", html.number):
+        assert all(len(row) == len(table.columns) for row in table.rows)
+        assert all(isinstance(cell, str) for row in table.rows for cell in row)
