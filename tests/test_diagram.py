@@ -26,7 +26,7 @@ LAYERS = (
     ("components", "trace"),
     ("diagram", "events"),
     ("simulation", "graphviz", "verify"),
-    ("runs",),
+    ("runs", "testing"),
     ("report",),
     ("commands", "__main__"),
 )
