@@ -17,6 +17,7 @@ from airground_drake.verify.claim import Claim
 from airground_drake.verify.registry import mutants
 
 DOCS = Path(__file__).parent
+EXAMPLES = DOCS.parent / "examples"
 PACKAGE = Path(airground_drake.__file__).parent
 WIDTH = 120
 
@@ -56,6 +57,7 @@ EQUATIONS = {
 REALISED_IN = ("nsbc", "decision", "intervention", "gatekeeper", "systems")
 """Packages whose docstrings say which equations they realise, in their first sentence or paragraph."""
 
+_RECIPE = re.compile(r"```(?P<language>\w+)\n# file: (?P<name>\S+)\n.*?```", re.DOTALL)
 _NUMBER = re.compile(r"(?<!` )(?<![\w\]])\((\d{1,2})[a-e]?\)(?:-\((\d{1,2})[a-e]?\))?")
 
 
@@ -67,7 +69,18 @@ def main() -> None:
 
 def pages() -> dict[str, str]:
     """Generated pages by file name."""
-    return {"equations.md": equations(), "claims.md": claims(), "names.md": names()}
+    return {"equations.md": equations(), "claims.md": claims(), "names.md": names(), **recipes()}
+
+
+def recipes() -> dict[str, str]:
+    """Pages that show files of examples/, each in a block that begins with `# file: name`, with these as they stand."""
+
+    def as_it_stands(block: re.Match[str]) -> str:
+        text = (EXAMPLES / block["name"]).read_text(encoding="utf-8")
+        return f"```{block['language']}\n# file: {block['name']}\n{text}```"
+
+    found = {path.name: path.read_text(encoding="utf-8") for path in DOCS.glob("*.md")}
+    return {name: _RECIPE.sub(as_it_stands, text) for name, text in found.items() if _RECIPE.search(text)}
 
 
 def equations() -> str:

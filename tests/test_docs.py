@@ -12,8 +12,16 @@ import pytest
 from airground_drake.report.__main__ import main
 
 ROOT = Path(__file__).parent.parent
-PAGES = sorted([ROOT / "README.md", ROOT / "CHANGELOG.md", ROOT / "SECURITY.md", *(ROOT / "docs").glob("*.md")])
-EXTENDING = ROOT / "docs" / "extending.md"
+PAGES = sorted(
+    [
+        ROOT / "README.md",
+        ROOT / "CHANGELOG.md",
+        ROOT / "SECURITY.md",
+        *(ROOT / "docs").glob("*.md"),
+        ROOT / "examples" / "README.md",
+    ]
+)
+EXAMPLES = ROOT / "examples"
 
 
 def blocks(page: Path, language: str) -> list[str]:
@@ -46,16 +54,17 @@ def test_what_follows_from_the_code_is_current() -> None:
         assert (ROOT / "docs" / name).read_text(encoding="utf-8") == text, "run python docs/generate.py"
 
 
+def test_everything_in_my_robots_is_explained() -> None:
+    shown = re.findall(r"^# file: (my_robots/\S+)$", (ROOT / "docs" / "extending.md").read_text(encoding="utf-8"), re.M)
+    assert sorted(shown) == sorted(f"my_robots/{path.name}" for path in (EXAMPLES / "my_robots").glob("*.py"))
+
+
 def test_everything_that_can_be_added_works_from_a_folder_of_its_own(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for block in [*blocks(EXTENDING, "python"), *blocks(EXTENDING, "yaml")]:
-        path = tmp_path / block.splitlines()[0].removeprefix("# file: ")
-        path.parent.mkdir(exist_ok=True)
-        path.write_text(block, encoding="utf-8")
-    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.syspath_prepend(str(EXAMPLES))
     assert (
-        main([str(tmp_path / "mine.yaml"), "-o", str(tmp_path / "report"), "--format", "json", "--allow-plugins"]) == 0
+        main([str(EXAMPLES / "mine.yaml"), "-o", str(tmp_path / "report"), "--format", "json", "--allow-plugins"]) == 0
     )
     document = json.loads((tmp_path / "report" / "report.json").read_text())
     found = {claim["id"]: claim["status"] for claim in document["claims"]}

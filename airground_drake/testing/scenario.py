@@ -22,5 +22,5 @@ def chosen(scenario: str | Path | Scenario, overrides: Overrides = ()) -> Scenar
 
 def digest(scenario: Scenario, run: str) -> str:
     """Name of a folder for a run: what it is of, readable, and a digest of all that the simulation rests on."""
-    told = re.sub(r"\W", "_", f"{scenario.name}-{run}", flags=re.ASCII)[:80]
+    told = re.sub(r"[^\w-]", "_", f"{scenario.name}-{run}", flags=re.ASCII)[:80]
     return f"{told}-{files.sha256(json.dumps([resolved(scenario), run]).encode())[:16]}"
