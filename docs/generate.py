@@ -69,18 +69,17 @@ def main() -> None:
 
 def pages() -> dict[str, str]:
     """Generated pages by file name."""
-    return {"equations.md": equations(), "claims.md": claims(), "names.md": names(), **recipes()}
+    return {"equations.md": equations(), "claims.md": claims(), "names.md": names(), "extending.md": extending()}
 
 
-def recipes() -> dict[str, str]:
-    """Pages that show files of examples/, each in a block that begins with `# file: name`, with these as they stand."""
+def extending() -> str:
+    """The page as it is, with the files of examples/ that it shows (in blocks that begin `# file: name`) as they are."""
 
-    def as_it_stands(block: re.Match[str]) -> str:
+    def as_it_is(block: re.Match[str]) -> str:
         text = (EXAMPLES / block["name"]).read_text(encoding="utf-8")
         return f"```{block['language']}\n# file: {block['name']}\n{text}```"
 
-    found = {path.name: path.read_text(encoding="utf-8") for path in DOCS.glob("*.md")}
-    return {name: _RECIPE.sub(as_it_stands, text) for name, text in found.items() if _RECIPE.search(text)}
+    return _RECIPE.sub(as_it_is, (DOCS / "extending.md").read_text(encoding="utf-8"))
 
 
 def equations() -> str:

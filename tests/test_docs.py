@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import runpy
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -52,6 +55,25 @@ def test_what_follows_from_the_code_is_current() -> None:
     pages = runpy.run_path(str(ROOT / "docs" / "generate.py"))["pages"]()
     for name, text in pages.items():
         assert (ROOT / "docs" / name).read_text(encoding="utf-8") == text, "run python docs/generate.py"
+
+
+def test_the_tutorial_from_an_empty_folder(tmp_path: Path) -> None:
+    """Its files as they come, its commands in the order of the page; the first one installs, which CI does."""
+    steps = re.findall(r"```(\w+)\n(.*?)```", (ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8"), re.DOTALL)
+    script = ["set -eu", f'python() {{ {sys.executable} "$@"; }}', 'airground() { python -m airground_drake "$@"; }']
+    for language, text in steps:
+        name = re.match(r"# file: (\S+)\n", text)
+        script.append(f"cat > {name[1]} <<'END'\n{text}END" if language == "python" and name else text)
+    environment = {**os.environ, "PYTEST_ADDOPTS": "-p airground_drake.testing.plugin -p no:cacheprovider"}
+    done = subprocess.run(
+        ["bash", "-c", "\n".join(script)], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "2 passed" in done.stdout
+    events = json.loads((tmp_path / "third" / "report.json").read_text())["runs"]["d"]["events"]
+    assert [event["kind"] for event in events if event["robot"] == "ugv1"][-1] == "arrival"
+    (sent,) = {event["policy"] for event in events if event["kind"] == "proposal"}
+    assert sent == "left:Left"
 
 
 def test_everything_in_my_robots_is_explained() -> None:
