@@ -73,7 +73,7 @@ def pages() -> dict[str, str]:
 
 
 def extending() -> str:
-    """The page as it is, with the files of examples/ that it shows (in blocks that begin `# file: name`) as they are."""
+    """The page as it is, with the files of examples/ in its blocks that begin `# file: name`."""
 
     def as_it_is(block: re.Match[str]) -> str:
         text = (EXAMPLES / block["name"]).read_text(encoding="utf-8")

@@ -91,7 +91,8 @@ def on_page_content(html: str, **_: Any) -> str:
     """Formulas as MathML."""
 
     def typeset(found: re.Match[str]) -> str:
-        return convert(unescape(found[2]), display="block" if found[1] == "div" else "inline")
+        made = convert(unescape(found[2]), display="block" if found[1] == "div" else "inline")
+        return made.replace("<mover>", '<mover accent="true">')  # dots, hats and bars; nothing else is set over
 
     return _FORMULA.sub(typeset, html)
 

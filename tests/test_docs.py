@@ -51,6 +51,11 @@ def test_lines_are_short_enough_to_read(page: Path) -> None:
     assert max(map(len, page.read_text(encoding="utf-8").splitlines())) <= 120
 
 
+def test_the_readme_shows_the_scenario_that_init_writes() -> None:
+    shipped = (ROOT / "airground_drake" / "scenarios" / "minimal.yaml").read_text(encoding="utf-8")
+    assert blocks(ROOT / "README.md", "yaml") == [re.sub(r"^#.*\n", "", shipped, flags=re.MULTILINE)]
+
+
 def test_what_follows_from_the_code_is_current() -> None:
     pages = runpy.run_path(str(ROOT / "docs" / "generate.py"))["pages"]()
     for name, text in pages.items():
