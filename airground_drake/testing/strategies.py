@@ -84,15 +84,20 @@ PARAMETERS: dict[str, Callable[[float], dict[str, float]]] = {
 
 @st.composite
 def policies(draw: DrawFn, names: Sequence[str] = tuple(PARAMETERS), *, at_most: int = 2) -> list[Policy]:
-    """A behaviour database of the package's policies, without repetition.
+    """A behaviour database, without repetition.
 
     Args:
         draw: given by Hypothesis.
-        names: which may be in it, the simplest first.
+        names: which may be in it, the simplest first; the package's policies are given parameters, those of others
+            (`module:Class`) none.
         at_most: so many.
     """
     chosen = draw(st.lists(st.sampled_from(names), max_size=at_most, unique=True))
-    return [Policy(name, PARAMETERS[name](draw(first_of(*SPEEDS)))) for name in chosen]
+    return [Policy(name, _parameters(name, draw(first_of(*SPEEDS)))) for name in chosen]
+
+
+def _parameters(name: str, speed: float) -> dict[str, float]:
+    return PARAMETERS[name](speed) if name in PARAMETERS else {}
 
 
 DATABASES = policies()
@@ -121,7 +126,8 @@ def scenarios(
         policies: of the UAV; default: `policies()`.
         triggers: default: any.
         routes: of method (c)'s gatekeeper; default: any.
-        durations: of the run, s; default: 1 to 20.
+        durations: of the run, s; default: 1 to 20. Of minutes not every draw is valid: rounding takes more from a
+            distance the farther robots may get.
     """
     count = draw(st.integers(1, 4) if ugvs is None else ugvs)
     method = draw(first_of(*sorted(METHODS, reverse=True)) if methods is None else methods)

@@ -44,6 +44,13 @@ def test_draws_are_valid_and_of_many_kinds() -> None:
     assert {"threshold fixed", "threshold bayes", "known True", "known False", "waypoints 4"} <= set(seen)
 
 
+@examples(5)
+@given(scenarios(ugvs=st.just(40), obstacles=st.just(60), policies=policies(["mine:Mine"])))
+def test_a_crowd_and_policies_of_others(scenario: Scenario) -> None:
+    assert from_data(resolved(scenario), "drawn") == scenario
+    assert [policy.parameters for policy in scenario.intervention.policies] in ([], [{}])
+
+
 def test_every_policy_of_the_package_can_be_drawn() -> None:
     assert set(PARAMETERS) == set(POLICIES.own)
 
