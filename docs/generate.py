@@ -20,6 +20,7 @@ from airground_drake.verify.claim import Claim
 from airground_drake.verify.registry import mutants
 
 DOCS = Path(__file__).parent
+EXAMPLES = DOCS.parent / "examples"
 PACKAGE = Path(airground_drake.__file__).parent
 WIDTH = 120
 
@@ -61,6 +62,7 @@ SCENARIO = json_schema.scenario_schema(installed=False)
 REALISED_IN = ("nsbc", "decision", "intervention", "gatekeeper", "systems")
 """Packages whose docstrings say which equations they realise, in their first sentence or paragraph."""
 
+_RECIPE = re.compile(r"```(?P<language>\w+)\n# file: (?P<name>\S+)\n.*?```", re.DOTALL)
 _NUMBER = re.compile(r"(?<!` )(?<![\w\]])\((\d{1,2})[a-e]?\)(?:-\((\d{1,2})[a-e]?\))?")
 
 
@@ -77,8 +79,19 @@ def pages() -> dict[str, str]:
         "claims.md": claims(),
         "names.md": names(),
         "scenario.md": scenario(),
+        "extending.md": extending(),
         "../airground_drake/scenarios/scenario.schema.json": json_schema.text(installed=False),
     }
+
+
+def extending() -> str:
+    """The page as it is, with the files of examples/ in its blocks that begin `# file: name`."""
+
+    def as_it_is(block: re.Match[str]) -> str:
+        text = (EXAMPLES / block["name"]).read_text(encoding="utf-8")
+        return f"```{block['language']}\n# file: {block['name']}\n{text}```"
+
+    return _RECIPE.sub(as_it_is, (DOCS / "extending.md").read_text(encoding="utf-8"))
 
 
 def equations() -> str:

@@ -7,19 +7,23 @@ import os
 import signal
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import HealthCheck, settings
 from hypothesis.internal.conjecture import providers
 from sharing import once
 
-from airground_drake import trace
 from airground_drake.gatekeeper import certified, sample
 from airground_drake.report.__main__ import main as write_report
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.simulation import simulate
-from airground_drake.trace import Trace
+
+if TYPE_CHECKING:
+    from airground_drake.testing.plugin import Simulations
+
+
+pytest_plugins = ["airground_drake.testing.plugin"]  # also where the package is not installed with its entry points
 
 # The first call compiles, and nothing here asserts on time: no deadlines, no complaints of slowness. The default
 # profile draws the same examples each time, so that a green suite stays green; `pytest --hypothesis-profile=fuzz` looks
@@ -72,19 +76,9 @@ def _no_constants_of_modules() -> Iterator[None]:
 
 
 @pytest.fixture(scope="session")
-def run(shared: Path) -> Callable[[str, str], Trace]:
+def run(airground_trace: Simulations) -> Simulations:
     """`run(scenario, name)`: one simulation of a shipped scenario, made once per session."""
-    made: dict[tuple[str, str], Trace] = {}
-
-    def get(scenario: str, name: str) -> Trace:
-        if (scenario, name) not in made:
-            place = shared / f"{scenario}-{name}"
-            made[scenario, name] = trace.load(
-                once(place, lambda folder: trace.save(simulate(load(scenario)[0], name), folder))
-            )
-        return made[scenario, name]
-
-    return get
+    return airground_trace
 
 
 @pytest.fixture(scope="session")

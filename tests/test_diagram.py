@@ -26,8 +26,9 @@ LAYERS = (
     ("components", "trace"),
     ("diagram", "events"),
     ("simulation", "blocks", "graphviz", "verify"),
-    ("runs",),
+    ("runs", "testing"),
     ("report", "replay"),
+    ("campaign",),
     ("commands", "__main__"),
 )
 """From left to right: a module imports from its own layer or from those before it."""

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import runpy
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -13,8 +16,16 @@ from airground_drake.report.__main__ import main
 from airground_drake.scenarios.load import load
 
 ROOT = Path(__file__).parent.parent
-PAGES = sorted([ROOT / "README.md", ROOT / "CHANGELOG.md", ROOT / "SECURITY.md", *(ROOT / "docs").glob("*.md")])
-EXTENDING = ROOT / "docs" / "extending.md"
+PAGES = sorted(
+    [
+        ROOT / "README.md",
+        ROOT / "CHANGELOG.md",
+        ROOT / "SECURITY.md",
+        *(ROOT / "docs").glob("*.md"),
+        ROOT / "examples" / "README.md",
+    ]
+)
+EXAMPLES = ROOT / "examples"
 
 
 def blocks(page: Path, language: str) -> list[str]:
@@ -41,23 +52,48 @@ def test_lines_are_short_enough_to_read(page: Path) -> None:
     assert max(map(len, page.read_text(encoding="utf-8").splitlines())) <= 120
 
 
+def test_the_readme_shows_the_scenario_that_init_writes() -> None:
+    shipped = (ROOT / "airground_drake" / "scenarios" / "minimal.yaml").read_text(encoding="utf-8")
+    assert blocks(ROOT / "README.md", "yaml") == [re.sub(r"^#.*\n", "", shipped, flags=re.MULTILINE)]
+
+
 def test_what_follows_from_the_code_is_current() -> None:
     pages = runpy.run_path(str(ROOT / "docs" / "generate.py"))["pages"]()
     for name, text in pages.items():
         assert (ROOT / "docs" / name).read_text(encoding="utf-8") == text, "run python docs/generate.py"
 
 
+def test_the_tutorial_from_an_empty_folder(tmp_path: Path) -> None:
+    """Its files as they come, its commands in the order of the page; the first one installs, which CI does."""
+    steps = re.findall(r"```(\w+)\n(.*?)```", (ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8"), re.DOTALL)
+    script = ["set -eu", f'python() {{ {sys.executable} "$@"; }}', 'airground() { python -m airground_drake "$@"; }']
+    for language, text in steps:
+        name = re.match(r"# file: (\S+)\n", text)
+        script.append(f"cat > {name[1]} <<'END'\n{text}END" if language == "python" and name else text)
+    environment = {**os.environ, "PYTEST_ADDOPTS": "-p airground_drake.testing.plugin -p no:cacheprovider"}
+    done = subprocess.run(
+        ["bash", "-c", "\n".join(script)], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "2 passed" in done.stdout
+    events = json.loads((tmp_path / "third" / "report.json").read_text())["runs"]["d"]["events"]
+    assert [event["kind"] for event in events if event["robot"] == "ugv1"][-1] == "arrival"
+    (sent,) = {event["policy"] for event in events if event["kind"] == "proposal"}
+    assert sent == "left:Left"
+
+
+def test_everything_in_my_robots_is_explained() -> None:
+    shown = re.findall(r"^# file: (my_robots/\S+)$", (ROOT / "docs" / "extending.md").read_text(encoding="utf-8"), re.M)
+    assert sorted(shown) == sorted(f"my_robots/{path.name}" for path in (EXAMPLES / "my_robots").glob("*.py"))
+
+
 def test_everything_that_can_be_added_works_from_a_folder_of_its_own(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for block in [*blocks(EXTENDING, "python"), *blocks(EXTENDING, "yaml")]:
-        path = tmp_path / block.splitlines()[0].removeprefix("# file: ")
-        path.parent.mkdir(exist_ok=True)
-        path.write_text(block, encoding="utf-8")
-    assert load(str(tmp_path / "shelves.yaml"))[0].obstacles["shelf"].radius_m == 3.0
-    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.syspath_prepend(str(EXAMPLES))
+    assert load(str(EXAMPLES / "shelves.yaml"))[0].obstacles["shelf"].radius_m == 3.0
     assert (
-        main([str(tmp_path / "mine.yaml"), "-o", str(tmp_path / "report"), "--format", "json", "--allow-plugins"]) == 0
+        main([str(EXAMPLES / "mine.yaml"), "-o", str(tmp_path / "report"), "--format", "json", "--allow-plugins"]) == 0
     )
     document = json.loads((tmp_path / "report" / "report.json").read_text())
     found = {claim["id"]: claim["status"] for claim in document["claims"]}

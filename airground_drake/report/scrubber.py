@@ -6,7 +6,6 @@ The drawings are complete without it. `templates/scrubber.js` moves marks over t
 from __future__ import annotations
 
 from collections.abc import Sequence
-from importlib import resources
 from typing import Any
 
 import numpy as np
@@ -21,8 +20,6 @@ SAMPLES = 121
 """Times at which a robot's place is in the page, evenly spread over the run; in between it is interpolated."""
 PER_UNIT = 10
 """Places are in so many parts of a unit of the drawing, as whole numbers."""
-
-SCRIPT = resources.files("airground_drake.report").joinpath("templates/scrubber.js").read_text(encoding="utf-8")
 
 
 def tracks(drawing: Drawing, trace: Trace, ugvs: Sequence[str]) -> dict[str, Any]:

@@ -118,8 +118,12 @@ def load(name_or_path: str | Path, overrides: Overrides = ()) -> tuple[Scenario,
     return scenario, digest
 
 
-def validated(scenario: Scenario) -> Scenario:
+def validated(scenario: Scenario, overrides: Overrides = ()) -> Scenario:
     """A scenario made or changed in Python, checked as strictly as a file; numpy's numbers and arrays may be in it.
+
+    Args:
+        scenario: left as it is.
+        overrides: as of `load`.
 
     Returns:
         A copy whose values have the types of the schema.
@@ -129,17 +133,18 @@ def validated(scenario: Scenario) -> Scenario:
     """
     source = f"scenario {getattr(scenario, 'name', None) or type(scenario).__name__!r}"
     try:
-        return from_data(resolved(scenario), source)
+        return from_data(resolved(scenario), source, overrides)
     except TypeError as error:
         raise ScenarioError(source, "", Fault(str(error)), "wanted: a Scenario") from None
 
 
-def from_data(data: Mapping[str, Any], source: str) -> Scenario:
+def from_data(data: Mapping[str, Any], source: str, overrides: Overrides = ()) -> Scenario:
     """A scenario from nested dicts and lists, such as `resolved` gives, checked like a file.
 
     Args:
         data: with the keys of a scenario file.
         source: where it comes from, for messages.
+        overrides: as of `load`.
 
     Raises:
         ScenarioError: if it is not valid.
@@ -148,6 +153,8 @@ def from_data(data: Mapping[str, Any], source: str) -> Scenario:
         root = _node(data, source)
     except RecursionError:
         raise _excess(source, deep=True) from None
+    for override in _texts(overrides):
+        root = _override(root, override)
     return _build(root, source)
 
 

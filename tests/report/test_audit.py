@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,6 +18,7 @@ from airground_drake.scenarios.load import load
 from airground_drake.verify import Finding, cache_folder, verify_model
 from airground_drake.verify.mutants import refute_mutants
 
+DOCS = Path(__file__).parent.parent.parent / "docs"
 FORMULAS = (2, 3, 4, 5, 8, 9, *range(12, 19))
 
 
@@ -96,3 +99,18 @@ def test_a_mutant_that_survives_is_in_the_verdict() -> None:
     overall = document.overall([{"as_expected": True, "status": "holds", "exercised": 1}], [], (), surviving)
     assert (overall["status"], overall["exit_code"]) == ("not_as_expected", 1)
     assert "SAFE-INV: harmless" in overall["why"]
+
+
+@pytest.mark.parametrize("number", [*FORMULAS, 7, 10, 11])
+def test_the_article_has_the_numbers_of_the_audit(
+    items: dict[int, dict[str, Any]], companion_items: dict[int, dict[str, Any]], number: int
+) -> None:
+    """Every decimal in a section of docs/audit.md is one of the item's, rounded."""
+    sections = re.split(r"^## (\d+)\. ", (DOCS / "audit.md").read_text(encoding="utf-8"), flags=re.MULTILINE)
+    assert sections[1::2] == [str(k + 1) for k in range(18)]
+    found = [
+        float(text) for text in re.findall(r"-?\d+\.?\d*(?:e-?\d+)?", json.dumps((items | companion_items)[number]))
+    ]
+    for text in re.findall(r"-?\d+\.\d+", re.sub(r"section [\d.]+", "", sections[2 * number])):
+        places = len(text.partition(".")[2])
+        assert any(round(value, places) == float(text) for value in found), text

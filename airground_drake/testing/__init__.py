@@ -1,0 +1,31 @@
+"""For tests of one's own: claims as assertions; traces that a session simulates once; scenarios drawn at random.
+
+    from airground_drake.testing import assert_holds
+
+    def test_my_team_keeps_its_distances(airground_trace):
+        assert_holds(airground_trace("team.yaml", "d"), "SAFE-TRACE", "LIVE-GOAL", exercised=True)
+
+`plugin.py` is a pytest plugin that installs itself, with the fixture `airground_trace`; `strategies.py` has scenarios
+for Hypothesis. Who imports these needs pytest and hypothesis; nothing else here does.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from airground_drake.testing.assertions import ClaimError, NotExercisedWarning, assert_holds, assert_proved
+
+__all__ = ["ClaimError", "NotExercisedWarning", "assert_holds", "assert_proved"]
+
+
+def __getattr__(name: str) -> Any:
+    """Import on first use: every session of pytest loads the plugin, and with it this package."""
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.assertions"), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

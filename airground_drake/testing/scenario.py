@@ -1,0 +1,26 @@
+"""The scenario that a test names."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+from airground_drake import files
+from airground_drake.scenarios.load import Overrides, load, resolved, validated
+from airground_drake.scenarios.schema import Scenario
+
+
+def chosen(scenario: str | Path | Scenario, overrides: Overrides = ()) -> Scenario:
+    """A scenario by name or path, or a copy of the one given, with overrides.
+
+    Raises:
+        ScenarioError: if it, or an override, is not valid.
+    """
+    return validated(scenario, overrides) if isinstance(scenario, Scenario) else load(scenario, overrides)[0]
+
+
+def digest(scenario: Scenario, run: str) -> str:
+    """Name of a folder for a run: what it is of, readable, and a digest of all that the simulation rests on."""
+    told = re.sub(r"[^\w-]", "_", f"{scenario.name}-{run}", flags=re.ASCII)[:80]
+    return f"{told}-{files.sha256(json.dumps([resolved(scenario), run]).encode())[:16]}"

@@ -1,0 +1,282 @@
+"""Hypothesis strategies for scenarios: every draw is valid, and stays valid while it shrinks.
+
+Nothing is filtered: what the rules of `scenarios.validate` tie together is built from one another. Places are cells of
+a grid whose pitch keeps every safe distance; periods are multiples of the control period; gains, release level and
+sensing range are fractions or multiples of what bounds them. Draws shrink to fewer robots and obstacles, shorter runs,
+and the defaults of the schema.
+
+    from hypothesis import given, settings, strategies as st
+    from airground_drake import simulate
+    from airground_drake.testing import assert_holds
+    from airground_drake.testing.strategies import scenarios
+
+    @settings(max_examples=20, deadline=None)
+    @given(scenarios(ugvs=st.integers(1, 3), methods=st.just("d")))
+    def test_distances_are_kept(scenario):
+        (run,) = scenario.runs
+        assert_holds(simulate(scenario, run), "SAFE-TRACE", "SAFE-HYP")
+
+Drake never frees a diagram with Python systems: a simulated example costs memory for the rest of the process, some
+megabytes each.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+from typing import TypeVar
+
+from hypothesis import strategies as st
+from hypothesis.strategies import DrawFn, SearchStrategy
+
+from airground_drake.decision.bayes import optimal_threshold
+from airground_drake.nsbc.avoidance import COMPOSITIONS
+from airground_drake.registry import METHODS, ROUTES
+from airground_drake.scenarios.schema import (
+    Control,
+    Decision,
+    Gatekeeper,
+    Intervention,
+    Obstacle,
+    Policy,
+    Preset,
+    Run,
+    SafeDistance,
+    Scenario,
+    Threshold,
+    Uav,
+    Ugv,
+    Vector,
+)
+from airground_drake.scenarios.validate import TRIGGERS
+
+T = TypeVar("T")
+
+SPEEDS = (1.0, 0.5, 2.0)
+"""Of preset trajectories and of what policies propose, m/s."""
+DISTANCES = (2.0, 1.0, 0.5, 3.0)
+"""Safe distances, m, the default first."""
+PERIODS = (0.025, 0.05, 0.1)
+"""Control periods, s; no gain that is drawn is too high for them."""
+JITTER = (0.0, 0.25, -0.25, 0.5, -0.5)
+"""By how much a place is off the middle of its cell, along an axis, m."""
+BAYES = (Threshold("bayes"), Threshold("bayes", drift_m_s=0.5, noise_m_sqrt_s=1.0))
+"""Thresholds by the Bayes risk."""
+
+
+@lru_cache(maxsize=None, typed=True)
+def first_of(*values: T) -> SearchStrategy[T]:
+    """One of these; the first is the simplest. Made once, as most of what a draw takes is making strategies."""
+    return st.sampled_from(values)
+
+
+PARAMETERS: dict[str, Callable[[float], dict[str, float]]] = {
+    "coordinate": lambda speed: {"speed_m_s": speed},
+    "detour": lambda speed: {"speed_m_s": speed},
+    "towards": lambda speed: {"speed_m_s": speed, "x_m": 0.0, "y_m": 0.0},
+    "stale_map": lambda speed: {"speed_m_s": speed},
+    "noisy": lambda speed: {"speed_m_s": speed, "noise_m": 0.5},
+    "hostile": lambda speed: {"speed_m_s": speed},
+}
+"""What the package's policies are given, for a speed in m/s."""
+
+
+@st.composite
+def policies(draw: DrawFn, names: Sequence[str] = tuple(PARAMETERS), *, at_most: int = 2) -> list[Policy]:
+    """A behaviour database, without repetition.
+
+    Args:
+        draw: given by Hypothesis.
+        names: which may be in it, the simplest first; the package's policies are given parameters, those of others
+            (`module:Class`) none.
+        at_most: so many.
+    """
+    chosen = draw(st.lists(st.sampled_from(names), max_size=at_most, unique=True))
+    return [Policy(name, _parameters(name, draw(first_of(*SPEEDS)))) for name in chosen]
+
+
+def _parameters(name: str, speed: float) -> dict[str, float]:
+    return PARAMETERS[name](speed) if name in PARAMETERS else {}
+
+
+DATABASES = policies()
+"""Any of them."""
+
+
+@st.composite
+def scenarios(
+    draw: DrawFn,
+    *,
+    ugvs: SearchStrategy[int] | None = None,
+    obstacles: SearchStrategy[int] | None = None,
+    methods: SearchStrategy[str] | None = None,
+    policies: SearchStrategy[list[Policy]] | None = None,
+    triggers: SearchStrategy[str] | None = None,
+    routes: SearchStrategy[str] | None = None,
+    durations: SearchStrategy[float] | None = None,
+) -> Scenario:
+    """A valid scenario with one run, named by its method.
+
+    Args:
+        draw: given by Hypothesis.
+        ugvs: how many; default: 1 to 4.
+        obstacles: how many; default: up to 6.
+        methods: of the run; default: any, (d) first.
+        policies: of the UAV; default: `policies()`.
+        triggers: default: any.
+        routes: of method (c)'s gatekeeper; default: any.
+        durations: of the run, s; default: 1 to 20. Of minutes not every draw is valid: rounding takes more from a
+            distance the farther robots may get.
+    """
+    count = draw(st.integers(1, 4) if ugvs is None else ugvs)
+    method = draw(first_of(*sorted(METHODS, reverse=True)) if methods is None else methods)
+    period = draw(first_of(*PERIODS))
+    safe = SafeDistance(draw(first_of(*DISTANCES)), draw(first_of(*DISTANCES)), draw(first_of(1.0, 0.5)))
+    team, uav, points = draw(_maps(count, draw(st.integers(0, 6) if obstacles is None else obstacles), safe))
+    speed = max(uav.max_speed_m_s, *(ugv.max_speed_m_s for ugv in team.values()))
+    database = draw(DATABASES if policies is None else policies)
+    return Scenario(
+        name="drawn",
+        seed=draw(st.integers(0, 3)),
+        duration_s=draw(st.integers(1, 20).map(float) if durations is None else durations),
+        ugvs=team,
+        uav=uav,
+        obstacles=points,
+        safe_distance=safe,
+        control=draw(_controls(period, _reach(safe, speed, period))),
+        decision=draw(_decisions(period, triggers)),
+        intervention=draw(_interventions(period, database)),
+        gatekeeper=draw(_gatekeepers(period, routes)),
+        runs={method: Run(method, draw(first_of(*COMPOSITIONS)))},
+    )
+
+
+def _reach(safe: SafeDistance, speed: float, period: float) -> float:
+    """A sensing range, m, that covers every safe distance and what two robots at this speed close in one period."""
+    return max(safe.obstacle_m, safe.ugv_m, safe.air_ground_m) + 2.0 * speed * period
+
+
+Cell = tuple[int, int]
+"""Of the grid on which maps are drawn: column and row."""
+
+
+@st.composite
+def _maps(draw: DrawFn, count: int, others: int, safe: SafeDistance) -> tuple[dict[str, Ugv], Uav, dict[str, Obstacle]]:
+    """UGVs, UAV and obstacles on a grid; no two starts share a cell, nor two targets, nor any with an obstacle.
+
+    Args:
+        draw: given by Hypothesis.
+        count: number of UGVs.
+        others: number of obstacles.
+        safe: distances that starts and targets keep.
+    """
+    pitch = max(safe.obstacle_m, safe.ugv_m, safe.air_ground_m) + 2.0 * max(JITTER)
+    width = math.isqrt(count + others + 2) + draw(st.integers(1, 3))
+    cells = [(x, y) for y in range(width) for x in range(width)]
+    free = list(cells)
+    points = {
+        f"obstacle_{k + 1}": Obstacle(draw(_places(free, pitch)), draw(first_of(True, False))) for k in range(others)
+    }
+    starts, targets = list(free), list(free)
+    team = {f"ugv{k + 1}": draw(_ugvs(cells, starts, targets, pitch)) for k in range(count)}
+    return team, draw(_uavs(cells, starts, targets, pitch, safe.air_ground_m + 1.0)), points
+
+
+@st.composite
+def _places(draw: DrawFn, free: list[Cell], pitch: float, besides: Cell | None = None) -> Vector:
+    """A point on the ground, m, in a free cell other than the one that it is to be besides; it is then taken."""
+    options = [cell for cell in free if cell != besides]
+    cell = options[draw(st.integers(0, len(options) - 1))]
+    free.remove(cell)
+    return [*(pitch * at + draw(first_of(*JITTER)) for at in cell), 0.0]
+
+
+def _middles(cells: list[Cell], pitch: float, at_most: int) -> SearchStrategy[list[Vector]]:
+    """Some middles of cells, m, whoever is there."""
+    return st.lists(first_of(*cells).map(lambda cell: [pitch * cell[0], pitch * cell[1], 0.0]), max_size=at_most)
+
+
+@st.composite
+def _ugvs(draw: DrawFn, cells: list[Cell], starts: list[Cell], targets: list[Cell], pitch: float) -> Ugv:
+    """A UGV that has somewhere to go, by a preset trajectory that may lead anywhere."""
+    begin = draw(_places(starts, pitch))
+    end = draw(_places(targets, pitch, besides=(round(begin[0] / pitch), round(begin[1] / pitch))))
+    speed = draw(first_of(*SPEEDS))
+    preset = Preset(_distinct([begin, *draw(_middles(cells, pitch, 2)), end]), speed)
+    return Ugv(begin, end, preset, draw(first_of(6.0, speed)))
+
+
+@st.composite
+def _uavs(
+    draw: DrawFn, cells: list[Cell], starts: list[Cell], targets: list[Cell], pitch: float, altitude: float
+) -> Uav:
+    """A UAV that starts and ends over cells of its own, with obstacles on its map that may not be there."""
+    above = [[*draw(_places(free, pitch))[:2], altitude] for free in (starts, targets)]
+    return Uav(
+        start_m=above[0],
+        target_m=above[1],
+        altitude_m=altitude,
+        max_speed_m_s=draw(first_of(10.0, 3.0)),
+        phantoms_m=draw(_middles(cells, pitch, 1)),
+    )
+
+
+def _distinct(points: list[Vector]) -> list[Vector]:
+    """Points of which none is where the one before it is."""
+    return [point for before, point in zip([None, *points], points, strict=False) if point != before]
+
+
+@st.composite
+def _controls(draw: DrawFn, period: float, reach: float) -> Control:
+    """Gains up to nine tenths of what the period allows; a sensing range that is just enough, or more."""
+    gain = st.one_of(st.none(), first_of(0.1, 0.5, 0.9).map(lambda part: part / period))
+    names = ("avoidance_gain_1_s", "motion_gain_1_s", "formation_gain_1_s", "intervention_gain_1_s")
+    gains = {name: value for name in names if (value := draw(gain)) is not None}
+    return Control(period_s=period, sensing_range_m=draw(first_of(max(4.0, reach), reach, reach + 4.0)), **gains)
+
+
+@st.composite
+def _decisions(draw: DrawFn, period: float, triggers: SearchStrategy[str] | None) -> Decision:
+    """A trigger with its threshold, a release level below it, and noise with a period of its own."""
+    fixed = first_of(3.0, 1.0, 0.5, 0.1).map(lambda zeta: Threshold(zeta_m=zeta))
+    threshold = draw(st.one_of(fixed, st.sampled_from(BAYES)))
+    zeta = threshold.zeta_m
+    if threshold.rule == "bayes":
+        zeta = optimal_threshold(threshold.drift_m_s, threshold.noise_m_sqrt_s, threshold.c1_1_s, threshold.c2)
+    return Decision(
+        threshold=threshold,
+        trigger=draw(first_of(*TRIGGERS) if triggers is None else triggers),
+        release_m=zeta * draw(first_of(0.5, 0.1, 0.9)),
+        min_inter_event_s=draw(first_of(0.5, 0.0, 0.05, 2.0)),
+        noise_m_sqrt_s=draw(first_of(0.0, 0.004, 0.1)),
+        leak_1_s=draw(first_of(0.0, 0.5)),
+        noise_period_s=period * draw(first_of(1.0, 0.5, 2.0)),
+    )
+
+
+@st.composite
+def _interventions(draw: DrawFn, period: float, database: list[Policy]) -> Intervention:
+    """How often the UAV plans, and in which order it asks its policies."""
+    return Intervention(
+        period_s=period * draw(first_of(2, 1, 4)),
+        retry_s=draw(first_of(1.0, 0.0)),
+        ranking=draw(first_of("predicted", "listed")),
+        policies=database,
+    )
+
+
+@st.composite
+def _gatekeepers(draw: DrawFn, period: float, routes: SearchStrategy[str] | None) -> Gatekeeper:
+    """A horizon of stages that are multiples of the control period; how often it decides, and for how long."""
+    stages = draw(first_of(60, 20, 6, 2))
+    return Gatekeeper(
+        route=draw(first_of(*ROUTES.own) if routes is None else routes),
+        period_s=period * draw(first_of(2, 1, 4)),
+        horizon_s=stages * period * draw(first_of(2, 1)),
+        stages=stages,
+        terminal_weight_s=draw(first_of(0.0, 1.0)),
+        min_dwell_s=draw(first_of(0.2, 0.0)),
+        tries=draw(first_of(5, 1)),
+        longest_s=draw(first_of(30.0, 3.0)),
+    )

@@ -1,0 +1,16 @@
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.primitives import ConstantVectorSource
+
+from airground_drake.diagram import build_diagram
+from airground_drake.scenarios.load import load
+
+builder = DiagramBuilder()
+team = builder.AddNamedSystem("team", build_diagram(load("minimal")[0], "d"))
+wind = builder.AddNamedSystem("wind", ConstantVectorSource([0.1, 0.0, 0.0]))
+builder.Connect(wind.get_output_port(), team.GetInputPort("disturbance_ugv1"))
+simulator = Simulator(builder.Build())
+simulator.AdvanceTo(1.0)
+controller = team.GetSubsystemByName("ugvs").GetSubsystemByName("ugv_controller")
+command = controller.GetOutputPort("command").Eval(controller.GetMyContextFromRoot(simulator.get_context()))
+assert command.shape == (3,)

@@ -1,0 +1,11 @@
+from pydrake.systems.analysis import Simulator
+
+from airground_drake.diagram import build_diagram, make_monitor
+from airground_drake.scenarios.load import load
+
+wanted, built = load("case_a")[0], load("case_a")[0]
+built.control.motion_gain_1_s *= 0.9  # a mistake
+monitor = make_monitor(wanted, "d", terminate=True)
+simulator = Simulator(build_diagram(built, "d", monitor=monitor))
+status = simulator.AdvanceTo(2.0)
+assert "breaks LAW" in status.message()

@@ -1,0 +1,79 @@
+"""The examples run, from a directory of their own, as somebody would run them who has installed the package."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import matplotlib as mpl
+import pytest
+
+from airground_drake.scenarios.load import load
+
+EXAMPLES = Path(__file__).parent.parent / "examples"
+PLUGIN = "airground_drake.testing.plugin"
+
+
+def imported(name: str) -> ModuleType:
+    specification = importlib.util.spec_from_file_location(name, EXAMPLES / f"{name}.py")
+    assert specification is not None
+    assert specification.loader is not None
+    module = importlib.util.module_from_spec(specification)
+    specification.loader.exec_module(module)
+    return module
+
+
+def pytest_in(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """`pytest` in a folder, with a session of its own: nothing of this one is known there."""
+    environment = {name: value for name, value in os.environ.items() if not name.startswith(("PYTEST_", "HYPOTHESIS_"))}
+    command = [sys.executable, "-m", "pytest", "-p", PLUGIN, "-p", "no:cacheprovider", *arguments]
+    return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+
+
+FAILING = """
+from airground_drake.testing import assert_holds
+
+def test_goal(airground_trace):
+    assert_holds(airground_trace("minimal", "a", set={"duration_s": 1.0}), "LIVE-GOAL")
+"""
+
+
+def test_the_tests_of_a_downstream_user_under_several_workers(tmp_path: Path) -> None:
+    """All pass, each run is simulated once; one that fails says why, and its traceback ends in the user's test."""
+    shutil.copytree(EXAMPLES / "downstream_tests", tmp_path / "mine", ignore=shutil.ignore_patterns("__pycache__"))
+    (tmp_path / "mine" / "test_goal.py").write_text(FAILING)
+    done = pytest_in(tmp_path, "-n", "2", "--basetemp", str(tmp_path / "kept"), "mine")
+    assert re.search(r"^=+ 1 failed, 8 passed in", done.stdout, re.MULTILINE), done.stdout + done.stderr
+    made = [path.parent for path in (tmp_path / "kept" / "airground_traces").glob("*/meta.json")]
+    assert sorted(path.name.rpartition("-")[0] for path in made) == ["depot-a", *4 * ["depot-d"], "minimal-a"]
+    assert "LIVE-GOAL is refuted, on run a of minimal (method a, seed 0)" in done.stdout
+    assert "value: tolerance left about where a robot must end: -8.9" in done.stdout
+    assert "_require" not in done.stdout
+
+
+def test_the_notebook_runs_and_has_no_output_in_it() -> None:
+    cells = json.loads((EXAMPLES / "first_steps.ipynb").read_text(encoding="utf-8"))["cells"]
+    namespace: dict[str, object] = {"__name__": "notebook"}
+    with mpl.rc_context({"backend": "agg"}):
+        for cell in cells:
+            if cell["cell_type"] == "code":
+                assert cell["outputs"] == []
+                exec(compile("".join(cell["source"]), cell["id"], "exec"), namespace)
+    assert {"a", "d"} == set(namespace["runs"])  # type: ignore[call-overload]
+
+
+def test_a_plant_of_ones_own_needs_more_room() -> None:
+    own = imported("own_plant")
+    distances = []
+    for wished in (2.0, 2.25):
+        scenario = load("minimal", {"safe_distance.obstacle_m": wished, "duration_s": 8.0})[0]
+        distances.append(own.nearest_to_the_rock(scenario))
+    assert distances[0] < own.NEEDED_M <= distances[1]
+    assert distances == pytest.approx([1.867, 2.117], abs=2e-3)

@@ -1,0 +1,45 @@
+"""The plugin: what it costs whoever does not use it, and that a run is simulated once."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from airground_drake import simulation
+from airground_drake.scenarios.load import load
+from airground_drake.testing.plugin import Simulations
+
+SHORT = {"duration_s": 0.1}
+
+
+def test_importing_it_imports_nothing_large() -> None:
+    code = "import sys, airground_drake.testing.plugin as p; print(*sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout.split()
+    assert not {"pydrake", "numpy", "pandas", "hypothesis", "yaml"} & set(loaded)
+
+
+def test_a_run_is_simulated_once_however_it_is_named(
+    airground_trace: Simulations, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    first = airground_trace("minimal", "a", set=SHORT)
+    monkeypatch.setattr(simulation, "simulate", None)
+    file = tmp_path / "mine.yaml"
+    file.write_bytes((Path(simulation.__file__).parent / "scenarios" / "minimal.yaml").read_bytes())
+    scenario = load("minimal")[0]
+    scenario.duration_s = 0.1
+    assert airground_trace("minimal", "a", set=["duration_s=0.1"]) is first
+    assert airground_trace(file, "a", set=SHORT) is first
+    assert airground_trace(scenario, "a") is first
+    assert airground_trace(load("minimal")[0], "a", set=SHORT) is first
+    with pytest.raises(TypeError):  # another run would have to be simulated
+        airground_trace("minimal", "a", set={**SHORT, "seed": 1})
+
+
+def test_a_scenario_that_was_changed_afterwards_is_another_one(airground_trace: Simulations) -> None:
+    scenario = load("minimal", SHORT)[0]
+    first = airground_trace(scenario, "a")
+    scenario.duration_s = 0.05
+    assert airground_trace(scenario, "a").t[-1] == 0.05 != first.t[-1]

@@ -1,0 +1,75 @@
+"""Every draw is a valid scenario, of every kind; what fails shrinks to the least that does."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import pytest
+from hypothesis import find, given, settings
+from hypothesis import strategies as st
+from properties import examples
+
+from airground_drake.registry import METHODS, POLICIES
+from airground_drake.scenarios.load import from_data, resolved
+from airground_drake.scenarios.schema import Control, Decision, Gatekeeper, Scenario
+from airground_drake.simulation import simulate
+from airground_drake.testing import assert_holds
+from airground_drake.testing.strategies import PARAMETERS, policies, scenarios
+
+
+@examples(15)
+@given(scenarios(ugvs=st.integers(5, 12), obstacles=st.just(30), triggers=st.just("bare"), routes=st.just("nonlinear")))
+def test_what_is_asked_for_is_drawn(scenario: Scenario) -> None:
+    assert 5 <= len(scenario.ugvs) <= 12
+    assert len(scenario.obstacles) == 30
+    assert (scenario.decision.trigger, scenario.gatekeeper.route) == ("bare", "nonlinear")
+    assert from_data(resolved(scenario), "drawn") == scenario
+
+
+def test_draws_are_valid_and_of_many_kinds() -> None:
+    seen: Counter[str] = Counter()
+
+    @examples(100)
+    @given(scenarios())
+    def draw(scenario: Scenario) -> None:
+        assert from_data(resolved(scenario), "drawn") == scenario
+        seen.update([f"method {next(iter(scenario.runs))}", f"threshold {scenario.decision.threshold.rule}"])
+        seen.update(f"policy {policy.name}" for policy in scenario.intervention.policies)
+        seen.update(f"known {obstacle.known_to_uav}" for obstacle in scenario.obstacles.values())
+        seen.update(f"waypoints {len(ugv.preset.waypoints_m)}" for ugv in scenario.ugvs.values())
+
+    draw()
+    assert {f"method {name}" for name in METHODS} <= set(seen)
+    assert {f"policy {name}" for name in POLICIES.own} <= set(seen)
+    assert {"threshold fixed", "threshold bayes", "known True", "known False", "waypoints 4"} <= set(seen)
+
+
+@examples(5)
+@given(scenarios(ugvs=st.just(40), obstacles=st.just(60), policies=policies(["mine:Mine"])))
+def test_a_crowd_and_policies_of_others(scenario: Scenario) -> None:
+    assert from_data(resolved(scenario), "drawn") == scenario
+    assert [policy.parameters for policy in scenario.intervention.policies] in ([], [{}])
+
+
+def test_every_policy_of_the_package_can_be_drawn() -> None:
+    assert set(PARAMETERS) == set(POLICIES.own)
+
+
+def test_what_is_found_is_the_least() -> None:
+    two = settings(database=None, max_examples=60)
+    drawn = scenarios(ugvs=st.integers(1, 3), obstacles=st.integers(0, 1))
+    least = find(drawn, lambda scenario: len(scenario.ugvs) >= 2, settings=two)
+    assert list(least.runs) == ["d"]
+    assert least.duration_s == 1.0
+    assert least.obstacles == {}
+    assert least.intervention.policies == []
+    assert len(least.ugvs) == 2
+    assert [least.ugvs["ugv1"].start_m, least.ugvs["ugv1"].target_m] == [[0.0, 0.0, 0.0], [3.0, 0.0, 0.0]]
+    assert (least.control, least.decision, least.gatekeeper) == (Control(), Decision(), Gatekeeper())
+
+
+@pytest.mark.filterwarnings("ignore::airground_drake.testing.NotExercisedWarning")
+@settings(max_examples=3)
+@given(scenarios(ugvs=st.integers(1, 2), methods=st.just("d"), policies=policies(("hostile",)), durations=st.just(3.0)))
+def test_certified_runs_are_safe(scenario: Scenario) -> None:
+    assert_holds(simulate(scenario, "d"), "SAFE-TRACE", "SAFE-HYP")
