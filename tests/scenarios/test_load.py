@@ -129,7 +129,7 @@ def test_files_that_are_no_scenario(content: bytes, fragments: list[str], write:
         ("seed: 3", "seed: 3\nseed: 4", ["bad.yaml:3: seed: given twice", "bad.yaml:2"]),
         ("  rock:", "  rock: {position_m: [9, 9, 9]}\n  rock:", ["bad.yaml:10: obstacles.rock: given twice", ":9"]),
         ("seed: 3", "sede: 3", ["bad.yaml:2: sede: unknown key", "did you mean seed?", "duration_s"]),
-        ("  rock: {", "  rock: {radius_m: 1, ", ["bad.yaml:9: obstacles.rock.radius_m", "position_m, known_to_uav"]),
+        ("  rock: {", "  rock: {width_m: 1, ", ["bad.yaml:9: obstacles.rock.width_m", "position_m, known_to_uav"]),
         ("duration_s: 5", "duration_s: 5 km", ["bad.yaml:3: duration_s: '5 km'", "a number in s"]),
         ("ugvs:", "ugvs: &a\n  <<: *a", ["nested too deeply"]),
         ("name: small", "name: !custom x", ["bad.yaml:1: name: the tag !custom is given", "text"]),
