@@ -746,7 +746,7 @@ GATEKEEPER = (
         "components.py",
         "return Horizon(gate.stages, substeps,",
         "return Horizon(gate.stages - 1, substeps,",
-        runs=("crowd d",),
+        runs=("crowd c",),
     ),
     Mutant(
         "the answer counts a sample later",

@@ -67,6 +67,9 @@ def test_every_decision_carries_its_evidence(seed: int) -> None:
     assert solution.rounding_deviation <= problem.dt / 2 + 1e-9
     constant = [problem.evaluate(np.full(20, w)).objective for w in (0.0, 1.0)]
     assert solution.objective <= min(constant)
+    assert solution.rounded is not None
+    other = np.append(1.0 - solution.rounded[0], solution.rounded[1:])
+    assert solution.objective <= cost(problem, np.stack([solution.rounded, other])).min() * (1.0 + 1e-12) + 1e-15
 
 
 @pytest.mark.parametrize("name", ["rolled out 0", "rolled out 2", "case A, stalled", "case A, on the way"])
