@@ -72,6 +72,30 @@ def side_by_side(
         _pieces = ()
 
 
+def apart(work: Callable[[], int]) -> int:
+    """What some work returns, done in a process of its own: what ends that process ends nothing else.
+
+    Raises:
+        AirgroundError: if the process ends without having returned.
+    """
+    if not forks():
+        return work()
+    context = multiprocessing.get_context("fork")
+    receiver, sender = context.Pipe(duplex=False)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # idle threads of numerical libraries survive a fork
+        process = context.Process(target=lambda: sender.send(work()))
+        process.start()
+    sender.close()
+    try:
+        returned: int = receiver.recv()
+    except EOFError:
+        process.join()
+        raise AirgroundError(f"a process with claims of others died (exit code {process.exitcode})") from None
+    process.join()
+    return returned
+
+
 def _begin() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent's to heed
     signal.signal(signal.SIGTERM, signal.SIG_DFL)

@@ -11,8 +11,10 @@ import argparse
 import shlex
 import sys
 import webbrowser
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from airground_drake.errors import (
     AirgroundError,
@@ -28,6 +30,9 @@ from airground_drake.report import folder
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.estimate import DEFAULT_LIMITS, GIB, Limits
 from airground_drake.scenarios.shipped import shipped
+
+if TYPE_CHECKING:
+    from airground_drake.scenarios.schema import Scenario
 
 EXIT_USAGE, EXIT_TOOL = 2, 4
 FORMATS = tuple(folder.PAGES)
@@ -53,28 +58,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.list:
         print("\n".join([*shipped(), AUDIT]))
         return 0
-    from airground_drake.report import document, make
-    from airground_drake.scenarios.load import load
-    from airground_drake.verify import cache_folder
-
     command = ["python", "-m", "airground_drake.report", *(sys.argv[1:] if arguments is None else arguments)]
+    return _explained(partial(_loaded, options, shlex.join(command)))
+
+
+def _explained(work: Callable[[], int]) -> int:
+    """The exit code of some work, with a line for what has kept it from being done."""
     try:
-        overrides = [*options.set, *([] if options.seed is None else [f"seed={options.seed}"])]
-        audited = options.scenario == AUDIT
-        scenario, digest = load(AUDITED if audited else options.scenario, overrides)
-        if audited:
-            scenario.name, scenario.title, scenario.description = AUDIT, AUDIT_TITLE, AUDIT_DESCRIPTION
-        kept = None if options.no_cache else cache_folder()
-        output = options.output or Path("reports") / scenario.name
-        limits = Limits(options.limit_steps, options.limit_memory * GIB)
-        with (
-            plugins.admitted(scenario, options.scenario, allow=options.allow_plugins),
-            told(quiet=options.quiet, verbose=options.verbose) as watch,
-        ):
-            report = make.write_report(
-                scenario, digest, output, options.format, shlex.join(command), kept, audited, limits, watch
-            )
-        make.read_back(output, options.format, report)
+        return work()
     except LimitError as error:
         print(f"error: {error}; see --limit-steps and --limit-memory", file=sys.stderr)
         return EXIT_USAGE
@@ -84,6 +75,40 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (AirgroundError, OSError) as error:
         print(f"error: {one_line(str(error))}", file=sys.stderr)
         return EXIT_TOOL
+
+
+def _loaded(options: argparse.Namespace, command: str) -> int:
+    """Load the scenario and report on it: in a process of its own, where claims of others may end that process."""
+    from airground_drake.scenarios.load import load
+
+    overrides = [*options.set, *([] if options.seed is None else [f"seed={options.seed}"])]
+    audited = options.scenario == AUDIT
+    scenario, digest = load(AUDITED if audited else options.scenario, overrides)
+    if audited:
+        scenario.name, scenario.title, scenario.description = AUDIT, AUDIT_TITLE, AUDIT_DESCRIPTION
+    work = partial(_reported, options, command, scenario, digest)
+    if not (scenario.claims and options.allow_plugins):
+        return work()
+    from airground_drake.side_by_side import apart
+
+    return apart(partial(_explained, work))
+
+
+def _reported(options: argparse.Namespace, command: str, scenario: Scenario, digest: str) -> int:
+    from airground_drake.report import document, make
+    from airground_drake.verify import cache_folder
+
+    kept = None if options.no_cache else cache_folder()
+    output = options.output or Path("reports") / scenario.name
+    limits = Limits(options.limit_steps, options.limit_memory * GIB)
+    with (
+        plugins.admitted(scenario, options.scenario, allow=options.allow_plugins),
+        told(quiet=options.quiet, verbose=options.verbose) as watch,
+    ):
+        report = make.write_report(
+            scenario, digest, output, options.format, command, kept, options.scenario == AUDIT, limits, watch
+        )
+    make.read_back(output, options.format, report)
     overall = report["overall"]
     if not options.quiet:
         print(f"{scenario.name}: {overall['status'].replace('_', ' ')}. {overall['why']}\n{one_line(str(output))}")

@@ -128,6 +128,31 @@ def test_a_simulation_that_ends_its_process_is_no_report(
     assert not (tmp_path / "out" / "report.json").exists()
 
 
+CLAIM = """
+import os
+from airground_drake.verify.claim import Finding, TraceClaim
+class It(TraceClaim):
+    id = "MINE"
+    statement = formula = method = equations = does_not_establish = summary = ""
+    assumptions = latex = ()
+    def applies(self, trace): os._exit(0)
+    def check(self, trace): ...
+"""
+CLAIMS = {"on import": "import os; os._exit(0)", "when asked": CLAIM}
+
+
+@pytest.mark.parametrize("when", CLAIMS)
+def test_a_claim_that_ends_its_process_is_no_report(
+    when: str, module: Callable[[str], str], tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    change = ["--set", f"claims={{MINE: '{module(CLAIMS[when])}'}}", "--set", "duration_s=0.5", "--allow-plugins"]
+    assert main(["minimal", "-o", str(tmp_path / "out"), "--format", "json", *change]) == 4
+    said = capfd.readouterr().err.strip().splitlines()
+    assert len(said) == 1
+    assert "died" in said[0]
+    assert not (tmp_path / "out" / "report.json").exists()
+
+
 @pytest.fixture
 def saved(report: Report, tmp_path: Path, module: Callable[[str], str]) -> Path:
     """A saved run whose scenario names a module for everything."""
