@@ -89,7 +89,7 @@ def _alone(work: Callable[[int], T], item: int) -> T | None:
 
 
 @contextmanager
-def cluster(scheduler: str) -> Iterator[Pool]:
+def cluster(scheduler: str, timeout_s: float = 10.0) -> Iterator[Pool]:
     """The workers of a Dask cluster, each of which must have this package installed.
 
     A worker that dies is Dask's to notice: its items go to others; one that has killed several is given up.
@@ -104,7 +104,7 @@ def cluster(scheduler: str) -> Iterator[Pool]:
         raise AirgroundError(missing) from None
     dask: Any = distributed  # its types are incomplete
     try:
-        client = dask.Client(scheduler, timeout="10s", set_as_default=False)
+        client = dask.Client(scheduler, timeout=timeout_s, set_as_default=False)
     except (OSError, ValueError) as error:
         raise AirgroundError(one_line(f"no Dask scheduler at {scheduler}: {error}")) from None
     with client:

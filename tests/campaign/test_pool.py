@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from airground_drake.campaign import pool as module
 from airground_drake.campaign.pool import cluster, local
 from airground_drake.errors import AirgroundError
 
@@ -21,6 +22,10 @@ def work(folder: Path, always: int, item: int) -> int:
     return item * item
 
 
+def times(factor: int, item: int) -> int:
+    return factor * item
+
+
 def test_a_process_that_dies_loses_no_item_and_does_none_twice(tmp_path: Path) -> None:
     with local(jobs=2) as pool:
         found = list(pool(partial(work, tmp_path, 5), range(9)))
@@ -29,13 +34,29 @@ def test_a_process_that_dies_loses_no_item_and_does_none_twice(tmp_path: Path) -
 
 def test_the_same_on_a_cluster_of_two_workers(tmp_path: Path) -> None:
     distributed = pytest.importorskip("distributed")
-    options = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None}
+    options = {"n_workers": 2, "threads_per_worker": 1, "processes": False, "dashboard_address": ":0"}
     with distributed.LocalCluster(**options) as here, cluster(here.scheduler_address) as pool:
-        found = list(pool(partial(work, tmp_path, -1), range(9)))
-    assert sorted(found) == [(item, item * item) for item in range(9)]
+        found = list(pool(partial(times, 3), range(40)))
+    assert sorted(found) == [(item, 3 * item) for item in range(40)]
+
+
+def test_an_item_that_has_killed_its_workers_is_given_up_and_what_work_raises_is_raised() -> None:
+    distributed = pytest.importorskip("distributed")
+
+    class Future:
+        def __init__(self, error: Exception) -> None:
+            self.error = error
+
+        def result(self) -> None:
+            raise self.error
+
+    killed = distributed.scheduler.KilledWorker("item-5", None, 3)
+    assert module._result(distributed, Future(killed)) is None
+    with pytest.raises(ZeroDivisionError):
+        module._result(distributed, Future(ZeroDivisionError()))
 
 
 def test_no_scheduler_is_one_line() -> None:
     pytest.importorskip("distributed")
-    with pytest.raises(AirgroundError, match="no Dask scheduler at"), cluster("tcp://127.0.0.1:9"):
+    with pytest.raises(AirgroundError, match="no Dask scheduler at"), cluster("tcp://127.0.0.1:9", timeout_s=0.5):
         pass
