@@ -2,28 +2,15 @@
 
 from __future__ import annotations
 
-import os
 from functools import partial
 from pathlib import Path
 
 import pytest
+from builders.dying import times, work
 
 from airground_drake.campaign import pool as module
 from airground_drake.campaign.pool import cluster, local
 from airground_drake.errors import AirgroundError
-
-
-def work(folder: Path, always: int, item: int) -> int:
-    """Item 2 kills its process the first time, one item every time."""
-    seen = folder / str(item)
-    if item == always or (item == 2 and not seen.exists()):
-        seen.touch()
-        os._exit(1)
-    return item * item
-
-
-def times(factor: int, item: int) -> int:
-    return factor * item
 
 
 def test_a_process_that_dies_loses_no_item_and_does_none_twice(tmp_path: Path) -> None:
