@@ -31,7 +31,6 @@ from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn, SearchStrategy
 
 from airground_drake.decision.bayes import optimal_threshold
-from airground_drake.nsbc.avoidance import COMPOSITIONS
 from airground_drake.registry import METHODS, ROUTES
 from airground_drake.scenarios.schema import (
     Control,
@@ -57,6 +56,8 @@ SPEEDS = (1.0, 0.5, 2.0)
 """Of preset trajectories and of what policies propose, m/s."""
 DISTANCES = (2.0, 1.0, 0.5, 3.0)
 """Safe distances, m, the default first."""
+RADII = (0.0, 0.5, 0.1)
+"""Of robots and obstacles, m."""
 PERIODS = (0.025, 0.05, 0.1)
 """Control periods, s; no gain that is drawn is too high for them."""
 JITTER = (0.0, 0.25, -0.25, 0.5, -0.5)
@@ -115,6 +116,7 @@ def scenarios(
     triggers: SearchStrategy[str] | None = None,
     routes: SearchStrategy[str] | None = None,
     durations: SearchStrategy[float] | None = None,
+    compositions: SearchStrategy[str] | None = None,
 ) -> Scenario:
     """A valid scenario with one run, named by its method.
 
@@ -128,12 +130,16 @@ def scenarios(
         routes: of method (c)'s gatekeeper; default: any.
         durations: of the run, s; default: 1 to 20. Of minutes not every draw is valid: rounding takes more from a
             distance the farther robots may get.
+        compositions: of the avoidance; default: `augmented`, the only one that is certified. Under the others no
+            distance is guaranteed.
     """
     count = draw(st.integers(1, 4) if ugvs is None else ugvs)
     method = draw(first_of(*sorted(METHODS, reverse=True)) if methods is None else methods)
     period = draw(first_of(*PERIODS))
     safe = SafeDistance(draw(first_of(*DISTANCES)), draw(first_of(*DISTANCES)), draw(first_of(1.0, 0.5)))
-    team, uav, points = draw(_maps(count, draw(st.integers(0, 6) if obstacles is None else obstacles), safe))
+    largest = draw(first_of(*RADII))
+    others = draw(st.integers(0, 6) if obstacles is None else obstacles)
+    team, uav, points = draw(_maps(count, others, safe, largest))
     speed = max(uav.max_speed_m_s, *(ugv.max_speed_m_s for ugv in team.values()))
     database = draw(DATABASES if policies is None else policies)
     return Scenario(
@@ -144,17 +150,17 @@ def scenarios(
         uav=uav,
         obstacles=points,
         safe_distance=safe,
-        control=draw(_controls(period, _reach(safe, speed, period))),
+        control=draw(_controls(period, _reach(safe, largest, speed, period))),
         decision=draw(_decisions(period, triggers)),
         intervention=draw(_interventions(period, database)),
         gatekeeper=draw(_gatekeepers(period, routes)),
-        runs={method: Run(method, draw(first_of(*COMPOSITIONS)))},
+        runs={method: Run(method, "augmented" if compositions is None else draw(compositions))},
     )
 
 
-def _reach(safe: SafeDistance, speed: float, period: float) -> float:
-    """A sensing range, m, that covers every safe distance and what two robots at this speed close in one period."""
-    return max(safe.obstacle_m, safe.ugv_m, safe.air_ground_m) + 2.0 * speed * period
+def _reach(safe: SafeDistance, radius: float, speed: float, period: float) -> float:
+    """A sensing range, m, that covers safe distances, radii and what two robots at this speed close in one period."""
+    return max(safe.obstacle_m, safe.ugv_m, safe.air_ground_m) + 2.0 * (radius + speed * period)
 
 
 Cell = tuple[int, int]
@@ -162,7 +168,9 @@ Cell = tuple[int, int]
 
 
 @st.composite
-def _maps(draw: DrawFn, count: int, others: int, safe: SafeDistance) -> tuple[dict[str, Ugv], Uav, dict[str, Obstacle]]:
+def _maps(
+    draw: DrawFn, count: int, others: int, safe: SafeDistance, largest: float
+) -> tuple[dict[str, Ugv], Uav, dict[str, Obstacle]]:
     """UGVs, UAV and obstacles on a grid; no two starts share a cell, nor two targets, nor any with an obstacle.
 
     Args:
@@ -170,17 +178,21 @@ def _maps(draw: DrawFn, count: int, others: int, safe: SafeDistance) -> tuple[di
         count: number of UGVs.
         others: number of obstacles.
         safe: distances that starts and targets keep.
+        largest: radius of a robot or obstacle, m.
     """
-    pitch = max(safe.obstacle_m, safe.ugv_m, safe.air_ground_m) + 2.0 * max(JITTER)
+    pitch = max(safe.obstacle_m, safe.ugv_m, safe.air_ground_m) + 2.0 * (max(JITTER) + largest)
+    radii = first_of(0.0, largest)
     width = math.isqrt(count + others + 2) + draw(st.integers(1, 3))
     cells = [(x, y) for y in range(width) for x in range(width)]
     free = list(cells)
     points = {
-        f"obstacle_{k + 1}": Obstacle(draw(_places(free, pitch)), draw(first_of(True, False))) for k in range(others)
+        f"obstacle_{k + 1}": Obstacle(draw(_places(free, pitch)), draw(first_of(True, False)), draw(radii))
+        for k in range(others)
     }
     starts, targets = list(free), list(free)
-    team = {f"ugv{k + 1}": draw(_ugvs(cells, starts, targets, pitch)) for k in range(count)}
-    return team, draw(_uavs(cells, starts, targets, pitch, safe.air_ground_m + 1.0)), points
+    team = {f"ugv{k + 1}": draw(_ugvs(cells, starts, targets, pitch, radii)) for k in range(count)}
+    altitude = safe.air_ground_m + 2.0 * largest + 1.0
+    return team, draw(_uavs(cells, starts, targets, pitch, altitude, radii)), points
 
 
 @st.composite
@@ -198,18 +210,26 @@ def _middles(cells: list[Cell], pitch: float, at_most: int) -> SearchStrategy[li
 
 
 @st.composite
-def _ugvs(draw: DrawFn, cells: list[Cell], starts: list[Cell], targets: list[Cell], pitch: float) -> Ugv:
+def _ugvs(
+    draw: DrawFn, cells: list[Cell], starts: list[Cell], targets: list[Cell], pitch: float, radii: SearchStrategy[float]
+) -> Ugv:
     """A UGV that has somewhere to go, by a preset trajectory that may lead anywhere."""
     begin = draw(_places(starts, pitch))
     end = draw(_places(targets, pitch, besides=(round(begin[0] / pitch), round(begin[1] / pitch))))
     speed = draw(first_of(*SPEEDS))
     preset = Preset(_distinct([begin, *draw(_middles(cells, pitch, 2)), end]), speed)
-    return Ugv(begin, end, preset, draw(first_of(6.0, speed)))
+    return Ugv(begin, end, preset, draw(first_of(6.0, speed)), draw(radii))
 
 
 @st.composite
 def _uavs(
-    draw: DrawFn, cells: list[Cell], starts: list[Cell], targets: list[Cell], pitch: float, altitude: float
+    draw: DrawFn,
+    cells: list[Cell],
+    starts: list[Cell],
+    targets: list[Cell],
+    pitch: float,
+    altitude: float,
+    radii: SearchStrategy[float],
 ) -> Uav:
     """A UAV that starts and ends over cells of its own, with obstacles on its map that may not be there."""
     above = [[*draw(_places(free, pitch))[:2], altitude] for free in (starts, targets)]
@@ -219,6 +239,7 @@ def _uavs(
         altitude_m=altitude,
         max_speed_m_s=draw(first_of(10.0, 3.0)),
         phantoms_m=draw(_middles(cells, pitch, 1)),
+        radius_m=draw(radii),
     )
 
 

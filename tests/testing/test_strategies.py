@@ -18,11 +18,20 @@ from airground_drake.testing.strategies import PARAMETERS, policies, scenarios
 
 
 @examples(15)
-@given(scenarios(ugvs=st.integers(5, 12), obstacles=st.just(30), triggers=st.just("bare"), routes=st.just("nonlinear")))
+@given(
+    scenarios(
+        ugvs=st.integers(5, 12),
+        obstacles=st.just(30),
+        triggers=st.just("bare"),
+        routes=st.just("nonlinear"),
+        compositions=st.just("recursion_nearest"),
+    )
+)
 def test_what_is_asked_for_is_drawn(scenario: Scenario) -> None:
     assert 5 <= len(scenario.ugvs) <= 12
     assert len(scenario.obstacles) == 30
     assert (scenario.decision.trigger, scenario.gatekeeper.route) == ("bare", "nonlinear")
+    assert {run.composition for run in scenario.runs.values()} == {"recursion_nearest"}
     assert from_data(resolved(scenario), "drawn") == scenario
 
 
@@ -36,12 +45,15 @@ def test_draws_are_valid_and_of_many_kinds() -> None:
         seen.update([f"method {next(iter(scenario.runs))}", f"threshold {scenario.decision.threshold.rule}"])
         seen.update(f"policy {policy.name}" for policy in scenario.intervention.policies)
         seen.update(f"known {obstacle.known_to_uav}" for obstacle in scenario.obstacles.values())
+        seen.update(f"composition {run.composition}" for run in scenario.runs.values())
+        seen.update(f"radius {ugv.radius_m}" for ugv in scenario.ugvs.values())
         seen.update(f"waypoints {len(ugv.preset.waypoints_m)}" for ugv in scenario.ugvs.values())
 
     draw()
     assert {f"method {name}" for name in METHODS} <= set(seen)
     assert {f"policy {name}" for name in POLICIES.own} <= set(seen)
-    assert {"threshold fixed", "threshold bayes", "known True", "known False", "waypoints 4"} <= set(seen)
+    assert {name for name in seen if name.startswith("composition")} == {"composition augmented"}
+    assert {"threshold fixed", "threshold bayes", "known True", "known False", "waypoints 4", "radius 0.5"} <= set(seen)
 
 
 @examples(5)
