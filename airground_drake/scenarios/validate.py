@@ -258,7 +258,9 @@ def _periods(scenario: Scenario) -> Problems:
             yield f"{key}.period_s", period, rule
     stage = gatekeeper.horizon_s / gatekeeper.stages
     if not _multiple(stage, control):
-        yield "gatekeeper.horizon_s", gatekeeper.horizon_s, f"a stage, horizon_s / stages = {stage:.9g} s, {rule}"
+        fits = f" (gatekeeper.stages: {round(gatekeeper.horizon_s / control)} would do)"
+        problem = f"a stage, horizon_s / stages = {stage:.9g} s, {rule}"
+        yield "gatekeeper.horizon_s", gatekeeper.horizon_s, problem + fits * _multiple(gatekeeper.horizon_s, control)
     if not (_multiple(noise, control) or _multiple(control, noise)):
         yield "decision.noise_period_s", noise, f"{rule}, or go into it a whole number of times"
 

@@ -106,7 +106,7 @@ BAD: list[tuple[str, object, list[str]]] = [
     ("gatekeeper.period_s", 0.0125, ["gatekeeper.period_s: 0.0125", "multiple of control.period_s"]),
     ("intervention.period_s", 0.06, ["intervention.period_s: 0.06", "multiple of control.period_s"]),
     ("gatekeeper.horizon_s", 3.1, ["gatekeeper.horizon_s: 3.1", "horizon_s / stages", "multiple of"]),
-    ("gatekeeper.stages", 7, ["gatekeeper.horizon_s: 3.0", "horizon_s / stages = 0.42857"]),
+    ("gatekeeper.stages", 7, ["gatekeeper.horizon_s: 3.0", "horizon_s / stages = 0.42857", "stages: 120 would do"]),
     ("decision.noise_period_s", 0.01, ["decision.noise_period_s: 0.01", "multiple of control.period_s"]),
     # decision
     ("decision.release_m", 0, ["decision.release_m: 0.0", "not below 1e-09"]),
