@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
+from filelock import FileLock
 from hypothesis import HealthCheck, settings
 from hypothesis.internal.conjecture import providers
 from sharing import once
@@ -83,10 +84,14 @@ def run(airground_trace: Simulations) -> Simulations:
 
 @pytest.fixture(scope="session")
 def report(shared: Path) -> Callable[[str], Path]:
-    """`report(scenario)`: folder of the report of a shipped scenario, made once per session; not to be changed."""
+    """`report(scenario)`: folder of the report of a shipped scenario, made once per session; not to be changed.
+
+    One is made after the other, on all processors: the second one takes proofs that the first one has kept.
+    """
 
     def make(scenario: str, folder: Path) -> None:
-        assert write_report([scenario, "-o", str(folder)]) == 0
+        with FileLock(shared / "reports.lock"):
+            assert write_report([scenario, "-o", str(folder)]) == 0
 
     return lambda scenario: once(shared / f"report-{scenario}", lambda folder: make(scenario, folder))
 

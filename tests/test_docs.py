@@ -70,7 +70,8 @@ def test_the_tutorial_from_an_empty_folder(tmp_path: Path) -> None:
     for language, text in steps:
         name = re.match(r"# file: (\S+)\n", text)
         script.append(f"cat > {name[1]} <<'END'\n{text}END" if language == "python" and name else text)
-    environment = {**os.environ, "PYTEST_ADDOPTS": "-p airground_drake.testing.plugin -p no:cacheprovider"}
+    options = "-p airground_drake.testing.plugin -p no:cacheprovider --hypothesis-profile=ci"  # draws the same again
+    environment = {**os.environ, "PYTEST_ADDOPTS": options}
     done = subprocess.run(
         ["bash", "-c", "\n".join(script)], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
     )

@@ -18,7 +18,8 @@ import pytest
 from airground_drake.scenarios.load import load
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
-PLUGIN = "airground_drake.testing.plugin"
+OPTIONS = ("-p", "airground_drake.testing.plugin", "-p", "no:cacheprovider", "--hypothesis-profile=ci")
+"""Of pytest; the profile draws the same examples each time."""
 
 
 def imported(name: str) -> ModuleType:
@@ -33,7 +34,7 @@ def imported(name: str) -> ModuleType:
 def pytest_in(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     """`pytest` in a folder, with a session of its own: nothing of this one is known there."""
     environment = {name: value for name, value in os.environ.items() if not name.startswith(("PYTEST_", "HYPOTHESIS_"))}
-    command = [sys.executable, "-m", "pytest", "-p", PLUGIN, "-p", "no:cacheprovider", *arguments]
+    command = [sys.executable, "-m", "pytest", *OPTIONS, *arguments]
     return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
 
 

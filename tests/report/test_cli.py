@@ -12,6 +12,7 @@ from airground_drake import trace
 from airground_drake.report import make
 from airground_drake.report.__main__ import main
 from airground_drake.scenarios.load import load, shipped
+from airground_drake.simulation import simulate
 from airground_drake.verify import __main__ as judge
 
 Report = Callable[[str], Path]
@@ -156,8 +157,6 @@ def test_what_cannot_be_judged_is_exit_code_2(
 def test_a_refuted_claim_that_is_not_expected_is_exit_code_1(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    changes = ["--set", "decision.trigger=bare", "--set", "runs={b: {method: b}}", "--set", "reproduction=[]"]
-    assert main(["case_b", "-o", str(tmp_path), *changes, "--format", "json", "-q"]) == 1
-    assert capsys.readouterr() == ("", "")
-    assert judge.main([str(tmp_path / "trace" / "b"), "ZENO-PROOF", "-v"]) == 1
+    trace.save(simulate(load("minimal", ["decision.trigger=bare", "duration_s=1"])[0], "a"), tmp_path / "a")
+    assert judge.main([str(tmp_path / "a"), "ZENO-PROOF", "-v"]) == 1
     assert "ZENO-PROOF" in capsys.readouterr().err

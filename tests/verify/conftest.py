@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 from verify.judging import Judged
 
+from airground_drake.scenarios.load import load
 from airground_drake.verify.cache import cache_folder, find
 from airground_drake.verify.claim import ModelClaim, Mutant
 from airground_drake.verify.finding import Finding
@@ -16,14 +17,19 @@ from airground_drake.verify.mutants import MutantClaim
 
 @pytest.fixture(scope="session")
 def judged() -> Judged:
-    """`judged(claim, inputs)`: the finding on a claim or a mutant. Tests that patch something must judge themselves."""
+    """`judged(claim, inputs)`: the finding on a claim or a mutant, on case A by default, which its report has, too.
+
+    Tests that patch something must judge themselves.
+    """
+    case_a = load("case_a")[0]
     made: dict[tuple[str, str], Finding] = {}
 
-    def get(claim: ModelClaim | Mutant, inputs: dict[str, Any]) -> Finding:
+    def get(claim: ModelClaim | Mutant, inputs: dict[str, Any] | None = None) -> Finding:
         asked = MutantClaim(claim) if isinstance(claim, Mutant) else claim
-        key = asked.id, json.dumps(inputs, sort_keys=True)
+        given = asked.inputs(case_a) if inputs is None else inputs
+        key = asked.id, json.dumps(given, sort_keys=True)
         if key not in made:
-            (made[key],) = find([asked], [inputs], folder=cache_folder())
+            (made[key],) = find([asked], [given], folder=cache_folder())
         return made[key]
 
     return get

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+from typing import Any, Protocol
 
 from airground_drake.trace import Trace
 from airground_drake.verify import TRACE_CLAIMS, Finding, TraceClaim
@@ -15,8 +14,13 @@ from airground_drake.verify.runs.gate_opt import GateOpt
 from airground_drake.verify.runs.gate_record import Off, rows_of
 from airground_drake.verify.runs.gate_sur import GateSur
 
-Judged = Callable[[ModelClaim | Mutant, dict[str, Any]], Finding]
-"""The fixture `judged` of conftest.py."""
+
+class Judged(Protocol):
+    """The type of the fixture `judged` of conftest.py."""
+
+    def __call__(self, claim: ModelClaim | Mutant, inputs: dict[str, Any] | None = None) -> Finding:
+        """The finding for these inputs; default: those of case A."""
+
 
 CLAIMS = {claim.id: claim for claim in TRACE_CLAIMS}
 

@@ -18,8 +18,8 @@ from airground_drake.verify.model.avoidance.safe_inv import SafeInv
 
 
 @pytest.mark.parametrize("name", MUTANTS)
-def test_mutant_is_refuted(name: str, inputs: dict[str, Any], judged: Judged) -> None:
-    finding = judged(MUTANTS[name], inputs)
+def test_mutant_is_refuted(name: str, judged: Judged) -> None:
+    finding = judged(MUTANTS[name])
     assert finding.status == "refuted", finding
     assert finding.counterexample is not None
     assert finding.counterexample.get("exactly_checked", True)
@@ -33,25 +33,23 @@ def test_mutant_is_refuted(name: str, inputs: dict[str, Any], judged: Judged) ->
         "SAFE-GATE: intervention on top",
     ],
 )
-def test_mutant_comes_too_close_on_the_running_code(name: str, inputs: dict[str, Any], judged: Judged) -> None:
-    counterexample = judged(MUTANTS[name], inputs).counterexample
+def test_mutant_comes_too_close_on_the_running_code(name: str, judged: Judged) -> None:
+    counterexample = judged(MUTANTS[name]).counterexample
     assert counterexample is not None
     replay = counterexample["replay"]
     least = replay.get("least_distances_m", [replay.get("least_distance_m")])
     assert min(least) < replay["safe_distance_m"] - 0.05
 
 
-def test_overshoot_on_the_running_code(inputs: dict[str, Any], judged: Judged) -> None:
-    counterexample = judged(MUTANTS["SAFE-INV: gain too large, A h = 1.8"], inputs).counterexample
+def test_overshoot_on_the_running_code(judged: Judged) -> None:
+    counterexample = judged(MUTANTS["SAFE-INV: gain too large, A h = 1.8"]).counterexample
     assert counterexample is not None
     assert counterexample["replay"]["end_m"][0][0] > counterexample["replay"]["safe_distance_m"] + 0.1
 
 
 @pytest.mark.parametrize("name", [n for n in MUTANTS if n.startswith("SAFE-DIST")])
-def test_disturbed_mutant_breaks_the_bound_on_the_running_code(
-    name: str, inputs: dict[str, Any], judged: Judged
-) -> None:
-    counterexample = judged(MUTANTS[name], inputs).counterexample
+def test_disturbed_mutant_breaks_the_bound_on_the_running_code(name: str, judged: Judged) -> None:
+    counterexample = judged(MUTANTS[name]).counterexample
     assert counterexample is not None
     replay = counterexample["replay"]
     assert replay["worst_margin_m"] < -0.01

@@ -7,21 +7,18 @@ import json
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from verify.model.threshold.cases import TABLE_1
+from verify.judging import Judged
 
 from airground_drake.decision.bayes import decision_time, error_rate
-from airground_drake.scenarios.load import load
-from airground_drake.verify.finding import Finding
 from airground_drake.verify.model.threshold import mutants
 from airground_drake.verify.model.threshold.first_passages import PassageExperiment
-from airground_drake.verify.model.threshold.thr_ddm import ThrDdm
 
 MUTANTS = {f"{mutant.claim}: {mutant.says}": mutant for mutant in mutants.MUTANTS}
 
 
 @pytest.mark.parametrize("name", [n for n in MUTANTS if not n.startswith("THR-DDM")])
-def test_mutants_of_the_threshold_are_refuted(name: str) -> None:
-    finding = MUTANTS[name].check(TABLE_1)
+def test_mutants_of_the_threshold_are_refuted(judged: Judged, name: str) -> None:
+    finding = judged(MUTANTS[name])
     assert finding.status == "refuted"
     assert finding.counterexample
     assert finding.margin is None or finding.margin < 0.0
@@ -29,8 +26,8 @@ def test_mutants_of_the_threshold_are_refuted(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", [n for n in MUTANTS if n.startswith("THR-DDM")])
-def test_mutants_of_the_formulas_are_refuted(simulated: Finding, name: str) -> None:
-    finding = MUTANTS[name].check(ThrDdm().inputs(load("case_a")[0]))
+def test_mutants_of_the_formulas_are_refuted(judged: Judged, name: str) -> None:
+    finding = judged(MUTANTS[name])
     assert finding.status == "refuted"
     assert finding.counterexample
     assert abs(finding.counterexample["z_score"]) > 5.0

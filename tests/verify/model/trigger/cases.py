@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cache
-
 import numpy as np
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
@@ -11,10 +9,7 @@ from pydrake.systems.primitives import ConstantVectorSource, Integrator, LogVect
 
 from airground_drake.decision.trigger import Trigger
 from airground_drake.systems.decision import FIELDS, EventTrigger
-from airground_drake.verify.finding import Finding
 from airground_drake.verify.model.trigger import mutants
-from airground_drake.verify.model.trigger.zeno_proof import ZenoProof
-from airground_drake.verify.model.trigger.zeno_refine import ZenoRefine
 
 ZENO = {"zeta_m": 3.0, "released_below_m": 2.0, "dwell_s": 0.3, "min_inter_event_s": 0.3, "duration_s": 30.0}
 
@@ -28,16 +23,6 @@ KINDS: dict[str, type[Trigger]] = {
     "recovers at once": mutants.RecoversAtOnce,
     "forgets a trigger after the dwell": mutants.Forgets,
 }
-
-
-@cache
-def proved() -> Finding:
-    return ZenoProof().judge(ZENO)
-
-
-@cache
-def refined() -> Finding:
-    return ZenoRefine().judge(REFINE)
 
 
 def simulate(system: EventTrigger, noise: LeafSystem, until: float, step: float, error_m: float = 0.0) -> np.ndarray:

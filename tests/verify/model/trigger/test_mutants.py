@@ -9,7 +9,8 @@ from typing import Any
 import pytest
 from pydrake.systems.primitives import TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
-from verify.model.trigger.cases import KINDS, REFINE, ZENO, simulate, trigger_times
+from verify.judging import Judged
+from verify.model.trigger.cases import KINDS, ZENO, simulate, trigger_times
 
 from airground_drake.decision.trigger import Trigger
 from airground_drake.systems.decision import EventTrigger
@@ -47,8 +48,8 @@ def test_mutants_have_no_symbolic_proof_either(name: str) -> None:
     assert "refuted" in {proof.status for proof in discharge(failing)}
 
 
-def test_experiments_that_must_fail() -> None:
-    found = {name: mutant.check(REFINE) for name, mutant in EXPERIMENTS.items()}
+def test_experiments_that_must_fail(judged: Judged) -> None:
+    found = {name: judged(mutant) for name, mutant in EXPERIMENTS.items()}
     assert {finding.status for finding in found.values()} == {"refuted"}
     whats: list[Any] = [finding.counterexample["what"] for finding in found.values() if finding.counterexample]
     assert ["automaton" in whats[0], "bare" in whats[1]] == [True, True]

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 
-from verify.model.trigger.cases import ZENO, proved
+from verify.judging import Judged
+from verify.model.trigger.cases import ZENO
 
 from airground_drake.decision.trigger import Trigger
 from airground_drake.scenarios.schema import Scenario
@@ -13,10 +14,10 @@ from airground_drake.verify.model.trigger import induction
 from airground_drake.verify.model.trigger.zeno_proof import ZenoProof
 
 
-def test_the_shipped_trigger_is_proved(case_a: Scenario) -> None:
+def test_the_shipped_trigger_is_proved(judged: Judged, case_a: Scenario) -> None:
     claim = ZenoProof()
     inputs = claim.inputs(case_a)
-    finding = claim.judge(inputs)
+    finding = judged(claim)
     assert finding.status == "proved", finding.evidence
     assert inputs["dwell_s"] == inputs["min_inter_event_s"] == case_a.decision.min_inter_event_s
     assert finding.margin is not None
@@ -47,8 +48,8 @@ def test_a_dwell_that_is_too_short_is_refuted() -> None:
     assert [each.name for each in broken] == ["dwell_is_the_bound"]
 
 
-def test_certificates_are_answered_alike_from_their_text() -> None:
-    files = proved().certificates
+def test_certificates_are_answered_alike_from_their_text(judged: Judged) -> None:
+    files = judged(ZenoProof(), ZENO).certificates
     assert [result.answer for result in solve([files["zeno_horn.smt2"]])] == ["sat"]
     for name in ("initiation", "consecution", "safety"):
         assert solve([files[f"inv_{name}.smt2"]], "cvc5")[0].answer == "unsat"

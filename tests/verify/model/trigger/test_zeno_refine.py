@@ -7,7 +7,8 @@ import math
 from itertools import pairwise
 
 import pytest
-from verify.model.trigger.cases import REFINE, refined
+from verify.judging import Judged
+from verify.model.trigger.cases import REFINE
 
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.model.trigger import mutants, refined_paths, zeno_refine
@@ -15,9 +16,9 @@ from airground_drake.verify.model.trigger.refined_paths import experiment
 from airground_drake.verify.model.trigger.zeno_refine import ZenoRefine
 
 
-def test_the_shipped_trigger_is_supported(case_a: Scenario) -> None:
+def test_the_shipped_trigger_is_supported(judged: Judged, case_a: Scenario) -> None:
     assert ZenoRefine().inputs(case_a) == REFINE
-    finding = refined()
+    finding = judged(ZenoRefine())
     assert finding.status == "supported", finding.counterexample
     evidence = finding.evidence
     assert evidence == zeno_refine.series(experiment(REFINE), refined_paths.counts(experiment(REFINE)))
