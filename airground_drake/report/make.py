@@ -18,8 +18,9 @@ from airground_drake.diagram import build_diagram
 from airground_drake.errors import PluginError, ReportError
 from airground_drake.progress import SILENT, Watch
 from airground_drake.report import audit, document, folder, html, junit
-from airground_drake.report.figures import moments, pictures, zeno_refine
+from airground_drake.report.figures import moments, zeno_refine
 from airground_drake.report.figures.draw import draw
+from airground_drake.report.figures.findings import draw as draw_findings
 from airground_drake.report.figures.panels import Figure
 from airground_drake.report.folder import PAGES
 from airground_drake.runs import simulate_all
@@ -100,7 +101,7 @@ def write_report(
         written.append("junit.xml")
     if "html" in formats:
         plates = [*draw(scenario, traces), *_refinement(verdicts, audited), *moments.draw(report, traces)]
-        plates += pictures.draw(report["audit"])
+        plates += draw_findings(report["audit"])
         files.write_text(output / "report.html", html.render(report, plates, drawn))
         written.append("report.html")
     report = document.sealed(report, output, written)
