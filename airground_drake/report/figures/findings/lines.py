@@ -40,7 +40,7 @@ class Lines(NamedTuple):
         """The figure beside finding `number`; call it inside `canvas.style`."""
         name = f"audit-{number}"
         says = "; ".join(f"{mark}: ({x:.3g}, {y:.3g})" for mark, (x, y) in self.marks.items())
-        text = f"{self.y[0].upper()}{self.y[1:]}, over {self.x}. {says}".rstrip()
+        text = f"Up: {self.y}. Across: {self.x}. {says}".rstrip()
         rows = []
         for line, (x, y) in self.lines.items():
             chosen = np.unique(np.linspace(0, len(x) - 1, MAX_TABLE_ROWS // len(self.lines)).round().astype(int))

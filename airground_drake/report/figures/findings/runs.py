@@ -53,6 +53,6 @@ def task_error(item: Mapping[str, Any]) -> Lines:
     """Item 11: the task error that (26) counts along the horizon, without and with the kinematics."""
     known = item["evidence"]["task_error"]
     t = np.array(known["t_s"])
-    names = {"printed_m": "as printed, either choice", "accept_m": "with (23), accept", "refuse_m": "with (23), refuse"}
+    names = {"printed_m": "as printed, either", "accept_m": "with (23), accept", "refuse_m": "with (23), refuse"}
     lines = {name: (t, np.array(known[key])) for key, name in names.items()}
     return Lines("Task error along the horizon", "time from the decision, s", "task error, m", lines)
