@@ -75,4 +75,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def entry() -> None:
     """Console script."""
     interruption.end_on_signals()  # before the imports, which take seconds
-    interruption.leave(main())
+    interruption.run(main)

@@ -72,6 +72,8 @@ def _explained(work: Callable[[], int]) -> int:
     except (ScenarioError, PluginError, UnknownNameError, FolderError) as error:
         print(f"error: {error}", file=sys.stderr)
         return EXIT_USAGE
+    except BrokenPipeError:  # nobody reads what is printed
+        raise
     except (AirgroundError, OSError) as error:
         print(f"error: {one_line(str(error))}", file=sys.stderr)
         return EXIT_TOOL
@@ -95,8 +97,8 @@ def _loaded(options: argparse.Namespace, command: str) -> int:
 
 
 def _reported(options: argparse.Namespace, command: str, scenario: Scenario, digest: str) -> int:
-    from airground_drake.report import document, make
-    from airground_drake.verify import cache_folder
+    from airground_drake.report import make
+    from airground_drake.verify.cache import cache_folder
 
     kept = None if options.no_cache else cache_folder()
     output = options.output or Path("reports") / scenario.name
@@ -114,7 +116,7 @@ def _reported(options: argparse.Namespace, command: str, scenario: Scenario, dig
         print(f"{scenario.name}: {overall['status'].replace('_', ' ')}. {overall['why']}\n{one_line(str(output))}")
     if options.open and "html" in options.format:
         webbrowser.open((output / "report.html").resolve().as_uri())
-    return document.exit_code(report)
+    return int(overall["exit_code"])
 
 
 def parser() -> argparse.ArgumentParser:
@@ -170,4 +172,4 @@ def _positive(text: str) -> float:
 
 
 if __name__ == "__main__":
-    interruption.leave(main())
+    interruption.run(main)

@@ -108,4 +108,4 @@ def _judge(target: str, wanted: Sequence[str], watch: Watch, *, allow_plugins: b
 
 
 if __name__ == "__main__":
-    interruption.leave(main())
+    interruption.run(main)
