@@ -30,6 +30,7 @@ from airground_drake.report import folder
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.estimate import DEFAULT_LIMITS, GIB, Limits
 from airground_drake.scenarios.shipped import shipped
+from airground_drake.usage import Parser
 
 if TYPE_CHECKING:
     from airground_drake.scenarios.schema import Scenario
@@ -121,7 +122,7 @@ def _reported(options: argparse.Namespace, command: str, scenario: Scenario, dig
 
 def parser() -> argparse.ArgumentParser:
     """What the command line takes."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="airground report",
         description="Simulate all runs of a scenario, check the claims on them, and write the report.",
         epilog="exit codes: 0 as expected, 1 a claim differs, 2 usage or bad scenario, 3 inconclusive, 4 tool error, "
@@ -165,9 +166,12 @@ def _formats(text: str) -> tuple[str, ...]:
 
 
 def _positive(text: str) -> float:
-    value = float(text)
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
     if not value > 0.0:
-        raise argparse.ArgumentTypeError(f"{text} is not allowed; wanted: a number above 0")
+        raise argparse.ArgumentTypeError(f"{text!r} is not allowed; wanted: a number above 0")
     return value
 
 
