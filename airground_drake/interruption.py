@@ -12,14 +12,17 @@ import os
 import signal
 import sys
 import threading
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from types import FrameType
 from typing import NoReturn
 
 from airground_drake import files
+from airground_drake.errors import one_line
 
 STOPPING = (signal.SIGINT, signal.SIGTERM)
+EXIT_TOOL = 4
 ROUNDS = 10
 """Searches for descendants at most: one that is killed may just have begun another."""
 
@@ -49,6 +52,18 @@ def end_on_signals() -> None:
             signal.signal(each, end)
     forks = _Forks()
     os.register_at_fork(before=forks.before, after_in_child=forks.in_child)
+
+
+def run(main: Callable[[], int]) -> NoReturn:
+    """Run a command and leave with its exit code; with 141, quietly, if whoever reads what it prints has gone."""
+    try:
+        code = main()
+    except BrokenPipeError:
+        code = 128 + signal.SIGPIPE
+    except OSError as error:
+        print(f"error: {one_line(str(error))}", file=sys.stderr)
+        code = EXIT_TOOL
+    leave(code)
 
 
 def leave(code: int) -> NoReturn:

@@ -82,7 +82,7 @@ class Registry:
         """What a registered class says of itself in a line; its module is read, not imported (packages above it are).
 
         Returns:
-            Its `statement` if it is a claim, else the first line of its docstring; '' if neither can be found.
+            Its `summary` if it is a claim that has one, else the first line of its docstring; '' if there is neither.
         """
         if name in self._added:
             return (self._added[name].__doc__ or "").strip().partition("\n")[0]
@@ -92,7 +92,7 @@ class Registry:
             tree = ast.parse(Path(spec.origin or "").read_bytes()) if spec else ast.Module([], [])
             for node in tree.body:
                 if isinstance(node, ast.ClassDef) and node.name == attribute:
-                    return _statement(node) or (ast.get_docstring(node) or "").partition("\n")[0]
+                    return _summary(node) or (ast.get_docstring(node) or "").partition("\n")[0]
         return ""
 
     def load(self, name: str, of: type[T]) -> type[T]:
@@ -194,10 +194,10 @@ def _places() -> str:
     return ", ".join([*dict.fromkeys(added), "Python's own folders"])
 
 
-def _statement(of: ast.ClassDef) -> str:
-    """The text of `statement = "..."` in a class; '' if there is none."""
+def _summary(of: ast.ClassDef) -> str:
+    """The text of `summary = "..."` in a class; '' if there is none."""
     for node in of.body:
-        if isinstance(node, ast.Assign) and [ast.unparse(target) for target in node.targets] == ["statement"]:
+        if isinstance(node, ast.Assign) and [ast.unparse(target) for target in node.targets] == ["summary"]:
             return str(ast.literal_eval(node.value))
     return ""
 

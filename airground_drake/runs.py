@@ -12,6 +12,7 @@ import os
 import signal
 import warnings
 from collections import deque
+from collections.abc import Callable
 from functools import partial
 from multiprocessing.connection import wait
 from multiprocessing.process import BaseProcess
@@ -34,13 +35,16 @@ TOLD_S = 0.2
 """How often it is told how far the runs have come, s."""
 
 
-def simulate_all(scenario: Scenario, jobs: int | None = None, watch: Watch = SILENT) -> dict[str, Trace]:
+def simulate_all(
+    scenario: Scenario, jobs: int | None = None, watch: Watch = SILENT, meanwhile: Callable[[], object] | None = None
+) -> dict[str, Trace]:
     """Simulate every run of a scenario, in its order, each in a process of its own.
 
     Args:
         scenario: from a file or made in Python.
         jobs: number of processes at a time; default: one for each processor that this process may use.
         watch: is told the simulated time.
+        meanwhile: is called once, when the first processes have begun.
 
     Raises:
         ScenarioError: if the scenario is not valid.
@@ -68,6 +72,9 @@ def simulate_all(scenario: Scenario, jobs: int | None = None, watch: Watch = SIL
                     name = waiting.popleft()
                     running[name] = context.Process(target=_simulate, args=(scenario, name, made / name, clocks[name]))
                     running[name].start()
+                if meanwhile is not None:
+                    meanwhile()
+                    meanwhile = None
                 wait([process.sentinel for process in running.values()], TOLD_S)
                 reached, before = sum(clock.value for clock in clocks.values()), reached
                 watch.advance(reached - before)

@@ -78,21 +78,38 @@ def apart(work: Callable[[], int]) -> int:
     Raises:
         AirgroundError: if the process ends without having returned.
     """
-    if not forks():
-        return work()
+    return _started(work, "with claims of others", daemon=False)() if forks() else work()
+
+
+def begun(work: Callable[[], T]) -> Callable[[], T]:
+    """Begin some work in a process of its own; what is returned waits for what comes of it, and is to be called once.
+
+    Where there is one processor, or no fork, the work is done when it is waited for.
+
+    Raises:
+        AirgroundError: when it is waited for, if the process ends without having returned.
+    """
+    return _started(work, "that was begun", daemon=True) if forks() and processors() > 1 else work
+
+
+def _started(work: Callable[[], T], which: str, *, daemon: bool) -> Callable[[], T]:
     context = multiprocessing.get_context("fork")
     receiver, sender = context.Pipe(duplex=False)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)  # idle threads of numerical libraries survive a fork
-        process = context.Process(target=lambda: sender.send(work()))
+        process = context.Process(target=lambda: sender.send(work()), daemon=daemon)
         process.start()
     sender.close()
-    try:
-        returned: int = receiver.recv()
-    except EOFError:
+
+    def returned() -> T:
+        try:
+            found: T = receiver.recv()
+        except EOFError:
+            process.join()
+            raise AirgroundError(f"a process {which} died (exit code {process.exitcode})") from None
         process.join()
-        raise AirgroundError(f"a process with claims of others died (exit code {process.exitcode})") from None
-    process.join()
+        return found
+
     return returned
 
 

@@ -16,7 +16,7 @@ from airground_drake.scenarios.load import load
 
 PACKAGE = Path(airground_drake.__file__).parent
 LAYERS = (
-    ("arrays", "confinement", "errors", "files", "interruption", "progress", "side_by_side", "check"),
+    ("arrays", "confinement", "errors", "files", "interruption", "progress", "side_by_side", "usage", "check"),
     ("registry",),
     ("nsbc",),
     ("decision", "intervention"),

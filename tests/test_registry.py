@@ -27,7 +27,7 @@ def test_every_name_stands_for_a_class(names: Registry) -> None:
 def test_what_a_name_stands_for_is_said_without_importing_it(names: Registry) -> None:
     for name in names.own:
         found = names.load(name, of=object)
-        assert names.says(name) == (getattr(found, "statement", "") or (found.__doc__ or "").partition("\n")[0])
+        assert names.says(name) == (getattr(found, "summary", "") or (found.__doc__ or "").partition("\n")[0])
 
 
 def test_what_cannot_be_found_says_nothing() -> None:

@@ -8,7 +8,7 @@ from functools import partial
 import pytest
 
 from airground_drake.errors import AirgroundError, TraceError
-from airground_drake.side_by_side import side_by_side
+from airground_drake.side_by_side import begun, processors, side_by_side
 
 
 def test_what_is_returned_is_in_order_and_comes_from_other_processes() -> None:
@@ -47,3 +47,20 @@ def test_what_a_piece_raises_is_raised() -> None:
 def test_a_process_that_dies_is_an_error() -> None:
     with pytest.raises(AirgroundError, match="died"):
         side_by_side([partial(os._exit, 0), os.getpid], jobs=2)
+
+
+def test_what_was_begun_is_done_elsewhere_and_waited_for() -> None:
+    returned = begun(os.getpid)
+    assert (returned() == os.getpid()) is (processors() == 1)
+
+
+def test_what_was_begun_and_dies_is_an_error_when_it_is_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("airground_drake.side_by_side.processors", lambda: 2)
+    returned = begun(partial(os._exit, 3))
+    with pytest.raises(AirgroundError, match=r"died \(exit code 3\)"):
+        returned()
+
+
+def test_on_one_processor_it_is_done_here(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("airground_drake.side_by_side.processors", lambda: 1)
+    assert begun(os.getpid)() == os.getpid()

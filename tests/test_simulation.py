@@ -95,7 +95,9 @@ def test_runs_in_several_processes_are_those_in_one(
     watch = Watch()
     watch.advance = lambda amount, what="": told.append(amount)  # type: ignore[method-assign]
     watch.stage = lambda name, *_: stages.append(name)  # type: ignore[method-assign]
-    one, two = simulate_all(case_a, 1), simulate_all(case_a, 2, watch)
+    called: list[str] = []
+    one, two = simulate_all(case_a, 1), simulate_all(case_a, 2, watch, meanwhile=lambda: called.append("once"))
+    assert called == ["once"]
     assert sum(told) == pytest.approx(2.0 * case_a.duration_s)
     assert stages == ["compiling, once, about half a minute", "simulating a, d"]
     for name in case_a.runs:

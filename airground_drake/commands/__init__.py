@@ -11,6 +11,7 @@ from importlib.metadata import version
 from typing import NamedTuple
 
 from airground_drake import interruption
+from airground_drake.usage import Parser
 
 EXIT_USAGE = 2
 
@@ -50,7 +51,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         The command's exit code; 2 if there is none of that name.
     """
     width = max(map(len, COMMANDS))
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="airground",
         description="Event-triggered UAV-to-UGV intervention on Drake, with verification reports.",
         epilog="commands:\n"
@@ -60,9 +61,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         usage="airground COMMAND ...",
     )
     parser.add_argument("--version", action="version", version=f"airground_drake {version('airground_drake')}")
-    parser.add_argument("command", metavar="COMMAND")
+    parser.add_argument("command", metavar="COMMAND", nargs="?")
     given = list(sys.argv[1:] if arguments is None else arguments)
-    name = parser.parse_args(given[:1]).command
+    options, unknown = parser.parse_known_args(given[:1])
+    name = "".join(unknown) or options.command
+    if name is None:
+        parser.error(f"a command is needed: {', '.join(COMMANDS)}")
     if name not in COMMANDS:
         close = difflib.get_close_matches(name, COMMANDS, n=1)
         meant = f"did you mean {close[0]}? " if close else ""
@@ -75,4 +79,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def entry() -> None:
     """Console script."""
     interruption.end_on_signals()  # before the imports, which take seconds
-    interruption.leave(main())
+    interruption.run(main)

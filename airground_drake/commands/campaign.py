@@ -15,6 +15,7 @@ from airground_drake.errors import AirgroundError, FolderError, ScenarioError, U
 from airground_drake.progress import told
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.estimate import DEFAULT_LIMITS, Limits
+from airground_drake.usage import Parser
 
 if TYPE_CHECKING:
     from airground_drake.campaign.spec import Spec
@@ -24,7 +25,7 @@ EXIT_REFUTED, EXIT_USAGE, EXIT_UNDECIDED, EXIT_TOOL = 1, 2, 3, 4
 
 def parser() -> argparse.ArgumentParser:
     """What the command line takes."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="airground campaign",
         description="Simulate and judge many draws of a scenario, and bound how likely a violation is.",
         epilog="exit codes: 0 every claim as expected in every draw, 1 one differs, 2 usage, bad spec or folder, "

@@ -12,6 +12,7 @@ from typing import Any
 from airground_drake import files
 from airground_drake.errors import AirgroundError, TraceError, one_line
 from airground_drake.report import compare
+from airground_drake.usage import Parser
 
 EXIT_WORSE, EXIT_USAGE = 1, 2
 PARTS = ("verdicts", "margins", "exercised", "expectations", "reproduction", "audit", "mutants", "events")
@@ -22,7 +23,7 @@ _ABOUT = ("claim", "id", "run", "robot", "kind", "n")
 
 def parser() -> argparse.ArgumentParser:
     """What the command line takes."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="airground compare",
         description="What has changed from one report to another: verdicts, margins, what was exercised, events.",
         epilog="verdicts from the best to the worst: "

@@ -8,6 +8,7 @@ from importlib import import_module
 from pathlib import Path
 
 from airground_drake.scenarios.shipped import shipped
+from airground_drake.usage import Parser
 
 SHELLS = ("bash", "zsh", "tcsh")
 EPILOG = """\
@@ -21,7 +22,7 @@ SCENARIOS = ("scenario", "target")
 
 def parser() -> argparse.ArgumentParser:
     """What the command line takes."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="airground completion",
         description="Print what completes commands, options, scenarios and files in a shell.",
         epilog=EPILOG,

@@ -11,6 +11,7 @@ from airground_drake import files
 from airground_drake.errors import AirgroundError, UnknownNameError
 from airground_drake.registry import METHODS
 from airground_drake.scenarios import plugins
+from airground_drake.usage import Parser
 
 EXIT_USAGE = 2
 FORMATS = ("dot", "svg", "pdf", "png")
@@ -18,7 +19,7 @@ FORMATS = ("dot", "svg", "pdf", "png")
 
 def parser() -> argparse.ArgumentParser:
     """What the command line takes."""
-    parser = argparse.ArgumentParser(prog="airground diagram", description="Draw the diagram of a scenario.")
+    parser = Parser(prog="airground diagram", description="Draw the diagram of a scenario.")
     parser.add_argument("scenario", help="name of a shipped scenario, or path to a YAML file")
     parser.add_argument("--method", choices=tuple(METHODS), help="default: that of the scenario's last run")
     parser.add_argument("--part", metavar="NAME", help="only the diagram inside it of that name")

@@ -18,6 +18,7 @@ from airground_drake.progress import told
 from airground_drake.registry import RUN_CLAIMS
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.estimate import DEFAULT_LIMITS
+from airground_drake.usage import Parser
 
 if TYPE_CHECKING:
     from airground_drake.campaign.falsification import Best, Search
@@ -32,7 +33,7 @@ TIMES = tuple(name for name in COLUMNS if name.endswith("_s") and name not in ("
 
 def parser() -> argparse.ArgumentParser:
     """What the command line takes."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="airground falsify",
         description="Search the space of a campaign for a scenario that violates a claim, and make it small.",
         epilog="exit codes: 0 no counterexample, 1 one was found, 2 usage or bad spec, 4 tool error",

@@ -12,6 +12,7 @@ from urllib.parse import quote
 from airground_drake import files
 from airground_drake.errors import AirgroundError, FolderError, ReportError, TraceError, one_line
 from airground_drake.report import compare, folder
+from airground_drake.usage import Parser
 
 EXIT_USAGE = 2
 PAGE = "index.html"
@@ -21,7 +22,7 @@ MARK = "airground_drake index"
 
 def parser() -> argparse.ArgumentParser:
     """What the command line takes."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="airground index", description=f"Write DIR/{PAGE}, which lists the reports below DIR and leads to them."
     )
     parser.add_argument("folder", type=Path, metavar="DIR", help="folder with folders of reports in it")

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from airground_drake import files
 from airground_drake.scenarios.shipped import json_schema_file, shipped_files
+from airground_drake.usage import Parser
 
 EXIT_USAGE = 2
 MODEL = "minimal"
@@ -18,7 +19,7 @@ MODEL = "minimal"
 
 def parser() -> argparse.ArgumentParser:
     """What the command line takes."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="airground init", description="Write a small scenario that runs: a UGV, an obstacle in its way, a UAV."
     )
     parser.add_argument("file", type=Path, nargs="?", default=Path("scenario.yaml"), help="default: %(default)s")

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 from airground_drake.registry import METHODS, MODEL_CLAIMS, POLICIES, ROUTES, RUN_CLAIMS, UAV_TASKS, Registry
 from airground_drake.scenarios.shipped import shipped, title
+from airground_drake.usage import Parser
 
 Lines = Iterator[tuple[str, str]]
 """Names, and what each is."""
@@ -14,7 +15,7 @@ Lines = Iterator[tuple[str, str]]
 
 def parser() -> argparse.ArgumentParser:
     """What the command line takes."""
-    parser = argparse.ArgumentParser(prog="airground list", description=__doc__.partition(": ")[2])
+    parser = Parser(prog="airground list", description=__doc__.partition(": ")[2])
     parser.add_argument("kind", nargs="?", choices=tuple(KINDS), help="default: all of them")
     parser.add_argument("--schema", action="store_true", help="the JSON Schema of scenario files instead, for editors")
     return parser

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from airground_drake import files
 from airground_drake.errors import AirgroundError, FolderError, UnknownNameError, one_line
+from airground_drake.usage import Parser
 
 if TYPE_CHECKING:
     from airground_drake.replay.scene import Scene
@@ -23,7 +24,7 @@ SLOWEST, FASTEST = 0.1, 100.0
 
 def parser() -> argparse.ArgumentParser:
     """What the command line takes."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="airground replay",
         description="Write replay_RUN.html for the runs of a report: one file each, which works offline.",
     )

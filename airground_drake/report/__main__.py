@@ -30,6 +30,7 @@ from airground_drake.report import folder
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.estimate import DEFAULT_LIMITS, GIB, Limits
 from airground_drake.scenarios.shipped import shipped
+from airground_drake.usage import Parser
 
 if TYPE_CHECKING:
     from airground_drake.scenarios.schema import Scenario
@@ -72,6 +73,8 @@ def _explained(work: Callable[[], int]) -> int:
     except (ScenarioError, PluginError, UnknownNameError, FolderError) as error:
         print(f"error: {error}", file=sys.stderr)
         return EXIT_USAGE
+    except BrokenPipeError:  # nobody reads what is printed
+        raise
     except (AirgroundError, OSError) as error:
         print(f"error: {one_line(str(error))}", file=sys.stderr)
         return EXIT_TOOL
@@ -95,8 +98,8 @@ def _loaded(options: argparse.Namespace, command: str) -> int:
 
 
 def _reported(options: argparse.Namespace, command: str, scenario: Scenario, digest: str) -> int:
-    from airground_drake.report import document, make
-    from airground_drake.verify import cache_folder
+    from airground_drake.report import make
+    from airground_drake.verify.cache import cache_folder
 
     kept = None if options.no_cache else cache_folder()
     output = options.output or Path("reports") / scenario.name
@@ -114,12 +117,12 @@ def _reported(options: argparse.Namespace, command: str, scenario: Scenario, dig
         print(f"{scenario.name}: {overall['status'].replace('_', ' ')}. {overall['why']}\n{one_line(str(output))}")
     if options.open and "html" in options.format:
         webbrowser.open((output / "report.html").resolve().as_uri())
-    return document.exit_code(report)
+    return int(overall["exit_code"])
 
 
 def parser() -> argparse.ArgumentParser:
     """What the command line takes."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="airground report",
         description="Simulate all runs of a scenario, check the claims on them, and write the report.",
         epilog="exit codes: 0 as expected, 1 a claim differs, 2 usage or bad scenario, 3 inconclusive, 4 tool error, "
@@ -163,11 +166,14 @@ def _formats(text: str) -> tuple[str, ...]:
 
 
 def _positive(text: str) -> float:
-    value = float(text)
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
     if not value > 0.0:
-        raise argparse.ArgumentTypeError(f"{text} is not allowed; wanted: a number above 0")
+        raise argparse.ArgumentTypeError(f"{text!r} is not allowed; wanted: a number above 0")
     return value
 
 
 if __name__ == "__main__":
-    interruption.leave(main())
+    interruption.run(main)

@@ -160,11 +160,6 @@ def overall(
     }
 
 
-def exit_code(document: Mapping[str, Any]) -> int:
-    """0 if all claims are as expected, 1 if one differs, 3 if one is undecided or missing and none differs."""
-    return int(document["overall"]["exit_code"])
-
-
 def missing(
     scenario: Scenario,
     traces: Mapping[str, Trace],

@@ -11,6 +11,7 @@ from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from functools import cache, partial
 from hashlib import sha256
+from importlib import resources
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -27,6 +28,8 @@ from airground_drake.report.reproduction import YES_NO
 
 STYLE, SCRIPTS = "report.css", ("report.js", "scrubber.js")
 """The style sheet and the scripts of the page, among the templates."""
+NOTHING = "'none'"
+"""In a content security policy: no source at all."""
 MAX_DIAGRAM_CHARS = 500_000
 MAX_JSON_CHARS = 4_000
 LINE_CHARS = 110
@@ -91,7 +94,7 @@ def _environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    style = f"{loader.get_source(environment, STYLE)[0]}{_in_the_dark()}"
+    style = stylesheet()
     scripts = [loader.get_source(environment, name)[0] for name in SCRIPTS]
     environment.filters.update(
         num=number, value=value, pretty=pretty, together=faults_together, inline=Markup, mathml=mathml,
@@ -104,10 +107,15 @@ def _environment() -> Environment:
     return environment
 
 
-def security_policy(style: str, scripts: Sequence[str]) -> str:
-    """The page's content security policy: nothing but this style sheet and these scripts, from nowhere else."""
+def stylesheet() -> str:
+    """The style sheet of all pages."""
+    return resources.files(__package__).joinpath("templates", STYLE).read_text(encoding="utf-8") + _in_the_dark()
+
+
+def security_policy(style: str, scripts: Sequence[str] = ()) -> str:
+    """A page's content security policy: nothing but this style sheet and these scripts, from nowhere else."""
     return (
-        f"default-src 'none'; style-src {_digest(style)}; script-src {' '.join(map(_digest, scripts))}; "
+        f"default-src 'none'; style-src {_digest(style)}; script-src {' '.join(map(_digest, scripts)) or NOTHING}; "
         "base-uri 'none'; form-action 'none'"
     )
 

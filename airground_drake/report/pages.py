@@ -1,4 +1,4 @@
-"""Pages beside the report, in its style: one offline file each, no script, everything from reports escaped."""
+"""Pages beside the report, with its style sheet: one offline file each, no script, everything from reports escaped."""
 
 from __future__ import annotations
 
@@ -8,15 +8,12 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from airground_drake.report.html import CHIPS, number
-
-POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'"
-"""Nothing is fetched and nothing runs; drawings have their styles in attributes."""
+from airground_drake.report.html import CHIPS, number, security_policy, stylesheet
 
 
 def render(template: str, **content: Any) -> str:
     """A page from a template of this package."""
-    return _environment().get_template(template).render(policy=Markup(POLICY), **content)
+    return _environment().get_template(template).render(**content)
 
 
 @cache
@@ -29,7 +26,8 @@ def _environment() -> Environment:
         lstrip_blocks=True,
     )
     environment.filters.update(num=number, inline=Markup, shown=shown)
-    environment.globals.update(chips=CHIPS)
+    style = stylesheet()
+    environment.globals.update(chips=CHIPS, style=Markup(style), policy=Markup(security_policy(style)))
     return environment
 
 

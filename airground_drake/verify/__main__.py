@@ -18,6 +18,7 @@ from airground_drake.errors import AirgroundError, UnknownNameError
 from airground_drake.progress import Watch, told
 from airground_drake.registry import NOT_EXERCISED, outcome
 from airground_drake.scenarios import plugins
+from airground_drake.usage import Parser
 
 if TYPE_CHECKING:
     from airground_drake.verify.claim import Verdict
@@ -27,7 +28,7 @@ EXIT_DIFFERS, EXIT_USAGE = 1, 2
 
 def parser() -> argparse.ArgumentParser:
     """What the command line takes."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="airground verify",
         description="Judge claims anew, on a saved run or about a scenario's model; nothing is taken from a cache.",
     )
@@ -108,4 +109,4 @@ def _judge(target: str, wanted: Sequence[str], watch: Watch, *, allow_plugins: b
 
 
 if __name__ == "__main__":
-    interruption.leave(main())
+    interruption.run(main)

@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from airground_drake import files
+from airground_drake.usage import Parser
 from airground_drake.verify.engines.smt import Result, solve
 
 LIMIT_S = 30.0
@@ -86,7 +87,7 @@ def outcome(result: Result) -> str:
 
 def parser() -> argparse.ArgumentParser:
     """What the command line takes."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="airground proofs",
         description="Write cvc5's own proofs of a report's scripts.",
     )

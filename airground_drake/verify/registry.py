@@ -57,7 +57,8 @@ def _made(registry: Registry, kind: type[C], ids: Collection[str] | None, added:
     for name in ids or ():
         if name not in places:
             raise UnknownNameError("claim", name, places)
-    return [_instance(registry, kind, name, place) for name, place in places.items() if ids is None or name in ids]
+    chosen = {name: place for name, place in places.items() if ids is None or name in ids}
+    return [_instance(registry, registry.load(place, of=kind), name, place) for name, place in chosen.items()]
 
 
 @cache

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import os
+import signal
 import subprocess
 import sys
 from importlib import import_module
@@ -110,3 +112,49 @@ def test_diagram_writes_what_was_asked_for(tmp_path: Path, capsys: pytest.Captur
     assert "allowed: decision, uav, ugvs, world" in capsys.readouterr().err
     assert main(["diagram", "nowhere.yaml"]) == 2
     assert "no such scenario" in capsys.readouterr().err
+
+
+MISTAKEN = """
+--versoin
+-x
+report
+report minimal --format pdf
+report minimal --limit-steps x
+report minimal --seed x
+report a b
+check
+list nothing
+verify
+compare one
+proofs
+campaign
+diagram minimal --depth -1
+completion fish
+"""
+
+
+@pytest.mark.parametrize("line", MISTAKEN.splitlines())
+def test_what_is_wrong_with_a_command_line_is_said_in_one_line(line: str, capsys: pytest.CaptureFixture[str]) -> None:
+    try:
+        code: int | str | None = main(line.split())
+    except SystemExit as ended:
+        code = ended.code
+    said = capsys.readouterr()
+    assert (code, said.out, said.err.count("\n")) == (2, "", 1)
+    assert said.err.startswith("error: ")
+
+
+def test_a_reader_that_has_gone_is_no_error() -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    command = [sys.executable, "-m", "airground_drake", "list", "--schema"]
+    ran = subprocess.run(command, stdout=writing, stderr=subprocess.PIPE, check=False)
+    os.close(writing)
+    assert (ran.returncode, ran.stderr) == (128 + signal.SIGPIPE, b"")
+
+
+def test_what_cannot_be_printed_is_one_line() -> None:
+    with Path("/dev/full").open("w") as full:
+        command = [sys.executable, "-m", "airground_drake", "list", "--schema"]
+        ran = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, check=False)
+    assert (ran.returncode, ran.stderr.count(b"\n")) == (4, 1)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import re
+import runpy
+import xml.etree.ElementTree as ET
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -15,6 +17,7 @@ from airground_drake.decision import bayes
 from airground_drake.registry import MODEL_CLAIMS
 from airground_drake.report import document
 from airground_drake.report.audit import companions, formulas, thresholds
+from airground_drake.report.figures import findings
 from airground_drake.scenarios.load import load
 from airground_drake.verify import Finding, cache_folder, verify_model
 from airground_drake.verify.mutants import refute_mutants
@@ -117,3 +120,21 @@ def test_the_article_has_the_numbers_of_the_audit(
     for text in re.findall(r"-?\d+\.\d+", re.sub(r"section [\d.]+", "", sections[2 * number])):
         places = len(text.partition(".")[2])
         assert any(round(value, places) == float(text) for value in found), text
+
+
+def test_the_article_has_the_pictures_of_the_audit(
+    items: dict[int, dict[str, Any]], companion_items: dict[int, dict[str, Any]]
+) -> None:
+    """Texts and described points are the same; how a release of matplotlib draws the lines is not compared."""
+    files_of = runpy.run_path(str(DOCS / "pictures.py"))["pictures"]
+    article = (DOCS / "audit.md").read_text(encoding="utf-8")
+    drawn = findings.draw([*items.values(), *companion_items.values()])
+    for name, text in (file for figure in drawn for file in files_of(figure)):
+        assert f"(audit/{name})" in article
+        assert said(text) == said((DOCS / "audit" / name).read_text(encoding="utf-8")), "run python docs/pictures.py"
+    linked = re.findall(r"\(audit/(\S+)\)", article)
+    assert sorted(linked) == sorted(path.name for path in (DOCS / "audit").iterdir())
+
+
+def said(picture: str) -> list[str]:
+    return [text for text in map(str.strip, ET.fromstring(picture).itertext()) if text]

@@ -15,7 +15,7 @@ import pytest
 
 import airground_drake
 from airground_drake.errors import PluginError
-from airground_drake.report.make import _save_certificates
+from airground_drake.report.after_runs import _save_certificates
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify import cache
 from airground_drake.verify.claim import ModelClaim, Verdict

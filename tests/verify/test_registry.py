@@ -73,3 +73,17 @@ def test_nothing_is_imported_before_use() -> None:
     count, *loaded = done.stdout.split()
     assert int(count) == len([*airground_drake.registry.RUN_CLAIMS])
     assert not [name for name in loaded if name.startswith(("pydrake", "cvxpy", "airground_drake.verify.model"))]
+
+
+def test_claims_of_one_name_in_files_of_two_folders_are_two(tmp_path: Path) -> None:
+    found = []
+    for folder in ("one", "two"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "claims.py").write_text(
+            "from airground_drake.verify.runs.comm import Comm\n"
+            f"class Mine(Comm):\n    id = 'MINE'\n    summary = {folder!r}\n"
+        )
+        with pytest.MonkeyPatch.context() as patch:
+            patch.syspath_prepend(tmp_path / folder)
+            found += registry.run_claims(["MINE"], {"MINE": "claims.py:Mine"})
+    assert [claim.summary for claim in found] == ["one", "two"]

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 from unittest import mock
 
 import numpy as np
 from pydrake.solvers import ClarabelSolver, MathematicalProgram
 
+from airground_drake.arrays import Array
 from airground_drake.gatekeeper.certified import CertifiedGatekeepers
 from airground_drake.report.audit.item import Item
 from airground_drake.report.figures.canvas import thin
@@ -21,6 +23,7 @@ from airground_drake.verify.model.patience.attack import Believing
 
 WAY_POINTS = 120
 """Points of a line that a finding keeps for its picture."""
+EVERYTHING = "d, all accepted"
 
 
 def companion_findings() -> list[Item]:
@@ -70,24 +73,20 @@ def _sign() -> Item:
 def _soft_gate() -> Item:
     """Item 10: an intervention that (c) accepts with a predicted distance below d, and (d) renders harmless."""
     evidence: dict[str, Any] = {}
-    gaps: dict[str, Any] = {}
-    for name, run in (("c", "c"), ("d", "d"), ("d, accepting everything", "d")):
-        trace = _run("soft_gate", run) if name == run else _accepting("soft_gate", run)
+    traces = {name: _run("soft_gate", name) for name in ("c", "d")} | {EVERYTHING: _accepting("soft_gate", "d")}
+    for name, trace in traces.items():
         nearest = closest_obstacle(trace, "ugv1")
         accepted = trace.decisions[trace.decisions["decision"] == "accept"]
-        gap = nearest_distance(trace, "ugv1")
-        shown = gaps.setdefault("t_s", np.linspace(trace.t[0], trace.t[-1], WAY_POINTS).round(3).tolist())
-        gaps[f"{name}_m"] = np.interp(shown, trace.t, gap).round(4).tolist()
         evidence[name] = {
             "accepted": len(accepted),
             "least_predicted_clearance_of_accepted_m": (
-                float(accepted["predicted_clearance_m"].min()) if len(accepted) and run == "c" else None
+                float(accepted["predicted_clearance_m"].min()) if len(accepted) and name == "c" else None
             ),
             "min_distance_m": nearest[0] if nearest else None,
             "t_s": nearest[1] if nearest else None,
         }
     d = load("soft_gate")[0].safe_distance.obstacle_m
-    paper, ours = evidence["c"], evidence["d, accepting everything"]
+    paper, ours = evidence["c"], evidence[EVERYTHING]
     predicted = paper["least_predicted_clearance_of_accepted_m"]
     return {
         "id": 10,
@@ -105,8 +104,18 @@ def _soft_gate() -> Item:
         and ours["min_distance_m"] >= d - 1e-9,
         "evidence": evidence
         | {"safe_distance_m": d, "command": "python -m airground_drake.report soft_gate"}
-        | {"distance_to_the_nearest_obstacle": gaps},
+        | {"distance_to_the_nearest_obstacle": _gaps(traces)},
     }
+
+
+def _gaps(traces: Mapping[str, Trace]) -> dict[str, list[float]]:
+    """Distances of UGV1 to its nearest obstacle over common times, the closest approaches among them."""
+    gaps = {name: nearest_distance(trace, "ugv1") for name, trace in traces.items()}
+    first = next(iter(traces.values()))
+    closest = [float(trace.t[gaps[name].argmin()]) for name, trace in traces.items()]
+    t_s = np.unique([*np.linspace(first.t[0], first.t[-1], WAY_POINTS), *closest])
+    lines = {f"{name}_m": np.interp(t_s, trace.t, gaps[name]).round(4).tolist() for name, trace in traces.items()}
+    return {"t_s": t_s.round(6).tolist(), **lines}
 
 
 def _no_dynamics() -> Item:
@@ -115,14 +124,14 @@ def _no_dynamics() -> Item:
     first = trace.problems.iloc[0]
     reference = np.asarray(first["reference_m"]).reshape(-1, 3)
     stages, start = len(reference), np.asarray(first["initial_m"])
-    costs = {}
+    costs, errors = {}, {}
     weight, dt = float(first["error_weight_1_m2_s"]), float(first["dt_s"])
+    printed_cost, states = _printed_optimum(reference, start, weight, dt)
+    errors["printed"] = states - reference
     for name in ("accept", "refuse"):
         moves = np.reshape(first[f"{name}_m_s"], (stages, 3))
-        costs[name] = {
-            "printed": _printed_optimum(reference, start, weight, dt),
-            "with_23": float(weight * dt * np.sum((start + dt * np.cumsum(moves, axis=0) - reference) ** 2)),
-        }
+        errors[name] = start + dt * np.cumsum(moves, axis=0) - reference
+        costs[name] = {"printed": printed_cost, "with_23": float(weight * dt * np.sum(errors[name] ** 2))}
     omega = np.concatenate([np.asarray(row, dtype=float) for row in trace.problems["relaxed"]] or [np.zeros(0)])
     fractional = int(np.sum((omega > 1e-3) & (omega < 1.0 - 1e-3)))
     printed, ours = (abs(costs["accept"][kind] - costs["refuse"][kind]) for kind in ("printed", "with_23"))
@@ -139,13 +148,15 @@ def _no_dynamics() -> Item:
             "problem": "the first decision of case_b, run c; task errors only",
             "t_s": float(trace.decisions["t_s"].iloc[0]),
             "cost": costs,
+            "task_error": {"t_s": (dt * np.arange(1, stages + 1)).round(6).tolist()}
+            | {f"{name}_m": np.linalg.norm(error, axis=1).round(6).tolist() for name, error in errors.items()},
             "relaxed_omega_strictly_between_0_and_1": {"count": fractional, "of": len(omega)},
         },
     }
 
 
-def _printed_optimum(reference: Any, start: Any, weight: float, dt: float) -> float:
-    """Least task error of (27) as printed: states tied to nothing but the initial one."""
+def _printed_optimum(reference: Array, start: Array, weight: float, dt: float) -> tuple[float, Array]:
+    """Least task error of (27) as printed, and its states (N, 3): tied to nothing but the initial one."""
     program = MathematicalProgram()
     states = program.NewContinuousVariables(len(reference) + 1, 3, "rho")
     program.AddBoundingBoxConstraint(start, start, states[0]).evaluator().set_description("(27b)")
@@ -153,4 +164,5 @@ def _printed_optimum(reference: Any, start: Any, weight: float, dt: float) -> fl
     hessian = 2.0 * weight * dt * np.eye(len(free))
     program.AddQuadraticErrorCost(hessian / 2.0, reference.ravel(), free).evaluator().set_description("(25) task error")
     result = ClarabelSolver().Solve(program)
-    return max(0.0, float(result.get_optimal_cost())) if result.is_success() else float("nan")
+    found = max(0.0, float(result.get_optimal_cost())) if result.is_success() else float("nan")
+    return found, np.asarray(result.GetSolution(states[1:]))

@@ -18,8 +18,8 @@ def formula_findings(scenario: Scenario) -> list[Item]:
     """Items 8 and 12 to 17; each is computed, none is quoted."""
     return [
         _task_and_configuration(),
-        _feed_forward(),
-        _centroid(),
+        _feed_forward(scenario),
+        _centroid(scenario),
         _grid_points(),
         _rule_three(),
         _null_space(),
@@ -46,7 +46,8 @@ def _task_and_configuration() -> Item:
         "v = J^+ d(rho_d)/dt", "v = J^+ d(sigma_d)/dt",
         not fits and pseudo_inverse.shape == (3, 1),
         {
-            "shape_of_J^+": list(pseudo_inverse.shape), "shape_of_rate_of_rho": list(rate.shape),
+            "J^+": pseudo_inverse.tolist(), "shape_of_J^+": list(pseudo_inverse.shape),
+            "shape_of_rate_of_rho": list(rate.shape), "shape_of_rate_of_sigma": [jacobian.shape[0]],
             "product_defined": fits, "(27c) and the caption of Figure 10": "by reading",
         },
     )  # fmt: skip
@@ -57,25 +58,40 @@ def _avoidance_jacobian() -> Array:
     return DistanceTask(np.zeros(3), 2.0, 3.0).jacobian(np.array([[1.0, 2.0, 0.0]]))[0]
 
 
-def _feed_forward() -> Item:
+def _feed_forward(scenario: Scenario) -> Item:
     """Item 12: (6) feeds the task's own rate forward, not the desired one."""
     v, gain, error = sympy.symbols("v B sigma_error", real=True)
-    solutions = sympy.solve(sympy.Eq(v, v + gain * error), error)  # J = I: the task's rate is v itself
+    printed = sympy.Eq(v, v + gain * error)  # J = I: the task's rate is v itself
+    solutions = sympy.solve(printed, error)
+    example = {gain: scenario.control.motion_gain_1_s, error: 1.0}
+    rate = scenario.ugvs["ugv1"].preset.speed_m_s
+    velocities = {
+        "as_printed": [float(x) for x in sympy.solve(printed.subs(example), v)],
+        "corrected": [float(x) for x in sympy.solve(sympy.Eq(v, rate + (gain * error).subs(example)), v)],
+    }
     return item(
         12, "(6)",
         "(6) feeds forward the rate of the task itself, sigma_m, instead of the desired sigma_md. With J = I it reads "
         "v = v + B error, which no velocity satisfies unless the error is 0.",
         "v = J^+ (d(sigma_m)/dt + B error)", "v = J^+ (d(sigma_md)/dt + B error)",
-        solutions == [0],
-        {"solutions_for_the_error": [str(solution) for solution in solutions]},
+        solutions == [0] and [len(found) for found in velocities.values()] == [0, 1],
+        {
+            "solutions_for_the_error": [str(solution) for solution in solutions], "error_m": example[error],
+            "gain_1_s": example[gain], "desired_rate_m_s": rate, "velocities_m_s": velocities,
+        },
     )  # fmt: skip
 
 
-def _centroid() -> Item:
+def _centroid(scenario: Scenario) -> Item:
     """Item 13: the task value (9) does not depend on the UAV."""
     uav, one, two = sympy.symbols("uav_x ugv1_x ugv2_x", real=True)
-    printed = sympy.diff((one + two) / 2, uav)
-    ours = sympy.diff(uav - (one + two) / 2, uav)
+    tasks = {"as_printed_m": (one + two) / 2, "corrected_m": uav - (one + two) / 2}
+    printed, ours = (sympy.diff(task, uav) for task in tasks.values())
+    targets = {robot: scenario.ugvs[robot].target_m[0] for robot in ("ugv1", "ugv2")}
+    at = {"uav_x_m": [-2.0, 0.0, 2.0, 4.0]} | {
+        name: [float(task.subs({one: targets["ugv1"], two: targets["ugv2"], uav: x})) for x in (-2.0, 0.0, 2.0, 4.0)]
+        for name, task in tasks.items()
+    }
     return item(
         13, "(9)-(10)",
         "The task value (9) is the centroid of the UGVs, which does not depend on the UAV's position: its Jacobian is "
@@ -83,35 +99,50 @@ def _centroid() -> Item:
         {"task": "centroid of the UGVs", "jacobian": int(printed)},
         {"task": "own position minus the centroid", "jacobian": int(ours)},
         printed == 0 and ours == 1,
-        {"pseudo_inverse_of_0": float(np.linalg.pinv(np.zeros((1, 1)))[0, 0])},
+        {
+            "pseudo_inverse_of_0": float(np.linalg.pinv(np.zeros((1, 1)))[0, 0]), "ugvs_at_x_m": targets,
+            "task_values": at,
+        },
     )  # fmt: skip
 
 
 def _grid_points() -> Item:
     """Item 14: (27a) sums N + 1 points and forgets the stage's length."""
     horizon, stages = 3.0, 60
-    printed = sum(1.0 for _ in range(stages + 1))
-    ours = sum(horizon / stages for _ in range(stages))
+    numbers = [5, 10, 20, 40, stages, 2 * stages]
+    as_printed = {n: sum(1.0 for _ in range(n + 1)) for n in numbers}
+    corrected = {n: sum(horizon / n for _ in range(n)) for n in numbers}
+    sums = {"stages": numbers, "as_printed": [*as_printed.values()], "corrected_s": [*corrected.values()]}
+    printed, ours = as_printed[stages], corrected[stages]
     return item(
         14, "(27a)",
         "(27a) discretises the integral (25) over N intervals by a sum over k = 0..N, N + 1 terms, without the "
         "interval's length: for the integrand 1 it gives 61 where the integral is 3 s.",
         printed, ours, not math.isclose(printed, horizon) and math.isclose(ours, horizon),
-        {"integrand": 1.0, "horizon_s": horizon, "stages": stages, "integral_s": horizon},
+        {"integrand": 1.0, "horizon_s": horizon, "stages": stages, "integral_s": horizon, "sums": sums},
     )  # fmt: skip
 
 
 def _rule_three() -> Item:
     """Item 15: rule (3) of section 3.1.3 says the opposite of its own reason."""
     n, others, lowest = 3, 2, 2  # dimensions: velocity, all tasks but the lowest, the lowest
+    totals: dict[str, list[int]] = {
+        "lowest_task": [*range(n + 1)],
+        "total": [others + m for m in range(n + 1)],
+        "admitted": [m > n - others for m in range(n + 1)],
+    }
+    smaller = [others + m > n for m in range(n + 1) if m > n - others]
     return item(
         15, "section 3.1.3, rule (3)",
         "Rule (3) lets the lowest task's dimension exceed what the higher ones leave, 'so that n is ensured to be "
         "greater than the total dimension': it then is smaller. And the introduction to section 3 says that an "
         "intervention is triggered when the threshold is *not* reached, against (20).",
         "m_r > n - sum of the others, so that n > the total", "m_r > n - sum of the others means n < the total",
-        lowest > n - others and not n > others + lowest,
-        {"n": n, "higher_tasks": others, "lowest_task": lowest, "total": others + lowest, "rest": "by reading"},
+        lowest > n - others and not n > others + lowest and all(smaller),
+        {
+            "n": n, "higher_tasks": others, "lowest_task": lowest, "total": others + lowest, "totals": totals,
+            "rest": "by reading",
+        },
     )  # fmt: skip
 
 
@@ -128,7 +159,7 @@ def _null_space() -> Item:
         {"rank_of_the_null_space": int(np.linalg.matrix_rank(left))},
         {"rank_for_an_intervention_in_one_direction": int(np.linalg.matrix_rank(partly))},
         not left.any() and bool(partly.any()),
-        {"projector": left.tolist()},
+        {"projector": left.tolist(), "projector_for_one_direction": partly.tolist()},
     )  # fmt: skip
 
 

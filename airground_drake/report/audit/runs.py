@@ -6,6 +6,9 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
+from airground_drake.arrays import Array
 from airground_drake.report.metrics import closest_obstacle
 from airground_drake.report.reproduction import MEASURES
 from airground_drake.scenarios.schema import Preset, Reproduction, Scenario
@@ -13,6 +16,8 @@ from airground_drake.trace import Trace
 
 PRINTED_SPEED_M_S = 1.0
 """Reference speed of Table 1, [3.3, 1t, 0]."""
+REFERENCE_POINTS = 121
+"""Points of the reference's way that a finding keeps for its picture."""
 
 
 def findings(scenario: Scenario, traces: Mapping[str, Trace]) -> list[dict[str, Any]]:
@@ -93,6 +98,7 @@ def _timing(scenario: Scenario, traces: Mapping[str, Trace]) -> dict[str, Any] |
             travelled = _leaves_ball(preset, stall, scenario.decision.threshold.zeta_m) if stall else None
             if travelled is None:
                 continue
+            reach = np.linspace(0.0, 1.2 * travelled, REFERENCE_POINTS)
             measured = MEASURES["trigger_time"](traces[row.run], robot) if row.run in traces else []
             return {
                 "id": 6,
@@ -116,6 +122,7 @@ def _timing(scenario: Scenario, traces: Mapping[str, Trace]) -> dict[str, Any] |
                     "trigger_at_scenario_speed_s": travelled / preset.speed_m_s,
                     "scenario_speed_m_s": preset.speed_m_s,
                     "speed_that_gives_the_paper_s_time_m_s": travelled / row.paper[0],
+                    "reference": {"travelled_m": reach.tolist(), "distance_m": _distances(preset, reach, stall)},
                     "measured_trigger": {"run": row.run, "t_s": measured[0]} if measured else None,
                 },
             }
@@ -141,6 +148,14 @@ def _leaves_ball(preset: Preset, centre: list[float], radius: float) -> float | 
             left = begin + u
         begin += length
     return left
+
+
+def _distances(preset: Preset, travelled: Array, centre: list[float]) -> list[float]:
+    """Distances (T,) from a point, m, along a preset trajectory, by the way travelled (T,), m; it ends at its end."""
+    points = np.array(preset.waypoints_m)[:, :2]
+    ends = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    at = np.stack([np.interp(travelled, ends, points[:, axis]) for axis in (0, 1)], axis=1)
+    return [float(d) for d in np.linalg.norm(at - np.array(centre[:2]), axis=1)]
 
 
 def _row(scenario: Scenario, measure: str) -> Reproduction | None:

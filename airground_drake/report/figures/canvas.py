@@ -142,12 +142,16 @@ def level(axes: Axes, value: float, dash: Any) -> None:
 def label_right(axes: Axes, labels: Sequence[tuple[float, str, str]]) -> None:
     """Labels (value, text, colour) in the margin right of the axes, at their values as far as there is room."""
     bottom, top = axes.get_ylim()
-    gap = 1.25 * _FONT_PT / _POINTS_PER_INCH / size_in(axes)[1]
     order = sorted(range(len(labels)), key=lambda k: labels[k][0])
-    places = spread([(labels[k][0] - bottom) / (top - bottom) for k in order], gap)
+    places = spread([(labels[k][0] - bottom) / (top - bottom) for k in order], line_gap(axes))
     for k, place in zip(order, places, strict=True):
         _, text, color = labels[k]
         axes.text(1.015, place, text, color=color, transform=axes.transAxes, va="center", ha="left", clip_on=False)
+
+
+def line_gap(axes: Axes) -> float:
+    """How far apart lines of text are, as a share of the axes' height."""
+    return 1.25 * _FONT_PT / _POINTS_PER_INCH / size_in(axes)[1]
 
 
 def spread(places: Sequence[float], gap: float) -> list[float]:
@@ -162,29 +166,37 @@ def spread(places: Sequence[float], gap: float) -> list[float]:
     return result
 
 
-def rule(axes: Axes, x: str, y: str) -> None:
+def rule(axes: Axes, x: str, y: str, log: str = "") -> None:
     """Grid lines, numbers and axis labels, once the limits are set; an empty label leaves the numbers out.
+
+    On the axes of `log`, among "xy", are the logarithms to base 10 of what is written.
 
     Drawn as a few artists: matplotlib's own ticks would take nearly half of the drawing time.
     """
     width_in, height_in = size_in(axes)
     axes.set_xticks([])
     axes.set_yticks([])
-    columns = _ticks(axes.get_xlim(), 6)
+    columns = _ticks(axes.get_xlim(), 6, whole="x" in log)
     axes.vlines(columns, 0.0, 1.0, transform=axes.get_xaxis_transform(), **_GRID)
     for at in columns if x else ():
         axes.text(
-            at, -0.05 / height_in, _number(at), transform=axes.get_xaxis_transform(), ha="center", va="top", **_NUMBERS
+            at,
+            -0.05 / height_in,
+            _number(10.0**at if "x" in log else at),
+            transform=axes.get_xaxis_transform(),
+            ha="center",
+            va="top",
+            **_NUMBERS,
         )
     axes.text(0.5, -0.22 / height_in, x, transform=axes.transAxes, ha="center", va="top")
     if y:
-        rows = _ticks(axes.get_ylim(), max(2, min(7, round(3.5 * height_in))))
+        rows = _ticks(axes.get_ylim(), max(2, min(7, round(3.5 * height_in))), whole="y" in log)
         axes.hlines(rows, 0.0, 1.0, transform=axes.get_yaxis_transform(), **_GRID)
         for at in rows:
             axes.text(
                 -0.05 / width_in,
                 at,
-                _number(at),
+                _number(10.0**at if "y" in log else at),
                 transform=axes.get_yaxis_transform(),
                 ha="right",
                 va="center",
@@ -193,10 +205,10 @@ def rule(axes: Axes, x: str, y: str) -> None:
         axes.text(-0.36 / width_in, 0.5, y, transform=axes.transAxes, ha="right", va="center", rotation=90)
 
 
-def _ticks(limits: tuple[float, float], count: int) -> list[float]:
+def _ticks(limits: tuple[float, float], count: int, *, whole: bool) -> list[float]:
     low, high = limits
     slack = 1e-9 * (high - low)
-    ticks = MaxNLocator(count, steps=[1, 2, 5, 10]).tick_values(low, high)
+    ticks = MaxNLocator(count, steps=[1, 2, 5, 10], integer=whole).tick_values(low, high)
     return [float(round(at, 12)) for at in ticks if low - slack <= at <= high + slack]
 
 

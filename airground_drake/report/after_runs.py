@@ -1,0 +1,160 @@
+"""From the traces of a report to its folder: verdicts, figures, findings about the paper, files."""
+
+from __future__ import annotations
+
+import platform
+import subprocess
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from datetime import datetime
+from functools import partial
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from airground_drake import files, graphviz, trace
+from airground_drake.diagram import build_diagram
+from airground_drake.errors import PluginError
+from airground_drake.progress import Watch
+from airground_drake.report import audit, document, folder, html, junit
+from airground_drake.report.figures import moments, zeno_refine
+from airground_drake.report.figures.draw import draw
+from airground_drake.report.figures.findings import draw as draw_findings
+from airground_drake.report.figures.panels import Figure
+from airground_drake.scenarios import plugins
+from airground_drake.scenarios.schema import Scenario
+from airground_drake.side_by_side import begun
+from airground_drake.trace import Trace
+from airground_drake.verify import Verdict, verify_all
+from airground_drake.verify.finding import PLAIN_NAME
+from airground_drake.verify.mutants import refute_mutants
+from airground_drake.verify.registry import model_claims
+
+PACKAGES = ("airground_drake", "drake", "numpy", "scipy", "numba", "pandas", "matplotlib")
+
+
+class Judged(NamedTuple):
+    """What is said of the runs, and their figures."""
+
+    verdicts: Sequence[Verdict]
+    findings: Sequence[dict[str, Any]]
+    mutants: Sequence[dict[str, Any]]
+    figures: Sequence[Figure]
+
+
+def judge(
+    scenario: Scenario, traces: Mapping[str, Trace], kept: Path | None, *, audited: bool, drawn: bool, watch: Watch
+) -> Judged:
+    """Judge the runs and the model and, if asked for, the paper and broken variants; draw the runs at the same time.
+
+    Raises:
+        PluginError: if a claim of the scenario cannot be made.
+        AirgroundError: if a process dies.
+    """
+    figures = begun(partial(draw, scenario, traces)) if drawn else list
+    verdicts = verify_all(scenario, traces.values(), kept=kept, watch=watch)
+    if audited:
+        watch.stage("auditing the paper")
+    findings = audit.whole(scenario, verdicts) if audited else ()
+    mutants = refute_mutants(scenario, kept=kept, watch=watch) if audited else ()
+    return Judged(verdicts, findings, mutants, figures())
+
+
+def write(
+    scenario: Scenario,
+    digest: str,
+    output: Path,
+    formats: Sequence[str],
+    traces: Mapping[str, Trace],
+    judged: Judged,
+    provenance: dict[str, Any],
+) -> dict[str, Any]:
+    """Write the folder, and return the document; arguments as of `make.write_report`.
+
+    Raises:
+        PluginError: if a claim or a certificate has no plain name.
+        OSError: if something cannot be written.
+    """
+    dot = graphviz.dot(build_diagram(plugins.without(scenario)))
+    drawn = graphviz.svg(dot)
+    folder.clear(output)
+    written = [f"certificates/{name}" for name in _save_certificates(output / "certificates", judged.verdicts)]
+    for name, of_run in traces.items():
+        written += [f"trace/{name}/{file}" for file in trace.save(of_run, output / "trace" / name)]
+    files.write_text(output / "diagram.dot", dot)
+    files.write_text(output / "diagram.svg", drawn)
+    written += ["diagram.dot", "diagram.svg"]
+    required = [claim.id for claim in model_claims(added=scenario.claims)]
+    report = document.build(
+        scenario, digest, traces, judged.verdicts, provenance, audit=judged.findings, mutants=judged.mutants,
+        required=required,
+    )  # fmt: skip
+    if "junit" in formats:
+        files.write_text(output / "junit.xml", junit.render(report))
+        written.append("junit.xml")
+    if "html" in formats:
+        plates = [*judged.figures, *_refinement(judged.verdicts, bool(judged.findings)), *moments.draw(report, traces)]
+        plates += draw_findings(report["audit"])
+        files.write_text(output / "report.html", html.render(report, plates, drawn))
+        written.append("report.html")
+    report = document.sealed(report, output, written)
+    if "json" in formats:
+        files.write_json(output / "report.json", report)
+    return report
+
+
+def _refinement(verdicts: Sequence[Verdict], audited: bool) -> list[Figure]:
+    """The figure of ZENO-REFINE, if there is such a verdict: beside finding 9, where that is in the report."""
+    drawn = [zeno_refine.draw(verdict.finding.evidence) for verdict in verdicts if verdict.claim.id == "ZENO-REFINE"]
+    return [replace(figure, beside="audit-9") if audited else figure for figure in drawn if figure is not None]
+
+
+def _save_certificates(folder: Path, verdicts: Sequence[Verdict]) -> list[str]:
+    """Write every certificate to <folder>/<claim>/ and return their paths in the folder.
+
+    Raises:
+        PluginError: if a claim or a certificate has no plain name.
+    """
+    written = []
+    for verdict in verdicts:
+        for name, text in verdict.finding.certificates.items():
+            if not (PLAIN_NAME.fullmatch(verdict.claim.id) and PLAIN_NAME.fullmatch(name)):
+                raise PluginError(f"claim {verdict.claim.id!r}: {name!r} is no name for a certificate")
+            files.write_text(folder / verdict.claim.id / name, text)
+            written.append(f"{verdict.claim.id}/{name}")
+    return written
+
+
+def provenance(scenario: Scenario, started: datetime, command: str) -> dict[str, Any]:
+    """Where the report comes from: versions, machine, commit, seed, begin, command."""
+    versions = {}
+    for name in PACKAGES:
+        try:
+            versions[name] = version(name)
+        except PackageNotFoundError:
+            versions[name] = "not installed"
+    return {
+        "package": versions.pop("airground_drake"),
+        "drake": versions.pop("drake"),
+        "python": platform.python_version(),
+        "packages": versions,
+        "platform": platform.platform(),
+        "git": _git(),
+        "seed": scenario.seed,
+        "started": started.isoformat(timespec="seconds"),
+        "command": command,
+    }
+
+
+def _git() -> str:
+    """Commit of the checkout that the package is imported from, with '+changes', or 'not a checkout'."""
+    here = ["git", "-C", str(Path(__file__).parent)]
+    try:
+        tracked = subprocess.run([*here, "ls-files", "--error-unmatch", __file__], capture_output=True, check=False)
+        if tracked.returncode != 0:
+            return "not a checkout"
+        commit = subprocess.run([*here, "rev-parse", "HEAD"], capture_output=True, text=True, check=True).stdout.strip()
+        changed = subprocess.run([*here, "status", "--porcelain"], capture_output=True, text=True, check=True).stdout
+    except (OSError, subprocess.CalledProcessError):
+        return "not a checkout"
+    return commit + ("+changes" if changed else "")

@@ -1,0 +1,99 @@
+"""Pictures of findings about the paper."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+
+import numpy as np
+import pytest
+
+from airground_drake.report.audit.formulas import formula_findings
+from airground_drake.report.audit.runs import findings as findings_of_runs
+from airground_drake.report.audit.thresholds import threshold_findings
+from airground_drake.report.figures import canvas, findings
+from airground_drake.report.figures.findings.lines import Lines
+from airground_drake.report.figures.findings.products import Factor, Products
+from airground_drake.report.figures.panels import Figure
+from airground_drake.scenarios.load import load
+from airground_drake.testing.plugin import Simulations
+
+
+def test_what_is_computed_is_drawn_with_its_marks() -> None:
+    scenario = load("case_a")[0]
+    drawn = {
+        figure.id: figure for figure in findings.draw([*threshold_findings(scenario, {}), *formula_findings(scenario)])
+    }
+    assert set(drawn) == {f"audit-{number}" for number in (2, 3, 4, 5, 8, *range(12, 19))}
+    for name, says in {
+        "audit-2": "root with c2/c1: (0.465, 0.384)",
+        "audit-3": "by finite differences: (0.1, 0.438)",
+        "audit-4": "6.07 m/s: (6.07, 3)",
+        "audit-5": "10, finite differences: (10, 0.09)",
+        "audit-8": "as printed: J⁺ (3 x 1) times rate of rho (3 x 1) is not defined",
+        "audit-14": "printed, N = 60: (60, 61); integral, s: (60, 3)",
+        "audit-17": "reported, case_b: (0.769, 10.6)",
+        "audit-18": "one, finite differences: (6.05, 0.496)",
+    }.items():
+        assert says in drawn[name].caption
+    assert all(figure.panels[0].table.rows and figure.beside == name for name, figure in drawn.items())
+
+
+def test_what_comes_of_runs_is_drawn_from_what_is_kept_of_them() -> None:
+    ways = {
+        "printed": {"preset_x_m": 1.3, "way_m": [[1.0, 0.0], [1.3, 3.0]]},
+        "ours": {"preset_x_m": -1.3, "way_m": [[1.0, 0.0], [-1.3, 13.0]]},
+    }
+    gaps = {"t_s": [0.0, 1.0], "c_m": [3.0, 0.8], "d_m": [3.0, 2.0]}
+    kept = {"distance_to_the_nearest_obstacle": gaps, "safe_distance_m": 2.0}
+    errors = {
+        "task_error": {"t_s": [0.5, 1.0], "printed_m": [0.0, 0.0], "accept_m": [1.0, 2.0], "refuse_m": [1.0, 3.0]}
+    }
+    sides, intrusion, error = findings.draw(
+        [{"id": 7, "evidence": ways}, {"id": 9}, {"id": 10, "evidence": kept}, {"id": 11, "evidence": errors}]
+    )
+    assert "end, x = -1.3 m: (13, -1.3)" in sides.caption
+    assert "closest, c: (1, 0.8)" in intrusion.caption
+    assert {row[0] for row in intrusion.panels[0].table.rows} == {"c", "d", "safe distance"}
+    assert {row[0] for row in error.panels[0].table.rows} == {
+        "as printed, either",
+        "with (23), accept",
+        "with (23), refuse",
+    }
+
+
+def test_the_due_time_is_where_the_reference_leaves_the_threshold(run: Simulations) -> None:
+    items = findings_of_runs(load("case_a")[0], {"a": run("case_a", "a")})
+    (figure,), known = findings.draw(items), items[0]["evidence"]
+    reference = known["reference"]
+    assert np.interp(
+        known["reference_travelled_m"], reference["travelled_m"], reference["distance_m"]
+    ) == pytest.approx(known["zeta_m"], abs=1e-3)
+    assert "due at 1 m/s: (8.1, 3); the paper's trigger: (14.4, 3)" in figure.caption
+
+
+def figure_of(shown: Lines | Products) -> Figure:
+    with canvas.style():
+        return shown.figure(1)
+
+
+def texts(figure: Figure) -> list[str]:
+    root = ET.fromstring(figure.panels[0].svg)
+    return ["".join(each.itertext()).strip() for each in root.iter("{http://www.w3.org/2000/svg}text")]
+
+
+def test_logarithmic_axes_show_the_values_themselves() -> None:
+    x = np.array([0.1, 1000.0])
+    shown = texts(figure_of(Lines("Powers", "x, m", "y, s", {"line": (x, x)}, {"mark": (10.0, 1.0)}, log="xy")))
+    assert {"0.1", "10", "1000", "x, m", "y, s", "line", "mark"} <= set(shown)
+
+
+def test_lines_and_marks_without_extent_can_be_drawn() -> None:
+    same = np.zeros(2)
+    assert {"a", "b"} <= set(texts(figure_of(Lines("Still", "x", "y", {"a": (same, same)}, {"b": (0.0, 0.0)}))))
+
+
+def test_a_product_is_defined_where_the_inner_sizes_agree() -> None:
+    tall, row = Factor("A", np.ones((3, 1))), Factor("B", np.ones((1, 2)))
+    shown = texts(figure_of(Products("Two", {"one way": (tall, row), "other way": (row, tall)})))
+    assert "defined, 3 x 2" in shown
+    assert "not defined" in shown
