@@ -42,6 +42,9 @@ def page(results: Sequence[dict[str, Any]], others: Sequence[str] = ()) -> str:
         "",
         *(f"- {count[s]} caught {says}" for s, says in STAGES.items() if count[s]),
     ]
+    lines += ["", "Judged on the code as it was at commit:", ""]
+    commits = Counter(each.get("commit") or "not recorded" for each in results)
+    lines += [f"- {commit}: {number}" for commit, number in commits.most_common()]
     for stage, says in STAGES.items():
         mine = [each for each in results if each["stage"] == stage]
         if mine:
