@@ -100,9 +100,9 @@ def patience_overstated(folder: Path) -> None:
         claim["margin"] = 3.0
 
 
-@refused_by("LIVE-WAIT", "favours that no UGV is asked for")
+@refused_by("LIVE-WAIT", "favours that no UGV is asked for", run="")
 def favours_to_nobody_done(folder: Path) -> None:
-    with edited_claim(folder, "LIVE-WAIT", None) as claim:
+    with edited_claim(folder, "LIVE-WAIT", "") as claim:
         next(row for row in claim["evidence"]["attacks"] if row["attack"] == "favours to nobody")["tries"] = 1
 
 
