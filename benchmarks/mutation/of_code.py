@@ -225,7 +225,7 @@ KERNELS = (
         "nsbc/kernels.py",
         "k = count - 1 - level",
         "k = level",
-        runs=("case_a nearest",),
+        runs=("case_a listed",),
         tests=("tests/nsbc/test_composition.py", "tests/nsbc/test_avoidance.py"),
     ),
     Mutant(
