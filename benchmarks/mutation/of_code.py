@@ -811,10 +811,10 @@ MIX_UPS = (
         "reference, self._noise.Eval(context)[::-1])",
     ),
     Mutant(
-        "a UGV is released by the decision variable of another one",
+        "the trigger has the place of another UGV",
         "systems/decision.py",
-        "float(x[j]), float(least[j]), float(most[j])",
-        "float(x[j]), float(least[j - 1]), float(most[j])",
+        "position, reference = self._position.Eval(context), ",
+        "position, reference = np.roll(self._position.Eval(context)[:-3], 3), ",
     ),
     Mutant(
         "obstacles out of sight are forgotten",
