@@ -139,6 +139,8 @@ CLAIMS = (
         "deviation, (50.0 + TIE) * row.dt)",
         runs=(),
         tests=(f"{RUNS}/test_gate_sur.py",),
+        equivalent="survives: a plan that is rounded by the rule (28), which is judged beside it, is never farther off "
+        "than half a stage",
     ),
     Mutant(
         "half a run is enough",
