@@ -227,6 +227,7 @@ CHECKER = (
         '"holds" if margin >= -0.05 else "refuted", margin)',
         runs=BOTH,
         tamperings=("SAFE-TRACE",),
+        tests=("tests/check/test_safety.py",),
     ),
     Mutant(
         "checker: hypotheses may be broken by 1 m/s",
@@ -235,6 +236,7 @@ CHECKER = (
         "~(each.margin >= -1.0)",
         runs=BOTH,
         tamperings=("SAFE-HYP",),
+        tests=("tests/check/test_safety.py",),
     ),
     Mutant(
         "checker: every robot has the whole share",
