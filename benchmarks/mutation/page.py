@@ -51,7 +51,7 @@ def page(results: Sequence[dict[str, Any]], others: Sequence[str] = ()) -> str:
             lines += ["", f"## Caught {says}", ""]
             for each in mine:
                 by = each["equivalent"] or "; ".join(each["by"][:4]) + ("; ..." if len(each["by"]) > 4 else "")
-                text = f"- **{each['name']}** (`{each['path']}`): {by}"
+                text = f"- **{each['name']}** (`{each['path']}`): {by or 'survives, and is not equivalent'}"
                 lines += textwrap.wrap(
                     text, WIDTH, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False
                 )
