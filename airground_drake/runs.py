@@ -10,6 +10,7 @@ import json
 import multiprocessing
 import os
 import signal
+import time
 import warnings
 from collections import deque
 from collections.abc import Callable
@@ -33,6 +34,9 @@ from airground_drake.trace import Trace
 FAILURE = "failure.json"
 TOLD_S = 0.2
 """How often it is told how far the runs have come, s."""
+STANDSTILL_S = 600.0
+"""A run whose simulated time stands still for so long by the clock is ended, s: what hangs is code of others, for every
+step of the package's own is bounded in counts."""
 
 
 def simulate_all(
@@ -49,7 +53,7 @@ def simulate_all(
     Raises:
         ScenarioError: if the scenario is not valid.
         PluginError: if it names a policy, route or task that cannot be made.
-        SimulationError: if a simulation stops before its end.
+        SimulationError: if a simulation stops before its end, or comes no further.
         AirgroundError: if its process dies.
     """
     scenario = validated(scenario)
@@ -63,6 +67,7 @@ def simulate_all(
     clocks = {name: context.RawValue("d") for name in scenario.runs}
     waiting, running = deque(scenario.runs), dict[str, BaseProcess]()
     traces: dict[str, Trace] = {}
+    since = dict[str, tuple[float, float]]()  # simulated time of each run, and since when it is that
     reached = 0.0
     with files.temporary_folder() as made, warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)  # idle threads of numerical libraries survive a fork
@@ -81,6 +86,10 @@ def simulate_all(
                 for name, process in list(running.items()):
                     if not process.is_alive():
                         traces[name] = _result(made / name, running.pop(name), f"run {name} of {scenario.name}")
+                    elif name not in since or clocks[name].value > since[name][0]:
+                        since[name] = clocks[name].value, time.monotonic()
+                    elif time.monotonic() - since[name][1] > STANDSTILL_S:
+                        raise SimulationError(name, since[name][0], f"no further after {STANDSTILL_S:g} s of waiting")
         finally:
             _stop(list(running.values()))
     return {name: traces[name] for name in scenario.runs}

@@ -190,6 +190,10 @@ def told(lie: Lie) -> Told:
     scenario.intervention.period_s = float(random.choice([0.05, 0.1]))
     scenario.duration_s = max(20.0, 2.5 * (gate.tries * gate.longest_s + gate.rest_s))
     scenario.obstacles["obstacle_2"].known_to_uav = bool(random.integers(2))
+    body = float(random.choice([0.0, 1.0]))  # of the 2 m to an obstacle's centre so much are its own
+    scenario.safe_distance.obstacle_m -= body
+    for obstacle in scenario.obstacles.values():
+        obstacle.radius_m = body
     scenario.choices, scenario.runs, scenario.reproduction = [], {"d": Run(method="d")}, []
 
     def lying(given: Scenario, method: Method) -> Planner:
@@ -244,7 +248,7 @@ def print_lies(found: list[Told]) -> None:
     print(f"  longest decision: {1e3 * max(one.decision_s for one in found):.0f} ms CPU")
     print("\n| part | is | runs | stole anything | most stolen, % of the bound | worst margin to d, m |")
     print("| --- | --- | --- | --- | --- | --- |")
-    for part in ("mapped", "motion", "cause", "forge"):
+    for part in ("mapped", "radii", "motion", "cause", "forge"):
         for value in CHOICES[part]:
             those = [one for one in found if getattr(one.lie.tactic, part) == value and not one.lie.believed]
             if those:

@@ -20,9 +20,10 @@ from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.motion import Motion
 
 CHOICES: dict[str, tuple[Any, ...]] = {
-    "mapped": ("true", "nothing", "phantoms", "on the robot", "ahead", "huge"),
+    "mapped": ("true", "moved", "nothing", "phantoms", "on the robot", "ahead", "huge"),
+    "radii": ("true", "none", "half", "large", "enormous", "no length"),
     "motion": ("hold", "stall", "back and forth", "away", "collide", "shadow", "creep"),
-    "cause": ("own", "another", "alternating", "nobody"),
+    "cause": ("own", "another", "alternating", "nobody", "itself", "the UAV"),
     "lasts_s": (0.3, 2.0, 10.0, 1e4),
     "renew_s": (0.05, 0.1, 0.5, 3.0, 1e4),
     "pause_s": (0.0, 0.05, 0.1, 1.0),
@@ -40,11 +41,14 @@ class Tactic:
     """How the UAV lies.
 
     Attributes:
-        mapped: the map that it sends: the true one, none, phantoms at random, some on top of the UGV, a wall across its
-            way out of its sight, or very many.
+        mapped: the map that it sends: the true one, that with every obstacle about a metre away, none, phantoms at
+            random, some on top of the UGV, a wall across its way out of its sight, or very many.
+        radii: of what is on it: true (0 for what is not there), none, half of that, 3 m more, very much more, or what
+            is no length at all.
         motion: where the UGV is asked to be: where it is; on its way to the goal, then at rest short of it; to and fro;
             far away; in what is nearest; always where it happens to be; towards its goal, at a crawl.
-        cause: whose trigger the proposal is said to be for.
+        cause: whose trigger the proposal is said to be for: the UGV's own, without a word or by its name, that of
+            another one, by turns, of nobody, or of the UAV.
         lasts_s: duration of the motion.
         renew_s: a standing proposal is replaced after so long.
         pause_s: silence after a refusal, and before a renewal.
@@ -54,6 +58,7 @@ class Tactic:
     """
 
     mapped: str
+    radii: str
     motion: str
     cause: str
     lasts_s: float
@@ -119,11 +124,35 @@ class LyingPlanner(Planner):
         return replace(memory, desks=tuple(desks), sent=tuple(sent))
 
     def _proposal(self, i: int, t: float, issued: float, positions: Array) -> Proposal:
+        motion, mapped = self._motion(i, t, positions), self._map(i, positions)
+        return Proposal("lying", issued, motion, mapped=mapped, mapped_radii=self._radii(mapped), cause=self._cause(i))
+
+    def _cause(self, i: int) -> str:
         other = self.ugvs[(i + 1) % len(self.ugvs)]
-        alternates = other if self.random.random() < 0.5 else ""
-        cause = {"own": "", "another": other, "alternating": alternates, "nobody": "?"}[self.tactic.cause]
-        motion = self._motion(i, t, positions)
-        return Proposal("lying", issued, motion, mapped=self._map(i, positions), cause=cause)
+        causes = {
+            "own": "",
+            "another": other,
+            "alternating": other if self.random.random() < 0.5 else "",
+            "nobody": "?",
+            "itself": self.ugvs[i],
+            "the UAV": "uav",
+        }
+        return causes[self.tactic.cause]
+
+    def _radii(self, mapped: Array) -> Array:
+        """Radii that go with a map, (m,), m."""
+        true = np.zeros(len(mapped))
+        if self.tactic.mapped in ("true", "moved"):
+            true = true + self.mapped_radii
+        radii = {
+            "true": true,
+            "none": 0.0 * true,
+            "half": 0.5 * true,
+            "large": true + 3.0,
+            "enormous": true + 1e6,
+            "no length": self.random.choice([np.nan, np.inf, -1.0], len(mapped)),
+        }
+        return np.asarray(radii[self.tactic.radii], dtype=np.float64)
 
     def _motion(self, i: int, t: float, positions: Array) -> Motion:
         """The motion that is proposed to UGV i."""
@@ -152,6 +181,7 @@ class LyingPlanner(Planner):
         across = 0.5 * (here + goal) + 8.0 * steps * np.array([1.0, 0.0, 0.0])
         maps = {
             "true": self.mapped,
+            "moved": self.mapped + self.random.normal(size=self.mapped.shape) * flat,
             "nothing": np.empty((0, 3)),
             "phantoms": self.random.uniform(-5.0, 15.0, (8, 3)) * flat,
             "on the robot": here + self.random.normal(scale=0.5, size=(4, 3)) * flat,

@@ -36,7 +36,7 @@ ROOT = Path(__file__).resolve().parents[1]
 COPIED = (PACKAGE, "tests", "benchmarks", "docs", "pyproject.toml", "README.md")
 MUTANTS: tuple[Mutant, ...] = (
     *of_code.TEAM, *of_code.BODIES, *of_code.KERNELS, *of_code.LAW, *of_code.DECISION, *of_code.INTERVENTION,
-    *of_code.GATEKEEPER, *of_checkers.CLAIMS, *of_checkers.CHECKER,
+    *of_code.GATEKEEPER, *of_code.MIX_UPS, *of_checkers.CLAIMS, *of_checkers.CHECKER,
 )  # fmt: skip
 NOT_COMPARED = ("GATE-TIME",)
 """Claims that depend on what else the machine does."""
@@ -52,6 +52,7 @@ class Result:
         by: the claims, rules or tests.
         equivalent: why nothing can, if nothing did.
         seconds: that it took.
+        commit: of the code on which it was judged; empty if that was not kept.
     """
 
     name: str
@@ -62,6 +63,7 @@ class Result:
     by: list[str] = field(default_factory=list)
     equivalent: str = ""
     seconds: float = 0.0
+    commit: str = ""
 
 
 class Copy:
@@ -152,6 +154,8 @@ class Bench:
                 shutil.copy2(ROOT / name, first / name)
         here = Copy(first, folder / "baseline")
         self.report = folder / "report" if report is None else report.resolve()
+        described = ("git", "describe", "--always", "--dirty", "--exclude", "*")
+        self.commit = subprocess.run(described, cwd=ROOT, capture_output=True, text=True, check=False).stdout.strip()
         probes = sorted({run for mutant in mutants for run in mutant.runs})
         found = here.probe("runs", *probes)
         if wrong := [each for each in found if each[2] in ("stops", "disagrees", "error")]:
@@ -178,7 +182,7 @@ class Bench:
     def judge(self, mutant: Mutant, quick: bool = False) -> Result:
         """Make the edit in a free copy, and see what catches it; `quick`: without tampered reports and tests."""
         copy, started = self.copies.get(), time.perf_counter()
-        result = Result(mutant.name, mutant.path, mutant.old, mutant.new)
+        result = Result(mutant.name, mutant.path, mutant.old, mutant.new, commit=self.commit)
         edited = copy.compiled_with(mutant.path)
         try:
             if mutant.compiled(copy.folder):
@@ -232,7 +236,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--only", action="append", default=[], metavar="WORD", help="mutants with this in name or path")
     parser.add_argument("--jobs", type=int, default=1, help="copies that are judged side by side (default: 1)")
-    parser.add_argument("--json", type=Path, help="file for the results; those of other mutants in it are kept")
+    parser.add_argument("--json", type=Path, help="file for the results; those in it of other mutants are kept")
     parser.add_argument("--missing", action="store_true", help="only those that the file of --json does not have")
     parser.add_argument("--quick", action="store_true", help="no tampered reports and tests; what survives is left out")
     parser.add_argument("--report", type=Path, help="a report of case B to tamper with (default: made)")
@@ -241,6 +245,8 @@ def main() -> int:
     kept: dict[str, Any] = {}
     if options.json and options.json.exists():
         kept = {each["name"]: each for each in json.loads(options.json.read_text(encoding="utf-8"))}
+    edits = {mutant.name: (mutant.path, mutant.old, mutant.new) for mutant in MUTANTS}
+    kept = {name: each for name, each in kept.items() if edits.get(name) == (each["path"], each["old"], each["new"])}
     wanted = [m for m in MUTANTS if not options.only or any(w in f"{m.name} {m.path}" for w in options.only)]
     wanted = [m for m in wanted if not (options.missing and m.name in kept)]
     wanted.sort(key=lambda m: m.compiled(ROOT))  # those last whose callers are compiled again

@@ -4,8 +4,9 @@
 
 For `detour` on the map of case A, and for `towards`, which has nothing to compute, the time of a proposal in the
 process of the simulation and in one of its own; their difference is the price, their ratio what a run notices. The two
-are asked in turn, so that both meet the same machine; the least and the median are printed. Besides: the time to start
-the process, once in a run, and that of the first proposal afterwards.
+are asked in turn, so that both meet the same machine; the least and the median are printed, by the clock and, on Linux,
+in CPU time of both processes, which does not count the wait for a processor. Besides: the time to start the process,
+once in a run, and that of the first proposal afterwards.
 """
 
 from __future__ import annotations
@@ -13,12 +14,14 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 
 from airground_drake.components import make_map, make_presets
 from airground_drake.intervention.database import make_policy
 from airground_drake.intervention.policy import Observation, Policy, Teammate, motions_of
+from airground_drake.intervention.process import GuestPolicy
 from airground_drake.scenarios.load import load
 
 
@@ -37,11 +40,18 @@ def observation() -> Observation:
     )
 
 
-def elapsed(ask: Callable[[], object]) -> float:
-    """Wall-clock time of a call, ms."""
-    started = time.perf_counter()
+def elapsed(ask: Callable[[], object], child: int | None = None) -> tuple[float, float]:
+    """Time of a call by the clock, ms, and CPU time of this process and of a child, ms."""
+    before, started, spent = cpu_s(child), time.perf_counter(), time.process_time()
     ask()
-    return 1e3 * (time.perf_counter() - started)
+    taken, spent = time.perf_counter() - started, time.process_time() - spent
+    return 1e3 * taken, 1e3 * (spent + cpu_s(child) - before)
+
+
+def cpu_s(child: int | None) -> float:
+    """CPU time that all threads of a child have had, s; 0 where the system does not say."""
+    threads = Path(f"/proc/{child}/task").glob("*/schedstat")
+    return sum(int(thread.read_text(encoding="utf-8").split()[0]) for thread in threads) / 1e9
 
 
 def compare(here: Policy, name: str, parameters: dict[str, float], proposals: int) -> None:
@@ -49,16 +59,19 @@ def compare(here: Policy, name: str, parameters: dict[str, float], proposals: in
     seen = observation()
     started = time.perf_counter()
     there = make_policy(name, parameters, 60.0)
+    child = there._process._process.pid if isinstance(there, GuestPolicy) and there._process else None
     print(f"{name}\n  start {1e3 * (time.perf_counter() - started):.0f} ms", end="")
-    print(f", first proposal {elapsed(lambda: there.propose(seen)):.2f} ms")
+    print(f", first proposal {elapsed(lambda: there.propose(seen))[0]:.2f} ms")
     calls = (
         lambda: motions_of(here.propose(seen.fresh()), seen),
         lambda: motions_of(there.propose(seen), seen),
     )
-    taken = np.array([[elapsed(call) for call in calls] for _ in range(proposals)])
-    for said, (inside, outside) in (("least", taken.min(axis=0)), ("median", np.median(taken, axis=0))):
-        print(f"  {said}: here {inside:.3f} ms, there {outside:.3f} ms, ", end="")
-        print(f"difference {outside - inside:.3f} ms, ratio {outside / inside:.2f}")
+    taken = np.array([[elapsed(call, child) for call in calls] for _ in range(proposals)])
+    for k, time_of in enumerate(("by the clock", "CPU time")):
+        both = taken[:, :, k]
+        for said, (inside, outside) in (("least", both.min(axis=0)), ("median", np.median(both, axis=0))):
+            print(f"  {time_of}, {said}: here {inside:.3f} ms, there {outside:.3f} ms, ", end="")
+            print(f"difference {outside - inside:.3f} ms, ratio {outside / inside:.2f}")
 
 
 def main() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -57,6 +58,14 @@ def test_one_run_alone_is_simulated_in_a_child_too(
         simulate_all(one_run(case_a), jobs=1)
     assert type(stopped.value) is error
     assert f"simulated in {os.getpid()}" not in str(stopped.value)
+
+
+def test_a_run_that_comes_no_further_is_ended(case_a: Scenario, monkeypatch: pytest.MonkeyPatch) -> None:
+    hangs = task(lambda: time.sleep(600.0))
+    monkeypatch.setattr(UAV_TASKS, "load", lambda name, of: hangs)
+    monkeypatch.setattr(runs, "STANDSTILL_S", 0.5)
+    with UAV_TASKS.adding("of_the_test", hangs), pytest.raises(SimulationError, match=r"no further after 0\.5 s"):
+        simulate_all(one_run(case_a), jobs=1)
 
 
 def test_what_is_not_valid_is_said_before_anything_runs(case_a: Scenario, monkeypatch: pytest.MonkeyPatch) -> None:

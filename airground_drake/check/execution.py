@@ -94,7 +94,14 @@ def _ugv(run: Run, ugv: str) -> Robot:
         law[closer], away[closer] = tried[closer], off[closer]
     executing = np.array([proposal is not None for proposal in accepted])
     spare = least_spare(law, around(run, ugv))
-    return Robot(ugv, recorded, law, executing, run.executed(ugv)[run.chosen_row], spare)
+    return Robot(ugv, recorded, law, executing, _said(run, ugv, executing), spare)
+
+
+def _said(run: Run, ugv: str, executing: Flags) -> Flags:
+    """What the signal says of each sample: otherwise than the messages if any row does up to the next one."""
+    ends = np.append(run.chosen_row[1:], len(run.t_s))
+    parts = [run.executed(ugv)[begin:end] for begin, end in zip(run.chosen_row, ends, strict=True)]
+    return np.array([not due if (part != due).any() else due for part, due in zip(parts, executing, strict=True)])
 
 
 def _law(run: Run, ugv: str, accepted: list[Proposal | None], own_side: float, asked_side: float) -> Array:

@@ -12,15 +12,12 @@ from .files import Json
 from .foresight import rows_of
 from .rules import SMALL, Array, Flags, Found, at_most, close, holds, same
 from .run import Run
-from .safety import avoidance_spare_m_s
 from .scenario import Pair
 
 COST = 1e-9
 """Recorded and recomputed costs may differ by this, relative: rounding of 3 N additions errs by 1e-13."""
 SPEED = 1e-4
 """A step may be longer than the speed limit allows by this, relative."""
-COMMAND_M_S = 1e-6
-"""A command may differ from the UGV's own task by this: positions enter with the motion gain."""
 INSIDE_M = 1e-6
 """Closer than the safe distance by more than this, avoidance may ask for more speed than the limit."""
 NO_DIFFERENCE = 1e-6
@@ -29,11 +26,11 @@ CHOICES = ("refuse", "accept")
 
 
 def gate_feas(run: Run, _: Json) -> Found:
-    """GATE-FEAS: situation, plan, answer and obedience; the margin is the part of a tolerance that rounding leaves."""
+    """GATE-FEAS: situation, plan and answer; the margin is the part of a tolerance that rounding leaves."""
     if silent_ugvs(run):
         return Found("not_run")
     if run.method == "d":
-        return _obedience(run)
+        return _in_time(run)
     decisions = decisions_of(run)
     for decision in decisions:
         _on_a_proposal(run, decision)
@@ -47,9 +44,6 @@ def gate_feas(run: Run, _: Json) -> Found:
         mine = [decision for decision in decisions if decision.ugv == ugv]
         _answers_follow_the_rules(run, mine)
         _every_proposal_is_decided_on(run, ugv, mine)
-        _nothing_is_executed_without_acceptance(run, ugv, mine)
-        if decisions:
-            _own_task_while_nothing_is_accepted(run, ugv)
     found = Found("holds", 0.0, 1.0, {"decisions": len(decisions)}) if decisions else Found("holds")
     return found.counted(len(decisions))
 
@@ -70,8 +64,8 @@ class Answer(NamedTuple):
         return str(self.row["robot"])
 
 
-def _obedience(run: Run) -> Found:
-    """Method (d): decisions come when they are due, and nothing is done without an acceptance."""
+def _in_time(run: Run) -> Found:
+    """Method (d): decisions come when they are due."""
     answers = [Answer(row) for row in rows_of(run)]
     for answer in answers:
         _on_a_proposal(run, answer)
@@ -79,9 +73,6 @@ def _obedience(run: Run) -> Found:
         mine = [answer for answer in answers if answer.ugv == ugv]
         _decisions_come_when_due(run, mine)
         _every_proposal_is_decided_on(run, ugv, mine)
-        _nothing_is_executed_without_acceptance(run, ugv, mine)
-        if answers:
-            _own_task_while_nothing_is_accepted(run, ugv)
     found = Found("holds", 0.0, 1.0, {"decisions": len(answers)}) if answers else Found("holds")
     return found.counted(len(answers))
 
@@ -301,41 +292,3 @@ def _every_proposal_is_decided_on(run: Run, ugv: str, decisions: Sequence[Decisi
         stands = ((stays[:, 0] <= issued + SMALL) & (stays[:, 1] > issued + allowed_s)).any()
         if stands and not replaced:
             holds("a proposal is decided on", issued in answered, "no decision", "a decision", about=ugv, t_s=issued)
-
-
-def _nothing_is_executed_without_acceptance(run: Run, ugv: str, decisions: Sequence[Decision | Answer]) -> None:
-    """What a row executes was set at the last control sample before it, by an acceptance not older than a period."""
-    executed = run.executed(ugv)
-    executed[0] = False  # nothing is executed before the first row
-    rows = np.flatnonzero(executed)
-    control_s, gate_s = run.scenario["control"]["period_s"], run.scenario["gatekeeper"]["period_s"]
-    set_at = control_s * (np.ceil(run.t_s[rows] / control_s - 1e-6) - 1.0)
-    decided = np.array([decision.t_s for decision in decisions])
-    last = np.searchsorted(decided, set_at + SMALL) - 1
-    for row, when, k in zip(rows, set_at, last, strict=True):
-        in_force = k >= 0 and decisions[k].row["decision"] == "accept" and when - decided[k] <= gate_s + SMALL
-        what = "an intervention is executed only while accepted"
-        holds(what, in_force, "executed", "no acceptance in force", about=ugv, t_s=float(run.t_s[row]))
-
-
-def _own_task_while_nothing_is_accepted(run: Run, ugv: str) -> None:
-    """Where nothing is accepted and avoidance does not interfere, the command is the UGV's own task (6).
-
-    That is v = d rho_rd/dt + B (rho_rd - rho), shortened to the speed limit; corners of the preset are left out.
-    """
-    control, preset, t = run.scenario["control"], run.presets[ugv], run.sample_s
-    step = 1e-3 * control["period_s"]
-    here, later = preset.position_m(t), preset.position_m(t + step)
-    wanted = (later - here) / step + control["motion_gain_1_s"] * (here - run.position_m[ugv][run.sample_row])
-    wanted[:, 2] = 0.0
-    speed = np.linalg.norm(wanted, axis=1)
-    limit = run.robots[ugv]["max_speed_m_s"]
-    wanted *= (limit / np.maximum(speed, limit))[:, None]
-    free = ~run.executed(ugv)[run.chosen_row]
-    free &= (np.abs(preset.corner_s[:, None] - t) > control["period_s"]).all(axis=0)
-    for pair in run.views:
-        if pair.robot == ugv:
-            free &= avoidance_spare_m_s(run, pair, wanted) > COMMAND_M_S
-    commanded = run.command_m_s[ugv][run.chosen_row]
-    what = "the command is the own task while nothing is accepted"
-    close(what, commanded[free], wanted[free], within=COMMAND_M_S, about=ugv, t_s=t[free])

@@ -99,7 +99,8 @@ class CertifiedGatekeepers(Gatekeepers):
         if self._patience.exhausted(turn):
             return Decision(seen.t, i, proposal, False, "exhausted", Foreseen(tries=turn.tries)), turn, None
         refuse, accept = self.foresee(seen, i, proposal)
-        reason = reason_of(refuse, accept, favour=proposal.cause not in ("", self._team.ugvs[i]))
+        favour = proposal.cause in self._team.ugvs and proposal.cause != self._team.ugvs[i]
+        reason = reason_of(refuse, accept, favour=favour)
         if reason not in ACCEPTING:
             return Decision(seen.t, i, proposal, False, reason, Foreseen(refuse, accept, tries=turn.tries)), turn, None
         turn = self._patience.accept(turn, seen.t, proposal.motion.end)
@@ -166,8 +167,9 @@ class CertifiedGatekeepers(Gatekeepers):
 def reason_of(refuse: Outcome, accept: Outcome, *, favour: bool) -> Reason:
     """Why to accept (one of ACCEPTING) or why not, given what comes of either.
 
-    A UGV that is asked to make way for another one (a `favour`) has nothing to gain: it accepts unless it would come to
-    rest short of its own goal. What that may cost it is bounded like any other try (`patience`).
+    A UGV that is asked to make way for another one of its team (a `favour`) has nothing to gain: it accepts unless it
+    would come to rest short of its own goal. Whether that other one's trigger is on it cannot know; what a lie may cost
+    it is bounded like any other try (`patience`).
     """
     if not (np.isfinite(accept.cost) and np.isfinite(refuse.cost)):
         return "no_plan"

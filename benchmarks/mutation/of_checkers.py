@@ -1,7 +1,8 @@
 """Mutants of what judges: claims about runs, engines and proofs (`verify`), the independent checker (`check`).
 
 On honest runs a claim or a rule that demands less says the same. It is caught by a run that must be refuted and on
-which the other side still refutes it, by tampered reports, or by the tests' broken traces.
+which the other side still refutes it, by tampered reports, or by the tests' broken traces; where there is no such run,
+none is made.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ CLAIMS = (
         "verify/runs/gate_opt.py",
         "largest_gap = 0.05",
         "largest_gap = 0.5",
-        runs=("case_b d", "crowd d"),
+        runs=(),
         tests=(f"{RUNS}/test_gate_opt.py",),
     ),
     Mutant(
@@ -136,15 +137,17 @@ CLAIMS = (
         "verify/runs/gate_sur.py",
         "deviation, (0.5 + TIE) * row.dt)",
         "deviation, (50.0 + TIE) * row.dt)",
-        runs=("case_b d",),
+        runs=(),
         tests=(f"{RUNS}/test_gate_sur.py",),
+        equivalent="survives: a plan that is rounded by the rule (28), which is judged beside it, is never farther off "
+        "than half a stage",
     ),
     Mutant(
         "half a run is enough",
         "verify/claim.py",
         "            if finding.status in PASSING:\n",
         "            if False:\n",
-        runs=("case_b d",),
+        runs=(),
         tests=("tests/verify/test_claim.py",),
     ),
     Mutant(
@@ -152,7 +155,7 @@ CLAIMS = (
         "verify/claim.py",
         "MOTION_TOLERANCE_M = 1e-9",
         "MOTION_TOLERANCE_M = 1e9",
-        runs=("case_b d",),
+        runs=(),
         tests=("tests/verify/test_claim.py",),
     ),
     Mutant(
@@ -160,7 +163,7 @@ CLAIMS = (
         "verify/engines/prover.py",
         ' and self.premises.answer == "sat"',
         "",
-        runs=("crowd d",),
+        runs=(),
         proofs=("SAFE-LEMMA",),
         tests=("tests/verify/engines/test_prover.py",),
     ),
@@ -169,7 +172,7 @@ CLAIMS = (
         "verify/engines/prover.py",
         'if self.cvc5.answer == "sat" or self.premises.answer == "unsat":',
         'if self.cvc5.answer == "sat":',
-        runs=("crowd d",),
+        runs=(),
         tests=("tests/verify/engines/test_prover.py",),
     ),
     Mutant(
@@ -177,7 +180,7 @@ CLAIMS = (
         "verify/engines/prover.py",
         "sure = self.certified and ",
         "sure = ",
-        runs=("crowd d",),
+        runs=(),
         tests=("tests/verify/engines/test_prover.py",),
     ),
     Mutant(
@@ -185,7 +188,7 @@ CLAIMS = (
         "verify/model/avoidance/conformance.py",
         "agrees = all(ratio <= 1.0 for",
         "agrees = all(ratio <= 1000.0 for",
-        runs=("crowd d",),
+        runs=(),
         proofs=("SAFE-INV",),
         tests=("tests/verify/model/avoidance/test_conformance.py", "tests/verify/model/avoidance/test_rounding.py"),
     ),
@@ -194,7 +197,7 @@ CLAIMS = (
         "verify/model/avoidance/wiring.py",
         "COMMAND_TOLERANCE = 1e-7",
         "COMMAND_TOLERANCE = 0.1",
-        runs=("crowd d",),
+        runs=(),
         proofs=("SAFE-INV",),
         tests=("tests/verify/model/avoidance/test_wiring.py",),
     ),
@@ -203,7 +206,7 @@ CLAIMS = (
         "verify/model/avoidance/conformance.py",
         "return name, TOLERANCE_M - margins[name]",
         "return name, 2.0 + TOLERANCE_M - margins[name]",
-        runs=("crowd d",),
+        runs=(),
         proofs=("SAFE-INV",),
         tests=("tests/verify/model/avoidance/test_rounding.py", "tests/verify/model/avoidance/test_safe_inv.py"),
     ),
@@ -224,6 +227,7 @@ CHECKER = (
         '"holds" if margin >= -0.05 else "refuted", margin)',
         runs=BOTH,
         tamperings=("SAFE-TRACE",),
+        tests=("tests/check/test_safety.py",),
     ),
     Mutant(
         "checker: hypotheses may be broken by 1 m/s",
@@ -232,6 +236,7 @@ CHECKER = (
         "~(each.margin >= -1.0)",
         runs=BOTH,
         tamperings=("SAFE-HYP",),
+        tests=("tests/check/test_safety.py",),
     ),
     Mutant(
         "checker: every robot has the whole share",
@@ -286,7 +291,7 @@ CHECKER = (
         "check/prediction.py",
         "VELOCITY_M_S = 1e-6",
         "VELOCITY_M_S = 0.1",
-        runs=("case_b d",),
+        runs=(),
         tamperings=("GATE-MODEL",),
     ),
     Mutant(
@@ -294,7 +299,7 @@ CHECKER = (
         "check/optimality.py",
         "LARGEST_GAP = 0.05",
         "LARGEST_GAP = 0.5",
-        runs=("case_b d", "crowd d"),
+        runs=(),
         tamperings=("GATE-OPT",),
     ),
     Mutant(
@@ -302,7 +307,7 @@ CHECKER = (
         "check/optimality.py",
         "OVERSTATED = 1e-5",
         "OVERSTATED = 0.1",
-        runs=("case_b d",),
+        runs=(),
         tamperings=("GATE-OPT",),
     ),
     Mutant(
@@ -310,7 +315,7 @@ CHECKER = (
         "check/run.py",
         'same("SHA-256 of a table", meta["files"][file], sha256(content), about=file)',
         "pass",
-        runs=("case_b d",),
+        runs=(),
         tamperings=("trace",),
     ),
     Mutant(
@@ -318,7 +323,7 @@ CHECKER = (
         "check/run.py",
         'close("law of motion", run.position_m[robot][1:], led, within=SMALL,',
         'close("law of motion", run.position_m[robot][1:], led, within=1e9,',
-        runs=("case_b d",),
+        runs=(),
         tamperings=("trace",),
     ),
     Mutant(
@@ -326,7 +331,7 @@ CHECKER = (
         "check/certificates.py",
         "    if left != right:\n",
         "    if False:\n",
-        runs=("crowd d",),
+        runs=(),
         tamperings=("SAFE-LEMMA", "SAFE-INV", "SAFE-GATE", "SAFE-DIST", "ZENO-PROOF"),
     ),
     Mutant(
@@ -334,7 +339,7 @@ CHECKER = (
         "check/certificates.py",
         'holds("no further premise", premise in known,',
         'holds("no further premise", True,',
-        runs=("crowd d",),
+        runs=(),
         tamperings=("SAFE-LEMMA", "SAFE-INV", "SAFE-GATE", "SAFE-DIST", "ZENO-PROOF"),
     ),
     Mutant(
@@ -342,7 +347,7 @@ CHECKER = (
         "check/certificates.py",
         'holds("the goal is the claim\'s", parse(one["goal"]) == goal,',
         'holds("the goal is the claim\'s", True,',
-        runs=("crowd d",),
+        runs=(),
         tamperings=("SAFE-LEMMA", "SAFE-INV", "SAFE-GATE", "SAFE-DIST", "ZENO-PROOF"),
     ),
     Mutant(
@@ -350,7 +355,7 @@ CHECKER = (
         "check/certificates.py",
         'number(term["coefficient"]) >= 0, term',
         'number(term["coefficient"]) >= -100, term',
-        runs=("crowd d",),
+        runs=(),
         tamperings=("SAFE-LEMMA", "SAFE-INV", "SAFE-GATE", "SAFE-DIST", "ZENO-PROOF"),
     ),
     Mutant(
@@ -358,7 +363,7 @@ CHECKER = (
         "check/report.py",
         'same("claims that there are", recorded, sorted(map(list, expectations(scenario))))',
         "pass",
-        runs=("crowd d",),
+        runs=(),
         tamperings=("report",),
     ),
     Mutant(
@@ -366,7 +371,7 @@ CHECKER = (
         "check/report.py",
         "    if status in UNDECIDED and found.status != status:\n",
         '    if status in UNDECIDED:\n        return "undecided"\n    if False:\n',
-        runs=("crowd d",),
+        runs=(),
         tamperings=("SAFE-TRACE", "SAFE-HYP", "EXEC", "THR-TRIG", "report", "GATE-TIME"),
     ),
 )

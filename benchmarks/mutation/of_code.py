@@ -225,7 +225,7 @@ KERNELS = (
         "nsbc/kernels.py",
         "k = count - 1 - level",
         "k = level",
-        runs=("case_a nearest",),
+        runs=("case_a listed",),
         tests=("tests/nsbc/test_composition.py", "tests/nsbc/test_avoidance.py"),
     ),
     Mutant(
@@ -755,5 +755,101 @@ GATEKEEPER = (
         "output.SetFromVector(self._memory(context).answers)  # as it was\n"
         "        self._before, held = self._memory(context).answers, getattr(self, '_before', None)\n"
         "        output.SetFromVector(self._before if held is None else held)",
+    ),
+)
+
+MIX_UPS = (
+    Mutant(
+        "motions are followed a sample late",
+        "systems/controllers.py",
+        "velocity = self.velocity(context.get_time(), positions, reference, rate, proposals)",
+        "velocity = self.velocity(context.get_time() - 0.05, positions, reference, rate, proposals)",
+    ),
+    Mutant(
+        "neighbours are sensed a sample late",
+        "systems/controllers.py",
+        "        own = positions[: self._count]\n",
+        "        own, now = positions[: self._count], positions\n"
+        "        positions, self._before = getattr(self, '_before', now), now\n",
+    ),
+    Mutant(
+        "the intervention gain has the wrong sign along y",
+        "nsbc/law.py",
+        "self.intervention_gain * (wanted - position)",
+        "self.intervention_gain * np.array([1.0, -1.0, 1.0]) * (wanted - position)",
+    ),
+    Mutant(
+        "the UAV takes the UGV that it plans for for a point",
+        "intervention/planner.py",
+        "radius=float(self.radii[i]),\n                obstacle_radii",
+        "radius=0.0,\n                obstacle_radii",
+        runs=AMONG_BODIES,
+        tests=PLANNER,
+    ),
+    Mutant(
+        "the UAV plans by the trigger of another UGV",
+        "systems/intervention.py",
+        "self._status.Eval(context)[::FIELDS].tolist()]",
+        "self._status.Eval(context)[::FIELDS].tolist()][::-1]",
+    ),
+    Mutant(
+        "messages go to another UGV",
+        "systems/intervention.py",
+        "output.set_value(self.memory(context).proposals)",
+        "output.set_value(self.memory(context).proposals[::-1])",
+    ),
+    Mutant(
+        "the answer of another UGV counts",
+        "intervention/messages.py",
+        "return float(answers[2 * robot])",
+        "return float(answers[-2 - 2 * robot])",
+    ),
+    Mutant(
+        "the trigger has the noise of another UGV",
+        "systems/decision.py",
+        "reference, self._noise.Eval(context))",
+        "reference, self._noise.Eval(context)[::-1])",
+    ),
+    Mutant(
+        "the trigger has the place of another UGV",
+        "systems/decision.py",
+        "position, reference = self._position.Eval(context), ",
+        "position, reference = np.roll(self._position.Eval(context)[:-3], 3), ",
+    ),
+    Mutant(
+        "obstacles out of sight are forgotten",
+        "gatekeeper/certified.py",
+        "return memory.sensed | now if (now > memory.sensed).any() else memory.sensed",
+        "return now",
+        runs=("crowd d",),
+        tests=("tests/gatekeeper/test_certified.py",),
+    ),
+    Mutant(
+        "what makes no difference is accepted",
+        "gatekeeper/certified.py",
+        "if accept.better_than(refuse):",
+        "if not refuse.better_than(accept):",
+        runs=("crowd d",),
+        tests=("tests/gatekeeper/test_certified.py",),
+    ),
+    Mutant(
+        "the first decision comes a sample late",
+        "gatekeeper/certified.py",
+        "            if proposal is None:\n                answers",
+        "            if proposal is None or t < proposal.issued + 0.075:\n                answers",
+    ),
+    Mutant(
+        "progress is compared with the prediction of the next sample",
+        "gatekeeper/certified.py",
+        "k = min(round((t - turn.since) / self._law.avoidance.period),",
+        "k = min(1 + round((t - turn.since) / self._law.avoidance.period),",
+    ),
+    Mutant(
+        "a cause that names nobody is a favour",
+        "gatekeeper/certified.py",
+        "favour = proposal.cause in self._team.ugvs and proposal.cause != self._team.ugvs[i]",
+        "favour = proposal.cause != self._team.ugvs[i]",
+        runs=("crowd d",),
+        proofs=("LIVE-WAIT",),
     ),
 )

@@ -42,13 +42,16 @@ def page(results: Sequence[dict[str, Any]], others: Sequence[str] = ()) -> str:
         "",
         *(f"- {count[s]} caught {says}" for s, says in STAGES.items() if count[s]),
     ]
+    lines += ["", "Judged on the code as it was at commit:", ""]
+    commits = Counter(each.get("commit") or "not recorded" for each in results)
+    lines += [f"- {commit}: {number}" for commit, number in commits.most_common()]
     for stage, says in STAGES.items():
         mine = [each for each in results if each["stage"] == stage]
         if mine:
             lines += ["", f"## Caught {says}", ""]
             for each in mine:
                 by = each["equivalent"] or "; ".join(each["by"][:4]) + ("; ..." if len(each["by"]) > 4 else "")
-                text = f"- **{each['name']}** (`{each['path']}`): {by}"
+                text = f"- **{each['name']}** (`{each['path']}`): {by or 'survives, and is not equivalent'}"
                 lines += textwrap.wrap(
                     text, WIDTH, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False
                 )

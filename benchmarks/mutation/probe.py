@@ -29,6 +29,7 @@ PROBES = {
     "bodies d": (str(HERE / "bodies.yaml"), "d"),
     "case_a a": ("case_a", "a"),
     "case_a nearest": ("case_a", "a_recursion_nearest"),
+    "case_a listed": ("case_a", "a_recursion_listed"),
     "case_b c": ("case_b", "c"),
     "case_b d": ("case_b", "d"),
     "soft_gate c": ("soft_gate", "c"),

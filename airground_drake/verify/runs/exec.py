@@ -214,8 +214,19 @@ def _judge_ugv(trace: Trace, ugv: str, proposals: list[Sent], samples: npt.NDArr
         closer = ~(off >= away)
         away[closer], law[closer] = off[closer], ours[closer]
     executing = np.array([sent is not None for sent in accepted], dtype=bool)
-    said = trace.column(f"{ugv}.accepted")[chosen] != 0.0
+    said = _said(trace.column(f"{ugv}.accepted") != 0.0, chosen, executing)
     return Judged(ugv, t, away, law, recorded, executing, said, _binding(given, law))
+
+
+def _said(
+    accepted: npt.NDArray[np.bool_], chosen: npt.NDArray[np.intp], executing: npt.NDArray[np.bool_]
+) -> npt.NDArray[np.bool_]:
+    """What the signal says of S control samples: otherwise than the messages if any row does up to the next sample."""
+    held = np.searchsorted(chosen, np.arange(chosen[0], len(accepted)), side="right") - 1
+    said = executing.copy()
+    wrong = held[accepted[chosen[0] :] != executing[held]]
+    said[wrong] = ~executing[wrong]
+    return said
 
 
 def _law(

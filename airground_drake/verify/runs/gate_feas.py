@@ -11,17 +11,14 @@ import numpy.typing as npt
 from airground_drake.arrays import Array
 from airground_drake.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
-from airground_drake.verify.engines.segments import MERGE_S, corner_times, interpolate, travelled
+from airground_drake.verify.engines.segments import interpolate, travelled
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.control_law import ON_TOP
-from airground_drake.verify.runs.control_samples import control_samples
 from airground_drake.verify.runs.gate_record import POSITION_TOLERANCE_M, GateClaim, Off, Row, conclude, cost_tolerance
-from airground_drake.verify.runs.pairs import pairs_of, places_of, slack_of
+from airground_drake.verify.runs.pairs import pairs_of
 
 SPEED_TOLERANCE = 1e-4
 """A step may be longer than the speed limit allows by this, relative."""
-COMMAND_TOLERANCE_M_S = 1e-6
-"""A command may differ from the UGV's own task by this, m/s: positions enter with the motion gain."""
 INSIDE_M = 1e-6
 """Closer than the safe distance by more than this, m, the avoidance inequalities may ask for more speed than that:
 they ask for less than 1e-5 m/s per point before, at gains up to 10 1/s."""
@@ -36,8 +33,7 @@ class GateFeas(GateClaim):
     summary = "Every decision was about the situation that the UGV was in, and its answer follows from its numbers."
     statement = (
         "Every gatekeeper decision was about the UGV's situation at that time, its plan satisfies (26b)-(26e) at the "
-        "recorded cost, the answer given is the one that follows from the costs, and no UGV did anything but its own "
-        "task while it had accepted nothing."
+        "recorded cost, and the answer given is the one that follows from the costs."
     )
     formula = (
         "rho(0) = p(t); omega in {0, 1}; rho_k = rho_(k-1) + dt (omega_k a_k + (1 - omega_k) b_k); u_k = max(0, max_j "
@@ -61,8 +57,8 @@ class GateFeas(GateClaim):
         "loop: there (23) is checked up to the first change of mode, after it that no step is longer than the speed "
         "limit allows. Constant plans keep to it, except where they begin more than 1e-6 m inside a safe distance: "
         "avoidance may then demand more; so do other plans where the constant plan of their stage's choice does. "
-        "Under method (d), which solves no problem (26), it is about the times of the decisions and about obedience; "
-        "what its answers rest on is GATE-MODEL, how they follow LIVE-PROG."
+        "Under method (d), which solves no problem (26), it is about the times of the decisions; what its answers rest "
+        "on is GATE-MODEL, how they follow LIVE-PROG. That answers are obeyed is EXEC."
     )
     equations = "(22)-(26)"
     assumptions = (
@@ -80,9 +76,9 @@ class GateFeas(GateClaim):
     def judge_rows(self, trace: Trace, rows: list[Row]) -> Finding:
         """Compare everything recorded with what it should be; the margin is the part of a tolerance left."""
         if trace.meta["method"] not in ON_TOP:
-            return judge_obedience(trace, rows)
+            return judge_compared(trace, rows, [*compare_times(trace, rows)])
         compared = [one for row in rows for one in (*compare_situation(trace, row), *compare_plan(trace, row))]
-        compared += [*compare_answers(trace, rows), *compare_obedience(trace, rows), *compare_own_task(trace, rows)]
+        compared += compare_answers(trace, rows)
         slack = [float(np.maximum(0.0, -row.clearance(row["positions_m"])).max()) for row in rows if row.planned]
         return judge_compared(
             trace, rows, compared,
@@ -90,12 +86,6 @@ class GateFeas(GateClaim):
             largest_slack_m=max(slack, default=0.0),
             plans_with_slack=sum(value > 0.0 for value in slack),
         )  # fmt: skip
-
-
-def judge_obedience(trace: Trace, rows: list[Row]) -> Finding:
-    """Method (d): decisions come when they are due, and nothing is done without an acceptance."""
-    compared = [*compare_times(trace, rows), *compare_obedience(trace, rows), *compare_own_task(trace, rows)]
-    return judge_compared(trace, rows, compared)
 
 
 def judge_compared(trace: Trace, rows: list[Row], compared: list[Off], **evidence: Any) -> Finding:
@@ -287,50 +277,3 @@ def rule(row: Row, standing: str | None, stood: float, gate: dict[str, Any]) -> 
     if stood < gate["min_dwell_s"] - TIME_TOLERANCE_S:
         return accepted, "dwell"
     return not accepted, "reversed"
-
-
-def compare_obedience(trace: Trace, rows: Sequence[Row]) -> Iterator[Off]:
-    """Interventions executed, by the signals, without an acceptance in force."""
-    control = trace.scenario["control"]["period_s"]
-    gate = trace.scenario["gatekeeper"]["period_s"]
-    # a row has what the last control sample before it has set, by the answer given up to then
-    sample = control * (np.ceil(trace.t / control - 1e-6) - 1.0)
-    for ugv in trace.ugvs:
-        own = [row for row in rows if row.given["robot"] == ugv]  # not empty if anything was executed: see `check`
-        times = np.array([row.given["t_s"] for row in own])
-        for k in np.flatnonzero(trace.column(f"{ugv}.accepted") == 1.0):
-            last = int(np.searchsorted(times, sample[k] + TIME_TOLERANCE_S)) - 1
-            age = sample[k] - times[last] if last >= 0 and own[last].given["decision"] == "accept" else np.inf
-            if age > gate + TIME_TOLERANCE_S:
-                what = "executed without an acceptance in force"
-                yield Off(own[max(last, 0)], what, 1.0, 0.0, row_t_s=float(trace.t[k]))
-
-
-def compare_own_task(trace: Trace, rows: Sequence[Row]) -> Iterator[Off]:
-    """Commands, where nothing is accepted and no avoidance inequality interferes, against the UGV's own task (6)."""
-    control, places = trace.scenario["control"], places_of(trace)
-    samples = control_samples(trace.t, control["period_s"])
-    chosen = np.searchsorted(trace.t, trace.t[samples] + MERGE_S)  # what is set at a sample is in the next row
-    t, step = trace.t[samples], 1e-3 * control["period_s"]
-    at = {name: place if place.ndim == 1 else place[samples] for name, place in places.items()}
-    for ugv in trace.ugvs:
-        own = trace.scenario["ugvs"][ugv]
-        waypoints = np.asarray(own["preset"]["waypoints_m"], dtype=np.float64)
-        speed = own["preset"]["speed_m_s"]
-        here = travelled(waypoints, speed, t)
-        wanted = (travelled(waypoints, speed, t + step) - here) / step + control["motion_gain_1_s"] * (here - at[ugv])
-        wanted[:, 2] = 0.0
-        size = np.linalg.norm(wanted, axis=1, keepdims=True)
-        wanted *= np.minimum(1.0, own["max_speed_m_s"] / np.maximum(size, 1e-12))
-        corners = np.asarray(corner_times(waypoints, speed), dtype=np.float64).reshape(-1, 1)
-        free = (np.abs(corners - t) > control["period_s"]).all(axis=0) & (
-            trace.column(f"{ugv}.accepted")[chosen] == 0.0
-        )
-        for pair in pairs_of(trace):
-            if ugv in (pair.first, pair.second):
-                other = pair.second if pair.first == ugv else pair.first
-                free &= slack_of(at[ugv] - at[other], wanted, pair, control, planar=True) > COMMAND_TOLERANCE_M_S
-        away = np.where(free, np.linalg.norm(trace.command(ugv)[chosen] - wanted, axis=1), 0.0)
-        k = int(np.argmax(away))
-        what = "not its own task, though nothing is accepted, m/s"
-        yield Off(rows[0], what, float(away[k]), COMMAND_TOLERANCE_M_S, robot=ugv, sample_t_s=float(t[k]))

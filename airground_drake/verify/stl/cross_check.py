@@ -81,11 +81,12 @@ FORMULAS = (
         compares=("speed limit", "planar motion", "zero-order hold"),
     ),
     StlFormula(
-        "ZENO-TRACE", "dwell", "always ((twice < 0) and ((trigger > 0) -> always[{pulse!r},{dwell!r}] (trigger < 0)))",
+        "ZENO-TRACE", "dwell", "always ((twice < 0) and ((trigger > 0) -> always[{past!r},{dwell!r}] (trigger < 0)))",
         {
-            "trigger": "true for 1e-9 s from each trigger of a UGV, one set of signals per UGV; the pulse is skipped, "
-            "and 2e-9 s at the end of the dwell are left out for the tolerance and the length of the pulse",
-            "twice": "true for 1e-9 s from an instant with two triggers",
+            "trigger": "true for 1e-9 s from each trigger of a UGV, one set of signals per UGV; the pulse and as much "
+            "again are skipped, and 2e-9 s at the end of the dwell are left out for the tolerance and the length of "
+            "the pulse",
+            "twice": "true for 1e-9 s from a trigger less than 3e-9 s after the one before",
         },
         "", stl_signals.triggers, "dense",
     ),

@@ -174,7 +174,11 @@ def _times(trace: Trace, ugv: str, kind: str) -> list[float]:
 
 
 def triggers(trace: Trace) -> Signals | None:
-    """Per UGV a pulse at each trigger, and the number of triggers in it."""
+    """Per UGV a pulse at each trigger, and one where another follows so soon that their pulses are hard to tell apart.
+
+    The formula looks for another pulse from `2 PULSE_S` after the beginning of each: where a pulse ends is a sum that
+    rtamt rounds otherwise.
+    """
     bound = float(trace.scenario["decision"]["min_inter_event_s"])
     end = float(trace.t[-1]) + 1.0
     if bound <= 0.0:
@@ -183,9 +187,9 @@ def triggers(trace: Trace) -> Signals | None:
     for ugv in trace.ugvs:
         times = _times(trace, ugv, "trigger")
         trigger = square(((t, t + PULSE_S) for t in times), end)
-        twice = square(((b, b + PULSE_S) for a, b in pairwise(times) if a == b), end)
+        twice = square(((b, b + PULSE_S) for a, b in pairwise(times) if b - a < 3.0 * PULSE_S), end)
         sets.append({"trigger": trigger, "twice": twice})
-    return Signals({"pulse": PULSE_S, "dwell": bound - 2.0 * PULSE_S}, sets)
+    return Signals({"past": 2.0 * PULSE_S, "dwell": bound - 2.0 * PULSE_S}, sets)
 
 
 def messages(trace: Trace) -> Signals | None:

@@ -73,6 +73,12 @@ def reason_of_a_refusal_changed(folder: Path) -> None:
     change(folder, first_refused, reason="not_cheaper")
 
 
+@refused_by("LIVE-PROG", "answer and its reason")
+def favour_to_itself(folder: Path) -> None:
+    """Accepted although of no use, to make way for the very UGV that is asked."""
+    change(folder, first_refused, decision="accept", reason="makes_way", accept_stalls=0.0)
+
+
 @refused_by("LIVE-PROG", "tries")
 def tries_understated(folder: Path) -> None:
     change(folder, under_way, tries=0.0)
@@ -92,6 +98,12 @@ def lag_predicted_afterwards(folder: Path) -> None:
 def patience_overstated(folder: Path) -> None:
     with edited_claim(folder, "LIVE-PROG") as claim:
         claim["margin"] = 3.0
+
+
+@refused_by("LIVE-WAIT", "favours that no UGV is asked for", run="")
+def favours_to_nobody_done(folder: Path) -> None:
+    with edited_claim(folder, "LIVE-WAIT", "") as claim:
+        next(row for row in claim["evidence"]["attacks"] if row["attack"] == "favours to nobody")["tries"] = 1
 
 
 @refused_by("GATE-MODEL", "evidence")

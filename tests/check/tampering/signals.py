@@ -170,7 +170,7 @@ def release_forgotten(folder: Path) -> None:
         frame.loc[len(frame) - 1, f"{UGV}.released_at_s"] = -1.0
 
 
-@refused_by("GATE-FEAS", "an intervention is executed only while accepted")
+@refused_by("EXEC", "what is executed is what was accepted")
 def executed_without_acceptance(folder: Path) -> None:
     with edited_table(folder) as frame:
         frame.loc[50, f"{UGV}.accepted"] = 1.0
@@ -182,7 +182,7 @@ def executed_without_a_proposal(folder: Path) -> None:
         frame.loc[50, f"{UGV}.accepted"] = 1.0
 
 
-@refused_by("GATE-FEAS", "the command is the own task while nothing is accepted")
+@refused_by("EXEC", "what is executed is what was accepted")
 def acceptance_hidden(folder: Path) -> None:
     """What was executed by an acceptance looks as if the UGV had done it of its own accord."""
     with edited_table(folder) as frame:

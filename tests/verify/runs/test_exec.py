@@ -246,11 +246,18 @@ def test_a_command_that_is_not_the_laws_is_refuted(run: Callable[[str, str], Tra
 
 
 @pytest.mark.parametrize("robot", ["ugv1", "ugv2"])
-def test_an_acceptance_that_nothing_says_is_refuted(run: Callable[[str, str], Trace], robot: str) -> None:
-    def edit(signals: Any) -> None:
-        signals.loc[100, f"{robot}.accepted"] = 1.0
+@pytest.mark.parametrize("between", [False, True], ids=["at a sample", "between samples"])
+def test_an_acceptance_that_nothing_says_is_refuted(
+    run: Callable[[str, str], Trace], robot: str, between: bool
+) -> None:
+    trace = run("case_b", "d")
+    off = np.abs(trace.t / 0.05 - np.round(trace.t / 0.05))
+    row = int(np.flatnonzero(off > 0.1)[0]) if between else 100  # the trigger is isolated between samples
 
-    found = refuted(with_signals(run("case_b", "d"), edit))
+    def edit(signals: Any) -> None:
+        signals.loc[row, f"{robot}.accepted"] = 1.0
+
+    found = refuted(with_signals(trace, edit))
     assert found["accepted_by_the_signals"]
     assert not found["accepted_by_the_messages"]
 

@@ -15,8 +15,6 @@ from verify.runs.cases import refused_for_want_of_a_plan
 
 from airground_drake.trace import Trace
 
-pytestmark = pytest.mark.usefixtures("scripted")
-
 
 @pytest.mark.parametrize(
     ("route", "expected"),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -80,14 +79,3 @@ def test_a_real_run_saved_and_broken(record_of: Simulated, tmp_path: Any) -> Non
         (OPT, understate_gap), (OPT, long_normals), (OPT, inflate_loser),
     ):  # fmt: skip
         assert claim.judge(with_decision(trace, edit)).status == "refuted", edit
-
-
-@pytest.mark.parametrize("run_name", ["c", "d"])
-def test_a_run_that_hides_an_intervention_is_refuted(record_of: Simulated, run_name: str) -> None:
-    """What was executed is not the UGV's own task, whatever the `accepted` column says."""
-    trace = record_of("case_b", run_name, "relaxed")
-    assert FEAS.judge(trace).status == "holds"
-    hidden = replace(trace, signals=trace.signals.assign(**{"ugv1.accepted": 0.0}))
-    finding = FEAS.judge(hidden)
-    assert finding.status == "refuted"
-    assert "own task" in str(finding.counterexample)

@@ -17,8 +17,6 @@ from airground_drake.trace import Trace
 from airground_drake.verify.runs import convex_bounds, gate_opt
 from airground_drake.verify.runs.gate_record import Row, rows_of
 
-pytestmark = pytest.mark.usefixtures("scripted")
-
 MUTANTS: list[tuple[DecisionEdit, str]] = [
     (overstate_bound, "lower bound overstated"),
     (understate_bound, "lower bound understated"),

@@ -9,8 +9,6 @@ from verify.runs.cases import fractional_rounding, relaxed_outside, round_otherw
 
 from airground_drake.trace import Trace
 
-pytestmark = pytest.mark.usefixtures("scripted")
-
 MUTANTS: list[tuple[DecisionEdit, str]] = [
     (round_otherwise, "rounded against the rule"),
     (fractional_rounding, "rounded omega is not binary"),

@@ -61,6 +61,8 @@ def test_the_run_itself_passes(decided: Trace, claim: str) -> None:
         ("LIVE-PROG", refused, {"reason": "not_cheaper"}, "answer or reason"),
         ("LIVE-PROG", refused, {"decision": "accept"}, "answer or reason"),
         ("LIVE-PROG", refused, {"accept_stalls": 0.0}, "answer or reason"),
+        ("LIVE-PROG", refused, {"decision": "accept", "reason": "makes_way", "accept_stalls": 0.0}, "answer or reason"),
+        ("LIVE-PROG", accepted, {"reason": "makes_way"}, "answer or reason"),
         ("LIVE-PROG", accepted, {"reason": "kept"}, "answer or reason"),
         ("LIVE-PROG", accepted, {"tries": 0.0}, "tries"),
         ("LIVE-PROG", executing, {"lag_m": lambda v: v + 1e-3}, "lag"),

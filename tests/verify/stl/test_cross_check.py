@@ -89,6 +89,25 @@ def test_agreement_on_a_run_of_hardly_a_period(periods: int) -> None:
     assert_agreement(simulate(case_a({"duration_s": periods * scenario["control"]["period_s"]}), "d"))
 
 
+@pytest.mark.parametrize("dwell", [0.3, 0.5, 1.0])
+@pytest.mark.parametrize("t", [0.9999999999999887, 0.99999999999998, 1.0 - 2.0**-53, 1.0, 1.0 + 2.0**-52])
+def test_a_trigger_whose_time_the_engines_round_differently_is_no_error(t: float, dwell: float) -> None:
+    """A pulse of 1e-9 s from there ends at a sum that each rounds its own way."""
+    decision = Decision(Threshold(zeta_m=1.03), "automaton", release_m=0.47, min_inter_event_s=dwell)
+    scenario = lone([0.0] * 3, [0.0] * 3, STILL, 1.6, decision=decision)
+    trace = simulate(scenario, drive=lambda _: [[1.03, 0.0, 0.0], [0.0] * 3])
+    (before,) = (event["t_s"] for event in trace.events if event["kind"] == "trigger")
+    assert before == pytest.approx(1.0, abs=1e-6)
+    columns = ["t_s", "ugv1.triggered_at_s"]
+    trace = with_signals(trace, lambda s: s.assign(**{c: s[c].where((s[c] - 1.0).abs() > 1e-6, t) for c in columns}))
+    trace = with_signals(trace, lambda s: s.drop_duplicates("t_s", keep="last").reset_index(drop=True))
+    trace = with_events(trace, lambda events: [{**e, "t_s": t} if e["t_s"] == before else e for e in events])
+    verdict = checked(trace)["ZENO-TRACE"]
+    assert verdict.finding.status == "holds", verdict.finding.evidence
+    assert verdict.finding.evidence["triggers"]["ugv1"]["t_s"] == [t]
+    assert verdict.finding.evidence["stl"]["agrees"] is True
+
+
 @pytest.mark.parametrize("offset", [-1e-6, -2e-9, -1e-9, -5e-10, 0.0, 1e-6])
 def test_distances_between_rows_are_seen(offset: float) -> None:
     trace = passing_by(offset)

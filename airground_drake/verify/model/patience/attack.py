@@ -1,8 +1,8 @@
 """UAVs that waste a UGV's time, against the running `CertifiedGatekeepers`: how long do they keep it from its task?
 
 The gatekeeper believes whatever is predicted: its roll-outs are replaced by ones in which refusing stalls and accepting
-does not, as a lying map could make it. The UAV proposes and withdraws at will, motions long and short; the UGV follows
-well, badly or not at all.
+does not, as a lying map could make it; or ones in which accepting is worse, for proposals that ask it to make way. The
+UAV proposes and withdraws at will, motions long and short; the UGV follows well, badly or not at all.
 """
 
 from __future__ import annotations
@@ -25,6 +25,11 @@ from airground_drake.nsbc.team import Team
 
 MOST_SAMPLES = 20_000
 """Of each attack: else as many as all tries take, and a fifth more."""
+UGV, OTHER = "ugv", "other"
+FAVOURS = {"favours": OTHER, "favours to nobody": "nobody", "favours to itself": UGV}
+"""Attacks by proposals that are of no use to the UGV, and the cause that they name."""
+FORGED = ("favours to nobody", "favours to itself")
+"""Those that no UGV goes along with: there is nobody to make way for."""
 
 
 class Believing(CertifiedGatekeepers):
@@ -37,18 +42,28 @@ class Believing(CertifiedGatekeepers):
         return Outcome(follows, True, 1.0, 1.0), Outcome(follows, False, 0.0, 0.0)
 
 
+class Unmoved(Believing):
+    """Sees no use in any proposal, and nothing that speaks against a favour."""
+
+    def foresee(self, seen: Situation, i: int, proposal: Proposal) -> tuple[Outcome, Outcome]:
+        """Neither stalls, and accepting costs more."""
+        refuse, accept = super().foresee(seen, i, proposal)
+        return Outcome(refuse.positions, False, 0.0, 1.0), Outcome(accept.positions, False, 0.0, 2.0)
+
+
 def attacks(patience: Patience, period: float) -> list[dict[str, Any]]:
     """What each attack came to: `attack`, `tries`, `longest_between_rests_s`, `longest_try_s`, `reasons`."""
-    return [_attack(name, patience, period) for name in ("endless", "greedy", "random", "stuck")]
+    return [_attack(name, patience, period) for name in ("endless", "greedy", "random", "stuck", *FAVOURS)]
 
 
 def _attack(name: str, patience: Patience, period: float) -> dict[str, Any]:
     rng = np.random.default_rng(len(name))
-    team = Team(("ugv",), "uav", np.empty((0, 3)), 1.0, 1.0, 1.0, np.ones(2))
+    team = Team((UGV, OTHER), "uav", np.empty((0, 3)), 1.0, 1.0, 1.0, np.ones(3))
     preset = Motion(np.zeros(1), np.zeros((1, 3)))
     law = UgvLaw(Avoidance(1.0, period), 1.0, 1.0, intervention_on_top=False)
-    gatekeepers = Believing(team, law, [preset], Outlook(patience.longest), patience)
-    memory, proposal, place = Memory.empty(1), None, np.zeros(3)
+    kind = Unmoved if name in FAVOURS else Believing
+    gatekeepers = kind(team, law, [preset] * 2, Outlook(patience.longest), patience)
+    memory, proposal, place = Memory.empty(2), None, np.zeros(3)
     executed, worst, began, longest, tries, alone = 0.0, 0.0, 0.0, 0.0, 0, 0.0
     for k in range(min(MOST_SAMPLES, int(1.2 * patience.most * patience.longest / period))):
         t = k * period
@@ -59,7 +74,7 @@ def _attack(name: str, patience: Patience, period: float) -> dict[str, Any]:
         if before:
             executed += period
             worst = max(worst, executed)
-        memory = gatekeepers.sample(t, (proposal,), np.stack([place, place]), np.zeros((2, 3)), memory)
+        memory = gatekeepers.sample(t, (proposal, None), np.stack([place] * 3), np.zeros((3, 3)), memory)
         now = memory.answers[0] == ACCEPT
         another = now and memory.turns[0].since == t
         if before and (another or not now):
@@ -82,13 +97,14 @@ def _next(
     refused = memory.answers[0] < 0.0
     if proposal is not None and not refused:
         if name == "greedy" and t >= proposal.issued + 0.9 * patience.longest:
-            return _proposal(t, 2.0 * patience.longest, rng)
+            return _proposal(name, t, 2.0 * patience.longest, rng)
         return proposal if name != "random" or rng.random() > 0.01 else None
     if name == "random" and rng.random() < 0.7:
         return None
-    return _proposal(t, float(rng.choice([0.1, 1.0, 100.0])) * patience.longest, rng)
+    return _proposal(name, t, float(rng.choice([0.1, 1.0, 100.0])) * patience.longest, rng)
 
 
-def _proposal(t: float, lasts: float, rng: np.random.Generator) -> Proposal:
+def _proposal(name: str, t: float, lasts: float, rng: np.random.Generator) -> Proposal:
     way: Array = rng.normal(size=(3, 3)) * [5.0, 5.0, 0.0]
-    return Proposal("waste", t, Motion(t + lasts * np.array([0.0, 0.5, 1.0]), way))
+    motion = Motion(t + lasts * np.array([0.0, 0.5, 1.0]), way)
+    return Proposal("waste", t, motion, cause=FAVOURS.get(name, ""))

@@ -15,7 +15,7 @@ from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.claim import TIME_TOLERANCE_S, ModelClaim
 from airground_drake.verify.engines.prover import LIMIT_S, discharge, finding, proved_again
 from airground_drake.verify.finding import Finding
-from airground_drake.verify.model.patience.attack import attacks
+from airground_drake.verify.model.patience.attack import FORGED, attacks
 from airground_drake.verify.model.patience.relation import obligations, symbolic
 
 
@@ -26,7 +26,7 @@ class LiveWait(ModelClaim):
     summary = "No UAV can keep a UGV from its own task for ever."
     statement = (
         "Under method (d) no UAV keeps a UGV from its own task for longer than a bound, whatever it proposes, "
-        "withdraws or says of its map: after so long the UGV is on its own until it has rested."
+        "withdraws, says of its map or names as its cause: after so long the UGV is on its own until it has rested."
     )
     formula = (
         "between two rests of rest_s on its own: time executed <= tries (longest_s + h), h the period of the "
@@ -43,7 +43,9 @@ class LiveWait(ModelClaim):
         "invariant (on its own c <= n (D + h), executing c <= (n - 1) (D + h) and u <= b + D) and that it implies the "
         "bound are polynomial implications with exact certificates, z3 and cvc5 besides. Running gatekeepers that "
         "believe every prediction are attacked: endless motions, greedy replacements, random withdrawals, a UGV that "
-        "cannot move. The margin is the bound less the longest that an attack kept a UGV between two rests."
+        "cannot move. So are ones that see no use in any proposal, by favours: for another UGV, which the bound "
+        "covers; for none that there is, or for the UGV itself, which must be refused. The margin is the bound less "
+        "the longest that an attack kept a UGV between two rests."
     )
     equations = "(20)"
     assumptions = (
@@ -86,7 +88,10 @@ def judge(kind: type[Patience], inputs: dict[str, Any]) -> Finding:
     attacked = attacks(patience, h)
     worst = max(row["longest_between_rests_s"] for row in attacked)
     found = finding(discharge(obligations(symbolic(kind)), LIMIT_S), bound_s=bound, attacks=attacked)
-    broken = [row for row in attacked if row["longest_between_rests_s"] > bound + TIME_TOLERANCE_S]
+    broken = [
+        row for row in attacked
+        if row["longest_between_rests_s"] > bound + TIME_TOLERANCE_S or (row["attack"] in FORGED and row["tries"])
+    ]  # fmt: skip
     if broken and found.status == "proved":
         return replace(found, status="error", counterexample=None)  # the relation is not the running code's
     return replace(

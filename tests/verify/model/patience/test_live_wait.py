@@ -10,6 +10,7 @@ from verify.judging import Judged
 from airground_drake.gatekeeper.patience import Patience
 from airground_drake.scenarios.load import load
 from airground_drake.verify.engines.prover import discharge
+from airground_drake.verify.finding import Finding
 from airground_drake.verify.model.patience import attack, live_wait, mutants, tracking_runs
 from airground_drake.verify.model.patience.live_gate import LiveGate
 from airground_drake.verify.model.patience.live_wait import LiveWait
@@ -44,13 +45,19 @@ def test_weaker_assumptions_have_no_proof(changes: dict[str, str]) -> None:
     assert "refuted" in {proof.status for proof in discharge(failing)}
 
 
-def test_an_attack_that_gets_through_makes_the_claim_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    ("name", "longest_s"), [("endless", 1e9), ("favours to nobody", 1.0), ("favours to itself", 1.0)]
+)
+def test_an_attack_that_gets_through_makes_the_claim_an_error(
+    monkeypatch: pytest.MonkeyPatch, name: str, longest_s: float
+) -> None:
     """What runs is not what was read off: the relation would be worth nothing."""
-    row = {"attack": "endless", "tries": 9, "longest_between_rests_s": 1e9, "longest_try_s": 1.0, "reasons": []}
+    row = {"attack": name, "tries": 1, "longest_between_rests_s": longest_s, "longest_try_s": 1.0, "reasons": []}
     monkeypatch.setattr(live_wait, "attacks", lambda *_: [row])
+    monkeypatch.setattr(live_wait, "finding", lambda *_, **__: Finding("proved"))
     monkeypatch.setattr(live_wait, "discharge", lambda *_: [])
     inputs = LiveWait().inputs(load("case_b")[0])
-    assert live_wait.judge(Patience, inputs).status in ("error", "inconclusive")
+    assert live_wait.judge(Patience, inputs).status == "error"
 
 
 def test_attacks_use_all_tries_and_no_more() -> None:
@@ -58,6 +65,14 @@ def test_attacks_use_all_tries_and_no_more() -> None:
     rows: list[dict[str, Any]] = attack.attacks(patience, 0.1)
     assert {reason for row in rows for reason in row["reasons"]} >= {"over", "exhausted", "no_progress"}
     assert max(row["longest_between_rests_s"] for row in rows) == pytest.approx(4.0, abs=0.3)
+
+
+def test_only_another_ugv_of_the_team_is_made_way_for_and_not_for_longer() -> None:
+    patience = Patience(most=2, rest=1.0, longest=2.0, lag=0.5, behind=0.5)
+    rows = {row["attack"]: row for row in attack.attacks(patience, 0.1)}
+    assert rows["favours"]["reasons"] == ["exhausted", "kept", "makes_way", "over"]
+    assert rows["favours"]["longest_between_rests_s"] <= patience.most * (patience.longest + 0.1)
+    assert [rows[name]["reasons"] for name in attack.FORGED] == [["not_cheaper"]] * 2
 
 
 def test_a_run_that_is_given_back_early_is_noticed() -> None:

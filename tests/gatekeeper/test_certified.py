@@ -1,0 +1,68 @@
+"""Method (d)'s gatekeeper, sample by sample: what it remembers, when it answers, and what tips the balance."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from airground_drake.gatekeeper.certified import CertifiedGatekeepers, reason_of
+from airground_drake.gatekeeper.outcome import Outcome, Outlook
+from airground_drake.gatekeeper.patience import Patience
+from airground_drake.gatekeeper.sample import Memory, Situation
+from airground_drake.intervention.messages import ACCEPT, REFUSE
+from airground_drake.intervention.policy import Proposal
+from airground_drake.nsbc.avoidance import Avoidance
+from airground_drake.nsbc.law import UgvLaw
+from airground_drake.nsbc.motion import Motion
+from airground_drake.nsbc.team import Team
+
+ROCK = np.array([[3.0, 0.0, 0.0]])
+STAYS = Motion(np.array([0.0, 5.0]), np.array([[20.0, 0.0, 0.0], [20.0, 0.0, 0.0]]))
+
+
+def gatekeepers(*ugvs: str) -> CertifiedGatekeepers:
+    """Of UGVs that are to be at (20, 0), with a rock on the way and a sensing range of 4 m."""
+    team = Team(ugvs, "uav", ROCK, 2.0, 2.0, 1.0, np.full(len(ugvs) + 1, 3.0))
+    law = UgvLaw(Avoidance(3.0, 0.05, 4.0), 2.0, 1.5, intervention_on_top=False)
+    patience = Patience(most=2, rest=1.0, longest=5.0, lag=0.5, behind=1.0)
+    preset = Motion(np.zeros(1), np.array([[20.0, 0.0, 0.0]]))
+    return CertifiedGatekeepers(team, law, [preset] * len(ugvs), Outlook(5.0), patience)
+
+
+def sampled(gate: CertifiedGatekeepers, t: float, x: float, proposal: Proposal | None, memory: Memory) -> Memory:
+    places = np.array([[x, 0.0, 0.0], [x, 0.0, 2.0]])
+    return gate.sample(t, (proposal,), places, np.zeros((2, 3)), memory)
+
+
+@pytest.mark.parametrize(("passed", "known"), [(True, 1), (False, 0)])
+def test_an_obstacle_that_was_in_sight_is_known_when_it_is_out_of_it(passed: bool, known: int) -> None:
+    gate, proposal = gatekeepers("ugv"), Proposal("way", 0.0, STAYS)
+    memory = sampled(gate, 0.0, 0.0 if passed else 20.0, None, Memory.empty(1))
+    memory = sampled(gate, 0.05, 20.0, None, memory)
+    places = np.array([[20.0, 0.0, 0.0], [20.0, 0.0, 2.0]])
+    discs, _ = gate._known(Situation(0.1, (proposal,), places, np.zeros((2, 3)), memory), 0, proposal)
+    assert discs.tolist() == ROCK[:known].tolist()
+
+
+def test_the_first_sample_decides_and_what_makes_no_difference_is_refused() -> None:
+    """The motion keeps the UGV where it stands anyway."""
+    memory = sampled(gatekeepers("ugv"), 0.05, 20.0, Proposal("way", 0.0, STAYS), Memory.empty(1))
+    assert [decision.reason for decision in memory.decisions] == ["not_cheaper"]
+    assert memory.answers == (REFUSE, 0.0)
+
+
+def test_a_favour_is_done_unless_it_strands_the_ugv() -> None:
+    way = np.zeros((2, 3))
+    plain, stranded = Outcome(way, False, 0.0, 2.0), Outcome(way, True, 1.0, 2.0)
+    assert reason_of(plain, plain, favour=True) == "makes_way"
+    assert reason_of(plain, stranded, favour=True) == "stalls"
+    assert reason_of(plain, plain, favour=False) == "not_cheaper"
+
+
+@pytest.mark.parametrize(("cause", "answer"), [("", REFUSE), ("ugv", REFUSE), ("uav", REFUSE), ("other", ACCEPT)])
+def test_only_another_ugv_is_made_way_for(cause: str, answer: float) -> None:
+    gate = gatekeepers("ugv", "other")
+    places = np.array([[20.0, 0.0, 0.0], [0.0, 9.0, 0.0], [20.0, 0.0, 9.0]])
+    proposal = Proposal("way", 0.0, STAYS, cause=cause)
+    memory = gate.sample(0.05, (proposal, None), places, np.zeros((3, 3)), Memory.empty(2))
+    assert memory.answers[0] == answer
