@@ -16,7 +16,7 @@ from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.control_law import ON_TOP
 from airground_drake.verify.runs.control_samples import control_samples
 from airground_drake.verify.runs.gate_record import POSITION_TOLERANCE_M, GateClaim, Off, Row, conclude, cost_tolerance
-from airground_drake.verify.runs.pairs import pairs_of, places_of, slack_of
+from airground_drake.verify.runs.pairs import around, places_of, slack_of
 
 SPEED_TOLERANCE = 1e-4
 """A step may be longer than the speed limit allows by this, relative."""
@@ -175,14 +175,12 @@ def _sensed(trace: Trace, robot: str, t: float, own: Array, after: Array) -> lis
     scenario = trace.scenario
     held = min(int(np.searchsorted(trace.t, t - TIME_TOLERANCE_S)), len(trace.t) - 1)
     things = []
-    for pair in pairs_of(trace):
-        if robot in (pair.first, pair.second):
-            other = pair.second if pair.first == robot else pair.first
-            if other in trace.robots:
-                place, velocity = interpolate(trace.t, trace.position(other), t), trace.command(other)[held]
-            else:
-                place, velocity = np.array(scenario["obstacles"][other]["position_m"]), np.zeros(3)
-            things.append((other, place, velocity, pair.safe_m))
+    for other, pair in around(trace, robot):
+        if other in scenario["obstacles"]:
+            place, velocity = np.array(scenario["obstacles"][other]["position_m"]), np.zeros(3)
+        else:
+            place, velocity = interpolate(trace.t, trace.position(other), t), trace.command(other)[held]
+        things.append((other, place, velocity, pair.safe_m))
     return [
         (name, place + after[:, None] * velocity, float(distance))
         for name, place, velocity, distance in things
@@ -326,10 +324,8 @@ def compare_own_task(trace: Trace, rows: Sequence[Row]) -> Iterator[Off]:
         free = (np.abs(corners - t) > control["period_s"]).all(axis=0) & (
             trace.column(f"{ugv}.accepted")[chosen] == 0.0
         )
-        for pair in pairs_of(trace):
-            if ugv in (pair.first, pair.second):
-                other = pair.second if pair.first == ugv else pair.first
-                free &= slack_of(at[ugv] - at[other], wanted, pair, control, planar=True) > COMMAND_TOLERANCE_M_S
+        for other, pair in around(trace, ugv):
+            free &= slack_of(at[ugv] - at[other], wanted, pair, control, planar=True) > COMMAND_TOLERANCE_M_S
         away = np.where(free, np.linalg.norm(trace.command(ugv)[chosen] - wanted, axis=1), 0.0)
         k = int(np.argmax(away))
         what = "not its own task, though nothing is accepted, m/s"

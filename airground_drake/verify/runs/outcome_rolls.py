@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 from scipy.sparse.csgraph import dijkstra
 
 from airground_drake.arrays import Array
@@ -198,13 +199,37 @@ def bounds_of_way_left(place: Array, goal: Array, discs: Array, distances: Array
     squared = np.square(distances) - np.square(discs[:, 2] - place[2])
     centres, radii = discs[squared > 0.0, :2], np.sqrt(squared[squared > 0.0])
     direct = float(np.linalg.norm(goal[:2] - place[:2]))
+    legs = np.array([place[:2], goal[:2]])
+    some = _crossed(legs, centres, radii)
+    while True:  # a way round some that crosses none of the others is one round all
+        legs = _round(legs[0], legs[-1], centres[some], radii[some])
+        if not len(legs):
+            return direct, np.inf
+        more = some | _crossed(legs, centres, radii)
+        if (more == some).all():
+            return direct, float(np.linalg.norm(np.diff(legs, axis=0), axis=1).sum())
+        some = more
+
+
+def _crossed(way: Array, centres: Array, radii: Array) -> npt.NDArray[np.bool_]:
+    """Which circles (m,) a polyline (M, 2) cuts."""
+    legs = np.diff(way, axis=0)
+    away = centres - way[:-1, None]
+    along = np.clip(np.einsum("lmd,ld->lm", away, legs) / np.maximum((legs**2).sum(axis=1), 1e-300)[:, None], 0.0, 1.0)
+    nearest = np.linalg.norm(away - along[..., None] * legs[:, None], axis=2)
+    return np.asarray((nearest < radii * (1.0 - 1e-6)).any(axis=0))
+
+
+def _round(place: Array, goal: Array, centres: Array, radii: Array) -> Array:
+    """A short way round circles over points all around them, (M, 2), m; (0, 2) where there is none."""
+    ends = np.stack([place, goal])
     if not len(centres):
-        return direct, direct
+        return ends
     angle = 2.0 * np.pi * np.arange(AROUND) / AROUND
     ring = np.column_stack([np.cos(angle), np.sin(angle)]) / np.cos(np.pi / AROUND)
     rings = (centres[:, None] + radii[:, None, None] * (1.0 + 1e-9) * ring).reshape(-1, 2)
     free = (np.linalg.norm(rings[:, None] - centres, axis=2) >= radii).all(axis=1)
-    nodes = np.concatenate([place[None, :2], goal[None, :2], rings[free]])
+    nodes = np.concatenate([ends, rings[free]])
     legs = nodes[None] - nodes[:, None]
     lengths = np.linalg.norm(legs, axis=2)
     clear = np.ones(lengths.shape, dtype=bool)
@@ -212,7 +237,10 @@ def bounds_of_way_left(place: Array, goal: Array, discs: Array, distances: Array
         along = np.clip(((centre - nodes)[:, None] * legs).sum(axis=2) / np.maximum(lengths, 1e-150) ** 2, 0.0, 1.0)
         nearest = nodes[:, None] + along[..., None] * legs - centre
         clear &= np.linalg.norm(nearest, axis=2) >= radius * (1.0 - 1e-6)
-    if clear[0, 1]:
-        return direct, direct
-    found = float(dijkstra(np.where(clear, lengths, 0.0), indices=0)[1])
-    return direct, found
+    before = dijkstra(np.where(clear, lengths, 0.0), indices=0, return_predecessors=True)[1]
+    if before[1] < 0:
+        return np.empty((0, 2))
+    chain = [1]
+    while chain[-1] != 0:
+        chain.append(int(before[chain[-1]]))
+    return np.asarray(nodes[chain[::-1]])
