@@ -22,10 +22,10 @@ SIDES = ((1, 0), (-1, 0), (0, 1), (0, -1))
 Point = tuple[float, float]
 
 HEAD = """\
-name: {name}
+name: "{name}"
 title: "{ugvs} UGVs among {obstacles} obstacles"
 description: >-
-  {ugvs} UGVs cross a field with {obstacles} obstacles, straight ahead. Those that have one in their way stop in front of
+  {ugvs} UGVs cross a field with {obstacles} obstacles, straight ahead. Those that have one in their way stop before
   it; the UAV shows them the way round (run d).
 seed: {seed}
 duration_s: 20.0
@@ -51,12 +51,14 @@ intervention:
 gatekeeper: {{period_s: 0.2}}
 
 runs:
-  d: {{method: d, expected: {{SAFE-TRACE: exercised, LIVE-GOAL: holds or refuted}}}}
+  d:
+    method: d
+    expected: {{{expected}}}
 """
 
 
 def fleet(ugvs: int, obstacles: int, seed: int = 1, name: str = "fleet") -> str:
-    """A scenario file.
+    """The text of a scenario file, without a comment at its head.
 
     Args:
         ugvs: how many, at least 1.
@@ -71,9 +73,11 @@ def fleet(ugvs: int, obstacles: int, seed: int = 1, name: str = "fleet") -> str:
             break
         side += 1
     middle = [sum(target[axis] for _, target in ways) / ugvs for axis in (0, 1)]
-    head = HEAD.format(
-        name=name, ugvs=ugvs, obstacles=obstacles, seed=seed, over=", ".join(f"{x:.2f}" for x in middle)
+    tested = (
+        ("COMM", "EXEC", "THR-TRIG", "LIVE-PROG", "LIVE-GOAL") if min(ugvs // BLOCKED, obstacles) else ("LIVE-GOAL",)
     )
+    over, expected = ", ".join(f"{x:.2f}" for x in middle), ", ".join(f"{claim}: exercised" for claim in tested)
+    head = HEAD.format(name=name, ugvs=ugvs, obstacles=obstacles, seed=seed, over=over, expected=expected)
     rows = [_ugv(number, *way) for number, way in enumerate(ways, 1)]
     rows = ["", "ugvs:", *rows, "", "obstacles:" if obstacles else "obstacles: {}"]
     rows += [f"  o{number}: {{position_m: {_place(point)}}}" for number, point in enumerate(rocks, 1)]

@@ -39,7 +39,7 @@ def boxes_of(positions: Array) -> Boxes:
 
 
 def apart_at_least(boxes: Boxes, first: Indices, second: Indices) -> Array:
-    """Bounds from below of the distances of P pairs of things, given by their numbers (P,): (P,), m; may be negative."""
+    """Bounds from below of the distances of P pairs of things, given by their numbers (P,): (P,), m."""
     found = np.empty(len(first))
     for some in np.array_split(np.arange(len(first)), len(first) * boxes.low.shape[1] // AT_ONCE + 1):
         one, other = first[some], second[some]

@@ -73,7 +73,7 @@ def _all_foreseen(trace: Trace, sent: Sequence[Sent]) -> dict[Key, tuple[Foresee
     rows = trace.decisions[trace.decisions["accept_stalls"] >= 0.0]
     columns = (rows[name].tolist() for name in ("robot", "t_s", "issued_s"))
     keys = [(str(robot), float(t), float(issued)) for robot, t, issued in zip(*columns, strict=True)]
-    found = {}
+    found = dict[Key, tuple[Foreseen, Foreseen]]()
     for some in (keys[k : k + AT_ONCE] for k in range(0, len(keys), AT_ONCE)):
         begun = [_beginning(trace, *key, sent) for key in some]
         found |= dict(zip(some, _rolled_out(trace, begun), strict=True))
@@ -285,10 +285,15 @@ def asked_of(trace: Trace, ugv: str, t: float, sent: Sequence[Sent]) -> tuple[Se
 
 def _answers_of(trace: Trace) -> dict[str, tuple[Array, Array, Any]]:
     """Of each UGV with decisions: their times, those of the proposals, s, and the answers, (D,) each."""
-    return trace.derived("answers", lambda: {
-        str(ugv): tuple(rows[name].to_numpy() for name in ("t_s", "issued_s", "decision"))
-        for ugv, rows in trace.decisions.groupby("robot", sort=False)
-    })  # fmt: skip
+
+    def found() -> dict[str, tuple[Array, Array, Any]]:
+        by_ugv = trace.decisions.groupby("robot", sort=False)
+        columns = {
+            str(ugv): [rows[name].to_numpy() for name in ("t_s", "issued_s", "decision")] for ugv, rows in by_ugv
+        }
+        return {ugv: (when, on, answers) for ugv, (when, on, answers) in columns.items()}
+
+    return trace.derived("answers", found)
 
 
 def bounds_of_way_left(place: Array, goal: Array, discs: Array, distances: Array | float) -> tuple[float, float]:

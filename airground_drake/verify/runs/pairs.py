@@ -117,7 +117,6 @@ def speed_limits(trace: Trace) -> dict[str, float]:
 def places_of(trace: Trace) -> dict[str, Array]:
     """Positions by name, m: (T, 3) of a robot, (3,) of an obstacle, whether the UAV knows it or not."""
 
-
     def found() -> dict[str, Array]:
         obstacles = trace.scenario["obstacles"]
         at_rest = {name: np.asarray(o["position_m"], dtype=np.float64) for name, o in obstacles.items()}
