@@ -62,8 +62,10 @@ class StlFormula:
 FORMULAS = (
     StlFormula(
         "SAFE-TRACE", "distances", "always (margin_m >= 0)",
-        {"margin_m": "least of distance - safe distance over all pairs, but for those that keep farther apart than others, at "
-            "rows and closest approaches between them"},
+        {
+            "margin_m": "least of distance - safe distance over all pairs, but for those that keep far apart, at rows and "
+            "closest approaches between them"
+        },
         "m", stl_signals.clearance, tolerance=DISTANCE_TOLERANCE_M, compares=("margin",),
     ),
     StlFormula(

@@ -54,7 +54,7 @@ def _pairs(trace: Trace) -> Iterator[tuple[str, str, Array, float, float]]:
     bodies = [*trace.scenario["ugvs"].values(), trace.scenario["uav"], *rocks.values()]
     radius = np.array([body["radius_m"] for body in bodies])
     kind = np.array([safe["ugv_m"]] * (count - 1) + [safe["air_ground_m"]] + [safe["obstacle_m"]] * len(rocks))
-    start, middle = (np.array([each(thing) for thing in things]) for each in (lambda a: a[0], lambda a: a.mean(axis=0)))
+    start, middle = np.array([thing[0] for thing in things]), np.array([thing.mean(axis=0) for thing in things])
     ball = np.array([np.linalg.norm(a - m, axis=1).max() for a, m in zip(things, middle, strict=True)])
     one, other = np.triu_indices(count, 1, len(things))
     apart = kind[other] + (radius[one] + radius[other])

@@ -1,8 +1,9 @@
 """Where a team's inequalities bind, and hostile inputs that put them to the test.
 
 Every robot is put beside every obstacle (of many: beside some) and every other robot, inside and outside of the safe
-distance, near enough for the inequality to bind; then robots crowd around one obstacle. Presets, proposals and the UGVs' velocities that the UAV
-feeds forward drive every robot to what it must avoid. What each may want by them is written here in plain numpy.
+distance, near enough for the inequality to bind; then robots crowd around one obstacle. Presets,
+proposals and the UGVs' velocities that the UAV feeds forward drive every robot to what it must avoid. What each may
+want by them is written here in plain numpy.
 """
 
 from __future__ import annotations
