@@ -63,8 +63,8 @@ FORMULAS = (
     StlFormula(
         "SAFE-TRACE", "distances", "always (margin_m >= 0)",
         {
-            "margin_m": "least of distance - safe distance over all pairs, but for those that keep far apart, at rows and "
-            "closest approaches between them"
+            "margin_m": "least of distance - safe distance over all pairs, but for those that keep far apart, at rows "
+            "and closest approaches between them"
         },
         "m", stl_signals.clearance, tolerance=DISTANCE_TOLERANCE_M, compares=("margin",),
     ),
