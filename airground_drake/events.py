@@ -17,7 +17,7 @@ def extract(trace: Trace, sent: Iterable[tuple[str, float, str]]) -> list[dict[s
         trace: the run.
         sent: proposals as (robot, time of issue in s, policy).
     """
-    t = trace.t
+    t, order = trace.t, {robot: k for k, robot in enumerate(trace.robots)}
     found: list[dict[str, Any]] = []
 
     def add(time_s: float, robot: str, kind: str, **more: Any) -> None:
@@ -40,7 +40,7 @@ def extract(trace: Trace, sent: Iterable[tuple[str, float, str]]) -> list[dict[s
     for robot in trace.robots:
         _add_arrival(trace, robot, add)
         _add_collisions(trace, robot, add)
-    return sorted(found, key=lambda event: (event["t_s"], trace.robots.index(event["robot"])))
+    return sorted(found, key=lambda event: (event["t_s"], order[event["robot"]]))
 
 
 def _add_arrival(trace: Trace, robot: str, add: Any) -> None:
@@ -56,10 +56,13 @@ def _add_arrival(trace: Trace, robot: str, add: Any) -> None:
 
 def _add_collisions(trace: Trace, robot: str, add: Any) -> None:
     """The first row of each visit within collision distance of an obstacle, from surface to surface."""
-    scenario = trace.scenario
+    scenario, position = trace.scenario, trace.position(robot)
     own = scenario["ugvs"].get(robot, scenario["uav"])["radius_m"]
-    for name, obstacle in scenario["obstacles"].items():
-        distance = np.linalg.norm(trace.position(robot) - np.array(obstacle["position_m"]), axis=1)
-        hit = distance < scenario["safe_distance"]["collision_m"] + (own + obstacle["radius_m"])
-        for k in np.flatnonzero(hit & ~np.append(False, hit[:-1])):
-            add(trace.t[k], robot, "collision", obstacle=name)
+    names, bodies = list(scenario["obstacles"]), scenario["obstacles"].values()
+    places = np.array([body["position_m"] for body in bodies], dtype=np.float64).reshape(-1, 3)
+    within = [scenario["safe_distance"]["collision_m"] + (own + obstacle["radius_m"]) for obstacle in bodies]
+    beside = np.maximum(np.maximum(position.min(axis=0) - places, places - position.max(axis=0)), 0.0)
+    for k in np.flatnonzero(np.linalg.norm(beside, axis=1) <= within):  # of the box around all its rows
+        hit = np.linalg.norm(position - places[k], axis=1) < within[k]
+        for row in np.flatnonzero(hit & ~np.append(False, hit[:-1])):
+            add(trace.t[row], robot, "collision", obstacle=names[k])

@@ -34,7 +34,7 @@ import numpy as np
 import pandas as pd
 
 from airground_drake import files
-from airground_drake.arrays import Array
+from airground_drake.arrays import Array, read_only
 from airground_drake.errors import TraceError
 
 T = TypeVar("T")
@@ -182,8 +182,11 @@ class Trace:
         return found
 
     def vector(self, robot: str, stem: str = "", unit: str = "m") -> Array:
-        """Three columns as (T, 3): positions by default; stem 'v' and unit 'm_s' for commands, 'ref_' for presets."""
-        return np.column_stack([self.column(f"{robot}.{stem}{axis}_{unit}") for axis in "xyz"])
+        """Three columns as (T, 3), read-only: positions by default; stem 'v' and unit 'm_s' for commands, 'ref_'."""
+        columns = (f"{robot}.{stem}{axis}_{unit}" for axis in "xyz")
+        return self.derived(
+            ("vector", robot, stem, unit), lambda: read_only(np.column_stack([self.column(name) for name in columns]))
+        )
 
     def position(self, robot: str) -> Array:
         """Positions, (T, 3), m, world frame."""

@@ -238,7 +238,8 @@ def _wiring(recorded: Json, scenario: Json) -> None:
     uav = scenario["uav"]["name"]
     counts = Counter(
         "obstacle" if view.share == 1.0 else "uav_ugv" if uav in (view.robot, view.other) else "ugv_ugv"
-        for view in views_of(scenario)
+        for views in views_of(scenario).values()
+        for view in views
     )
     same("robots and what they avoid", recorded["views"], dict(counts))
     for kind in counts:

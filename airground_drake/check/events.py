@@ -101,8 +101,10 @@ def _collisions(run: Run) -> Iterator[Event]:
     """The first row of each visit within collision distance of an obstacle, from surface to surface."""
     for robot, body in run.robots.items():
         for obstacle, other in run.scenario["obstacles"].items():
-            distance = np.linalg.norm(run.position_m[robot] - run.position_m[obstacle], axis=1)
-            hit = distance < apart_m(run.scenario, "collision_m", body, other)
+            within = apart_m(run.scenario, "collision_m", body, other)
+            if run.apart_m[robot, obstacle] >= within:
+                continue
+            hit = np.linalg.norm(run.position_m[robot] - run.position_m[obstacle], axis=1) < within
             begins = hit & ~np.append(False, hit[:-1])
             yield from (Event(float(when), robot, "collision") for when in run.t_s[begins])
 

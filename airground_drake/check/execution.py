@@ -70,7 +70,7 @@ def execution(run: Run, claim: Json) -> Found:
 
 def around(run: Run, robot: str) -> Inequalities:
     """The avoidance inequalities of a robot at the control samples."""
-    views = [pair for pair in run.views if pair.robot == robot]
+    views = run.near_views[robot]
     here = run.position_m[robot][run.sample_row]
     offsets = [here - run.position_m[pair.other][run.sample_row] for pair in views]
     return inequalities(

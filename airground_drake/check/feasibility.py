@@ -148,12 +148,11 @@ def _sensed(run: Run, decision: Decision) -> Iterator[tuple[Pair, Array]]:
     """What is within sensing range, and where it will be at the ends of the stages, (N, 3), m."""
     here, after = run.place_m(decision.ugv, decision.t_s), _stage_ends_s(run)[:, None]
     held = min(int(np.searchsorted(run.t_s, decision.t_s - SMALL)), len(run.t_s) - 1)
-    for pair in run.views:
-        if pair.robot == decision.ugv:
-            there = run.place_m(pair.other, decision.t_s)
-            if np.linalg.norm(there - here) <= run.scenario["control"]["sensing_range_m"]:
-                velocity = run.command_m_s[pair.other][held] if pair.other in run.robots else np.zeros(3)
-                yield pair, there + after * velocity
+    for pair in run.near_views[decision.ugv]:
+        there = run.place_m(pair.other, decision.t_s)
+        if np.linalg.norm(there - here) <= run.scenario["control"]["sensing_range_m"]:
+            velocity = run.command_m_s[pair.other][held] if pair.other in run.robots else np.zeros(3)
+            yield pair, there + after * velocity
 
 
 def _out_of_reach(run: Run, decision: Decision, pair: Pair, path_m: Array) -> None:

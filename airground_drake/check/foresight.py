@@ -98,7 +98,7 @@ def foreseen(run: Run, ugv: str, t_s: float, issued_s: float) -> tuple[Foreseen,
     discs, distances = _known_m(run, ugv, t_s, asked)
     fixed, over = np.tile(discs, (len(after), 1, 1)), [until, arrives, float(t_s + gate["horizon_s"])]
     ways: tuple[list[Array], list[Array]] = ([fixed], [fixed])  # if it is refused, if it is accepted
-    views = [pair for pair in run.views if pair.robot == ugv and pair.other in run.robots]
+    views = [pair for pair in run.views[ugv] if pair.other in run.robots]
     for pair in views:
         refused, accepted, way_over = _way_of(run, pair.other, t_s, after)
         ways[0].append(refused[:, None])
@@ -214,16 +214,35 @@ def _way_left(found: Foreseen, left_m: float, choice: str, about: dict[str, Any]
 
 
 def _way_around_m(start: Array, goal: Array, discs_m: Array, safe_m: Array) -> float:
-    """Length of a way outside the safe circles, infinite if none is found: Dijkstra over points around them."""
+    """Length of a way outside the safe circles, infinite if none is found.
+
+    Found round the circles that are in the way, and then round those besides that the way so far runs into.
+    """
     squared = safe_m**2 - (discs_m[:, 2] - start[2]) ** 2
     centres, radii = discs_m[squared > 0.0, :2], np.sqrt(squared[squared > 0.0])
+    taken, way = np.full(len(radii), False), np.stack([start[:2], goal[:2]])
+    while len(way):
+        legs = np.diff(way, axis=0)
+        share = ((centres[:, None] - way[:-1]) * legs).sum(axis=2) / np.maximum((legs**2).sum(axis=1), 1e-150)
+        nearest = way[:-1] + np.clip(share, 0.0, 1.0)[..., None] * legs - centres[:, None]
+        hit = (np.linalg.norm(nearest, axis=2) < radii[:, None] * (1.0 - 1e-6)).any(axis=1)
+        if not (hit & ~taken).any():
+            return float(np.linalg.norm(legs, axis=1).sum())
+        taken |= hit
+        way = _way_around(way[0], way[-1], centres[taken], radii[taken])
+    return np.inf
+
+
+def _way_around(start: Array, goal: Array, centres: Array, radii: Array) -> Array:
+    """A way (M, 2) outside the circles, (0, 2) if none is found: Dijkstra over points around them."""
     angle = 2.0 * np.pi * np.arange(AROUND) / AROUND
     ring = np.stack([np.cos(angle), np.sin(angle)], axis=1) / np.cos(np.pi / AROUND) * (1.0 + SMALL)
     around = (centres[:, None] + radii[:, None, None] * ring).reshape(-1, 2)
     outside = (np.linalg.norm(around[:, None] - centres, axis=2) >= radii).all(axis=1)
-    nodes = np.concatenate([start[None, :2], goal[None, :2], around[outside]])
+    nodes = np.concatenate([start[None], goal[None], around[outside]])
     length = np.full(len(nodes), np.inf)
     length[0] = 0.0
+    before = np.zeros(len(nodes), dtype=np.intp)
     left = np.full(len(nodes), True)
     while left.any():
         here = int(np.where(left, length, np.inf).argmin())
@@ -235,5 +254,11 @@ def _way_around_m(start: Array, goal: Array, discs_m: Array, safe_m: Array) -> f
         share = np.clip(((centres - nodes[here]) @ legs.T) / np.maximum(reach, 1e-150) ** 2, 0.0, 1.0)
         nearest = nodes[here] + share[..., None] * legs - centres[:, None]
         clear = (np.linalg.norm(nearest, axis=2) >= radii[:, None] * (1.0 - 1e-6)).all(axis=0)
-        length = np.where(clear, np.minimum(length, length[here] + reach), length)
-    return float(length[1])
+        shorter = clear & (length[here] + reach < length)
+        length, before = np.where(shorter, length[here] + reach, length), np.where(shorter, here, before)
+    if not np.isfinite(length[1]):
+        return np.empty((0, 2))
+    chain = [1]
+    while chain[-1] != 0:
+        chain.append(int(before[chain[-1]]))
+    return np.asarray(nodes[chain[::-1]])

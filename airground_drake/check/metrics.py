@@ -12,6 +12,9 @@ from .run import Run
 from .safety import least_distance_m
 from .scenario import Pair
 
+MOST_OBSTACLES = 20
+"""Whose distances from a robot are in the metrics at most: those of least margin."""
+
 
 def check_metrics(run: Run, metrics: Json) -> str:
     """Apply the rules about metrics.
@@ -23,14 +26,22 @@ def check_metrics(run: Run, metrics: Json) -> str:
         Disagreement: if a rule is broken.
     """
     for robot in run.robots:
-        views = {pair.other: pair for pair in run.views if pair.robot == robot}
-        obstacles = [other for other, pair in views.items() if pair.share == 1.0]
-        same("obstacles in the metrics", sorted(metrics["min_distance_m"][robot]), sorted(obstacles), about=robot)
-        for other in obstacles:
-            _least_distance(run, views[other], metrics["min_distance_m"][robot][other])
-        for other, recorded in metrics["min_robot_distance_m"][robot].items():
-            _least_distance(run, views[other], recorded)
-            _least_margin_of_robots(run, views, other)
+        views = {pair.other: pair for pair in run.views[robot]}
+        obstacles = {other for other, pair in views.items() if pair.share == 1.0}
+        recorded = metrics["min_distance_m"][robot]
+        same("obstacles in the metrics", sorted({*recorded} - obstacles), [], about=robot)
+        same("obstacles in the metrics", len(recorded), min(len(obstacles), MOST_OBSTACLES), about=robot)
+        for other in recorded:
+            _least_distance(run, views[other], recorded[other])
+        largest = max((margin_m(run, views[other]) for other in recorded), default=np.inf)
+        for other in obstacles - {*recorded}:
+            _is_no_nearer(run, views[other], largest, "an obstacle that is not in the metrics is farther")
+        nearest = metrics["min_robot_distance_m"][robot]
+        same("robots in the metrics", len(nearest), min(len(views) - len(obstacles), 1), about=robot)
+        for other, entry in nearest.items():
+            _least_distance(run, views[other], entry)
+            for mate in {*views} - obstacles:
+                _is_no_nearer(run, views[mate], margin_m(run, views[other]), "robot of least margin")
     _ends_and_counts(run, metrics)
     if len(run.decisions):
         _gatekeeper(run, metrics["gatekeeper"])
@@ -45,10 +56,14 @@ def _least_distance(run: Run, pair: Pair, recorded: Json) -> None:
     same("safe distance", recorded["safe_distance_m"], pair.safe_m, about=about)
 
 
-def _least_margin_of_robots(run: Run, views: dict[str, Pair], nearest: str) -> None:
-    margins = {other: least_distance_m(run, pair) - pair.safe_m for other, pair in views.items() if pair.share < 1.0}
-    about = f"{views[nearest].robot}, {nearest}"
-    at_most("robot of least margin", margins[nearest], min(margins.values()), within=SMALL, about=about)
+def margin_m(run: Run, pair: Pair) -> float:
+    """What a pair keeps apart beyond its safe distance."""
+    return least_distance_m(run, pair) - pair.safe_m
+
+
+def _is_no_nearer(run: Run, pair: Pair, than_m: float, rule: str) -> None:
+    if run.apart_m[pair.robot, pair.other] - pair.safe_m < than_m:
+        at_most(rule, than_m, margin_m(run, pair), within=SMALL, about=f"{pair.robot}, {pair.other}")
 
 
 def _ends_and_counts(run: Run, metrics: Json) -> None:

@@ -78,7 +78,7 @@ def _loop(run: Run, decision: Decision) -> tuple[Array, ...]:
     holds("a decision is on a proposal that was sent", len(on) == 1, decision.row["issued_s"], "one of them", **about)
     periods = round(run.scenario["gatekeeper"]["horizon_s"] / control["period_s"])
     instants = t + control["period_s"] * np.arange(periods + 1.0)
-    here, views = run.place_m(ugv, t), [pair for pair in run.views if pair.robot == ugv]
+    here, views = run.place_m(ugv, t), run.views[ugv]
     points = np.array([run.place_m(pair.other, t) for pair in views]).reshape(-1, 3)
     held = min(int(np.searchsorted(run.t_s, t - SMALL)), len(run.t_s) - 1)
     still = np.zeros((len(run.t_s), 3))

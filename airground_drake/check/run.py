@@ -13,6 +13,7 @@ import numpy.typing as npt
 import pandas as pd
 
 from .files import Json, canonical, parse_json, parse_table, read_bytes, sha256
+from .nearness import least_apart_m
 from .rules import SMALL, Array, Flags, NotEstablished, close, holds, same
 from .scenario import Levels, Pair, Preset, levels_of, pairs_of, preset_of, robots_of, views_of
 
@@ -77,9 +78,25 @@ class Run:
         return pairs_of(self.scenario)
 
     @cached_property
-    def views(self) -> list[Pair]:
-        """The same, as each robot sees it."""
+    def apart_m(self) -> dict[tuple[str, str], float]:
+        """What each pair keeps apart at least, by both names in either order."""
+        least = least_apart_m(self.position_m, self.pairs).tolist()
+        found = {(pair.robot, pair.other): apart for pair, apart in zip(self.pairs, least, strict=True)}
+        return found | {(other, robot): apart for (robot, other), apart in found.items()}
+
+    @cached_property
+    def views(self) -> dict[str, list[Pair]]:
+        """The pairs as each robot sees them."""
         return views_of(self.scenario)
+
+    @cached_property
+    def near_views(self) -> dict[str, list[Pair]]:
+        """Those of them that may come within sensing range: no other has an inequality."""
+        reach = self.scenario["control"]["sensing_range_m"]
+        return {
+            robot: [pair for pair in views if self.apart_m[robot, pair.other] <= reach]
+            for robot, views in self.views.items()
+        }
 
     @cached_property
     def presets(self) -> dict[str, Preset]:

@@ -101,15 +101,14 @@ def apart_m(scenario: Json, kind: str, one: Json, other: Json) -> float:
     return float(scenario["safe_distance"][kind]) + (float(one["radius_m"]) + float(other["radius_m"]))
 
 
-def views_of(scenario: Json) -> list[Pair]:
+def views_of(scenario: Json) -> dict[str, list[Pair]]:
     """The pairs as each robot sees them: obstacles, then the other robots, UGVs first, as recursion (5) lists them."""
-    pairs = pairs_of(scenario)
-    return [
-        pair if pair.robot == robot else pair.turned()
-        for robot in robots_of(scenario)
-        for pair in pairs
-        if robot in (pair.robot, pair.other)
-    ]
+    found: dict[str, list[Pair]] = {robot: [] for robot in robots_of(scenario)}
+    for pair in pairs_of(scenario):
+        found[pair.robot].append(pair)
+        if pair.other in found:
+            found[pair.other].append(pair.turned())
+    return found
 
 
 def preset_of(scenario: Json, ugv: str) -> Preset:

@@ -1,4 +1,4 @@
-"""`airground init FILE`: write a small scenario to start from."""
+"""`airground init FILE`: write a small scenario to start from, or one of a fleet."""
 
 from __future__ import annotations
 
@@ -9,10 +9,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from airground_drake import files
+from airground_drake.scenarios.fleet import fleet
 from airground_drake.scenarios.shipped import json_schema_file, shipped_files
 from airground_drake.usage import Parser
 
 EXIT_USAGE = 2
+MOST = 2000
 MODEL = "minimal"
 """The shipped scenario that is copied."""
 
@@ -23,7 +25,19 @@ def parser() -> argparse.ArgumentParser:
         prog="airground init", description="Write a small scenario that runs: a UGV, an obstacle in its way, a UAV."
     )
     parser.add_argument("file", type=Path, nargs="?", default=Path("scenario.yaml"), help="default: %(default)s")
+    parser.add_argument(
+        "--fleet", type=_count, metavar="N", help="so many UGVs that cross a field of obstacles instead"
+    )
+    parser.add_argument("--obstacles", type=_count, metavar="M", help="of the field (default: five for each UGV)")
+    parser.add_argument("--seed", type=int, default=1, help="from which the field is drawn (default: %(default)s)")
     return parser
+
+
+def _count(text: str) -> int:
+    count = int(text)
+    if not 1 <= count <= MOST:
+        raise argparse.ArgumentTypeError(f"{count} is not from 1 to {MOST}")
+    return count
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -32,16 +46,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         Exit code: 0, or 2 if the file exists or cannot be written.
     """
-    path: Path = parser().parse_args(arguments).file
+    options = parser().parse_args(arguments)
+    path: Path = options.file
     if path.exists():
         print(f"error: {path} exists; name a file that does not", file=sys.stderr)
         return EXIT_USAGE
-    text = shipped_files()[MODEL].read_text(encoding="utf-8")
     name = re.sub(r"^[\W\d_]+|[\W_]+$", "", re.sub(r"\W+", "_", path.stem, flags=re.ASCII)) or MODEL
-    text = text[text.index("name:") :]  # what stands before is so of the shipped file only
+    if options.fleet is None:
+        text = shipped_files()[MODEL].read_text(encoding="utf-8")
+        # what stands before the name is so of the shipped file only
+        text = text[text.index("name:") :].replace(f"name: {MODEL}", f'name: "{name}"', 1)
+    else:
+        text = fleet(options.fleet, options.obstacles or 5 * options.fleet, options.seed, name)
     schema = f"# yaml-language-server: $schema={json_schema_file()}\n"
     try:
-        files.write_text(path, schema + text.replace(f"name: {MODEL}", f'name: "{name}"', 1))
+        files.write_text(path, schema + text)
     except OSError as error:
         print(f"error: {path} cannot be written: {error.strerror or error}", file=sys.stderr)
         return EXIT_USAGE

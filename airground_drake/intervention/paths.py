@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
+from scipy.spatial import cKDTree
 
 Array = NDArray[np.float64]
 Points = NDArray[np.complex128]
@@ -31,6 +32,13 @@ to TOL is ignored. A tenth of it absorbs rounding: a leg may dip TOL / 10 into a
 of another by no more is dropped, a piece that short is left out of the path. Meant for coordinates and radii
 up to about 1e4 m, where double rounding (2e-12 m) stays well below."""
 _EPS = TOL / 10
+
+
+FEW = 64
+"""Discs that are all taken into account at once; of more, those that a path runs into."""
+
+AT_ONCE = 1_000_000
+"""Pairs of a segment and a disc that are looked at together, lest they take up the memory."""
 
 
 class NoPath(ValueError):  # noqa: N818
@@ -125,10 +133,10 @@ def shortest_path(start: ArrayLike, goal: ArrayLike, centres: ArrayLike, radii: 
     free = _escape(p, c, r) if (abs(c - p) < r - TOL).any() else p
     for point in (free, q):  # up to TOL inside a circle: shrink the disc to put the point on the circle
         r = np.minimum(r, abs(c - point))
-    route = _route(free, q, c, r)
+    route = _route_among(free, q, c, r)
     if route is None:
         beyond = p + 1.0 + np.max(abs(c - p) + r)
-        shut = [n for n, z in (("start", free), ("goal", q)) if _route(z, beyond, c, r) is None]
+        shut = [n for n, z in (("start", free), ("goal", q)) if _route_among(z, beyond, c, r) is None]
         raise NoPath(f"no way from start {_show(p)} to goal {_show(q)}: discs enclose {' and '.join(shut)}")
     leg = np.array([free - p])
     pieces = np.concatenate((_rows(np.array([p]), leg, np.zeros(1), abs(leg)), route))
@@ -154,14 +162,30 @@ def _show(z: complex) -> str:
 def _outermost(c: Points, r: Array) -> tuple[Points, Array]:
     """Drop the discs that are inside another one; of equal discs keep the first."""
     c, r = c[r > TOL], r[r > TOL]
-    within = abs(c[:, None] - c) + r[:, None] <= r + _EPS
-    keep = ~(within & (~within.T | np.tri(len(r), k=-1, dtype=bool))).any(axis=1)
+    if not len(r):
+        return c, r
+    near = cKDTree(np.column_stack([c.real, c.imag])).query_pairs(np.ptp(r) + TOL, output_type="ndarray")
+    i, j = np.concatenate([near, near[:, ::-1]]).T
+    apart = abs(c[i] - c[j])
+    within, around = apart + r[i] <= r[j] + _EPS, apart + r[j] <= r[i] + _EPS
+    keep = np.ones(len(r), dtype=bool)
+    keep[i[within & (~around | (j < i))]] = False
     return c[keep], r[keep]
 
 
 def _clear(points: Points, c: Points, r: Array) -> NDArray[np.bool_]:
     """Tell which points, shape (n, 1) or one per disc (n, m), are outside all discs; shape (n,)."""
     return np.asarray((abs(points - c) >= r - _EPS).all(axis=1))
+
+
+def _passable(a: Points, b: Points, c: Points, r: Array) -> NDArray[np.bool_]:
+    """Tell which segments, from (n,) to (n,), no disc blocks; shape (n,)."""
+    u = (b - a) / np.maximum(abs(b - a), 1e-300)
+    free = np.ones(len(a), dtype=bool)
+    for some in np.array_split(np.arange(len(a)), len(a) * len(r) // AT_ONCE + 1):
+        along = np.clip(((c - a[some, None]) * u[some, None].conj()).real, 0.0, abs(b - a)[some, None])
+        free[some] = _clear(a[some, None] + along * u[some, None], c, r)
+    return free
 
 
 def _crossings(c: Points, r: Array) -> tuple[Points, NDArray[np.intp]]:
@@ -178,6 +202,17 @@ def _crossings(c: Points, r: Array) -> tuple[Points, NDArray[np.intp]]:
 
 def _escape(p: complex, c: Points, r: Array) -> complex:
     """Return the nearest point to p, which is inside a disc, of the boundary of the union of the discs."""
+    reach = 2.0 * float(r.max())
+    while True:  # as far as it reaches, the discs that do, too, are the union
+        near = abs(c - p) - r <= reach
+        found = _exit(p, c[near], r[near])
+        if abs(found - p) <= reach or near.all():
+            return found
+        reach *= 2.0
+
+
+def _exit(p: complex, c: Points, r: Array) -> complex:
+    """Return what `_escape` does, with all crossings of the circles."""
     e = np.where(abs(p - c) > _EPS, p - c, 1.0)  # along +x from a centre
     candidates = np.concatenate(((c + r / abs(e) * e)[abs(p - c) < r], _crossings(c, r)[0]))
     return complex(min(candidates[_clear(candidates[:, None], c, r)], key=lambda z: float(abs(z - p))))
@@ -202,14 +237,40 @@ def _rows(begin: Points, heading: Points, curvature: Array, length: Array) -> Ar
     return np.stack((begin.real, begin.imag, unit.real, unit.imag, curvature, length), axis=1)
 
 
+def _route_among(p: complex, q: complex, c: Points, r: Array) -> Array | None:
+    """As `_route`, also among many discs: a shortest path among some that runs into none of the others is shortest."""
+    if len(r) <= FEW:
+        return _route(p, q, c, r)
+    some = _entered(_rows(np.array([p]), np.array([q - p]), np.zeros(1), np.array([abs(q - p)])), c, r)
+    while True:
+        route = _route(p, q, c[some], r[some])
+        more = some if route is None else some | _entered(route, c, r)
+        if (more == some).all():
+            return route
+        some = more
+
+
+def _entered(pieces: Array, c: Points, r: Array) -> NDArray[np.bool_]:
+    """Tell which discs pieces of a path (see ``Path``) run into; shape (m,)."""
+    x, y, tx, ty, curvature, length = pieces.T[:, :, None]
+    begin, heading, bent = x + 1j * y, tx + 1j * ty, curvature != 0.0
+    along = np.clip(((c - begin) * heading.conj()).real, 0.0, length)
+    hub = begin + np.where(bent, 1j * heading / np.where(bent, curvature, 1.0), 0.0)
+    turned = np.angle((c - hub) / np.where(bent, begin - hub, 1.0)) * np.sign(curvature) % (2.0 * np.pi)
+    sweep = length * abs(curvature)
+    # the point of an arc that is nearest to a centre is in its direction or, beyond the ends, the nearer end
+    turn = np.where(turned <= sweep, turned, np.where(turned - sweep < 2.0 * np.pi - turned, sweep, 0.0))
+    on_arc = hub + (begin - hub) * np.exp(1j * np.sign(curvature) * turn)
+    nearest = np.where(bent, on_arc, begin + along * heading)
+    return np.asarray((abs(nearest - c) < r - _EPS).any(axis=0))
+
+
 def _route(p: complex, q: complex, c: Points, r: Array) -> Array | None:
     """Return the pieces (see ``Path``) of the shortest path between free points; None if there is none."""
     if abs(q - p) <= _EPS:
         return np.empty((0, 6))
     a, b, on = _tangents(np.concatenate(([p, q], c)), np.concatenate(([0.0, 0.0], r)))
-    u = (b - a) / np.maximum(abs(b - a), 1e-300)
-    nearest = np.clip(((c - a[:, None]) * u.conj()[:, None]).real, 0.0, abs(b - a)[:, None])
-    free = _clear(a[:, None] + nearest * u[:, None], c, r)
+    free = _passable(a, b, c, r)
     a, b, on = a[free], b[free], on[:, free] - 2  # on -2, -1: start and goal, which are the nodes 0 and 1
     cross, pair = _crossings(c, r)
     at = np.concatenate(([p, q], a, b, cross))

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Sequence
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from airground_drake.arrays import Array
 from airground_drake.trace import Trace
-from airground_drake.verify.engines.segments import closest_approach
+from airground_drake.verify.engines.segments import Approach, closest_approach
+from airground_drake.verify.runs.pairs import apart_of, least_of, pairs_of
+
+MOST_OBSTACLES = 20
+"""Of which the distances of a robot are in the metrics at most."""
 
 
 class Closest(NamedTuple):
@@ -25,7 +30,8 @@ def of_run(trace: Trace) -> dict[str, Any]:
     """Metrics of one run.
 
     Returns:
-        `min_distance_m` (robot -> obstacle -> value, t_s, safe_distance_m; exact in continuous time) and
+        `min_distance_m` (robot -> obstacle -> value, t_s, safe_distance_m; exact in continuous time; of many obstacles
+        those of least margin) and
         `min_robot_distance_m` (the same, for the other robot of least margin only), `final_position_m`,
         `duration_s`, `wall_s` and `realtime_factor` (None if not measured), `event_counts` (robot -> kind ->
         count), `gatekeeper` (see `gatekeeper`).
@@ -34,8 +40,11 @@ def of_run(trace: Trace) -> dict[str, Any]:
     duration_s = float(trace.t[-1] - trace.t[0])
     counts = {robot: Counter(e["kind"] for e in trace.events if e["robot"] == robot) for robot in trace.robots}
     return {
-        "min_distance_m": {robot: _distances(trace, robot, trace.scenario["obstacles"]) for robot in trace.robots},
-        "min_robot_distance_m": _tightest_pairs(trace),
+        "min_distance_m": {robot: _to_obstacles(trace, robot) for robot in trace.robots},
+        "min_robot_distance_m": {
+            robot: _distances(trace, robot, [other for other in trace.robots if other != robot], 1)
+            for robot in trace.robots
+        },
         "final_position_m": {robot: trace.position(robot)[-1].tolist() for robot in trace.robots},
         "duration_s": duration_s,
         "wall_s": wall_s,
@@ -104,7 +113,7 @@ def _closest_call(trace: Trace) -> dict[str, Any] | None:
 
 def closest_obstacle(trace: Trace, robot: str) -> Closest | None:
     """Smallest distance of a robot to any obstacle over continuous time, exact; None without obstacles."""
-    found = _distances(trace, robot, trace.scenario["obstacles"])
+    found = _to_obstacles(trace, robot)
     closest = (Closest(at["value"] - radii_m(trace, robot, name), at["t_s"], name) for name, at in found.items())
     return min(closest, default=None)
 
@@ -127,7 +136,7 @@ def safe_distance_m(trace: Trace, robot: str, other: str) -> float:
     if other in trace.scenario["obstacles"]:
         kind = "obstacle_m"
     else:
-        kind = "ugv_m" if {robot, other} <= set(trace.ugvs) else "air_ground_m"
+        kind = "air_ground_m" if trace.scenario["uav"]["name"] in (robot, other) else "ugv_m"
     return float(trace.scenario["safe_distance"][kind]) + radii_m(trace, robot, other)
 
 
@@ -139,7 +148,11 @@ def radii_m(trace: Trace, one: str, other: str) -> float:
 def radius_m(trace: Trace, name: str) -> float:
     """Radius of a robot or an obstacle, m."""
     scenario = trace.scenario
-    return float({**scenario["obstacles"], **scenario["ugvs"]}.get(name, scenario["uav"])["radius_m"])
+    return float((scenario["obstacles"].get(name) or scenario["ugvs"].get(name, scenario["uav"]))["radius_m"])
+
+
+def _to_obstacles(trace: Trace, robot: str) -> dict[str, dict[str, float]]:
+    return _distances(trace, robot, list(trace.scenario["obstacles"]), MOST_OBSTACLES)
 
 
 def events_of(trace: Trace, robot: str, *kinds: str) -> list[dict[str, Any]]:
@@ -147,35 +160,30 @@ def events_of(trace: Trace, robot: str, *kinds: str) -> list[dict[str, Any]]:
     return [event for event in trace.events if event["robot"] == robot and event["kind"] in kinds]
 
 
-def _distances(trace: Trace, robot: str, others: Iterable[str]) -> dict[str, dict[str, float]]:
-    t, position = trace.t, trace.position(robot)
-    found = {}
-    for name in others:
-        at = closest_approach(t, position, place(trace, name))
-        required = safe_distance_m(trace, robot, name)
-        found[name] = {"value": at.distance_m, "t_s": at.t_s, "safe_distance_m": required}
-    return found
+def _distances(trace: Trace, robot: str, among: Sequence[str], most: int) -> dict[str, dict[str, float]]:
+    """Least distances of a robot to so many of some obstacles or robots, those of least margin."""
+    bound = _bounds(trace)
+    required = {other: safe_distance_m(trace, robot, other) for other in among}
+
+    @cache
+    def closest(k: int) -> Approach:
+        return closest_approach(trace.t, trace.position(robot), place(trace, among[k]))
+
+    least = np.array([bound[frozenset((robot, other))] - required[other] for other in among])
+    near = least_of(least, most, lambda k: closest(k).distance_m - required[among[k]])
+    return {
+        among[k]: {
+            "value": closest(k).distance_m, "t_s": closest(k).t_s, "safe_distance_m": required[among[k]],
+        }
+        for k in near
+    }  # fmt: skip
 
 
-def _tightest_pairs(trace: Trace) -> dict[str, dict[str, dict[str, float]]]:
-    """For each robot the other one of least margin.
+def _bounds(trace: Trace) -> dict[frozenset[str], float]:
+    """What each pair keeps apart at least, m."""
 
-    The margin at the rows is at most half of both robots' longest steps above the exact one, so the exact one
-    is needed only where it can be the least: a large team has thousands of pairs.
-    """
-    robots = trace.robots
-    position = [trace.position(robot) for robot in robots]
-    half_step = [0.5 * float(np.linalg.norm(np.diff(p, axis=0), axis=1).max(initial=0.0)) for p in position]
-    at_rows = np.full((len(robots), len(robots)), np.inf)
-    for i in range(len(robots)):
-        for j in range(i):
-            gap = position[i] - position[j]
-            nearest = np.sqrt(np.einsum("ti,ti->t", gap, gap).min())
-            at_rows[i, j] = at_rows[j, i] = nearest - safe_distance_m(trace, robots[i], robots[j])
-    found = {}
-    for i, robot in enumerate(robots):
-        reach = at_rows[i].min() + half_step[i] + np.asarray(half_step)
-        pairs = _distances(trace, robot, (robots[j] for j in np.flatnonzero(at_rows[i] <= reach) if j != i))
-        other = min(pairs, key=lambda name: pairs[name]["value"] - pairs[name]["safe_distance_m"], default=None)
-        found[robot] = {} if other is None else {other: pairs[other]}
-    return found
+    def found() -> dict[frozenset[str], float]:
+        apart = zip(pairs_of(trace), apart_of(trace).tolist(), strict=True)
+        return {frozenset((pair.first, pair.second)): least for pair, least in apart}
+
+    return trace.derived("bounds", found)

@@ -33,8 +33,8 @@ COPIES = 6
 """Of a table, while it is logged, made, written and looked at."""
 OF_A_DECISION = 2048
 """Bytes of a decision without its arrays: a row of a table and some objects."""
-OF_A_TANGENT = 80
-"""Bytes for each tangent of two discs and each disc that may block it: complex numbers and copies of them."""
+OF_A_TANGENT = 320
+"""Bytes of a tangent of two discs: complex numbers and copies of them."""
 PROGRAM = GIB // 2
 """Bytes of the program itself with its libraries."""
 
@@ -127,4 +127,4 @@ def _planning(scenario: Scenario) -> float:
     if not any(METHODS[run.method].intervenes for run in scenario.runs.values()):
         return 0.0
     discs = len(scenario.ugvs) + len(scenario.obstacles) + len(scenario.uav.phantoms_m)
-    return 2.0 * OF_A_TANGENT * math.pow(discs, 3)
+    return 2.0 * OF_A_TANGENT * math.pow(discs, 2)

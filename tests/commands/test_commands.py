@@ -92,6 +92,16 @@ def test_init_writes_a_scenario_that_is_valid(tmp_path: Path, file: str, name: s
     assert len(path.read_text(encoding="utf-8").splitlines()) < 26
 
 
+def test_init_writes_a_fleet(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "field.yaml"
+    assert main(["init", str(path), "--fleet", "4", "--obstacles", "6", "--seed", "2"]) == 0
+    scenario = load(str(path))[0]
+    assert (scenario.name, len(scenario.ugvs), len(scenario.obstacles)) == ("field", 4, 6)
+    with pytest.raises(SystemExit, match="2"):
+        main(["init", str(tmp_path / "none.yaml"), "--fleet", "0"])
+    assert "0 is not from 1 to 2000" in capsys.readouterr().err
+
+
 def test_init_overwrites_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "mine.yaml"
     path.write_text("mine", encoding="utf-8")

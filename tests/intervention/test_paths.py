@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from properties import examples
 from scipy.sparse.csgraph import dijkstra
 
+from airground_drake.intervention import paths
 from airground_drake.intervention.paths import TOL, NoPath, Path, shortest_path
 
 Array = NDArray[np.float64]
@@ -324,3 +325,11 @@ def test_start_inside_discs(angle: float, depth: float, goal: Point, discs: list
     s, points, _ = sample(path)
     assert clearance(points[s >= leg], discs) >= -TOL
     assert path.length_m >= leg + math.dist(leave.tolist(), goal) - 1e-9
+
+
+@given(point, point, scene)
+def test_a_path_among_many_discs_is_found_from_those_in_its_way(start: Point, goal: Point, discs: list[Disc]) -> None:
+    at_once = length_or_inf(start, goal, discs)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(paths, "FEW", 0)
+        assert length_or_inf(start, goal, discs) == pytest.approx(at_once, abs=1e-7)

@@ -100,7 +100,7 @@ def _select(scenario: Scenario, traces: Mapping[str, Trace], *, wide: bool) -> _
 
 def _trajectories(chosen: _Selection) -> Figure:
     first = next(iter(chosen.runs.values()))
-    frame = maps.frame_of(list(chosen.runs.values()), [*chosen.team, first.robots[-1]])
+    frame = maps.frame_of(list(chosen.runs.values()), first.robots)
     width_in = frame.width_in(canvas.FULL_IN, canvas.TALLEST_IN) if chosen.wide else canvas.MAP_IN
     stalls = list(filter(None, (_standing(name, trace, chosen.team) for name, trace in chosen.runs.items())))
     reach = first.scenario["safe_distance"]["obstacle_m"]
@@ -111,7 +111,7 @@ def _trajectories(chosen: _Selection) -> Figure:
         f"{_sentence('; '.join(stalls)) if stalls else 'No UGV shown stands still short of its target. '}"
         "○ start, \N{MULTIPLICATION SIGN} target, ▲ trigger, □ stands still, ✖ collision. Hexagons are obstacles "
         f"(hollow: not on the UAV's map) in {circles} of {reach:g} m. The thin dashed line is the UAV's path, "
-        f"projected onto the ground. Equal scales, in m.{_left_out(chosen, chosen.team)}"
+        f"projected onto the ground. Equal scales, in m.{_thin(chosen)}"
     )
     robots = [*chosen.team, first.robots[-1]]
     panels = per_run(
@@ -246,6 +246,11 @@ def _finals(trace: Trace, robots: Iterable[str]) -> str:
 
 def _sentence(text: str) -> str:
     return f"{text[0].upper()}{text[1:]}. "
+
+
+def _thin(chosen: _Selection) -> str:
+    hidden = len(next(iter(chosen.runs.values())).ugvs) - len(chosen.team)
+    return f" The thin grey lines, which end in dots, are the paths of {hidden} more UGVs." if hidden else ""
 
 
 def _left_out(chosen: _Selection, drawn: Sequence[str]) -> str:

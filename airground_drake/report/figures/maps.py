@@ -61,10 +61,17 @@ def frame_of(traces: Sequence[Trace], robots: Sequence[str]) -> Frame:
 
 
 def plane(trace: Trace, ugvs: Sequence[str], frame: Frame, width_in: float) -> Figure:
-    """Trajectories of a run in the plane: starts o, targets x, obstacles with safe circles, the UAV dashed."""
+    """Trajectories of a run in the plane: starts o, targets x, obstacles with safe circles, the UAV dashed.
+
+    Other UGVs than those named are thin lines that end in a dot.
+    """
     figure, axes = _map(trace, frame, width_in)
     labels = list[Label]()
     uav = trace.robots[-1]
+    for robot in trace.ugvs:
+        if robot not in ugvs:
+            axes.plot(*trace.position(robot)[:, :2].T, color=MUTED, linewidth=0.7, zorder=1)
+            axes.plot(*trace.position(robot)[-1, :2], marker=".", markersize=3, color=MUTED, zorder=1)
     targets = {**{name: ugv["target_m"] for name, ugv in trace.scenario["ugvs"].items()}, uav: None}
     for position, robot in enumerate([*ugvs, uav]):
         appearance = UAV_LOOK if robot == uav else look(position)

@@ -26,7 +26,7 @@ from airground_drake.verify.runs.control_law import (
     tracking,
 )
 from airground_drake.verify.runs.control_samples import control_samples
-from airground_drake.verify.runs.pairs import pairs_of, places_of
+from airground_drake.verify.runs.pairs import around, places_of
 from airground_drake.verify.runs.proposals import Sent, accepted_at, proposals_of
 
 COMMAND_TOLERANCE_M_S = 1e-6
@@ -179,15 +179,14 @@ def _chosen(trace: Trace, samples: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]
 
 
 def _around(trace: Trace, robot: str, samples: npt.NDArray[np.intp], *, planar: bool) -> Inequalities:
-    """The avoidance inequalities of a robot at the samples."""
-    places = {name: np.broadcast_to(p, (len(trace.t), 3))[samples] for name, p in places_of(trace).items()}
-    pairs = [pair for pair in pairs_of(trace) if robot in (pair.first, pair.second)]
-    others = [places[pair.second if pair.first == robot else pair.first] for pair in pairs]
+    """The avoidance inequalities of a robot at the samples; what never comes within sensing range has none."""
+    places, beside = places_of(trace), around(trace, robot)
+    others = [np.broadcast_to(places[other], (len(trace.t), 3))[samples] for other, _ in beside]
     return inequalities(
-        places[robot],
+        places[robot][samples],
         np.stack(others, axis=1) if others else np.empty((len(samples), 0, 3)),
-        np.array([pair.safe_m for pair in pairs]),
-        np.array([pair.share for pair in pairs]),
+        np.array([pair.safe_m for _, pair in beside]),
+        np.array([pair.share for _, pair in beside]),
         trace.scenario["control"],
         planar=planar,
     )

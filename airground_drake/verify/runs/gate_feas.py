@@ -15,7 +15,7 @@ from airground_drake.verify.engines.segments import interpolate, travelled
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.control_law import ON_TOP
 from airground_drake.verify.runs.gate_record import POSITION_TOLERANCE_M, GateClaim, Off, Row, conclude, cost_tolerance
-from airground_drake.verify.runs.pairs import pairs_of
+from airground_drake.verify.runs.pairs import around
 
 SPEED_TOLERANCE = 1e-4
 """A step may be longer than the speed limit allows by this, relative."""
@@ -165,14 +165,12 @@ def _sensed(trace: Trace, robot: str, t: float, own: Array, after: Array) -> lis
     scenario = trace.scenario
     held = min(int(np.searchsorted(trace.t, t - TIME_TOLERANCE_S)), len(trace.t) - 1)
     things = []
-    for pair in pairs_of(trace):
-        if robot in (pair.first, pair.second):
-            other = pair.second if pair.first == robot else pair.first
-            if other in trace.robots:
-                place, velocity = interpolate(trace.t, trace.position(other), t), trace.command(other)[held]
-            else:
-                place, velocity = np.array(scenario["obstacles"][other]["position_m"]), np.zeros(3)
-            things.append((other, place, velocity, pair.safe_m))
+    for other, pair in around(trace, robot):
+        if other in scenario["obstacles"]:
+            place, velocity = np.array(scenario["obstacles"][other]["position_m"]), np.zeros(3)
+        else:
+            place, velocity = interpolate(trace.t, trace.position(other), t), trace.command(other)[held]
+        things.append((other, place, velocity, pair.safe_m))
     return [
         (name, place + after[:, None] * velocity, float(distance))
         for name, place, velocity, distance in things

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 from scipy.sparse.csgraph import dijkstra
 
 from airground_drake.arrays import Array
@@ -18,13 +19,20 @@ from airground_drake.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.segments import corner_times, interpolate, travelled
 from airground_drake.verify.runs.control_law import Asked, avoiding, inequalities, intervened, tracking
-from airground_drake.verify.runs.pairs import pairs_of, radii_of
+from airground_drake.verify.runs.pairs import Pair, pairs_of, radii_of
 from airground_drake.verify.runs.proposals import Sent
 
 STILL_M = 0.05
 """Less than this within the last second is at rest, m."""
 AROUND = 48
 """Points around each safe circle."""
+AT_ONCE = 16
+"""Decisions that are rolled out side by side, so that they fit into the memory."""
+FAR_M = 1e9
+"""A coordinate beyond every sensing range."""
+NONE = np.empty(0), np.empty(0), np.empty(0)
+Key = tuple[str, float, float]
+"""Of a decision: UGV, time, and time of issue of the proposal, s."""
 MOST_CLAIMED = 64
 """Obstacles of a message that a UGV takes into account."""
 
@@ -53,13 +61,59 @@ def foreseen(trace: Trace, given: dict[str, Any], sent: Sequence[Sent]) -> tuple
     Raises:
         TraceError: if the decision is on a proposal that was not sent.
     """
-    t, robot, issued = float(given["t_s"]), str(given["robot"]), float(given["issued_s"])
-    return trace.derived(("foreseen", robot, t, issued), lambda: _rolled_out(trace, t, robot, issued, sent))
+    known = trace.derived("foreseen", lambda: _all_foreseen(trace, sent))
+    key = str(given["robot"]), float(given["t_s"]), float(given["issued_s"])
+    if key not in known:
+        known[key] = _rolled_out(trace, [_beginning(trace, *key, sent)])[0]
+    return known[key]
 
 
-def _rolled_out(trace: Trace, t: float, robot: str, issued: float, sent: Sequence[Sent]) -> tuple[Foreseen, Foreseen]:
-    scenario, control, gate = trace.scenario, trace.scenario["control"], trace.scenario["gatekeeper"]
-    h = control["period_s"]
+def _all_foreseen(trace: Trace, sent: Sequence[Sent]) -> dict[Key, tuple[Foreseen, Foreseen]]:
+    """What comes of either choice of all decisions for which that was recorded, many side by side."""
+    rows = trace.decisions[trace.decisions["accept_stalls"] >= 0.0]
+    columns = (rows[name].tolist() for name in ("robot", "t_s", "issued_s"))
+    keys = [(str(robot), float(t), float(issued)) for robot, t, issued in zip(*columns, strict=True)]
+    found = dict[Key, tuple[Foreseen, Foreseen]]()
+    for some in (keys[k : k + AT_ONCE] for k in range(0, len(keys), AT_ONCE)):
+        begun = [_beginning(trace, *key, sent) for key in some]
+        found |= dict(zip(some, _rolled_out(trace, begun), strict=True))
+    return found
+
+
+class Beginning(NamedTuple):
+    """What a decision's roll-outs begin with; S is the number of periods, K that of points to keep away from.
+
+    Attributes:
+        here: (3,), m.
+        preset: at the control samples, (S + 1, 3), m.
+        wanted: where the proposed motion is, (S + 1, 3), m.
+        chosen: its directions, (3, 3).
+        limit: speed limit, m/s.
+        periods: for which the proposal is executed.
+        settled: periods after which it is over when nothing moves any more.
+        points: if it is refused and if it is accepted, (2, S + 1, K, 3), m.
+        safe: distances to keep, (K,), m.
+        share: of the inequalities, (K,).
+        discs: how many of the points are obstacles: they come first.
+        goal: (3,), m.
+    """
+
+    here: Array
+    preset: Array
+    wanted: Array
+    chosen: Array
+    limit: float
+    periods: int
+    settled: int
+    points: Array
+    safe: Array
+    share: Array
+    discs: int
+    goal: Array
+
+
+def _beginning(trace: Trace, robot: str, t: float, issued: float, sent: Sequence[Sent]) -> Beginning:
+    scenario, gate, h = trace.scenario, trace.scenario["gatekeeper"], trace.scenario["control"]["period_s"]
     on = [one for one in sent if (one.ugv, one.issued_s) == (robot, issued)]
     if not on:
         raise TraceError(f"the decision of {robot} at t = {t} s is on no proposal that was sent")
@@ -70,52 +124,91 @@ def _rolled_out(trace: Trace, t: float, robot: str, issued: float, sent: Sequenc
     until = min(float(on[0].times_s[-1]), t + longest)
     ends = min(max(until, arrives), t + longest) + gate["settling_s"]
     after = h * np.arange(np.ceil((ends - t) / h) + 1.0)
-    here = interpolate(trace.t, trace.position(robot), t)
     discs, distances = known_discs(trace, robot, t, on[0])
-    others = [_other(trace, robot, t, after, pair, sent) for pair in pairs_of(trace) if _between(trace, pair, robot)]
-    fixed = np.tile(discs, (len(after), 1, 1))
-    points = [np.concatenate([fixed, *(one[0][choice][:, None] for one in others)], axis=1) for choice in (0, 1)]
-    safe = np.array([*distances, *(one[1] for one in others)])
-    share = np.array([1.0] * len(discs) + [one[2] for one in others])
+    pairs = [pair for pair in _among_robots(trace) if robot in (pair.first, pair.second)]
+    others = [_other(trace, robot, t, after, pair, sent) for pair in pairs]
+    fixed = np.broadcast_to(discs, (2, len(after), *discs.shape))
+    moving = np.array([each[0] for each in others]).reshape(len(others), 2, len(after), 3)
     settled = max(until, arrives, t + gate["horizon_s"], *(end for _, _, _, end in others))
-    goal = corners[-1]
-    last = round(np.ceil((settled - t) / h - 1e-9))
-    periods = np.array([0, max(0, int(np.ceil((until - t) / h - 1e-9)))])
-    preset, wanted = travelled(corners, speed, t + after), on[0].place(t + after)
-    place = np.stack([here, here])
-    ways, integral = [place], np.zeros((len(after), 2))
-    done = np.full(2, len(after) - 1)
-    for k in range(len(after) - 1):
-        given_here = inequalities(place, np.stack([points[0][k], points[1][k]]), safe, share, control, planar=True)
-        rate = (preset[k + 1] - preset[k]) / h
-        own = tracking(place, preset[k], rate, control["motion_gain_1_s"], spec["max_speed_m_s"])
-        task = own.copy()
-        if k < periods[1]:
-            asked = Asked(wanted[k][None], ((wanted[k + 1] - wanted[k]) / h)[None], on[0].chosen[None])
+    return Beginning(
+        here=interpolate(trace.t, trace.position(robot), t),
+        preset=travelled(corners, speed, t + after),
+        wanted=on[0].place(t + after),
+        chosen=on[0].chosen,
+        limit=float(spec["max_speed_m_s"]),
+        periods=max(0, int(np.ceil((until - t) / h - 1e-9))),
+        settled=round(np.ceil((settled - t) / h - 1e-9)),
+        points=np.concatenate([fixed, np.moveaxis(moving, 0, 2)], axis=2),
+        safe=np.array([*distances, *(each[1] for each in others)]),
+        share=np.array([1.0] * len(discs) + [each[2] for each in others]),
+        discs=len(discs),
+        goal=corners[-1],
+    )
+
+
+def _rolled_out(trace: Trace, begun: Sequence[Beginning]) -> list[tuple[Foreseen, Foreseen]]:
+    """Both choices of B decisions side by side: 2 B roll-outs, first all that refuse."""
+    scenario, control, h = trace.scenario, trace.scenario["control"], trace.scenario["control"]["period_s"]
+    lasting = np.tile([len(each.preset) - 1 for each in begun], 2)
+    steps, most = int(lasting.max()), max(len(each.safe) for each in begun)
+    preset, wanted = (np.stack([_lengthened(part, steps) for part in parts]) for parts in zip(
+        *((each.preset, each.wanted) for each in begun), strict=True))  # fmt: skip
+    points = np.stack([_padded(each.points[choice], steps, most) for choice in (0, 1) for each in begun])
+    safe, share = (np.tile([np.pad(getattr(each, name), (0, most - len(each.safe))) for each in begun], (2, 1))
+                   for name in ("safe", "share"))  # fmt: skip
+    preset, wanted, goal, place = (np.concatenate([part, part]) for part in (
+        preset, wanted, np.stack([each.goal for each in begun]), np.stack([each.here for each in begun])))  # fmt: skip
+    chosen = np.stack([each.chosen for each in begun])
+    limit = np.tile([each.limit for each in begun], 2)
+    settled, second = np.tile([each.settled for each in begun], 2), max(1, round(1.0 / h))
+    periods = np.array([0] * len(begun) + [each.periods for each in begun])
+    ways, integral, done = [place], np.zeros((steps + 1, len(place))), lasting.copy()
+    for k in range(steps):
+        around = inequalities(place, points[:, k], safe, share, control, planar=True)
+        rate = (preset[:, k + 1] - preset[:, k]) / h
+        task = tracking(place, preset[:, k], rate, control["motion_gain_1_s"], limit)
+        asked = np.flatnonzero(k < periods)
+        if asked.size:
+            rates = (wanted[asked, k + 1] - wanted[asked, k]) / h
+            wish = Asked(wanted[asked, k], rates, chosen[asked - len(begun)])
             gain = control["intervention_gain_1_s"]
-            task[1:] = intervened(place[1:], own[1:], asked, gain, spec["max_speed_m_s"])
-        velocity = avoiding(task, given_here, trace.meta["composition"], planar=True)
-        place = place + h * velocity
+            task[asked] = intervened(place[asked], task[asked], wish, gain, limit[asked])
+        place = place + h * avoiding(task, around, trace.meta["composition"], planar=True)
         ways.append(place)
-        integral[k + 1] = integral[k] + h * np.square(preset[k + 1] - place).sum(axis=1)
-        second = max(1, round(1.0 / h))
-        if k >= last:
-            home = np.linalg.norm(goal - place, axis=1) < scenario["arrival_tolerance_m"]
-            moved = np.linalg.norm(place - ways[k + 1 - second], axis=1) if k + 1 >= second else np.full(2, np.inf)
-            resting = home | (moved < 0.1 * STILL_M)
-            done = np.where(resting, np.minimum(done, k + 1), done)
-            if (done <= k + 1).all():
-                break
+        integral[k + 1] = integral[k] + h * np.square(preset[:, k + 1] - place).sum(axis=1)
+        home = np.linalg.norm(goal - place, axis=1) < scenario["arrival_tolerance_m"]
+        moved = np.linalg.norm(place - ways[k + 1 - second], axis=1) if k + 1 >= second else np.full(len(place), np.inf)
+        resting = (home | (moved < 0.1 * STILL_M)) & (k >= settled)
+        done = np.where(resting, np.minimum(done, k + 1), done)
+        if (done <= k + 1).all():
+            break
     way = np.array(ways)
     found = []
-    for choice in (0, 1):
-        k = int(done[choice])
-        found.append(_concluded(way[: k + 1, choice], float(integral[k, choice]), goal, discs, distances, scenario, h))
-    return found[0], found[1]
+    for row, each in enumerate(begun):
+        known = each.points[0, 0, : each.discs], each.safe[: each.discs]
+        both = [
+            _concluded(way[: done[b] + 1, b], float(integral[done[b], b]), each.goal, *known, scenario, h)
+            for b in (row, row + len(begun))
+        ]
+        found.append((both[0], both[1]))
+    return found
 
 
-def _between(trace: Trace, pair: Any, robot: str) -> bool:
-    return robot in (pair.first, pair.second) and {pair.first, pair.second} <= set(trace.robots)
+def _lengthened(places: Array, steps: int) -> Array:
+    """(S + 1, 3) to (steps + 1, 3) by staying at the end: what comes of that is not looked at."""
+    return np.concatenate([places, np.repeat(places[-1:], steps + 1 - len(places), axis=0)])
+
+
+def _padded(points: Array, steps: int, most: int) -> Array:
+    """(S + 1, K, 3) to (steps + 1, most, 3), with points out of sight."""
+    found = np.full((steps + 1, most, 3), FAR_M)
+    found[: points.shape[0], : points.shape[1]] = points
+    return found
+
+
+def _among_robots(trace: Trace) -> list[Pair]:
+    robots = set(trace.robots)
+    return trace.derived("robots", lambda: [pair for pair in pairs_of(trace) if pair.second in robots])
 
 
 def _concluded(
@@ -178,16 +271,29 @@ def asked_of(trace: Trace, ugv: str, t: float, sent: Sequence[Sent]) -> tuple[Se
 
     A proposal in force is one that the UGV decides about at that sample. Besides: whether it has accepted it by then.
     """
-    table = trace.decisions[(trace.decisions["robot"] == ugv)]
-    now = table[np.abs(table["t_s"] - t) <= TIME_TOLERANCE_S]
-    if not len(now):
+    when, on, answers = _answers_of(trace).get(ugv, NONE)
+    now = np.flatnonzero(np.abs(when - t) <= TIME_TOLERANCE_S)
+    if not now.size:
         return None, False
-    issued = float(now["issued_s"].iloc[0])
-    before = table[(table["issued_s"] == issued) & (table["t_s"] < t - TIME_TOLERANCE_S)]
-    answer = str(before["decision"].iloc[-1]) if len(before) else ""
+    issued = float(on[now[0]])
+    before = np.flatnonzero((on == issued) & (when < t - TIME_TOLERANCE_S))
+    answer = str(answers[before[-1]]) if before.size else ""
     if answer == "refuse":
         return None, False
     return next((one for one in sent if (one.ugv, one.issued_s) == (ugv, issued)), None), answer == "accept"
+
+
+def _answers_of(trace: Trace) -> dict[str, tuple[Array, Array, Any]]:
+    """Of each UGV with decisions: their times, those of the proposals, s, and the answers, (D,) each."""
+
+    def found() -> dict[str, tuple[Array, Array, Any]]:
+        by_ugv = trace.decisions.groupby("robot", sort=False)
+        columns = {
+            str(ugv): [rows[name].to_numpy() for name in ("t_s", "issued_s", "decision")] for ugv, rows in by_ugv
+        }
+        return {ugv: (when, on, answers) for ugv, (when, on, answers) in columns.items()}
+
+    return trace.derived("answers", found)
 
 
 def bounds_of_way_left(place: Array, goal: Array, discs: Array, distances: Array | float) -> tuple[float, float]:
@@ -198,13 +304,37 @@ def bounds_of_way_left(place: Array, goal: Array, discs: Array, distances: Array
     squared = np.square(distances) - np.square(discs[:, 2] - place[2])
     centres, radii = discs[squared > 0.0, :2], np.sqrt(squared[squared > 0.0])
     direct = float(np.linalg.norm(goal[:2] - place[:2]))
+    legs = np.array([place[:2], goal[:2]])
+    some = _crossed(legs, centres, radii)
+    while True:  # a way round some that crosses none of the others is one round all
+        legs = _round(legs[0], legs[-1], centres[some], radii[some])
+        if not len(legs):
+            return direct, np.inf
+        more = some | _crossed(legs, centres, radii)
+        if (more == some).all():
+            return direct, float(np.linalg.norm(np.diff(legs, axis=0), axis=1).sum())
+        some = more
+
+
+def _crossed(way: Array, centres: Array, radii: Array) -> npt.NDArray[np.bool_]:
+    """Which circles (m,) a polyline (M, 2) cuts."""
+    legs = np.diff(way, axis=0)
+    away = centres - way[:-1, None]
+    along = np.clip(np.einsum("lmd,ld->lm", away, legs) / np.maximum((legs**2).sum(axis=1), 1e-300)[:, None], 0.0, 1.0)
+    nearest = np.linalg.norm(away - along[..., None] * legs[:, None], axis=2)
+    return np.asarray((nearest < radii * (1.0 - 1e-6)).any(axis=0))
+
+
+def _round(place: Array, goal: Array, centres: Array, radii: Array) -> Array:
+    """A short way round circles over points all around them, (M, 2), m; (0, 2) where there is none."""
+    ends = np.stack([place, goal])
     if not len(centres):
-        return direct, direct
+        return ends
     angle = 2.0 * np.pi * np.arange(AROUND) / AROUND
     ring = np.column_stack([np.cos(angle), np.sin(angle)]) / np.cos(np.pi / AROUND)
     rings = (centres[:, None] + radii[:, None, None] * (1.0 + 1e-9) * ring).reshape(-1, 2)
     free = (np.linalg.norm(rings[:, None] - centres, axis=2) >= radii).all(axis=1)
-    nodes = np.concatenate([place[None, :2], goal[None, :2], rings[free]])
+    nodes = np.concatenate([ends, rings[free]])
     legs = nodes[None] - nodes[:, None]
     lengths = np.linalg.norm(legs, axis=2)
     clear = np.ones(lengths.shape, dtype=bool)
@@ -212,7 +342,10 @@ def bounds_of_way_left(place: Array, goal: Array, discs: Array, distances: Array
         along = np.clip(((centre - nodes)[:, None] * legs).sum(axis=2) / np.maximum(lengths, 1e-150) ** 2, 0.0, 1.0)
         nearest = nodes[:, None] + along[..., None] * legs - centre
         clear &= np.linalg.norm(nearest, axis=2) >= radius * (1.0 - 1e-6)
-    if clear[0, 1]:
-        return direct, direct
-    found = float(dijkstra(np.where(clear, lengths, 0.0), indices=0)[1])
-    return direct, found
+    before = dijkstra(np.where(clear, lengths, 0.0), indices=0, return_predecessors=True)[1]
+    if before[1] < 0:
+        return np.empty((0, 2))
+    chain = [1]
+    while chain[-1] != 0:
+        chain.append(int(before[chain[-1]]))
+    return np.asarray(nodes[chain[::-1]])

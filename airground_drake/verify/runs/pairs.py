@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import combinations
 from typing import Any, NamedTuple
 
@@ -10,33 +10,96 @@ import numpy as np
 
 from airground_drake.arrays import Array
 from airground_drake.trace import Trace
+from airground_drake.verify.engines.boxes import apart_at_least, boxes_of
 from airground_drake.verify.engines.segments import MERGE_S, interpolate
 
 
 class Pair(NamedTuple):
     """Two things to keep apart: a robot, and an obstacle or robot; `share` is the part that each robot takes.
 
-    `safe_m` is the safe distance between centres: that of the kind of pair and both radii.
+    `safe_m` is the safe distance between centres: that of the kind of pair and both radii. In one control period they
+    come nearer to each other by `reach_m` at most.
     """
 
     first: str
     second: str
     safe_m: float
     share: float
+    reach_m: float
 
 
-def pairs_of(trace: Trace) -> Iterator[Pair]:
+def pairs_of(trace: Trace) -> tuple[Pair, ...]:
     """All robot/obstacle and robot/robot pairs of a run, with the safe distances of its scenario.
 
     Those of one robot come in the order in which its controller lists them: obstacles, then robots in array order.
     """
+    return trace.derived("pairs", lambda: tuple(_pairs_of(trace)))
+
+
+def _pairs_of(trace: Trace) -> Iterator[Pair]:
     safe, uav, radius = trace.scenario["safe_distance"], trace.scenario["uav"]["name"], radii_of(trace)
+    limit, period = speed_limits(trace), float(trace.scenario["control"]["period_s"])
     for robot in trace.robots:
         for obstacle in trace.scenario["obstacles"]:
-            yield Pair(robot, obstacle, safe["obstacle_m"] + (radius[robot] + radius[obstacle]), 1.0)
+            distance = safe["obstacle_m"] + (radius[robot] + radius[obstacle])
+            yield Pair(robot, obstacle, distance, 1.0, limit[robot] * period)
     for robot, other in combinations(trace.robots, 2):
         kind = "air_ground_m" if uav in (robot, other) else "ugv_m"
-        yield Pair(robot, other, safe[kind] + (radius[robot] + radius[other]), 0.5)
+        distance = safe[kind] + (radius[robot] + radius[other])
+        yield Pair(robot, other, distance, 0.5, (limit[robot] + limit[other]) * period)
+
+
+def apart_of(trace: Trace) -> Array:
+    """A bound of the distance of each pair over the whole run from below, (P,), m, in the order of `pairs_of`."""
+    return trace.derived("apart", lambda: _apart_of(trace))
+
+
+def _apart_of(trace: Trace) -> Array:
+    places, pairs = places_of(trace), pairs_of(trace)
+    number = {name: k for k, name in enumerate(places)}
+    boxes = boxes_of(np.stack([np.broadcast_to(place, (len(trace.t), 3)) for place in places.values()]))
+    first, second = (np.array([number[name] for name in names], dtype=np.intp) for names in _sides(pairs))
+    return apart_at_least(boxes, first, second)
+
+
+def least_of(bounds: Array, most: int, value: Callable[[int], float]) -> list[int]:
+    """Numbers, in their order, of so many of the least values, of which bounds (K,) from below are known.
+
+    As many values as are wanted, of whatever, say how large a wanted one can be: those with larger bounds are not
+    looked at.
+    """
+    if len(bounds) <= most:
+        return list(range(len(bounds)))
+    enough = max(value(int(k)) for k in np.argsort(bounds, kind="stable")[:most])
+    return sorted(sorted(np.flatnonzero(bounds <= enough).tolist(), key=value)[:most])
+
+
+def _sides(pairs: Sequence[Pair]) -> tuple[list[str], list[str]]:
+    return [pair.first for pair in pairs], [pair.second for pair in pairs]
+
+
+def near_pairs(trace: Trace) -> tuple[Pair, ...]:
+    """The pairs, in their order, that may come within sensing range of each other: no other has an inequality."""
+
+    def chosen() -> tuple[Pair, ...]:
+        near = apart_of(trace) <= trace.scenario["control"]["sensing_range_m"]
+        return tuple(pair for pair, is_near in zip(pairs_of(trace), near.tolist(), strict=True) if is_near)
+
+    return trace.derived("near", chosen)
+
+
+def around(trace: Trace, robot: str) -> list[tuple[str, Pair]]:
+    """What may come within sensing range of a robot, by name, with the pair that it is with the robot."""
+
+    def by_robot() -> dict[str, list[tuple[str, Pair]]]:
+        found: dict[str, list[tuple[str, Pair]]] = {name: [] for name in trace.robots}
+        for pair in near_pairs(trace):
+            found[pair.first].append((pair.second, pair))
+            if pair.second in found:
+                found[pair.second].append((pair.first, pair))
+        return found
+
+    return trace.derived("around", by_robot)[robot]
 
 
 def radii_of(trace: Trace) -> dict[str, float]:
@@ -51,18 +114,15 @@ def speed_limits(trace: Trace) -> dict[str, float]:
     return {name: float(robot["max_speed_m_s"]) for name, robot in robots.items()}
 
 
-def reach_m(trace: Trace, pair: Pair) -> float:
-    """By how much a pair can come closer to each other in one control period, m."""
-    limits = speed_limits(trace)
-    closing = limits[pair.first] + limits.get(pair.second, 0.0)
-    return closing * float(trace.scenario["control"]["period_s"])
-
-
 def places_of(trace: Trace) -> dict[str, Array]:
     """Positions by name, m: (T, 3) of a robot, (3,) of an obstacle, whether the UAV knows it or not."""
-    obstacles = trace.scenario["obstacles"]
-    at_rest = {name: np.asarray(o["position_m"], dtype=np.float64) for name, o in obstacles.items()}
-    return at_rest | {robot: trace.position(robot) for robot in trace.robots}
+
+    def found() -> dict[str, Array]:
+        obstacles = trace.scenario["obstacles"]
+        at_rest = {name: np.asarray(o["position_m"], dtype=np.float64) for name, o in obstacles.items()}
+        return at_rest | {robot: trace.position(robot) for robot in trace.robots}
+
+    return trace.derived("places", found)
 
 
 def snapshot(trace: Trace, names: Iterable[str], t_s: float) -> dict[str, Any]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.control_samples import control_samples
 from airground_drake.verify.runs.pairs import (
     DISTANCE_TOLERANCE_M,
+    near_pairs,
     pairs_of,
     places_of,
     slack_of,
@@ -33,7 +35,10 @@ BINDING_M_S = 1e-9
 
 @dataclass(frozen=True)
 class _Hypothesis:
-    """One hypothesis over K instants: margins (K,), negative where broken beyond the tolerance `slop`."""
+    """One hypothesis over K instants or pairs: margins (K,), negative where broken beyond the tolerance `slop`.
+
+    It is about a robot, or whatever `about` says, and in the k-th place about `others[k]`, if there are any.
+    """
 
     name: str
     unit: str
@@ -41,6 +46,7 @@ class _Hypothesis:
     margin: Array
     slop: float
     about: dict[str, Any]
+    others: Sequence[str] = ()
 
     def broken(self) -> npt.NDArray[np.intp]:
         """Instants at which it does not hold; a margin that is not a number counts."""
@@ -48,7 +54,8 @@ class _Hypothesis:
 
     def at(self, k: int) -> dict[str, Any]:
         """What is needed to redo the evaluation at instant k by hand."""
-        described = {"hypothesis": self.name, **self.about, "t_s": float(self.t[k])}
+        other = {"second": self.others[k]} if self.others else {}
+        described = {"hypothesis": self.name, **self.about, **other, "t_s": float(self.t[k])}
         return {**described, "margin": float(self.margin[k]), "unit": self.unit}
 
 
@@ -134,18 +141,19 @@ def _binding(trace: Trace, monitored: list[_Hypothesis]) -> dict[str, int]:
 def _static(trace: Trace) -> Iterator[_Hypothesis]:
     """Hypotheses on the scenario and the start: gain, sensing range, distances at t = 0."""
     control, places = trace.scenario["control"], places_of(trace)
-    start = trace.t[:1]
-    period = control["period_s"]
-    limits = speed_limits(trace)
-    stable = np.array([1.0 - control["avoidance_gain_1_s"] * period])
-    yield _Hypothesis("gain: A h <= 1", "1", start, stable, 1e-12, {})
-    for pair in pairs_of(trace):
-        about = {"first": pair.first, "second": pair.second}
-        distance = np.linalg.norm(places[pair.first][0] - np.atleast_2d(places[pair.second])[0])
-        yield _Hypothesis("safe start", "m", start, np.array([distance - pair.safe_m]), DISTANCE_TOLERANCE_M, about)
-        closing = limits[pair.first] + limits.get(pair.second, 0.0)
-        spare = np.array([control["sensing_range_m"] - pair.safe_m - closing * period])
-        yield _Hypothesis("sensing range", "m", start, spare, DISTANCE_TOLERANCE_M, about)
+    stable = np.array([1.0 - control["avoidance_gain_1_s"] * control["period_s"]])
+    yield _Hypothesis("gain: A h <= 1", "1", trace.t[:1], stable, 1e-12, {})
+    pairs = sorted(pairs_of(trace), key=lambda pair: trace.robots.index(pair.first))
+    for robot, own in groupby(pairs, key=lambda pair: pair.first):
+        beside = list(own)
+        others = [pair.second for pair in beside]
+        safe, reach = (np.array([getattr(pair, name) for pair in beside]) for name in ("safe_m", "reach_m"))
+        away = places[robot][0] - np.array([np.atleast_2d(places[other])[0] for other in others])
+        start, about = np.full(len(beside), trace.t[0]), {"first": robot}
+        excess = np.linalg.norm(away, axis=1) - safe
+        yield _Hypothesis("safe start", "m", start, excess, DISTANCE_TOLERANCE_M, about, others)
+        spare = control["sensing_range_m"] - safe - reach
+        yield _Hypothesis("sensing range", "m", start, spare, DISTANCE_TOLERANCE_M, about, others)
 
 
 def _sampled(trace: Trace) -> Iterator[_Hypothesis]:
@@ -169,8 +177,9 @@ def _sampled(trace: Trace) -> Iterator[_Hypothesis]:
             climb = 0.0 - np.abs(command[1:, 2])
             yield _Hypothesis("planar motion", "m/s", t[:-1], climb, VELOCITY_TOLERANCE_M_S, about)
     velocities = {robot: trace.command(robot)[chosen] for robot in trace.robots}
-    sampled = {name: place if place.ndim == 1 else place[samples] for name, place in places_of(trace).items()}
-    for pair in pairs_of(trace):
+    places = places_of(trace)
+    sampled = {name: places[name] if places[name].ndim == 1 else places[name][samples] for name in places}
+    for pair in near_pairs(trace):
         for robot, other in ((pair.first, pair.second), (pair.second, pair.first)):
             if robot not in velocities:
                 continue

@@ -62,7 +62,10 @@ class StlFormula:
 FORMULAS = (
     StlFormula(
         "SAFE-TRACE", "distances", "always (margin_m >= 0)",
-        {"margin_m": "least of distance - safe distance over all pairs, at rows and closest approaches between them"},
+        {
+            "margin_m": "least of distance - safe distance over all pairs, but for those that keep far apart, at rows "
+            "and closest approaches between them"
+        },
         "m", stl_signals.clearance, tolerance=DISTANCE_TOLERANCE_M, compares=("margin",),
     ),
     StlFormula(
@@ -100,7 +103,8 @@ FORMULAS = (
         " and ((after > 1.5) -> (since_s <= {over!r}))"
         " and ((before > 0.5 and after < 0.5) -> (since_s >= {dwell!r})))",
         {
-            "x_m": "||recorded reference - position|| + recorded noise at a row; one set of signals per UGV",
+            "x_m": "||recorded reference - position|| + recorded noise at a row; one set of signals per UGV; of rows "
+            "with the same modes those of least and largest x and time",
             "before": "mode up to the row: 0 supervising, 1 intervening, 2 refractory (and before the first row)",
             "after": "mode from the row on",
             "since_s": "time since the last trigger; levels are widened by what x moves in 1e-5 s",

@@ -12,7 +12,7 @@ claims. Two kinds of signals:
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from itertools import combinations, pairwise, zip_longest
+from itertools import pairwise, zip_longest
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -42,18 +42,27 @@ class Signals(NamedTuple):
 
 
 def _pairs(trace: Trace) -> Iterator[tuple[str, str, Array, float, float]]:
-    """Robot, other, offset (T, 3) from the other to the robot, safe distance, share of the robot; each pair once."""
-    scenario, safe, ugvs = trace.scenario, trace.scenario["safe_distance"], set(trace.ugvs)
-    place = {robot: trace.position(robot) for robot in trace.robots}
-    size = {name: body["radius_m"] for name, body in scenario["ugvs"].items()}
-    size[scenario["uav"]["name"]] = scenario["uav"]["radius_m"]
-    for robot in place:
-        for name, obstacle in scenario["obstacles"].items():
-            apart = safe["obstacle_m"] + (size[robot] + obstacle["radius_m"])
-            yield robot, name, place[robot] - obstacle["position_m"], apart, 1.0
-    for robot, other in combinations(place, 2):
-        kind = "ugv_m" if {robot, other} <= ugvs else "air_ground_m"
-        yield robot, other, place[robot] - place[other], safe[kind] + (size[robot] + size[other]), 0.5
+    """Robot, other, offset (T, 3) from the other to the robot, safe distance, share of the robot; each pair once.
+
+    Left out is who keeps farther apart than the sensing range, and by more than the pair of least margin at the start:
+    things in two balls are no nearer than the balls.
+    """
+    safe, place = trace.scenario["safe_distance"], {robot: trace.position(robot) for robot in trace.robots}
+    rocks = trace.scenario["obstacles"]
+    things = [*place.values(), *(np.array([rock["position_m"]], dtype=np.float64) for rock in rocks.values())]
+    names, count = [*place, *rocks], len(place)
+    bodies = [*trace.scenario["ugvs"].values(), trace.scenario["uav"], *rocks.values()]
+    radius = np.array([body["radius_m"] for body in bodies])
+    kind = np.array([safe["ugv_m"]] * (count - 1) + [safe["air_ground_m"]] + [safe["obstacle_m"]] * len(rocks))
+    start, middle = np.array([thing[0] for thing in things]), np.array([thing.mean(axis=0) for thing in things])
+    ball = np.array([np.linalg.norm(a - m, axis=1).max() for a, m in zip(things, middle, strict=True)])
+    one, other = np.triu_indices(count, 1, len(things))
+    apart = kind[other] + (radius[one] + radius[other])
+    least = np.linalg.norm(middle[one] - middle[other], axis=1) - ball[one] - ball[other] - 1e-6
+    nearest = (np.linalg.norm(start[one] - start[other], axis=1) - apart).min(initial=np.inf)
+    kept = (least <= trace.scenario["control"]["sensing_range_m"]) | (least - apart <= nearest)
+    for i, j, distance in zip(one[kept].tolist(), other[kept].tolist(), apart[kept].tolist(), strict=True):
+        yield names[i], names[j], things[i] - things[j], distance, 0.5 if j < count else 1.0
 
 
 def clearance(trace: Trace) -> Signals:
@@ -148,10 +157,20 @@ def levels(trace: Trace) -> Signals:
         before = np.append(2.0, mode[1:-1])
         since = np.where(last >= 0.0, t - last, NEVER)
         values = {"x_m": x[:-1], "before": before, "after": mode[1:], "since_s": since[:-1]}
-        sets.append({name: (t[:-1], value) for name, value in values.items()})
+        rows = _telling((before, mode[1:]), (x[:-1], since[:-1]))
+        sets.append({name: (t[rows], value[rows]) for name, value in values.items()})
     slop = EVENT_TOLERANCE_S * rate + VARIABLE_TOLERANCE_M
     constants = {"least": zeta - slop, "most": zeta + slop, "low": release - slop, "high": release + slop}
     return Signals(constants | {"dwell": dwell - EVENT_TOLERANCE_S, "over": dwell + EVENT_TOLERANCE_S}, sets)
+
+
+def _telling(modes: tuple[Array, ...], values: tuple[Array, ...]) -> Rows:
+    """Of the rows with the same modes, those of the least and of the largest of each value: the others say less."""
+    of_row = np.unique(np.stack(modes), axis=1, return_inverse=True)[1].ravel()
+    found = list[np.intp]()
+    for same in (np.flatnonzero(of_row == kind) for kind in np.unique(of_row)):
+        found += [same[pick(value[same])] for value in values for pick in (np.argmin, np.argmax)]
+    return np.unique(np.array(found, dtype=np.intp))
 
 
 def square(intervals: Iterable[tuple[float, float]], end: float) -> Samples:

@@ -1,8 +1,9 @@
 """Where a team's inequalities bind, and hostile inputs that put them to the test.
 
-Every robot is put beside every obstacle and every other robot, inside and outside of the safe distance, near enough for
-the inequality to bind; then robots crowd around one obstacle. Presets, proposals and the UGVs' velocities that the UAV
-feeds forward drive every robot to what it must avoid. What each may want by them is written here in plain numpy.
+Every robot is put beside every obstacle (of many: beside some) and every other robot, inside and outside of the safe
+distance, near enough for the inequality to bind; then robots crowd around one obstacle. Presets,
+proposals and the UGVs' velocities that the UAV feeds forward drive every robot to what it must avoid. What each may
+want by them is written here in plain numpy.
 """
 
 from __future__ import annotations
@@ -21,6 +22,11 @@ from airground_drake.verify.model.avoidance.scenario_pairs import Inputs, Views
 
 STATES = 240
 """Team positions at least; more where there are many pairs."""
+MOST_BESIDE = 40
+"""Obstacles that every robot is put beside at most, unless it takes more that every obstacle has a robot beside it."""
+MANY = 80
+"""Rounds of partners from which on each is gone through with one kind of distance, not with all."""
+KINDS_OF_DISTANCES = 5
 CROWDED = 60
 """Team positions besides, in which robots crowd around one obstacle."""
 TRIALS = 24
@@ -63,17 +69,18 @@ class Asked(NamedTuple):
 
 
 def states(inputs: Inputs, views: Views, rng: np.random.Generator) -> Iterator[State]:
-    """Positions in which every robot is beside everything that it must avoid, then crowded ones.
+    """Positions in which every robot is beside what it must avoid (but for obstacles beyond many), then crowded ones.
 
     In a round every robot has one partner: an obstacle, or another robot away from everything else.
     """
     n, m = len(views.robots), len(views.obstacles)
-    rounds: list[list[tuple[int, int]]] = [[(i, -1 - (i + r) % m) for i in range(n)] for r in range(m)]
+    spaced = np.linspace(0, m, min(m, max(MOST_BESIDE, -(-m // n))), endpoint=False).astype(int).tolist()
+    rounds: list[list[tuple[int, int]]] = [[(i, -1 - (i + r) % m) for i in range(n)] for r in spaced]
     rounds += list(_round_robin(n))
-    repeated = max(5, -(-STATES // len(rounds)))
+    repeated = max(KINDS_OF_DISTANCES, -(-STATES // len(rounds))) if len(rounds) <= MANY else 1
     for r in range(repeated):
-        for pairs in rounds:
-            yield beside(inputs, views, pairs, r, rng)
+        for k, pairs in enumerate(rounds):
+            yield beside(inputs, views, pairs, r if len(rounds) <= MANY else r + k, rng)
     for _ in range(CROWDED):
         yield _crowded(inputs, views, rng)
 
@@ -90,7 +97,7 @@ def _round_robin(count: int) -> Iterator[list[tuple[int, int]]]:
 def _distance(inputs: Inputs, how: int, safe: float, share: float, speed: float, rng: np.random.Generator) -> float:
     """A distance at which an inequality binds at full speed towards: inside, at d, outside, almost too far."""
     free = speed * inputs["period_s"] / share  # farther outside than this nothing binds
-    match how % 5:
+    match how % KINDS_OF_DISTANCES:
         case 0:
             return safe * (1.0 - 0.3 * rng.random())
         case 1:

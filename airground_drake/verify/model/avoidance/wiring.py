@@ -96,7 +96,8 @@ def unbound(views: Views, bound_of: npt.NDArray[np.intp]) -> list[tuple[int, int
     m = len(views.obstacles)
     found: list[tuple[int, int]] = []
     taken: set[int] = set()
-    for i, k in np.argwhere(bound_of == 0)[::-1].tolist():
+    missing = np.argwhere(bound_of == 0)[::-1]
+    for i, k in missing[np.argsort(missing[:, 1] < m, kind="stable")].tolist():  # robots first: they must have bound
         j = -1 - k if k < m else int(views.others[i, k - m])
         if not taken & {i, j}:
             found.append((i, j))
