@@ -32,6 +32,7 @@ from airground_drake.nsbc.team import Team
 from airground_drake.scenarios.load import resolved, validated
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.systems.decision import FIELDS
+from airground_drake.systems.lifetime import untie
 from airground_drake.trace import (
     DECISION_COLUMNS,
     PROBLEM_ARRAYS,
@@ -49,10 +50,7 @@ MERGE_S = 1e-9
 
 
 class Recorder:
-    """A model inside a diagram that logs its exported outputs at every step; reused for several seeds.
-
-    A Diagram with Python systems is never garbage-collected, so that one is built per method and process.
-    """
+    """A model inside a diagram that logs its exported outputs at every step; may be used for several seeds."""
 
     def __init__(self, scenario: Scenario, name: str) -> None:
         """Build the model of a run of the scenario and its loggers.
@@ -77,6 +75,7 @@ class Recorder:
         self._log = LogVectorOutput(together.get_output_port(), builder)  # one for all: a log costs a step 10 us
         self._root = builder.Build()
         self._root.set_name("recorded")
+        untie(self._root)
         warm_up()
 
     def simulate(
