@@ -25,7 +25,7 @@ from airground_drake.gatekeeper.prediction import Horizon, Scene, predicted_prob
 from airground_drake.gatekeeper.routes.relaxed import RelaxedRoute
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance, Composition, Surroundings, limit_speed
-from airground_drake.nsbc.kernels import distances, within
+from airground_drake.nsbc.kernels import distances, news_within, within
 from airground_drake.nsbc.law import UgvLaw
 from airground_drake.nsbc.motion import Motion
 from airground_drake.nsbc.team import Team
@@ -232,7 +232,7 @@ def _problems(decided: Sequence[Decision]) -> pd.DataFrame:
 def warm_up() -> None:
     """Load the compiled kernels and the solver, once per process, so that no run's time includes that."""
     one, motion = np.ones((1, 3)), Motion(np.array([0.0, 1.0]), np.zeros((2, 3)))
-    within(one, one, 1.0)
+    news_within(one, one, 1.0, within(one, one, 1.0))
     distances(one, one[0])
     avoidance = Avoidance(gain=1.0, period=0.1)
     spaces = avoidance.half_spaces(one, one, Surroundings(np.zeros((1, 1, 3)), np.ones((1, 1)), np.ones((1, 1))))

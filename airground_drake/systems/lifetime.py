@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any
-from weakref import WeakMethod
+from weakref import ref
 
 from pydrake.systems.framework import Diagram, DiagramBuilder, InputPort, OutputPort
 
@@ -17,16 +17,10 @@ PEERS = "_pydrake_internal_ref_cycle_peers"
 """Attribute with which pydrake ties one object to others. Without it `untie` does nothing, and nothing is freed."""
 
 
-def weakly(method: Callable[..., Any]) -> Callable[..., Any]:
+def weakly(method: Any) -> Callable[..., Any]:
     """A bound method that does not keep its object: for what a system declares about itself."""
-    of = WeakMethod(method)
-
-    def call(*arguments: Any) -> Any:
-        bound = of()
-        assert bound is not None  # Drake calls systems that are there
-        return bound(*arguments)
-
-    return call
+    of, function = ref(method.__self__), method.__func__
+    return lambda *arguments: function(of(), *arguments)
 
 
 def untie(diagram: Diagram) -> None:
