@@ -108,9 +108,7 @@ def main() -> None:
                 row["exponents"] = " ".join(f"{slope:.1f}" for slope in slopes)
             rows.append(row)
             before = row
-            print(
-                pd.DataFrame(rows[-1:]).to_string(index=False, header=len(rows) == 1, float_format="%.3g"), flush=True
-            )
+            print({name: f"{each:.3g}" if isinstance(each, float) else each for name, each in row.items()}, flush=True)
     table = pd.DataFrame(rows)
     print("\n" + table.to_string(index=False, float_format="%.3g", na_rep=""))
     if options.json:

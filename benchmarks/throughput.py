@@ -63,7 +63,7 @@ def rates(spec: Spec, number: int, jobs: list[int]) -> list[dict[str, Any]]:
     found: list[dict[str, Any]] = []
     for name, count, way in ways:
         with way() as processes:
-            for _ in processes(partial(worked, spec), range(number, number + 4 * count)):  # imports and compiled code
+            for _ in processes(partial(worked, spec), range(number, number + 2 * count)):  # imports and compiled code
                 pass
             started = time.perf_counter()
             done = [result for _, result in processes(partial(worked, spec), range(number))]
