@@ -149,10 +149,8 @@ def profiled(repetitions: int) -> pd.DataFrame:
         part = _part(file, name)
         own[part] += taken
         calls[part] += count
-    whole, rows = sum(own.values()), recorder.simulate().signals
-    shares = [
-        (part, 100.0 * taken / whole, calls[part] / repetitions / len(rows)) for part, taken in own.most_common(8)
-    ]
+    whole, per = sum(own.values()), repetitions * len(recorder.simulate().signals)
+    shares = [(part, 100.0 * taken / whole, calls[part] / per) for part, taken in own.most_common(8)]
     return pd.DataFrame(shares, columns=["part", "share_percent", "calls_per_row"])
 
 

@@ -55,11 +55,13 @@ def dask(workers: int) -> Iterator[Pool]:
         yield processes
 
 
-def rates(spec: Spec, number: int, jobs: list[int]) -> list[dict[str, Any]]:
+POOLS: dict[str, Any] = {"joblib": pool.local, "dask": dask}
+
+
+def rates(spec: Spec, number: int, jobs: list[int], pools: list[str]) -> list[dict[str, Any]]:
     """A row for each way of working."""
     ways: list[tuple[str, int, Any]] = [("serial", 1, serial)]
-    ways += [("joblib", count, partial(pool.local, count)) for count in jobs]
-    ways += [("dask", count, partial(dask, count)) for count in jobs]
+    ways += [(name, count, partial(POOLS[name], count)) for name in pools for count in jobs]
     found: list[dict[str, Any]] = []
     for name, count, way in ways:
         with way() as processes:
@@ -100,12 +102,13 @@ def main() -> None:
     parser.add_argument("spec", type=Path, nargs="?", default=SPEC)
     parser.add_argument("-n", "--number", type=int, default=40, help="draws (default: %(default)s; 0: no rates)")
     parser.add_argument("--jobs", type=int, nargs="*", default=[1, 2], help="processes (default: 1 2)")
+    parser.add_argument("--pools", nargs="*", choices=POOLS, default=list(POOLS), help="besides this process")
     parser.add_argument("--memory", type=int, default=0, metavar="RUNS")
     parser.add_argument("--json", type=Path, metavar="FILE")
     options = parser.parse_args()
     spec = load_spec(options.spec)
     found = {
-        "rates": rates(spec, options.number, options.jobs) if options.number else [],
+        "rates": rates(spec, options.number, options.jobs, options.pools) if options.number else [],
         "memory": grown(spec, options.memory),
     }
     if found["rates"]:
