@@ -100,7 +100,7 @@ class Spec:
 
     def scenario_of(self, values: Mapping[str, Any], index: int) -> Scenario:
         """The scenario with these values by dotted key, on the course of a draw; raises as `draw`."""
-        overrides = NOT_JUDGED | dict(self.fixed)
+        overrides = dict(self.fixed)
         if self.course is not None:
             distance = self._with(overrides).safe_distance
             try:
@@ -118,8 +118,8 @@ class Spec:
 
 @cache
 def _data(scenario: str) -> Any:
-    """What a scenario's file has, read once in a process: what a worker draws from does not change under its hands."""
-    return read_data(Path(scenario))[0]
+    """What is drawn from a scenario's file, which is read once in a process: it does not change under its hands."""
+    return read_data(Path(scenario))[0] | NOT_JUDGED
 
 
 def load_spec(path: Path) -> Spec:
