@@ -90,7 +90,7 @@ def build_diagram(
         UnknownNameError: if there is no such method or composition.
         PluginError: if it names a policy, route or task that cannot be made, or a plant has other ports.
     """
-    return build_model(scenario, method, composition, plants, monitor).diagram
+    return build_model(validated(scenario), method, composition, plants, monitor).diagram
 
 
 def build_model(
@@ -100,8 +100,7 @@ def build_model(
     plants: PlantFactory = components.first_order_plant,
     monitor: Monitor | None = None,
 ) -> Model:
-    """Build and wire all components of one method; arguments and errors are those of `build_diagram`."""
-    scenario = validated(scenario)
+    """Build and wire all components of one method of a valid scenario; else as `build_diagram`."""
     chosen = method_of(next(reversed(scenario.runs.values())).method if method is None else method)
     if composition not in COMPOSITIONS:
         raise UnknownNameError("composition", composition, COMPOSITIONS)

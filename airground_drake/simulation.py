@@ -13,7 +13,7 @@ import pandas as pd
 from pydrake.common import RandomGenerator
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 from pydrake.systems.framework import Context, DiagramBuilder
-from pydrake.systems.primitives import LogVectorOutput, VectorLogSink
+from pydrake.systems.primitives import LogVectorOutput, Multiplexer
 
 from airground_drake.arrays import Array
 from airground_drake.diagram import RECORDED, Model, build_model
@@ -25,13 +25,14 @@ from airground_drake.gatekeeper.prediction import Horizon, Scene, predicted_prob
 from airground_drake.gatekeeper.routes.relaxed import RelaxedRoute
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance, Composition, Surroundings, limit_speed
-from airground_drake.nsbc.kernels import distances, within
+from airground_drake.nsbc.kernels import distances, news_within, within
 from airground_drake.nsbc.law import UgvLaw
 from airground_drake.nsbc.motion import Motion
 from airground_drake.nsbc.team import Team
 from airground_drake.scenarios.load import resolved, validated
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.systems.decision import FIELDS
+from airground_drake.systems.lifetime import untie
 from airground_drake.trace import (
     DECISION_COLUMNS,
     PROBLEM_ARRAYS,
@@ -49,10 +50,7 @@ MERGE_S = 1e-9
 
 
 class Recorder:
-    """A model inside a diagram that logs its exported outputs at every step; reused for several seeds.
-
-    A Diagram with Python systems is never garbage-collected, so that one is built per method and process.
-    """
+    """A model inside a diagram that logs its exported outputs at every step; may be used for several seeds."""
 
     def __init__(self, scenario: Scenario, name: str) -> None:
         """Build the model of a run of the scenario and its loggers.
@@ -70,12 +68,14 @@ class Recorder:
         self._model: Model = build_model(self._scenario, self._run.method, composition)
         builder = DiagramBuilder()
         builder.AddSystem(self._model.diagram)
-        self._sinks: dict[str, VectorLogSink] = {}
-        for port in RECORDED:
-            self._sinks[port] = LogVectorOutput(self._model.diagram.GetOutputPort(port), builder)
-            self._sinks[port].set_name(f"log_{port}")
+        ports = [self._model.diagram.GetOutputPort(name) for name in RECORDED]
+        together = builder.AddNamedSystem("recorded_signals", Multiplexer([port.size() for port in ports]))
+        for i, port in enumerate(ports):
+            builder.Connect(port, together.get_input_port(i))
+        self._log = LogVectorOutput(together.get_output_port(), builder)  # one for all: a log costs a step 10 us
         self._root = builder.Build()
         self._root.set_name("recorded")
+        untie(self._root)
         warm_up()
 
     def simulate(
@@ -117,10 +117,12 @@ class Recorder:
 
     def _trace(self, context: Context, seed: int, wall: float) -> Trace:
         model, ugvs, robots = self._model, self._model.team.ugvs, self._model.team.robots
-        logs = {port: self._sinks[port].FindLog(context) for port in RECORDED}
-        t = logs["team_position"].sample_times()
-        keep = _distinct(t, logs["team_command"].data())
-        data = {port: log.data()[:, keep] for port, log in logs.items()}
+        log = self._log.FindLog(context)
+        ends = np.cumsum([model.diagram.GetOutputPort(name).size() for name in RECORDED])
+        data = dict(zip(RECORDED, np.split(log.data(), ends[:-1]), strict=True))
+        t = log.sample_times()
+        keep = _distinct(t, data["team_command"])
+        data = {name: rows[:, keep] for name, rows in data.items()}
         signals = _signals(t[keep], data, ugvs, robots)
         gatekeeper = model.gatekeeper
         decided = gatekeeper.decisions(gatekeeper.GetMyContextFromRoot(context)) if gatekeeper is not None else ()
@@ -230,7 +232,7 @@ def _problems(decided: Sequence[Decision]) -> pd.DataFrame:
 def warm_up() -> None:
     """Load the compiled kernels and the solver, once per process, so that no run's time includes that."""
     one, motion = np.ones((1, 3)), Motion(np.array([0.0, 1.0]), np.zeros((2, 3)))
-    within(one, one, 1.0)
+    news_within(one, one, 1.0, within(one, one, 1.0))
     distances(one, one[0])
     avoidance = Avoidance(gain=1.0, period=0.1)
     spaces = avoidance.half_spaces(one, one, Surroundings(np.zeros((1, 1, 3)), np.ones((1, 1)), np.ones((1, 1))))

@@ -51,7 +51,7 @@ TOUCHING_M = 0.05
 """A robot that did not arrive was stopped by what is no farther beyond the safe distance than this, m."""
 
 RUNS_PER_PROCESS = 25
-"""Drake never frees a diagram with Python systems, so that processes are replaced."""
+"""Then a process is replaced, whatever it has kept of what it ran."""
 
 SEPARATED, NO_PLAN, FEASIBLE = "separated", "no plan found", "feasible"
 

@@ -47,7 +47,7 @@ CERTIFIED = ("SAFE-TRACE", "SAFE-HYP")
 """Claims that must hold in every run (with a dwell, for ZENO-TRACE), and in those of method (d)."""
 
 RUNS_PER_PROCESS = 20
-"""Drake's diagrams with Python systems are never freed: processes are replaced."""
+"""Then a process is replaced, whatever it has kept of what it ran."""
 
 
 @dataclass

@@ -44,8 +44,8 @@ def local(jobs: int) -> Iterator[Pool]:
 def _locally(jobs: int, work: Callable[[int], T], items: Iterable[int]) -> Iterator[tuple[int, T | None]]:
     """See `Pool`.
 
-    Processes whose memory grows are replaced (loky sees to it): Drake never frees a diagram with Python systems. If
-    one dies, those items that it may have taken with it are done again, each in a process of its own.
+    A process whose memory grows, by code of others, is replaced (loky sees to it). If one dies, those items that it may
+    have taken with it are done again, each in a process of its own.
     """
     from joblib import Parallel, delayed
     from joblib.externals.loky.process_executor import BrokenProcessPool

@@ -18,6 +18,7 @@ import dataclasses
 import difflib
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +27,7 @@ from airground_drake.campaign.distributions import KINDS, Key, combinations, mad
 from airground_drake.campaign.rows import TIMES
 from airground_drake.errors import Fault, ScenarioError
 from airground_drake.registry import RUN_CLAIMS
-from airground_drake.scenarios.load import load, read_data, shipped
+from airground_drake.scenarios.load import from_data, load, read_data, shipped
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.finding import PLAIN_NAME
 
@@ -99,16 +100,26 @@ class Spec:
 
     def scenario_of(self, values: Mapping[str, Any], index: int) -> Scenario:
         """The scenario with these values by dotted key, on the course of a draw; raises as `draw`."""
-        overrides = NOT_JUDGED | dict(self.fixed)
+        overrides = dict(self.fixed)
         if self.course is not None:
-            distance = load(self.scenario, overrides)[0].safe_distance
+            distance = self._with(overrides).safe_distance
             try:
                 overrides |= self.course.values(stream(self.seed, COURSE, index), distance.obstacle_m, distance.ugv_m)
             except ValueError as error:
                 raise ScenarioError(self.source, COURSE, Fault(str(error)), "wanted: a larger field") from None
-        scenario = load(self.scenario, overrides | dict(values))[0]
+        scenario = self._with(overrides | dict(values))
         runs = {run: scenario.runs[run] for run in self.runs} if self.runs else scenario.runs
         return replace(scenario, name=f"{self.name}_{index}", runs=runs)
+
+    def _with(self, overrides: Mapping[str, Any]) -> Scenario:
+        """The scenario with values by dotted key; raises as `draw`."""
+        return from_data(_data(self.scenario), self.scenario, overrides)
+
+
+@cache
+def _data(scenario: str) -> Any:
+    """What is drawn from a scenario's file, which is read once in a process: it does not change under its hands."""
+    return read_data(Path(scenario))[0] | NOT_JUDGED
 
 
 def load_spec(path: Path) -> Spec:

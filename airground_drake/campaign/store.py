@@ -62,10 +62,11 @@ class Store:
         except BlockingIOError:
             os.close(self._journal)
             raise FolderError(one_line(f"{folder} is in use by another campaign command")) from None
-        self._in_parts = _read_parts(folder)
-        self._lately, whole = _read_journal(folder / JOURNAL, set(self._in_parts["index"]))
+        there_already = _read_parts(folder)
+        self._in_parts = [there_already]
+        self._lately, whole = _read_journal(folder / JOURNAL, set(there_already["index"]))
         os.ftruncate(self._journal, whole)
-        self.finished = {*self._in_parts["index"].tolist(), *self._lately}
+        self.finished = {*there_already["index"].tolist(), *self._lately}
 
     def add(self, rows: Sequence[Row]) -> None:
         """Keep the rows of a draw: when this returns, it is finished."""
@@ -89,13 +90,13 @@ class Store:
         number = len(list((self.folder / PARTS).glob("*.parquet")))
         files.write_bytes(self.folder / PARTS / f"part-{number:06d}.parquet", buffer.getvalue())
         os.ftruncate(self._journal, 0)
-        self._in_parts = pd.concat([self._in_parts, part], ignore_index=True)
+        self._in_parts.append(part)
         self._lately = {}
 
     def table(self) -> pd.DataFrame:
         """All rows of all finished draws, by index."""
         lately = _table([row for rows in self._lately.values() for row in rows])
-        both = pd.concat([self._in_parts, lately], ignore_index=True)
+        both = pd.concat([*self._in_parts, lately], ignore_index=True)
         return both.sort_values("index", kind="stable", ignore_index=True)
 
     def close(self) -> None:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import time
 from collections.abc import Collection, Mapping
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -33,7 +34,17 @@ def rows_of(spec: Spec, index: int, limits: Limits, *, allow_plugins: bool = Fal
     Returns:
         A row for each run and claim, with the columns of `rows.COLUMNS`.
     """
-    return rows_at(spec, spec.values(index), index, limits, allow_plugins=allow_plugins)
+    rows = rows_at(spec, spec.values(index), index, limits, allow_plugins=allow_plugins)
+    _keep_what_is_loaded()
+    gc.collect()  # Python does not see how large a diagram is, and would wait for hundreds
+    return rows
+
+
+@cache
+def _keep_what_is_loaded() -> None:
+    """Libraries and compiled code are no garbage: once they are loaded, collections need not look at them again."""
+    gc.collect()
+    gc.freeze()
 
 
 def rows_at(

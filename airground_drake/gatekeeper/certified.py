@@ -24,7 +24,7 @@ from airground_drake.gatekeeper.patience import Patience, Turn
 from airground_drake.gatekeeper.sample import Commitment, Gatekeepers, Memory, Situation
 from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT, Proposals, Report, answer_to
 from airground_drake.intervention.policy import Proposal
-from airground_drake.nsbc.kernels import within
+from airground_drake.nsbc.kernels import news_within, within
 from airground_drake.nsbc.law import UgvLaw
 from airground_drake.nsbc.motion import Motion
 from airground_drake.nsbc.team import Team
@@ -87,10 +87,12 @@ class CertifiedGatekeepers(Gatekeepers):
 
     def _remembered(self, positions: Array, memory: Memory) -> np.ndarray:
         """Which obstacles each UGV has sensed up to now, (n, m); the very same array if nothing is new."""
-        now = within(self._neighbourhood.obstacles, positions[:-1], self._law.avoidance.sensing_range)
-        if memory.sensed.shape != now.shape:
-            return now
-        return memory.sensed | now if (now > memory.sensed).any() else memory.sensed
+        points, own, reach = self._neighbourhood.obstacles, positions[:-1], self._law.avoidance.sensing_range
+        if memory.sensed.shape != (len(own), len(points)):
+            return within(points, own, reach)
+        if news_within(points, own, reach, memory.sensed):
+            return memory.sensed | within(points, own, reach)
+        return memory.sensed
 
     def _judge(
         self, seen: Situation, i: int, proposal: Proposal, turn: Turn

@@ -71,6 +71,18 @@ def within(points: Array, positions: Array, reach: float) -> npt.NDArray[np.bool
 
 
 @njit(cache=True)
+def news_within(points: Array, positions: Array, reach: float, known: npt.NDArray[np.bool_]) -> bool:
+    """Whether `within` would find a point that is not among the known ones, (n, m)."""
+    for i in range(len(positions)):
+        for k in range(len(points)):
+            if not known[i, k]:
+                x, y, z = points[k, 0] - positions[i, 0], points[k, 1] - positions[i, 1], points[k, 2] - positions[i, 2]
+                if np.sqrt(x * x + y * y + z * z) <= reach:
+                    return True
+    return False
+
+
+@njit(cache=True)
 def avoid_one(lower: Array, normal: Array, bound: Array, composition: int) -> Array:
     """Velocity of one robot, (3,) m/s: the avoidance tasks above `lower`; see `avoid`.
 

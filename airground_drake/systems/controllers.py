@@ -15,6 +15,7 @@ from airground_drake.nsbc.law import Intervention, UgvLaw
 from airground_drake.nsbc.task import Task
 from airground_drake.nsbc.tasks import FormationTask, PositionTask
 from airground_drake.nsbc.team import Team
+from airground_drake.systems.lifetime import weakly
 
 
 class UgvController(LeafSystem):
@@ -48,12 +49,13 @@ class UgvController(LeafSystem):
         accepted = self.DeclareDiscreteState(n)
         self.DeclareStateOutputPort("command", command)
         self.DeclareStateOutputPort("accepted", accepted)
-        self.DeclarePeriodicDiscreteUpdateEvent(law.avoidance.period, 0.0, self._update)
+        self.DeclarePeriodicDiscreteUpdateEvent(law.avoidance.period, 0.0, weakly(self._update))
 
     def _update(self, context: Context, discrete: DiscreteValues) -> None:
         positions = self._position.Eval(context).reshape(-1, 3)
         reference, rate = self._reference.Eval(context).reshape(2, -1, 3)
-        proposals = accepted_proposals(self._proposals.Eval(context), self._answers.Eval(context))
+        asked = self._proposals.Eval(context)
+        proposals = accepted_proposals(asked, self._answers.Eval(context)) if any(asked) else asked
         velocity = self.velocity(context.get_time(), positions, reference, rate, proposals)
         discrete.set_value(0, velocity.ravel())
         discrete.set_value(1, [float(proposal is not None) for proposal in proposals])
@@ -125,7 +127,7 @@ class UavController(LeafSystem):
         self._ugv_command = self.DeclareVectorInputPort("ugv_command", 3 * n)
         command = self.DeclareDiscreteState(3)
         self.DeclareStateOutputPort("command", command)
-        self.DeclarePeriodicDiscreteUpdateEvent(avoidance.period, 0.0, self._update)
+        self.DeclarePeriodicDiscreteUpdateEvent(avoidance.period, 0.0, weakly(self._update))
 
     def _update(self, context: Context, discrete: DiscreteValues) -> None:
         positions = self._position.Eval(context).reshape(-1, 3)

@@ -29,6 +29,7 @@ from airground_drake.decision.excursion import (
 )
 from airground_drake.decision.trigger import Mode, Trigger, TriggerState
 from airground_drake.nsbc.motion import Motion
+from airground_drake.systems.lifetime import weakly
 
 FIELDS = 4
 """Numbers of the trigger's state per UGV: mode, triggers, triggered_at, released_at."""
@@ -56,7 +57,7 @@ class DecisionVariable(LeafSystem):
         self.DeclareVectorOutputPort(
             "decision_variable",
             count,
-            self._calc,
+            weakly(self._calc),
             prerequisites_of_calc={self._position.ticket(), self._reference.ticket(), self._noise.ticket()},
         )
 
@@ -103,10 +104,10 @@ class EventTrigger(LeafSystem):
         status = self.DeclareDiscreteState(_pack([TriggerState()] * count))
         self.DeclareDiscreteState(1 + 7 * count)
         self.DeclareStateOutputPort("status", status)
-        self.DeclareInitializationUnrestrictedUpdateEvent(self._start)
-        self.DeclarePerStepDiscreteUpdateEvent(self.update)
+        self.DeclareInitializationUnrestrictedUpdateEvent(weakly(self._start))
+        self.DeclarePerStepDiscreteUpdateEvent(weakly(self.update))
         direction = WitnessFunctionDirection.kPositiveThenNonPositive
-        self._witness = self.MakeWitnessFunction("a transition is due", direction, self.nothing_due)
+        self._witness = self.MakeWitnessFunction("a transition is due", direction, weakly(self.nothing_due))
 
     def DoGetWitnessFunctions(self, context: Context) -> list[WitnessFunction]:
         """The one witness."""

@@ -11,6 +11,7 @@ from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSys
 from airground_drake.gatekeeper.answer import Decision
 from airground_drake.gatekeeper.sample import Gatekeepers, Memory
 from airground_drake.intervention.messages import ACCEPT, SILENT, Report
+from airground_drake.systems.lifetime import weakly
 from airground_drake.systems.ticks import Ticks
 
 
@@ -42,12 +43,12 @@ class Gatekeeper(LeafSystem):
         state = self.DeclareAbstractState(Value(Memory.empty(n)))
         self._state = int(state)
         held = {self.abstract_state_ticket(state)}
-        self.DeclareVectorOutputPort("answers", 2 * n, self._calc_answers, prerequisites_of_calc=held)
+        self.DeclareVectorOutputPort("answers", 2 * n, weakly(self._calc_answers), prerequisites_of_calc=held)
         self.DeclareAbstractOutputPort(
-            "reports", lambda: Value(object()), self._calc_reports, prerequisites_of_calc=held
+            "reports", lambda: Value(object()), weakly(self._calc_reports), prerequisites_of_calc=held
         )
         self._ticks = Ticks(period, control)
-        self.DeclarePeriodicUnrestrictedUpdateEvent(self._ticks.period, 0.0, self._update)
+        self.DeclarePeriodicUnrestrictedUpdateEvent(self._ticks.period, 0.0, weakly(self._update))
 
     @property
     def decision_times_s(self) -> list[float]:
@@ -100,7 +101,7 @@ class DirectAcceptance(LeafSystem):
         super().__init__()
         self._proposals = self.DeclareAbstractInputPort("proposals", Value(object()))
         self.DeclareVectorOutputPort(
-            "answers", 2 * count, self._calc_answers, prerequisites_of_calc={self._proposals.ticket()}
+            "answers", 2 * count, weakly(self._calc_answers), prerequisites_of_calc={self._proposals.ticket()}
         )
         self.DeclareAbstractOutputPort(
             "reports",

@@ -8,6 +8,7 @@ from pydrake.systems.framework import Context, EventStatus, LeafSystem, State
 from airground_drake.decision.excursion import INTERVENING
 from airground_drake.intervention.planner import Planner, PlannerMemory
 from airground_drake.systems.decision import FIELDS
+from airground_drake.systems.lifetime import weakly
 from airground_drake.systems.ticks import Ticks
 
 
@@ -35,11 +36,11 @@ class InterventionPlanner(LeafSystem):
         self.DeclareAbstractOutputPort(
             "proposals",
             lambda: Value(object()),
-            self._calc_proposals,
+            weakly(self._calc_proposals),
             prerequisites_of_calc={self.abstract_state_ticket(held)},
         )
         self._ticks = Ticks(planner.period, planner.period if control_period is None else control_period)
-        self.DeclarePeriodicUnrestrictedUpdateEvent(self._ticks.period, 0.0, self._update)
+        self.DeclarePeriodicUnrestrictedUpdateEvent(self._ticks.period, 0.0, weakly(self._update))
 
     def memory(self, context: Context) -> PlannerMemory:
         """What was sent and what went wrong, up to the context's time."""

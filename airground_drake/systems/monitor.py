@@ -16,6 +16,7 @@ from airground_drake.intervention.messages import accepted_proposals
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.team import Team
+from airground_drake.systems.lifetime import weakly
 
 INEQUALITY_TOLERANCE_M_S = 1e-9
 """By this much a velocity may miss an inequality or a limit, m/s, as in SAFE-HYP: rounding errs by 1e-13 m/s."""
@@ -124,9 +125,9 @@ class Monitor(LeafSystem):
         self._answers = self.DeclareVectorInputPort("answers", 2 * n)
         self._memory = self.DeclareAbstractState(Value(Memory()))
         self.DeclareVectorOutputPort(
-            "violation", 5, self._calc, prerequisites_of_calc={self.abstract_state_ticket(self._memory)}
+            "violation", 5, weakly(self._calc), prerequisites_of_calc={self.abstract_state_ticket(self._memory)}
         )
-        self.DeclarePeriodicUnrestrictedUpdateEvent(avoidance.period, 0.0, self._update)
+        self.DeclarePeriodicUnrestrictedUpdateEvent(avoidance.period, 0.0, weakly(self._update))
 
     def violation(self, context: Context) -> Violation | None:
         """The first one up to the context's time."""

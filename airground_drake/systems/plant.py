@@ -6,6 +6,8 @@ from collections.abc import Sequence
 
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
+from airground_drake.systems.lifetime import weakly
+
 
 class VelocityDisturbance(LeafSystem):
     """Adds a disturbance to the command of each robot: p_dot = v + w, the disturbance w of SAFE-DIST.
@@ -22,7 +24,7 @@ class VelocityDisturbance(LeafSystem):
         self._disturbances = [self.DeclareVectorInputPort(f"disturbance_{robot}", 3) for robot in robots]
         inputs = (self._command, *self._disturbances)
         self.DeclareVectorOutputPort(
-            "velocity", 3 * len(robots), self._calc, prerequisites_of_calc={port.ticket() for port in inputs}
+            "velocity", 3 * len(robots), weakly(self._calc), prerequisites_of_calc={port.ticket() for port in inputs}
         )
 
     def _calc(self, context: Context, output: BasicVector) -> None:

@@ -15,9 +15,6 @@ and the defaults of the schema.
     def test_distances_are_kept(scenario):
         (run,) = scenario.runs
         assert_holds(simulate(scenario, run), "SAFE-TRACE", "SAFE-HYP")
-
-Drake never frees a diagram with Python systems: a simulated example costs memory for the rest of the process, some
-megabytes each.
 """
 
 from __future__ import annotations

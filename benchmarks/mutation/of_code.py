@@ -323,14 +323,14 @@ LAW = (
     Mutant(
         "UGVs sampled at half the rate",
         "systems/controllers.py",
-        "self.DeclarePeriodicDiscreteUpdateEvent(law.avoidance.period, 0.0, self._update)",
-        "self.DeclarePeriodicDiscreteUpdateEvent(2.0 * law.avoidance.period, 0.0, self._update)",
+        "self.DeclarePeriodicDiscreteUpdateEvent(law.avoidance.period, 0.0, weakly(self._update))",
+        "self.DeclarePeriodicDiscreteUpdateEvent(2.0 * law.avoidance.period, 0.0, weakly(self._update))",
     ),
     Mutant(
         "the UAV sampled half a period later",
         "systems/controllers.py",
-        "self.DeclarePeriodicDiscreteUpdateEvent(avoidance.period, 0.0, self._update)",
-        "self.DeclarePeriodicDiscreteUpdateEvent(avoidance.period, 0.5 * avoidance.period, self._update)",
+        "self.DeclarePeriodicDiscreteUpdateEvent(avoidance.period, 0.0, weakly(self._update))",
+        "self.DeclarePeriodicDiscreteUpdateEvent(avoidance.period, 0.5 * avoidance.period, weakly(self._update))",
     ),
     Mutant(
         "reference and its rate exchanged",
