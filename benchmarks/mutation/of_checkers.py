@@ -300,7 +300,7 @@ CHECKER = (
         "LARGEST_GAP = 0.05",
         "LARGEST_GAP = 0.5",
         runs=(),
-        tamperings=("GATE-OPT",),
+        tests=("tests/check/test_optimality.py",),
     ),
     Mutant(
         "checker: bounds overstated by a tenth",

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from airground_drake.check import optimality
 from airground_drake.check.decisions import Decision
-from airground_drake.check.optimality import NARROW, enclose, least_squares
+from airground_drake.check.optimality import NARROW, Enclosure, enclose, gate_opt, least_squares
 
 
 def decision(relaxed: np.ndarray, centres_m: list[list[float]], terminal_weight_s: float) -> Decision:
@@ -82,3 +84,23 @@ def test_least_squares_are_not_negative() -> None:
         gradient = matrix.T @ (matrix @ x - right)
         assert (gradient >= -1e-6).all()
         assert abs(gradient @ x) <= 1e-6
+
+
+@pytest.mark.parametrize(("gap", "status"), [(0.04, "holds"), (0.06, "inconclusive")])
+def test_a_plan_is_at_most_a_twentieth_dearer_than_the_optimum(
+    gap: float, status: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    problem = decision(np.full(12, 0.5), [[1.5, 0.3, 0.0]], 0.0)
+    optimum = float(problem.cost(problem.positions_m)) - gap * problem.scale
+    monkeypatch.setattr(optimality, "silent_ugvs", lambda run: [])
+    monkeypatch.setattr(optimality, "decisions_of", lambda run: [problem])
+    monkeypatch.setattr(optimality, "enclose", lambda _: Enclosure(optimum, optimum))
+    others = (
+        "_no_dearer_than_constant_plans",
+        "_bound_and_gap_are_not_overstated",
+        "_no_plan_of_blocks_is_much_cheaper",
+    )
+    for rule in others:
+        monkeypatch.setattr(optimality, rule, lambda *_: None)
+    found = gate_opt(SimpleNamespace(scenario={"gatekeeper": {"route": "relaxed"}}), {})
+    assert found.status == status

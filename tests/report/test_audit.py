@@ -89,13 +89,15 @@ def test_without_proofs_the_items_that_rest_on_them_are_not_demonstrated(proofs:
     assert found == {number: number not in (2, 9) for number in FORMULAS}
 
 
-def test_every_mutant_of_the_proofs_is_refuted() -> None:
-    """On case A, as the tests beside the proofs, which look at each: all take what the first one has found."""
-    found = refute_mutants(load("case_a")[0], kept=cache_folder())
+@pytest.mark.parametrize("name", ["case_a", "case_b"])
+def test_every_mutant_of_the_proofs_is_refuted(name: str) -> None:
+    """On case A as the tests beside the proofs, which look at each: all take what the first one has found."""
+    scenario = load(name)[0]
+    found = refute_mutants(scenario, kept=cache_folder())
     assert len(found) >= 30
     assert [mutant for mutant in found if not mutant["refuted"]] == []
     assert {mutant["claim"] for mutant in found} == set(MODEL_CLAIMS)
-    again = refute_mutants(load("case_a")[0], kept=cache_folder())
+    again = refute_mutants(scenario, kept=cache_folder())
     assert any(mutant["from_cache"] for mutant in again)
     assert [mutant | {"from_cache": False} for mutant in again] == [mutant | {"from_cache": False} for mutant in found]
 

@@ -45,11 +45,14 @@ def compositions_of(scenario: Scenario) -> list[str]:
 def built_from(scenario: Scenario) -> Inputs:
     """The scenario that the diagram of method (d) is built from, strict JSON: without anything by others.
 
-    Policies, route and the UAV's task may be others' code; the proofs trust in none of them, and the comparison of
-    `wiring.py` takes their place at the controllers' ports.
+    Its name and seed are set, as no controller gets either: one proof serves all seeds. Policies, route and the UAV's
+    task may be others' code; the proofs trust in none of them, and the comparison of `wiring.py` takes their place at
+    the controllers' ports.
     """
     bare = replace(
         scenario,
+        name="built",
+        seed=0,
         title="",
         description="",
         uav=replace(scenario.uav, task="formation"),
