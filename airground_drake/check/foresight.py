@@ -245,8 +245,9 @@ def _way_around(start: Array, goal: Array, centres: Array, radii: Array) -> Arra
     before = np.zeros(len(nodes), dtype=np.intp)
     left = np.full(len(nodes), True)
     while left.any():
-        here = int(np.where(left, length, np.inf).argmin())
-        if not np.isfinite(length[here]) or here == 1:
+        to_go = np.where(left, length, np.inf)
+        here = int(to_go.argmin())
+        if np.isinf(to_go[here]) or here == 1:
             break
         left[here] = False
         legs = nodes - nodes[here]

@@ -54,8 +54,7 @@ class UgvController(LeafSystem):
     def _update(self, context: Context, discrete: DiscreteValues) -> None:
         positions = self._position.Eval(context).reshape(-1, 3)
         reference, rate = self._reference.Eval(context).reshape(2, -1, 3)
-        asked = self._proposals.Eval(context)
-        proposals = accepted_proposals(asked, self._answers.Eval(context)) if any(asked) else asked
+        proposals = accepted_proposals(self._proposals.Eval(context), self._answers.Eval(context))
         velocity = self.velocity(context.get_time(), positions, reference, rate, proposals)
         discrete.set_value(0, velocity.ravel())
         discrete.set_value(1, [float(proposal is not None) for proposal in proposals])

@@ -819,8 +819,8 @@ MIX_UPS = (
     Mutant(
         "obstacles out of sight are forgotten",
         "gatekeeper/certified.py",
-        "return memory.sensed | now if (now > memory.sensed).any() else memory.sensed",
-        "return now",
+        "return memory.sensed | within(points, own, reach)",
+        "return within(points, own, reach)",
         runs=("crowd d",),
         tests=("tests/gatekeeper/test_certified.py",),
     ),

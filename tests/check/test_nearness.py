@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -30,12 +29,11 @@ def test_no_pair_comes_nearer_than_its_balls(seed: int, rows: int, step: float) 
 
 
 @pytest.fixture(scope="module")
-def judged(report: Callable[[str], Path]) -> tuple[Run, dict[str, Any], dict[str, Any]]:
+def judged(report: Path) -> tuple[Run, dict[str, Any], dict[str, Any]]:
     """A run, its claim SAFE-TRACE, and its metrics."""
-    folder = report("case_b")
-    document = json.loads((folder / "report.json").read_text(encoding="utf-8"))
+    document = json.loads((report / "report.json").read_text(encoding="utf-8"))
     claim = next(claim for claim in document["claims"] if (claim["id"], claim["run"]) == ("SAFE-TRACE", "d"))
-    return read_run(folder / "trace" / "d", "d", document), claim, document["runs"]["d"]["metrics"]
+    return read_run(report / "trace" / "d", "d", document), claim, document["runs"]["d"]["metrics"]
 
 
 def test_the_pairs_that_are_listed_are_those_of_least_margin(

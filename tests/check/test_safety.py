@@ -27,8 +27,8 @@ RUN = cast(
 def test_a_distance_that_is_short_refutes(monkeypatch: pytest.MonkeyPatch, short_m: float, status: str) -> None:
     monkeypatch.setattr(safety, "least_distance_m", lambda run, pair: pair.safe_m - short_m)
     monkeypatch.setattr(safety, "_evidence_on_a_pair", lambda *_: None)
-    noted = {"first": "ugv1", "second": "rock", "exercised": True}
-    claim = {"evidence": {"pairs": [noted]}, "where": noted}
+    noted = {"first": "ugv1", "second": "rock", "exercised": True, "margin_m": -short_m}
+    claim = {"evidence": {"pairs": [noted], "pairs_in_all": 1}, "where": noted}
     assert safety.safe_trace(RUN, claim).status == status
 
 

@@ -90,7 +90,7 @@ def test_more_of_anything_never_asks_for_less(method: str, key: str, factor: int
         ("gatekeeper.horizon_s", 1.5e6, "c"),
         ("gatekeeper.longest_s", 1e9, "d"),
         ("gatekeeper.settling_s", 1e9, "d"),
-        ("obstacles", {f"o{i}": {"position_m": [1e3 + 9.0 * i, 0.0, 0.0]} for i in range(2_000)}, "b"),
+        ("obstacles", {f"o{i}": {"position_m": [1e3 + 9.0 * i, 0.0, 0.0]} for i in range(4_000)}, "b"),
     ],
 )
 def test_what_would_never_end_is_refused_in_one_line(key: str, value: object, method: str) -> None:
