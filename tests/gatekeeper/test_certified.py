@@ -20,9 +20,9 @@ ROCK = np.array([[3.0, 0.0, 0.0]])
 STAYS = Motion(np.array([0.0, 5.0]), np.array([[20.0, 0.0, 0.0], [20.0, 0.0, 0.0]]))
 
 
-def gatekeepers(*ugvs: str) -> CertifiedGatekeepers:
+def gatekeepers(*ugvs: str, rocks: np.ndarray = ROCK) -> CertifiedGatekeepers:
     """Of UGVs that are to be at (20, 0), with a rock on the way and a sensing range of 4 m."""
-    team = Team(ugvs, "uav", ROCK, 2.0, 2.0, 1.0, np.full(len(ugvs) + 1, 3.0))
+    team = Team(ugvs, "uav", rocks, 2.0, 2.0, 1.0, np.full(len(ugvs) + 1, 3.0))
     law = UgvLaw(Avoidance(3.0, 0.05, 4.0), 2.0, 1.5, intervention_on_top=False)
     patience = Patience(most=2, rest=1.0, longest=5.0, lag=0.5, behind=1.0)
     preset = Motion(np.zeros(1), np.array([[20.0, 0.0, 0.0]]))
@@ -42,6 +42,14 @@ def test_an_obstacle_that_was_in_sight_is_known_when_it_is_out_of_it(passed: boo
     places = np.array([[20.0, 0.0, 0.0], [20.0, 0.0, 2.0]])
     discs, _ = gate._known(Situation(0.1, (proposal,), places, np.zeros((2, 3)), memory), 0, proposal)
     assert discs.tolist() == ROCK[:known].tolist()
+
+
+def test_what_comes_into_sight_does_not_replace_what_was() -> None:
+    rocks = np.concatenate([ROCK, [[22.0, 3.0, 0.0]]])
+    gate, memory = gatekeepers("ugv", rocks=rocks), Memory.empty(1)
+    for t, x, known in ((0.0, 0.0, [True, False]), (0.05, 20.0, [True, True]), (0.1, 40.0, [True, True])):
+        memory = sampled(gate, t, x, None, memory)
+        assert memory.sensed.tolist() == [known]
 
 
 def test_the_first_sample_decides_and_what_makes_no_difference_is_refused() -> None:
