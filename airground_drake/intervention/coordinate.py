@@ -23,6 +23,9 @@ MOST_REFUSALS = 3
 """A UGV that is not triggered is not asked again once it has refused so often to make way."""
 MOST_PLANS = 4
 """Joint plans that are made at most for one proposal, each for more robots."""
+NARROWER = (1.0, 0.1, 0.01)
+"""Shares of the clearance that are tried one after the other, while the UGV that is planned for has no way even alone:
+its own task may have taken it through a gap with no room for more."""
 ON_PRESET_M = 0.5
 """A motion that ends within this of the preset goes on along it."""
 BLEND_S = 1.0
@@ -35,7 +38,7 @@ class Coordinate(Policy):
     First only the triggered UGVs that have no proposal in force are planned for, round obstacles, robots that stand,
     and the predicted motions of the others. If they find no way, those in their way are planned for, too, if they are
     willing: a parked one steps aside and comes back. If nothing serves, as many move as can. One plan concerns all: its
-    proposals have the same time of issue.
+    proposals have the same time of issue. A UGV that would find no way even alone is planned for with less clearance.
 
     Attributes:
         speed: largest, m/s; of each UGV no more than SHARE of its limit.
@@ -69,7 +72,18 @@ class Coordinate(Policy):
         """Motions by UGV; None if no triggered UGV can be helped."""
         if not seen.team:
             return None
-        space = self._space(seen)
+        own, tried = [mate.name for mate in seen.team].index(seen.robot), []
+        for share in NARROWER:
+            space = self._space(seen, share * self.clearance)
+            tried.append(self._joint(seen, space))
+            lost = tried[-1][0][0]
+            if not lost or self._alone(seen, space, own) is not None:
+                break
+        _, group, found = min(tried, key=lambda each: each[0])
+        return self._proposals(seen, group, found)
+
+    def _joint(self, seen: Observation, space: Space) -> tuple[tuple[float, ...], list[int], Plan]:
+        """The best plan, its cost and whom it is for."""
         everyone = range(len(seen.team))
         group = [i for i in everyone if seen.team[i].name == seen.robot or _waits(seen.team[i], seen.t)]
         best: tuple[list[int], Plan] | None = None
@@ -86,7 +100,7 @@ class Coordinate(Policy):
                 break
             group = sorted([*group, *more])
         assert best is not None
-        return self._proposals(seen, *best)
+        return least, *best
 
     def _plan(self, seen: Observation, space: Space, group: Sequence[int]) -> Plan:
         team = seen.team
@@ -103,14 +117,18 @@ class Coordinate(Policy):
         for i, way in zip(group, found.ways, strict=True):
             if way is not None or not seen.team[i].triggered:
                 continue
-            mate = seen.team[i]
-            pace = min(self.speed, SHARE * mate.max_speed)
-            (alone,) = plan(space, [errand(mate, seen.start)], [pace], follow=self.follow).ways
+            mate, alone = seen.team[i], self._alone(seen, space, i)
             if alone is None:
                 continue
             near = {j: self.spacing + space.apart + (mate.radius + seen.team[j].radius) for j in others}
             more |= {j for j in others if distance(alone.motion, ahead[j]) < near[j]}
         return sorted(more or others)
+
+    def _alone(self, seen: Observation, space: Space, i: int) -> Way | None:
+        """What a UGV would do if there were no others."""
+        mate = seen.team[i]
+        pace = min(self.speed, SHARE * mate.max_speed)
+        return plan(space, [errand(mate, seen.start)], [pace], follow=self.follow).ways[0]
 
     def _proposals(self, seen: Observation, group: Sequence[int], found: Plan) -> dict[str, Motion] | None:
         motions = {}
@@ -122,11 +140,11 @@ class Coordinate(Policy):
         helped = any(seen.team[i].triggered and seen.team[i].name in motions for i in group)
         return motions if helped else None
 
-    def _space(self, seen: Observation) -> Space:
+    def _space(self, seen: Observation, clearance: float) -> Space:
         """What UGVs without bodies keep away from in the plane of the one that is planned for."""
         radii = seen.safe_distance + np.broadcast_to(seen.obstacle_radii, len(seen.obstacles))
         above = seen.obstacles[:, 2] - float(seen.position[2])
-        return Space(seen.obstacles[:, :2], radii, self.clearance, seen.robot_distance, self.spacing, above)
+        return Space(seen.obstacles[:, :2], radii, clearance, seen.robot_distance, self.spacing, above)
 
 
 def errand(mate: Teammate, start: float) -> Errand:

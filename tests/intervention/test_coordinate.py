@@ -37,6 +37,12 @@ BAY = [
     *((x, 7.0) for x in (2.0, 4.0, 6.0, 8.0)), (1.0, 5.0), (9.5, 5.0),
 ]  # fmt: skip
 """A corridor along y = 0 in which two robots cannot pass each other, with a bay above 3 m < x < 8 m."""
+TRAP = [
+    (8.115876, 1.431656), (13.292501, 0.287848), (3.983709, -4.271705), (7.562889, 4.727434), (5.863896, 4.08611),
+    (0.434908, -4.559956), (4.720305, -0.689488), (8.237888, -1.205923),
+]  # fmt: skip
+"""Between the first and the last but one there are 3.5 mm more than a UGV needs; behind it, between the first and the
+last, is no way on. A random course (`benchmarks/liveness.py --only 402`)."""
 COMES = mate("comes", [-1.0, 0.0], [12.0, 0.0])
 PARKED = mate("parked", [2.0, 0.0], [2.0, 0.0], triggered=False)
 
@@ -68,6 +74,14 @@ def test_a_parked_robot_is_asked_aside_and_back_only_where_it_is_in_the_way() ->
     assert np.abs(found["parked"].positions - [2.0, 0.0, 0.0]).max() > 2.0
     assert least_distance(found["comes"], found["parked"]) >= 2.0 - 1e-9
     assert list(propose(seen([COMES, PARKED]))) == ["comes"]  # there is room to go round
+
+
+def test_a_robot_that_went_through_a_narrow_gap_is_led_back_through_it() -> None:
+    trapped = mate("trapped", [6.67613121, 0.04344314], [20.0, 0.0])
+    found = propose(seen([trapped], TRAP))["trapped"]
+    assert found.positions[-1].tolist() == [20.0, 0.0, 0.0]
+    ways = found.sample(np.linspace(found.times[0], found.end, 5000))[:, None, :2] - np.array(TRAP)
+    assert np.linalg.norm(ways, axis=2).min() >= 2.0 - 1e-6
 
 
 @pytest.mark.parametrize(
