@@ -24,6 +24,8 @@ width have room for a team."""
 
 _PAPER = {"case_a": (3, 4, 5, 6), "case_b": (7, 8, 9, 10)}
 """Numbers of the paper's figures, by the beginning of a scenario's name."""
+FARTHEST = 10.0
+"""Distances are drawn up to so many safe distances: nobody looks for what is on the other side of a fleet's field."""
 _HAPPENINGS = ("trigger", "release", "proposal", "accept", "refuse", "collision")
 
 
@@ -167,11 +169,15 @@ def _distances(chosen: _Selection) -> Figure:
         run: {f"{ugv} to {name}": gap_m(trace, ugv, name) for ugv in chosen.ugvs for name in chosen.obstacles}
         for run, trace in chosen.runs.items()
     }
-    top = 1.05 * max(float(gap.max()) for each in gaps.values() for gap in each.values())
+    largest = max(float(gap.max()) for each in gaps.values() for gap in each.values())
+    first = next(iter(chosen.runs.values()))
+    far = FARTHEST * float(first.scenario["safe_distance"]["obstacle_m"])
+    top = 1.05 * min(largest, far)
     caption = (
         "No line may enter the hatched band below the safe distance d. The circle marks the smallest distance, which "
         "is exact in continuous time: robots move on straight lines between samples."
         f"{' Distances are of surfaces.' if _has_bodies(chosen) else ''}{_left_out(chosen, chosen.ugvs)}"
+        f"{f' What is farther away than {far:g} m is not drawn.' if largest > far else ''}"
     )
 
     def describe(trace: Trace) -> str:

@@ -66,6 +66,8 @@ def distances(trace: Trace, ugvs: Sequence[str], obstacles: Sequence[str], top: 
         labels = [(d, f"d = {d:g}", INK)]
         for position, name in enumerate(obstacles):
             gap = gap_m(trace, ugv, name)
+            if gap.min() > top:
+                continue
             time_line(axes, trace.t, gap, look(position))
             labels.append((float(gap[-1]), short(name, 12), look(position).color))
         axes.set_ylim(0.0, top)
