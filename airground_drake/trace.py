@@ -104,6 +104,8 @@ def no_proposals() -> pd.DataFrame:
 class Trace:
     """One run.
 
+    Its tables are not to be changed, as what follows from them is kept: `dataclasses.replace` makes another run.
+
     Attributes:
         meta: strict JSON: `schema`, `run` (identifier), `method`, `composition`, `seed`, `robots`, `ugvs`
             (names, array order; the UAV is the last robot), `zeta_m` (threshold in force), `scenario` (the

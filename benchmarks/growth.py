@@ -24,8 +24,8 @@ from airground_drake import files, trace
 from airground_drake.campaign.course import Course
 from airground_drake.check.report import check_report
 from airground_drake.report import document, html
+from airground_drake.report.after_runs import provenance
 from airground_drake.report.figures.draw import draw
-from airground_drake.report.make import _provenance
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.simulation import simulate
@@ -76,7 +76,7 @@ def measured(scenario: Scenario) -> dict[str, float]:
         folder = Path(made)
 
         def report() -> None:
-            whole = document.build(scenario, "", {"d": run}, verdicts, _provenance(scenario, files_at, ""))
+            whole = document.build(scenario, "", {"d": run}, verdicts, provenance(scenario, files_at, ""))
             names = [f"trace/d/{name}" for name in trace.save(run, folder / "trace" / "d")]
             files.write_text(folder / "report.html", html.render(whole, draw(scenario, {"d": run}), ""))
             files.write_json(folder / "report.json", document.sealed(whole, folder, [*names, "report.html"]))

@@ -38,6 +38,8 @@ MUTANTS: tuple[Mutant, ...] = (
     *of_code.TEAM, *of_code.BODIES, *of_code.KERNELS, *of_code.LAW, *of_code.DECISION, *of_code.INTERVENTION,
     *of_code.GATEKEEPER, *of_code.MIX_UPS, *of_checkers.CLAIMS, *of_checkers.CHECKER,
 )  # fmt: skip
+LONGEST_S = 900
+"""Time of a command, s: a mutant may run for ever."""
 NOT_COMPARED = ("GATE-TIME",)
 """Claims that depend on what else the machine does."""
 
@@ -89,10 +91,14 @@ class Copy:
         self._server.wait()
 
     def run(self, *command: str) -> subprocess.CompletedProcess[str]:
-        """A command in the copy, on its package."""
-        return subprocess.run(
-            command, cwd=self.folder, env=self._environment, capture_output=True, text=True, check=False
-        )
+        """A command in the copy, on its package; one that does not end in time has failed."""
+        try:
+            return subprocess.run(
+                command, cwd=self.folder, env=self._environment, capture_output=True, text=True, check=False,
+                timeout=LONGEST_S,
+            )  # fmt: skip
+        except subprocess.TimeoutExpired:
+            return subprocess.CompletedProcess(command, 1, f"FAILED no end within {LONGEST_S} s", "")
 
     def probe(self, kind: str, *what: str) -> list[list[str]]:
         """Findings of `mutation/probe.py`; one that says so where its process ends otherwise."""

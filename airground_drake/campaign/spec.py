@@ -17,8 +17,7 @@ from __future__ import annotations
 import dataclasses
 import difflib
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, replace
-from functools import cache
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -54,6 +53,7 @@ class Spec:
         marks: values to be found in distributions of times, by column.
         digest: SHA-256 of the file.
         source: its path.
+        data: what the scenario's file held when the campaign was read, without what is not judged.
     """
 
     name: str
@@ -68,6 +68,7 @@ class Spec:
     marks: Mapping[str, float]
     digest: str
     source: str
+    data: Any = field(repr=False)
 
     @property
     def combinations(self) -> int:
@@ -113,13 +114,7 @@ class Spec:
 
     def _with(self, overrides: Mapping[str, Any]) -> Scenario:
         """The scenario with values by dotted key; raises as `draw`."""
-        return from_data(_data(self.scenario), self.scenario, overrides)
-
-
-@cache
-def _data(scenario: str) -> Any:
-    """What is drawn from a scenario's file, which is read once in a process: it does not change under its hands."""
-    return read_data(Path(scenario))[0] | NOT_JUDGED
+        return from_data(self.data, self.scenario, overrides)
 
 
 def load_spec(path: Path) -> Spec:
@@ -134,10 +129,11 @@ def load_spec(path: Path) -> Spec:
     name = given.get("name", path.stem)
     if not isinstance(name, str) or not PLAIN_NAME.fullmatch(name):
         raise ScenarioError(source, "name", name, f"wanted: {PLAIN_NAME.pattern}")
+    scenario = _scenario(given.get("scenario"), path)
     spec = Spec(
         name,
         _text(given.get("title", ""), source, "title"),
-        _scenario(given.get("scenario"), path),
+        scenario,
         _names(given.get("runs", []), source, "runs"),
         _seed(given.get("seed", 0), source),
         _keys(given.get("set", {}), source, "set"),
@@ -147,10 +143,16 @@ def load_spec(path: Path) -> Spec:
         _marks(given.get("marks", {}), source),
         digest,
         source,
+        _judged_part(scenario),
     )  # fmt: skip
     _known(spec.runs, spec.base().runs, source, "runs")
     _known(spec.claims, tuple(RUN_CLAIMS), source, "claims")
     return spec
+
+
+def _judged_part(scenario: str) -> dict[str, Any]:
+    data = read_data(Path(scenario))[0]
+    return data | NOT_JUDGED if isinstance(data, dict) else {}  # `Spec.base` says what is wrong, and in which line
 
 
 def _mapping(given: Any, source: str, key: str, allowed: Collection[str]) -> dict[str, Any]:

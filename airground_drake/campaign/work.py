@@ -34,10 +34,7 @@ def rows_of(spec: Spec, index: int, limits: Limits, *, allow_plugins: bool = Fal
     Returns:
         A row for each run and claim, with the columns of `rows.COLUMNS`.
     """
-    rows = rows_at(spec, spec.values(index), index, limits, allow_plugins=allow_plugins)
-    _keep_what_is_loaded()
-    gc.collect()  # Python does not see how large a diagram is, and would wait for hundreds
-    return rows
+    return rows_at(spec, spec.values(index), index, limits, allow_plugins=allow_plugins)
 
 
 @cache
@@ -70,6 +67,9 @@ def rows_of_scenario(
             return [row for run in scenario.runs for row in _rows_of_run(scenario, run, spec.claims, common)]
     except AirgroundError as error:
         return [common | {"ended": INVALID, "what": one_line(str(error))}]
+    finally:
+        _keep_what_is_loaded()
+        gc.collect()  # Python does not see how large a diagram is, and would wait for hundreds
 
 
 def _rows_of_run(scenario: Scenario, run: str, claims: Collection[str], common: Row) -> list[Row]:

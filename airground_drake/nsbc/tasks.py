@@ -6,8 +6,6 @@ a constant Jacobian allows; tests hold those against the tasks as stated here.
 
 from __future__ import annotations
 
-from functools import cache
-
 import numpy as np
 
 from airground_drake.arrays import Array
@@ -84,14 +82,8 @@ class FormationTask(PositionTask):
 
     def __init__(self, ugv_positions: Array, ugv_velocities: Array, altitude: float, gain: float) -> None:
         """Fly `altitude` m over the centroid of UGVs at (n, 3) m moving at (n, 3) m/s."""
-        share = _shares(len(ugv_positions))
+        share = np.full((1, len(ugv_positions)), 1.0 / len(ugv_positions))
         super().__init__(share @ ugv_positions + np.array([0.0, 0.0, altitude]), share @ ugv_velocities, gain)
-
-
-@cache
-def _shares(count: int) -> Array:
-    """Of so many in their mean, (1, count)."""
-    return np.full((1, count), 1.0 / count)
 
 
 class InterventionTask(Task):
