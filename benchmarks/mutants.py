@@ -91,14 +91,15 @@ class Copy:
         self._server.wait()
 
     def run(self, *command: str) -> subprocess.CompletedProcess[str]:
-        """A command in the copy, on its package; one that does not end in time has failed."""
+        """A command in the copy, on its package; the test that does not end in time has failed."""
         try:
             return subprocess.run(
                 command, cwd=self.folder, env=self._environment, capture_output=True, text=True, check=False,
                 timeout=LONGEST_S,
             )  # fmt: skip
-        except subprocess.TimeoutExpired:
-            return subprocess.CompletedProcess(command, 1, f"FAILED no end within {LONGEST_S} s", "")
+        except subprocess.TimeoutExpired as late:
+            begun = (late.stdout or b"").decode(errors="replace").rstrip().rpartition("\n")[2]
+            return subprocess.CompletedProcess(command, 1, f"FAILED {begun.strip()}", "")
 
     def probe(self, kind: str, *what: str) -> list[list[str]]:
         """Findings of `mutation/probe.py`; one that says so where its process ends otherwise."""
@@ -228,7 +229,7 @@ class Bench:
 
     def _failing(self, mutant: Mutant, copy: Copy) -> str:
         """The first test that fails on the copy and passes on the package as it is; '' if there is none."""
-        options = ("-n", "0", "-x", "-q", "--no-header", "-p", "no:cacheprovider")
+        options = ("-n", "0", "-x", "-v", "--no-header", "-p", "no:cacheprovider")
         done = copy.run(sys.executable, "-m", "pytest", *options, *mutant.tests)
         failed = re.findall(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", done.stdout, flags=re.MULTILINE)
         if done.returncode == 0 or not failed:

@@ -261,6 +261,7 @@ CHECKER = (
         "inside = (u > 2.0) & (u < 1.0)",
         runs=("crowd d",),
         tamperings=("THR-TRIG",),
+        tests=("tests/check/test_triggers.py",),
     ),
     Mutant(
         "checker: commands within 0.1 m/s",
