@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from airground_drake.arrays import Array
-from airground_drake.intervention.paths import NoPath, shortest_path
+from airground_drake.intervention.paths import NoPath, Path, shortest_path
 from airground_drake.intervention.policy import Observation, Policy, Teammate
 from airground_drake.nsbc.motion import Motion
 
@@ -15,6 +15,9 @@ SAMPLE_S = 0.05
 """Spacing of the vertices of the motion, s."""
 
 RENDEZVOUS_TOLERANCE_S = 1e-3
+
+CHASED = 16
+"""After so many strides the preset counts as running away."""
 
 
 class Detour(Policy):
@@ -49,28 +52,55 @@ class Detour(Policy):
         """
         height = seen.position[2]
         centres, radii = self._in_the_way(seen)
-        start = seen.position[:2]
-
-        gap = np.linalg.norm(seen.preset.at(seen.start)[0][:2] - start)
-        duration = float(gap) / (self.speed + seen.preset.max_speed)  # no rendezvous can be earlier
-        while True:  # the duration only grows: by a sample where the preset is blocked, else to the travel time
-            goal = seen.preset.at(seen.start + duration)[0][:2]
-            try:
-                path = shortest_path(start, goal, centres, radii)
-                needed = path.length_m / self.speed
-            except NoPath:
-                if seen.start + duration > seen.preset.end:
-                    return None
-                needed = duration + SAMPLE_S
-            else:
-                if needed <= duration + RENDEZVOUS_TOLERANCE_S:
-                    break
-            duration = needed
+        met = self._rendezvous(seen, centres, radii)
+        if met is None:
+            return None
+        duration, path = met
 
         count = max(1, math.ceil(duration / SAMPLE_S))
         legs = np.array([path.at(path.length_m * k / count)[0] for k in range(count + 1)])
         times = seen.start + np.linspace(0.0, max(duration, RENDEZVOUS_TOLERANCE_S), count + 1)
         return _then_follow(times, legs, seen.preset, self.follow, height)
+
+    def _rendezvous(self, seen: Observation, centres: Array, radii: Array) -> tuple[float, Path] | None:
+        """Time to the earliest rendezvous, s, and the path to it; None if the preset is blocked up to its end.
+
+        The duration only grows: by a sample where the preset is blocked, else to the travel time. A preset that runs
+        away nearly as fast is met by strides that double, and then by bisection of the last.
+        """
+        gap = np.linalg.norm(seen.preset.at(seen.start)[0][:2] - seen.position[:2])
+        duration = float(gap) / (self.speed + seen.preset.max_speed)  # no rendezvous can be earlier
+        missed, strides = duration, 0
+        while True:
+            needed, path = self._way(seen, duration, centres, radii)
+            if path is not None and needed <= duration + RENDEZVOUS_TOLERANCE_S:
+                break
+            missed = duration
+            if path is None:
+                if seen.start + duration > seen.preset.end:
+                    return None
+                duration += SAMPLE_S
+            else:
+                stride = 2.0 ** max(0, strides - CHASED)
+                duration = needed if stride == 1.0 else duration + stride * (needed - duration)
+                strides += 1
+        while strides > CHASED and duration - missed > RENDEZVOUS_TOLERANCE_S:
+            middle = 0.5 * (missed + duration)
+            needed, between = self._way(seen, middle, centres, radii)
+            if between is not None and needed <= middle + RENDEZVOUS_TOLERANCE_S:
+                duration, path = middle, between
+            else:
+                missed = middle
+        return duration, path
+
+    def _way(self, seen: Observation, duration: float, centres: Array, radii: Array) -> tuple[float, Path | None]:
+        """Travel time, s, to where the preset is after the duration, and the path; None if there is none."""
+        goal = seen.preset.at(seen.start + duration)[0][:2]
+        try:
+            path = shortest_path(seen.position[:2], goal, centres, radii)
+        except NoPath:
+            return math.inf, None
+        return path.length_m / self.speed, path
 
     def _in_the_way(self, seen: Observation) -> tuple[Array, Array]:
         """Centres (m, 2), m, and radii (m,), m, of the discs to keep out of, in the plane of the UGV."""

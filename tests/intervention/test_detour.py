@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from builders.observations import mate, seen
 
 from airground_drake.components import make_planner
+from airground_drake.intervention import detour
 from airground_drake.intervention.database import predicted_cost
 from airground_drake.intervention.detour import Detour
+from airground_drake.intervention.paths import Path, shortest_path
 from airground_drake.intervention.planner import STANDS_S, PlannerMemory
 from airground_drake.intervention.policy import Observation, Proposal
 from airground_drake.intervention.wrong import StaleMap
@@ -89,3 +92,23 @@ def test_the_predicted_cost_counts_intrusion_into_what_radii_demand() -> None:
     ]
     assert costs[0] == costs[1] == costs[2]
     assert costs[3] > costs[0]
+
+
+@pytest.mark.parametrize("ratio", [1.0, 0.9999, 0.9])
+def test_a_preset_that_runs_away_is_met_with_few_paths(ratio: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[float] = []
+
+    def counting(*args: Any) -> Path:
+        path = shortest_path(*args)
+        asked.append(path.length_m)
+        return path
+
+    monkeypatch.setattr(detour, "shortest_path", counting)
+    runs = Motion(np.array([0.0, 100.0 / ratio]), np.array([[5.0, 0.0, 0.0], [105.0, 0.0, 0.0]]))
+    what = seen([mate("ugv1", [0.0, 0.0], [105.0, 0.0])])
+    motion = DETOUR.propose(replace(what, preset=runs, t=0.0, start=0.0))
+    assert motion is not None
+    assert len(asked) < 40
+    met = min(105.0, 5.0 / (1.0 - ratio) if ratio < 1.0 else np.inf)  # s, at 1 m/s
+    after = motion.times[motion.positions[:, 0] >= runs.sample(motion.times)[:, 0] - 1e-9]
+    assert after[0] == pytest.approx(met, abs=0.1)
