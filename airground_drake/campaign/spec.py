@@ -123,6 +123,9 @@ def load_spec(path: Path) -> Spec:
     Raises:
         ScenarioError: if the file cannot be read, or something in it is not allowed.
     """
+    if not path.exists():
+        wanted = "wanted: the path of a campaign (YAML: a scenario, and distributions over its keys)"
+        raise ScenarioError(str(path), "", Fault("no such file"), wanted)
     data, digest = read_data(path)
     source = str(path)
     given = _mapping(data, source, "", KEYS)

@@ -79,9 +79,37 @@ def _ends_and_counts(run: Run, metrics: Json) -> None:
 def _gatekeeper(run: Run, recorded: Json) -> None:
     same("number of decisions", recorded["calls"], len(run.decisions))
     same("counts of answers", recorded["decisions"], dict(Counter(map(str, run.decisions["decision"]))))
+    same("counts of refusals", recorded["refusals"], _refusals(run))
     known = run.decisions["gap"][run.decisions["gap"] >= 0.0]
     agrees("largest recorded gap", recorded["max_gap"], float(known.max()) if len(known) else None, within=SMALL)
     times = np.array(run.decision_times_s, dtype=np.float64)
     if len(times):
         quantiles = {"p50": float(np.quantile(times, 0.5)), "p99": float(np.quantile(times, 0.99))}
         agrees("decision times", recorded["time_s"], {**quantiles, "max": float(times.max())}, within=SMALL)
+    _closest_call(run, recorded["closest_call"])
+
+
+def _refusals(run: Run) -> dict[str, dict[str, int]]:
+    """Proposals refused at their first answer, by robot and reason."""
+    answered: set[tuple[str, float]] = set()
+    counts: dict[str, Counter[str]] = {}
+    for robot, issued_s, decision, reason in run.decisions[["robot", "issued_s", "decision", "reason"]].to_numpy():
+        if (robot, issued_s) not in answered and decision == "refuse":
+            counts.setdefault(str(robot), Counter())[str(reason)] += 1
+        answered.add((robot, issued_s))
+    return {robot: dict(reasons) for robot, reasons in counts.items()}
+
+
+def _closest_call(run: Run, recorded: Json | None) -> None:
+    """The decision at which accepting and refusing throughout differ least, relative to the smaller cost."""
+    costs = run.decisions[["accept_throughout", "refuse_throughout"]].to_numpy(dtype=np.float64)
+    known = np.flatnonzero((costs >= 0.0).all(axis=1))
+    if not len(known):
+        same("closest call", recorded, None)
+        return
+    apart = np.abs(np.diff(costs[known], axis=1)[:, 0]) / np.maximum(costs[known].min(axis=1), 1e-12)
+    row = run.decisions.iloc[known[int(np.argmin(apart))]]
+    named = {name: str(row[name]) for name in ("robot", "policy", "decision")}
+    valued = {name: float(row[name]) for name in ("t_s", "accept_throughout", "refuse_throughout")}
+    expected = {"relative_cost_margin": float(apart.min()), **named, **valued}
+    agrees("closest call", recorded, expected, within=SMALL)

@@ -90,3 +90,9 @@ def test_mistakes_are_one_line(tmp_path: Path, text: str, says: str) -> None:
         spec_of(tmp_path, text)
     assert says in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["nothere.yaml", "case_a"])
+def test_a_campaign_is_a_file(name: str) -> None:
+    with pytest.raises(ScenarioError, match="no such file; wanted: the path of a campaign"):
+        load_spec(Path(name))

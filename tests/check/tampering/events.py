@@ -168,6 +168,19 @@ def count_of_events_changed(folder: Path) -> None:
         report["runs"][RUN]["metrics"]["event_counts"][UGV]["proposal"] = 1
 
 
+@refused_by("metrics", "counts of refusals", run="c")
+def refusals_in_the_metrics_changed(folder: Path) -> None:
+    with edited_report(folder) as report:
+        refusals = report["runs"]["c"]["metrics"]["gatekeeper"]["refusals"]
+        refusals[UGV] = {"unsafe": 1 + sum(refusals.get(UGV, {}).values())}
+
+
+@refused_by("metrics", "closest call", run="c")
+def closest_call_changed(folder: Path) -> None:
+    with edited_report(folder) as report:
+        report["runs"]["c"]["metrics"]["gatekeeper"]["closest_call"]["relative_cost_margin"] *= 2.0
+
+
 @refused_by("metrics", "least distance", run="b")
 def distance_in_the_metrics_changed(folder: Path) -> None:
     with edited_report(folder) as report:
