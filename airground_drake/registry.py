@@ -280,6 +280,17 @@ ROUTES = Registry(
 UAV_TASKS = Registry("task", "uav_tasks", {"formation": "airground_drake.nsbc.tasks:FormationTask"})
 """What the UAV does below obstacle avoidance: subclasses of `nsbc.tasks.UavTask`."""
 
+SAMPLERS = Registry(
+    "sampler",
+    "samplers",
+    {
+        "cma": "airground_drake.campaign.search:CmaEs",
+        "halton": "airground_drake.campaign.search:Halton",
+        "random": "airground_drake.campaign.search:Uniform",
+    },
+)
+"""Where to look for violations: classes that are a `campaign.search.Sampler`."""
+
 RUN_CLAIMS = Registry(
     "claim",
     "run_claims",

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from scipy.stats import qmc
@@ -18,8 +17,9 @@ WORTHLESS = 1e6
 """Value of a point at which nothing can be measured."""
 
 
+@runtime_checkable
 class Sampler(Protocol):
-    """Where to look next."""
+    """Where to look next; made for a number of dimensions and a seed."""
 
     def ask(self) -> Array:
         """Points (k, n) in [0, 1)."""
@@ -90,7 +90,3 @@ class CmaEs:
         }  # fmt: skip
         start = self._rng.uniform(0.2, 0.8, size)
         self._strategy: Any = cma.CMAEvolutionStrategy(start, 0.3, options)
-
-
-SAMPLERS: dict[str, Callable[[int, int], Sampler]] = {"cma": CmaEs, "halton": Halton, "random": Uniform}
-"""By name: made for a number of dimensions and a seed."""

@@ -15,7 +15,7 @@ from airground_drake import files
 from airground_drake.campaign.rows import COLUMNS
 from airground_drake.errors import AirgroundError, Fault, ScenarioError, UnknownNameError, one_line
 from airground_drake.progress import told
-from airground_drake.registry import RUN_CLAIMS
+from airground_drake.registry import RUN_CLAIMS, SAMPLERS, is_plugin
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.estimate import DEFAULT_LIMITS
 from airground_drake.usage import Parser
@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from airground_drake.campaign.spec import Spec
 
 EXIT_FOUND, EXIT_USAGE, EXIT_TOOL = 1, 2, 4
-SAMPLERS = ("cma", "halton", "random")
-"""As in `campaign.search`, which takes a while to import."""
 TIMES = tuple(name for name in COLUMNS if name.endswith("_s") and name not in ("wall_s", "duration_s"))
 
 
@@ -44,7 +42,9 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--limit", type=float, default=math.inf, metavar="S", help="of --most: longer is a counterexample"
     )
-    parser.add_argument("--sampler", choices=SAMPLERS, default="cma", help="default: %(default)s")
+    parser.add_argument(
+        "--sampler", default="cma", metavar="NAME", help=f"{', '.join(SAMPLERS.allowed)} (default: %(default)s)"
+    )
     parser.add_argument(
         "-n", "--number", type=int, default=200, metavar="N", help="scenarios to try (default: %(default)s)"
     )
@@ -86,15 +86,18 @@ def _run(spec: Spec, options: argparse.Namespace) -> int:
     from airground_drake.campaign.distributions import dimensions
     from airground_drake.campaign.falsification import Search, falsify
     from airground_drake.campaign.objective import Margin, Most
-    from airground_drake.campaign.search import SAMPLERS as KINDS
+    from airground_drake.campaign.search import Sampler
 
     objective: Objective = Margin(options.claim) if options.most is None else Most(options.most, options.limit)
     if options.claim not in RUN_CLAIMS:
         raise UnknownNameError("claim about runs", options.claim, RUN_CLAIMS)
     if not dimensions(spec.drawn):
         raise ScenarioError(spec.source, "draw", Fault("nothing is drawn"), "wanted: keys to search over")
+    if options.sampler not in SAMPLERS and is_plugin(options.sampler) and not options.allow_plugins:
+        raise ScenarioError("--sampler", "", options.sampler, plugins.WANTED)
+    with plugins.beside(spec.source, allow=options.allow_plugins):
+        sampler = SAMPLERS.make(options.sampler, of=Sampler, dimensions=dimensions(spec.drawn), seed=spec.seed)
     search = Search(replace(spec, claims=(options.claim,)), objective, DEFAULT_LIMITS, options.allow_plugins)
-    sampler = KINDS[options.sampler](dimensions(spec.drawn), spec.seed)
     jobs = options.jobs or len(os.sched_getaffinity(0))
     with told(quiet=options.quiet) as watch, pool.local(jobs) as processes:
         watch.stage(spec.name, options.number, "scenarios")
@@ -103,7 +106,12 @@ def _run(spec: Spec, options: argparse.Namespace) -> int:
     value = best.value if options.most is None else -best.value
     print(f"{spec.name}: {best.tried} tried by {options.sampler}, {what} {value:.6g}")
     if len(best.point):
-        _save(search, best, options.output or Path(f"{spec.name}_{options.sampler}.yaml"), options.shrink)
+        _save(
+            search,
+            best,
+            options.output or Path(f"{spec.name}_{options.sampler.rpartition(':')[2]}.yaml"),
+            options.shrink,
+        )
     return EXIT_FOUND if best.found else 0
 
 

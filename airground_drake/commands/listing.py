@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Iterator, Sequence
 
-from airground_drake.registry import METHODS, MODEL_CLAIMS, POLICIES, ROUTES, RUN_CLAIMS, UAV_TASKS, Registry
+from airground_drake.registry import METHODS, MODEL_CLAIMS, POLICIES, ROUTES, RUN_CLAIMS, SAMPLERS, UAV_TASKS, Registry
 from airground_drake.scenarios.shipped import shipped, title
 from airground_drake.usage import Parser
 
@@ -63,5 +63,6 @@ KINDS: dict[str, Callable[[], Lines]] = {
     "policies": _registered(POLICIES),
     "routes": _registered(ROUTES),
     "tasks": _registered(UAV_TASKS),
+    "samplers": _registered(SAMPLERS),
     "claims": _registered(RUN_CLAIMS, MODEL_CLAIMS),
 }

@@ -64,6 +64,13 @@ def admitted(scenario: Scenario, source: str, *, allow: bool, keys: Collection[s
     """
     if not allow:
         refuse(scenario, source, keys)
+    with beside(source, allow=allow):
+        yield
+
+
+@contextmanager
+def beside(source: str, *, allow: bool) -> Iterator[None]:
+    """Have the folder of a file as the last one on Python's path for the time being, if code of others is allowed."""
     before, path = list(sys.path), Path(source)
     if allow and path.is_file():
         importlib.invalidate_caches()

@@ -51,8 +51,34 @@ def test_a_time_is_made_long(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     assert "largest intervened_s" in capsys.readouterr().out
 
 
+SAMPLER = """
+import numpy as np
+
+class Corner:
+    def __init__(self, dimensions, seed):
+        self.points = np.full((1, dimensions), 0.5)
+
+    def ask(self):
+        return self.points
+
+    def tell(self, points, values):
+        pass
+"""
+
+
+def test_a_sampler_of_ones_own_is_found_beside_the_spec(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "corner.py").write_text(SAMPLER, encoding="utf-8")
+    assert falsified(tmp_path, "d", "--sampler", "corner.py:Corner") == 2
+    assert "--allow-plugins" in capsys.readouterr().err
+    assert falsified(tmp_path, "d", "--sampler", "corner.py:Corner", "--allow-plugins") == 0
+    assert "2 tried by corner.py:Corner" in capsys.readouterr().out
+    assert load(tmp_path / "found.yaml")[0].obstacles["rock"].position_m == [5.0, 0.0, 0.0]
+
+
 def test_usage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert falsified(tmp_path, "b", "--claim", "SAFE-INV") == 2
+    assert falsified(tmp_path, "b", "--sampler", "nothing") == 2
+    assert "allowed: cma, halton, random, module:Class or file.py:Class" in capsys.readouterr().err
     (tmp_path / "none.yaml").write_text("scenario: minimal\n", encoding="utf-8")
     assert main([str(tmp_path / "none.yaml")]) == 2
     assert "nothing is drawn" in capsys.readouterr().err
