@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial.distance import cdist
 
 from airground_drake.arrays import Array
 from airground_drake.intervention.policy import Proposal
@@ -133,24 +134,22 @@ def beside(inputs: Inputs, views: Views, pairs: Sequence[tuple[int, int]], how: 
     return State(positions, drawn_to)
 
 
-def _direction(turn: float, rise: float) -> Array:
-    return np.array([np.cos(turn) * np.cos(rise), np.sin(turn) * np.cos(rise), np.sin(rise)])
+def _direction(turn: Array | float, rise: Array | float) -> Array:
+    return np.stack(np.broadcast_arrays(np.cos(turn) * np.cos(rise), np.sin(turn) * np.cos(rise), np.sin(rise)), -1)
 
 
 def _clear_of_others(views: Views, centre: Array, reach: float, flies: bool, rng: np.random.Generator) -> Array:
     """A place at distance `reach` of an obstacle, as far from the others as some random directions allow."""
-    found: list[Array] = []
-    for _ in range(TRIALS):
-        if flies:
-            found.append(centre + reach * _direction(rng.uniform(0.0, 2.0 * np.pi), rng.uniform(-1.5, 1.5)))
-        else:
-            across = np.sqrt(max(reach**2 - centre[2] ** 2, 1e-4))
-            place = centre + across * _direction(rng.uniform(0.0, 2.0 * np.pi), 0.0)
-            found.append(np.array([place[0], place[1], 0.0]))
-    places = np.array(found)
-    between = np.linalg.norm(places[:, None] - views.obstacles, axis=-1) - views.obstacle_radius
-    between[:, np.linalg.norm(views.obstacles - centre, axis=-1) == 0.0] = np.inf
-    return places[int(np.argmax(between.min(axis=1)))]
+    if flies:
+        turn, rise = rng.uniform([0.0, -1.5], [2.0 * np.pi, 1.5], (TRIALS, 2)).T
+        places = centre + reach * _direction(turn, rise)
+    else:
+        across = np.sqrt(max(reach**2 - centre[2] ** 2, 1e-4))
+        places = (centre + across * _direction(rng.uniform(0.0, 2.0 * np.pi, TRIALS), 0.0)) * [1.0, 1.0, 0.0]
+    between = cdist(places, views.obstacles) - views.obstacle_radius
+    between[:, (views.obstacles == centre).all(axis=1)] = np.inf
+    found: Array = places[int(np.argmax(between.min(axis=1)))]
+    return found
 
 
 def _crowded(inputs: Inputs, views: Views, rng: np.random.Generator) -> State:
@@ -160,10 +159,9 @@ def _crowded(inputs: Inputs, views: Views, rng: np.random.Generator) -> State:
     spread = views.safe.max() * np.sqrt(n) * rng.uniform(0.5, 2.0)
     positions = centre + rng.uniform(-spread, spread, (n, 3))
     positions[:-1, 2] = 0.0
-    around = views.centres(positions)
-    excess = np.linalg.norm(positions[:, None] - around, axis=-1) - views.safe
-    nearest = np.where(rng.random(n) < 0.5, np.argmin(excess, axis=1), rng.integers(around.shape[1], size=n))
-    return State(positions, around[np.arange(n), nearest])
+    excess = views.distances(positions) - views.safe
+    nearest = np.where(rng.random(n) < 0.5, np.argmin(excess, axis=1), rng.integers(excess.shape[1], size=n))
+    return State(positions, views.centres(positions)[np.arange(n), nearest])
 
 
 def hostile(inputs: Inputs, views: Views, state: State, rng: np.random.Generator) -> Asked:
