@@ -30,6 +30,8 @@ MANY = 80
 KINDS_OF_DISTANCES = 5
 CROWDED = 60
 """Team positions besides, in which robots crowd around one obstacle."""
+MOST_CROWDED = 1200
+"""Robots in these positions, counted in each: of a team of more than 20 there are fewer positions."""
 TRIALS = 24
 """Directions from an obstacle that are tried for one that is clear of the others."""
 ACCEPT, SILENT, REFUSE = 1.0, 0.0, -1.0
@@ -82,7 +84,7 @@ def states(inputs: Inputs, views: Views, rng: np.random.Generator) -> Iterator[S
     for r in range(repeated):
         for k, pairs in enumerate(rounds):
             yield beside(inputs, views, pairs, r if len(rounds) <= MANY else r + k, rng)
-    for _ in range(CROWDED):
+    for _ in range(min(CROWDED, -(-MOST_CROWDED // n))):
         yield _crowded(inputs, views, rng)
 
 

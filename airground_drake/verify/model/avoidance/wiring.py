@@ -37,6 +37,8 @@ from airground_drake.verify.model.avoidance.scenario_pairs import Inputs, Views
 
 AGAIN = 60
 """Team positions at most for inequalities that have not bound, as where several robots were beside one obstacle."""
+AGAIN_OF_ROBOTS = 2
+"""As many for each robot, if that is more, as long as it is two robots' inequality: those must have bound."""
 RESTORING_TOLERANCE_M_S = 2e-9
 """By which a recovery from inside a safe distance may be missed, m/s: below 1e-9 the layer takes it for rounding."""
 COMMAND_TOLERANCE = 1e-7
@@ -84,8 +86,9 @@ def compare(inputs: Inputs, composition: Composition = "augmented") -> Inputs:
 
     for state in states(inputs, views, rng):
         look(state)
-    for r in range(AGAIN):
-        if not (pairs := unbound(views, tally.bound_of)):
+    for r in range(max(AGAIN, AGAIN_OF_ROBOTS * len(views.robots))):
+        pairs = unbound(views, tally.bound_of)
+        if not pairs or (r >= AGAIN and all(other < 0 for _, other in pairs)):
             break
         look(beside(inputs, views, pairs, r, rng))
     return tally.to_json(composition)

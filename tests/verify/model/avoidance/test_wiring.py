@@ -347,6 +347,19 @@ def test_what_has_not_bound_is_met_in_pairs_that_share_nothing(seed: int) -> Non
     assert all({i, j} & set(met) for i, j in left)  # no other pair could be added
 
 
+def test_robots_are_put_beside_each_other_until_they_have_bound(
+    monkeypatch: pytest.MonkeyPatch, inputs: dict[str, Any]
+) -> None:
+    monkeypatch.setattr(wiring, "states", lambda *_: iter(()))
+    monkeypatch.setattr(wiring, "AGAIN", 0)
+    monkeypatch.setattr(wiring, "AGAIN_OF_ROBOTS", 50)
+    seen = wiring.compare(inputs)
+    assert min(seen["least_times_bound"][kind] for kind in ("uav_ugv", "ugv_ugv")) > 0
+    assert seen["states"] < 50
+    monkeypatch.setattr(wiring, "AGAIN_OF_ROBOTS", 0)
+    assert wiring.compare(inputs)["states"] == 0
+
+
 def test_in_a_large_team_every_pair_binds(case_a: Scenario) -> None:
     first = case_a.ugvs["ugv1"]
     for k in range(20):
