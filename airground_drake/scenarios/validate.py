@@ -10,10 +10,13 @@ import math
 import re
 import unicodedata
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import fields, is_dataclass
-from itertools import combinations, pairwise
+from itertools import pairwise
 from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial.distance import cdist
 
 from airground_drake.decision.bayes import optimal_threshold
 from airground_drake.errors import Fault, ScenarioError
@@ -371,23 +374,44 @@ def _extent(scenario: Scenario) -> Problems:
         yield "control.avoidance_gain_1_s", control.avoidance_gain_1_s, f"0, or at least {gain / _SHORT:.6g} 1/s, {why}"
 
 
+class _Round(NamedTuple):
+    """A robot or obstacle: its key in the scenario, its name, where it is, m, and its radius, m."""
+
+    key: str
+    name: str
+    point: Vector
+    radius: float
+
+
 def _clearances(scenario: Scenario) -> Problems:
     """Robots that start, or are to end, within the safe distance of an obstacle or of each other."""
+    fixed = [_Round("", name, each.position_m, each.radius_m) for name, each in scenario.obstacles.items()]
     for attribute, verb in (("start_m", "starts"), ("target_m", "would end")):
-        ugvs = [(f"ugvs.{name}", name, getattr(ugv, attribute), ugv.radius_m) for name, ugv in scenario.ugvs.items()]
-        uav = ("uav", scenario.uav.name, getattr(scenario.uav, attribute), scenario.uav.radius_m)
-        fixed = [(name, obstacle.position_m, obstacle.radius_m) for name, obstacle in scenario.obstacles.items()]
-        pairs = [
-            *((robot, other, "obstacle_m") for robot in (*ugvs, uav) for other in fixed),
-            *((robot, other[1:], "ugv_m") for other, robot in combinations(ugvs, 2)),
-            *((uav, ugv[1:], "air_ground_m") for ugv in ugvs),
+        ugvs = [
+            _Round(f"ugvs.{name}", name, getattr(ugv, attribute), ugv.radius_m) for name, ugv in scenario.ugvs.items()
         ]
-        for (key, name, point, radius), (other_name, other_point, other_radius), kind in pairs:
-            distance, radii = math.dist(point, other_point), radius + other_radius
+        uav = _Round("uav", scenario.uav.name, getattr(scenario.uav, attribute), scenario.uav.radius_m)
+        for robots, others, kind in (
+            ([*ugvs, uav], fixed, "obstacle_m"), (ugvs, ugvs, "ugv_m"), ([uav], ugvs, "air_ground_m"),
+        ):  # fmt: skip
             least = getattr(scenario.safe_distance, kind)
-            if distance < least + radii - TOLERANCE:
+            for robot, other in _within(robots, others, least - TOLERANCE):
+                radii = robot.radius + other.radius
                 allowed = f"at least safe_distance.{kind} = {least:.9g} m{_and(radii)} is needed"
-                yield f"{key}.{attribute}", point, f"{name} {verb} {distance:.9g} m from {other_name}, {allowed}"
+                distance = math.dist(robot.point, other.point)
+                message = f"{robot.name} {verb} {distance:.9g} m from {other.name}, {allowed}"
+                yield f"{robot.key}.{attribute}", robot.point, message
+
+
+def _within(these: Sequence[_Round], those: Sequence[_Round], distance: float) -> Iterator[tuple[_Round, _Round]]:
+    """Pairs whose surfaces are nearer than that, m; of one list with itself, each pair once."""
+    (points, radii), (others, other_radii) = (
+        (np.reshape([each.point for each in group], (-1, 3)), np.array([each.radius for each in group]))
+        for group in (these, those)
+    )
+    for i, j in np.argwhere(cdist(points, others) < distance + np.add.outer(radii, other_radii)).tolist():
+        if these is not those or j < i:
+            yield these[i], those[j]
 
 
 def _reproduction(scenario: Scenario) -> Problems:

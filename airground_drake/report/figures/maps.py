@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import PatchCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
@@ -122,15 +123,21 @@ def _map(trace: Trace, frame: Frame, width_in: float, above_in: float = 0.1) -> 
     axes.set_ylim(frame.bottom, frame.top)
     axes.set_aspect("equal")
     rule(axes, "x, m", "y, m")
-    for obstacle in trace.scenario["obstacles"].values():
-        x, y = obstacle["position_m"][:2]
-        reach = _safe_circle_m(trace.scenario, obstacle)
-        axes.add_patch(Circle((x, y), reach, facecolor="#f3f3f3", edgecolor=MUTED, linestyle=(0, (2, 2)), zorder=1.0))
+    obstacles = list(trace.scenario["obstacles"].values())
+    circles = [Circle(each["position_m"][:2], _safe_circle_m(trace.scenario, each)) for each in obstacles]
+    dashes = (0, (2, 2))
+    axes.add_collection(
+        PatchCollection(circles, facecolor="#f3f3f3", edgecolor=MUTED, linestyle=dashes, linewidth=1.0, zorder=1.0)
+    )
+    for obstacle in obstacles:
         _body(axes, obstacle["position_m"], obstacle["radius_m"], INK)
-        if not (frame.left < x < frame.right and frame.bottom < y < frame.top):
-            continue
-        known = obstacle["known_to_uav"]
-        axes.plot(x, y, marker="h", markersize=6, color=INK, markerfacecolor=INK if known else "white", zorder=3)
+    for known, fill in ((True, INK), (False, "white")):
+        places = [each["position_m"] for each in obstacles if each["known_to_uav"] is known]
+        shown = [(x, y) for x, y, _ in places if frame.left < x < frame.right and frame.bottom < y < frame.top]
+        axes.plot(
+            *np.reshape(shown, (-1, 2)).T, linestyle="none", marker="h", markersize=6, color=INK, markerfacecolor=fill,
+            zorder=3,
+        )  # fmt: skip
     for x, y, _ in trace.scenario["uav"].get("phantoms_m", []):
         axes.plot(x, y, marker="x", markersize=6, color=MUTED, zorder=3)
     return figure, axes

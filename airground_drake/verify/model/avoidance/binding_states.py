@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial.distance import cdist
 
 from airground_drake.arrays import Array
 from airground_drake.intervention.policy import Proposal
@@ -29,12 +30,14 @@ MANY = 80
 KINDS_OF_DISTANCES = 5
 CROWDED = 60
 """Team positions besides, in which robots crowd around one obstacle."""
+MOST_CROWDED = 1200
+"""Robots in these positions, counted in each: of a team of more than 20 there are fewer positions."""
 TRIALS = 24
 """Directions from an obstacle that are tried for one that is clear of the others."""
 ACCEPT, SILENT, REFUSE = 1.0, 0.0, -1.0
 """Answers, as messages have them."""
-ANSWERS = ("none", "accepted", "refused", "silent", "answered_another")
-"""What may be the matter with a proposal."""
+ANSWERS = {"none": ACCEPT, "accepted": ACCEPT, "refused": REFUSE, "silent": SILENT, "answered_another": ACCEPT}
+"""What may be the matter with a proposal, and the answer that there is."""
 TIME_S = 2.0
 """Time in the contexts, s."""
 
@@ -81,7 +84,7 @@ def states(inputs: Inputs, views: Views, rng: np.random.Generator) -> Iterator[S
     for r in range(repeated):
         for k, pairs in enumerate(rounds):
             yield beside(inputs, views, pairs, r if len(rounds) <= MANY else r + k, rng)
-    for _ in range(CROWDED):
+    for _ in range(min(CROWDED, -(-MOST_CROWDED // n))):
         yield _crowded(inputs, views, rng)
 
 
@@ -133,24 +136,22 @@ def beside(inputs: Inputs, views: Views, pairs: Sequence[tuple[int, int]], how: 
     return State(positions, drawn_to)
 
 
-def _direction(turn: float, rise: float) -> Array:
-    return np.array([np.cos(turn) * np.cos(rise), np.sin(turn) * np.cos(rise), np.sin(rise)])
+def _direction(turn: Array | float, rise: Array | float) -> Array:
+    return np.stack(np.broadcast_arrays(np.cos(turn) * np.cos(rise), np.sin(turn) * np.cos(rise), np.sin(rise)), -1)
 
 
 def _clear_of_others(views: Views, centre: Array, reach: float, flies: bool, rng: np.random.Generator) -> Array:
     """A place at distance `reach` of an obstacle, as far from the others as some random directions allow."""
-    found: list[Array] = []
-    for _ in range(TRIALS):
-        if flies:
-            found.append(centre + reach * _direction(rng.uniform(0.0, 2.0 * np.pi), rng.uniform(-1.5, 1.5)))
-        else:
-            across = np.sqrt(max(reach**2 - centre[2] ** 2, 1e-4))
-            place = centre + across * _direction(rng.uniform(0.0, 2.0 * np.pi), 0.0)
-            found.append(np.array([place[0], place[1], 0.0]))
-    places = np.array(found)
-    between = np.linalg.norm(places[:, None] - views.obstacles, axis=-1) - views.obstacle_radius
-    between[:, np.linalg.norm(views.obstacles - centre, axis=-1) == 0.0] = np.inf
-    return places[int(np.argmax(between.min(axis=1)))]
+    if flies:
+        turn, rise = rng.uniform([0.0, -1.5], [2.0 * np.pi, 1.5], (TRIALS, 2)).T
+        places = centre + reach * _direction(turn, rise)
+    else:
+        across = np.sqrt(max(reach**2 - centre[2] ** 2, 1e-4))
+        places = (centre + across * _direction(rng.uniform(0.0, 2.0 * np.pi, TRIALS), 0.0)) * [1.0, 1.0, 0.0]
+    between = cdist(places, views.obstacles) - views.obstacle_radius
+    between[:, (views.obstacles == centre).all(axis=1)] = np.inf
+    found: Array = places[int(np.argmax(between.min(axis=1)))]
+    return found
 
 
 def _crowded(inputs: Inputs, views: Views, rng: np.random.Generator) -> State:
@@ -160,10 +161,9 @@ def _crowded(inputs: Inputs, views: Views, rng: np.random.Generator) -> State:
     spread = views.safe.max() * np.sqrt(n) * rng.uniform(0.5, 2.0)
     positions = centre + rng.uniform(-spread, spread, (n, 3))
     positions[:-1, 2] = 0.0
-    around = views.centres(positions)
-    excess = np.linalg.norm(positions[:, None] - around, axis=-1) - views.safe
-    nearest = np.where(rng.random(n) < 0.5, np.argmin(excess, axis=1), rng.integers(around.shape[1], size=n))
-    return State(positions, around[np.arange(n), nearest])
+    excess = views.distances(positions) - views.safe
+    nearest = np.where(rng.random(n) < 0.5, np.argmin(excess, axis=1), rng.integers(excess.shape[1], size=n))
+    return State(positions, views.centres(positions)[np.arange(n), nearest])
 
 
 def hostile(inputs: Inputs, views: Views, state: State, rng: np.random.Generator) -> Asked:
@@ -182,38 +182,34 @@ def hostile(inputs: Inputs, views: Views, state: State, rng: np.random.Generator
     places = own + rng.choice([0.0, 1.0], (n, 1)) * rng.uniform(-1.0, 1.0, (n, 3))
     rates = push[:-1] - inputs["motion_gain_1_s"] * (places - own)
     task = limited(planar * (rates + inputs["motion_gain_1_s"] * (places - own)), views.max_speed[:-1])
-    how = [str(each) for each in rng.choice(ANSWERS, n, p=[0.2, 0.4, 0.15, 0.1, 0.15])]
-    executed = np.array([each == "accepted" for each in how])
-    proposals: list[Proposal | None] = []
-    answers = np.zeros((n, 2))
-    wanted = task.copy()
-    for i, each in enumerate(how):
-        issued = float(rng.integers(1, 100))
-        if each == "none":
-            proposals.append(None)
-            answers[i] = ACCEPT, issued
-            continue
-        there = own[i] + rng.uniform(-1.0, 1.0, 3)
-        # away from its own task's way where it must not be executed, so that the two cannot be confused
-        rate = push[i] if each == "accepted" else -push[i]
-        rows = np.linalg.qr(rng.normal(size=(3, 3)))[0][: rng.integers(1, 4)] if rng.random() < 0.3 else np.eye(3)
-        motion = Motion(np.array([TIME_S - 1.0, TIME_S + 1.0]), np.array([there - rate, there + rate]))
-        proposals.append(Proposal(f"hostile_{i}", issued, motion, rows))
-        answer = {"accepted": ACCEPT, "refused": REFUSE, "silent": SILENT, "answered_another": ACCEPT}[each]
-        answers[i] = answer, issued + (each == "answered_another")
-        if each == "accepted":
-            at = 0.5 * (motion.positions[0] + motion.positions[1])
-            slope = 0.5 * (motion.positions[1] - motion.positions[0])
-            intervention = planar[i] * (slope + inputs["intervention_gain_1_s"] * (at - own[i]))
-            wanted[i] = planar[i] * (task[i] + rows.T @ rows @ (intervention - task[i]))
-    wanted = limited(wanted, views.max_speed[:-1])
+    how = rng.choice(list(ANSWERS), n, p=[0.2, 0.4, 0.15, 0.1, 0.15])
+    executed = how == "accepted"
+    # away from its own task's way where it must not be executed, so that the two cannot be confused
+    rate = np.where(executed[:, None], push[:-1], -push[:-1])
+    there = own + rng.uniform(-1.0, 1.0, (n, 3))
+    turned = rng.random(n) < 0.3
+    bases = np.where(turned[:, None, None], np.linalg.qr(rng.normal(size=(n, 3, 3)))[0], np.eye(3))
+    rank = np.where(turned, rng.integers(1, 4, n), 3)
+    kept = bases * (np.arange(3) < rank[:, None])[..., None]
+    intervention = planar * (rate + inputs["intervention_gain_1_s"] * (there - own))
+    followed = task + np.einsum("ika,ikb,ib->ia", kept, kept, intervention - task)
+    wanted = limited(np.where(executed[:, None], planar * followed, task), views.max_speed[:-1])
+
+    issued = rng.integers(1, 100, n).astype(np.float64)
+    answers = np.column_stack([[ANSWERS[each] for each in how], issued + (how == "answered_another")])
+    times, legs = np.array([TIME_S - 1.0, TIME_S + 1.0]), np.stack([there - rate, there + rate], axis=1)
+    proposals = tuple(
+        None if how[i] == "none"
+        else Proposal(f"hostile_{i}", float(issued[i]), Motion(times, legs[i]), bases[i, : rank[i]])
+        for i in range(n)
+    )  # fmt: skip
 
     above = own.mean(axis=0) + np.array([0.0, 0.0, inputs["altitude_m"]])
     formation = inputs["formation_gain_1_s"] * (above - state.positions[-1])
     feed_forward = push[-1] - formation
     flown = limited((feed_forward + formation)[None], views.max_speed[-1:])
     return Asked(
-        np.hstack([places, rates]), tuple(proposals), answers, feed_forward, np.vstack([wanted, flown]), executed, how
+        np.hstack([places, rates]), proposals, answers, feed_forward, np.vstack([wanted, flown]), executed, how.tolist()
     )  # fmt: skip
 
 

@@ -256,9 +256,8 @@ def _safe_team(team: Views, rng: np.random.Generator) -> Array:
         else:
             trial = placed[0] + np.array([*rng.uniform(-1.0, 1.0, 2), team.apart(n, 0) + rng.random()])
             trial[2] += rng.choice([0.0, spread / 3.0]) * team.obstacle_distance
-        clear = [np.linalg.norm(trial - o) >= team.apart(i, -1 - k) for k, o in enumerate(team.obstacles)]
-        clear += [np.linalg.norm(trial - other) >= team.apart(i, j) for j, other in enumerate(placed)]
-        if all(clear):
+        apart = np.linalg.norm(trial - np.vstack([team.obstacles, *placed]), axis=1)
+        if (apart >= team.safe[i, : m + i]).all():
             placed.append(trial)
         elif i == n and rng.random() < 0.05:
             placed.clear()

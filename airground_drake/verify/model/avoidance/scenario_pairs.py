@@ -9,10 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations, product
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial.distance import cdist
 
 from airground_drake.arrays import Array
 from airground_drake.scenarios.schema import Scenario
@@ -93,6 +94,26 @@ def _distances_and_speeds(team: Inputs) -> dict[str, set[tuple[float, float]]]:
     return {name: values for name, values in found.items() if values}
 
 
+class Inequalities(NamedTuple):
+    """What each of n + 1 robots must obey, n.v >= b, of K views each: all that it senses, and some that it does not.
+
+    Attributes:
+        view: which view, (n + 1, K).
+        distance: of centres, (n + 1, K), m.
+        safe: the safe one, ditto.
+        share: part of the inequality that the robot takes, (n + 1, K).
+        normal: n, (n + 1, K, 3); z is 0 for a UGV.
+        bound: b, (n + 1, K), m/s; -inf for what is not sensed.
+    """
+
+    view: npt.NDArray[np.intp]
+    distance: Array
+    safe: Array
+    share: Array
+    normal: Array
+    bound: Array
+
+
 @dataclass(frozen=True, eq=False)
 class Views:
     """n UGVs and the UAV, the last: what each must keep away from, the m obstacles first, then the other robots.
@@ -149,6 +170,12 @@ class Views:
         return np.array([[j for j in robots if j != i] for i in robots], dtype=np.intp)
 
     @cached_property
+    def points(self) -> npt.NDArray[np.intp]:
+        """What each view is of: indices into the m obstacles and n + 1 robots, (n + 1, m + n)."""
+        m = len(self.obstacles)
+        return np.hstack([np.tile(np.arange(m), (len(self.robots), 1)), m + self.others])
+
+    @cached_property
     def safe(self) -> Array:
         """Safe distances of centres, (n + 1, m + n), m."""
         n, own = len(self.ugvs), self.radius[:, None]
@@ -169,29 +196,34 @@ class Views:
 
     def centres(self, positions: Array) -> Array:
         """Where what each robot avoids is when the robots are at positions (n + 1, 3): (n + 1, m + n, 3), m."""
-        fixed = np.broadcast_to(self.obstacles, (len(self.robots), *self.obstacles.shape))
-        return np.concatenate([fixed, positions[self.others]], axis=1)
+        return np.vstack([self.obstacles, positions])[self.points]
 
-    def inequalities(self, positions: Array, gain: float, period: float, reach: float) -> tuple[Array, Array]:
-        """n (n + 1, m + n, 3) and b (n + 1, m + n), m/s, such that every velocity must satisfy n.v >= b.
+    def distances(self, positions: Array) -> Array:
+        """Distances of centres when the robots are at positions (n + 1, 3): (n + 1, m + n), m."""
+        return np.take_along_axis(cdist(positions, np.vstack([self.obstacles, positions])), self.points, axis=1)
 
-        b is -inf beyond the sensing range `reach`, m; z of n is 0 for a UGV.
-        """
-        offset = positions[:, None] - self.centres(positions)
+    def inequalities(self, positions: Array, gain: float, period: float, reach: float) -> Inequalities:
+        """What every velocity must satisfy when the robots are at positions (n + 1, 3), m, and sense to `reach`, m."""
+        beyond = self.distances(positions) > reach * (1.0 + 1e-9)
+        most = max(1, int((~beyond).sum(axis=1).max()))
+        view = np.argsort(beyond, axis=1, kind="stable")[:, :most]
+        safe, share = (np.take_along_axis(each, view, axis=1) for each in (self.safe, self.share))
+        points = np.take_along_axis(self.points, view, axis=1)
+        offset = positions[:, None] - np.vstack([self.obstacles, positions])[points]
         distance = np.sqrt((offset**2).sum(axis=-1))
-        normal = offset / np.where(distance > 0.0, distance, 1.0)[..., None]
-        rate = np.where(distance <= self.safe, gain, 1.0 / period)
-        bound = np.where(distance <= reach, self.share * rate * (self.safe - distance), -np.inf)
-        return normal * self.mobility[:, None], bound
+        normal = offset / np.where(distance > 0.0, distance, 1.0)[..., None] * self.mobility[:, None]
+        rate = np.where(distance <= safe, gain, 1.0 / period)
+        bound = np.where(distance <= reach, share * rate * (safe - distance), -np.inf)
+        return Inequalities(view, distance, safe, share, normal, bound)
 
     def name_of(self, robot: int, view: int) -> str:
         """What a robot avoids: a robot's name, or `obstacle` and its number in the scenario's order."""
         m = len(self.obstacles)
         return f"obstacle {view}" if view < m else self.robots[self.others[robot, view - m]]
 
-    def kind_of(self, robot: int, view: int) -> str:
-        """Name of the kind of a pair, as `kinds_of` has it."""
+    @cached_property
+    def kinds(self) -> npt.NDArray[np.str_]:
+        """Name of each view's kind of pair, without the number that `kinds_of` may give it: (n + 1, m + n)."""
         m, n = len(self.obstacles), len(self.ugvs)
-        if view < m:
-            return "obstacle"
-        return "uav_ugv" if n in (robot, int(self.others[robot, view - m])) else "ugv_ugv"
+        with_uav = (self.points == m + n) | (np.arange(n + 1)[:, None] == n)
+        return np.where(self.points < m, "obstacle", np.where(with_uav, "uav_ugv", "ugv_ugv"))

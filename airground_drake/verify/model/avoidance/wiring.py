@@ -37,6 +37,8 @@ from airground_drake.verify.model.avoidance.scenario_pairs import Inputs, Views
 
 AGAIN = 60
 """Team positions at most for inequalities that have not bound, as where several robots were beside one obstacle."""
+AGAIN_OF_ROBOTS = 2
+"""As many for each robot, if that is more, as long as it is two robots' inequality: those must have bound."""
 RESTORING_TOLERANCE_M_S = 2e-9
 """By which a recovery from inside a safe distance may be missed, m/s: below 1e-9 the layer takes it for rounding."""
 COMMAND_TOLERANCE = 1e-7
@@ -84,8 +86,9 @@ def compare(inputs: Inputs, composition: Composition = "augmented") -> Inputs:
 
     for state in states(inputs, views, rng):
         look(state)
-    for r in range(AGAIN):
-        if not (pairs := unbound(views, tally.bound_of)):
+    for r in range(max(AGAIN, AGAIN_OF_ROBOTS * len(views.robots))):
+        pairs = unbound(views, tally.bound_of)
+        if not pairs or (r >= AGAIN and all(other < 0 for _, other in pairs)):
             break
         look(beside(inputs, views, pairs, r, rng))
     return tally.to_json(composition)
@@ -93,15 +96,17 @@ def compare(inputs: Inputs, composition: Composition = "augmented") -> Inputs:
 
 def unbound(views: Views, bound_of: npt.NDArray[np.intp]) -> list[tuple[int, int]]:
     """Pairs (robot, robot or -1 - obstacle) whose inequality has not bound yet, no robot or obstacle in two of them."""
-    m = len(views.obstacles)
+    m, n = len(views.obstacles), len(views.robots)
     found: list[tuple[int, int]] = []
-    taken: set[int] = set()
-    missing = np.argwhere(bound_of == 0)[::-1]
-    for i, k in missing[np.argsort(missing[:, 1] < m, kind="stable")].tolist():  # robots first: they must have bound
-        j = -1 - k if k < m else int(views.others[i, k - m])
-        if not taken & {i, j}:
-            found.append((i, j))
-            taken |= {i, j}
+    free = np.ones(m + n, dtype=np.bool_)
+    for columns in (slice(m, None), slice(m)):  # robots first: they must have bound
+        for i in reversed(range(n)):
+            points = views.points[i, columns]
+            left = points[(bound_of[i, columns] == 0) & free[points] & free[m + i]]
+            if len(left):
+                last = int(left[-1])
+                found.append((i, last - m if last >= m else -1 - last))
+                free[[m + i, last]] = False
     return found
 
 
@@ -135,12 +140,13 @@ def _judge(
 ) -> None:
     """Commands (n + 1, 3), m/s, against every inequality and, where one binds at most, the closest velocity."""
     gain, h = inputs["avoidance_gain_1_s"], inputs["period_s"]
-    normal, bound = views.inequalities(state.positions, gain, h, inputs["sensing_range_m"])
-    distance = np.linalg.norm(state.positions[:, None] - views.centres(state.positions), axis=-1)
+    view, distance, apart, share, normal, bound = views.inequalities(
+        state.positions, gain, h, inputs["sensing_range_m"]
+    )
     rate = np.einsum("ika,ia->ik", normal, commands)
     speed = np.linalg.norm(commands, axis=1)
-    steep = views.share * max(gain, 1.0 / h)
-    allowed = ROUNDOFF * (20.0 * steep * np.maximum(distance, views.safe) + 40.0 * speed[:, None] + 40.0)
+    steep = share * max(gain, 1.0 / h)
+    allowed = ROUNDOFF * (20.0 * steep * np.maximum(distance, apart) + 40.0 * speed[:, None] + 40.0)
     seen = np.isfinite(bound)
     posed, expected, binding = closest_velocity(asked.wanted, normal, bound)
     safe = bound <= 0.0
@@ -151,27 +157,29 @@ def _judge(
     other = posed & (np.linalg.norm(commands - expected, axis=1) > scale) & closest
     tally.inequalities += int(judged.sum())
     tally.commands += int(posed.sum())
-    tally.bound_of += binding & posed[:, None]
+    robot, column = np.nonzero(binding & posed[:, None])
+    tally.bound_of[robot, view[robot, column]] += 1
     if (seen & safe).any():
         tally.slack = min(tally.slack, float((rate - bound)[seen & safe].min()))
     for i, k in np.argwhere(missed).tolist():
         short = float(bound[i, k] - rate[i, k])
         tally.differ(1.0 + short, "an inequality of the scenario is missed", {
-            "avoided": views.name_of(i, k), "avoided_m": views.centres(state.positions)[i, k].tolist(),
-            "distance_m": float(distance[i, k]), "safe_distance_m": float(views.safe[i, k]),
-            "share": float(views.share[i, k]), "bound_m_s": float(bound[i, k]), "rate_m_s": float(rate[i, k]),
+            "avoided": views.name_of(i, view[i, k]),
+            "avoided_m": views.centres(state.positions)[i, view[i, k]].tolist(),
+            "distance_m": float(distance[i, k]), "safe_distance_m": float(apart[i, k]),
+            "share": float(share[i, k]), "bound_m_s": float(bound[i, k]), "rate_m_s": float(rate[i, k]),
             "missed_by_m_s": short, "missed_by_m": short * h, "command_m_s": commands[i].tolist(),
         }, i, state)  # fmt: skip
     for i in np.flatnonzero(off_plane).tolist():
         tally.differ(0.9, "a UGV leaves its plane", {"command_m_s": commands[i].tolist()}, i, state)
     for i in np.flatnonzero(other & ~missed.any(axis=1)).tolist():
-        held = [int(k) for k in np.flatnonzero(binding[i])]
+        held = np.flatnonzero(binding[i]).tolist()
         tally.differ(0.0, "a command is not the closest velocity that the scenario allows", {
             "command_m_s": commands[i].tolist(), "expected_m_s": expected[i].tolist(),
             "wanted_m_s": asked.wanted[i].tolist(), "proposal": [*asked.how, "none"][i],
             "binding": [
-                {"avoided": views.name_of(i, k), "distance_m": float(distance[i, k]),
-                 "safe_distance_m": float(views.safe[i, k]), "share": float(views.share[i, k])} for k in held
+                {"avoided": views.name_of(i, view[i, k]), "distance_m": float(distance[i, k]),
+                 "safe_distance_m": float(apart[i, k]), "share": float(share[i, k])} for k in held
             ],
         }, i, state)  # fmt: skip
 
@@ -210,7 +218,8 @@ class _Probe:
         self._root = diagram.CreateDefaultContext()
         self._root.SetTime(TIME_S)
         world, ugvs, uav = (diagram.GetSubsystemByName(each) for each in ("world", "ugvs", "uav"))
-        self._plants = [world.GetSubsystemByName(f"{robot}_plant") for robot in views.robots]
+        plants = [world.GetSubsystemByName(f"{robot}_plant") for robot in views.robots]
+        self._plants = [(plant, plant.GetMyMutableContextFromRoot(self._root)) for plant in plants]
         self._ugvs, self._uav = ugvs.GetSubsystemByName("ugv_controller"), uav.GetSubsystemByName("uav_controller")
 
     def sampling(self) -> dict[str, tuple[float, float]]:
@@ -227,9 +236,8 @@ class _Probe:
         Returns:
             Commands, (n + 1, 3), m/s; whether each UGV executes a proposal, (n,); how the plants move, (n + 1, 3), m/s.
         """
-        for plant, position in zip(self._plants, positions, strict=True):
-            context = plant.GetMyMutableContextFromRoot(self._root)
-            context.get_mutable_continuous_state_vector().SetFromVector(position)
+        for (_, context), position in zip(self._plants, positions, strict=True):
+            context.SetContinuousState(position)
         ugvs, uav = (each.GetMyMutableContextFromRoot(self._root) for each in (self._ugvs, self._uav))
         self._ugvs.GetInputPort("reference").FixValue(ugvs, asked.reference.reshape(-1, 2, 3).swapaxes(0, 1).ravel())
         self._ugvs.GetInputPort("proposals").FixValue(ugvs, Value(asked.proposals))
@@ -242,7 +250,7 @@ class _Probe:
             if system is self._ugvs:
                 executed = np.asarray(updated.value(1)) > 0.5
             context.get_mutable_discrete_state().SetFrom(updated)
-        driven = [p.EvalTimeDerivatives(p.GetMyContextFromRoot(self._root)).CopyToVector() for p in self._plants]
+        driven = [plant.EvalTimeDerivatives(context).CopyToVector() for plant, context in self._plants]
         return np.vstack(found), executed, np.array(driven)
 
 
@@ -278,20 +286,16 @@ class _Tally:
 
     def to_json(self, composition: str) -> Inputs:
         """As `compare` returns it."""
-        rows, columns = len(self.bound_of), self.views.safe.shape[1]
-        of_kind: dict[str, list[int]] = {}
-        free = []
-        for i in range(rows):
-            for k in range(columns):
-                of_kind.setdefault(self.views.kind_of(i, k), []).append(int(self.bound_of[i, k]))
-                if not self.bound_of[i, k]:
-                    free.append(f"{self.views.robots[i]}, {self.views.name_of(i, k)}")
+        kinds = self.views.kinds
+        of_kind = {str(kind): self.bound_of[kinds == kind] for kind in np.unique(kinds)}
+        free = np.argwhere(self.bound_of == 0).tolist()
         return {
             "agrees": self.differences == 0, "composition": composition, "states": self.states,
             "inequalities": self.inequalities, "commands": self.commands, "executed": self.executed,
             "proposals": {name: self.answers[name] for name in ANSWERS},
-            "views": {kind: len(counts) for kind, counts in sorted(of_kind.items())},
-            "least_times_bound": {kind: min(counts) for kind, counts in sorted(of_kind.items())},
-            "never_bound": free[:20], "never_bound_count": len(free), "least_slack_m_s": self.slack,
+            "views": {kind: len(counts) for kind, counts in of_kind.items()},
+            "least_times_bound": {kind: int(counts.min()) for kind, counts in of_kind.items()},
+            "never_bound": [f"{self.views.robots[i]}, {self.views.name_of(i, k)}" for i, k in free[:20]],
+            "never_bound_count": len(free), "least_slack_m_s": self.slack,
             "differences": self.differences, "first_difference": self.first,
         }  # fmt: skip

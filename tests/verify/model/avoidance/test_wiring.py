@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, strategies
 from pydrake.systems.primitives import LinearSystem
 from verify.test_layers import imported, within
 
@@ -305,6 +306,58 @@ def test_a_projection_onto_one_half_space() -> None:
         posed, found, _ = wiring.closest_velocity(np.array([wanted]), normal, np.array([bound]))
         assert posed[0] == one
         assert velocity is None or np.allclose(found[0], velocity)
+
+
+def test_inequalities_are_those_of_all_that_is_sensed(bodies: Scenario) -> None:
+    views, rng = Views.of(constants(bodies)["team"]), np.random.default_rng(1)
+    gain, period, reach = 2.0, 0.1, 4.0
+    for spread in (1.0, 4.0, 100.0):
+        positions = rng.uniform(-spread, spread, (len(views.robots), 3))
+        found = views.inequalities(positions, gain, period, reach)
+        offset = positions[:, None] - views.centres(positions)
+        distance = np.linalg.norm(offset, axis=-1)
+        deficit = views.safe - distance
+        bound = views.share * deficit * np.where(deficit >= 0.0, gain, 1.0 / period)
+        seen = np.isfinite(found.bound)
+        robot, column = np.nonzero(seen)
+        view = found.view[robot, column]
+        assert sorted(zip(robot, view, strict=True)) == [tuple(pair) for pair in np.argwhere(distance <= reach)]
+        assert np.allclose(found.bound[seen], bound[robot, view])
+        assert np.allclose(found.normal[seen], (offset / distance[..., None])[robot, view] * views.mobility[robot])
+        assert np.allclose(found.distance, np.take_along_axis(distance, found.view, axis=1))
+
+
+@given(strategies.integers(0, 10**9))
+def test_what_has_not_bound_is_met_in_pairs_that_share_nothing(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    count, m = int(rng.integers(1, 6)), int(rng.integers(0, 5))
+    team = {
+        "ugvs": [f"ugv{k}" for k in range(count)], "uav": "uav", "obstacles": rng.normal(size=(m, 3)).tolist(),
+        "obstacle_distance": 1.0, "ugv_distance": 1.0, "air_ground_distance": 1.0, "max_speed": [1.0] * (count + 1),
+        "radius": [0.0] * (count + 1), "obstacle_radius": [0.0] * m,
+    }  # fmt: skip
+    views = Views.of(team)
+    bound_of = rng.integers(0, 2, views.safe.shape)
+    missing = [(i, int(views.points[i, k])) for i, k in np.argwhere(bound_of == 0).tolist()]
+    left = {(i, point - m if point >= m else -1 - point) for i, point in missing}
+    pairs = wiring.unbound(views, bound_of)
+    assert left.issuperset(pairs)
+    met = [each for pair in pairs for each in pair]
+    assert len(set(met)) == len(met)
+    assert all({i, j} & set(met) for i, j in left)  # no other pair could be added
+
+
+def test_robots_are_put_beside_each_other_until_they_have_bound(
+    monkeypatch: pytest.MonkeyPatch, inputs: dict[str, Any]
+) -> None:
+    monkeypatch.setattr(wiring, "states", lambda *_: iter(()))
+    monkeypatch.setattr(wiring, "AGAIN", 0)
+    monkeypatch.setattr(wiring, "AGAIN_OF_ROBOTS", 50)
+    seen = wiring.compare(inputs)
+    assert min(seen["least_times_bound"][kind] for kind in ("uav_ugv", "ugv_ugv")) > 0
+    assert seen["states"] < 50
+    monkeypatch.setattr(wiring, "AGAIN_OF_ROBOTS", 0)
+    assert wiring.compare(inputs)["states"] == 0
 
 
 def test_in_a_large_team_every_pair_binds(case_a: Scenario) -> None:
