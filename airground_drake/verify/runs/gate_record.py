@@ -219,7 +219,7 @@ class GateClaim(TraceClaim):
             if needed and not (trace.decisions["robot"] == ugv).any():
                 reason = f"{ugv} was in mode 'intervening', but the trace has no decision of it"
                 return Finding("not_run", evidence={"reason": reason, "faults": trace.meta["faults"]})
-        rows = rows_of(trace) if trace.meta["method"] in ON_TOP else bare_rows_of(trace)
+        rows = trace.derived("rows", lambda: (rows_of if trace.meta["method"] in ON_TOP else bare_rows_of)(trace))
         if not rows:
             reason = "no UGV was intervened on: nothing to decide"
             return Finding("holds", evidence={"decisions": 0, "reason": reason}, exercised=0)
