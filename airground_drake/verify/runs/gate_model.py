@@ -122,14 +122,16 @@ class GateModel(GateClaim):
             return judge_outcomes(trace, rows)
         sent = proposals_of(trace)
         scenes = scenes_of(trace, rows, sent)
-        stages = len(rows[0]["reference_m"])
         compared = []
         largest = 0.0
-        modes = np.repeat([0.0, 1.0], len(rows))[:, None] * np.ones(stages)
-        ways = roll_out(trace, scenes, np.tile(np.arange(len(rows)), 2), modes)
+        constant, telling = np.tile(np.arange(len(rows)), 2), _telling(rows)
+        modes = np.repeat([0.0, 1.0], len(rows))[:, None] * np.ones(len(rows[0]["reference_m"]))
+        plans = [np.concatenate([rows[k]["plan"][None], _plans_of_blocks(len(modes[0]))]) for k in telling]
+        of = np.concatenate([constant, np.repeat(telling, 1 + 2**BLOCKS)])
+        ways = roll_out(trace, scenes, of, np.concatenate([modes, *plans]))
         for k, row in enumerate(rows):
-            for name, velocities in zip(("refuse", "accept"), np.split(ways.velocities, 2), strict=True):
-                off = row[f"{name}_m_s"] - velocities[k]
+            for name, at in (("refuse", k), ("accept", len(rows) + k)):
+                off = row[f"{name}_m_s"] - ways.velocities[at]
                 largest = max(largest, float(np.abs(off).max()))
                 compared.append(Off(row, f"velocity of mode {name}, m/s", off, VELOCITY_TOLERANCE_M_S))
         evidence = {"decisions": len(rows), "largest_difference_m_s": largest}
@@ -138,7 +140,9 @@ class GateModel(GateClaim):
             margin=VELOCITY_TOLERANCE_M_S - largest,
             unit="m/s",
             quantity="tolerance left by which a predicted velocity may differ from the closed loop's",
-            evidence={**evidence, **_realised(trace, rows), **_regrets(trace, rows, scenes)},
+            evidence=evidence
+            | _realised(trace, rows)
+            | _regrets([rows[k] for k in telling], ways.positions[len(constant) :]),
             exercised=len(rows),
         )
         return conclude(finding, compared)
@@ -275,8 +279,8 @@ def _realised(trace: Trace, rows: Sequence[Row]) -> dict[str, Any]:
     return {"answers_that_stood_to_the_horizon": stood, "farthest_from_predicted": farthest}
 
 
-def _regrets(trace: Trace, rows: Sequence[Row], scenes: Scenes) -> dict[str, Any]:
-    """What chosen plans cost on the closed loop above the cheapest constant one, and of the plans of few blocks."""
+def _telling(rows: Sequence[Row]) -> npt.NDArray[np.intp]:
+    """Numbers of the decisions whose regret is looked at: the first on each proposal, reversals, others in between."""
     planned = [k for k, row in enumerate(rows) if row.planned]
     seen: set[Any] = set()
     telling = []
@@ -288,17 +292,27 @@ def _regrets(trace: Trace, rows: Sequence[Row], scenes: Scenes) -> dict[str, Any
     rest = [k for k in planned if k not in telling]
     spare = max(0, MOST_REGRETS - len(telling))
     spaced = np.linspace(0, len(rest) - 1, min(spare, len(rest))).round().astype(int) if rest and spare else ()
-    chosen = [*telling[:MOST_REGRETS], *(rest[k] for k in dict.fromkeys(spaced))]
-    if not chosen:
-        return {"regrets": 0}
-    stages = len(rows[0]["reference_m"])
+    return np.array([*telling[:MOST_REGRETS], *(rest[k] for k in dict.fromkeys(spaced))], dtype=np.intp)
+
+
+def _plans_of_blocks(stages: int) -> Array:
+    """All plans of BLOCKS blocks, (2^BLOCKS, N); the first is all 0, the last all 1."""
     modes = (np.arange(2**BLOCKS)[:, None] >> np.arange(BLOCKS)) % 2
-    few = modes[:, np.arange(stages) * BLOCKS // stages].astype(np.float64)  # the first is all 0, the last all 1
-    plans = np.concatenate([np.concatenate([rows[k]["plan"][None], few]) for k in chosen])
-    ways = roll_out(trace, scenes, np.repeat(chosen, len(few) + 1), plans)
+    return modes[:, np.arange(stages) * BLOCKS // stages].astype(np.float64)
+
+
+def _regrets(rows: Sequence[Row], positions: Array) -> dict[str, Any]:
+    """What chosen plans cost on the closed loop above the cheapest constant one, and of the plans of few blocks.
+
+    Args:
+        rows: the decisions that are looked at.
+        positions: of each, one after the other, those of its own plan and of `_plans_of_blocks`, (..., N, 3), m.
+    """
+    if not rows:
+        return {"regrets": 0}
     found: list[dict[str, Any]] = []
-    for row, positions in zip((rows[k] for k in chosen), np.split(ways.positions, len(chosen)), strict=True):
-        cost = row.cost(positions) / row.scale
+    for row, ways in zip(rows, np.split(positions, len(rows)), strict=True):
+        cost = row.cost(ways) / row.scale
         at = {"robot": str(row.given["robot"]), "t_s": float(row.given["t_s"])}
         constant = float(cost[0] - min(cost[1], cost[-1]))
         found.append({**at, "against_constant_plans": constant, "against_blocks": float(cost[0] - cost[1:].min())})

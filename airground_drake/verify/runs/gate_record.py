@@ -176,7 +176,7 @@ class Off:
         self.what = what
         self.allowed = allowed
         self.more = more
-        self.off = float(np.max(np.abs(by), initial=0.0))
+        self.off = float(np.abs(by).max(initial=0.0))
 
     @property
     def wrong(self) -> bool:

@@ -127,10 +127,10 @@ def _accepted_at(trace: Trace, ugv: str) -> list[Sent | None]:
         return [None] * len(t)
     gated = trace.meta["method"] in GATED_METHODS
     table = trace.decisions[trace.decisions["robot"] == ugv]
-    answers = [
-        (float(row["t_s"]), float(row["issued_s"]), row["decision"] == "accept") for row in table.to_dict("records")
-    ]
-    answers.sort()
+    columns = (table[name].tolist() for name in ("t_s", "issued_s", "decision"))
+    answers = sorted(
+        (float(t_s), float(issued), answer == "accept") for t_s, issued, answer in zip(*columns, strict=True)
+    )
     times = np.array([answer[0] for answer in answers])
     gate_s = trace.scenario["gatekeeper"]["period_s"]
     plan_s = trace.scenario["intervention"]["period_s"]
