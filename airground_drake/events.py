@@ -32,7 +32,7 @@ def extract(trace: Trace, sent: Iterable[tuple[str, float, str]]) -> list[dict[s
     for ugv, issued, policy in sent:
         add(issued, ugv, "proposal", policy=policy)
     previous: dict[tuple[str, float], str] = {}
-    for row in trace.decisions.to_dict("records"):
+    for row in trace.decisions[["t_s", "robot", "policy", "issued_s", "decision", "status"]].to_dict("records"):
         key = (row["robot"], row["issued_s"])
         if previous.get(key) != row["decision"]:
             previous[key] = row["decision"]

@@ -127,10 +127,7 @@ class Recorder:
         gatekeeper = model.gatekeeper
         decided = gatekeeper.decisions(gatekeeper.GetMyContextFromRoot(context)) if gatekeeper is not None else ()
         memory = model.planner.memory(model.planner.GetMyContextFromRoot(context))
-        decisions = pd.DataFrame(
-            [_decision(r, ugvs[r.robot], self._scenario.gatekeeper.route) for r in decided],
-            columns=list(DECISION_COLUMNS),
-        ).astype(DECISION_COLUMNS)
+        decisions = _decisions([_decision(r, ugvs[r.robot], self._scenario.gatekeeper.route) for r in decided])
         sent = [(ugvs[i], proposal.issued, proposal.policy) for i, proposal in memory.sent]
         meta: dict[str, Any] = {
             "schema": SCHEMA,
@@ -191,6 +188,12 @@ def _decision(decision: Decision, robot: str, route: str) -> dict[str, Any]:
         "rounding_deviation_s": solution.rounding_deviation,
         "predicted_clearance_m": solution.clearance,
     }
+
+
+def _decisions(rows: Sequence[dict[str, Any]]) -> pd.DataFrame:
+    """`Trace.decisions` of its rows."""
+    columns: dict[str, Any] = {name: [row[name] for row in rows] for name in DECISION_COLUMNS}
+    return pd.DataFrame({name: pd.Series(values, dtype=DECISION_COLUMNS[name]) for name, values in columns.items()})
 
 
 def _proposals(sent: Sequence[tuple[str, Proposal]]) -> pd.DataFrame:

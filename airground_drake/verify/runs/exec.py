@@ -27,7 +27,7 @@ from airground_drake.verify.runs.control_law import (
 )
 from airground_drake.verify.runs.control_samples import control_samples
 from airground_drake.verify.runs.pairs import around, places_of
-from airground_drake.verify.runs.proposals import Sent, accepted_at, proposals_of
+from airground_drake.verify.runs.proposals import Sent, accepted_at
 
 COMMAND_TOLERANCE_M_S = 1e-6
 """A command may differ from the law by this, m/s. Both are evaluated at the same recorded positions and differ by
@@ -121,9 +121,8 @@ class Exec(TraceClaim):
 
     def check(self, trace: Trace) -> Finding:
         """Compare every command with the law; the margin is the tolerance less the largest difference."""
-        proposals = proposals_of(trace)
         samples = control_samples(trace.t, trace.scenario["control"]["period_s"])
-        judged = [_judge_ugv(trace, ugv, proposals, samples) for ugv in trace.ugvs]
+        judged = [_judge_ugv(trace, ugv, samples) for ugv in trace.ugvs]
         formation = trace.scenario["uav"]["task"] == "formation"
         if formation:
             judged.append(_judge_uav(trace, samples))
@@ -192,13 +191,13 @@ def _around(trace: Trace, robot: str, samples: npt.NDArray[np.intp], *, planar: 
     )
 
 
-def _judge_ugv(trace: Trace, ugv: str, proposals: list[Sent], samples: npt.NDArray[np.intp]) -> Judged:
+def _judge_ugv(trace: Trace, ugv: str, samples: npt.NDArray[np.intp]) -> Judged:
     """A UGV's commands against the law, with whatever it has accepted."""
     scenario, control, t = trace.scenario, trace.scenario["control"], trace.t[samples]
     spec, chosen = scenario["ugvs"][ugv], _chosen(trace, samples)
     position, recorded = trace.position(ugv)[samples], trace.command(ugv)[chosen]
     given = _around(trace, ugv, samples, planar=True)
-    accepted = accepted_at(trace, ugv, proposals, t)
+    accepted = accepted_at(trace, ugv)
     waypoints = np.asarray(spec["preset"]["waypoints_m"], dtype=np.float64)
     speed = float(spec["preset"]["speed_m_s"])
     preset = travelled(waypoints, speed, t)

@@ -69,10 +69,6 @@ class Scenes(NamedTuple):
     share: Array
     limit: Array
 
-    def repeated(self, rows: npt.NDArray[np.intp]) -> Scenes:
-        """Those of some decisions, in that order."""
-        return Scenes(*(part[rows] for part in self))
-
 
 class Ways(NamedTuple):
     """Where B closed loops lead: positions at the ends of N stages, m, and their mean velocities, m/s, (B, N, 3)."""
@@ -126,13 +122,16 @@ class GateModel(GateClaim):
             return judge_outcomes(trace, rows)
         sent = proposals_of(trace)
         scenes = scenes_of(trace, rows, sent)
-        stages = len(rows[0]["reference_m"])
         compared = []
         largest = 0.0
-        ways = [roll_out(trace, scenes, np.full((len(rows), stages), mode)) for mode in (0.0, 1.0)]
+        constant, telling = np.tile(np.arange(len(rows)), 2), _telling(rows)
+        modes = np.repeat([0.0, 1.0], len(rows))[:, None] * np.ones(len(rows[0]["reference_m"]))
+        plans = [np.concatenate([rows[k]["plan"][None], _plans_of_blocks(len(modes[0]))]) for k in telling]
+        of = np.concatenate([constant, np.repeat(telling, 1 + 2**BLOCKS)])
+        ways = roll_out(trace, scenes, of, np.concatenate([modes, *plans]))
         for k, row in enumerate(rows):
-            for name, way in zip(("refuse", "accept"), ways, strict=True):
-                off = row[f"{name}_m_s"] - way.velocities[k]
+            for name, at in (("refuse", k), ("accept", len(rows) + k)):
+                off = row[f"{name}_m_s"] - ways.velocities[at]
                 largest = max(largest, float(np.abs(off).max()))
                 compared.append(Off(row, f"velocity of mode {name}, m/s", off, VELOCITY_TOLERANCE_M_S))
         evidence = {"decisions": len(rows), "largest_difference_m_s": largest}
@@ -141,7 +140,9 @@ class GateModel(GateClaim):
             margin=VELOCITY_TOLERANCE_M_S - largest,
             unit="m/s",
             quantity="tolerance left by which a predicted velocity may differ from the closed loop's",
-            evidence={**evidence, **_realised(trace, rows, sent), **_regrets(trace, rows, scenes)},
+            evidence=evidence
+            | _realised(trace, rows)
+            | _regrets([rows[k] for k in telling], ways.positions[len(constant) :]),
             exercised=len(rows),
         )
         return conclude(finding, compared)
@@ -216,42 +217,46 @@ def _thing(trace: Trace, name: str, t: float) -> tuple[Array, Array]:
     return interpolate(trace.t, trace.position(name), t), trace.command(name)[row]
 
 
-def roll_out(trace: Trace, scenes: Scenes, plans: Array) -> Ways:
-    """Closed loops under plans (B, N) of 0 (refused) and 1 (accepted)."""
+def roll_out(trace: Trace, scenes: Scenes, of: npt.NDArray[np.intp], plans: Array) -> Ways:
+    """Closed loops under plans (B, N) of 0 (refused) and 1 (accepted), each from the scene of a decision, `of` (B,).
+
+    As long as plans of one decision agree, so do their ways, which are then one.
+    """
     control, composition = trace.scenario["control"], trace.meta["composition"]
     on_top, h = trace.meta["method"] in ON_TOP, control["period_s"]
     steps, stages = scenes.preset.shape[1] - 1, plans.shape[1]
     each = steps // stages
-    position = scenes.start.copy()
-    positions, velocities = np.empty((len(plans), stages, 3)), np.zeros((len(plans), stages, 3))
-    for k in range(steps):
-        accepted = plans[:, k // each] == 1.0
-        centres = scenes.centres + k * h * scenes.velocities
-        given = inequalities(position, centres, scenes.safe, scenes.share, control, planar=True)
-        rate = (scenes.preset[:, k + 1] - scenes.preset[:, k]) / h
-        own = tracking(position, scenes.preset[:, k], rate, control["motion_gain_1_s"], scenes.limit)
-        velocity = avoiding(own, given, composition, planar=True)
-        if accepted.any():
-            asked = Asked(
-                scenes.wanted[accepted, k],
-                (scenes.wanted[accepted, k + 1] - scenes.wanted[accepted, k]) / h,
-                scenes.chosen[accepted],
-            )
-            lower = (velocity if on_top else own)[accepted]
-            gain = control["intervention_gain_1_s"]
-            task = intervened(position[accepted], lower, asked, gain, scenes.limit[accepted])
-            bounds = Inequalities(given.normal[accepted], given.bound[accepted])
-            velocity[accepted] = task if on_top else avoiding(task, bounds, composition, planar=True)
-        position = position + h * velocity
-        velocities[:, k // each] += velocity / each
-        positions[:, k // each] = position
+    way, position = of, scenes.start
+    positions, velocities = np.empty((len(plans), stages, 3)), np.empty((len(plans), stages, 3))
+    for stage in range(stages):
+        parted, first, way = np.unique(2 * way + (plans[:, stage] == 1.0), return_index=True, return_inverse=True)
+        position, row, accepted = position[parted // 2], of[first], parted % 2 == 1
+        mean = np.zeros_like(position)
+        for k in range(stage * each, (stage + 1) * each):
+            centres = scenes.centres[row] + k * h * scenes.velocities[row]
+            given = inequalities(position, centres, scenes.safe[row], scenes.share[row], control, planar=True)
+            preset, rate = scenes.preset[row, k], (scenes.preset[row, k + 1] - scenes.preset[row, k]) / h
+            own = tracking(position, preset, rate, control["motion_gain_1_s"], scenes.limit[row])
+            velocity = avoiding(own, given, composition, planar=True)
+            if accepted.any():
+                here = row[accepted]
+                wanted = scenes.wanted[here, k]
+                asked = Asked(wanted, (scenes.wanted[here, k + 1] - wanted) / h, scenes.chosen[here])
+                lower = (velocity if on_top else own)[accepted]
+                gain = control["intervention_gain_1_s"]
+                task = intervened(position[accepted], lower, asked, gain, scenes.limit[here])
+                bounds = Inequalities(given.normal[accepted], given.bound[accepted])
+                velocity[accepted] = task if on_top else avoiding(task, bounds, composition, planar=True)
+            position = position + h * velocity
+            mean += velocity / each
+        positions[:, stage], velocities[:, stage] = position[way], mean[way]
     return Ways(positions, velocities)
 
 
-def _realised(trace: Trace, rows: Sequence[Row], sent: list[Sent]) -> dict[str, Any]:
+def _realised(trace: Trace, rows: Sequence[Row]) -> dict[str, Any]:
     """By how much UGVs were elsewhere than predicted while the answer stood."""
     t = trace.t[control_samples(trace.t, trace.scenario["control"]["period_s"])]
-    accepted = {ugv: accepted_at(trace, ugv, sent, t) for ugv in trace.ugvs}
+    accepted = {ugv: accepted_at(trace, ugv) for ugv in trace.ugvs}
     farthest: dict[str, Any] = {}
     stood = 0
     for row in rows:
@@ -274,8 +279,8 @@ def _realised(trace: Trace, rows: Sequence[Row], sent: list[Sent]) -> dict[str, 
     return {"answers_that_stood_to_the_horizon": stood, "farthest_from_predicted": farthest}
 
 
-def _regrets(trace: Trace, rows: Sequence[Row], scenes: Scenes) -> dict[str, Any]:
-    """What chosen plans cost on the closed loop above the cheapest constant one, and of the plans of few blocks."""
+def _telling(rows: Sequence[Row]) -> npt.NDArray[np.intp]:
+    """Numbers of the decisions whose regret is looked at: the first on each proposal, reversals, others in between."""
     planned = [k for k, row in enumerate(rows) if row.planned]
     seen: set[Any] = set()
     telling = []
@@ -287,17 +292,27 @@ def _regrets(trace: Trace, rows: Sequence[Row], scenes: Scenes) -> dict[str, Any
     rest = [k for k in planned if k not in telling]
     spare = max(0, MOST_REGRETS - len(telling))
     spaced = np.linspace(0, len(rest) - 1, min(spare, len(rest))).round().astype(int) if rest and spare else ()
-    chosen = [*telling[:MOST_REGRETS], *(rest[k] for k in dict.fromkeys(spaced))]
-    if not chosen:
-        return {"regrets": 0}
-    stages = len(rows[0]["reference_m"])
+    return np.array([*telling[:MOST_REGRETS], *(rest[k] for k in dict.fromkeys(spaced))], dtype=np.intp)
+
+
+def _plans_of_blocks(stages: int) -> Array:
+    """All plans of BLOCKS blocks, (2^BLOCKS, N); the first is all 0, the last all 1."""
     modes = (np.arange(2**BLOCKS)[:, None] >> np.arange(BLOCKS)) % 2
-    few = modes[:, np.arange(stages) * BLOCKS // stages].astype(np.float64)  # the first is all 0, the last all 1
-    plans = np.concatenate([np.concatenate([rows[k]["plan"][None], few]) for k in chosen])
-    ways = roll_out(trace, scenes.repeated(np.repeat(np.array(chosen), len(few) + 1)), plans)
+    return modes[:, np.arange(stages) * BLOCKS // stages].astype(np.float64)
+
+
+def _regrets(rows: Sequence[Row], positions: Array) -> dict[str, Any]:
+    """What chosen plans cost on the closed loop above the cheapest constant one, and of the plans of few blocks.
+
+    Args:
+        rows: the decisions that are looked at.
+        positions: of each, one after the other, those of its own plan and of `_plans_of_blocks`, (..., N, 3), m.
+    """
+    if not rows:
+        return {"regrets": 0}
     found: list[dict[str, Any]] = []
-    for row, positions in zip((rows[k] for k in chosen), np.split(ways.positions, len(chosen)), strict=True):
-        cost = row.cost(positions) / row.scale
+    for row, ways in zip(rows, np.split(positions, len(rows)), strict=True):
+        cost = row.cost(ways) / row.scale
         at = {"robot": str(row.given["robot"]), "t_s": float(row.given["t_s"])}
         constant = float(cost[0] - min(cost[1], cost[-1]))
         found.append({**at, "against_constant_plans": constant, "against_blocks": float(cost[0] - cost[1:].min())})

@@ -176,7 +176,7 @@ class Off:
         self.what = what
         self.allowed = allowed
         self.more = more
-        self.off = float(np.max(np.abs(by), initial=0.0))
+        self.off = float(np.abs(by).max(initial=0.0))
 
     @property
     def wrong(self) -> bool:
@@ -219,7 +219,7 @@ class GateClaim(TraceClaim):
             if needed and not (trace.decisions["robot"] == ugv).any():
                 reason = f"{ugv} was in mode 'intervening', but the trace has no decision of it"
                 return Finding("not_run", evidence={"reason": reason, "faults": trace.meta["faults"]})
-        rows = rows_of(trace) if trace.meta["method"] in ON_TOP else bare_rows_of(trace)
+        rows = trace.derived("rows", lambda: (rows_of if trace.meta["method"] in ON_TOP else bare_rows_of)(trace))
         if not rows:
             reason = "no UGV was intervened on: nothing to decide"
             return Finding("holds", evidence={"decisions": 0, "reason": reason}, exercised=0)

@@ -162,28 +162,29 @@ def _rolled_out(trace: Trace, begun: Sequence[Beginning]) -> list[tuple[Foreseen
     limit = np.tile([each.limit for each in begun], 2)
     settled, second = np.tile([each.settled for each in begun], 2), max(1, round(1.0 / h))
     periods = np.array([0] * len(begun) + [each.periods for each in begun])
-    ways, integral, done = [place], np.zeros((steps + 1, len(place))), lasting.copy()
+    rates, wishes = (np.diff(part, axis=1) / h for part in (preset, wanted))
+    ways, done, earliest = [place], lasting.copy(), int(settled.min())
     for k in range(steps):
         around = inequalities(place, points[:, k], safe, share, control, planar=True)
-        rate = (preset[:, k + 1] - preset[:, k]) / h
-        task = tracking(place, preset[:, k], rate, control["motion_gain_1_s"], limit)
+        task = tracking(place, preset[:, k], rates[:, k], control["motion_gain_1_s"], limit)
         asked = np.flatnonzero(k < periods)
         if asked.size:
-            rates = (wanted[asked, k + 1] - wanted[asked, k]) / h
-            wish = Asked(wanted[asked, k], rates, chosen[asked - len(begun)])
+            wish = Asked(wanted[asked, k], wishes[asked, k], chosen[asked - len(begun)])
             gain = control["intervention_gain_1_s"]
             task[asked] = intervened(place[asked], task[asked], wish, gain, limit[asked])
         place = place + h * avoiding(task, around, trace.meta["composition"], planar=True)
         ways.append(place)
-        integral[k + 1] = integral[k] + h * np.square(preset[:, k + 1] - place).sum(axis=1)
+        if k < earliest:
+            continue
         home = np.linalg.norm(goal - place, axis=1) < scenario["arrival_tolerance_m"]
         moved = np.linalg.norm(place - ways[k + 1 - second], axis=1) if k + 1 >= second else np.full(len(place), np.inf)
         resting = (home | (moved < 0.1 * STILL_M)) & (k >= settled)
         done = np.where(resting, np.minimum(done, k + 1), done)
         if (done <= k + 1).all():
             break
-    way = np.array(ways)
-    found = []
+    way, found = np.array(ways), []
+    away = np.square(preset.swapaxes(0, 1)[1 : len(way)] - way[1:]).sum(axis=2)
+    integral = np.concatenate([np.zeros((1, len(place))), np.cumsum(h * away, axis=0)])
     for row, each in enumerate(begun):
         known = each.points[0, 0, : each.discs], each.safe[: each.discs]
         both = [

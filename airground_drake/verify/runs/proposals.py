@@ -13,6 +13,7 @@ from airground_drake.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.segments import interpolate
 from airground_drake.verify.runs.control_law import selected
+from airground_drake.verify.runs.control_samples import control_samples
 from airground_drake.verify.runs.interventions import GATED_METHODS
 
 
@@ -65,6 +66,10 @@ def proposals_of(trace: Trace) -> list[Sent]:
     Raises:
         TraceError: if one is none, or they are not those of the events.
     """
+    return trace.derived("proposals", lambda: _proposals_of(trace))
+
+
+def _proposals_of(trace: Trace) -> list[Sent]:
     found = []
     for row in trace.proposals.to_dict("records"):
         times, places, selection, mapped, radii = (
@@ -104,29 +109,28 @@ def _is_cause(trace: Trace, ugv: str, cause: str, issued_s: float) -> bool:
     return bool(called[cause].any()) and (cause == ugv or not called[ugv].all())
 
 
-def accepted_at(trace: Trace, ugv: str, proposals: list[Sent], t: Array) -> list[Sent | None]:
-    """The proposal that a UGV has accepted, at control samples (S,), s, or None.
+def accepted_at(trace: Trace, ugv: str) -> list[Sent | None]:
+    """The proposal that a UGV has accepted, at each control sample of the run, or None.
 
     A proposal is in force from when it is sent until, at a planning instant, neither the UGV nor the one that it is to
     make way for is being intervened on, the motion has run out, the UGV's last answer was a refusal, or another one is
     sent. Under method (b) it is accepted all the while; under (c) and (d) while the decision of the last sample of the
     gatekeeper accepts it.
-
-    Args:
-        trace: one run.
-        ugv: name.
-        proposals: as sent, by time.
-        t: increasing.
     """
-    mine = [sent for sent in proposals if sent.ugv == ugv]
+    return trace.derived(("accepted", ugv), lambda: _accepted_at(trace, ugv))
+
+
+def _accepted_at(trace: Trace, ugv: str) -> list[Sent | None]:
+    t = trace.t[control_samples(trace.t, trace.scenario["control"]["period_s"])]
+    mine = [sent for sent in proposals_of(trace) if sent.ugv == ugv]
     if not mine:
         return [None] * len(t)
     gated = trace.meta["method"] in GATED_METHODS
     table = trace.decisions[trace.decisions["robot"] == ugv]
-    answers = [
-        (float(row["t_s"]), float(row["issued_s"]), row["decision"] == "accept") for row in table.to_dict("records")
-    ]
-    answers.sort()
+    columns = (table[name].tolist() for name in ("t_s", "issued_s", "decision"))
+    answers = sorted(
+        (float(t_s), float(issued), answer == "accept") for t_s, issued, answer in zip(*columns, strict=True)
+    )
     times = np.array([answer[0] for answer in answers])
     gate_s = trace.scenario["gatekeeper"]["period_s"]
     plan_s = trace.scenario["intervention"]["period_s"]
