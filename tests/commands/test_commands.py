@@ -15,7 +15,7 @@ import pytest
 
 from airground_drake.commands import COMMANDS, main
 from airground_drake.commands.listing import KINDS
-from airground_drake.registry import METHODS, MODEL_CLAIMS, POLICIES, ROUTES, RUN_CLAIMS, UAV_TASKS
+from airground_drake.registry import METHODS, MODEL_CLAIMS, POLICIES, ROUTES, RUN_CLAIMS, SAMPLERS, UAV_TASKS
 from airground_drake.scenarios.load import load, shipped
 
 
@@ -72,7 +72,7 @@ def test_list_has_everything_that_can_be_named(capsys: pytest.CaptureFixture[str
     lines = capsys.readouterr().out.splitlines()
     assert [line for line in lines if not line.startswith(" ")] == [f"{kind}:" for kind in KINDS]
     listed = {line.split()[0]: line.split(maxsplit=1)[1:] for line in lines if line.startswith("  ")}
-    assert set(listed) == {*shipped(), *METHODS, *POLICIES, *ROUTES, *UAV_TASKS, *RUN_CLAIMS, *MODEL_CLAIMS}
+    assert set(listed) == {*shipped(), *METHODS, *POLICIES, *ROUTES, *UAV_TASKS, *SAMPLERS, *RUN_CLAIMS, *MODEL_CLAIMS}
     assert all(listed.values())
 
 
