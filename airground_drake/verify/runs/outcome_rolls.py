@@ -26,8 +26,8 @@ STILL_M = 0.05
 """Less than this within the last second is at rest, m."""
 AROUND = 48
 """Points around each safe circle."""
-AT_ONCE = 16
-"""Decisions that are rolled out side by side, so that they fit into the memory."""
+AT_ONCE = 5_000_000
+"""Coordinates of what decisions that are rolled out side by side keep away from: they have to fit into the memory."""
 FAR_M = 1e9
 """A coordinate beyond every sensing range."""
 NONE = np.empty(0), np.empty(0), np.empty(0)
@@ -73,10 +73,12 @@ def _all_foreseen(trace: Trace, sent: Sequence[Sent]) -> dict[Key, tuple[Foresee
     rows = trace.decisions[trace.decisions["accept_stalls"] >= 0.0]
     columns = (rows[name].tolist() for name in ("robot", "t_s", "issued_s"))
     keys = [(str(robot), float(t), float(issued)) for robot, t, issued in zip(*columns, strict=True)]
-    found = dict[Key, tuple[Foreseen, Foreseen]]()
-    for some in (keys[k : k + AT_ONCE] for k in range(0, len(keys), AT_ONCE)):
-        begun = [_beginning(trace, *key, sent) for key in some]
-        found |= dict(zip(some, _rolled_out(trace, begun), strict=True))
+    found, begun = dict[Key, tuple[Foreseen, Foreseen]](), dict[Key, Beginning]()
+    for k, key in enumerate(keys):
+        begun[key] = _beginning(trace, *key, sent)
+        if k + 1 == len(keys) or len(begun) * max(each.points.size for each in begun.values()) > AT_ONCE:
+            found |= dict(zip(begun, _rolled_out(trace, list(begun.values())), strict=True))
+            begun = {}
     return found
 
 
