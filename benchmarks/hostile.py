@@ -76,7 +76,7 @@ def at_decision_level(seed: int, proposals: int) -> tuple[float, int, int]:
     for _ in range(proposals):
         centres = np.column_stack([random.uniform(-4.0, 4.0, (4, 2)), np.zeros(4)])
         start = safe_start(random, centres, d)
-        team = replace(base, obstacles=centres)
+        team = replace(base, obstacles=centres, obstacle_radius=0.0)
         t = float(random.uniform(0.0, 20.0))
         proposal = Proposal("hostile", t, attack(random, start, centres, t))
         for on_top in (False, True):
@@ -125,7 +125,7 @@ def execute(
 
 
 def whole_run(seed: int) -> tuple[float, int, float, float, float]:
-    """Margins, m, of one run under (d) and (c), proposals that (d) executed, time stolen and the bound of it, s."""
+    """Margin under (d), m, proposals that it executed, margin under (c), m, time stolen and the bound of it, s."""
     random = np.random.default_rng(seed)
     scenario = load("case_a", ["duration_s=20", f"seed={seed}"])[0]
     x, y = random.uniform([-1.0, 3.0], [6.0, 10.0])
