@@ -14,7 +14,17 @@ from typing import Any
 
 import airground_drake
 from airground_drake import files
-from airground_drake.registry import METHODS, MODEL_CLAIMS, PLUGIN, POLICIES, ROUTES, RUN_CLAIMS, UAV_TASKS, Registry
+from airground_drake.registry import (
+    METHODS,
+    MODEL_CLAIMS,
+    PLUGIN,
+    POLICIES,
+    ROUTES,
+    RUN_CLAIMS,
+    SAMPLERS,
+    UAV_TASKS,
+    Registry,
+)
 from airground_drake.scenarios import json_schema
 from airground_drake.verify.claim import Claim
 from airground_drake.verify.registry import mutants
@@ -181,10 +191,12 @@ def names() -> str:
     lines = ["## Methods", "", *(f"- `{method.id}`: {method.says}" for method in METHODS.values())]
     for title, registry in (("Policies", POLICIES), ("Routes", ROUTES), ("Tasks of the UAV", UAV_TASKS)):
         lines += ["", f"## {title}", "", *(_entry(registry, name) for name in registry.own)]
+    lines += ["", "## Samplers, of `airground falsify`", "", *(_entry(SAMPLERS, name) for name in SAMPLERS.own)]
     return _page(
-        "What a scenario may name",
-        "Besides these: what installed packages register (see [extending](extending.md)), and `module:Class` or "
-        "`file.py:Class` for whatever can be imported, also from beside the scenario file.",
+        "What can be named",
+        "In a scenario, and samplers on a command line. Besides these: what installed packages register (see "
+        "[extending](extending.md)), and `module:Class` or `file.py:Class` for whatever can be imported, also from "
+        "beside the scenario file.",
         lines,
     )
 

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from airground_drake.commands.falsify import main as falsify
 from airground_drake.report.__main__ import main
 from airground_drake.scenarios.load import load
 
@@ -103,3 +104,9 @@ def test_everything_that_can_be_added_works_from_a_folder_of_its_own(
     assert {"accept", "arrival"} <= set(kinds)
     reached = document["runs"]["d"]["metrics"]["final_position_m"]
     assert reached["uav"][:2] == pytest.approx(reached["ugv1"][:2], abs=0.01)
+
+
+def test_a_sampler_of_ones_own_looks_for_violations(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    command = [str(EXAMPLES / "pushed.yaml"), "--sampler", "my_robots/climb.py:Climb", "--allow-plugins"]
+    assert falsify([*command, "-n", "6", "--jobs", "1", "-o", str(tmp_path / "worst.yaml")]) == 0
+    assert "6 tried by my_robots/climb.py:Climb" in capsys.readouterr().out

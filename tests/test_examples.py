@@ -13,6 +13,7 @@ from pathlib import Path
 from types import ModuleType
 
 import matplotlib as mpl
+import numpy as np
 import pytest
 
 from airground_drake.scenarios.load import load
@@ -78,3 +79,19 @@ def test_a_plant_of_ones_own_needs_more_room() -> None:
         distances.append(own.nearest_to_the_rock(scenario))
     assert distances[0] < own.NEEDED_M <= distances[1]
     assert distances == pytest.approx([1.867, 2.117], abs=2e-3)
+
+
+@pytest.mark.parametrize("kind", ["CrossEntropy", "MultiArmedBandit"])
+def test_samplers_of_verifai_go_where_it_is_less(kind: str) -> None:
+    pytest.importorskip("verifai")
+    found = []
+    for _ in range(2):
+        sampler, points = getattr(imported("verifai_sampler"), kind)(dimensions=2, seed=3), []
+        for _ in range(150):
+            points.append(sampler.ask())
+            sampler.tell(points[-1], points[-1][:, 0] - 0.3)
+        found.append(np.concatenate(points))
+    assert found[0].shape == (150, 2)
+    assert ((found[0] >= 0.0) & (found[0] < 1.0)).all()
+    assert np.mean(found[0][100:, 0]) < np.mean(found[0][:50, 0])
+    np.testing.assert_array_equal(*found)

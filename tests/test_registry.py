@@ -12,9 +12,9 @@ import pytest
 from airground_drake import registry
 from airground_drake.errors import PluginError, UnknownNameError
 from airground_drake.intervention.policy import Policy
-from airground_drake.registry import METHODS, MODEL_CLAIMS, POLICIES, ROUTES, RUN_CLAIMS, UAV_TASKS, Registry
+from airground_drake.registry import METHODS, MODEL_CLAIMS, POLICIES, ROUTES, RUN_CLAIMS, SAMPLERS, UAV_TASKS, Registry
 
-ALL = (POLICIES, ROUTES, UAV_TASKS, RUN_CLAIMS, MODEL_CLAIMS)
+ALL = (POLICIES, ROUTES, UAV_TASKS, SAMPLERS, RUN_CLAIMS, MODEL_CLAIMS)
 
 
 @pytest.mark.parametrize("names", ALL, ids=lambda names: names.group)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -9,14 +11,14 @@ from typing import Any
 import numpy as np
 
 from airground_drake.arrays import Array
-from airground_drake.campaign.distributions import values_at
+from airground_drake.campaign.distributions import dimensions, values_at
 from airground_drake.campaign.objective import Objective
 from airground_drake.campaign.pool import Pool
 from airground_drake.campaign.rows import Row
 from airground_drake.campaign.search import WORTHLESS, Sampler
 from airground_drake.campaign.spec import Spec
 from airground_drake.campaign.work import rows_at, rows_of_scenario
-from airground_drake.errors import ScenarioError
+from airground_drake.errors import PluginError, ScenarioError, described, one_line
 from airground_drake.progress import SILENT, Watch
 from airground_drake.scenarios.estimate import Limits
 from airground_drake.scenarios.load import from_data
@@ -84,16 +86,20 @@ def falsify(search: Search, sampler: Sampler, number: int, pool: Pool, watch: Wa
         number: of points, at least; the last batch is finished.
         pool: that does the work.
         watch: is told how far it is.
+
+    Raises:
+        PluginError: if the sampler raises, ends the process, or asks for what are no points.
     """
     best = Best(0, WORTHLESS, np.empty(0), False)
     while best.tried < number and not best.found:
-        points = sampler.ask()
+        points = _asked(sampler, dimensions(search.spec.drawn))
         values = np.full(len(points), WORTHLESS)
         found = np.zeros(len(points), dtype=bool)
         for k, judged in pool(partial(search.at, points), range(len(points))):
             if judged is not None:
                 values[k], found[k] = judged
-        sampler.tell(points, values)
+        with _of_others(sampler, "tell"):
+            sampler.tell(points.copy(), values.copy())
         k = int(np.argmin(np.where(found, values, np.inf))) if found.any() else int(values.argmin())
         tried = best.tried + len(points)
         if found.any() or values[k] < best.value:
@@ -102,3 +108,31 @@ def falsify(search: Search, sampler: Sampler, number: int, pool: Pool, watch: Wa
             best = replace(best, tried=tried)
         watch.advance(len(points), f"least {best.value:.6g}")
     return best
+
+
+def _asked(sampler: Sampler, n: int) -> Array:
+    """The points (k, n) that a sampler, perhaps somebody else's, asks for.
+
+    Raises:
+        PluginError: if it raises, or these are not one or more points in [0, 1).
+    """
+    with _of_others(sampler, "ask"):
+        points = np.array(sampler.ask(), dtype=np.float64)
+    if points.ndim != 2 or points.shape[1] != n or not len(points):
+        raise PluginError(f"ask of sampler {_name(sampler)}: array {points.shape}, wanted (k, {n}), k at least 1")
+    if not ((points >= 0.0) & (points < 1.0)).all():
+        raise PluginError(f"ask of sampler {_name(sampler)}: a point outside [0, 1)")
+    return points
+
+
+@contextmanager
+def _of_others(sampler: Sampler, what: str) -> Iterator[None]:
+    """Whatever a method of a sampler raises is a `PluginError` that names it."""
+    try:
+        yield
+    except (Exception, SystemExit) as error:
+        raise PluginError(f"{what} of sampler {_name(sampler)}: {described(error)}") from error
+
+
+def _name(sampler: Sampler) -> str:
+    return one_line(type(sampler).__name__)

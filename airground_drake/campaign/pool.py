@@ -1,4 +1,4 @@
-"""Much of the same work, on the processors of this machine (joblib, loky) or on a Dask cluster."""
+"""Much of the same work, on the processors of this machine (loky) or on a Dask cluster."""
 
 from __future__ import annotations
 
@@ -13,7 +13,11 @@ from airground_drake.errors import AirgroundError, one_line
 DEATHS = 2
 """An item in whose presence so many processes have died is given up."""
 AHEAD = 4
-"""Items that are handed out beforehand for each process of a cluster."""
+"""Items that are handed out beforehand for each process."""
+IDLE_S = 300.0
+"""A process that has had nothing to do for so long ends, s."""
+THREADS = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL", "BLIS", "NUMEXPR")}
+"""Environment of the processes: one thread each for numerical libraries."""
 
 T = TypeVar("T")
 
@@ -33,58 +37,60 @@ class Pool(Protocol):
 @contextmanager
 def local(jobs: int) -> Iterator[Pool]:
     """So many processes of this machine, which end in the end."""
-    from joblib.externals.loky import get_reusable_executor  # takes a while, which other commands need not wait for
+    import loky  # takes a while, which other commands need not wait for
 
     try:
         yield partial(_locally, jobs)
     finally:
-        get_reusable_executor().shutdown(wait=True, kill_workers=True)
+        loky.get_reusable_executor(reuse=True).shutdown(wait=True, kill_workers=True)
 
 
 def _locally(jobs: int, work: Callable[[int], T], items: Iterable[int]) -> Iterator[tuple[int, T | None]]:
     """See `Pool`.
 
-    A process whose memory grows, by code of others, is replaced (loky sees to it). If one dies, those items that it may
-    have taken with it are done again, each in a process of its own.
+    A process whose memory grows, by code of others, is replaced (loky sees to it). If one dies, those that are there
+    end with it, and the items that they may have been at are done again, each in a process of its own.
     """
-    from joblib import Parallel, delayed
-    from joblib.externals.loky.process_executor import BrokenProcessPool
+    import loky
 
-    waiting, begun, numbered = iter(items), dict[int, None](), partial(_numbered, work)
-
-    def handed_out() -> Iterator[Any]:
-        for item in waiting:
-            begun[item] = None
-            yield delayed(numbered)(item)
-
+    waiting, under_way = iter(items), dict[Any, int]()
     while True:
-        pool = Parallel(jobs, return_as="generator_unordered", batch_size=1, pre_dispatch="2*n_jobs")
-        try:
-            for item, result in pool(handed_out()):
-                del begun[item]
-                yield item, result
+        for item in itertools.islice(waiting, AHEAD * jobs - len(under_way)):
+            under_way[_submitted(partial(work, item), jobs)] = item
+        if not under_way:
             return
-        except BrokenProcessPool:
-            for item in tuple(begun):
-                del begun[item]
-                yield item, _alone(work, item)
+        done = loky.wait(under_way, return_when=loky.FIRST_COMPLETED).done
+        for future in tuple(under_way) if any(map(_lost, done)) else done:
+            item = under_way.pop(future)
+            yield item, _alone(partial(work, item)) if _lost(future) else future.result()
 
 
-def _numbered(work: Callable[[int], T], item: int) -> tuple[int, T]:
-    return item, work(item)
+def _submitted(call: Callable[[], T], jobs: int) -> Any:
+    """The future of a call in one of so many processes; failed already if one of them has just died."""
+    import loky
+
+    try:
+        return loky.get_reusable_executor(jobs, timeout=IDLE_S, env=THREADS).submit(call)
+    except loky.BrokenProcessPool as error:
+        future = loky.Future()
+        future.set_exception(error)
+        return future
 
 
-def _alone(work: Callable[[int], T], item: int) -> T | None:
-    """One item in a process of its own, again if that dies."""
-    from joblib.externals.loky import get_reusable_executor
-    from joblib.externals.loky.process_executor import BrokenProcessPool
+def _lost(future: Any) -> bool:
+    """Whether a process died before it had finished this."""
+    import loky
 
+    return isinstance(future.exception(), loky.BrokenProcessPool)
+
+
+def _alone(call: Callable[[], T]) -> T | None:
+    """The result of a call in a process of its own, begun again if that dies; None if it always does."""
     for _ in range(DEATHS):
-        try:
-            result: T = get_reusable_executor(1, kill_workers=True).submit(work, item).result()
-        except BrokenProcessPool:
-            continue
-        return result
+        future = _submitted(call, 1)
+        if not _lost(future):
+            result: T = future.result()
+            return result
     return None
 
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from importlib import import_module
 from pathlib import Path
 
+from airground_drake.registry import SAMPLERS
 from airground_drake.scenarios.shipped import shipped
 from airground_drake.usage import Parser
 
@@ -61,19 +62,16 @@ def _complete(action: argparse.Action) -> None:
     import shtab
 
     if action.dest in SCENARIOS:
-        action.complete = _scenarios()  # type: ignore[attr-defined]
+        action.complete = _name_or_file("scenario", shipped())  # type: ignore[attr-defined]
+    elif action.dest == "sampler":
+        action.complete = _name_or_file("sampler", SAMPLERS)  # type: ignore[attr-defined]
     elif action.type is Path:
         action.complete = shtab.DIRECTORY if action.metavar == "DIR" else shtab.FILE  # type: ignore[attr-defined]
 
 
-def _scenarios() -> dict[str, str | dict[str, str]]:
-    """The shipped scenarios and files, in the words of each shell."""
-    names = " ".join(shipped())
-    bash = f'_airground_scenarios() {{\n  compgen -W "{names}" -- "$1"\n  _shtab_compgen_files "$1"\n}}'
-    zsh = f"_airground_scenarios() {{\n  _alternative 'scenarios:shipped scenario:({names})' 'files:file:_files'\n}}"
-    return {
-        "bash": "_airground_scenarios",
-        "zsh": "_airground_scenarios",
-        "tcsh": f"({names})",
-        "preamble": {"bash": bash, "zsh": zsh, "tcsh": ""},
-    }
+def _name_or_file(kind: str, allowed: Iterable[str]) -> dict[str, str | dict[str, str]]:
+    """Some names and files, in the words of each shell."""
+    names, function = " ".join(allowed), f"_airground_{kind}"
+    bash = f'{function}() {{\n  compgen -W "{names}" -- "$1"\n  _shtab_compgen_files "$1"\n}}'
+    zsh = f"{function}() {{\n  _alternative '{kind}:{kind}:({names})' 'files:file:_files'\n}}"
+    return {"bash": function, "zsh": function, "tcsh": f"({names})", "preamble": {"bash": bash, "zsh": zsh, "tcsh": ""}}

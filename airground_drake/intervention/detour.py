@@ -63,10 +63,11 @@ class Detour(Policy):
         return _then_follow(times, legs, seen.preset, self.follow, height)
 
     def _rendezvous(self, seen: Observation, centres: Array, radii: Array) -> tuple[float, Path] | None:
-        """Time to the earliest rendezvous, s, and the path to it; None if the preset is blocked up to its end.
+        """Time to a rendezvous, s, and the path to it; None if the preset is blocked up to its end.
 
-        The duration only grows: by a sample where the preset is blocked, else to the travel time. A preset that runs
-        away nearly as fast is met by strides that double, and then by bisection of the last.
+        The duration only grows: by a sample where the preset is blocked, else to the travel time, so that no
+        rendezvous is passed over but in gaps of a sample. A preset that runs away nearly as fast is met by strides
+        that double, and then by bisection of the last: a rendezvous, not certainly the earliest.
         """
         gap = np.linalg.norm(seen.preset.at(seen.start)[0][:2] - seen.position[:2])
         duration = float(gap) / (self.speed + seen.preset.max_speed)  # no rendezvous can be earlier
@@ -82,7 +83,7 @@ class Detour(Policy):
                 duration += SAMPLE_S
             else:
                 stride = 2.0 ** max(0, strides - CHASED)
-                duration = needed if stride == 1.0 else duration + stride * (needed - duration)
+                duration = needed + (stride - 1.0) * (needed - duration)
                 strides += 1
         while strides > CHASED and duration - missed > RENDEZVOUS_TOLERANCE_S:
             middle = 0.5 * (missed + duration)

@@ -14,7 +14,7 @@ from airground_drake.registry import POLICIES, ROUTES, UAV_TASKS, Registry, is_p
 from airground_drake.scenarios.schema import Scenario
 
 OPTION = "--allow-plugins"
-HELP = "import and run what the scenario names as module:Class or file.py:Class; looked for beside its file, too"
+HELP = "import and run what is named as module:Class or file.py:Class; looked for beside the scenario or spec, too"
 WANTED = f"code of others is imported and run only with {OPTION}"
 
 

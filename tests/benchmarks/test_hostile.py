@@ -6,9 +6,9 @@ import hostile
 
 
 def test_no_proposal_brings_d_below_the_safe_distance() -> None:
-    worst, accepted, below = hostile.at_decision_level(seed=0, proposals=40)
+    worst, accepted, below = hostile.at_decision_level(seed=0, proposals=150)
     assert worst >= -1e-9
-    assert accepted >= below
+    assert accepted > below > 0  # the measure sees what comes of proposals that (c) accepts
 
 
 def test_a_run_with_a_hostile_uav_keeps_the_distance_and_the_bound() -> None:

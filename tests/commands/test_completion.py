@@ -41,6 +41,8 @@ def script(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (["compare", "fol"], "folder"),
         (["diagram", "mi"], "minimal mine.yaml"),
         (["diagram", "minimal", "--method", ""], "a b c d"),
+        (["falsify", "--sampler", "h"], "halton"),
+        (["falsify", "--sampler", "m"], "mine.yaml"),
     ],
 )
 def test_bash_is_offered_what_fits(typed: list[str], offered: str, script: Path, tmp_path: Path) -> None:

@@ -59,20 +59,49 @@ class Corner:
         self.points = np.full((1, dimensions), 0.5)
 
     def ask(self):
-        return self.points
+        ASK
 
     def tell(self, points, values):
-        pass
+        TELL
 """
 
 
+def sampled(tmp_path: Path, ask: str = "return self.points", tell: str = "pass", *, allow: bool = True) -> int:
+    text = SAMPLER.replace("ASK", ask).replace("TELL", tell)
+    (tmp_path / "corner.py").write_text(text, encoding="utf-8")
+    return falsified(tmp_path, "d", "--sampler", "corner.py:Corner", *["--allow-plugins"][:allow])
+
+
 def test_a_sampler_of_ones_own_is_found_beside_the_spec(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "corner.py").write_text(SAMPLER, encoding="utf-8")
-    assert falsified(tmp_path, "d", "--sampler", "corner.py:Corner") == 2
+    assert sampled(tmp_path, allow=False) == 2
     assert "--allow-plugins" in capsys.readouterr().err
-    assert falsified(tmp_path, "d", "--sampler", "corner.py:Corner", "--allow-plugins") == 0
+    assert sampled(tmp_path, tell="points += 1") == 0  # what it does with its copy is its own business
     assert "2 tried by corner.py:Corner" in capsys.readouterr().out
     assert load(tmp_path / "found.yaml")[0].obstacles["rock"].position_m == [5.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("faulty", "said"),
+    [
+        ({"ask": "raise ValueError('no\\nmore')"}, "ask of sampler Corner: ValueError: no\\nmore"),
+        ({"ask": "raise SystemExit(0)"}, "ask of sampler Corner: SystemExit: 0"),
+        ({"ask": "return self.points[0]"}, "ask of sampler Corner: array (3,), wanted (k, 3), k at least 1"),
+        ({"ask": "return self.points[:0]"}, "ask of sampler Corner: array (0, 3), wanted (k, 3), k at least 1"),
+        ({"ask": "return self.points[:, :2]"}, "ask of sampler Corner: array (1, 2), wanted (k, 3), k at least 1"),
+        ({"ask": "return self.points * np.nan"}, "ask of sampler Corner: a point outside [0, 1)"),
+        ({"ask": "return 2 * self.points"}, "ask of sampler Corner: a point outside [0, 1)"),
+        ({"ask": "return None"}, "ask of sampler Corner: "),
+        ({"tell": "exit()"}, "tell of sampler Corner: SystemExit: None"),
+    ],
+)
+def test_a_sampler_that_fails_is_no_counterexample(
+    faulty: dict[str, str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert sampled(tmp_path, **faulty) == 4
+    written = capsys.readouterr().err
+    assert said in written
+    assert written.count("\n") == 1
+    assert not (tmp_path / "found.yaml").exists()
 
 
 def test_usage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
