@@ -38,13 +38,14 @@ class Course:
     max_speed_m_s: float = 3.0
     hidden: float = 0.0
 
-    def values(self, rng: np.random.Generator, obstacle_m: float, ugv_m: float) -> dict[str, Any]:
-        """The keys of a scenario that a course replaces: `ugvs`, `obstacles`, start and target of the UAV.
+    def values(self, rng: np.random.Generator, obstacle_m: float, ugv_m: float, altitude_m: float) -> dict[str, Any]:
+        """The keys of a scenario that a course replaces, dotted: UGVs, obstacles, start and target of the UAV.
 
         Args:
             rng: of the draw.
             obstacle_m: safe distance of a UGV and an obstacle, m.
             ugv_m: of two UGVs, m.
+            altitude_m: of the UAV, which starts and ends over the centroid of the UGVs.
 
         Raises:
             ValueError: if the field is too small for what is drawn.
@@ -67,7 +68,9 @@ class Course:
             f"obstacle{k + 1}": {"position_m": _ground(place), "known_to_uav": not hidden[k]}
             for k, place in enumerate(places)
         }
-        return {"ugvs": ugvs, "obstacles": obstacles}
+        ends = {"uav.start_m": starts, "uav.target_m": targets}
+        over = {key: [*np.round(places.mean(axis=0), 6).tolist(), altitude_m] for key, places in ends.items()}
+        return {"ugvs": ugvs, "obstacles": obstacles, **over}
 
     def _apart(self, rng: np.random.Generator, side: Array, least: float) -> Array:
         """Places (n, 2), m, at these x, any two on the same side with at least that distance."""

@@ -103,9 +103,10 @@ class Spec:
         """The scenario with these values by dotted key, on the course of a draw; raises as `draw`."""
         overrides = dict(self.fixed)
         if self.course is not None:
-            distance = self._with(overrides).safe_distance
+            base = self._with(overrides)
+            distance, rng = base.safe_distance, stream(self.seed, COURSE, index)
             try:
-                overrides |= self.course.values(stream(self.seed, COURSE, index), distance.obstacle_m, distance.ugv_m)
+                overrides |= self.course.values(rng, distance.obstacle_m, distance.ugv_m, base.uav.altitude_m)
             except ValueError as error:
                 raise ScenarioError(self.source, COURSE, Fault(str(error)), "wanted: a larger field") from None
         scenario = self._with(overrides | dict(values))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import product
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +18,8 @@ COMMAND_M_S = 1e-6
 BINDING_M_S, DOUBT_M_S = 1e-9, 1e-10
 """An inequality binds where the law has the first to spare at most; of one closer to that than the second, rounding
 decides."""
+SIDES = (-1.0, 1.0)
+"""Before and after."""
 ON_TOP = ("b", "c")
 """Methods that put an accepted intervention above the avoidance inequalities."""
 
@@ -83,12 +85,11 @@ def around(run: Run, robot: str) -> Inequalities:
 
 
 def _ugv(run: Run, ugv: str) -> Robot:
-    """(6), (14) and (20). At a corner of a motion its rates on both sides are tried."""
+    """(6), (14) and (20); of the rates on both sides of corners those count that come closer."""
     accepted = accepted_at(run, ugv)
     recorded = run.command_m_s[ugv][run.chosen_row]
     law, away = np.zeros_like(recorded), np.full(len(recorded), np.inf)
-    for own_side, asked_side in product((-1.0, 1.0), repeat=2):
-        tried = _law(run, ugv, accepted, own_side, asked_side)
+    for tried in _laws(run, ugv, accepted):
         off = np.linalg.norm(recorded - tried, axis=1)
         closer = ~(off >= away)
         law[closer], away[closer] = tried[closer], off[closer]
@@ -99,31 +100,36 @@ def _ugv(run: Run, ugv: str) -> Robot:
 
 def _said(run: Run, ugv: str, executing: Flags) -> Flags:
     """What the signal says of each sample: otherwise than the messages if any row does up to the next one."""
-    ends = np.append(run.chosen_row[1:], len(run.t_s))
-    parts = [run.executed(ugv)[begin:end] for begin, end in zip(run.chosen_row, ends, strict=True)]
+    executed, ends = run.executed(ugv), np.append(run.chosen_row[1:], len(run.t_s))
+    parts = [executed[begin:end] for begin, end in zip(run.chosen_row, ends, strict=True)]
     return np.array([not due if (part != due).any() else due for part, due in zip(parts, executing, strict=True)])
 
 
-def _law(run: Run, ugv: str, accepted: list[Proposal | None], own_side: float, asked_side: float) -> Array:
-    """Commands of a UGV, (S, 3), with the rates before (-1) or after (+1) each sample."""
+def _laws(run: Run, ugv: str, accepted: list[Proposal | None]) -> Iterator[Array]:
+    """Commands of a UGV, (S, 3), with rates before and after each sample: of its preset, and of what it accepted."""
     control, limit = run.scenario["control"], run.robots[ugv]["max_speed_m_s"]
     composition = run.scenario["runs"][run.name]["composition"]
     given, here, t = around(run, ugv), run.position_m[ugv][run.sample_row], run.sample_s
     preset = run.presets[ugv]
-    wish = preset.rate_m_s(t + own_side * SMALL) + control["motion_gain_1_s"] * (preset.position_m(t) - here)
-    own = limited(PLANE * wish, limit)
-    law = avoiding(own, given, composition)
+    away = control["motion_gain_1_s"] * (preset.position_m(t) - here)
     rows = np.array([proposal is not None for proposal in accepted])
-    if rows.any():
-        with_it = [(proposal, when) for proposal, when in zip(accepted, t, strict=True) if proposal is not None]
+    with_it = [(proposal, when) for proposal, when in zip(accepted, t, strict=True) if proposal is not None]
+    for own_side in SIDES:
+        own = limited(PLANE * (preset.rate_m_s(t + own_side * SMALL) + away), limit)
+        law = avoiding(own, given, composition)
+        if not with_it:
+            yield law
+            continue
         place = np.stack([proposal.place_m(np.array([when]))[0] for proposal, when in with_it])
-        rate = np.stack([proposal.rate_m_s(float(when), asked_side) for proposal, when in with_it])
-        below = (law if run.method in ON_TOP else own)[rows]
-        asked = PLANE * (rate + control["intervention_gain_1_s"] * (place - here[rows]))
         projector = np.stack([proposal.projector for proposal, _ in with_it])
-        task = limited(PLANE * (below + np.einsum("bij,bj->bi", projector, asked - below)), limit)
-        law[rows] = task if run.method in ON_TOP else avoiding(task, given.rows(rows), composition)
-    return law
+        below = (law if run.method in ON_TOP else own)[rows]
+        for asked_side in SIDES:
+            rate = np.stack([proposal.rate_m_s(float(when), asked_side) for proposal, when in with_it])
+            asked = PLANE * (rate + control["intervention_gain_1_s"] * (place - here[rows]))
+            task = limited(PLANE * (below + np.einsum("bij,bj->bi", projector, asked - below)), limit)
+            tried = law.copy()
+            tried[rows] = task if run.method in ON_TOP else avoiding(task, given.rows(rows), composition)
+            yield tried
 
 
 def _uav(run: Run) -> Robot:

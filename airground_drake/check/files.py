@@ -57,11 +57,12 @@ def names_in(folder: Path) -> list[str]:
     found: list[str] = []
     for place, folders, files in os.walk(folder):
         for name in (*folders, *files):
-            path = Path(place, name)
-            mode = path.lstat().st_mode
+            path = os.path.join(place, name)
+            mode = os.lstat(path).st_mode
             if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
-                raise NotEstablished("it has regular files and folders only", "it is neither", str(path))
-        found += [Path(place, name).relative_to(folder).as_posix() for name in files]
+                raise NotEstablished("it has regular files and folders only", "it is neither", path)
+        inside = "" if place == os.fspath(folder) else f"{os.path.relpath(place, folder)}/"
+        found += [inside + name for name in files]
         if len(found) > MOST_FILES:
             raise NotEstablished("it has a number of files", f"more than {MOST_FILES}", str(folder))
     return sorted(found)

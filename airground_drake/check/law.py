@@ -117,7 +117,7 @@ def _closest(wanted_m_s: Array, given: Inequalities, _: str) -> Array:
 def _worked_out(wanted_m_s: Array, given: Inequalities) -> Array:
     """The closest velocities; where inequalities contradict each other, the slowest that miss them least.
 
-    The latter are shortened until the inequalities hold that standing still meets.
+    The latter are shortened until the inequalities hold that standing still meets but for rounding.
     """
     found, lacking = _by_active_sets(wanted_m_s, given)
     torn = lacking > CONTRADICTION_M_S
@@ -125,8 +125,9 @@ def _worked_out(wanted_m_s: Array, given: Inequalities) -> Array:
         contradicting = given.rows(torn)
         slowest = _least_missing(contradicting)
         rate = (contradicting.normal * slowest[:, None]).sum(axis=2)
-        late = (rate < contradicting.bound) & (contradicting.bound <= 0.0)
-        factor = np.where(late, contradicting.bound / np.where(late, rate, 1.0), 1.0).min(axis=1)
+        least = np.minimum(contradicting.bound, 0.0)
+        late = (rate < least) & (contradicting.bound <= CONTRADICTION_M_S)
+        factor = np.where(late, least / np.where(late, rate, 1.0), 1.0).min(axis=1)
         found[torn] = slowest * factor[:, None]
     return found
 

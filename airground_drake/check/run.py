@@ -149,11 +149,18 @@ class Run:
             NotEstablished: if it is not there.
             Disagreement: if a number is not finite.
         """
-        if name not in self.signals:
-            raise NotEstablished("the signals have the column", "it is missing", name)
-        values = self.signals[name].to_numpy(dtype=np.float64)
-        holds("numbers are finite", np.isfinite(values), values, "a finite number", about=name)
-        return values
+        if name not in self._columns:
+            if name not in self.signals:
+                raise NotEstablished("the signals have the column", "it is missing", name)
+            values = self.signals[name].to_numpy(dtype=np.float64)
+            holds("numbers are finite", np.isfinite(values), values, "a finite number", about=name)
+            self._columns[name] = values
+        return self._columns[name]
+
+    @cached_property
+    def _columns(self) -> dict[str, Array]:
+        """Those that were asked for."""
+        return {}
 
     def vector(self, robot: str, stem: str, unit: str) -> Array:
         """Three columns of the signals, (T, 3), such as `ugv1.vx_m_s`: stem `v`, unit `m_s`."""

@@ -123,6 +123,7 @@ class Gatekeepers(abc.ABC):
         self._law = law
         self._presets = tuple(presets)
         self._team = team
+        self._discs = np.column_stack([team.obstacles, team.obstacle_radii])
         self._neighbourhood = team.neighbourhood(slice(0, len(team.ugvs)))
         self._max_speed = team.max_speed
         self.times_s: list[float] = []
@@ -151,8 +152,7 @@ class Gatekeepers(abc.ABC):
     def _report(self, position: Array, decision: Decision) -> Report:
         """What goes with an answer."""
         near = self._sensed(position)
-        found = np.column_stack([self._team.obstacles, self._team.obstacle_radii])[near]
-        discs: tuple[Disc, ...] = tuple((x, y, z, radius) for x, y, z, radius in found.tolist())
+        discs: tuple[Disc, ...] = tuple((x, y, z, radius) for x, y, z, radius in self._discs[near].tolist())
         return Report(discs, decision.reason, in_words(decision))
 
     def _scene(self, seen: Situation, i: int) -> Scene:

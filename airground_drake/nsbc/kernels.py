@@ -303,13 +303,16 @@ def _active_step(row: Array, gap: Array, i: int, j: int, m: int, step: Array) ->
 
 @njit(cache=True)
 def _scale_back(velocity: Array, normal: Array, bound: Array) -> Array:
-    """Shorten a velocity, in place, until every constraint that v = 0 satisfies holds in floating point."""
+    """Shorten a velocity, in place, until every constraint that v = 0 satisfies holds in floating point.
+
+    A robot in contact is at the safe distance but for rounding, on either side of it: it counts as there.
+    """
     while True:
         scale = 1.0
         for k in range(len(bound)):
-            rate = _dot(normal[k], velocity)
-            if rate < bound[k] <= 0.0:
-                scale = min(scale, bound[k] / rate)
+            rate, least = _dot(normal[k], velocity), min(bound[k], 0.0)
+            if rate < least and bound[k] <= CONTRADICTION_M_S:
+                scale = min(scale, least / rate)
         if scale == 1.0:
             return velocity
         scale = np.nextafter(scale, 0.0) if scale > 1e-300 else 0.0

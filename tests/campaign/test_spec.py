@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from airground_drake.campaign.spec import Spec, load_spec
@@ -53,6 +54,10 @@ def test_random_courses_are_valid_and_have_the_counts_that_are_asked_for(tmp_pat
     assert {len(each.ugvs) for each in scenarios} == {2, 3}
     assert {len(each.obstacles) for each in scenarios} == {1, 2, 3, 4}
     assert {o.known_to_uav for each in scenarios for o in each.obstacles.values()} == {True, False}
+    for each in scenarios:  # the UAV's own goal is where its formation takes it
+        for end in ("start_m", "target_m"):
+            centroid = np.mean([getattr(ugv, end) for ugv in each.ugvs.values()], axis=0)
+            assert getattr(each.uav, end) == pytest.approx([*centroid[:2], each.uav.altitude_m], abs=1e-6)
 
 
 def test_a_course_without_room_is_a_draw_that_cannot_be_made(tmp_path: Path) -> None:

@@ -97,7 +97,7 @@ class Exec(TraceClaim):
         "the scenario and the table of proposals. The closest velocity is found by another algorithm than the "
         "controller's (constraints one by one, each reducing the dimension), so also where inequalities bind; where "
         "they contradict each other it is the slowest of those that miss them least, shortened until those hold that "
-        "standing still meets. What is accepted follows from "
+        "standing still meets but for 1e-9 m/s. What is accepted follows from "
         "proposals, modes, answers and the periods, not from the signal `accepted`, which has to agree. At a corner of "
         "a preset or proposed motion either rate counts."
     )

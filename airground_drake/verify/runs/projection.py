@@ -83,10 +83,10 @@ def _in_interval(wanted: Array, sign: Array, level: Array) -> tuple[Array, Flags
 
 
 def shortened(velocity: Array, normal: Array, bound: Array) -> Array:
-    """Velocities (B, d), shortened until those inequalities hold that standing still meets."""
-    rate = np.einsum("bkd,bd->bk", normal, velocity)
-    broken = (rate < bound) & (bound <= 0.0)
-    factor = np.where(broken, bound / np.where(broken, rate, 1.0), 1.0).min(axis=1, initial=1.0)
+    """Velocities (B, d), shortened until those inequalities hold that standing still meets but for rounding."""
+    rate, least = np.einsum("bkd,bd->bk", normal, velocity), np.minimum(bound, 0.0)
+    broken = (rate < least) & (bound <= CONTRADICTION_M_S)
+    factor = np.where(broken, least / np.where(broken, rate, 1.0), 1.0).min(axis=1, initial=1.0)
     return np.asarray(velocity * factor[:, None])
 
 

@@ -261,14 +261,22 @@ def copy(report: Path, folder: Path) -> Path:
     return folder
 
 
+@cache
+def _digest(path: str, _inode: int, _written_ns: int) -> str:
+    """SHA-256 of a file; one that was put in its place is another."""
+    return hashlib.sha256(Path(path).read_bytes()).hexdigest()
+
+
 def mend(folder: Path) -> None:
     """Make the list of files right, if there is a report to put it into."""
     try:
         with edited_report(folder) as report:
-            names = [path for path in folder.rglob("*") if path.is_file() and path.name != "report.json"]
-            names = [path for path in names if path.relative_to(folder).parts[0] != "proofs"]  # those are added later
+            names = [os.path.join(place, name) for place, _, names in os.walk(folder) for name in names]
+            files = {os.path.relpath(path, folder): path for path in names if os.path.isfile(path)}
             report["files"] = {
-                path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest() for path in names
+                name: _digest(path, os.stat(path).st_ino, os.stat(path).st_mtime_ns)
+                for name, path in files.items()
+                if name != "report.json" and not name.startswith("proofs/")  # those are added later
             }
     except (OSError, ValueError, TypeError, RecursionError):
         return

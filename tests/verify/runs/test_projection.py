@@ -96,3 +96,22 @@ def test_walls_that_close_in_are_missed_evenly_and_slowly() -> None:
     normal, bound = np.array([[[1.0, 0.0], [-1.0, 0.0]]]), np.array([[1.0, 0.5]])
     assert not closest(np.array([[9.0, 9.0]]), normal, bound)[1].any()
     assert least_violation(normal, bound) == pytest.approx(np.array([[0.25, 0.0]]), abs=1e-8)
+
+
+@given(SEEDS)
+def test_in_contact_rounding_decides_nothing(seed: int) -> None:
+    """A robot at the safe distance of one, and inside that of another behind it: on which side rounding puts it."""
+    rng = np.random.default_rng(seed)
+    angle = rng.uniform(0.0, 2.0 * np.pi) + np.array([0.0, np.pi + rng.uniform(-0.2, 0.2), rng.uniform(1.0, 2.0)])
+    normal = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(3)])[None]
+    wanted = 3.0 * rng.normal(size=(1, 3)) * [1.0, 1.0, 0.0]
+    inside, aside = rng.uniform(0.1, 2.0), rng.uniform(-1.0, 0.0)
+    for found in (
+        lambda bound: avoiding(wanted, Inequalities(normal, bound), "augmented", planar=True),
+        lambda bound: checker.avoiding(wanted, checker.Inequalities(normal, bound), "augmented"),
+        lambda bound: kernels.team_avoid(wanted, normal, bound, kernels.AUGMENTED),
+    ):
+        there, *beside = (
+            found(np.array([[touches, inside, aside]])) for touches in (0.0, -1e-15, 1e-15, -1e-12, 1e-12)
+        )
+        assert np.array(beside) == pytest.approx(np.array([there] * 4), abs=1e-9)
