@@ -1,11 +1,13 @@
-"""Scenarios that nobody tuned: `python benchmarks/random_scenarios.py -n 500 [--only 17] [--keep DIR] [--rows FILE]`.
+"""Scenarios that nobody tuned: `python benchmarks/random_scenarios.py -n 500 [--crowded] [--only 17] [--rows FILE]`.
 
 Draws scenarios (1 to 6 UGVs, 0 to 12 obstacles, all methods, compositions, periods, triggers, thresholds, routes and
 policies), simulates those that are valid, and judges each run by its claims (cross-checked as signal temporal logic)
 and by the independent checker, which gets a report folder of the run. Nothing may stop the simulator, no claim may be
 an `error`, the checker must agree with every verdict about the run, method (d) keeps every safe distance to 1e-9 m, no
-two triggers are closer than the dwell, and every trigger and release is where THR-TRIG has it. Prints each scenario
-that breaks one of these, by its number, which draws it again, and what was exercised. Exit code 1 if there is one.
+two triggers are closer than the dwell, every trigger and release is where THR-TRIG has it, and commands, decisions and
+predictions are those of the laws. Prints each scenario that breaks one of these, by its number, which draws it again,
+and what was exercised. Exit code 1 if there is one. `--crowded` draws other scenarios: on half the extent, where robots
+and obstacles touch.
 
 Proofs about the model are not made (they take longer than all the rest): the checker's line about the list of claims,
 which misses them, is left out, all its lines about the run count.
@@ -22,6 +24,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -45,6 +48,8 @@ from airground_drake.verify.stl import cross_check as stl
 ALWAYS = ("ZENO-TRACE", "THR-TRIG", "EXEC")
 CERTIFIED = ("SAFE-TRACE", "SAFE-HYP")
 """Claims that must hold in every run (with a dwell, for ZENO-TRACE), and in those of method (d)."""
+NEVER_REFUTED = ("GATE-FEAS", "GATE-MODEL", "GATE-SUR", "LIVE-PROG", "COMM")
+"""Claims that need a proposal to be decided, but may not be refuted."""
 
 RUNS_PER_PROCESS = 20
 """Then a process is replaced, whatever it has kept of what it ran."""
@@ -84,7 +89,7 @@ class Row:
     statuses: dict[str, str] = field(default_factory=dict)
 
 
-def draw(number: int) -> dict[str, Any]:
+def draw(number: int, *, crowded: bool = False) -> dict[str, Any]:
     """A scenario, valid with a fair chance."""
     rng = np.random.default_rng([20261121, number])
     n, m = int(rng.integers(1, 7)), int(rng.integers(0, 13))
@@ -95,7 +100,9 @@ def draw(number: int) -> dict[str, Any]:
     both = sum(sorted(radii)[-2:])
     apart = max(d, between) + both
     extent = 4.0 + 2.0 * (n + m) ** 0.5 * apart
-    points = _apart(rng, n + m, extent, apart)
+    if crowded:
+        extent *= 0.5
+    points = (_one_by_one if crowded else _apart)(rng, n + m, extent, apart)
     method = str(rng.choice(list(METHODS)))
     decision = _decision(rng, h)
     ugvs = {}
@@ -199,12 +206,22 @@ def _apart(rng: np.random.Generator, count: int, extent: float, least: float) ->
             return [place.tolist() for place in places]
 
 
-def judged(number: int) -> Row:
+def _one_by_one(rng: np.random.Generator, count: int, extent: float, least: float) -> list[list[float]]:
+    """The same where there is hardly room: each is drawn until it is apart from those before it."""
+    places: list[list[float]] = []
+    while len(places) < count:
+        place = rng.uniform(-extent, extent, 2)
+        if all(np.linalg.norm(place - other) >= 1.01 * least for other in places):
+            places.append(place.tolist())
+    return places
+
+
+def judged(number: int, *, crowded: bool = False) -> Row:
     """Draw, simulate, judge; whatever goes wrong is in the row."""
     started = time.perf_counter()
     row = Row(number)
     try:
-        scenario = from_data(draw(number), f"random {number}")
+        scenario = from_data(draw(number, crowded=crowded), f"random {number}")
     except ScenarioError as error:
         row.invalid = error.key
         return row
@@ -242,7 +259,8 @@ def _claims(scenario: Scenario, method: str, verdicts: Sequence[Verdict]) -> lis
         status, name = verdict.finding.status, verdict.claim.id
         must = name in ALWAYS or (name in CERTIFIED and method == "d")
         must = must and not (name == "ZENO-TRACE" and not dwells)
-        if status == "error" or (must and status != "holds"):
+        wrongly = status == "refuted" and name in NEVER_REFUTED
+        if status == "error" or wrongly or (must and status != "holds"):
             wrong.append(f"{name} {status}: {verdict.finding.counterexample or verdict.finding.evidence}"[:300])
     return wrong
 
@@ -264,6 +282,7 @@ def main() -> int:
     parser.add_argument("-n", "--number", type=int, default=100, help="so many valid ones (default: %(default)s)")
     parser.add_argument("--first", type=int, default=0, help="number of the first scenario (default: %(default)s)")
     parser.add_argument("--only", type=int, help="this one")
+    parser.add_argument("--crowded", action="store_true", help="on half the extent")
     parser.add_argument("--jobs", type=int, help="processes (default: one for each processor)")
     parser.add_argument("--keep", type=Path, help="folder for the scenario files of those that fail")
     parser.add_argument("--rows", type=Path, help="file for a line of JSON per scenario, appended")
@@ -276,21 +295,22 @@ def main() -> int:
             print(f"scenario {row.number}, method ({row.method}): {line}", flush=True)
         if row.wrong and options.keep:
             options.keep.mkdir(parents=True, exist_ok=True)
-            text = yaml.safe_dump(resolved(from_data(draw(row.number), "")), sort_keys=False)
+            data = draw(row.number, crowded=options.crowded)
+            text = yaml.safe_dump(resolved(from_data(data, "")), sort_keys=False)
             (options.keep / f"random_{row.number}.yaml").write_text(text, encoding="utf-8")
         if options.rows:
             with options.rows.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(asdict(row)) + "\n")
 
     if options.only is not None:
-        take(judged(options.only))
+        take(judged(options.only, crowded=options.crowded))
     else:
-        _many(options.first, options.number, options.jobs, take)
+        _many(options.first, options.number, options.jobs, partial(judged, crowded=options.crowded), take)
     print(summary(rows))
     return int(any(row.wrong for row in rows))
 
 
-def _many(first: int, wanted: int, jobs: int | None, take: Callable[[Row], None]) -> None:
+def _many(first: int, wanted: int, jobs: int | None, judge: Callable[[int], Row], take: Callable[[Row], None]) -> None:
     """Scenarios from this number on until so many were valid."""
     valid, number = 0, first
     fresh = multiprocessing.get_context("spawn")
@@ -299,7 +319,7 @@ def _many(first: int, wanted: int, jobs: int | None, take: Callable[[Row], None]
         while valid < wanted:
             batch = range(number, number + max(8, (wanted - valid) // 4))
             number = batch.stop
-            for row in pool.imap_unordered(judged, batch):
+            for row in pool.imap_unordered(judge, batch):
                 if valid < wanted:
                     take(row)
                     valid += not row.invalid
