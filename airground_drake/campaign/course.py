@@ -55,7 +55,10 @@ class Course:
         side = np.where(eastward, 0.0, self.length_m)
         starts = self._apart(rng, side, ugv_m + BEYOND_M)
         targets = self._apart(rng, self.length_m - side, ugv_m + BEYOND_M)
-        places = self._field(rng, m, np.concatenate([starts, targets]), obstacle_m + BEYOND_M)
+        over = {"uav.start_m": starts.mean(axis=0), "uav.target_m": targets.mean(axis=0)}
+        below_m = float(np.sqrt(max(0.0, obstacle_m**2 - altitude_m**2)))  # what the UAV keeps from obstacles in plan
+        ends = np.concatenate([starts, targets, [*over.values()]])
+        places = self._field(rng, m, ends, np.array([obstacle_m + BEYOND_M] * 2 * n + [below_m] * 2))
         hidden = rng.random(m) < self.hidden
         ugvs = {
             f"ugv{i + 1}": {
@@ -68,9 +71,8 @@ class Course:
             f"obstacle{k + 1}": {"position_m": _ground(place), "known_to_uav": not hidden[k]}
             for k, place in enumerate(places)
         }
-        ends = {"uav.start_m": starts, "uav.target_m": targets}
-        over = {key: [*np.round(places.mean(axis=0), 6).tolist(), altitude_m] for key, places in ends.items()}
-        return {"ugvs": ugvs, "obstacles": obstacles, **over}
+        above = {key: [*np.round(place, 6).tolist(), altitude_m] for key, place in over.items()}
+        return {"ugvs": ugvs, "obstacles": obstacles, **above}
 
     def _apart(self, rng: np.random.Generator, side: Array, least: float) -> Array:
         """Places (n, 2), m, at these x, any two on the same side with at least that distance."""
@@ -85,14 +87,14 @@ class Course:
                 raise ValueError(f"{len(side)} UGVs have no room on a field {self.width_m:g} m wide")
         return np.reshape(places, (-1, 2))
 
-    def _field(self, rng: np.random.Generator, count: int, ends: Array, least: float) -> Array:
-        """Places (count, 2), m, no nearer than that to starts and targets."""
+    def _field(self, rng: np.random.Generator, count: int, ends: Array, least: Array) -> Array:
+        """Places (count, 2), m, no nearer to starts and targets (k, 2), m, than that, (k,), m."""
         places: list[Array] = []
         for _ in range(TRIES):
             if len(places) == count:
                 break
             place = rng.uniform([0.0, -0.5 * self.width_m], [self.length_m, 0.5 * self.width_m])
-            if np.linalg.norm(ends - place, axis=1).min(initial=np.inf) >= least:
+            if (np.linalg.norm(ends - place, axis=1) >= least).all():
                 places.append(place)
         if len(places) < count:
             raise ValueError(f"{count} obstacles have no room between starts and targets")

@@ -60,6 +60,12 @@ def test_random_courses_are_valid_and_have_the_counts_that_are_asked_for(tmp_pat
             assert getattr(each.uav, end) == pytest.approx([*centroid[:2], each.uav.altitude_m], abs=1e-6)
 
 
+def test_obstacles_of_a_course_are_clear_of_a_low_uav(tmp_path: Path) -> None:
+    low = "set: {uav.altitude_m: 1.2}\ncourse: {ugvs: 2, obstacles: 9, length_m: 12, width_m: 9}\n"
+    spec = spec_of(tmp_path, f"scenario: minimal\n{low}")
+    assert len([spec.draw(i) for i in range(12)]) == 12  # all are valid
+
+
 def test_a_course_without_room_is_a_draw_that_cannot_be_made(tmp_path: Path) -> None:
     spec = spec_of(tmp_path, "scenario: minimal\ncourse: {ugvs: 9, width_m: 3}\n")
     with pytest.raises(ScenarioError, match="have no room"):
