@@ -104,7 +104,8 @@ def no_proposals() -> pd.DataFrame:
 class Trace:
     """One run.
 
-    Its tables are not to be changed, as what follows from them is kept: `dataclasses.replace` makes another run.
+    What is read from its tables is kept, so whoever changes them makes another run with `dataclasses.replace`;
+    `verify` and `verify_all` read them anew.
 
     Attributes:
         meta: strict JSON: `schema`, `run` (identifier), `method`, `composition`, `seed`, `robots`, `ugvs`

@@ -19,6 +19,7 @@ from airground_drake.nsbc.task import Array
 from airground_drake.nsbc.tasks import PositionTask
 from airground_drake.scenarios.load import resolved, validated
 from airground_drake.scenarios.schema import Scenario
+from airground_drake.verify import verify
 
 Edit = Callable[[Scenario], Any]
 
@@ -191,3 +192,11 @@ def test_another_task_of_the_uav(case_a: Scenario) -> None:
     case_a.uav.task = f"{__name__}:Hold"
     case_a.duration_s = 5.0
     assert np.abs(simulate(case_a, "a").position("uav")[-1] - [0.0, 0.0, 2.0]).max() < 1e-3
+
+
+def test_a_table_that_changed_is_judged_anew(case_a: Scenario) -> None:
+    case_a.duration_s = 1.0
+    trace = simulate(case_a, "d")
+    assert verify(trace, claims=["SAFE-TRACE"])[0].finding.status == "holds"
+    trace.signals["ugv1.x_m"] += 0.1 * trace.signals["t_s"]  # a robot that does not do what it was told
+    assert verify(trace, claims=["SAFE-TRACE"])[0].finding.status == "error"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -34,7 +35,7 @@ def verify(trace: Trace, claims: Collection[str] | None = None, watch: Watch = S
         UnknownNameError: if an identifier is not that of a claim about a run.
         PluginError: if a claim of the scenario cannot be made.
     """
-    chosen = _applicable(trace, claims)
+    chosen, trace = _applicable(trace, claims), replace(trace)  # nothing kept from before: its tables may have changed
     findings = []
     for claim in chosen:
         with watch.item(f"{claim.id} {trace.meta.get('run')}"):
@@ -100,7 +101,7 @@ def verify_all(
     """
     chosen = model_claims(added=scenario.claims)
     inputs = [claim.judge_inputs(scenario) for claim in chosen]
-    of_runs = [(trace, _applicable(trace)) for trace in traces]
+    of_runs = [(replace(trace), _applicable(trace)) for trace in traces]  # as in `verify`
     pieces = [partial(_found, claim, given, kept) for claim, given in zip(chosen, inputs, strict=True)]
     pieces += [partial(_judged, trace, claims) for trace, claims in of_runs]
     names = [*(claim.id for claim in chosen), *(f"claims about run {trace.run}" for trace, _ in of_runs)]
