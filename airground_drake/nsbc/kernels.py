@@ -16,6 +16,8 @@ MARGIN_M_S = 1e-12
 """Added to every bound in the projection, so that rounding leaves the bound itself satisfied, m/s."""
 CONTRADICTION_M_S = 1e-9
 """Constraints that every trial misses by more contradict each other; by less, it is rounding, m/s."""
+DEPENDENT = 1e-20
+"""Square of the sine of the angle between normals of which one says what the others say: 1e-10 rad."""
 
 AUGMENTED, RECURSION_NEAREST, RECURSION_LISTED = 0, 1, 2
 
@@ -191,7 +193,7 @@ def _closest_feasible(lower: Array, normal: Array, bound: Array) -> Array:
 
 @njit(cache=True)
 def _least_violation(normal: Array, bound: Array) -> Array:
-    """Slowest velocity among those whose largest violation is least, to 1e-9 of what standing still violates.
+    """Slowest velocity among those whose largest violation is least, to 1e-13 of what standing still violates.
 
     Constraints contradict each other only where a robot is inside several safe distances at once. What the
     lower priorities ask for then has no say: they might be hostile.
@@ -200,12 +202,12 @@ def _least_violation(normal: Array, bound: Array) -> Array:
     for k in range(len(bound)):
         high = max(high, bound[k] + MARGIN_M_S)  # standing still violates nothing by more
     still, best = np.zeros(3), np.zeros(3)
-    while high - low > 1e-9 * high:
+    while high - low > 1e-13 * high:
         middle = 0.5 * (low + high)
         if middle <= low or middle >= high:
             break
         velocity, shortfall = _closest(still, normal, bound - middle, True)
-        if shortfall <= CONTRADICTION_M_S:
+        if shortfall == 0.0:
             high, best = middle, velocity
         else:
             low = middle
@@ -214,91 +216,90 @@ def _least_violation(normal: Array, bound: Array) -> Array:
 
 @njit(cache=True)
 def _closest(lower: Array, normal: Array, bound: Array, every: bool) -> tuple[Array, float]:
-    """Closest velocity to `lower` under all constraints, and by how much it misses one, m/s.
+    """Closest velocity to `lower` under all constraints, and by how much it misses one, m/s (0: rounding at most).
 
     By enumeration of active sets of at most three: a projection in R^3 needs no larger one (a planar robot:
     two), so this is exact. Each trial is lower + J^+ (b - J lower), the augmented composition over that active
-    set; the one that misses least is taken. Where standing still meets all constraints, no projection is longer
-    than `lower`, and those that nothing of its size can reach are left out, unless `every` one is asked for.
+    set. Of those that meet all constraints the closest one is taken, else the one that misses least. Where standing
+    still meets all constraints, no projection is longer than `lower`, and those that nothing of its size can reach are
+    left out, unless `every` one is asked for.
     """
     worst = 0.0
     for k in range(len(bound)):
         worst = max(worst, bound[k])
     every = every or worst > CONTRADICTION_M_S
     reach = np.sqrt(_dot(lower, lower)) + 2.0 * worst + 1e-9
-    row, gap = np.empty((len(bound), 3)), np.empty(len(bound))
+    row, level = np.empty((len(bound), 3)), np.empty(len(bound))
     count = 0
     planar = True
     for k in range(len(bound)):
         if bound[k] > -reach or (every and bound[k] > -np.inf):
             for a in range(3):
                 row[count, a] = normal[k, a]
-            gap[count] = bound[k] + MARGIN_M_S - _dot(normal[k], lower)
+            level[count] = bound[k] + MARGIN_M_S
             planar = planar and normal[k, 2] == 0.0
             count += 1
-    tolerance = 0.5 * MARGIN_M_S + 1e-14 * reach
     best_cost, best_shortfall = np.inf, np.inf
-    best, step = np.zeros(3), np.zeros(3)
+    best, trial = lower.copy(), np.empty(3)
+    active, across = np.empty(3, dtype=np.int64), np.empty((3, 3))
     for i in range(count):
         for j in range(i, count):
             for m in range(j, j + 1 if planar or j == i else count):
-                if not _active_step(row, gap, i, j, m, step):
+                active[0], active[1], active[2] = i, j, m
+                size = 1 if j == i else 2 if m == j else 3
+                if not _across(row, active[:size], across):
                     continue
-                shortfall = tolerance
+                for a in range(3):
+                    trial[a] = lower[a]
+                _meet(row, level, active[:size], across, trial)
+                shortfall = 0.0
                 for k in range(count):
-                    shortfall = max(shortfall, gap[k] - _dot(row[k], step))
-                cost = _dot(step, step)
+                    shortfall = max(shortfall, level[k] - _dot(row[k], trial))
+                if shortfall <= 0.5 * MARGIN_M_S + 1e-14 * max(reach, np.sqrt(_dot(trial, trial))):
+                    shortfall = 0.0
+                cost = 0.0
+                for a in range(3):
+                    cost += (trial[a] - lower[a]) ** 2
                 if shortfall < best_shortfall or (shortfall == best_shortfall and cost < best_cost):
                     best_shortfall, best_cost = shortfall, cost
                     for a in range(3):
-                        best[a] = step[a]
-    for a in range(3):
-        best[a] += lower[a]
+                        best[a] = trial[a]
     return best, best_shortfall
 
 
 @njit(cache=True)
-def _active_step(row: Array, gap: Array, i: int, j: int, m: int, step: Array) -> bool:
-    """Minimum-norm step that closes the gaps of constraints i <= j <= m (a repeated index counts once).
+def _across(row: Array, active: npt.NDArray[np.int64], across: Array) -> bool:
+    """Of each active constraint the part of its normal that is orthogonal to the normals before it, by Gram-Schmidt.
 
-    Written into `step`; False where the rows are (nearly) dependent, so that a smaller set says the same.
+    Written into `across`; False where the normals are dependent but for rounding, so that a smaller set says the same.
     """
-    ii, jj, ij = _dot(row[i], row[i]), _dot(row[j], row[j]), _dot(row[i], row[j])
-    if ii < 1e-18 or jj < 1e-18:
-        return False
-    if i == j:
+    for k in range(len(active)):
         for a in range(3):
-            step[a] = row[i, a] * gap[i] / ii
-        return True
-    if m == j:
-        if row[i, 2] == 0.0 and row[j, 2] == 0.0:  # the corner itself: exact where the normal equations are not
-            cross = row[i, 0] * row[j, 1] - row[i, 1] * row[j, 0]
-            if cross**2 <= 1e-12 * ii * jj:
-                return False
-            step[0] = (gap[i] * row[j, 1] - gap[j] * row[i, 1]) / cross
-            step[1] = (gap[j] * row[i, 0] - gap[i] * row[j, 0]) / cross
-            step[2] = 0.0
-            return True
-        det = ii * jj - ij**2
-        if det <= 1e-12 * ii * jj:
+            across[k, a] = row[active[k], a]
+        for _ in range(2):  # once leaves a part of the normals before, by rounding, as large as what is orthogonal
+            for n in range(k):
+                share = _dot(across[n], across[k]) / _dot(across[n], across[n])
+                for a in range(3):
+                    across[k, a] -= share * across[n, a]
+        squared = _dot(row[active[k]], row[active[k]])
+        if squared < 1e-18 or _dot(across[k], across[k]) <= DEPENDENT * squared:
             return False
-        first, second = (jj * gap[i] - ij * gap[j]) / det, (ii * gap[j] - ij * gap[i]) / det
-        for a in range(3):
-            step[a] = row[i, a] * first + row[j, a] * second
-        return True
-    volume = 0.0
-    for a in range(3):
-        b, c = (a + 1) % 3, (a + 2) % 3
-        jm = row[j, b] * row[m, c] - row[j, c] * row[m, b]
-        mi = row[m, b] * row[i, c] - row[m, c] * row[i, b]
-        across = row[i, b] * row[j, c] - row[i, c] * row[j, b]
-        step[a] = gap[i] * jm + gap[j] * mi + gap[m] * across
-        volume += across * row[m, a]
-    if volume**2 <= 1e-12 * ii * jj * _dot(row[m], row[m]):
-        return False
-    for a in range(3):
-        step[a] /= volume
     return True
+
+
+@njit(cache=True)
+def _meet(row: Array, level: Array, active: npt.NDArray[np.int64], across: Array, velocity: Array) -> None:
+    """Take a velocity, in place, the shortest way to where the active constraints hold with equality.
+
+    Twice: of nearly parallel ones the first pass leaves rounding, divided by the sine of their angle, which is more
+    than what counts as met; the second one starts beside the goal, and what it leaves is rounding again.
+    """
+    for _ in range(2):
+        for k in range(len(active)):
+            normal = row[active[k]]
+            share = (level[active[k]] - _dot(normal, velocity)) / _dot(across[k], normal)
+            for a in range(3):
+                velocity[a] += share * across[k, a]
 
 
 @njit(cache=True)

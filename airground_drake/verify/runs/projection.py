@@ -23,13 +23,16 @@ CONTRADICTION_M_S = 1e-9
 """Inequalities that nothing meets by more contradict each other, m/s; the controller tells them apart by the same."""
 
 
-def closest(wanted: Array, normal: Array, bound: Array) -> tuple[Array, Flags]:
+def closest(
+    wanted: Array, normal: Array, bound: Array, contradiction: float = CONTRADICTION_M_S
+) -> tuple[Array, Flags]:
     """argmin ||v - wanted||^2 with normal_k.v >= bound_k for all k, for B samples, in 1 to 3 dimensions d.
 
     Args:
         wanted: (B, d), m/s.
         normal: (B, K, d), of any length.
         bound: (B, K), m/s; -inf where nothing is asked.
+        contradiction: inequalities that nothing meets by more contradict each other, m/s.
 
     Returns:
         Velocities (B, d), m/s, and whether the inequalities of a sample can be met: (B,). Where they cannot, the
@@ -37,29 +40,29 @@ def closest(wanted: Array, normal: Array, bound: Array) -> tuple[Array, Flags]:
     """
     length = np.linalg.norm(normal, axis=2)
     flat = length <= PARALLEL
-    possible = ~(flat & (bound > CONTRADICTION_M_S)).any(axis=1)
+    possible = ~(flat & (bound > contradiction)).any(axis=1)
     unit = normal / np.where(flat, 1.0, length)[..., None]
     level = np.where(flat, -np.inf, bound / np.where(flat, 1.0, length))
     if wanted.shape[1] == 1:
-        found, met = _in_interval(wanted[:, 0], unit[:, :, 0], level)
+        found, met = _in_interval(wanted[:, 0], unit[:, :, 0], level, contradiction)
         return found[:, None], possible & met
     found = wanted.copy()
     for k in range(bound.shape[1]):
         rows = np.flatnonzero(((unit[:, k] * found).sum(axis=1) < level[:, k] - ROUNDING_M_S) & possible)
         if rows.size:
-            found[rows], met = _on_boundary(wanted[rows], unit[rows, : k + 1], level[rows, : k + 1])
+            found[rows], met = _on_boundary(wanted[rows], unit[rows, : k + 1], level[rows, : k + 1], contradiction)
             possible[rows] &= met
     return found, possible
 
 
-def _on_boundary(wanted: Array, unit: Array, level: Array) -> tuple[Array, Flags]:
+def _on_boundary(wanted: Array, unit: Array, level: Array, contradiction: float) -> tuple[Array, Flags]:
     """The closest velocities on the boundary of the last inequality, under those before it."""
     facing = unit[:, -1]
     along = _complement(facing)  # (B, d - 1, d)
     foot = facing * level[:, -1:]
     normal = np.einsum("bkd,bed->bke", unit[:, :-1], along)
     bound = level[:, :-1] - np.einsum("bkd,bd->bk", unit[:, :-1], foot)
-    inner, met = closest(np.einsum("bed,bd->be", along, wanted), normal, bound)
+    inner, met = closest(np.einsum("bed,bd->be", along, wanted), normal, bound, contradiction)
     return foot + np.einsum("bed,be->bd", along, inner), met
 
 
@@ -73,13 +76,13 @@ def _complement(facing: Array) -> Array:
     return np.stack([first, np.cross(facing, first)], axis=1)
 
 
-def _in_interval(wanted: Array, sign: Array, level: Array) -> tuple[Array, Flags]:
+def _in_interval(wanted: Array, sign: Array, level: Array, contradiction: float) -> tuple[Array, Flags]:
     """In one dimension: the closest number (B,) with sign_k x >= level_k, signs being 1 or -1 (0: nothing is asked)."""
     low = np.where(sign > 0.0, level, -np.inf).max(axis=1, initial=-np.inf)
     high = np.where(sign < 0.0, -level, np.inf).min(axis=1, initial=np.inf)
     over = low > high
     middle = np.where(over, 0.5 * (np.where(over, low, 0.0) + np.where(over, high, 0.0)), 0.0)
-    return np.where(over, middle, np.clip(wanted, low, np.maximum(low, high))), ~(low > high + CONTRADICTION_M_S)
+    return np.where(over, middle, np.clip(wanted, low, np.maximum(low, high))), ~(low > high + contradiction)
 
 
 def shortened(velocity: Array, normal: Array, bound: Array) -> Array:
@@ -98,7 +101,7 @@ def least_violation(normal: Array, bound: Array) -> Array:
     best = still.copy()
     for _ in range(60):
         middle = 0.5 * (low + high)
-        found, met = closest(still, normal, bound - middle[:, None])
+        found, met = closest(still, normal, bound - middle[:, None], contradiction=0.0)
         best[met] = found[met]
         high, low = np.where(met, middle, high), np.where(met, low, middle)
     return best
