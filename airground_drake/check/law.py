@@ -13,12 +13,14 @@ from .rules import Array, Flags
 
 PLANE = np.array([1.0, 1.0, 0.0])
 """Directions in which a UGV can move."""
-MET_M_S = 1e-11
-"""A velocity that misses an inequality by less meets it."""
+MET_M_S = 1e-12
+"""A velocity that misses an inequality by less meets it; a fast one, by less than this many times its speed, m/s."""
 CONTRADICTION_M_S = 1e-9
 """Inequalities that every velocity misses by more contradict each other."""
-SINGULAR = 1e-12
-"""Normals of which the squared volume, relative, is below this are dependent: fewer of them say the same."""
+SHORTEST = 1e-9
+"""A shorter normal, of what is nearly above a robot that stays in the plane, asks for nothing that it could do."""
+DEPENDENT = 1e-10
+"""Sine of the angle between a normal and those before it up to which fewer of them say the same."""
 
 NUMBERS = 300_000
 """Inequalities of candidates that are looked at together, so that they fit into the memory."""
@@ -140,7 +142,7 @@ def _least_missing(given: Inequalities) -> Array:
     for _ in range(60):
         middle = (low + high) / 2.0
         found, lacking = _by_active_sets(still, Inequalities(given.normal, given.bound - middle[:, None]))
-        met = lacking <= CONTRADICTION_M_S
+        met = lacking == 0.0
         best[met] = found[met]
         low, high = np.where(met, low, middle), np.where(met, middle, high)
     return best
@@ -154,17 +156,17 @@ def _by_active_sets(wanted_m_s: Array, given: Inequalities) -> tuple[Array, Arra
     """
     normal, bound = _relevant(wanted_m_s, given)
     best, lacking = wanted_m_s.copy(), np.maximum(0.0, -_spare(wanted_m_s, given)).max(axis=1)
-    length = np.where(lacking <= MET_M_S, 0.0, np.inf)
+    length = np.where(lacking == 0.0, 0.0, np.inf)
     at_once = max(1, NUMBERS // bound.size)
     for size in range(1, 4 if normal[:, :, 2].any() else 3):
         every = combinations(range(bound.shape[1]), size)
         while active := [*islice(every, at_once)]:
             step, lacks = _candidates(wanted_m_s, Inequalities(normal, bound), np.array(active))
-            size_of, met = np.linalg.norm(step, axis=2), lacks <= MET_M_S
+            size_of, met = np.linalg.norm(step, axis=2), lacks == 0.0
             first = np.argmin(np.where(met, size_of, np.inf), axis=1)
             pick = np.arange(len(best)), np.where(met.any(axis=1), first, np.argmin(lacks, axis=1))
             lacks, size_of, met = lacks[pick], size_of[pick], met[pick]
-            before = lacking <= MET_M_S
+            before = lacking == 0.0
             better = np.where(met & before, size_of < length, met | (~before & (lacks < lacking)))
             best[better] = (wanted_m_s + step[pick])[better]
             lacking[better], length[better] = lacks[better], size_of[better]
@@ -174,21 +176,43 @@ def _by_active_sets(wanted_m_s: Array, given: Inequalities) -> tuple[Array, Arra
 def _candidates(wanted_m_s: Array, given: Inequalities, active: Array) -> tuple[Array, Array]:
     """How far from what is wanted the velocities are that meet the active inequalities (C, size) exactly.
 
+    Each solves three equations: those of the active inequalities and, in the directions that are orthogonal to their
+    normals, those of what is wanted. What the first solution leaves is solved again: rounding grows with the inverse of
+    the angle between normals.
+
     Returns:
         Their differences from it (B, C, 3), and what they lack (B, C): infinitely much where the active ones depend on
         each other or ask for nothing.
     """
     n, b = given.normal[:, active], given.bound[:, active]
-    gram = np.einsum("bcid,bcjd->bcij", n, n)
-    scale = np.einsum("bcii->bci", gram).prod(axis=2)
-    usable = np.isfinite(b).all(axis=2) & (scale > 0.0)
-    usable &= np.linalg.det(gram) > SINGULAR * scale
-    gap = np.where(usable[..., None], b - np.einsum("bckd,bd->bck", n, wanted_m_s), 0.0)
-    gram = np.where(usable[..., None, None], gram, np.eye(active.shape[1]))
-    step = np.einsum("bckd,bck->bcd", n, np.linalg.solve(gram, gap[..., None])[..., 0])
-    rate = np.einsum("bkd,bcd->bck", given.normal, wanted_m_s[:, None] + step)
+    length = np.linalg.norm(n, axis=3)
+    asked = np.isfinite(b) & (length > SHORTEST)
+    unit = n / np.where(asked, length, 1.0)[..., None]
+    rest, sine = _completed(unit)
+    usable = asked.all(axis=2) & (sine > DEPENDENT)
+    equations = np.where(usable[..., None, None], np.concatenate([unit, rest], axis=2), np.eye(3))
+    free = np.einsum("bckd,bd->bck", rest, wanted_m_s)
+    due = np.concatenate([np.where(asked, b / np.where(asked, length, 1.0), 0.0), free], axis=2)
+    inverse = np.linalg.inv(equations)
+    v = np.einsum("bcij,bcj->bci", inverse, due)
+    v += np.einsum("bcij,bcj->bci", inverse, due - np.einsum("bcij,bcj->bci", equations, v))
+    rate = np.einsum("bkd,bcd->bck", given.normal, v)
     lacks = np.maximum(0.0, given.bound[:, None] - rate).max(axis=2)
-    return step, np.where(usable, lacks, np.inf)
+    lacks = np.where(lacks <= MET_M_S * np.maximum(1.0, np.linalg.norm(v, axis=2)), 0.0, lacks)
+    return v - wanted_m_s[:, None], np.where(usable, lacks, np.inf)
+
+
+def _completed(unit: Array) -> tuple[Array, Array]:
+    """What unit vectors (B, C, size, 3) lack to a basis, (B, C, 3 - size, 3), and the least sine among them, (B, C)."""
+    size, first = unit.shape[2], unit[:, :, 0]
+    other = unit[:, :, 1] if size > 1 else np.eye(3)[np.argmin(np.abs(first), axis=2)]
+    across = np.cross(first, other)
+    sine = np.linalg.norm(across, axis=2)
+    across /= np.where(sine > 0.0, sine, 1.0)[..., None]
+    if size == 3:
+        return unit[:, :, :0], np.minimum(sine, np.abs((across * unit[:, :, 2]).sum(axis=2)))
+    rest = [across] if size == 2 else [across, np.cross(first, across)]
+    return np.stack(rest, axis=2), sine
 
 
 def _relevant(wanted_m_s: Array, given: Inequalities) -> Inequalities:

@@ -62,6 +62,27 @@ def test_three_algorithms_agree(seed: int, planar: bool, demanding: bool) -> Non
         assert (off[judged] <= 1e-8 * flat[judged]).all()
 
 
+@given(SEEDS, st.booleans(), st.sampled_from([1e-2, 1e-3, 1e-4]), st.sampled_from([1e-7, 1e-4, 1.0]))
+def test_nearly_parallel_inequalities(seed: int, planar: bool, angle: float, demand: float) -> None:
+    """A robot behind another, both ahead: where their inequalities meet, not where one meets that of a far obstacle."""
+    rng = np.random.default_rng(seed)
+    ahead = rng.normal(size=(BATCH, 1, 3)) * [1.0, 1.0, float(not planar)]
+    normal = ahead / np.linalg.norm(ahead, axis=2, keepdims=True) + angle * rng.normal(size=(BATCH, 5, 3))
+    normal[:, 3:] = rng.normal(size=(BATCH, 2, 3))
+    if planar:
+        normal[..., 2] = 0.0
+    normal /= np.linalg.norm(normal, axis=2, keepdims=True)
+    bound = demand * rng.normal(size=(BATCH, 5))
+    bound[:, 3:] = -rng.uniform(50.0, 500.0, size=(BATCH, 2))
+    wanted = -3.0 * ahead[:, 0] / np.linalg.norm(ahead[:, 0], axis=1, keepdims=True)
+    ours = avoiding(wanted, Inequalities(normal, bound), "augmented", planar=planar)
+    again = checker.avoiding(wanted, checker.Inequalities(normal, bound), "augmented")
+    running = kernels.team_avoid(wanted, normal, bound, kernels.AUGMENTED)
+    allowed = 1e-6 * np.maximum(1.0, np.linalg.norm(ours, axis=1, keepdims=True))
+    assert (np.abs(running - ours) <= allowed).all()
+    assert (np.abs(again - ours) <= allowed).all()
+
+
 def _flattest(normal: Array) -> Array:
     """1 / the least sine between two normals (B, K, 3), or volume of three, squared; (B,)."""
     least = np.ones(len(normal))
