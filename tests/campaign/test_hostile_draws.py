@@ -1,0 +1,21 @@
+"""Draws of the hostile campaign in which two exact roll-outs of one outcome once went different ways."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from airground_drake.campaign.spec import load_spec
+from airground_drake.simulation import simulate
+from airground_drake.verify import verify
+
+HOSTILE = Path(__file__).parents[2] / "benchmarks" / "campaigns" / "hostile.yaml"
+
+
+@pytest.mark.parametrize("index", [1093, 1957, 2397, 3774])
+def test_roll_outs_agree(index: int) -> None:
+    """A UGV is squeezed between robots predicted in nearly one direction, or in nearly opposite ones."""
+    trace = simulate(load_spec(HOSTILE).draw(index), "d")
+    for verdict in verify(trace, claims=["GATE-MODEL", "LIVE-PROG", "SAFE-TRACE"]):
+        assert verdict.finding.status == "holds", verdict.finding
