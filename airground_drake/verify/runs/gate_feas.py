@@ -14,8 +14,18 @@ from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.segments import interpolate, travelled
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.control_law import ON_TOP
-from airground_drake.verify.runs.gate_record import POSITION_TOLERANCE_M, GateClaim, Off, Row, conclude, cost_tolerance
+from airground_drake.verify.runs.gate_record import (
+    POSITION_TOLERANCE_M,
+    GateClaim,
+    Off,
+    Row,
+    bare_row,
+    conclude,
+    cost_tolerance,
+)
+from airground_drake.verify.runs.interventions import intervening
 from airground_drake.verify.runs.pairs import around
+from airground_drake.verify.runs.proposals import proposals_of
 
 SPEED_TOLERANCE = 1e-4
 """A step may be longer than the speed limit allows by this, relative."""
@@ -33,7 +43,8 @@ class GateFeas(GateClaim):
     summary = "Every decision was about the situation that the UGV was in, and its answer follows from its numbers."
     statement = (
         "Every gatekeeper decision was about the UGV's situation at that time, its plan satisfies (26b)-(26e) at the "
-        "recorded cost, and the answer given is the one that follows from the costs."
+        "recorded cost, and the answer given is the one that follows from the costs; every proposal that stood for "
+        "long enough was decided on."
     )
     formula = (
         "rho(0) = p(t); omega in {0, 1}; rho_k = rho_(k-1) + dt (omega_k a_k + (1 - omega_k) b_k); u_k = max(0, max_j "
@@ -53,7 +64,8 @@ class GateFeas(GateClaim):
         "All recomputed in numpy from the scenario, the signals and the recorded mode velocities. A sensed obstacle or "
         "robot may be missing only if no plan can come within its safe distance. The rules (no difference below a "
         "relative gain of 1e-6, switching margin, dwell) are run again over the decisions of each UGV, which "
-        "must follow each other without a gap while a proposal stands. Route 'rollout' predicts the nonlinear closed "
+        "must follow each other without a gap while a proposal stands; a proposal that stands for a period of the "
+        "planner and one of the gatekeeper must have one. Route 'rollout' predicts the nonlinear closed "
         "loop: there (23) is checked up to the first change of mode, after it that no step is longer than the speed "
         "limit allows. Constant plans keep to it, except where they begin more than 1e-6 m inside a safe distance: "
         "avoidance may then demand more; so do other plans where the constant plan of their stage's choice does. "
@@ -108,7 +120,7 @@ def judge_compared(trace: Trace, rows: list[Row], compared: list[Off], **evidenc
 
 
 def compare_times(trace: Trace, rows: Sequence[Row]) -> Iterator[Off]:
-    """The times of the decisions: the first within a period of the proposal, the others a period apart."""
+    """The times of the decisions: the first within a period of the proposal, the others a period apart; all are due."""
     period = trace.scenario["gatekeeper"]["period_s"]
     for ugv in trace.ugvs:
         last: Row | None = None
@@ -121,6 +133,27 @@ def compare_times(trace: Trace, rows: Sequence[Row]) -> Iterator[Off]:
             yield Off(row, "a decision is missing before this one, s", max(0.0, t - late), TIME_TOLERANCE_S)
             yield Off(row, "a decision too many, s", max(0.0, early - t), TIME_TOLERANCE_S)
             last = row
+    yield from compare_proposals(trace, rows)
+
+
+def compare_proposals(trace: Trace, rows: Sequence[Row]) -> Iterator[Off]:
+    """A proposal that stands for a period of the planner and one of the gatekeeper is decided on.
+
+    It does not if another one is sent meanwhile, if its motion is over, if neither the UGV nor the one that it is to
+    make way for is intervened on all the time, or if the run ends.
+    """
+    allowed = trace.scenario["intervention"]["period_s"] + trace.scenario["gatekeeper"]["period_s"] + TIME_TOLERANCE_S
+    decided = {(row.given["robot"], row.given["issued_s"]) for row in rows}
+    sent = proposals_of(trace)
+    for one in sent:
+        until = one.issued_s + allowed
+        stays = np.concatenate([intervening(trace, ugv) for ugv in sorted({one.ugv, one.cause})])
+        called = ((stays[:, 0] <= one.issued_s + TIME_TOLERANCE_S) & (stays[:, 1] > until)).any()
+        replaced = any(other.ugv == one.ugv and one.issued_s < other.issued_s <= until for other in sent)
+        if called and not replaced and one.times_s[-1] > until:
+            given = dict.fromkeys(("decision", "reason", "status"), "")
+            row = bare_row({"t_s": one.issued_s, "robot": one.ugv, "policy": one.policy, **given})
+            yield Off(row, "nothing is decided on a proposal", float((one.ugv, one.issued_s) not in decided), 0.0)
 
 
 def compare_situation(trace: Trace, row: Row) -> Iterator[Off]:

@@ -131,6 +131,11 @@ def rows_of(trace: Trace) -> list[Row]:
     return rows
 
 
+def bare_row(given: dict[str, Any]) -> Row:
+    """A decision without a problem."""
+    return Row(given, -1.0, -1.0, -1.0, -1.0, {})
+
+
 def bare_rows_of(trace: Trace) -> list[Row]:
     """All decisions by outcomes: they have no problem.
 
@@ -141,7 +146,7 @@ def bare_rows_of(trace: Trace) -> list[Row]:
         raise TraceError(f"{len(trace.problems)} problems, though outcomes are compared")
     rows = []
     for given in trace.decisions.to_dict("records"):
-        row = Row({str(name): value for name, value in given.items()}, -1.0, -1.0, -1.0, -1.0, {})
+        row = bare_row({str(name): value for name, value in given.items()})
         if not np.isfinite([value for value in given.values() if isinstance(value, float)]).all():
             raise TraceError(f"{row.label}: it has numbers that are not finite")
         if given["robot"] not in trace.ugvs:

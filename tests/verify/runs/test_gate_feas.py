@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -178,3 +179,45 @@ def test_the_rules_are_those_of_the_running_gatekeeper(
     stands = {SILENT: None, ACCEPT: "accept", REFUSE: "refuse"}[standing]
     rules = Rules(switching_margin=margin, min_dwell=0.2)
     assert gate_feas.rule(row, stands, stood, gate) == settle(decision, kept, standing, stood, rules)
+
+
+@pytest.mark.parametrize("run_name", ["c", "d"])
+def test_a_proposal_that_nothing_is_decided_on_is_refuted(run: Callable[[str, str], Trace], run_name: str) -> None:
+    trace = run("case_b", run_name)
+    assert FEAS.judge(trace).status == "holds"
+    issued = trace.decisions["issued_s"]
+    for silent in sorted(set(issued))[:2]:
+        rows = [k for k, row in enumerate(issued) if row != silent]
+        problems = trace.problems.iloc[rows] if len(trace.problems) else trace.problems
+        finding = FEAS.judge(replace(trace, decisions=trace.decisions.iloc[rows], problems=problems))
+        assert finding.status == "refuted", silent
+        assert finding.counterexample is not None
+        assert finding.counterexample["what"] == "nothing is decided on a proposal"
+        assert finding.counterexample["t_s"] == silent
+
+
+@pytest.mark.parametrize(
+    ("sent", "status"),
+    [
+        ([("ugv1", 11.5, 99.0)], "refuted"),
+        ([("ugv2", 11.5, 99.0)], "refuted"),  # to make way
+        ([("ugv1", 11.5, 11.55)], "holds"),  # its motion is over
+        ([("ugv1", 11.5, 99.0), ("ugv1", 11.55, 11.6)], "holds"),  # replaced
+        ([("ugv1", 15.3, 99.0)], "holds"),  # released at 15.36 s
+        ([("ugv2", 15.3, 99.0)], "holds"),
+    ],
+)
+def test_what_is_taken_back_within_two_periods_needs_no_decision(
+    run: Callable[[str, str], Trace], sent: list[tuple[str, float, float]], status: str
+) -> None:
+    """Proposals more, (to whom, when, end of the motion), while ugv1 is intervened on and nothing is in force."""
+    trace = run("case_b", "d")
+    first = trace.proposals.iloc[0].to_dict()
+    rows = [
+        {**first, "robot": robot, "issued_s": t, "times_s": [t, end], "positions_m": [0.0] * 6}
+        for robot, t, end in sent
+    ]
+    events = [{"t_s": t, "robot": robot, "kind": "proposal", "policy": first["policy"]} for robot, t, _ in sent]
+    meta = {**trace.meta, "events": [*trace.events, *events]}
+    proposals = pd.concat([trace.proposals, pd.DataFrame(rows)], ignore_index=True)
+    assert FEAS.judge(replace(trace, proposals=proposals, meta=meta)).status == status
