@@ -47,7 +47,7 @@ class GateTime(TraceClaim):
             return Finding("holds", evidence={"count": 0, "reason": reason}, exercised=0)
         if not decisions or not times.size:
             return Finding("not_run", evidence={"reason": "no decision, or none timed", "decisions": decisions})
-        if len(times) < decisions or not (times >= 0.0).all():
+        if len(times) != decisions or not (times >= 0.0).all():
             raise TraceError(f"{len(times)} times for {decisions} decisions, or times that are not numbers >= 0")
         p50, p99 = (float(np.quantile(times, level, method="higher")) for level in (0.5, 0.99))
         evidence = {
