@@ -311,9 +311,12 @@ def _recorded_of_wait(claim: Json, scenario: Json) -> Found:
     close("the bound", evidence["bound_s"], bound, within=SMALL)
     names = [row["attack"] for row in evidence["attacks"]]
     forged = ["favours to nobody", "favours to itself"]
-    same("attacks", names, ["endless", "greedy", "random", "stuck", "favours", *forged])
+    same("attacks", names, ["endless", "greedy", "random", "brief", "stuck", "favours", *forged])
     gone_along = [row["tries"] for row in evidence["attacks"] if row["attack"] in forged]
     same("favours that no UGV is asked for", gone_along, [0, 0])
+    same(
+        "answers that the tries left do not allow", [row["unexpected"] for row in evidence["attacks"]], [0] * len(names)
+    )
     longest = [row["longest_between_rests_s"] for row in evidence["attacks"]]
     at_most("time that an attack takes between two rests", longest, bound, within=SMALL)
     tries = [row["longest_try_s"] for row in evidence["attacks"]]

@@ -852,4 +852,28 @@ MIX_UPS = (
         runs=("crowd d",),
         proofs=("LIVE-WAIT",),
     ),
+    Mutant(
+        "a withdrawal is not noticed before the next proposal",
+        "gatekeeper/sample.py",
+        "return not any(proposals) and not any(memory.answers[::2])",
+        "return not any(proposals)",
+        runs=("crowd d",),
+        proofs=("LIVE-WAIT",),
+    ),
+    Mutant(
+        "a replaced proposal does not end its try",
+        "gatekeeper/certified.py",
+        "if turns[i].executing and standing != ACCEPT:  # withdrawn",
+        "if turns[i].executing and proposal is None:  # withdrawn",
+        runs=("crowd d",),
+        proofs=("LIVE-WAIT",),
+    ),
+    Mutant(
+        "a UGV rests only where nothing is proposed",
+        "gatekeeper/certified.py",
+        "            turns[i] = self._patience.rested(turns[i], t)\n            if proposal is None:\n",
+        "            if proposal is None:\n                turns[i] = self._patience.rested(turns[i], t)\n",
+        runs=("crowd d",),
+        proofs=("LIVE-WAIT",),
+    ),
 )

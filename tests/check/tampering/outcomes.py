@@ -100,6 +100,12 @@ def patience_overstated(folder: Path) -> None:
         claim["margin"] = 3.0
 
 
+@refused_by("LIVE-WAIT", "answers that the tries left do not allow", run="")
+def an_attack_was_answered_wrongly(folder: Path) -> None:
+    with edited_claim(folder, "LIVE-WAIT", "") as claim:
+        claim["evidence"]["attacks"][0]["unexpected"] = 1
+
+
 @refused_by("LIVE-WAIT", "favours that no UGV is asked for", run="")
 def favours_to_nobody_done(folder: Path) -> None:
     with edited_claim(folder, "LIVE-WAIT", "") as claim:

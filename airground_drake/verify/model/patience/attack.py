@@ -2,7 +2,9 @@
 
 The gatekeeper believes whatever is predicted: its roll-outs are replaced by ones in which refusing stalls and accepting
 does not, as a lying map could make it; or ones in which accepting is worse, for proposals that ask it to make way. The
-UAV proposes and withdraws at will, motions long and short; the UGV follows well, badly or not at all.
+UAV proposes and withdraws at will, motions long and short; the UGV follows well, badly or not at all. The gatekeepers
+are called as their system calls them, not where they say that a sample changes nothing, and a count of tries is kept
+beside theirs: each new proposal is to be accepted as long as it leaves any, so also after every rest, and else refused.
 """
 
 from __future__ import annotations
@@ -16,7 +18,7 @@ from airground_drake.gatekeeper.certified import CertifiedGatekeepers
 from airground_drake.gatekeeper.outcome import Outcome, Outlook
 from airground_drake.gatekeeper.patience import Patience
 from airground_drake.gatekeeper.sample import Memory, Situation
-from airground_drake.intervention.messages import ACCEPT
+from airground_drake.intervention.messages import ACCEPT, answer_to
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.law import UgvLaw
@@ -24,7 +26,9 @@ from airground_drake.nsbc.motion import Motion
 from airground_drake.nsbc.team import Team
 
 MOST_SAMPLES = 20_000
-"""Of each attack: else as many as all tries take, and a fifth more."""
+"""Of each attack: else as many as all tries with a rest after each take, and a fifth more."""
+BRIEF_S = 1.0
+"""Time after which the attack of that name withdraws."""
 UGV, OTHER = "ugv", "other"
 FAVOURS = {"favours": OTHER, "favours to nobody": "nobody", "favours to itself": UGV}
 """Attacks by proposals that are of no use to the UGV, and the cause that they name."""
@@ -52,8 +56,8 @@ class Unmoved(Believing):
 
 
 def attacks(patience: Patience, period: float) -> list[dict[str, Any]]:
-    """What each attack came to: `attack`, `tries`, `longest_between_rests_s`, `longest_try_s`, `reasons`."""
-    return [_attack(name, patience, period) for name in ("endless", "greedy", "random", "stuck", *FAVOURS)]
+    """What each attack came to: `attack`, `tries`, times in s, `reasons`, and `unexpected`: answers that are wrong."""
+    return [_attack(name, patience, period) for name in ("endless", "greedy", "random", "brief", "stuck", *FAVOURS)]
 
 
 def _attack(name: str, patience: Patience, period: float) -> dict[str, Any]:
@@ -64,29 +68,33 @@ def _attack(name: str, patience: Patience, period: float) -> dict[str, Any]:
     kind = Unmoved if name in FAVOURS else Believing
     gatekeepers = kind(team, law, [preset] * 2, Outlook(patience.longest), patience)
     memory, proposal, place = Memory.empty(2), None, np.zeros(3)
-    executed, worst, began, longest, tries, alone = 0.0, 0.0, 0.0, 0.0, 0, 0.0
-    for k in range(min(MOST_SAMPLES, int(1.2 * patience.most * patience.longest / period))):
-        t = k * period
+    accepted, executed, worst, began, longest, tries, unexpected = False, 0.0, 0.0, 0.0, 0.0, 0, 0
+    left, alone = patience.most, 0.0
+    for k in range(min(MOST_SAMPLES, int(1.2 * patience.most * (patience.longest + patience.rest) / period))):
+        t, before, asked = k * period, accepted, proposal
         proposal = _next(name, proposal, memory, t, rng, patience)
         if proposal is not None and name != "stuck":
             place = proposal.motion.at(t)[0]
-        before = memory.answers[0] == ACCEPT
         if before:
             executed += period
             worst = max(worst, executed)
-        memory = gatekeepers.sample(t, (proposal, None), np.stack([place] * 3), np.zeros((3, 3)), memory)
-        now = memory.answers[0] == ACCEPT
-        another = now and memory.turns[0].since == t
-        if before and (another or not now):
-            longest = max(longest, t - began)
-        if another:
-            executed = 0.0 if not before and t >= alone + patience.rest else executed
-            began, tries = t, tries + 1
-        if before and not now:
-            alone = t
+        positions = np.stack([place] * 3)
+        if not gatekeepers.idle((proposal, None), positions, memory):
+            memory = gatekeepers.sample(t, (proposal, None), positions, np.zeros((3, 3)), memory)
+        accepted = answer_to(proposal, memory.answers, 0) == ACCEPT
+        if before and not (accepted and proposal is asked):
+            alone, longest = t, max(longest, t - began)
+        if proposal is None or proposal is asked:
+            continue
+        if t >= alone + patience.rest:
+            left, executed = patience.most, 0.0
+        unexpected += accepted != (left > 0 and name not in FORGED)
+        if accepted:
+            began, tries, left = t, tries + 1, left - 1
     reasons = sorted({decision.reason for decision in memory.decisions})
     return {
         "attack": name, "tries": tries, "longest_between_rests_s": worst, "longest_try_s": longest, "reasons": reasons,
+        "unexpected": unexpected,
     }  # fmt: skip
 
 
@@ -95,6 +103,11 @@ def _next(
 ) -> Proposal | None:
     """What the UAV proposes now: a new one when the last is refused, withdrawn or replaced."""
     refused = memory.answers[0] < 0.0
+    if name == "brief":
+        begun = t % (BRIEF_S + 1.1 * patience.rest)
+        if begun >= BRIEF_S:
+            return None
+        return proposal if proposal is not None else _proposal(name, t, 2.0 * patience.longest, rng)
     if proposal is not None and not refused:
         if name == "greedy" and t >= proposal.issued + 0.9 * patience.longest:
             return _proposal(name, t, 2.0 * patience.longest, rng)

@@ -42,10 +42,12 @@ class LiveWait(ModelClaim):
         "The transitions are read off the running `Patience` by running its methods on symbols. That they keep the "
         "invariant (on its own c <= n (D + h), executing c <= (n - 1) (D + h) and u <= b + D) and that it implies the "
         "bound are polynomial implications with exact certificates, z3 and cvc5 besides. Running gatekeepers that "
-        "believe every prediction are attacked: endless motions, greedy replacements, random withdrawals, a UGV that "
-        "cannot move. So are ones that see no use in any proposal, by favours: for another UGV, which the bound "
-        "covers; for none that there is, or for the UGV itself, which must be refused. The margin is the bound less "
-        "the longest that an attack kept a UGV between two rests."
+        "believe every prediction are attacked: endless motions, greedy replacements, random withdrawals, brief "
+        "proposals and silence for longer than a rest, a UGV that cannot move. So are ones that see no use in any "
+        "proposal, by favours: for another UGV, which the bound covers; for none that there is, or for the UGV itself, "
+        "which must be refused. They are called as their system calls them, and tries are counted once more from what "
+        "they answer: a new proposal of use must be accepted while a try is left, so also after every rest, and "
+        "refused else. The margin is the bound less the longest that an attack kept a UGV between two rests."
     )
     equations = "(20)"
     assumptions = (
@@ -90,7 +92,7 @@ def judge(kind: type[Patience], inputs: dict[str, Any]) -> Finding:
     found = finding(discharge(obligations(symbolic(kind)), LIMIT_S), bound_s=bound, attacks=attacked)
     broken = [
         row for row in attacked
-        if row["longest_between_rests_s"] > bound + TIME_TOLERANCE_S or (row["attack"] in FORGED and row["tries"])
+        if row["longest_between_rests_s"] > bound + TIME_TOLERANCE_S or row["unexpected"]
     ]  # fmt: skip
     if broken and found.status == "proved":
         return replace(found, status="error", counterexample=None)  # the relation is not the running code's

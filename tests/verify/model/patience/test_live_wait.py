@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import inspect
 from typing import Any
 
 import pytest
 from verify.judging import Judged
 
+from airground_drake.gatekeeper import certified
+from airground_drake.gatekeeper.certified import CertifiedGatekeepers
 from airground_drake.gatekeeper.patience import Patience
+from airground_drake.gatekeeper.sample import Gatekeepers
 from airground_drake.scenarios.load import load
 from airground_drake.verify.engines.prover import discharge
 from airground_drake.verify.finding import Finding
@@ -45,19 +49,55 @@ def test_weaker_assumptions_have_no_proof(changes: dict[str, str]) -> None:
     assert "refuted" in {proof.status for proof in discharge(failing)}
 
 
-@pytest.mark.parametrize(
-    ("name", "longest_s"), [("endless", 1e9), ("favours to nobody", 1.0), ("favours to itself", 1.0)]
-)
-def test_an_attack_that_gets_through_makes_the_claim_an_error(
-    monkeypatch: pytest.MonkeyPatch, name: str, longest_s: float
-) -> None:
-    """What runs is not what was read off: the relation would be worth nothing."""
-    row = {"attack": name, "tries": 1, "longest_between_rests_s": longest_s, "longest_try_s": 1.0, "reasons": []}
-    monkeypatch.setattr(live_wait, "attacks", lambda *_: [row])
+def _judged(monkeypatch: pytest.MonkeyPatch) -> Finding:
+    """LIVE-WAIT, its obligations taken for proved."""
     monkeypatch.setattr(live_wait, "finding", lambda *_, **__: Finding("proved"))
     monkeypatch.setattr(live_wait, "discharge", lambda *_: [])
-    inputs = LiveWait().inputs(load("case_b")[0])
-    assert live_wait.judge(Patience, inputs).status == "error"
+    return live_wait.judge(Patience, LiveWait().inputs(load("case_b")[0]))
+
+
+@pytest.mark.parametrize(("longest_s", "unexpected"), [(1e9, 0), (1.0, 1)])
+def test_an_attack_that_gets_through_makes_the_claim_an_error(
+    monkeypatch: pytest.MonkeyPatch, longest_s: float, unexpected: int
+) -> None:
+    """What runs is not what was read off: the relation would be worth nothing."""
+    row = {
+        "attack": "endless", "tries": 1, "longest_between_rests_s": longest_s, "longest_try_s": 1.0, "reasons": [],
+        "unexpected": unexpected,
+    }  # fmt: skip
+    monkeypatch.setattr(live_wait, "attacks", lambda *_: [row])
+    assert _judged(monkeypatch).status == "error"
+
+
+TURNED = [
+    ("standing != ACCEPT:  # withdrawn", "proposal is None:"),
+    (
+        "            turns[i] = self._patience.rested(turns[i], t)\n            if proposal is None:\n",
+        "            if proposal is None:\n                turns[i] = self._patience.rested(turns[i], t)\n",
+    ),
+    ("proposal.cause in self._team.ugvs and proposal", "proposal"),
+]
+"""Ways to call `Patience` wrongly: text of the gatekeeper's module, and what takes its place."""
+
+
+@pytest.mark.parametrize(("old", "new"), TURNED, ids=["replaced", "rests in silence only", "forged favours"])
+def test_a_gatekeeper_that_miscounts_makes_the_claim_an_error(
+    monkeypatch: pytest.MonkeyPatch, old: str, new: str
+) -> None:
+    source = inspect.getsource(certified)
+    assert source.count(old) == 1
+    broken: dict[str, Any] = {"__name__": certified.__name__}
+    exec(compile(source.replace(old, new), certified.__file__, "exec"), broken)
+    for method in ("sample", "_judge"):
+        monkeypatch.setattr(CertifiedGatekeepers, method, getattr(broken["CertifiedGatekeepers"], method))
+    assert _judged(monkeypatch).status == "error"
+
+
+def test_a_gatekeeper_that_does_not_notice_withdrawals_makes_the_claim_an_error(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(Gatekeepers, "idle", lambda _, proposals, *__: not any(proposals))
+    assert _judged(monkeypatch).status == "error"
 
 
 def test_attacks_use_all_tries_and_no_more() -> None:
