@@ -119,10 +119,19 @@ class LiveProg(GateClaim):
                 "farthest_behind_prediction_m": largest,
                 "reasons": {str(k): int(v) for k, v in trace.decisions["reason"].value_counts().items()},
                 "most_tries": float(trace.decisions["tries"].max()),
+                "leave_a_direction": leaving_a_direction(trace, sent),
             },
             exercised=accepted,
         )
         return conclude(finding, compared)
+
+
+def leaving_a_direction(trace: Trace, sent: Sequence[Sent]) -> int:
+    """How many accepted proposals leave a direction of the plane to the own task: LIVE-GATE assumes that none does."""
+    accepted = trace.decisions[trace.decisions["decision"] == "accept"]
+    which = set(zip(accepted["robot"], accepted["issued_s"], strict=True))
+    whole = [np.allclose(one.chosen[:2, :2], np.eye(2)) for one in sent if (one.ugv, one.issued_s) in which]
+    return whole.count(False)
 
 
 def judge_decision(trace: Trace, row: Row, last: Row | None, patience: Patience, sent: Sequence[Sent]) -> Iterator[Off]:

@@ -79,6 +79,17 @@ def test_an_edited_decision_is_refuted(
     assert what in finding.counterexample["what"]
 
 
+def test_what_leaves_a_direction_to_the_own_task_is_counted(decided: Trace) -> None:
+    """LIVE-GATE assumes that none does."""
+
+    def count(trace: Trace) -> Any:
+        return CLAIMS["LIVE-PROG"].judge(trace).evidence["leave_a_direction"]
+
+    along_x = decided.proposals.assign(selection=[[1.0, 0.0, 0.0]] * len(decided.proposals))
+    assert count(decided) == 0
+    assert count(replace(decided, proposals=along_x)) == 1
+
+
 def test_a_map_that_was_not_sent_is_noticed(decided: Trace) -> None:
     """The outcome of the detour rests on the map in its message: with another one it is another."""
     proposals = decided.proposals.copy()

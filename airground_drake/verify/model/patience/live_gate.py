@@ -25,18 +25,19 @@ class LiveGate(ModelClaim):
     """LIVE-GATE."""
 
     id = "LIVE-GATE"
-    summary = "Given room, an intervention that a UGV has accepted is carried through to its end."
+    summary = "Given room, an accepted intervention that leaves the UGV no direction is carried through to its end."
     statement = (
-        "Under method (d) an accepted intervention is never given back before its time, and is over when its motion "
-        "is, as long as there is room along the predicted way, disturbances are bounded and the speed limit is not "
-        "reached."
+        "Under method (d) an accepted intervention that leaves no direction of the plane to the UGV's own task is "
+        "never given back before its time, and is over when its motion is, as long as there is room along the "
+        "predicted way, disturbances are bounded and the speed limit is not reached."
     )
     formula = (
-        "predicted distances >= d + v h + lag_m (robots: d + 2 v h + lag_m), |disturbance| <= Lambda lag_m: |p - "
-        "predicted| <= lag_m at every sample, so lag <= predicted lag + lag_m: never late; over by t0 + length / speed "
-        "+ h for a motion of that length at that speed, if that is no more than longest_s"
+        "J^+ J = I in the plane, predicted distances >= d + v h + lag_m (robots: d + 2 v h + lag_m), |disturbance| <= "
+        "Lambda lag_m: |p - predicted| <= lag_m at every sample, so lag <= predicted lag + lag_m: never late; over by "
+        "t0 + length / speed + h for a motion of that length at that speed, if that is no more than longest_s"
     )
     latex = (
+        r"J^+ J = I \text{ in the plane}",
         r"D_{\text{predicted}} \ge d + v h + \ell \text{ (robots: } d + 2 v h + \ell \text{)}, \quad \lVert e "
         r"\rVert \le \Lambda \ell",
         r"\Rightarrow \; \lVert p - p_{\text{predicted}} \rVert \le \ell \text{ at every sample}, \quad "
@@ -45,14 +46,18 @@ class LiveGate(ModelClaim):
         r"than } t_0 + \tau_{\text{longest}}",
     )
     method = (
-        "The difference e between run and prediction obeys e' = (1 - Lambda h) e + h w, w the disturbance: it never "
-        "leaves the ball of radius lag_m; within it, with that room, no avoidance inequality can bind, so that both "
-        "are the same law. Polynomial implications with exact certificates, z3 and cvc5; what is late and what is over "
-        "is read off the running `Patience`. The running gatekeeper and the running control law are run on random "
-        "ways with room, disturbed by the most that is allowed: nothing may be given back."
+        "Where the intervention has every direction of the plane, the difference e between run and prediction obeys "
+        "e' = (1 - Lambda h) e + h w, w the disturbance: it never leaves the ball of radius lag_m; within it, with "
+        "that room, no avoidance inequality can bind, so that both are the same law. Polynomial implications with "
+        "exact certificates, z3 and cvc5; what is late and what is over is read off the running `Patience`. The "
+        "running gatekeeper and the running control law are run on random ways with room, disturbed by the most that "
+        "is allowed: nothing may be given back."
     )
     equations = "(14), (20)"
     assumptions = (
+        "J^+ J is the identity in the plane, as in every proposal of a `BehaviourDatabase`. Along a direction that is "
+        "left to the own task that one's gain acts, not Lambda, and the UGV may be pushed out of the room. LIVE-PROG "
+        "counts the accepted proposals of a run that leave one (`leave_a_direction`).",
         "The obstacles near the way are known and stand still, and no other robot comes nearer to it than stated.",
         "Neither run nor prediction reaches the speed limit: speed of the motion + Lambda lag < v.",
         "The disturbance includes what the rate of the motion differs by from that of the motion sampled every "

@@ -15,7 +15,7 @@ from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.claim import TIME_TOLERANCE_S, ModelClaim
 from airground_drake.verify.engines.prover import LIMIT_S, discharge, finding, proved_again
 from airground_drake.verify.finding import Finding
-from airground_drake.verify.model.patience.attack import FORGED, attacks
+from airground_drake.verify.model.patience.attack import attacks
 from airground_drake.verify.model.patience.relation import obligations, symbolic
 
 

@@ -81,6 +81,7 @@ def _tracking(kind: type[Patience] = Patience, **changes: str) -> Callable[[dict
 MUTANTS: tuple[Mutant, ...] = (
     Mutant("LIVE-GATE", "a disturbance twice as large", _tracking(disturbance="2*g*r")),
     Mutant("LIVE-GATE", "differences do not contract", _tracking(contraction="1")),
+    Mutant("LIVE-GATE", "a direction left to an own task of half the gain", _tracking(contraction="1 - g*h/2")),
     Mutant("LIVE-GATE", "no room for the lag", _tracking(room="v*h")),
     Mutant("LIVE-GATE", "no room to stop", _tracking(room="r")),
     Mutant("LIVE-GATE", "late at once", _tracking(LateAtOnce)),

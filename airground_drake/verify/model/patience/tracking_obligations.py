@@ -29,7 +29,8 @@ class Tracking:
 
     Attributes:
         disturbance: largest, as a polynomial in g, r, h.
-        contraction: factor of the difference in one period.
+        contraction: factor of the difference in one period: in every direction in which the UGV moves, so that J_int
+            must leave none out.
         room: what predicted distances have beyond d.
     """
 

@@ -5,14 +5,24 @@ from __future__ import annotations
 import inspect
 from typing import Any
 
+import numpy as np
 import pytest
 from verify.judging import Judged
 
 from airground_drake.gatekeeper import certified
+from airground_drake.gatekeeper.answer import Foreseen
 from airground_drake.gatekeeper.certified import CertifiedGatekeepers
+from airground_drake.gatekeeper.outcome import Outlook
 from airground_drake.gatekeeper.patience import Patience
-from airground_drake.gatekeeper.sample import Gatekeepers
+from airground_drake.gatekeeper.sample import Gatekeepers, Memory
+from airground_drake.intervention.messages import ACCEPT
+from airground_drake.intervention.policy import Proposal
+from airground_drake.nsbc.avoidance import Avoidance
+from airground_drake.nsbc.law import UgvLaw
+from airground_drake.nsbc.motion import Motion
+from airground_drake.nsbc.team import Team
 from airground_drake.scenarios.load import load
+from airground_drake.systems.controllers import UgvController
 from airground_drake.verify.engines.prover import discharge
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.model.patience import attack, live_wait, mutants, tracking_runs
@@ -26,7 +36,7 @@ KINDS = [
     mutants.NeverExhausted, mutants.RestsAtOnce, mutants.Endless, mutants.DoesNotCount, mutants.NeverOver,
     mutants.NeverLate,
 ]  # fmt: skip
-WEAKER = [{"disturbance": "2*g*r"}, {"contraction": "1"}, {"room": "v*h"}, {"room": "r"}]
+WEAKER = [{"disturbance": "2*g*r"}, {"contraction": "1"}, {"contraction": "1 - g*h/2"}, {"room": "v*h"}, {"room": "r"}]
 
 
 @pytest.mark.parametrize("claim", [LiveWait(), LiveGate()])
@@ -120,3 +130,36 @@ def test_a_run_that_is_given_back_early_is_noticed() -> None:
     numbers = [inputs[name] for name in ("tries", "rest_s", "longest_s", "lag_m", "behind_s")]
     assert not any(row["given_back"] for row in tracking_runs.runs(Patience(*numbers), inputs))
     assert all(row["given_back"] for row in tracking_runs.runs(mutants.LateAtOnce(*numbers), inputs))
+
+
+@pytest.mark.parametrize(
+    ("selection", "kept"), [([[1.0, 1.0, 0.0], [1.0, -1.0, 0.0]], True), ([[1.0, 0.0, 0.0]], False)]
+)
+def test_a_direction_that_is_left_to_the_own_task_may_cost_the_room(selection: list[list[float]], kept: bool) -> None:
+    """Past the end of a wall with room, pushed to where the wall is: only Lambda is strong enough to hold the UGV."""
+    patience, h, limit, d = Patience(5, 5.0, 30.0, 0.5, 2.0), 0.025, 5.0, 1.0
+    room = limit * h + patience.lag + 0.1
+    stands = np.column_stack([np.full(8, 8.0), d + room + 0.8 * np.arange(8.0), np.zeros(8)])
+    team = Team(("ugv",), "uav", stands, d, 1.0, 1.0, np.array([limit, 1.0]))
+    law = UgvLaw(Avoidance(1.0, h, 20.0), motion_gain=0.1, intervention_gain=1.0, intervention_on_top=False)
+    preset = Motion(np.zeros(1), np.zeros((1, 3)))
+    gatekeepers = tracking_runs.Stalled(team, law, [preset], Outlook(patience.longest), patience)
+    controller, at = UgvController(team, law), np.zeros((1, 3))
+    motion = Motion(np.array([0.0, 20.0]), np.array([[0.0, 0.0, 0.0], [10.0, 0.0, 0.0]]))
+    proposal = Proposal("way", 0.0, motion, selection=np.array(selection))
+    memory, place, push = Memory.empty(1), np.zeros(3), np.array([0.0, 0.99 * patience.lag, 0.0])
+    for k in range(round(motion.end / h) + 1):
+        positions = np.stack([place, tracking_runs.FAR])
+        if k % 2 == 0:
+            memory = gatekeepers.sample(k * h, (proposal,), positions, np.zeros((2, 3)), memory)
+        accepted = [proposal if memory.answers[0] == ACCEPT else None]
+        velocity = controller.velocity(k * h, positions, at, at, accepted)[0]
+        place = place + h * (velocity + push)
+    first = memory.decisions[0].grounds
+    assert isinstance(first, Foreseen)
+    assert first.accept is not None
+    along = first.accept.positions[: round(motion.end / h)]
+    assert np.linalg.norm(along[:, None] - stands, axis=2).min() >= d + limit * h + patience.lag
+    reasons = [decision.reason for decision in memory.decisions]
+    assert ("no_progress" in reasons) != kept
+    assert ("over" in reasons) == kept
