@@ -273,6 +273,20 @@ LAW = (
         tests=("tests/verify/runs/test_exec.py",),
     ),
     Mutant(
+        "every intervention limited to the first UGV's speed",
+        "nsbc/law.py",
+        "velocity = limit_speed(task[None], max_speed[row])",
+        "velocity = limit_speed(task[None], max_speed[:1])",
+        runs=("crowd d", "crowd c", "crowd b", "bodies d", "bodies b"),
+    ),
+    Mutant(
+        "every UGV predicted with the first one's speed limit",
+        "gatekeeper/sample.py",
+        "max_speed=float(self._max_speed[i])",
+        "max_speed=float(self._max_speed[0])",
+        runs=("crowd d", "crowd c", "bodies d", "bodies c"),
+    ),
+    Mutant(
         "intervention gain 20 % off",
         "components.py",
         "control.motion_gain_1_s, control.intervention_gain_1_s,",
