@@ -8,6 +8,8 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 """Numbers in binary64; every docstring gives the shape and the unit."""
 
+LARGEST = 1e9
+"""Of a number of a scenario and of a time or coordinate of a proposal, in size: products and quotients stay finite."""
 ROUNDOFF = 2.0**-53
 """Unit roundoff u of binary64: every operation returns its exact result times 1 + e, |e| <= u."""
 

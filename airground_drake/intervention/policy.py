@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 
-from airground_drake.arrays import Array, read_only
+from airground_drake.arrays import LARGEST, Array, read_only
 from airground_drake.nsbc.motion import Motion
 from airground_drake.nsbc.task import pseudoinverse
 
@@ -148,7 +148,7 @@ that is hardly longer has no velocity to speak of."""
 class Policy(abc.ABC):
     """An intervention behaviour of the UAV. Subclasses take their parameters as keyword numbers.
 
-    A policy may fail: an exception, or anything but motions of finite numbers or None, counts as no
+    A policy may fail: an exception, or anything but None or motions of numbers up to `LARGEST` in size, counts as no
     intervention and is reported (see `database.py`). No policy's code runs in a UGV's control loop, and one that does
     not come with the package runs in a process of its own (see `process.py`).
 
@@ -174,8 +174,8 @@ def motions_of(proposed: object, seen: Observation) -> dict[str, Motion]:
 
     Raises:
         TypeError: if it is neither a motion nor motions by name.
-        ValueError: if it names what is no UGV of the team, asks one again that has a proposal of this instant, or has
-            vertices that are hardly apart in time.
+        ValueError: if it names what is no UGV of the team, asks one again that has a proposal of this instant, has
+            vertices that are hardly apart in time, or numbers beyond `LARGEST`.
     """
     if proposed is None:
         return {}
@@ -192,6 +192,8 @@ def motions_of(proposed: object, seen: Observation) -> dict[str, Motion]:
         if name in taken:
             raise ValueError(f"{name} has a proposal of this instant already")
         plain = Motion(motion.times, motion.positions)
+        if max(np.abs(plain.times).max(), np.abs(plain.positions).max()) > LARGEST:
+            raise ValueError(f"the times and coordinates of a proposed motion must be at most {LARGEST:g} in size")
         if (np.diff(plain.times) < SHORTEST_LEG_S).any():
             raise ValueError(f"the vertices of a proposed motion must be {SHORTEST_LEG_S:g} s apart at least")
         motions[str(name)] = plain

@@ -13,6 +13,7 @@ from collections.abc import Iterable
 from dataclasses import MISSING, Field, fields, is_dataclass
 from typing import Any, get_args, get_origin
 
+from airground_drake.arrays import LARGEST
 from airground_drake.intervention.database import RANKINGS
 from airground_drake.nsbc.avoidance import COMPOSITIONS
 from airground_drake.registry import (
@@ -30,7 +31,6 @@ from airground_drake.scenarios import schema
 from airground_drake.scenarios.validate import (
     BUDGETS,
     CLAIM_PATTERN,
-    LARGEST,
     MAX_NAME,
     MAX_SEED,
     MAX_STAGES,

@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.distance import cdist
 
+from airground_drake.arrays import LARGEST
 from airground_drake.decision.bayes import optimal_threshold
 from airground_drake.errors import Fault, ScenarioError
 from airground_drake.intervention.database import RANKINGS
@@ -47,7 +48,7 @@ MAX_UGVS, MAX_STAGES, MAX_SEED = 100, 1000, 2**31 - 1
 MAX_NAME, MAX_TEXT = 64, 10_000  # characters
 NAME_PATTERN = "^[A-Za-z_][A-Za-z0-9_]*$"  # of a UGV, an obstacle, a run, a parameter
 CLAIM_PATTERN = f"^[A-Z][A-Z0-9-]{{0,{MAX_NAME - 1}}}$"
-LARGEST, SMALLEST = 1e9, 1e-9  # of any number; of a positive number: products and quotients stay finite
+SMALLEST = 1e-9  # of a positive number
 TOLERANCE = 1e-9  # m between points; relative between periods
 _SHORT = 1.0 - 1e-5  # of a limit that is printed with six digits, so that what a message allows is allowed
 

@@ -19,6 +19,7 @@ from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
+from airground_drake.intervention.codec import packed_motions
 from airground_drake.intervention.policy import Observation, Policy
 from airground_drake.nsbc.motion import Motion
 
@@ -397,6 +398,16 @@ def returns_what_overflows(seen: Observation) -> Motion:
     return Motion(np.array([0.0, 1e-300]), np.array([[0.0] * 3, [1e300] * 3]))
 
 
+@tame("ValueError: .* at most 1e[+]09 in size")
+def returns_what_is_too_far(seen: Observation) -> Motion:
+    return Motion(np.array([0.0, 1.0]), np.array([[0.0] * 3, [-1e155] * 3]))
+
+
+@tame("ValueError: .* at most 1e[+]09 in size")
+def returns_what_is_too_late(seen: Observation) -> Motion:
+    return Motion(np.array([0.0, 1e10]), np.zeros((2, 3)))
+
+
 @tame("ValueError: a motion needs times")
 def returns_a_wrong_shape(seen: Observation) -> Motion:
     return Motion(np.arange(3.0), np.zeros((3, 2)))
@@ -609,6 +620,12 @@ def sends_a_motion_of_half_a_number(seen: Observation) -> None:
 @kind(NO_PROPOSAL)
 def sends_a_motion_that_is_not_finite(seen: Observation) -> None:
     answers({"motions": [["a", "AAAAAAAA+H8=", "AAAAAAAA+H8AAAAAAAD4fwAAAAAAAPh/"]]})
+
+
+@kind("ValueError: .* at most 1e[+]09 in size")
+def sends_a_motion_that_is_too_far(seen: Observation) -> None:
+    motion = Motion(np.array([0.0]), np.full((1, 3), 1e308))
+    answers({"motions": packed_motions({"a": motion})})
 
 
 @kind("its process does not say what went wrong")

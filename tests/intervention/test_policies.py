@@ -50,7 +50,28 @@ class NoTime(Policy):
         return Motion(times, seen.position + np.array([[0.0, 0.0, 0.0], [1e-15, 0.0, 0.0], [1.0, 0.0, 0.0]]))
 
 
-@pytest.mark.parametrize("kind", [Raises, Nonsense, NotFinite, NoTime])
+class TooFar(Policy):
+    """A policy whose motion ends where squares lose all digits, or overflow."""
+
+    END_M, LASTS_S = 1e308, 1.0
+
+    def propose(self, seen: Observation) -> Motion | None:
+        return Motion(seen.start + np.array([0.0, self.LASTS_S]), np.array([seen.position, [self.END_M, 0.0, 0.0]]))
+
+
+class Far(TooFar):
+    END_M = 1e155
+
+
+class JustTooFar(TooFar):
+    END_M = -1e10
+
+
+class TooLate(TooFar):
+    END_M, LASTS_S = 1.0, 1e10
+
+
+@pytest.mark.parametrize("kind", [Raises, Nonsense, NotFinite, NoTime, TooFar, Far, JustTooFar, TooLate])
 def test_a_broken_policy_counts_as_no_intervention_and_is_reported(case_a: Scenario, kind: type[Policy]) -> None:
     case_a.intervention.policies = [PolicyEntry("broken", {})]
     case_a.duration_s = 16.0
