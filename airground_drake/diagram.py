@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import cast
 
 from pydrake.common import RandomDistribution
 from pydrake.systems.framework import Diagram, DiagramBuilder, InputPort, OutputPort, System
@@ -67,7 +68,7 @@ class Model:
 def build_diagram(
     scenario: Scenario,
     method: str | None = None,
-    composition: Composition = "augmented",
+    composition: Composition | None = None,
     plants: PlantFactory = components.first_order_plant,
     monitor: Monitor | None = None,
 ) -> Diagram:
@@ -76,7 +77,7 @@ def build_diagram(
     Args:
         scenario: from a file or made in Python.
         method: default: that of the scenario's last run.
-        composition: of the UGVs' avoidance tasks.
+        composition: of the UGVs' avoidance tasks; default: 'augmented', without a method that of the last run.
         plants: makes the plant of each robot. The claims are about the default, `first_order_plant`.
         monitor: watches the diagram while it runs; see `make_monitor`.
 
@@ -96,14 +97,12 @@ def build_diagram(
 def build_model(
     scenario: Scenario,
     method: str | None = None,
-    composition: Composition = "augmented",
+    composition: Composition | None = None,
     plants: PlantFactory = components.first_order_plant,
     monitor: Monitor | None = None,
 ) -> Model:
     """Build and wire all components of one method of a valid scenario; else as `build_diagram`."""
-    chosen = method_of(next(reversed(scenario.runs.values())).method if method is None else method)
-    if composition not in COMPOSITIONS:
-        raise UnknownNameError("composition", composition, COMPOSITIONS)
+    chosen, composition = _chosen(scenario, method, composition)
     team, presets = components.make_team(scenario), components.make_presets(scenario)
     n = len(team.ugvs)
     zeta = components.threshold(scenario)
@@ -126,6 +125,22 @@ def build_model(
     exported = [*RECORDED, *(["violation"] if monitor is not None else [])]
     diagram = _assembled(f"{scenario.name}_method_{chosen.id}", parts, named, exported)
     return Model(diagram, chosen, team, zeta, planner, gatekeeper)
+
+
+def _chosen(scenario: Scenario, method: str | None, composition: str | None) -> tuple[Method, Composition]:
+    """The method and the composition that are asked for; without a method, those of the scenario's last run.
+
+    Raises:
+        UnknownNameError: if there is no such method or composition.
+    """
+    if method is None:
+        last = next(reversed(scenario.runs.values()))
+        method = last.method
+        composition = last.composition if composition is None else composition
+    composition = "augmented" if composition is None else composition
+    if composition not in COMPOSITIONS:
+        raise UnknownNameError("composition", composition, COMPOSITIONS)
+    return method_of(method), cast("Composition", composition)
 
 
 def _decision(scenario: Scenario, n: int, trigger: Trigger, presets: Sequence[Motion]) -> Diagram:
@@ -238,21 +253,21 @@ def _outputs(system: System) -> list[OutputPort]:
 
 
 def make_monitor(
-    scenario: Scenario, method: str | None = None, composition: Composition = "augmented", *, terminate: bool = False
+    scenario: Scenario, method: str | None = None, composition: Composition | None = None, *, terminate: bool = False
 ) -> Monitor:
     """A monitor of a diagram of the scenario, with laws of its own.
 
     Args:
         scenario: what is to hold, whatever the diagram was built from.
         method: default: that of the scenario's last run.
-        composition: of the UGVs' avoidance tasks.
+        composition: of the UGVs' avoidance tasks; default: 'augmented', without a method that of the last run.
         terminate: end the simulation at the first violation.
 
     Raises:
         ScenarioError, UnknownNameError, PluginError: as `build_diagram`.
     """
     scenario = validated(scenario)
-    chosen = method_of(next(reversed(scenario.runs.values())).method if method is None else method)
+    chosen, composition = _chosen(scenario, method, composition)
     team = components.make_team(scenario)
     ugvs = UgvController(team, components.make_law(scenario, chosen, composition))
     laws = Laws(ugvs.velocity, _uav_controller(scenario, team).velocity)

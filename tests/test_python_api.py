@@ -126,7 +126,20 @@ def test_it_runs_without_the_recorder(case_a: Scenario) -> None:
     simulator.AdvanceTo(1.0)
     positions = diagram.GetOutputPort("team_position").Eval(simulator.get_context()).reshape(-1, 3)
     assert np.linalg.norm(positions[0] - starts(case_a)[0]) > 0.5
-    assert build_diagram(case_a).get_name() == "case_a_method_a"
+
+
+@pytest.mark.parametrize(
+    ("asked", "built"),
+    [
+        ({}, ("case_a_method_a", "recursion_listed")),
+        ({"method": "d"}, ("case_a_method_d", "augmented")),
+        ({"composition": "augmented"}, ("case_a_method_a", "augmented")),
+    ],
+)
+def test_what_is_not_asked_for_is_of_the_last_run(case_a: Scenario, asked: Any, built: tuple[str, str]) -> None:
+    diagram = build_diagram(case_a, **asked)
+    controller = diagram.GetSubsystemByName("ugvs").GetSubsystemByName("ugv_controller")
+    assert (diagram.get_name(), controller.avoidance.composition) == built
 
 
 def drifted(case_a: Scenario, robot: str, drift: Array | None) -> Array:

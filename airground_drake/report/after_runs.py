@@ -16,6 +16,7 @@ from airground_drake import files, graphviz, trace
 from airground_drake.diagram import build_diagram
 from airground_drake.errors import PluginError
 from airground_drake.progress import Watch
+from airground_drake.registry import METHODS
 from airground_drake.report import audit, document, folder, html, junit
 from airground_drake.report.figures import moments, zeno_refine
 from airground_drake.report.figures.draw import draw
@@ -75,7 +76,8 @@ def write(
         PluginError: if a claim or a certificate has no plain name.
         OSError: if something cannot be written.
     """
-    dot = graphviz.dot(build_diagram(plugins.without(scenario)))
+    most_complete = max((run.method for run in scenario.runs.values()), key=list(METHODS).index)
+    dot = graphviz.dot(build_diagram(plugins.without(scenario), most_complete))
     drawn = graphviz.svg(dot)
     folder.clear(output)
     written = [f"certificates/{name}" for name in _save_certificates(output / "certificates", judged.verdicts)]

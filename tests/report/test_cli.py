@@ -15,6 +15,7 @@ from airground_drake.scenarios.load import load, shipped
 from airground_drake.simulation import simulate
 from airground_drake.verify import __main__ as judge
 
+DIAGRAMS = Path(__file__).parents[2] / "diagrams"
 Report = Callable[[str], Path]
 
 
@@ -22,6 +23,7 @@ def test_everything_is_written(report: Report) -> None:
     folder = report("case_a")
     names = {path.name for path in folder.iterdir()}
     assert names == {"report.html", "report.json", "junit.xml", "diagram.dot", "diagram.svg", "trace", "certificates"}
+    assert (folder / "diagram.dot").read_text() == (DIAGRAMS / "case_a.dot").read_text()
     scenario = load("case_a")[0]
     for name in scenario.runs:
         assert trace.load(folder / "trace" / name).run == name
