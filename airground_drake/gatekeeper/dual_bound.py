@@ -1,8 +1,6 @@
-"""Lower bounds of (25) by weak duality, for the relaxation (27) with half-planes."""
+"""A lower bound of (25) by weak duality, for the relaxation (27) with half-planes."""
 
 from __future__ import annotations
-
-from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -12,37 +10,8 @@ from airground_drake.gatekeeper.cost import Terms
 from airground_drake.gatekeeper.problem import Kinematics, Problem
 
 
-class DualBound(NamedTuple):
-    """Lower bounds of the cost (25) still to come, with distances along half-planes: affine in the position.
-
-    Whatever a relaxed plan does from the end of stage k - 1 on, where it is in p, its stages k, k + 1, ... cost
-    at least constants[k] + slopes[k].(p - at[k - 1]); for k = 0, p is the initial state and the slope is idle.
-
-    Attributes:
-        constants: (N + 1,); the first is a lower bound of (25) for the whole problem.
-        slopes: (N + 1, 3), 1/m.
-        at: positions at the ends of the stages that the bounds are linearised along, (N, 3), m.
-        pressed: whether some half-plane has a multiplier; if none has, the bounds hold for (26) itself.
-    """
-
-    constants: Array
-    slopes: Array
-    at: Array
-    pressed: bool
-
-    @classmethod
-    def none(cls, stages: int) -> DualBound:
-        """The bound that says nothing."""
-        return cls(np.full(stages + 1, -np.inf), np.zeros((stages + 1, 3)), np.zeros((stages, 3)), False)
-
-    @property
-    def bound(self) -> float:
-        """Lower bound of (25) over all relaxed plans."""
-        return float(self.constants[0])
-
-
-def dual_bound(problem: Problem, normals: Array, omega: Array, multipliers: Array) -> DualBound:
-    """Lower bounds by weak duality, valid for any arguments.
+def dual_bound(problem: Problem, normals: Array, omega: Array, multipliers: Array) -> float:
+    """Lower bound of (25), with distances along half-planes, by weak duality; valid for any arguments.
 
     For multipliers l >= 0 of the half-planes, (25) is at least the Lagrangian, whose minimum over u >= 0 is
     closed, and whose task error is convex in omega, so that it is at least its linearisation at any omega,
@@ -56,26 +25,23 @@ def dual_bound(problem: Problem, normals: Array, omega: Array, multipliers: Arra
         multipliers: of the half-planes, (N, m), 1/m; negative ones count as 0.
     """
     at = problem.positions(omega)
-    constants, slopes = _dual_bound(problem.kinematics, problem.terms, normals, omega, at, multipliers)
-    return DualBound(constants, slopes, at, bool((multipliers > 0.0).any()))
+    return float(_dual_bound(problem.kinematics, problem.terms, normals, omega, at, multipliers))
 
 
 @njit(cache=True)
 def _dual_bound(
     motion: Kinematics, terms: Terms, normals: Array, omega: Array, positions: Array, multipliers: Array
-) -> tuple[Array, Array]:
-    stages = len(omega)
-    constants, slopes = np.zeros(stages + 1), np.zeros((stages + 1, 3))
-    for k in range(stages - 1, -1, -1):
-        total, pressure = constants[k + 1], 0.0
-        slopes[k] = slopes[k + 1]
+) -> float:
+    total, gradient = 0.0, np.zeros(3)  # of what comes from stage k on, in the position at its end
+    for k in range(len(omega) - 1, -1, -1):
+        pressure = 0.0
         for m in range(len(terms.distances)):
             if multipliers[k, m] <= 0.0 or terms.slack_weight <= 0.0:
                 continue
             reach = 0.0
             for a in range(3):
                 reach += normals[k, m, a] * (positions[k, a] - terms.centres[k, m, a])
-                slopes[k, a] -= multipliers[k, m] * normals[k, m, a]
+                gradient[a] -= multipliers[k, m] * normals[k, m, a]
             total += multipliers[k, m] * (terms.distances[m] - reach)
             pressure += multipliers[k, m]
         if pressure > 0.0:
@@ -84,10 +50,10 @@ def _dual_bound(
         for a in range(3):
             error = positions[k, a] - terms.reference[k, a]
             total += terms.dt * terms.error_weights[k] * error * error
-            slopes[k, a] += 2.0 * terms.dt * terms.error_weights[k] * error
-            slope += terms.dt * (motion.velocities[1, k, a] - motion.velocities[0, k, a]) * slopes[k, a]
-        constants[k] = total + min(-omega[k] * slope, (1.0 - omega[k]) * slope)
-    return constants, slopes
+            gradient[a] += 2.0 * terms.dt * terms.error_weights[k] * error
+            slope += terms.dt * (motion.velocities[1, k, a] - motion.velocities[0, k, a]) * gradient[a]
+        total += min(-omega[k] * slope, (1.0 - omega[k]) * slope)
+    return total
 
 
 def multipliers_at(problem: Problem, normals: Array, positions: Array) -> Array:

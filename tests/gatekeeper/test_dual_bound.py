@@ -14,51 +14,24 @@ from pydrake.solvers import ClarabelSolver, SolverOptions
 from airground_drake.gatekeeper.convex_program import team_program
 from airground_drake.gatekeeper.dual_bound import dual_bound
 from airground_drake.gatekeeper.half_planes import normals_along
-from airground_drake.gatekeeper.problem import Problem
 from gatekeeper.contract import used
 from gatekeeper.formulas import half_plane_cost
 
 
-def check_bounds(
-    problem: Problem, seed: int, at: np.ndarray, omega: np.ndarray, *, twist: float = 1.0, loaded: bool = True
-) -> None:
-    """ConstantPlans and slopes bound the cost to come, in half-planes, of any plan from any stage on."""
-    rng = np.random.default_rng(seed)
-    normals = normals_along(problem, problem.positions(rng.random(problem.stages)))
-    multipliers = rng.exponential(3.0, normals.shape[:2]) * (rng.random(normals.shape[:2]) < 0.3) * loaded
-    ahead = dual_bound(problem, normals, at, multipliers)
-    positions = problem.positions(omega)
-    stages = [
-        half_plane_cost(
-            replace(
-                problem, initial=positions[k - 1] if k else problem.initial, accept=problem.accept[k:],
-                refuse=problem.refuse[k:], reference=problem.reference[k:], centres=problem.centres[k:],
-            ), omega[k:], normals[k:],
-        )
-        for k in range(problem.stages)
-    ]  # fmt: skip
-    moved = positions[:-1] - ahead.at[:-1]
-    bounds = ahead.constants[:-1].copy()
-    bounds[1:] += twist * np.sum(ahead.slopes[1:-1] * moved, axis=1)
-    assert (bounds <= np.array(stages) + 1e-9 * (1.0 + np.abs(bounds))).all()
-    assert ahead.bound == ahead.constants[0]
-
-
 @given(st.integers(0, 10**6), PLANS, PLANS)
 def test_the_dual_bound_holds_for_any_multipliers(seed: int, at: np.ndarray, omega: np.ndarray) -> None:
-    check_bounds(random_problem(seed), seed, at, omega)
-
-
-def test_a_wrong_slope_is_refuted() -> None:
-    rng = np.random.default_rng(0)
-    for seed in range(5):
-        problem = replace(random_problem(seed), terminal_weight=0.0)
-        at = used("relaxed").solve(problem).relaxed
-        assert at is not None
-        omega = np.clip(at + 0.2 * rng.normal(size=24), 0.0, 1.0)  # near the optimum, where bounds are tight
-        check_bounds(problem, seed, at, omega, loaded=False)
-        with pytest.raises(AssertionError):
-            check_bounds(problem, seed, at, omega, twist=-1.0, loaded=False)
+    """The bound linearised at one plan is below the cost, in half-planes, of another, from any stage on."""
+    problem, rng = random_problem(seed), np.random.default_rng(seed)
+    normals = normals_along(problem, problem.positions(rng.random(problem.stages)))
+    multipliers = rng.exponential(3.0, normals.shape[:2]) * (rng.random(normals.shape[:2]) < 0.3)
+    positions = problem.positions(omega)
+    for k in range(problem.stages):
+        rest = replace(
+            problem, initial=positions[k - 1] if k else problem.initial, accept=problem.accept[k:],
+            refuse=problem.refuse[k:], reference=problem.reference[k:], centres=problem.centres[k:],
+        )  # fmt: skip
+        bound = dual_bound(rest, normals[k:], at[k:], multipliers[k:])
+        assert bound <= half_plane_cost(rest, omega[k:], normals[k:]) + 1e-9 * (1.0 + abs(bound))
 
 
 def test_the_bound_of_the_relaxation_is_tight() -> None:

@@ -10,12 +10,11 @@ from pydrake.solvers import ClarabelSolver, MathematicalProgramResult, SolutionR
 from airground_drake.arrays import Array
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.convex_program import Shape, TeamProgram, empty_program
-from airground_drake.gatekeeper.dual_bound import DualBound, dual_bound, multipliers_at
+from airground_drake.gatekeeper.dual_bound import dual_bound, multipliers_at
 from airground_drake.gatekeeper.half_planes import normals_along
 from airground_drake.gatekeeper.problem import Problem
-from airground_drake.gatekeeper.reachable_box import remaining_cost
 from airground_drake.gatekeeper.rounding import sum_up_rounding
-from airground_drake.gatekeeper.routes.guard import guarded, without_optimum
+from airground_drake.gatekeeper.routes.guard import guarded, unavoidable_cost, without_optimum
 from airground_drake.gatekeeper.solution import ConstantPlans, Solution, cheapest
 
 _TOLERANCE = 1e-6
@@ -63,25 +62,23 @@ class RelaxedRoute:
 
     def _solve(self, problem: Problem, constants: ConstantPlans, budget: Budget) -> Solution:
         normals = normals_along(problem, constants.better.positions)
-        relaxed, ahead, finished = self._relax(problem, normals, constants.better.objective, budget)
-        if relaxed is None or ahead is None:
+        relaxed, bound, finished = self._relax(problem, normals, constants.better.objective, budget)
+        if relaxed is None:
             return without_optimum(problem, constants, budget)
-        rounded, tail = sum_up_rounding(relaxed), remaining_cost(problem)
+        rounded = sum_up_rounding(relaxed)
         other = np.append(1.0 - rounded[0], rounded[1:])
         return cheapest(
             problem,
             (constants.accept, constants.refuse, problem.evaluate(rounded), problem.evaluate(other)),
             status="optimal" if finished else "budget_spent",
-            route_bound=max(ahead.bound, float(tail[0])),
+            route_bound=max(bound, unavoidable_cost(problem)),
             normals=normals,
             relaxed=relaxed,
             rounded=rounded,
         )
 
-    def _relax(
-        self, problem: Problem, normals: Array, cost: float, budget: Budget
-    ) -> tuple[Array | None, DualBound | None, bool]:
-        """Omega (N,), the bounds that follow, and whether it is an optimum; None where the solver failed."""
+    def _relax(self, problem: Problem, normals: Array, cost: float, budget: Budget) -> tuple[Array | None, float, bool]:
+        """Omega (N,), or None where the solver failed, the bound that follows, and whether it is an optimum."""
         scale = _scale(cost)
         shape = Shape.of(problem, scale=scale)
         if shape not in self._programs:
@@ -95,15 +92,13 @@ class RelaxedRoute:
         usable = np.isfinite(omega).all()
         if not usable or not (finished or _stopped(result, budget)):
             del self._programs[shape]  # a fresh workspace after a failure
-            return None, None, False
-        ahead = dual_bound(problem, normals, omega, multipliers_at(problem, normals, problem.positions(omega)))
-        if ahead.bound < (1.0 - 2.0 * _TOLERANCE) * scale * result.get_optimal_cost() and rows.any():
+            return None, -math.inf, False
+        bound = dual_bound(problem, normals, omega, multipliers_at(problem, normals, problem.positions(omega)))
+        if bound < (1.0 - 2.0 * _TOLERANCE) * scale * result.get_optimal_cost() and rows.any():
             multipliers = np.zeros(rows.shape)
             multipliers[rows] = scale * result.GetDualSolution(ugv.avoidance)
-            with_ties = dual_bound(problem, normals, omega, multipliers)
-            if with_ties.bound > ahead.bound:
-                ahead = with_ties
-        return omega, ahead, finished
+            bound = max(bound, dual_bound(problem, normals, omega, multipliers))
+        return omega, bound, finished
 
 
 def _stopped(result: MathematicalProgramResult, budget: Budget) -> bool:
