@@ -352,7 +352,7 @@ def alternatives(expected: str) -> tuple[str, ...]:
     return tuple(expected.split(" or "))
 
 
-def outcome(status: str, exercised: int | None) -> str:
+def outcome(status: str, exercised: float | None) -> str:
     """How a verdict counts: by its status, or as `NOT_EXERCISED` if nothing was there to refute it.
 
     Args:

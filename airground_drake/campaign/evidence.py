@@ -13,7 +13,7 @@ import pandas as pd
 from scipy.stats import chi2_contingency, qmc
 
 from airground_drake.arrays import Array
-from airground_drake.campaign.rows import JUDGED, TIMES
+from airground_drake.campaign.rows import JUDGED, TIMES, is_tested
 from airground_drake.campaign.statistics import CONFIDENCE, clopper_pearson, confidence_sequence
 
 WORST = 5
@@ -60,7 +60,7 @@ class Counts(NamedTuple):
 
 
 def _tested(rows: pd.DataFrame) -> pd.Series:
-    return (rows["exercised"] > 0) | rows["exercised"].isna() | rows["status"].isin([*OPEN, "refuted"])
+    return pd.Series(map(is_tested, rows["status"], rows["exercised"]), rows.index, dtype=bool)
 
 
 def evidence(table: pd.DataFrame, marks: Mapping[str, float] | None = None) -> Json:

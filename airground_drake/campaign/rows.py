@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from airground_drake.registry import NOT_EXERCISED, outcome
+
 COLUMNS: dict[str, str] = {
     "index": "int64", "run": "str", "method": "str", "ended": "str", "what": "str", "claim": "str", "status": "str",
     "as_expected": "bool", "margin": "float64", "unit": "str", "exercised": "float64", "ugvs": "int64",
@@ -23,6 +25,11 @@ TIMES = ("first_trigger_s", "arrival_s", "intervened_s", "wall_s")
 """Columns whose distributions are shown, s."""
 
 Row = dict[str, Any]
+
+
+def is_tested(status: str, exercised: float) -> bool:
+    """Whether something could have refuted the claim of a row; where nobody counted (NaN), it is taken to be so."""
+    return outcome(status, exercised) != NOT_EXERCISED
 
 
 def blank() -> Row:

@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 
 from airground_drake.campaign.evidence import OPEN
-from airground_drake.campaign.rows import Row
+from airground_drake.campaign.rows import Row, is_tested
 from airground_drake.campaign.statistics import confidence_sequence
 from airground_drake.errors import UnknownNameError
 from airground_drake.registry import RUN_CLAIMS
@@ -50,8 +50,7 @@ class Stopping:
     def met(self, rows: list[Row]) -> bool:
         """Count the rows of one more draw; whether every run of the scenario now meets the rule."""
         for row in rows:
-            idle = row["exercised"] == 0.0 and row["status"] == "holds"
-            if row["claim"] == self.claim and not idle:
+            if row["claim"] == self.claim and is_tested(row["status"], row["exercised"]):
                 counts = self._counts.setdefault(row["run"], [0, 0, 0])
                 counts[0] += row["status"] == "refuted"
                 counts[1] += row["status"] in OPEN

@@ -52,6 +52,23 @@ def test_a_claim_that_nothing_tested_has_no_bound_but_the_whole_interval() -> No
     assert (claim["tested"], claim["fixed"], claim["anytime"]) == (0, [0.0, 1.0], [0.0, 1.0])
 
 
+@pytest.mark.parametrize(
+    ("status", "exercised", "tested"),
+    [
+        ("holds", 1.0, True), ("holds", 0.0, False), ("holds", NAN, True), ("proved", 0.0, False),
+        ("supported", 0.0, False), ("refuted", 0.0, True), ("inconclusive", 0.0, True), ("error", NAN, True),
+    ],
+)  # fmt: skip
+def test_reports_and_stopping_rules_agree_on_what_was_tested(status: str, exercised: float, tested: bool) -> None:
+    rows = [row(i, status, exercised=exercised) for i in range(3)]
+    (claim,) = conclude(rows)["claims"]
+    rule = Stopping.parse("SAFE-TRACE < 0.1")
+    rule.met(rows)
+    counts = rule._counts.get("d", [0, 0, 0])
+    assert [claim[name] for name in ("refuted", "undecided", "tested")] == counts
+    assert claim["tested"] == 3 * tested
+
+
 def test_it_finds_the_keys_by_which_a_claim_fails() -> None:
     rng = np.random.default_rng(0)
     rows = []
