@@ -23,7 +23,7 @@ from functools import cache
 from importlib.metadata import entry_points
 from pathlib import Path
 from types import ModuleType
-from typing import Any, Literal, TypeVar, get_args
+from typing import Any, TypeVar
 
 from airground_drake.errors import PluginError, UnknownNameError, described
 from airground_drake.files import sha256
@@ -331,38 +331,3 @@ MODEL_CLAIMS = Registry(
     },
 )
 """Claims about the model, whatever the run, in the order of the report: subclasses of `verify.claim.ModelClaim`."""
-
-Status = Literal["proved", "holds", "supported", "refuted", "inconclusive", "error", "not_run"]
-"""What can come of a claim."""
-STATUSES: tuple[Status, ...] = get_args(Status)
-PASSING: tuple[Status, ...] = ("proved", "holds", "supported")
-"""Statuses in which the claim was established, each in its way."""
-
-
-EXERCISED = "exercised"
-"""What a scenario may expect besides a status: one of `PASSING`, on at least one thing that could have refuted it."""
-NOT_EXERCISED = "not_exercised"
-"""How a claim counts that was established because nothing put it to the test."""
-EXPECTATIONS: tuple[str, ...] = (*STATUSES, EXERCISED)
-"""What an alternative of an expectation may be."""
-
-
-def alternatives(expected: str) -> tuple[str, ...]:
-    """What an expectation admits: "holds"; "exercised"; "exercised or refuted" where there is no guarantee."""
-    return tuple(expected.split(" or "))
-
-
-def outcome(status: str, exercised: float | None) -> str:
-    """How a verdict counts: by its status, or as `NOT_EXERCISED` if nothing was there to refute it.
-
-    Args:
-        status: the verdict.
-        exercised: how often the claim was put to the test; None: nobody counted.
-    """
-    return NOT_EXERCISED if status in PASSING and exercised == 0 else status
-
-
-def meets(expected: str, status: str, exercised: int | None) -> bool:
-    """Whether a verdict is one that an expectation admits; a status admits it however often it was exercised."""
-    put_to_the_test = status in PASSING and bool(exercised)
-    return any(status == each or (each == EXERCISED and put_to_the_test) for each in alternatives(expected))

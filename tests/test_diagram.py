@@ -17,7 +17,7 @@ from airground_drake.scenarios.load import load
 PACKAGE = Path(airground_drake.__file__).parent
 LAYERS = (
     ("arrays", "confinement", "errors", "files", "interruption", "progress", "side_by_side", "usage", "check"),
-    ("registry",),
+    ("registry", "statuses"),
     ("nsbc",),
     ("decision", "intervention"),
     ("gatekeeper",),

@@ -15,6 +15,7 @@ from scipy.stats import chi2_contingency, qmc
 from airground_drake.arrays import Array
 from airground_drake.campaign.rows import JUDGED, TIMES, is_tested
 from airground_drake.campaign.statistics import CONFIDENCE, clopper_pearson, confidence_sequence
+from airground_drake.statuses import UNDECIDED
 
 WORST = 5
 """Runs of least margin that are listed for each claim."""
@@ -23,8 +24,6 @@ BINS = 4
 MOST_POINTS = 1000
 """Draws that the discrepancy is computed from: its cost grows with their square."""
 QUANTILES = (0.0, 0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 1.0)
-OPEN = ("inconclusive", "error", "not_run")
-"""Statuses that decide nothing; they count as violations in every upper bound."""
 
 Json = dict[str, Any]
 
@@ -35,7 +34,7 @@ class Counts(NamedTuple):
     Attributes:
         tested: judged and exercised, or judged by a claim that does not count how often it was.
         refuted: violations.
-        undecided: of these.
+        undecided: of these; they count as violations in every upper bound.
         idle: judged, but nothing could have refuted the claim: these count for nothing.
     """
 
@@ -49,7 +48,7 @@ class Counts(NamedTuple):
         """From the rows of one claim and run."""
         tested = _tested(rows)
         status = rows.loc[tested, "status"]
-        refuted, undecided = int((status == "refuted").sum()), int(status.isin(OPEN).sum())
+        refuted, undecided = int((status == "refuted").sum()), int(status.isin(UNDECIDED).sum())
         return cls(int(tested.sum()), refuted, undecided, int((~tested).sum()))
 
     def interval(self, *, anytime: bool, confidence: float = CONFIDENCE) -> tuple[float, float]:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from airground_drake.campaign.evidence import OPEN
 from airground_drake.campaign.rows import Row, is_tested
 from airground_drake.campaign.statistics import confidence_sequence
 from airground_drake.errors import UnknownNameError
 from airground_drake.registry import RUN_CLAIMS
+from airground_drake.statuses import UNDECIDED
 
 _RULE = re.compile(r"\s*(?P<claim>[A-Za-z0-9_.-]+)\s*(?P<sign>[<>])\s*(?P<value>[0-9.eE+-]+)\s*")
 
@@ -53,7 +53,7 @@ class Stopping:
             if row["claim"] == self.claim and is_tested(row["status"], row["exercised"]):
                 counts = self._counts.setdefault(row["run"], [0, 0, 0])
                 counts[0] += row["status"] == "refuted"
-                counts[1] += row["status"] in OPEN
+                counts[1] += row["status"] in UNDECIDED
                 counts[2] += 1
         return bool(self._counts) and all(map(self._decides, self._counts.values()))
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from airground_drake.registry import PASSING, outcome
+from airground_drake.statuses import PASSING, UNDECIDED, outcome
 
 REFUSED = {
     "cheaper": "the plan that it preferred began by waiting",
@@ -48,7 +48,7 @@ class Item:
 def items(document: Mapping[str, Any]) -> list[Item]:
     """All of a report, in the order of the page: what is refuted first, then what is open, then the rest."""
     unexpected = [claim for claim in document["claims"] if not claim["as_expected"]]
-    unexpected.sort(key=lambda claim: claim["status"] in ("inconclusive", "error", "not_run"))
+    unexpected.sort(key=lambda claim: claim["status"] in UNDECIDED)
     return [
         *(_of_claim(claim, document["runs"].get(claim["run"], {})) for claim in unexpected),
         *(Item("not_run", f"{each['why']}", each["id"], each["run"]) for each in document["overall"]["missing"]),

@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any
 
 from airground_drake.errors import ReportError, one_line
-from airground_drake.registry import outcome
 from airground_drake.report.folder import PAGES
+from airground_drake.statuses import UNDECIDED, outcome
 
 SCHEMA = "airground_drake.comparison/1"
 REPORT = "airground_drake.report/2"
@@ -26,10 +26,10 @@ ORDER: tuple[tuple[str, ...], ...] = (
     ("proved",),
     ("holds", "supported"),
     ("not_exercised",),
-    ("inconclusive", "error", "not_run", "gone"),
+    (*UNDECIDED, "gone"),
     ("refuted",),
 )
-"""Verdicts from the best to the worst, as `registry.outcome` names them; `gone`: there is none any more."""
+"""Verdicts from the best to the worst, as `statuses.outcome` names them; `gone`: there is none any more."""
 ROWS: tuple[tuple[str, ...], ...] = (("reproduced",), ("calibrated",), ("ambiguous",), ("not_reproduced", "gone"))
 """Rows of the reproduction table, likewise."""
 VERDICTS = ("as_expected", "not_as_expected", "inconclusive")

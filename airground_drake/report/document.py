@@ -12,18 +12,17 @@ from typing import Any
 import numpy as np
 
 from airground_drake.files import sha256
-from airground_drake.registry import NOT_EXERCISED, STATUSES, method_of, outcome
+from airground_drake.registry import method_of
 from airground_drake.report import metrics, reproduction
 from airground_drake.report.audit import of_runs
 from airground_drake.scenarios.plugins import OPTION
 from airground_drake.scenarios.schema import Scenario
+from airground_drake.statuses import NOT_EXERCISED, STATUSES, UNDECIDED, outcome
 from airground_drake.trace import Trace
 from airground_drake.verify.claim import Verdict
 
 SCHEMA = "airground_drake.report/2"
 
-UNDECIDED = ("inconclusive", "error", "not_run")
-"""Statuses that say nothing about the claim: unexpected, they leave the report inconclusive."""
 EXIT_CODES = {"as_expected": 0, "not_as_expected": 1, "inconclusive": 3}
 
 

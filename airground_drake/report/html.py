@@ -18,13 +18,13 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from airground_drake.errors import one_line
-from airground_drake.registry import NOT_EXERCISED, outcome
 from airground_drake.report import attention, evidence
 from airground_drake.report.figures import svg
 from airground_drake.report.figures.canvas import DARK
 from airground_drake.report.figures.panels import Figure, Table
 from airground_drake.report.mathml import mathml
 from airground_drake.report.reproduction import YES_NO
+from airground_drake.statuses import NOT_EXERCISED, outcome
 
 STYLE, SCRIPTS = "report.css", ("report.js", "scrubber.js")
 """The style sheet and the scripts of the page, among the templates."""

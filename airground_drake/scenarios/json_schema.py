@@ -17,7 +17,6 @@ from airground_drake.arrays import LARGEST
 from airground_drake.intervention.database import RANKINGS
 from airground_drake.nsbc.avoidance import COMPOSITIONS
 from airground_drake.registry import (
-    EXPECTATIONS,
     METHODS,
     MODEL_CLAIMS,
     PLUGIN_PATTERN,
@@ -42,6 +41,7 @@ from airground_drake.scenarios.validate import (
     TRIGGERS,
     unit_of,
 )
+from airground_drake.statuses import EXPECTATIONS
 
 Schema = dict[str, Any]
 

@@ -24,7 +24,6 @@ from airground_drake.errors import Fault, ScenarioError
 from airground_drake.intervention.database import RANKINGS
 from airground_drake.nsbc.avoidance import COMPOSITIONS
 from airground_drake.registry import (
-    EXPECTATIONS,
     METHODS,
     MODEL_CLAIMS,
     PLUGIN,
@@ -33,11 +32,11 @@ from airground_drake.registry import (
     RUN_CLAIMS,
     UAV_TASKS,
     Registry,
-    alternatives,
     is_plugin,
 )
 from airground_drake.scenarios.rounding import TOLERANCE_M, Rounding
 from airground_drake.scenarios.schema import Scenario, Vector
+from airground_drake.statuses import EXPECTATIONS, alternatives
 
 TRIGGERS: tuple[str, ...] = ("automaton", "bare")
 THRESHOLD_RULES: tuple[str, ...] = ("fixed", "bayes")

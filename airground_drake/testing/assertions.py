@@ -6,9 +6,9 @@ import warnings
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from airground_drake.registry import PASSING
 from airground_drake.scenarios.load import Overrides
 from airground_drake.scenarios.schema import Scenario
+from airground_drake.statuses import PASSING
 from airground_drake.testing.scenario import chosen
 from airground_drake.testing.words import told
 from airground_drake.trace import Trace

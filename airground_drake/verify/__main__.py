@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING
 
 from airground_drake.errors import AirgroundError, UnknownNameError
 from airground_drake.progress import Watch, told
-from airground_drake.registry import NOT_EXERCISED, outcome
 from airground_drake.scenarios import plugins
+from airground_drake.statuses import NOT_EXERCISED, outcome
 from airground_drake.usage import Parser
 
 if TYPE_CHECKING:

@@ -12,8 +12,8 @@ import numpy as np
 
 from airground_drake import files
 from airground_drake.errors import TraceError, described
-from airground_drake.registry import PASSING, Status, meets
 from airground_drake.scenarios.schema import Scenario
+from airground_drake.statuses import PASSING, Status, meets
 from airground_drake.trace import Trace
 from airground_drake.verify.finding import Finding
 

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from airground_drake.progress import SILENT, Watch
-from airground_drake.registry import Status
 from airground_drake.scenarios.schema import Scenario
+from airground_drake.statuses import Status
 from airground_drake.verify.cache import find
 from airground_drake.verify.claim import ModelClaim, Mutant
 from airground_drake.verify.finding import Finding

@@ -10,7 +10,7 @@ from check.tampering.base import attempt, edited_report, read_json
 from check.tampering.counts import COUNT
 
 from airground_drake.check import report as checker
-from airground_drake.registry import EXPECTATIONS, STATUSES, meets, outcome
+from airground_drake.statuses import EXPECTATIONS, STATUSES, meets, outcome
 
 
 @pytest.mark.parametrize("by", [1, -1])

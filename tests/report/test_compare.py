@@ -44,7 +44,7 @@ def test_the_schema_is_the_reports() -> None:
 
 
 def test_every_verdict_has_a_place_in_the_order() -> None:
-    from airground_drake.registry import NOT_EXERCISED, STATUSES
+    from airground_drake.statuses import NOT_EXERCISED, STATUSES
 
     assert sorted(name for alike in compare.ORDER for name in alike) == sorted([*STATUSES, NOT_EXERCISED, "gone"])
 

@@ -12,9 +12,10 @@ import pytest
 from builders.runs import run_of
 from verify.judging import CLAIMS
 
-from airground_drake.registry import MODEL_CLAIMS, RUN_CLAIMS, meets, outcome
+from airground_drake.registry import MODEL_CLAIMS, RUN_CLAIMS
 from airground_drake.scenarios.load import load
 from airground_drake.simulation import simulate
+from airground_drake.statuses import meets, outcome
 from airground_drake.trace import Trace
 from airground_drake.verify import Finding, verify
 from airground_drake.verify.__main__ import main

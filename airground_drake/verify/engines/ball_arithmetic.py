@@ -25,7 +25,7 @@ from typing import Any, Literal
 import flint
 import sympy
 
-from airground_drake.registry import Status
+from airground_drake.statuses import Status
 from airground_drake.verify.finding import Finding
 
 PRECISION_BITS = 256

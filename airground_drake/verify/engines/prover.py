@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from airground_drake.registry import Status
+from airground_drake.statuses import Status
 from airground_drake.verify.engines.obligation import Obligation
 from airground_drake.verify.engines.smt import Result, solve
 from airground_drake.verify.finding import Finding

@@ -25,8 +25,8 @@ from typing import Any
 
 from airground_drake.components import make_trigger, threshold
 from airground_drake.decision.trigger import Trigger
-from airground_drake.registry import Status
 from airground_drake.scenarios.schema import Scenario
+from airground_drake.statuses import Status
 from airground_drake.verify.claim import TIME_TOLERANCE_S, ModelClaim
 from airground_drake.verify.engines.obligation import Obligation, rational
 from airground_drake.verify.engines.prover import LIMIT_S, discharge, finding, proved_again

@@ -26,8 +26,8 @@ import numpy as np
 
 from airground_drake.arrays import Array
 from airground_drake.components import make_trigger, threshold
-from airground_drake.registry import Status
 from airground_drake.scenarios.schema import Scenario
+from airground_drake.statuses import Status
 from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.model.trigger.refined_paths import (
