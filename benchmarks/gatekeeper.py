@@ -68,7 +68,11 @@ SCIP_LIMIT_S = 10.0
 
 
 def recorded(case: str, run: str, most: int) -> list[Sample]:
-    """Evenly spaced among the problems that the gatekeeper solved in a run; by mode velocities, without the loop."""
+    """Evenly spaced among the problems that the gatekeeper solved in a run; by mode velocities, without the loop.
+
+    Raises:
+        ValueError: if it solved none, as the gatekeeper of method (d) does.
+    """
     seen: list[Sample] = []
 
     class Listening(RelaxedRoute):
@@ -80,6 +84,8 @@ def recorded(case: str, run: str, most: int) -> list[Sample]:
     scenario.gatekeeper.route = "listening"
     with ROUTES.adding("listening", Listening):
         Recorder(scenario, run).simulate()
+    if not seen:
+        raise ValueError(f"{case}, run {run}: no problem (26) was solved")
     return seen[:: -(-len(seen) // most)]
 
 
@@ -162,9 +168,9 @@ def way(start: np.ndarray, goal: np.ndarray, centres: np.ndarray, radius: float)
 def groups(quick: bool) -> Iterator[tuple[str, int, int, int, list[Sample]]]:
     """Name, UGVs, points, stages and samples of every group."""
     many, few = (20, 5) if quick else (200, 30)
-    for case, run in (("case_a", "c"), ("case_a", "d"), ("case_b", "c"), ("case_b", "d")):
-        samples = recorded(case, run, many)
-        yield f"{case}, run {run}", 1, max(len(s[0].distances) for s in samples), samples[0][0].stages, samples
+    for case in ("case_a", "case_b"):
+        samples = recorded(case, "c", many)
+        yield f"{case}, run c", 1, max(len(s[0].distances) for s in samples), samples[0][0].stages, samples
 
     def random(ugvs: int, discs: int, stages: int, safe: float, count: int) -> tuple[int, int, int, list[Sample]]:
         rng = np.random.default_rng([ugvs, discs, stages])
