@@ -16,7 +16,14 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from airground_drake.diagram import build_diagram
-    from airground_drake.errors import AirgroundError, PluginError, ScenarioError, TraceError, UnknownNameError
+    from airground_drake.errors import (
+        AirgroundError,
+        PluginError,
+        ScenarioError,
+        SimulationError,
+        TraceError,
+        UnknownNameError,
+    )
     from airground_drake.scenarios.load import load
     from airground_drake.scenarios.schema import Scenario
     from airground_drake.simulation import simulate
@@ -27,6 +34,7 @@ __all__ = [
     "PluginError",
     "Scenario",
     "ScenarioError",
+    "SimulationError",
     "Trace",
     "TraceError",
     "UnknownNameError",
@@ -40,6 +48,7 @@ _HOME = {
     "PluginError": "errors",
     "Scenario": "scenarios.schema",
     "ScenarioError": "errors",
+    "SimulationError": "errors",
     "Trace": "trace",
     "TraceError": "errors",
     "UnknownNameError": "errors",

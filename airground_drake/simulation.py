@@ -263,6 +263,7 @@ def simulate(
         ScenarioError: if the scenario is not valid.
         UnknownNameError: if it has no such run.
         PluginError: if it names a policy, route or task that cannot be made.
+        SimulationError: if Drake or a system stops; names the run and the time.
     """
     return Recorder(scenario, run).simulate(seed, watch=watch)
 
