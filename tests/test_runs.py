@@ -6,7 +6,6 @@ import os
 import signal
 import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -83,7 +82,7 @@ def test_a_note_that_is_none_is_an_error_in_words(note: bytes) -> None:
     assert "left no readable note" in str(runs._noted(note, "run a of case_a"))
 
 
-def test_what_a_process_notes_is_the_error_that_it_met(tmp_path: Path) -> None:
+def test_what_a_process_notes_is_the_error_that_it_met() -> None:
     refused = runs._noted(b'{"stopped": null, "refused": true, "what": "no\\nsuch thing"}', "")
     assert (type(refused), str(refused)) == (PluginError, r"no\nsuch thing")
     stopped = runs._noted(b'{"stopped": ["d", 1.5, "why"], "refused": false, "what": ""}', "")

@@ -202,7 +202,10 @@ def test_a_trace_survives_saving_and_a_changed_file_does_not(run: Runs, tmp_path
     (tmp_path / "signals.parquet").write_bytes((tmp_path / "signals.parquet").read_bytes()[:-1])
     with pytest.raises(TraceError, match="SHA-256"):
         trace.load(tmp_path)
-    (tmp_path / "decisions.parquet").unlink()
+    trace.save(of_run, tmp_path / "other")
+    (tmp_path / "other" / "decisions.parquet").unlink()
+    with pytest.raises(TraceError, match=r"other: not a readable trace: .*decisions\.parquet"):
+        trace.load(tmp_path / "other")
     with pytest.raises(TraceError, match="not a readable trace"):
         trace.load(tmp_path / "nowhere")
     (tmp_path / "meta.json").write_text("[" * 100_000, encoding="utf-8")
@@ -236,7 +239,7 @@ def test_case_b_refuses_the_wrong_intervention_and_accepts_the_right_one(run: Ru
         assert (gap / first[["accept_throughout", "refuse_throughout"]].max(axis=1) > 0.05).all()  # no knife edge
 
 
-def test_what_a_refusal_teaches_is_on_the_uavs_map_afterwards(case_a: Scenario, run: Runs) -> None:
+def test_what_a_refusal_teaches_is_on_the_uavs_map_afterwards(run: Runs) -> None:
     """The detour accepted in case B keeps clear of the obstacle that the UAV did not know at first."""
     of_run = run("case_b", "c")
     accepted = times(of_run, "accept")[0]

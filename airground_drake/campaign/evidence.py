@@ -51,11 +51,11 @@ class Counts(NamedTuple):
         refuted, undecided = int((status == "refuted").sum()), int(status.isin(UNDECIDED).sum())
         return cls(int(tested.sum()), refuted, undecided, int((~tested).sum()))
 
-    def interval(self, *, anytime: bool, confidence: float = CONFIDENCE) -> tuple[float, float]:
+    def interval(self, *, anytime: bool) -> tuple[float, float]:
         """Bounds of the probability of a violation; what is undecided is none for the lower, one for the upper."""
         bounds = confidence_sequence if anytime else clopper_pearson
-        low = bounds(self.refuted, self.tested, confidence).low
-        return low, bounds(self.refuted + self.undecided, self.tested, confidence).high
+        low = bounds(self.refuted, self.tested).low
+        return low, bounds(self.refuted + self.undecided, self.tested).high
 
 
 def _tested(rows: pd.DataFrame) -> pd.Series:

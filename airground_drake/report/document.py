@@ -23,6 +23,8 @@ from airground_drake.verify.claim import Verdict
 
 SCHEMA = "airground_drake.report/2"
 
+MOST_LISTED = 4
+"""Checks that a sentence names."""
 EXIT_CODES = {"as_expected": 0, "not_as_expected": 1, "inconclusive": 3}
 
 
@@ -219,15 +221,15 @@ def _nothing_to_check(idle: Sequence[Mapping[str, Any]]) -> str:
     return f"{len(idle)} of them had nothing to check: {listed}."
 
 
-def _list(items: Sequence[Mapping[str, Any]], limit: int = 4) -> str:
+def _list(items: Sequence[Mapping[str, Any]]) -> str:
     """The first few items in words."""
     words = [
         f"{item['id']}{_on(item['run'])} ({_found(item)}, expected {item['expected']})"
         if "status" in item
         else f"{item['id'] or 'run'} {item['run']} ({item['why']})"
-        for item in items[:limit]
+        for item in items[:MOST_LISTED]
     ]
-    return ", ".join(words) + (f" and {len(items) - limit} more" if len(items) > limit else "")
+    return ", ".join(words) + (f" and {len(items) - MOST_LISTED} more" if len(items) > MOST_LISTED else "")
 
 
 def _found(item: Mapping[str, Any]) -> str:

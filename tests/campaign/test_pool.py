@@ -19,7 +19,7 @@ def test_a_process_that_dies_loses_no_item_and_does_none_twice(tmp_path: Path) -
     assert sorted(found) == [(item, None if item == 5 else item * item) for item in range(9)]
 
 
-def test_the_same_on_a_cluster_of_two_workers(tmp_path: Path) -> None:
+def test_the_same_on_a_cluster_of_two_workers() -> None:
     distributed = pytest.importorskip("distributed")
     options = {"n_workers": 2, "threads_per_worker": 1, "processes": False, "dashboard_address": ":0"}
     with distributed.LocalCluster(**options) as here, cluster(here.scheduler_address) as pool:

@@ -32,7 +32,7 @@ def test_places_are_those_of_the_drawing(drawn: list[Figure]) -> None:
             assert np.abs(dense[:, None] - places).max(axis=2).min(axis=0).max() < 1.0
 
 
-def test_tracks_are_small_and_of_the_whole_run(drawn: list[Figure], traces: dict[str, Trace]) -> None:
+def test_tracks_are_small_and_of_the_whole_run(drawn: list[Figure]) -> None:
     panels = drawn[0].panels
     assert all(panel.tracks for panel in panels)
     assert not any(panel.tracks for figure in drawn[1:] for panel in figure.panels)

@@ -34,9 +34,9 @@ class States:
     lower: Array
 
 
-def safe_states(inputs: Inputs, count: int, most: int = 12) -> States:
-    """Deterministic states with 1 to `most` points, many at exactly the safe distance; velocities up to 1e6 m/s."""
-    rng = np.random.default_rng(SEED)
+def safe_states(inputs: Inputs, count: int) -> States:
+    """Deterministic states with 1 to 12 points, many at exactly the safe distance; velocities up to 1e6 m/s."""
+    rng, most = np.random.default_rng(SEED), 12
     avoidance = running_avoidance(inputs)
     kind = np.array([(k.safe, k.share) for k in kinds(inputs)])
     safe, share = np.moveaxis(kind[rng.integers(len(kind), size=(count, most))], -1, 0)
