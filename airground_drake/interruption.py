@@ -19,10 +19,9 @@ from types import FrameType
 from typing import NoReturn
 
 from airground_drake import files
-from airground_drake.errors import one_line
+from airground_drake.usage import EXIT_TOOL, refuse
 
 STOPPING = (signal.SIGINT, signal.SIGTERM)
-EXIT_TOOL = 4
 ROUNDS = 10
 """Searches for descendants at most: one that is killed may just have begun another."""
 
@@ -61,8 +60,7 @@ def run(main: Callable[[], int]) -> NoReturn:
     except BrokenPipeError:
         code = 128 + signal.SIGPIPE
     except OSError as error:
-        print(f"error: {one_line(str(error))}", file=sys.stderr)
-        code = EXIT_TOOL
+        code = refuse(error, EXIT_TOOL)
     leave(code)
 
 

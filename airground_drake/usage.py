@@ -1,11 +1,24 @@
-"""Parsers of command lines."""
+"""Parsers of command lines, the numbers that they take, and how a command says that it is not done."""
 
 from __future__ import annotations
 
 import argparse
+import math
+import sys
+from collections.abc import Callable
+from contextlib import suppress
 from typing import NoReturn
 
-EXIT_USAGE = 2
+from airground_drake.errors import one_line
+
+EXIT_USAGE, EXIT_TOOL = 2, 4
+
+
+def refuse(why: object, code: int = EXIT_USAGE) -> int:
+    """Say in one line why a command is not done, if standard error takes it; returns the exit code."""
+    with suppress(OSError):
+        print(f"error: {one_line(str(why))}", file=sys.stderr)
+    return code
 
 
 class Parser(argparse.ArgumentParser):
@@ -13,4 +26,31 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Say so, and exit with 2."""
-        self.exit(EXIT_USAGE, f"error: {message}; see {self.prog} --help\n")
+        raise SystemExit(refuse(f"{message}; see {self.prog} --help"))
+
+
+def whole(least: int, most: float = math.inf) -> Callable[[str], int]:
+    """What takes an argument that is a whole number, `least` and `most` included."""
+    up_to = "on" if most == math.inf else f"to {most}"
+
+    def number(text: str) -> int:
+        try:
+            value = int(text)
+        except ValueError:
+            value = least - 1
+        if not least <= value <= most:
+            raise argparse.ArgumentTypeError(f"{text!r} is not allowed; wanted: a whole number from {least} {up_to}")
+        return value
+
+    return number
+
+
+def positive(text: str) -> float:
+    """An argument that is a finite number above 0."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 0.0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f"{text!r} is not allowed; wanted: a finite number above 0")
+    return value

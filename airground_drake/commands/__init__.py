@@ -11,9 +11,7 @@ from importlib.metadata import version
 from typing import NamedTuple
 
 from airground_drake import interruption
-from airground_drake.usage import Parser
-
-EXIT_USAGE = 2
+from airground_drake.usage import Parser, refuse
 
 
 class Command(NamedTuple):
@@ -70,8 +68,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if name not in COMMANDS:
         close = difflib.get_close_matches(name, COMMANDS, n=1)
         meant = f"did you mean {close[0]}? " if close else ""
-        print(f"error: {name!r} is no command: {meant}commands are {', '.join(COMMANDS)}", file=sys.stderr)
-        return EXIT_USAGE
+        return refuse(f"{name!r} is no command: {meant}commands are {', '.join(COMMANDS)}")
     code: int = import_module(COMMANDS[name].module).main(given[1:])
     return code
 

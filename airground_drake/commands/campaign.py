@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import math
 import os
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,12 +14,12 @@ from airground_drake.errors import AirgroundError, FolderError, ScenarioError, U
 from airground_drake.progress import told
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.estimate import DEFAULT_LIMITS, Limits
-from airground_drake.usage import Parser
+from airground_drake.usage import EXIT_TOOL, Parser, positive, refuse, whole
 
 if TYPE_CHECKING:
     from airground_drake.campaign.spec import Spec
 
-EXIT_REFUTED, EXIT_USAGE, EXIT_UNDECIDED, EXIT_TOOL = 1, 2, 3, 4
+EXIT_REFUTED, EXIT_UNDECIDED = 1, 3
 
 
 def parser() -> argparse.ArgumentParser:
@@ -32,14 +31,14 @@ def parser() -> argparse.ArgumentParser:
         "3 undecided, 4 tool error, 130 and 143 interrupted; what is finished is kept: --resume goes on with it",
     )
     parser.add_argument("spec", type=Path, help="YAML file: a scenario, and distributions over its keys")
-    parser.add_argument("-n", "--number", type=_count, metavar="N", help="draws (default: all combinations of grids)")
+    parser.add_argument("-n", "--number", type=whole(1), metavar="N", help="draws (default: all combinations of grids)")
     parser.add_argument("-o", "--output", type=Path, metavar="DIR", help="default: campaigns/<name>; new, or --resume")
     parser.add_argument("--resume", action="store_true", help="go on with what the folder has")
-    parser.add_argument("--only", type=int, metavar="INDEX", help="this draw alone; its scenario is written as YAML")
-    parser.add_argument("--jobs", type=_count, metavar="N", help="processes (default: one for each processor)")
+    parser.add_argument("--only", type=whole(0), metavar="INDEX", help="this draw alone; its scenario is written")
+    parser.add_argument("--jobs", type=whole(1), metavar="N", help="processes (default: one for each processor)")
     parser.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster, such as tcp://host:8786")
     parser.add_argument("--stop-when", metavar="RULE", help="such as 'SAFE-TRACE < 1e-3': the anytime-valid bound")
-    parser.add_argument("--limit-steps", type=float, default=DEFAULT_LIMITS.work, metavar="N", help="of one draw")
+    parser.add_argument("--limit-steps", type=positive, default=DEFAULT_LIMITS.work, metavar="N", help="of one draw")
     parser.add_argument("-q", "--quiet", action="store_true", help="no progress")
     parser.add_argument(plugins.OPTION, action="store_true", help=plugins.HELP)
     return parser
@@ -59,11 +58,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         spec = load_spec(options.spec)
         return _all(spec, options) if options.only is None else _only(spec, options)
     except (ScenarioError, FolderError, UnknownNameError, ValueError) as error:
-        print(f"error: {one_line(str(error))}", file=sys.stderr)
-        return EXIT_USAGE
+        return refuse(error)
     except (AirgroundError, OSError) as error:
-        print(f"error: {one_line(str(error))}", file=sys.stderr)
-        return EXIT_TOOL
+        return refuse(error, EXIT_TOOL)
 
 
 def _all(spec: Spec, options: argparse.Namespace) -> int:
@@ -126,10 +123,3 @@ def _summary(found: dict[str, Any]) -> str:
             f"  {claim['run']:10} {claim['claim']:12} {claim['refuted']} of {claim['tested']} refuted, {bounds}"
         )
     return "\n".join(lines)
-
-
-def _count(text: str) -> int:
-    value = int(text)
-    if value < 1:
-        raise argparse.ArgumentTypeError(f"{text} is not allowed; wanted: a whole number from 1 on")
-    return value

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -12,9 +11,9 @@ from typing import Any
 from airground_drake import files
 from airground_drake.errors import AirgroundError, TraceError, one_line
 from airground_drake.report import compare
-from airground_drake.usage import Parser
+from airground_drake.usage import Parser, refuse
 
-EXIT_WORSE, EXIT_USAGE = 1, 2
+EXIT_WORSE = 1
 PARTS = ("verdicts", "margins", "exercised", "expectations", "reproduction", "audit", "mutants", "events")
 MOST_LINES, MOST_ROWS = 20, 200
 """Changes of one part that are shown, in the terminal and on the page; --json has all."""
@@ -54,8 +53,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if options.html is not None:
             files.write_text(options.html, _page((options.before, options.after), before, after, found))
     except (AirgroundError, OSError) as error:
-        print(f"error: {one_line(str(error))}", file=sys.stderr)
-        return EXIT_USAGE
+        return refuse(error)
     if options.json:
         places = {"schema": compare.SCHEMA, "before": str(options.before), "after": str(options.after)}
         print(json.dumps({**places, **found}, indent=1, allow_nan=False))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -11,9 +10,8 @@ from airground_drake import files
 from airground_drake.errors import AirgroundError, UnknownNameError
 from airground_drake.registry import METHODS
 from airground_drake.scenarios import plugins
-from airground_drake.usage import Parser
+from airground_drake.usage import Parser, refuse, whole
 
-EXIT_USAGE = 2
 FORMATS = ("dot", "svg", "pdf", "png")
 
 
@@ -23,7 +21,7 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument("scenario", help="name of a shipped scenario, or path to a YAML file")
     parser.add_argument("--method", choices=tuple(METHODS), help="default: that of the scenario's last run")
     parser.add_argument("--part", metavar="NAME", help="only the diagram inside it of that name")
-    parser.add_argument("--depth", type=_depth, default=1, metavar="N", help="levels of the first graph (default: 1)")
+    parser.add_argument("--depth", type=whole(1), default=1, metavar="N", help="levels of the first graph (default: 1)")
     parser.add_argument("--format", action="append", choices=FORMATS, help="may be repeated (default: dot and svg)")
     parser.add_argument("-o", "--output", type=Path, default=Path(), metavar="DIR", help="default: this folder")
     parser.add_argument(plugins.OPTION, action="store_true", help=plugins.HELP)
@@ -56,12 +54,5 @@ def main(arguments: Sequence[str] | None = None) -> int:
             files.write_bytes(path, graphviz.drawn(text, kind))
             print(path)
     except (AirgroundError, OSError) as error:
-        print(f"error: {error}", file=sys.stderr)
-        return EXIT_USAGE
+        return refuse(error)
     return 0
-
-
-def _depth(text: str) -> int:
-    if not text.isdigit() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"{text!r} is not allowed; wanted: a whole number from 1 on")
-    return int(text)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import math
 import os
-import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -18,14 +17,14 @@ from airground_drake.progress import told
 from airground_drake.registry import RUN_CLAIMS, SAMPLERS, is_plugin
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.estimate import DEFAULT_LIMITS
-from airground_drake.usage import Parser
+from airground_drake.usage import EXIT_TOOL, Parser, refuse
 
 if TYPE_CHECKING:
     from airground_drake.campaign.falsification import Best, Search
     from airground_drake.campaign.objective import Objective
     from airground_drake.campaign.spec import Spec
 
-EXIT_FOUND, EXIT_USAGE, EXIT_TOOL = 1, 2, 4
+EXIT_FOUND = 1
 TIMES = tuple(name for name in COLUMNS if name.endswith("_s") and name not in ("wall_s", "duration_s"))
 
 
@@ -74,11 +73,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         return _run(load_spec(options.spec), options)
     except (ScenarioError, UnknownNameError) as error:
-        print(f"error: {error}", file=sys.stderr)
-        return EXIT_USAGE
+        return refuse(error)
     except (AirgroundError, OSError) as error:
-        print(f"error: {one_line(str(error))}", file=sys.stderr)
-        return EXIT_TOOL
+        return refuse(error, EXIT_TOOL)
 
 
 def _run(spec: Spec, options: argparse.Namespace) -> int:

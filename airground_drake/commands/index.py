@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
 from airground_drake import files
-from airground_drake.errors import AirgroundError, FolderError, ReportError, TraceError, one_line
+from airground_drake.errors import AirgroundError, FolderError, ReportError, TraceError
 from airground_drake.report import compare, folder
-from airground_drake.usage import Parser
+from airground_drake.usage import Parser, refuse
 
-EXIT_USAGE = 2
 PAGE = "index.html"
 MARK = "airground_drake index"
 """By which a page of ours is known."""
@@ -39,8 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         print(_write(place))
     except (AirgroundError, OSError) as error:
-        print(f"error: {one_line(str(error))}", file=sys.stderr)
-        return EXIT_USAGE
+        return refuse(error)
     return 0
 
 

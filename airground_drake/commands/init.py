@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import argparse
 import re
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 from airground_drake import files
 from airground_drake.scenarios.fleet import fleet
 from airground_drake.scenarios.shipped import json_schema_file, shipped_files
-from airground_drake.usage import Parser
+from airground_drake.usage import Parser, refuse, whole
 
-EXIT_USAGE = 2
 MOST = 2000
 MODEL = "minimal"
 """The shipped scenario that is copied."""
@@ -26,18 +24,11 @@ def parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("file", type=Path, nargs="?", default=Path("scenario.yaml"), help="default: %(default)s")
     parser.add_argument(
-        "--fleet", type=_count, metavar="N", help="so many UGVs that cross a field of obstacles instead"
+        "--fleet", type=whole(1, MOST), metavar="N", help="so many UGVs that cross a field of obstacles instead"
     )
-    parser.add_argument("--obstacles", type=_count, metavar="M", help="of the field (default: five for each UGV)")
+    parser.add_argument("--obstacles", type=whole(1, MOST), metavar="M", help="of the field (default: five a UGV)")
     parser.add_argument("--seed", type=int, default=1, help="from which the field is drawn (default: %(default)s)")
     return parser
-
-
-def _count(text: str) -> int:
-    count = int(text)
-    if not 1 <= count <= MOST:
-        raise argparse.ArgumentTypeError(f"{count} is not from 1 to {MOST}")
-    return count
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -49,8 +40,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser().parse_args(arguments)
     path: Path = options.file
     if path.exists():
-        print(f"error: {path} exists; name a file that does not", file=sys.stderr)
-        return EXIT_USAGE
+        return refuse(f"{path} exists; name a file that does not")
     name = re.sub(r"^[\W\d_]+|[\W_]+$", "", re.sub(r"\W+", "_", path.stem, flags=re.ASCII)) or MODEL
     if options.fleet is None:
         text = shipped_files()[MODEL].read_text(encoding="utf-8")
@@ -62,7 +52,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         files.write_text(path, schema + text)
     except OSError as error:
-        print(f"error: {path} cannot be written: {error.strerror or error}", file=sys.stderr)
-        return EXIT_USAGE
+        return refuse(f"{path} cannot be written: {error.strerror or error}")
     print(f"{path}\nnext: airground report {path}")
     return 0

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from airground_drake import files
 from airground_drake.errors import AirgroundError, FolderError, UnknownNameError, one_line
-from airground_drake.usage import Parser
+from airground_drake.usage import Parser, refuse
 
 if TYPE_CHECKING:
     from airground_drake.replay.scene import Scene
 
-EXIT_USAGE = 2
 SCHEMA = "airground_drake.report/"
 SLOWEST, FASTEST = 0.1, 100.0
 """How fast a video may be."""
@@ -70,8 +68,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 files.write_text(path, page(_scene(options.folder, name)))
                 print(path)
     except (AirgroundError, OSError) as error:
-        print(f"error: {error}", file=sys.stderr)
-        return EXIT_USAGE
+        return refuse(error)
     return 0
 
 

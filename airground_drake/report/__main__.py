@@ -30,12 +30,11 @@ from airground_drake.report import folder
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.estimate import DEFAULT_LIMITS, GIB, Limits
 from airground_drake.scenarios.shipped import shipped
-from airground_drake.usage import Parser
+from airground_drake.usage import EXIT_TOOL, Parser, positive, refuse
 
 if TYPE_CHECKING:
     from airground_drake.scenarios.schema import Scenario
 
-EXIT_USAGE, EXIT_TOOL = 2, 4
 FORMATS = tuple(folder.PAGES)
 AUDIT, AUDITED = "audit", "case_a"
 """`report audit` is the report of the scenario AUDITED with every finding about the paper."""
@@ -68,16 +67,13 @@ def _explained(work: Callable[[], int]) -> int:
     try:
         return work()
     except LimitError as error:
-        print(f"error: {error}; see --limit-steps and --limit-memory", file=sys.stderr)
-        return EXIT_USAGE
+        return refuse(f"{error}; see --limit-steps and --limit-memory")
     except (ScenarioError, PluginError, UnknownNameError, FolderError) as error:
-        print(f"error: {error}", file=sys.stderr)
-        return EXIT_USAGE
+        return refuse(error)
     except BrokenPipeError:  # nobody reads what is printed
         raise
     except (AirgroundError, OSError) as error:
-        print(f"error: {one_line(str(error))}", file=sys.stderr)
-        return EXIT_TOOL
+        return refuse(error, EXIT_TOOL)
 
 
 def _loaded(options: argparse.Namespace, command: str) -> int:
@@ -142,11 +138,11 @@ def parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(plugins.OPTION, action="store_true", help=plugins.HELP)
     parser.add_argument(
-        "--limit-steps", type=_positive, default=DEFAULT_LIMITS.work, metavar="N",
+        "--limit-steps", type=positive, default=DEFAULT_LIMITS.work, metavar="N",
         help="refuse a scenario that asks for more: robots moved by one step, over all runs (default: %(default).0g)",
     )  # fmt: skip
     parser.add_argument(
-        "--limit-memory", type=_positive, default=DEFAULT_LIMITS.memory / GIB, metavar="GIB",
+        "--limit-memory", type=positive, default=DEFAULT_LIMITS.memory / GIB, metavar="GIB",
         help="refuse a scenario that asks for more (default: %(default)g)",
     )  # fmt: skip
     parser.add_argument("--open", action="store_true", help="open the report in a browser")
@@ -163,16 +159,6 @@ def _formats(text: str) -> tuple[str, ...]:
     if unknown:
         raise argparse.ArgumentTypeError(f"{', '.join(unknown)!r} is not allowed; formats are {', '.join(FORMATS)}")
     return chosen
-
-
-def _positive(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = 0.0
-    if not value > 0.0:
-        raise argparse.ArgumentTypeError(f"{text!r} is not allowed; wanted: a number above 0")
-    return value
 
 
 if __name__ == "__main__":

@@ -9,7 +9,6 @@ if __name__ == "__main__":
 
 import argparse
 import json
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,12 +17,12 @@ from airground_drake.errors import AirgroundError, UnknownNameError
 from airground_drake.progress import Watch, told
 from airground_drake.scenarios import plugins
 from airground_drake.statuses import NOT_EXERCISED, outcome
-from airground_drake.usage import Parser
+from airground_drake.usage import Parser, refuse
 
 if TYPE_CHECKING:
     from airground_drake.verify.claim import Verdict
 
-EXIT_DIFFERS, EXIT_USAGE = 1, 2
+EXIT_DIFFERS = 1
 
 
 def parser() -> argparse.ArgumentParser:
@@ -51,11 +50,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with told(verbose=options.verbose) as watch:
             verdicts = _judge(options.target, options.claims, watch, allow_plugins=options.allow_plugins)
     except (AirgroundError, OSError) as error:
-        print(f"error: {error}", file=sys.stderr)
-        return EXIT_USAGE
+        return refuse(error)
     if missing := set(options.claims) - {verdict.claim.id for verdict in verdicts}:
-        print(f"error: {', '.join(sorted(missing))} says nothing about {options.target}", file=sys.stderr)
-        return EXIT_USAGE
+        return refuse(f"{', '.join(sorted(missing))} says nothing about {options.target}")
     if options.json:
         print(json.dumps([verdict.to_json() for verdict in verdicts], indent=1, allow_nan=False))
     else:

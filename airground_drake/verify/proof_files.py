@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from airground_drake import files
-from airground_drake.usage import Parser
+from airground_drake.usage import Parser, refuse
 from airground_drake.verify.engines.smt import Result, solve
 
 LIMIT_S = 30.0
@@ -99,8 +99,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Write the proofs of a report, and say by claim how many there are; 2 if the folder is no report's."""
     folder = parser().parse_args(arguments).report
     if not (folder / "certificates").is_dir():
-        print(f"error: {folder} has no certificates", file=sys.stderr)
-        return 2
+        return refuse(f"{folder} has no certificates")
     index = proofs_of(folder)
     for claim, count in Counter(entry["claim"] for entry in index).items():
         mine = [entry for entry in index if entry["claim"] == claim]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import contextlib
 import os
 import signal
@@ -13,6 +14,7 @@ from pathlib import Path
 
 import pytest
 
+import airground_drake
 from airground_drake.commands import COMMANDS, main
 from airground_drake.commands.listing import KINDS
 from airground_drake.registry import METHODS, MODEL_CLAIMS, POLICIES, ROUTES, RUN_CLAIMS, SAMPLERS, UAV_TASKS
@@ -99,7 +101,7 @@ def test_init_writes_a_fleet(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     assert (scenario.name, len(scenario.ugvs), len(scenario.obstacles)) == ("field", 4, 6)
     with pytest.raises(SystemExit, match="2"):
         main(["init", str(tmp_path / "none.yaml"), "--fleet", "0"])
-    assert "0 is not from 1 to 2000" in capsys.readouterr().err
+    assert "wanted: a whole number from 1 to 2000" in capsys.readouterr().err
 
 
 def test_init_overwrites_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -168,3 +170,15 @@ def test_what_cannot_be_printed_is_one_line() -> None:
         command = [sys.executable, "-m", "airground_drake", "list", "--schema"]
         ran = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, check=False)
     assert (ran.returncode, ran.stderr.count(b"\n")) == (4, 1)
+
+
+def test_exit_codes_that_commands_share_are_defined_once() -> None:
+    package = Path(airground_drake.__file__).parent
+    defined = [
+        (path.relative_to(package).as_posix(), name.id)
+        for path in package.rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_bytes()))
+        for name in (ast.walk(node) if isinstance(node, ast.Assign) else ())
+        if isinstance(name, ast.Name) and isinstance(name.ctx, ast.Store) and name.id in ("EXIT_USAGE", "EXIT_TOOL")
+    ]
+    assert sorted(defined) == [("usage.py", "EXIT_TOOL"), ("usage.py", "EXIT_USAGE")]
