@@ -56,7 +56,7 @@ class LimitError(AirgroundError):
 
 
 class FolderError(AirgroundError):
-    """A folder that is to take a report, and holds something else."""
+    """A folder or file that is to take what a command writes, and cannot, or has something that would be lost."""
 
 
 class UnknownNameError(AirgroundError):

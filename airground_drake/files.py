@@ -13,6 +13,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from airground_drake.errors import FolderError, one_line
+
 _PARTIAL = re.compile(r"\..*\.(?P<pid>\d+)\.[a-z0-9_]+\.partial")
 """Name of a temporary file: the process that writes it is in it."""
 
@@ -94,6 +96,44 @@ def try_to_write(folder: Path) -> None:
     probe = folder / f".{os.getpid()}.probe"
     write_bytes(probe, b"\n")
     probe.unlink()
+
+
+@contextmanager
+def wanted(path: Path, what: str) -> Iterator[None]:
+    """While something is written to a path; `what` is wanted there.
+
+    Raises:
+        FolderError: if the system refuses; says where, why, and what is wanted.
+    """
+    try:
+        yield
+    except OSError as error:
+        why = f"{error.filename or path} cannot be written: {error.strerror or error}"
+        raise FolderError(one_line(f"{why}; wanted: {what}")) from None
+
+
+def make_folder(folder: Path, what: str) -> None:
+    """Create a folder for `what` if need be, and try to write to it.
+
+    Raises:
+        FolderError: if it cannot be created or written.
+    """
+    with wanted(folder, f"a folder for {what}"):
+        folder.mkdir(parents=True, exist_ok=True)
+        try_to_write(folder)
+
+
+def try_to_create(path: Path) -> None:
+    """Write a file that is not there yet, and remove it; its folder is created.
+
+    Raises:
+        FolderError: if it is there, or cannot be written.
+    """
+    if os.path.lexists(path):
+        raise FolderError(one_line(f"{path} exists; name a file that does not"))
+    with wanted(path, "a file that can be written"):
+        write_bytes(path, b"")
+        path.unlink()
 
 
 def sweep(folder: Path) -> None:

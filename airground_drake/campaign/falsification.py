@@ -15,7 +15,7 @@ from airground_drake.campaign.distributions import dimensions, values_at
 from airground_drake.campaign.objective import Objective
 from airground_drake.campaign.pool import Pool
 from airground_drake.campaign.rows import Row
-from airground_drake.campaign.search import WORTHLESS, Sampler
+from airground_drake.campaign.search import Sampler
 from airground_drake.campaign.spec import Spec
 from airground_drake.campaign.work import rows_at, rows_of_scenario
 from airground_drake.errors import PluginError, ScenarioError, described, one_line
@@ -66,7 +66,7 @@ class Best:
 
     Attributes:
         tried: points.
-        value: the least of the objective; `WORTHLESS` if it could be measured nowhere.
+        value: the least of the objective; infinite if it could be measured nowhere.
         point: where, (n,); (0,) if nowhere.
         found: whether it is a counterexample.
     """
@@ -90,10 +90,10 @@ def falsify(search: Search, sampler: Sampler, number: int, pool: Pool, watch: Wa
     Raises:
         PluginError: if the sampler raises, ends the process, or asks for what are no points.
     """
-    best = Best(0, WORTHLESS, np.empty(0), False)
+    best = Best(0, np.inf, np.empty(0), False)
     while best.tried < number and not best.found:
         points = _asked(sampler, dimensions(search.spec.drawn))
-        values = np.full(len(points), WORTHLESS)
+        values = np.full(len(points), np.inf)
         found = np.zeros(len(points), dtype=bool)
         for k, judged in pool(partial(search.at, points), range(len(points))):
             if judged is not None:

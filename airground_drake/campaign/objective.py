@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from airground_drake.campaign.rows import JUDGED, Row
-from airground_drake.campaign.search import WORTHLESS
 
 FAILED = -1.0
 """Value of a violation that has no margin."""
@@ -20,8 +19,8 @@ class Margin:
     claim: str
 
     def value(self, rows: Sequence[Row]) -> float:
-        """Of the rows of a draw; `WORTHLESS` where nothing was measured."""
-        return min((self._of(row) for row in rows if row["claim"] == self.claim), default=WORTHLESS)
+        """Of the rows of a draw; infinite where nothing was measured."""
+        return min((self._of(row) for row in rows if row["claim"] == self.claim), default=math.inf)
 
     def found(self, rows: Sequence[Row]) -> bool:
         """Whether the claim is refuted."""
@@ -30,7 +29,7 @@ class Margin:
     def _of(self, row: Row) -> float:
         if row["status"] == "refuted":
             return min(FAILED, row["margin"]) if math.isnan(row["margin"]) or row["margin"] >= 0.0 else row["margin"]
-        return WORTHLESS if math.isnan(row["margin"]) else float(row["margin"])
+        return math.inf if math.isnan(row["margin"]) else float(row["margin"])
 
 
 @dataclass(frozen=True)
@@ -41,9 +40,9 @@ class Most:
     limit: float = math.inf
 
     def value(self, rows: Sequence[Row]) -> float:
-        """Of the rows of a draw, with the sign changed."""
+        """Of the rows of a draw, with the sign changed; infinite where nothing was measured."""
         values = [-float(row[self.column]) for row in rows if row["ended"] == JUDGED]
-        return min((each for each in values if not math.isnan(each)), default=WORTHLESS)
+        return min((each for each in values if not math.isnan(each)), default=math.inf)
 
     def found(self, rows: Sequence[Row]) -> bool:
         """Whether the limit is passed."""

@@ -14,7 +14,7 @@ from airground_drake.arrays import Array
 BATCH = 16
 """Points at a time, of samplers that learn nothing from one to the next."""
 WORTHLESS = 1e6
-"""Value of a point at which nothing can be measured."""
+"""What the strategy is told of a point at which nothing could be measured: it takes finite values only."""
 
 
 @runtime_checkable
@@ -25,7 +25,7 @@ class Sampler(Protocol):
         """Points (k, n) in [0, 1)."""
 
     def tell(self, points: Array, values: Array) -> None:
-        """What was found there, (k,); less is better."""
+        """What was found there, (k,); less is better, infinite is where nothing could be measured."""
 
 
 class Uniform:

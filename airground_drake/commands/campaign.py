@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import math
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,6 +13,7 @@ from airground_drake.errors import AirgroundError, FolderError, ScenarioError, U
 from airground_drake.progress import told
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.estimate import DEFAULT_LIMITS, Limits
+from airground_drake.side_by_side import processors
 from airground_drake.usage import EXIT_TOOL, Parser, positive, refuse, whole
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ def _all(spec: Spec, options: argparse.Namespace) -> int:
 
     stopping = Stopping.parse(options.stop_when) if options.stop_when else None
     folder = options.output or Path("campaigns") / spec.name
-    jobs = options.jobs or len(os.sched_getaffinity(0))
+    jobs = options.jobs or processors()
     with (
         told(quiet=options.quiet) as watch,
         pool.cluster(options.scheduler) if options.scheduler else pool.local(jobs) as processes,

@@ -4,27 +4,29 @@ from __future__ import annotations
 
 import argparse
 import math
-import os
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from airground_drake import files
 from airground_drake.campaign.rows import COLUMNS
-from airground_drake.errors import AirgroundError, Fault, ScenarioError, UnknownNameError, one_line
+from airground_drake.errors import AirgroundError, Fault, FolderError, ScenarioError, UnknownNameError, one_line
 from airground_drake.progress import told
 from airground_drake.registry import RUN_CLAIMS, SAMPLERS, is_plugin
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.estimate import DEFAULT_LIMITS
-from airground_drake.usage import EXIT_TOOL, Parser, refuse
+from airground_drake.side_by_side import processors
+from airground_drake.usage import EXIT_TOOL, Parser, positive, refuse, whole
 
 if TYPE_CHECKING:
     from airground_drake.campaign.falsification import Best, Search
     from airground_drake.campaign.objective import Objective
+    from airground_drake.campaign.pool import Pool
     from airground_drake.campaign.spec import Spec
 
-EXIT_FOUND = 1
+EXIT_FOUND, EXIT_UNDECIDED = 1, 3
 TIMES = tuple(name for name in COLUMNS if name.endswith("_s") and name not in ("wall_s", "duration_s"))
 
 
@@ -33,29 +35,25 @@ def parser() -> argparse.ArgumentParser:
     parser = Parser(
         prog="airground falsify",
         description="Search the space of a campaign for a scenario that violates a claim, and make it small.",
-        epilog="exit codes: 0 no counterexample, 1 one was found, 2 usage or bad spec, 4 tool error",
+        epilog="exit codes: 0 no counterexample, 1 one was found, 2 usage, bad spec or output, 3 nothing was judged, "
+        "4 tool error",
     )
     parser.add_argument("spec", type=Path, help="YAML file of a campaign")
     parser.add_argument("--claim", default="SAFE-TRACE", metavar="ID", help="claim about runs (default: %(default)s)")
     parser.add_argument("--most", choices=TIMES, help="make this time as long as can be, instead of a margin small")
-    parser.add_argument(
-        "--limit", type=float, default=math.inf, metavar="S", help="of --most: longer is a counterexample"
-    )
+    parser.add_argument("--limit", type=positive, metavar="S", help="of --most: longer is a counterexample")
     parser.add_argument(
         "--sampler", default="cma", metavar="NAME", help=f"{', '.join(SAMPLERS.allowed)} (default: %(default)s)"
     )
     parser.add_argument(
-        "-n", "--number", type=int, default=200, metavar="N", help="scenarios to try (default: %(default)s)"
+        "-n", "--number", type=whole(1), default=200, metavar="N", help="scenarios to try (default: %(default)s)"
     )
     parser.add_argument(
-        "--shrink",
-        type=int,
-        default=300,
-        metavar="N",
+        "--shrink", type=whole(0), default=300, metavar="N",
         help="runs to make a counterexample small (default: %(default)s)",
-    )
-    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="default: <name>_<sampler>.yaml")
-    parser.add_argument("--jobs", type=int, metavar="N", help="processes (default: one for each processor)")
+    )  # fmt: skip
+    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="new; default: <name>_<sampler>.yaml")
+    parser.add_argument("--jobs", type=whole(1), metavar="N", help="processes (default: one for each processor)")
     parser.add_argument("-q", "--quiet", action="store_true", help="no progress")
     parser.add_argument(plugins.OPTION, action="store_true", help=plugins.HELP)
     return parser
@@ -65,14 +63,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line.
 
     Returns:
-        Exit code: 0 no counterexample, 1 one was found, 2 usage or bad spec, 4 tool error.
+        Exit code: 0 no counterexample, 1 one was found, 2 usage, bad spec or output, 3 nothing was judged, 4 tool
+        error.
     """
-    options = parser().parse_args(arguments)
+    of_command = parser()
+    options = of_command.parse_args(arguments)
+    if options.limit is not None and options.most is None:
+        of_command.error("--limit is of a time: name it with --most")
     from airground_drake.campaign.spec import load_spec
 
     try:
         return _run(load_spec(options.spec), options)
-    except (ScenarioError, UnknownNameError) as error:
+    except (ScenarioError, UnknownNameError, FolderError) as error:
         return refuse(error)
     except (AirgroundError, OSError) as error:
         return refuse(error, EXIT_TOOL)
@@ -85,7 +87,8 @@ def _run(spec: Spec, options: argparse.Namespace) -> int:
     from airground_drake.campaign.objective import Margin, Most
     from airground_drake.campaign.search import Sampler
 
-    objective: Objective = Margin(options.claim) if options.most is None else Most(options.most, options.limit)
+    limit = math.inf if options.limit is None else options.limit
+    objective: Objective = Margin(options.claim) if options.most is None else Most(options.most, limit)
     if options.claim not in RUN_CLAIMS:
         raise UnknownNameError("claim about runs", options.claim, RUN_CLAIMS)
     if not dimensions(spec.drawn):
@@ -94,22 +97,42 @@ def _run(spec: Spec, options: argparse.Namespace) -> int:
         raise ScenarioError("--sampler", "", options.sampler, plugins.WANTED)
     with plugins.beside(spec.source, allow=options.allow_plugins):
         sampler = SAMPLERS.make(options.sampler, of=Sampler, dimensions=dimensions(spec.drawn), seed=spec.seed)
+    path: Path = options.output or Path(f"{spec.name}_{options.sampler.rpartition(':')[2]}.yaml")
+    files.try_to_create(path)
+    files.try_to_create(_small(path))
     search = Search(replace(spec, claims=(options.claim,)), objective, DEFAULT_LIMITS, options.allow_plugins)
-    jobs = options.jobs or len(os.sched_getaffinity(0))
-    with told(quiet=options.quiet) as watch, pool.local(jobs) as processes:
+    with told(quiet=options.quiet) as watch, pool.local(options.jobs or processors()) as processes:
+        _try(search, processes)
         watch.stage(spec.name, options.number, "scenarios")
         best = falsify(search, sampler, options.number, processes, watch)
+    tried = f"{spec.name}: {best.tried} tried by {options.sampler}"
+    if not len(best.point):
+        print(f"{tried}, never judged: no {options.most or f'margin of {options.claim}'} in any of them")
+        return EXIT_UNDECIDED
     what = f"least margin of {options.claim}" if options.most is None else f"largest {options.most}"
     value = best.value if options.most is None else -best.value
-    print(f"{spec.name}: {best.tried} tried by {options.sampler}, {what} {value:.6g}")
-    if len(best.point):
-        _save(
-            search,
-            best,
-            options.output or Path(f"{spec.name}_{options.sampler.rpartition(':')[2]}.yaml"),
-            options.shrink,
-        )
+    print(f"{tried}, {what} {value:.6g}")
+    _save(search, best, path, options.shrink)
     return EXIT_FOUND if best.found else 0
+
+
+def _try(search: Search, pool: Pool) -> None:
+    """Judge the first draw, to see that the claim says something about its runs.
+
+    Raises:
+        ScenarioError: if it does not.
+    """
+    from airground_drake.campaign.work import rows_of
+
+    spec = search.spec
+    for _, rows in pool(partial(rows_of, spec, limits=search.limits, allow_plugins=search.allow_plugins), [0]):
+        if rows == []:
+            raise ScenarioError("--claim", "", *spec.claims, f"wanted: one that applies to a run of {spec.source}")
+
+
+def _small(path: Path) -> Path:
+    """Where the smaller scenario is written."""
+    return path.with_stem(f"{path.stem}_small")
 
 
 def _save(search: Search, best: Best, path: Path, tests: int) -> None:
@@ -124,7 +147,7 @@ def _save(search: Search, best: Best, path: Path, tests: int) -> None:
         alone = data | {"runs": {run: data["runs"][run]}}
         if search.fails(alone):
             smaller, used = shrink(alone, search.fails, tests)
-            small = path.with_stem(f"{path.stem}_small")
+            small = _small(path)
             _write(small, smaller | {"name": f"{scenario.name}_small"})
             print(
                 f"made small with {used} runs: {len(smaller['ugvs'])} UGVs, {len(smaller['obstacles'])} obstacles, "

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from airground_drake import files
+from airground_drake.errors import FolderError
 from airground_drake.scenarios.fleet import fleet
 from airground_drake.scenarios.shipped import json_schema_file, shipped_files
 from airground_drake.usage import Parser, refuse, whole
@@ -39,8 +40,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     options = parser().parse_args(arguments)
     path: Path = options.file
-    if path.exists():
-        return refuse(f"{path} exists; name a file that does not")
+    try:
+        files.try_to_create(path)
+    except FolderError as error:
+        return refuse(error)
     name = re.sub(r"^[\W\d_]+|[\W_]+$", "", re.sub(r"\W+", "_", path.stem, flags=re.ASCII)) or MODEL
     if options.fleet is None:
         text = shipped_files()[MODEL].read_text(encoding="utf-8")
@@ -49,9 +52,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     else:
         text = fleet(options.fleet, options.obstacles or 5 * options.fleet, options.seed, name)
     schema = f"# yaml-language-server: $schema={json_schema_file()}\n"
-    try:
-        files.write_text(path, schema + text)
-    except OSError as error:
-        return refuse(f"{path} cannot be written: {error.strerror or error}")
+    files.write_text(path, schema + text)
     print(f"{path}\nnext: airground report {path}")
     return 0

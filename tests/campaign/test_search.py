@@ -11,7 +11,7 @@ import pytest
 from airground_drake.campaign import shrink as module
 from airground_drake.campaign.objective import Margin, Most
 from airground_drake.campaign.rows import JUDGED, Row, blank
-from airground_drake.campaign.search import WORTHLESS, Sampler
+from airground_drake.campaign.search import Sampler
 from airground_drake.campaign.shrink import shrink
 from airground_drake.errors import ScenarioError
 from airground_drake.registry import SAMPLERS
@@ -42,7 +42,7 @@ def test_the_strategy_goes_where_it_is_least_and_the_baselines_do_not() -> None:
         while tried < 400:
             points = sampler.ask()
             values = ((points - np.array([0.9, 0.1, 0.5, 0.7])) ** 2).sum(axis=1)
-            values[points[:, 0] < 0.2] = WORTHLESS
+            values[points[:, 0] < 0.2] = np.inf
             sampler.tell(points, values)
             tried, best = tried + len(points), min(best, values.min())
         least[name] = best
@@ -58,9 +58,9 @@ def row(**more: Any) -> Row:
 def test_objectives() -> None:
     margin = Margin("SAFE-TRACE")
     assert margin.value([row(), row(margin=0.2)]) == 0.2
-    assert margin.value([row(margin=float("nan")), row(claim="EXEC", margin=-3.0)]) == WORTHLESS
+    assert margin.value([row(margin=float("nan")), row(claim="EXEC", margin=-3.0)]) == np.inf
     assert margin.value([row(status="refuted", margin=float("nan"))]) < 0.0
-    assert margin.value([blank()]) == WORTHLESS
+    assert margin.value([blank()]) == np.inf
     assert (margin.found([row(margin=0.0)]), margin.found([row(status="refuted")])) == (False, True)
     most = Most("intervened_s", 3.0)
     assert most.value([row(), row(intervened_s=2.5), row(intervened_s=float("nan"))]) == -2.5

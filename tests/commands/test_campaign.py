@@ -59,10 +59,12 @@ def test_one_draw_alone_is_the_same_draw_and_a_scenario(
     assert scenario.duration_s == 1.0
 
 
-@pytest.mark.parametrize("arguments", [["-n", "0"], ["--only", "x"], ["-n", "2", "--jobs", "-1"]])
-def test_usage(spec: Path, arguments: list[str]) -> None:
+@pytest.mark.parametrize(
+    "arguments", ["-n 0", "--only x", "--only -1", "-n 2 --jobs -1", "--limit-steps nan", "--limit-steps 0"]
+)
+def test_usage(spec: Path, arguments: str) -> None:
     with pytest.raises(SystemExit) as end:
-        main([str(spec), *arguments])
+        main([str(spec), *arguments.split()])
     assert end.value.code == 2
 
 

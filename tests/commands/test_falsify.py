@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from airground_drake.commands import falsify as module
 from airground_drake.commands.falsify import main
 from airground_drake.scenarios.load import load
 from airground_drake.simulation import simulate
@@ -38,6 +39,26 @@ def test_a_violation_is_found_and_made_small(tmp_path: Path, capsys: pytest.Capt
         (verdict,) = verify(simulate(scenario, "b"), claims=["SAFE-TRACE"])
         assert verdict.finding.status == "refuted"
     assert scenario.duration_s < 8.0
+
+
+@pytest.mark.parametrize("there", ["found.yaml", "found_small.yaml"])
+def test_nothing_is_overwritten(there: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / there).write_text("mine", encoding="utf-8")
+    assert falsified(tmp_path, "b") == 2
+    assert capsys.readouterr().err == f"error: {tmp_path / there} exists; name a file that does not\n"
+    assert (tmp_path / there).read_text(encoding="utf-8") == "mine"
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(["pushed.yaml", there])
+
+
+@pytest.mark.parametrize("output", [".", "pushed.yaml/found.yaml", "x" * 251 + ".yaml", "/proc/found.yaml"])
+def test_what_cannot_be_written_is_told_before_the_search(
+    output: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(module, "_try", None)  # what begins the search
+    assert falsified(tmp_path, "b", "-o", output) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["pushed.yaml"]
 
 
 def test_where_there_is_none_the_worst_is_kept(tmp_path: Path) -> None:
@@ -102,6 +123,38 @@ def test_a_sampler_that_fails_is_no_counterexample(
     assert said in written
     assert written.count("\n") == 1
     assert not (tmp_path / "found.yaml").exists()
+
+
+def test_a_claim_that_applies_to_no_run_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert falsified(tmp_path, "d", "--claim", "GATE-OPT") == 2
+    said = capsys.readouterr()
+    assert (said.out, said.err.count("\n")) == ("", 1)
+    assert "--claim: 'GATE-OPT' is not allowed; wanted: one that applies to a run of" in said.err
+
+
+def test_where_nothing_is_judged_nothing_is_said_of_a_margin(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert falsified(tmp_path, "a", "--most", "first_trigger_s", "--sampler", "halton") == 3
+    said = capsys.readouterr().out
+    assert said == "pushed: 16 tried by halton, never judged: no first_trigger_s in any of them\n"
+    assert not (tmp_path / "found.yaml").exists()
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        *(["-n", number] for number in ("0", "-3", "x")),
+        ["--shrink", "-1"],
+        ["--jobs", "0"],
+        ["--limit", "1"],
+        *(["--most", "intervened_s", "--limit", limit] for limit in ("0", "-1", "nan", "inf")),
+    ],
+)
+def test_numbers(arguments: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        falsified(tmp_path, "b", *arguments)
+    assert capsys.readouterr().err.count("\n") == 1
 
 
 def test_usage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
