@@ -12,6 +12,7 @@ import os
 import signal
 import sys
 import threading
+import traceback
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -30,11 +31,9 @@ _PR_SET_PDEATHSIG = 1
 
 def end_on_signals() -> None:
     """From now on SIGINT and SIGTERM end this process with exit code 130 and 143, and its descendants with it."""
+    _open_standard_streams()
     owner = os.getpid()
-    try:
-        stderr = os.dup(2)  # 2 itself may be pointed elsewhere while a C library is kept silent
-    except OSError:  # closed from the beginning
-        stderr = os.open(os.devnull, os.O_WRONLY)
+    stderr = os.dup(2)  # 2 itself may be pointed elsewhere while a C library is kept silent
 
     def end(number: int, frame: FrameType | None) -> NoReturn:
         for each in STOPPING:
@@ -53,21 +52,40 @@ def end_on_signals() -> None:
     os.register_at_fork(before=forks.before, after_in_child=forks.in_child)
 
 
+def _open_standard_streams() -> None:
+    """Point those that are closed to nowhere, or what is opened next takes their place."""
+    for name in ("stdin", "stdout", "stderr"):
+        if getattr(sys, name) is None:
+            stream = open(os.devnull, "r+")  # noqa: SIM115 - on the least descriptor that is free
+            os.set_inheritable(stream.fileno(), True)
+            setattr(sys, name, stream)
+
+
 def run(main: Callable[[], int]) -> NoReturn:
-    """Run a command and leave with its exit code; with 141, quietly, if whoever reads what it prints has gone."""
+    """Run a command and leave with its exit code; with 141, quietly, if whoever reads what it prints has gone.
+
+    What no command expects is shown with its traceback, and is the tool's fault.
+    """
     try:
         code = main()
+        sys.stdout.flush()
+    except SystemExit as ended:
+        code = ended.code if isinstance(ended.code, int) else EXIT_TOOL
     except BrokenPipeError:
         code = 128 + signal.SIGPIPE
     except OSError as error:
         code = refuse(error, EXIT_TOOL)
+    except Exception:
+        code = EXIT_TOOL
+        with suppress(OSError):
+            traceback.print_exc()
     leave(code)
 
 
 def leave(code: int) -> NoReturn:
     """End this process with its work done: at once, as an interpreter that winds up has no handlers any more."""
     for stream in (sys.stdout, sys.stderr):
-        with suppress(OSError, ValueError, AttributeError):  # a reader that has gone, a stream that is closed
+        with suppress(OSError, ValueError):  # a reader that has gone, a stream that is closed
             stream.flush()
     os._exit(code)
 

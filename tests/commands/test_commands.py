@@ -165,9 +165,10 @@ def test_a_reader_that_has_gone_is_no_error() -> None:
     assert (ran.returncode, ran.stderr) == (128 + signal.SIGPIPE, b"")
 
 
-def test_what_cannot_be_printed_is_one_line() -> None:
+@pytest.mark.parametrize("line", ["list methods", "list --schema"])
+def test_what_cannot_be_printed_is_one_line(line: str) -> None:
     with Path("/dev/full").open("w") as full:
-        command = [sys.executable, "-m", "airground_drake", "list", "--schema"]
+        command = [sys.executable, "-m", "airground_drake", *line.split()]
         ran = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, check=False)
     assert (ran.returncode, ran.stderr.count(b"\n")) == (4, 1)
 
@@ -182,3 +183,20 @@ def test_exit_codes_that_commands_share_are_defined_once() -> None:
         if isinstance(name, ast.Name) and isinstance(name.ctx, ast.Store) and name.id in ("EXIT_USAGE", "EXIT_TOOL")
     ]
     assert sorted(defined) == [("usage.py", "EXIT_TOOL"), ("usage.py", "EXIT_USAGE")]
+
+
+@pytest.mark.parametrize("stderr", ["2>&-", "2>/dev/full"])
+@pytest.mark.parametrize(
+    ("line", "code"),
+    [("list methods", 0), ("nothing", 2), ("report", 2), ("verify minimal NOTHING", 2), ("check .", 2)],
+)
+def test_where_nobody_can_be_told_the_exit_code_is_the_same(line: str, code: int, stderr: str) -> None:
+    command = f'exec "{sys.executable}" -m airground_drake {line} >/dev/null {stderr}'
+    assert subprocess.run(command, shell=True, check=False).returncode == code
+
+
+def test_what_no_command_expects_is_the_tools_fault() -> None:
+    program = "from airground_drake import interruption; interruption.run(lambda: 1 // 0)"
+    ran = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert ran.returncode == 4
+    assert "ZeroDivisionError" in ran.stderr
