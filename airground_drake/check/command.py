@@ -9,6 +9,7 @@ import sys
 import warnings
 from collections import Counter
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -25,6 +26,8 @@ Each line says what was checked, on which run, and
 Exit codes: 0 all agree; 1 not all; 2 usage, or no report."""
 LIMIT_S = 300.0
 """CPU time that a check may take, s: those of a report of minutes take seconds."""
+MOST_S = 1e6
+"""CPU time that may be allowed for a check, s: far more does not fit a timer."""
 LONGEST_INTEGER = 10_000
 """Bits of an integer that is written: Python writes none of more than 4300 digits."""
 
@@ -50,10 +53,24 @@ def parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("report", metavar="DIR", type=Path, help="folder with report.json, trace/ and certificates/")
     parser.add_argument(
-        "--limit-s", type=float, default=LIMIT_S, metavar="S", help="CPU time for each check (default: %(default)g s)"
+        "--limit-s",
+        type=_limit_s,
+        default=LIMIT_S,
+        metavar="S",
+        help="CPU time for each check (default: %(default)g)",
     )
     parser.add_argument("--json", action="store_true", help="write strict JSON to standard output")
     return parser
+
+
+def _limit_s(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 0.0 < value <= MOST_S:
+        raise argparse.ArgumentTypeError(f"{text!r} is not allowed; wanted: a number above 0, at most {MOST_S:g}")
+    return value
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -92,7 +109,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _refuse(why: str) -> int:
-    print("error:", _printable(why), file=sys.stderr)
+    with suppress(OSError):
+        print("error:", _printable(why), file=sys.stderr)
     return 2
 
 

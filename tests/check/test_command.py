@@ -23,6 +23,14 @@ def test_usage_errors_and_missing_reports_are_exit_code_2(
     assert said.err.count("\n") == 1
 
 
+@pytest.mark.parametrize("limit", ["-1", "0", "nan", "inf", "1e300", "x"])
+def test_a_limit_that_is_none_is_not_the_files_fault(limit: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert check.main(["no/such/folder", "--limit-s", limit]) == 2
+    said = capsys.readouterr().err
+    assert f"--limit-s: {limit!r} is not allowed; wanted: a number above 0, at most 1e+06" in said
+    assert said.count("\n") == 1
+
+
 def test_help_explains_outcomes_and_exit_codes(capsys: pytest.CaptureFixture[str]) -> None:
     assert check.main(["--help"]) == 0
     said = capsys.readouterr()
