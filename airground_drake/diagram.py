@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import cast
 
 from pydrake.common import RandomDistribution
 from pydrake.systems.framework import Diagram, DiagramBuilder, InputPort, OutputPort, System
@@ -140,7 +139,7 @@ def _chosen(scenario: Scenario, method: str | None, composition: str | None) -> 
     composition = "augmented" if composition is None else composition
     if composition not in COMPOSITIONS:
         raise UnknownNameError("composition", composition, COMPOSITIONS)
-    return method_of(method), cast("Composition", composition)
+    return method_of(method), composition
 
 
 def _decision(scenario: Scenario, n: int, trigger: Trigger, presets: Sequence[Motion]) -> Diagram:

@@ -127,7 +127,7 @@ def _try(search: Search, pool: Pool) -> None:
     spec = search.spec
     for _, rows in pool(partial(rows_of, spec, limits=search.limits, allow_plugins=search.allow_plugins), [0]):
         if rows == []:
-            raise ScenarioError("--claim", "", *spec.claims, f"wanted: one that applies to a run of {spec.source}")
+            raise ScenarioError("--claim", "", spec.claims[0], f"wanted: one that applies to a run of {spec.source}")
 
 
 def _small(path: Path) -> Path:
