@@ -44,6 +44,19 @@ def test_an_obstacle_that_was_in_sight_is_known_when_it_is_out_of_it(passed: boo
     assert discs.tolist() == ROCK[:known].tolist()
 
 
+def test_what_was_in_sight_before_anything_was_proposed_is_known() -> None:
+    """The gatekeepers are called as their system calls them."""
+    gate, memory = gatekeepers("ugv"), Memory.empty(1)
+    called = []
+    for k, x in enumerate((-20.0, -20.0, 0.0, 0.0, 20.0)):
+        places = np.array([[x, 0.0, 0.0], [x, 0.0, 2.0]])
+        if not gate.idle((None,), places, memory):
+            memory = sampled(gate, 0.05 * k, x, None, memory)
+            called.append(k)
+    assert called == [0, 2]
+    assert memory.sensed.tolist() == [[True]]
+
+
 def test_what_comes_into_sight_does_not_replace_what_was() -> None:
     rocks = np.concatenate([ROCK, [[22.0, 3.0, 0.0]]])
     gate, memory = gatekeepers("ugv", rocks=rocks), Memory.empty(1)
