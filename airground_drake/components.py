@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from pydrake.systems.primitives import AffineSystem, LinearSystem
+from pydrake.common import RandomDistribution
+from pydrake.systems.primitives import AffineSystem, LinearSystem, RandomSource
 from pydrake.trajectories import PiecewisePolynomial
 
 from airground_drake.arrays import Array
@@ -26,7 +27,7 @@ from airground_drake.nsbc.law import UgvLaw
 from airground_drake.nsbc.motion import Motion
 from airground_drake.nsbc.team import Team
 from airground_drake.registry import ROUTES, Method
-from airground_drake.scenarios.schema import Scenario
+from airground_drake.scenarios.schema import Decision, Scenario
 
 
 def make_avoidance(scenario: Scenario, composition: Composition = "augmented") -> Avoidance:
@@ -203,6 +204,12 @@ def stack_presets(presets: list[Motion]) -> PiecewisePolynomial:
     times = np.unique(np.concatenate([preset.times for preset in presets]))
     samples = np.concatenate([preset.sample(times) for preset in presets], axis=1)
     return PiecewisePolynomial.FirstOrderHold(times, samples.T)
+
+
+def make_noise(count: int, given: Decision) -> tuple[RandomSource, AffineSystem]:
+    """Where the noise of `count` decision variables comes from, and what integrates it; to be connected."""
+    source = RandomSource(RandomDistribution.kGaussian, count, given.noise_period_s)
+    return source, integrated_noise(count, given.noise_m_sqrt_s, given.leak_1_s, given.noise_period_s)
 
 
 def integrated_noise(count: int, intensity: float, leak: float, period: float) -> AffineSystem:

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from pydrake.common import RandomDistribution
 from pydrake.systems.framework import Diagram, DiagramBuilder, InputPort, OutputPort, System
-from pydrake.systems.primitives import Demultiplexer, Multiplexer, RandomSource, TrajectorySource
+from pydrake.systems.primitives import Demultiplexer, Multiplexer, TrajectorySource
 
 from airground_drake import components
 from airground_drake.arrays import Array
@@ -144,9 +143,7 @@ def _chosen(scenario: Scenario, method: str | None, composition: str | None) -> 
 
 def _decision(scenario: Scenario, n: int, trigger: Trigger, presets: Sequence[Motion]) -> Diagram:
     """The decision layer of n UGVs: noise, decision variables, triggers."""
-    given = scenario.decision
-    source = RandomSource(RandomDistribution.kGaussian, n, given.noise_period_s)
-    noise = components.integrated_noise(n, given.noise_m_sqrt_s, given.leak_1_s, given.noise_period_s)
+    source, noise = components.make_noise(n, scenario.decision)
     variable, events = DecisionVariable(n), EventTrigger(n, trigger, presets)
     systems = {
         "noise_source": source, "decision_noise": noise, "decision_variable": variable, "event_trigger": events,

@@ -132,15 +132,18 @@ def test_warming_up_compiles_all_that_a_run_needs() -> None:
     subprocess.run([sys.executable, "-c", WARM_UP], check=True, timeout=300)
 
 
-def test_noise_has_the_intensity_of_the_scenario(case_a: Scenario) -> None:
-    """Independent increments of variance sigma^2 dt, eq (15)."""
+def test_noise_is_normal_and_has_the_intensity_of_the_scenario(case_a: Scenario) -> None:
+    """Independent increments of mean 0 and variance sigma^2 dt, eq (15)."""
     case_a.decision.noise_m_sqrt_s = 0.1
     case_a.decision.threshold.zeta_m = 50.0
     recorder = Recorder(case_a, "a")
     steps = [
         np.diff(recorder.simulate(seed, 3.0).column(f"{ugv}.noise_m")) for seed in range(3) for ugv in ("ugv1", "ugv2")
     ]
-    assert np.std(steps) == pytest.approx(0.1 * np.sqrt(0.05), rel=0.15)  # 360 increments: 4 standard errors
+    deviation = 0.1 * np.sqrt(0.05)
+    assert np.std(steps) == pytest.approx(deviation, rel=0.15)  # 360 increments: 4 standard errors
+    assert abs(np.mean(steps)) < 4.0 * deviation / np.sqrt(360.0)
+    assert kstest(np.ravel(steps) / deviation, "norm").statistic < 2.0 / np.sqrt(360.0)
     assert abs(np.corrcoef(steps[0], steps[1])[0, 1]) < 0.5  # each UGV has its own noise
 
 

@@ -1,9 +1,10 @@
 """Simulated drift-diffusion paths of the decision variable between two thresholds.
 
-Paths come from the project's own systems: RandomSource -> integrated noise -> DecisionVariable, whose UGVs stand
-still while their references leave at the drift, so that x = drift t + n. Increments of x over the noise period are
-independent, so one long record is cut into paths, one beginning where the one before has ended, until a fixed
-number is complete; a fixed number, because the paths that happen to fit into a fixed time are too short.
+Paths come from the systems of the diagram that runs: RandomSource -> integrated noise (`make_noise`) ->
+DecisionVariable, whose UGVs stand still while their references leave at the drift, so that x = drift t + n. Increments
+of x over the noise period are independent, so one long record is cut into paths, one beginning where the one before
+has ended, until a fixed number is complete; a fixed number, because the paths that happen to fit into a fixed time are
+too short.
 
 A path is decided at the first sample at or beyond a barrier, which is later, and less often wrong, than for the
 continuous process. The barrier is therefore moved inwards by 0.5826 noise sqrt(period) (Chernoff 1965, Siegmund
@@ -19,14 +20,15 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from pydrake.common import RandomDistribution, RandomGenerator
+from pydrake.common import RandomGenerator
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import DiagramBuilder
-from pydrake.systems.primitives import ConstantVectorSource, LogVectorOutput, RandomSource, TrajectorySource
+from pydrake.systems.primitives import ConstantVectorSource, LogVectorOutput, TrajectorySource
 
-from airground_drake.components import integrated_noise, stack_presets
+from airground_drake.components import make_noise, stack_presets
 from airground_drake.decision.bayes import decision_time, error_rate, optimal_threshold
 from airground_drake.nsbc.motion import Motion
+from airground_drake.scenarios.schema import Decision
 from airground_drake.systems.decision import DecisionVariable
 
 SEED = 20061
@@ -137,8 +139,8 @@ def increments(experiment: PassageExperiment, rows: int) -> list[float]:
     ends = np.array([[0.0, 0.0, 0.0], [1.01 * experiment.drift * duration, 0.0, 0.0]])
     away = Motion.at_speed(ends, experiment.drift)
     builder = DiagramBuilder()
-    source = builder.AddNamedSystem("noise_source", RandomSource(RandomDistribution.kGaussian, CHANNELS, period))
-    noise = builder.AddNamedSystem("decision_noise", integrated_noise(CHANNELS, experiment.noise, 0.0, period))
+    given = Decision(noise_m_sqrt_s=experiment.noise, leak_1_s=0.0, noise_period_s=period)
+    source, noise = map(builder.AddSystem, make_noise(CHANNELS, given))
     reference = builder.AddNamedSystem("reference", TrajectorySource(stack_presets([away] * CHANNELS), 1))
     standing = builder.AddNamedSystem("team_position", ConstantVectorSource(np.zeros(3 * (CHANNELS + 1))))
     variable = builder.AddNamedSystem("decision_variable", DecisionVariable(CHANNELS))

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.special import ndtr
+from scipy.stats import kstest
 from verify.model.threshold.cases import INPUTS
 
 from airground_drake.verify.model.threshold import first_passages, thr_ddm
@@ -56,6 +57,7 @@ def test_increments_are_those_of_the_process(zeta: float) -> None:
     deviation = each.noise * math.sqrt(each.period)
     assert abs(steps.mean() - each.drift * each.period) < 4.0 * deviation / math.sqrt(len(steps))
     assert steps.std() == pytest.approx(deviation, rel=4.0 / math.sqrt(2.0 * len(steps)))
+    assert kstest((steps - steps.mean()) / deviation, "norm").statistic < 2.0 / math.sqrt(len(steps))
     assert abs(np.corrcoef(steps[:-1], steps[1:])[0, 1]) < 4.0 / math.sqrt(len(steps))
     assert first_passages.increments(each, 20) == first_passages.increments(each, 20)
     assert first_passages.increments(each, 20) != first_passages.increments(replace(each, seed=6), 20)
