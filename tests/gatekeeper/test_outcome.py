@@ -60,6 +60,14 @@ def test_a_proposal_to_stay_makes_no_difference_to_a_stall() -> None:
     assert not accept.better_than(refuse)
 
 
+def test_no_roll_out_takes_longer_than_the_longest_try_and_what_comes_past_it() -> None:
+    """However long the preset trajectory is."""
+    scene, discs = situation()
+    endless = replace(scene, preset=Motion.at_speed(np.array([[0.0, 0.0, 0.0], [8.0, 0.0, 0.0]]), 1e-3))
+    for outcome in outcomes(endless, LAW, ROUND, discs, 2.0, (), LOOK):
+        assert len(outcome.positions) == round((LOOK.longest + LOOK.past) / LAW.avoidance.period) + 1
+
+
 def test_what_is_not_known_is_not_avoided_and_a_map_that_lies_costs_no_more_than_usefulness() -> None:
     scene, discs = situation((4.0, 1.0), (4.0, -1.0))
     assert not outcomes(scene, LAW, ROUND, NONE, 2.0, (), LOOK)[0].stalls

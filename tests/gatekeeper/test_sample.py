@@ -1,0 +1,43 @@
+"""Method (c)'s gatekeeper, sample by sample: since when an answer stands."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from airground_drake.gatekeeper.answer import Decision, Foreseen, Rules
+from airground_drake.gatekeeper.budget import Budget
+from airground_drake.gatekeeper.prediction import Horizon
+from airground_drake.gatekeeper.routes.enumeration import EnumerationRoute
+from airground_drake.gatekeeper.sample import Judging, Memory, PaperGatekeepers, Situation
+from airground_drake.intervention.messages import ACCEPT
+from airground_drake.intervention.policy import Proposal
+from airground_drake.nsbc.avoidance import Avoidance
+from airground_drake.nsbc.law import UgvLaw
+from airground_drake.nsbc.motion import Motion
+from airground_drake.nsbc.team import Team
+
+
+class Agreeing(PaperGatekeepers):
+    """Accepts everything."""
+
+    def _decide(self, seen: Situation, i: int, proposal: Proposal, budgets: Iterator[Budget]) -> Decision:
+        return Decision(seen.t, i, proposal, True, "cheaper", Foreseen())
+
+
+def test_the_dwell_of_an_answer_begins_anew_with_each_proposal() -> None:
+    team = Team(("ugv",), "uav", np.empty((0, 3)), 2.0, 2.0, 1.0, np.ones(2))
+    law = UgvLaw(Avoidance(3.0, 0.05, 4.0), 2.0, 1.5, intervention_on_top=True)
+    motion = Motion(np.zeros(1), np.zeros((1, 3)))
+    judging = Judging(
+        EnumerationRoute(), Horizon(4, 1, 1.0, 1.0, 0.0), Rules(switching_margin=0.1, min_dwell=0.2), 0.05
+    )
+    gate, memory = Agreeing(team, law, [motion], judging), Memory.empty(1)
+    since = []
+    for k, issued in enumerate((0.0, 0.0, 0.1, 0.1)):
+        proposal = Proposal("way", issued, motion)
+        memory = gate.sample(0.05 * (k + 1), (proposal,), np.zeros((2, 3)), np.zeros((2, 3)), memory)
+        assert memory.answers == (ACCEPT, issued)
+        since.append(memory.since[0])
+    assert since == [0.05, 0.05, 0.05 * 3, 0.05 * 3]
