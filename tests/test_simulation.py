@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scenarios.cases import DEADLOCKS
+from scipy.stats import kstest
 from timeline import kinds, times
 
 from airground_drake import runs, trace
