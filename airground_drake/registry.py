@@ -278,7 +278,7 @@ ROUTES = Registry(
 """Ways to solve the gatekeeper's problem (26)."""
 
 UAV_TASKS = Registry("task", "uav_tasks", {"formation": "airground_drake.nsbc.tasks:FormationTask"})
-"""What the UAV does below obstacle avoidance: subclasses of `nsbc.tasks.UavTask`."""
+"""What the UAV does below obstacle avoidance: subclasses of `nsbc.task.Task`."""
 
 SAMPLERS = Registry(
     "sampler",

@@ -116,8 +116,8 @@ class Trace:
         decisions: see DECISION_COLUMNS.
         problems: see PROBLEM_ARRAYS.
         proposals: see PROPOSAL_COLUMNS.
-        timings: wall-clock measurements, kept apart because they differ between identical runs:
-            `wall_s`, and `decision_times_s`: CPU time of each row of `decisions`, in order.
+        timings: kept apart because they differ between identical runs: `wall_s`, how long the run took by the
+            clock, and `decision_times_s`, CPU time of each row of `decisions`, in order.
     """
 
     meta: dict[str, Any]

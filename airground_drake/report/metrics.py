@@ -60,7 +60,7 @@ def gatekeeper(trace: Trace) -> dict[str, Any] | None:
     Returns:
         `calls`, `decisions` (decision -> count), `refusals` (robot -> reason -> proposals refused at the first
         answer), `max_gap` (largest optimality gap), `time_s` (p50, p99, max
-        of the wall-clock times) and `closest_call`: where the costs of accepting and refusing were closest,
+        of the CPU times) and `closest_call`: where the costs of accepting and refusing were closest,
         relative to the smaller one, so that nobody has to trust a knife edge. None where not recorded.
     """
     table = trace.decisions
