@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
-from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
+from jinja2 import Environment
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
@@ -15,6 +15,7 @@ from airground_drake.arrays import Array
 from airground_drake.campaign.rows import JUDGED
 from airground_drake.report.figures import canvas, svg
 from airground_drake.report.html import number
+from airground_drake.report.templating import environment_of
 
 BARS = 40
 SHOWN = ("SAFE-TRACE", "SAFE-HYP", "LIVE-GOAL")
@@ -88,12 +89,6 @@ def _histogram(values: Array, title: str, label: str, mark: float | None) -> tup
 
 @cache
 def _environment() -> Environment:
-    environment = Environment(
-        loader=ChoiceLoader([PackageLoader("airground_drake.campaign"), PackageLoader("airground_drake.report")]),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    environment = environment_of("airground_drake.campaign", "airground_drake.report")
     environment.filters["num"] = number
     return environment

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined, Template
+from jinja2 import Template
 
 from airground_drake.errors import ReplayError
 from airground_drake.replay.looks import (
@@ -18,6 +18,7 @@ from airground_drake.replay.looks import (
 )
 from airground_drake.replay.recording import recorded, robot_path
 from airground_drake.replay.scene import FRAMES_PER_S, MAX_NAMED_OBSTACLES, STATES, Scene
+from airground_drake.report.templating import environment_of
 
 MAX_EVENTS = 300
 """Events that are listed."""
@@ -64,12 +65,6 @@ def _data(scene: Scene) -> dict[str, Any]:
 
 @cache
 def _overlay() -> Template:
-    environment = Environment(
-        loader=PackageLoader("airground_drake.replay"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    environment = environment_of("airground_drake.replay")
     environment.globals["max_events"] = MAX_EVENTS
     return environment.get_template("overlay.html.j2")

@@ -14,7 +14,7 @@ from hashlib import sha256
 from importlib import resources
 from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import Environment
 from markupsafe import Markup
 
 from airground_drake.errors import one_line
@@ -24,6 +24,7 @@ from airground_drake.report.figures.canvas import DARK
 from airground_drake.report.figures.panels import Figure, Table
 from airground_drake.report.mathml import mathml
 from airground_drake.report.reproduction import YES_NO
+from airground_drake.report.templating import environment_of
 from airground_drake.statuses import NOT_EXERCISED, outcome
 
 STYLE, SCRIPTS = "report.css", ("report.js", "scrubber.js")
@@ -86,16 +87,9 @@ def render(document: Mapping[str, Any], figures: Sequence[Figure], diagram_svg: 
 
 @cache
 def _environment() -> Environment:
-    loader = PackageLoader("airground_drake.report")
-    environment = Environment(
-        loader=loader,
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    environment = environment_of("airground_drake.report")
     style = stylesheet()
-    scripts = [loader.get_source(environment, name)[0] for name in SCRIPTS]
+    scripts = [_template(name) for name in SCRIPTS]
     environment.filters.update(
         num=number, value=value, pretty=pretty, together=faults_together, inline=Markup, mathml=mathml,
         evidence=evidence_tables, records=partial(evidence.tables, number=number), brief=brief,
@@ -109,7 +103,12 @@ def _environment() -> Environment:
 
 def stylesheet() -> str:
     """The style sheet of all pages."""
-    return resources.files(__package__).joinpath("templates", STYLE).read_text(encoding="utf-8") + _in_the_dark()
+    return _template(STYLE) + _in_the_dark()
+
+
+def _template(name: str) -> str:
+    """The text of a file among the templates."""
+    return resources.files(__package__).joinpath("templates", name).read_text(encoding="utf-8")
 
 
 def security_policy(style: str, scripts: Sequence[str] = ()) -> str:

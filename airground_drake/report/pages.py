@@ -5,10 +5,11 @@ from __future__ import annotations
 from functools import cache
 from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import Environment
 from markupsafe import Markup
 
 from airground_drake.report.html import CHIPS, number, security_policy, stylesheet
+from airground_drake.report.templating import environment_of
 
 
 def render(template: str, **content: Any) -> str:
@@ -18,13 +19,7 @@ def render(template: str, **content: Any) -> str:
 
 @cache
 def _environment() -> Environment:
-    environment = Environment(
-        loader=PackageLoader("airground_drake.report"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    environment = environment_of("airground_drake.report")
     environment.filters.update(num=number, inline=Markup, shown=shown)
     style = stylesheet()
     environment.globals.update(chips=CHIPS, style=Markup(style), policy=Markup(security_policy(style)))
