@@ -139,14 +139,14 @@ def _from(data: Json, trace: Trace, t: float) -> Json:
 
 
 def _shorter(data: Json) -> Iterator[Json]:
-    """End soon after the last event but arrivals, or in half the time."""
+    """End soon after the last event but arrivals, or in half the time; not before the first control period is over."""
     trace = _trace(data)
     ends = [data["duration_s"] * share for share in (0.25, 0.5, 0.75, 0.9)]
     if trace is not None:
         events = [event["t_s"] for event in trace.events if event["kind"] != "arrival"]
         ends += [event + spare for event in events[:20] for spare in SPARE_S]
     for end in sorted(ends):
-        if 0.0 < end < 0.95 * data["duration_s"]:
+        if data["control"]["period_s"] <= end < 0.95 * data["duration_s"]:
             yield copy.deepcopy(data) | {"duration_s": end}
 
 

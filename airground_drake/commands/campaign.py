@@ -13,6 +13,7 @@ from airground_drake.errors import AirgroundError, FolderError, ScenarioError, U
 from airground_drake.progress import told
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.estimate import DEFAULT_LIMITS, Limits
+from airground_drake.scenarios.shipped import argument
 from airground_drake.side_by_side import processors
 from airground_drake.usage import EXIT_TOOL, Parser, positive, refuse, whole
 
@@ -92,12 +93,13 @@ def _only(spec: Spec, options: argparse.Namespace) -> int:
 
     scenario = spec.draw(options.only)
     path = options.output or Path(f"{scenario.name}.yaml")
-    files.write_text(path, yaml.safe_dump(resolved(scenario), sort_keys=False, allow_unicode=True))
+    with files.wanted(path, "a file for the scenario"):
+        files.write_text(path, yaml.safe_dump(resolved(scenario), sort_keys=False, allow_unicode=True))
     rows = rows_of(spec, options.only, _limits(options), allow_plugins=options.allow_plugins)
     for row in rows:
         margin = "" if math.isnan(row["margin"]) else f" {row['margin']:.6g} {row['unit']}"
         print(f"{row['run']:12} {row['claim'] or row['ended']:12} {row['status'] or row['what']}{margin}")
-    print(f"airground report {one_line(str(path))}")
+    print(f"airground report {argument(path)}")
     return 0 if all(row["as_expected"] for row in rows) else EXIT_REFUTED
 
 

@@ -17,6 +17,7 @@ from airground_drake.progress import told
 from airground_drake.registry import RUN_CLAIMS, SAMPLERS, is_plugin
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.estimate import DEFAULT_LIMITS
+from airground_drake.scenarios.shipped import argument
 from airground_drake.side_by_side import processors
 from airground_drake.usage import EXIT_TOOL, Parser, positive, refuse, whole
 
@@ -151,7 +152,7 @@ def _save(search: Search, best: Best, path: Path, tests: int) -> None:
             _write(small, smaller | {"name": f"{scenario.name}_small"})
             print(
                 f"made small with {used} runs: {len(smaller['ugvs'])} UGVs, {len(smaller['obstacles'])} obstacles, "
-                f"{smaller['duration_s']:g} s: airground report {one_line(str(small))}"
+                f"{smaller['duration_s']:g} s: airground report {argument(small)}"
             )
             return
 

@@ -8,12 +8,14 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from airground_drake import files
-from airground_drake.errors import FolderError
+from airground_drake.errors import FolderError, one_line
 from airground_drake.scenarios.fleet import fleet
-from airground_drake.scenarios.shipped import json_schema_file, shipped_files
+from airground_drake.scenarios.schema import MAX_NAME, MAX_SEED, MAX_UGVS
+from airground_drake.scenarios.shipped import argument, json_schema_file, shipped_files
 from airground_drake.usage import Parser, refuse, whole
 
-MOST = 2000
+MOST_OBSTACLES = 2000 - MAX_UGVS
+"""Beside as many UGVs as are allowed, what the checker looks at."""
 MODEL = "minimal"
 """The shipped scenario that is copied."""
 
@@ -25,10 +27,12 @@ def parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("file", type=Path, nargs="?", default=Path("scenario.yaml"), help="default: %(default)s")
     parser.add_argument(
-        "--fleet", type=whole(1, MOST), metavar="N", help="so many UGVs that cross a field of obstacles instead"
+        "--fleet", type=whole(1, MAX_UGVS), metavar="N", help="so many UGVs that cross a field of obstacles instead"
     )
-    parser.add_argument("--obstacles", type=whole(1, MOST), metavar="M", help="of the field (default: five a UGV)")
-    parser.add_argument("--seed", type=int, default=1, help="from which the field is drawn (default: %(default)s)")
+    parser.add_argument(
+        "--obstacles", type=whole(1, MOST_OBSTACLES), metavar="M", help="of the field (default: 5 a UGV)"
+    )
+    parser.add_argument("--seed", type=whole(0, MAX_SEED), metavar="S", help="of the field (default: 1)")
     return parser
 
 
@@ -38,20 +42,24 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         Exit code: 0, or 2 if the file exists or cannot be written.
     """
-    options = parser().parse_args(arguments)
+    of_command = parser()
+    options = of_command.parse_args(arguments)
+    if options.fleet is None and (options.obstacles, options.seed) != (None, None):
+        of_command.error("--obstacles and --seed are of a fleet: give --fleet, too")
     path: Path = options.file
     try:
         files.try_to_create(path)
     except FolderError as error:
         return refuse(error)
-    name = re.sub(r"^[\W\d_]+|[\W_]+$", "", re.sub(r"\W+", "_", path.stem, flags=re.ASCII)) or MODEL
+    name = re.sub(r"^[\W\d_]+|[\W_]+$", "", re.sub(r"\W+", "_", path.stem, flags=re.ASCII))[:MAX_NAME] or MODEL
     if options.fleet is None:
         text = shipped_files()[MODEL].read_text(encoding="utf-8")
         # what stands before the name is so of the shipped file only
         text = text[text.index("name:") :].replace(f"name: {MODEL}", f'name: "{name}"', 1)
     else:
-        text = fleet(options.fleet, options.obstacles or 5 * options.fleet, options.seed, name)
+        seed = 1 if options.seed is None else options.seed
+        text = fleet(options.fleet, options.obstacles or 5 * options.fleet, seed, name)
     schema = f"# yaml-language-server: $schema={json_schema_file()}\n"
     files.write_text(path, schema + text)
-    print(f"{path}\nnext: airground report {path}")
+    print(f"{one_line(str(path))}\nnext: airground report {argument(path)}")
     return 0

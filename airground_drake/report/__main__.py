@@ -29,14 +29,14 @@ from airground_drake.progress import told
 from airground_drake.report import folder
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.estimate import DEFAULT_LIMITS, GIB, Limits
-from airground_drake.scenarios.shipped import shipped
+from airground_drake.scenarios.shipped import AUDIT, shipped
 from airground_drake.usage import EXIT_TOOL, Parser, positive, refuse
 
 if TYPE_CHECKING:
     from airground_drake.scenarios.schema import Scenario
 
 FORMATS = tuple(folder.PAGES)
-AUDIT, AUDITED = "audit", "case_a"
+AUDITED = "case_a"
 """`report audit` is the report of the scenario AUDITED with every finding about the paper."""
 AUDIT_TITLE = "The paper's formulas and numbers, audited"
 AUDIT_DESCRIPTION = (

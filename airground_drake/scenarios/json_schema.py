@@ -27,11 +27,10 @@ from airground_drake.registry import (
     Registry,
 )
 from airground_drake.scenarios import schema
+from airground_drake.scenarios.schema import MAX_NAME, MAX_SEED, MAX_UGVS
 from airground_drake.scenarios.validate import (
     BUDGETS,
     CLAIM_PATTERN,
-    MAX_NAME,
-    MAX_SEED,
     MAX_STAGES,
     MAX_TEXT,
     NAME_PATTERN,
@@ -59,6 +58,7 @@ _ONE_OF: dict[tuple[str, str], Iterable[str]] = {
 _REGISTERED = {("Uav", "task"): UAV_TASKS, ("Gatekeeper", "route"): ROUTES, ("Policy", "name"): POLICIES}
 _EXPECTED = {("Run", "expected"): RUN_CLAIMS, ("Scenario", "expected"): MODEL_CLAIMS}
 _MOST = {"stages": MAX_STAGES}
+_MOST_ENTRIES = {"ugvs": {"maxProperties": MAX_UGVS}}
 _AT_LEAST_ONE = {"ugvs", "runs", "paper"}
 
 
@@ -156,7 +156,8 @@ def _typed(hint: Any, name: str) -> Schema:
     item = _typed(get_args(hint)[-1], name)
     some = int(name in _AT_LEAST_ONE)
     if get_origin(hint) is dict:
-        return {"type": "object", "propertyNames": _NAME_OR_MERGE, "additionalProperties": item, "minProperties": some}
+        entries = {"minProperties": some, **_MOST_ENTRIES.get(name, {})}
+        return {"type": "object", "propertyNames": _NAME_OR_MERGE, "additionalProperties": item, **entries}
     if hint == schema.Vector and unit_of(name) == "m":
         return {"type": "array", "items": item, "minItems": 3, "maxItems": 3}
     return {"type": "array", "items": item, "minItems": 2 if name == "waypoints_m" else some}

@@ -9,6 +9,8 @@ from dataclasses import dataclass, field
 
 Vector = list[float]
 
+MAX_UGVS, MAX_SEED = 100, 2**31 - 1
+MAX_NAME = 64  # characters
 
 REQUIRED = {"required": True}
 """Of a key that a scenario must have; what stands there before is what pydrake needs."""
@@ -325,7 +327,7 @@ class Scenario:
     seed: int = 0
     """Of the decision noise."""
     duration_s: float = 30.0
-    """How long each run is simulated."""
+    """How long each run is simulated, at least one control period."""
     arrival_tolerance_m: float = 0.1
     """How close to its target a robot has arrived."""
     stall_tolerance_m: float = 0.1

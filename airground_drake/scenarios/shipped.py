@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+import shlex
 from importlib import resources
 from importlib.resources.abc import Traversable
+from pathlib import Path
 
 import yaml
+
+from airground_drake.errors import one_line
+
+AUDIT = "audit"
+"""What `airground report` takes besides the name of a scenario or a file."""
 
 
 def shipped() -> list[str]:
@@ -17,6 +24,12 @@ def shipped_files() -> dict[str, Traversable]:
     """The files of the scenarios that come with the package, by name."""
     found = resources.files(__package__).iterdir()
     return {file.name.removesuffix(".yaml"): file for file in found if file.name.endswith(".yaml")}
+
+
+def argument(path: Path) -> str:
+    """The path of a scenario as the command line takes it: quoted, neither an option nor a name that is shipped."""
+    text = str(path)
+    return one_line(shlex.quote(f"./{text}" if text.startswith("-") or text in (AUDIT, *shipped()) else text))
 
 
 def json_schema_file() -> Traversable:

@@ -35,7 +35,7 @@ from airground_drake.registry import (
     is_plugin,
 )
 from airground_drake.scenarios.rounding import TOLERANCE_M, Rounding
-from airground_drake.scenarios.schema import Scenario, Vector
+from airground_drake.scenarios.schema import MAX_NAME, MAX_SEED, MAX_UGVS, Scenario, Vector
 from airground_drake.statuses import EXPECTATIONS, alternatives
 
 TRIGGERS: tuple[str, ...] = ("automaton", "bare")
@@ -43,8 +43,8 @@ THRESHOLD_RULES: tuple[str, ...] = ("fixed", "bayes")
 SOURCES: tuple[str, ...] = ("calibrated", "ours")
 BUDGETS: tuple[str, ...] = ("counted", "wall_clock")
 
-MAX_UGVS, MAX_STAGES, MAX_SEED = 100, 1000, 2**31 - 1
-MAX_NAME, MAX_TEXT = 64, 10_000  # characters
+MAX_STAGES = 1000
+MAX_TEXT = 10_000  # characters
 NAME_PATTERN = "^[A-Za-z_][A-Za-z0-9_]*$"  # of a UGV, an obstacle, a run, a parameter
 CLAIM_PATTERN = f"^[A-Z][A-Z0-9-]{{0,{MAX_NAME - 1}}}$"
 SMALLEST = 1e-9  # of a positive number
@@ -256,6 +256,8 @@ def _gains(scenario: Scenario) -> Problems:
 def _periods(scenario: Scenario) -> Problems:
     control, gatekeeper, noise = scenario.control.period_s, scenario.gatekeeper, scenario.decision.noise_period_s
     rule = f"must be a whole multiple of control.period_s = {control:.9g} s"
+    if scenario.duration_s < control:
+        yield "duration_s", scenario.duration_s, f"at least one control period, control.period_s = {control} s"
     for key, period in (("gatekeeper", gatekeeper.period_s), ("intervention", scenario.intervention.period_s)):
         if not _multiple(period, control):
             yield f"{key}.period_s", period, rule

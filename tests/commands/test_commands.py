@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import contextlib
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -19,6 +20,7 @@ from airground_drake.commands import COMMANDS, main
 from airground_drake.commands.listing import KINDS
 from airground_drake.registry import METHODS, MODEL_CLAIMS, POLICIES, ROUTES, RUN_CLAIMS, SAMPLERS, UAV_TASKS
 from airground_drake.scenarios.load import load, shipped
+from airground_drake.scenarios.schema import MAX_UGVS
 
 
 @pytest.mark.parametrize("name", COMMANDS)
@@ -85,6 +87,7 @@ def test_list_has_everything_that_can_be_named(capsys: pytest.CaptureFixture[str
         ("new/on the floor.yaml", "on_the_floor"),
         ("7 floors.yaml", "floors"),
         ("7.yaml", "minimal"),
+        ("n" * 100 + ".yaml", "n" * 64),
     ],
 )
 def test_init_writes_a_scenario_that_is_valid(tmp_path: Path, file: str, name: str) -> None:
@@ -101,7 +104,45 @@ def test_init_writes_a_fleet(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     assert (scenario.name, len(scenario.ugvs), len(scenario.obstacles)) == ("field", 4, 6)
     with pytest.raises(SystemExit, match="2"):
         main(["init", str(tmp_path / "none.yaml"), "--fleet", "0"])
-    assert "wanted: a whole number from 1 to 2000" in capsys.readouterr().err
+    assert "wanted: a whole number from 1 to 100" in capsys.readouterr().err
+
+
+def test_init_writes_no_fleet_that_is_too_large(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "field.yaml"
+    with pytest.raises(SystemExit, match="2"):
+        main(["init", str(path), "--fleet", str(MAX_UGVS + 1)])
+    assert f"wanted: a whole number from 1 to {MAX_UGVS}" in capsys.readouterr().err
+    assert main(["init", str(path), "--fleet", str(MAX_UGVS)]) == 0
+    assert len(load(path)[0].ugvs) == MAX_UGVS
+
+
+@pytest.mark.parametrize("alone", ["--obstacles", "--seed"])
+def test_init_takes_no_option_that_it_would_ignore(
+    alone: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        main(["init", str(tmp_path / "mine.yaml"), alone, "3"])
+    assert "give --fleet, too" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("file", "taken"),
+    [
+        ("mine.yaml", "mine.yaml"),
+        ("case_a", "./case_a"),
+        ("audit", "./audit"),
+        ("on the floor.yaml", "'on the floor.yaml'"),
+        ("-x.yaml", "./-x.yaml"),
+    ],
+)
+def test_what_init_prints_can_be_run(
+    file: str, taken: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["init", "--", file]) == 0
+    assert capsys.readouterr().out.endswith(f"next: airground report {taken}\n")
+    assert load(*shlex.split(taken))[0].ugvs.keys() == {"ugv1"}
 
 
 def test_init_overwrites_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -63,6 +63,7 @@ def test_what_may_be_named_is_what_is_registered() -> None:
         ("seed", 1.5),
         ("seed", -1),
         ("ugvs", {}),
+        ("ugvs", {f"ugv{index}": data("minimal")["ugvs"]["ugv1"] for index in range(101)}),
         ("ugvs.ugv", {"start_m": [0, 0, 0]}),
         ("ugvs.my robot", {"start_m": [0, 0, 0], "target_m": [1, 0, 0], "preset": {"waypoints_m": [[0, 0, 0]] * 2}}),
         ("uav.start_m", [0, 0]),

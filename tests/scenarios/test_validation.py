@@ -44,6 +44,7 @@ BAD: list[tuple[str, object, list[str]]] = [
     ("ugvs.one.start_m", [0, math.nan, 0], ["ugvs.one.start_m.1: nan", "a finite number in m"]),
     ("duration_s", math.inf, ["duration_s: inf", "a finite number in s"]),
     ("duration_s", 10**400, ["duration_s: inf", "a finite number in s"]),
+    ("duration_s", 1e-9, ["duration_s: 1e-09", "at least one control period, control.period_s = "]),
     ("duration_s", -(10**400), ["duration_s:", "a finite number in s"]),
     ("intervention.policies.0.parameters.speed_m_s", math.nan, ["speed_m_s: nan", "a finite number in m/s"]),
     ("intervention.policies.0.parameters.speed_m_s", "fast", ["speed_m_s: 'fast'", "a number in m/s"]),
