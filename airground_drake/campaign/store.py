@@ -42,10 +42,11 @@ class Store:
             resume: go on with what the folder has.
 
         Raises:
-            FolderError: if the folder has another campaign, or something else, or another command has it open.
-            OSError: if it cannot be read or written.
+            FolderError: if the folder cannot be written, or has another campaign or something else, or another command
+                has it open.
+            OSError: if it cannot be read.
         """
-        folder.mkdir(parents=True, exist_ok=True)
+        files.make_folder(folder, "the campaign")
         self.folder = folder
         manifest = {"schema": SCHEMA, **manifest}
         there = sorted(path.name for path in folder.iterdir() if not files.is_partial(path))

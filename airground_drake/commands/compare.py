@@ -51,7 +51,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         before, after = compare.read(options.before), compare.read(options.after)
         found = compare.compared(before, after)
         if options.html is not None:
-            files.write_text(options.html, _page((options.before, options.after), before, after, found))
+            page = _page((options.before, options.after), before, after, found)
+            with files.wanted(options.html, "a file for the page"):
+                files.write_text(options.html, page)
     except (AirgroundError, OSError) as error:
         return refuse(error)
     if options.json:

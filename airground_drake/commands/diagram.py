@@ -40,6 +40,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from airground_drake.scenarios.load import load
 
     try:
+        files.make_folder(options.output, "the pictures")
         scenario, _ = load(options.scenario)
         with plugins.admitted(scenario, options.scenario, allow=options.allow_plugins):
             diagram, name = build_diagram(scenario, method=options.method), scenario.name

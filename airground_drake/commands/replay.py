@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from airground_drake.replay.scene import Scene
 
 SCHEMA = "airground_drake.report/"
-SLOWEST, FASTEST = 0.1, 100.0
-"""How fast a video may be."""
+SLOWEST, SPEED, FASTEST = 0.1, 4.0, 100.0
+"""How fast a video may be, and is if nothing is said of it."""
 
 
 def parser() -> argparse.ArgumentParser:
@@ -28,12 +28,11 @@ def parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("folder", type=Path, metavar="DIR", help="folder of a report")
     parser.add_argument("run", nargs="?", metavar="RUN", help="default: all runs, a file each")
-    parser.add_argument(
-        "-o", "--output", type=Path, default=Path(), metavar="DIR", help="for the pages; default: this folder"
-    )
-    parser.add_argument("--live", action="store_true", help="write nothing; serve the pages on this machine")
-    parser.add_argument("--video", type=Path, metavar="FILE", help="write RUN as a video instead: .webp or .mp4")
-    parser.add_argument("--speed", type=_speed, default=4.0, metavar="X", help="of the video (default: 4)")
+    to = parser.add_mutually_exclusive_group()
+    to.add_argument("-o", "--output", type=Path, metavar="DIR", help="for the pages; default: this folder")
+    to.add_argument("--live", action="store_true", help="write nothing; serve the pages on this machine")
+    to.add_argument("--video", type=Path, metavar="FILE", help="write RUN as a video instead: .webp or .mp4")
+    parser.add_argument("--speed", type=_speed, metavar="X", help=f"of the video (default: {SPEED:g})")
     return parser
 
 
@@ -47,6 +46,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = of_command.parse_args(arguments)
     if options.video and not options.run:
         of_command.error("a video is of one RUN: name it")
+    if options.speed and not options.video:
+        of_command.error("--speed is of a video: give --video, too")
     from airground_drake.replay import live, video
     from airground_drake.replay.page import page
 
@@ -58,13 +59,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if options.live:
             live.serve(chosen, lambda name: page(_scene(options.folder, name)))
         elif options.video:
-            _keep_out(options.video.parent)
-            video.write(_scene(options.folder, options.run), options.video, options.speed)
+            _take(options.video.parent, "the video")
+            video.write(_scene(options.folder, options.run), options.video, options.speed or SPEED)
             print(options.video)
         else:
-            _keep_out(options.output)
+            output = options.output or Path()
+            _take(output, "the pages")
             for name in chosen:
-                path = options.output / f"replay_{name}.html"
+                path = output / f"replay_{name}.html"
                 files.write_text(path, page(_scene(options.folder, name)))
                 print(path)
     except (AirgroundError, OSError) as error:
@@ -104,15 +106,16 @@ def _runs(folder: Path) -> list[str]:
     return found
 
 
-def _keep_out(folder: Path) -> None:
-    """Leave reports as they are: they say of each of their files what is in it, and the checker refuses others.
+def _take(folder: Path, what: str) -> None:
+    """Create a folder for `what`. Reports are left as they are: the checker refuses files that are not theirs.
 
     Raises:
-        FolderError: if the folder is one of a report.
+        FolderError: if the folder is one of a report, or cannot be written.
     """
     for each in (folder.resolve(), *folder.resolve().parents):
         if _is_report(each):
             raise FolderError(one_line(f"{folder} is in the report {each}, which is complete; name another, with -o"))
+    files.make_folder(folder, what)
 
 
 def _scene(folder: Path, run: str) -> Scene:

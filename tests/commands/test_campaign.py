@@ -68,6 +68,18 @@ def test_usage(spec: Path, arguments: str) -> None:
     assert end.value.code == 2
 
 
+@pytest.mark.parametrize("more", [["-n", "1", "--jobs", "1"], ["--only", "0"]])
+def test_what_cannot_be_written(
+    spec: Path, tmp_path: Path, more: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").write_text("mine")
+    output = tmp_path if "--only" in more else tmp_path / "file"
+    assert main([str(spec), "-o", str(output), *more]) == 2
+    said = capsys.readouterr().err
+    assert f"{output} cannot be written: " in said
+    assert said.count("\n") == 1
+
+
 def test_a_rule_that_is_none(spec: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main([str(spec), "--stop-when", "x"]) == 2
     assert "wanted: CLAIM < PROBABILITY" in capsys.readouterr().err

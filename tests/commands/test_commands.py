@@ -163,6 +163,8 @@ def test_diagram_writes_what_was_asked_for(tmp_path: Path, capsys: pytest.Captur
     assert "ugv_controller" in (tmp_path / "minimal_ugvs.svg").read_text(encoding="utf-8")
     assert main(["diagram", "minimal", "--part", "nothing", "-o", str(tmp_path)]) == 2
     assert "allowed: decision, uav, ugvs, world" in capsys.readouterr().err
+    assert main(["diagram", "minimal", "-o", str(tmp_path / "minimal.dot")]) == 2
+    assert "minimal.dot cannot be written: File exists; wanted: a folder for the pictures" in capsys.readouterr().err
     assert main(["diagram", "nowhere.yaml"]) == 2
     assert "no such scenario" in capsys.readouterr().err
 

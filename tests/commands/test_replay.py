@@ -52,11 +52,16 @@ def test_a_video(folder: Path, tmp_path: Path) -> None:
         (["{folder}/trace"], "is no report"),
         (["{folder}/missing"], "is no report"),
         (["{folder}", "-o", "{folder}"], "is in the report"),
+        (
+            ["{folder}", "-o", "{folder}.txt"],
+            "report.txt cannot be written: File exists; wanted: a folder for the pages",
+        ),
         (["{folder}", "d", "--video", "{folder}/trace/d.webp"], "is in the report"),
         (["{folder}", "d", "--video", "d.avi"], "allowed: names that end in .webp or .mp4"),
     ],
 )
 def test_what_is_refused(folder: Path, arguments: list[str], says: str, capsys: pytest.CaptureFixture[str]) -> None:
+    folder.with_suffix(".txt").write_text("mine")
     before = sorted(folder.rglob("*"))
     assert main(["replay", *(each.format(folder=folder) for each in arguments)]) == 2
     error = capsys.readouterr().err
@@ -66,10 +71,20 @@ def test_what_is_refused(folder: Path, arguments: list[str], says: str, capsys: 
     assert sorted(folder.rglob("*")) == before
 
 
-@pytest.mark.parametrize("extra", [["--video", "x.webp"], ["d", "--video", "x.webp", "--speed", "nan"]])
-def test_usage(folder: Path, extra: list[str]) -> None:
+@pytest.mark.parametrize(
+    "extra",
+    [
+        "--video x.webp",
+        "d --video x.webp --speed nan",
+        "d --video x.webp --live",
+        "d --video x.webp -o out",
+        "--live -o .",
+        "--speed 2",
+    ],
+)
+def test_usage(folder: Path, extra: str) -> None:
     with pytest.raises(SystemExit) as ended:
-        main(["replay", str(folder), *extra])
+        main(["replay", str(folder), *extra.split()])
     assert ended.value.code == 2
 
 

@@ -163,6 +163,15 @@ class Seen(HTMLParser):
         self.tags.append(tag)
 
 
+def test_a_page_that_cannot_be_written_is_named(
+    before: Json, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = str(save(tmp_path / "before", before))
+    assert main([folder, folder, "--html", str(tmp_path)]) == 2
+    said = capsys.readouterr().err
+    assert said == f"error: {tmp_path} cannot be written: Is a directory; wanted: a file for the page\n"
+
+
 def test_the_page_has_both_runs_drawn_and_nothing_foreign(before: Json, tmp_path: Path) -> None:
     scenario = make_scenario()
     after = copy.deepcopy(before)
