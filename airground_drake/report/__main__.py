@@ -107,7 +107,6 @@ def _reported(options: argparse.Namespace, command: str, scenario: Scenario, dig
         report = make.write_report(
             scenario, digest, output, options.format, command, kept, options.scenario == AUDIT, limits, watch
         )
-    make.read_back(output, options.format, report)
     overall = report["overall"]
     if not options.quiet:
         print(f"{scenario.name}: {overall['status'].replace('_', ' ')}. {overall['why']}\n{one_line(str(output))}")

@@ -6,8 +6,11 @@ report of ours is there, too.
 
 from __future__ import annotations
 
+import fcntl
+import os
 import re
 from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from airground_drake import files
@@ -27,22 +30,44 @@ _FOLDERS = re.compile(rf"trace(/\w+)?|(certificates|proofs)(/{_CLAIM})?")
 _OURS = re.compile(rb'\s*\{\s*"schema":\s*"airground_drake\.report/')
 
 
+@contextmanager
+def held(folder: Path) -> Iterator[None]:
+    """Prepare the folder, and keep other reports out of it; no file says so, and it ends with this process.
+
+    Raises:
+        FolderError: as `prepare`, and if another report is being written to it.
+    """
+    with files.wanted(folder, "a folder for the report"):
+        folder.mkdir(parents=True, exist_ok=True)
+        handle = os.open(folder, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise FolderError(one_line(f"{folder} is in use by another report; name another folder")) from None
+        except OSError:  # the file system has no such locks
+            pass
+        prepare(folder)
+        yield
+    finally:
+        with suppress(OSError):
+            fcntl.flock(handle, fcntl.LOCK_UN)  # also where a process that was forked meanwhile still lives
+        os.close(handle)
+
+
 def prepare(folder: Path) -> None:
     """Create the folder if need be, look whose it is, try to write to it, and sweep what killed runs have left in it.
 
     Raises:
         FolderError: if it holds something that is no report, or cannot be created or written.
     """
-    try:
+    with files.wanted(folder, "a folder for the report"):
         folder.mkdir(parents=True, exist_ok=True)
         if why := _refused(folder):
             raise FolderError(one_line(why))
         files.sweep(folder)
         for each in (folder, *_parts(folder)):
             files.try_to_write(each)
-    except OSError as error:
-        why = f"{error.filename or folder} cannot be written: {error.strerror or error}"
-        raise FolderError(one_line(f"{why}; wanted: a folder for the report")) from None
 
 
 def clear(folder: Path) -> None:

@@ -53,9 +53,10 @@ def write_report(
 
     Raises:
         LimitError: if the scenario asks for more than the limits.
-        FolderError: if the folder holds something that is no report, or cannot be written; before the work.
+        FolderError: if the folder holds something that is no report, is in use, or cannot be written; before the work.
         PluginError: if the scenario names a policy, route or task that cannot be made.
         OSError: if something cannot be written, after all.
+        ReportError: if, read back, it is not what was written.
     """
     within(scenario, limits)
     started, clock = datetime.now(UTC), time.perf_counter()
@@ -63,17 +64,19 @@ def write_report(
         from airground_drake.verify.registry import model_claims
 
         model_claims(added=scenario.claims)
-    folder.prepare(output)
-    if kept is not None and kept.is_dir():
-        files.sweep(kept)
-    traces = simulate_all(scenario, watch=watch, meanwhile=partial(import_module, _NEXT))
-    from airground_drake.report import after_runs
+    with folder.held(output):
+        if kept is not None and kept.is_dir():
+            files.sweep(kept)
+        traces = simulate_all(scenario, watch=watch, meanwhile=partial(import_module, _NEXT))
+        from airground_drake.report import after_runs
 
-    judged = after_runs.judge(scenario, traces, kept, audited=audited, drawn="html" in formats, watch=watch)
-    watch.stage("writing")
-    provenance = after_runs.provenance(scenario, started, command)
-    provenance["wall_s"] = time.perf_counter() - clock
-    return after_runs.write(scenario, digest, output, formats, traces, judged, provenance)
+        judged = after_runs.judge(scenario, traces, kept, audited=audited, drawn="html" in formats, watch=watch)
+        watch.stage("writing")
+        provenance = after_runs.provenance(scenario, started, command)
+        provenance["wall_s"] = time.perf_counter() - clock
+        report = after_runs.write(scenario, digest, output, formats, traces, judged, provenance)
+        read_back(output, formats, report)
+    return report
 
 
 def read_back(folder: Path, formats: Sequence[str], report: dict[str, Any]) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -82,6 +84,31 @@ def test_nothing_stays_of_an_old_report_and_everything_else_does(tmp_path: Path)
     assert content(tmp_path) == mine
     assert not (tmp_path / "proofs").exists()
     folder.clear(tmp_path)
+
+
+def test_two_reports_at_once_do_not_mix(tmp_path: Path) -> None:
+    with folder.held(tmp_path / "out"):
+        with pytest.raises(FolderError, match="out is in use by another report"), folder.held(tmp_path / "out"):
+            pass
+        with folder.held(tmp_path / "other"):
+            assert list((tmp_path / "out").iterdir()) == []
+    with folder.held(tmp_path / "out"):
+        pass
+
+
+def test_a_report_that_is_killed_leaves_the_folder_to_others(tmp_path: Path) -> None:
+    program = "import sys, time; from pathlib import Path; from airground_drake.report import folder\n"
+    program += "with folder.held(Path(sys.argv[1])): print(flush=True); time.sleep(600)"
+    command = [sys.executable, "-c", program, str(tmp_path)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        process.stdout.readline()
+        with pytest.raises(FolderError, match="in use"), folder.held(tmp_path):
+            pass
+        process.kill()
+        process.wait()
+        with folder.held(tmp_path):
+            pass
 
 
 def test_a_folder_that_cannot_be_had_is_named(tmp_path: Path) -> None:

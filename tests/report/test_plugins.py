@@ -15,7 +15,7 @@ from builders.hostile_policies import KINDS
 
 from airground_drake import scenarios
 from airground_drake.commands import diagram
-from airground_drake.report import make
+from airground_drake.report import after_runs, make
 from airground_drake.report.__main__ import main
 from airground_drake.verify import __main__ as judge
 
@@ -185,10 +185,11 @@ def test_a_report_that_is_not_what_was_written_is_exit_code_4(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def half(scenario: object, digest: str, folder: Path, *_: object) -> dict[str, object]:
-        folder.mkdir()
         (folder / "report.json").write_text('{"overall": ')
         return {"overall": {"status": "as_expected", "exit_code": 0, "why": ""}}
 
-    monkeypatch.setattr(make, "write_report", half)
+    monkeypatch.setattr(make, "simulate_all", lambda *_, **__: {})
+    monkeypatch.setattr(after_runs, "judge", lambda *_, **__: None)
+    monkeypatch.setattr(after_runs, "write", half)
     assert main(["case_a", "-o", str(tmp_path / "out"), "--format", "json"]) == 4
     assert "is not what was written" in capsys.readouterr().err
