@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import itertools
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -43,6 +44,7 @@ def local(jobs: int) -> Iterator[Pool]:
         yield partial(_locally, jobs)
     finally:
         loky.get_reusable_executor(reuse=True).shutdown(wait=True, kill_workers=True)
+        gc.collect()  # its semaphores are in cycles; those that are left when the command ends would be warned of
 
 
 def _locally(jobs: int, work: Callable[[int], T], items: Iterable[int]) -> Iterator[tuple[int, T | None]]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from functools import partial
 from pathlib import Path
 
@@ -17,6 +19,13 @@ def test_a_process_that_dies_loses_no_item_and_does_none_twice(tmp_path: Path) -
     with local(jobs=2) as pool:
         found = list(pool(partial(work, tmp_path, 5), range(9)))
     assert sorted(found) == [(item, None if item == 5 else item * item) for item in range(9)]
+
+
+def test_it_leaves_nothing_to_warn_of() -> None:
+    program = "from airground_drake import interruption; from airground_drake.campaign.pool import local\n"
+    program += "with local(2) as pool: list(pool(abs, range(5)))\n"
+    ran = subprocess.run([sys.executable, "-c", program + "interruption.leave(0)"], capture_output=True, text=True)
+    assert (ran.returncode, ran.stderr) == (0, "")
 
 
 def test_the_same_on_a_cluster_of_two_workers() -> None:
