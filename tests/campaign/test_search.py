@@ -91,3 +91,12 @@ def test_what_does_not_matter_goes(monkeypatch: pytest.MonkeyPatch) -> None:
     assert small["intervention"]["policies"] == []
     assert 3.0 < small["duration_s"] < 12.0
     assert round(small["obstacles"][matters]["position_m"][0], 1) == small["obstacles"][matters]["position_m"][0]
+
+
+def test_a_run_gets_no_shorter_than_a_control_period(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "_trace", lambda data: None)
+    data = resolved(load("minimal")[0])
+    period = data["control"]["period_s"]
+    shorter = [each["duration_s"] for each in module._shorter(data | {"duration_s": 1.5 * period})]
+    assert shorter
+    assert min(shorter) >= period
