@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from check.tampering.base import claim_of, copy, edited_report, edited_scenarios, mend
 
 from airground_drake import check
 from airground_drake.report.__main__ import main as write
@@ -43,3 +44,44 @@ def test_reports_of_changed_scenarios_agree(
     found = set(pd.read_parquet(tmp_path / "r/trace/c/decisions.parquet")["reason"])
     assert reasons <= found if reasons else not found
     assert check.main([str(tmp_path / "r")]) == 0, capsys.readouterr().out
+
+
+def _with_a_claim_of_others(report: Path, folder: Path, expected: str, *, declared: dict[str, str]) -> None:
+    """Put a claim that the scenario adds into a copy of a report, about run d and about the model."""
+    copy(report, folder)
+    with edited_scenarios(folder) as scenarios:
+        for scenario in scenarios:
+            scenario["claims"] = {"MINE": "mine:Mine"}
+            scenario["runs"]["d"]["expected"] |= declared
+            scenario["expected"] |= declared
+    with edited_report(folder) as document:
+        for run in ("d", ""):
+            entry = dict(claim_of(document, "ZENO-TRACE" if run else "SAFE-LEMMA", run))
+            document["claims"].append(entry | {"id": "MINE", "status": expected, "expected": expected, "evidence": {}})
+            document["claims"][-1]["counterexample"] = {"what": "shown"} if expected == "refuted" else None
+            document["claims"][-1]["exercised"] = 1
+        count = document["overall"]["counts"]
+        count[expected] = count.get(expected, 0) + 2
+        document["overall"]["checks"] += 2
+        document["overall"]["as_expected"] += 2
+    mend(folder)
+
+
+@pytest.mark.parametrize(("expected", "declared"), [("holds", {}), ("refuted", {"MINE": "refuted"})])
+def test_claims_of_others_are_known_but_not_established(
+    expected: str, declared: dict[str, str], report: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _with_a_claim_of_others(report, tmp_path / "r", expected, declared=declared)
+    assert check.main(["--json", str(tmp_path / "r")]) == 1
+    checks = json.loads(capsys.readouterr().out)["checks"]
+    left = [(one["claim"], one["run"], one["outcome"]) for one in checks if one["outcome"] != "agrees"]
+    assert left == [("MINE", "d", "cannot be re-established"), ("MINE", "", "cannot be re-established")]
+
+
+def test_what_is_expected_of_a_claim_of_others_is_the_scenarios(
+    report: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _with_a_claim_of_others(report, tmp_path / "r", "refuted", declared={})
+    assert check.main(["--json", str(tmp_path / "r")]) == 1
+    found = [one for one in json.loads(capsys.readouterr().out)["checks"] if one["claim"] == "MINE"]
+    assert [one["rule"] for one in found] == ["expected verdict"] * 2
