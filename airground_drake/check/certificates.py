@@ -68,9 +68,10 @@ def prove(claim: Json, files: Files, scenario: Json) -> Found:
         same("an obligation is proved", entry["status"], "proved", about=entry["name"])
     if claim["id"] == "SAFE-LEMMA":
         _gram_matrix(parse_json(content_of(files, "gram.json"), "gram.json"))
-        return Found("proved").counted(len(obligations))
-    found: Found = _RECORDED[claim["id"]](claim, scenario)
-    return found.counted(len(obligations))
+        found = Found("proved")
+    else:
+        found = _RECORDED[claim["id"]](claim, scenario)
+    return found.counted(len(obligations)).having_judged("evidence.obligations.*.name", "evidence.obligations.*.status")
 
 
 @lru_cache(maxsize=64)
@@ -227,9 +228,38 @@ def _recorded_of_inv(claim: Json, scenario: Json) -> Found:
         kind.name: float(reach - rational(kind.safe_m) - rational(kind.closing_m_s) * h) for kind in kinds_of(scenario)
     }
     agrees("spare of the sensing range", evidence["sensing_range_spare_m"], spare, within=SMALL)
-    left = SMALL - max(rounding_m(scenario, kind) for kind in kinds_of(scenario))
-    status = "proved" if left >= 0.0 else "inconclusive"
-    return Found.with_margin(status, left, within=1e-15) if math.isfinite(left) else Found(status)
+    lost = {kind.name: rounding_m(scenario, kind) for kind in kinds_of(scenario)}
+    _rounding(evidence["rounding"], lost, scenario)
+    left = SMALL - max(lost.values())
+    if not math.isfinite(left):
+        return Found("inconclusive")
+    worst = lost.get(claim["where"]["pair"], -1.0)
+    holds("where the margin is attained", worst >= max(lost.values()) * (1.0 - ALIKE), claim["where"], str(lost))
+    found = Found.with_margin("proved" if left >= 0.0 else "inconclusive", left, within=1e-15)
+    return found.also(**_CONFORMS, composition=_MET | {"composition": "augmented"}, wiring=_WIRED).having_judged(
+        "where.pair", "evidence.wiring.composition", "evidence.wiring.views.*", "evidence.wiring.least_times_bound.*",
+        "evidence.sensing_range_spare_m.*", "evidence.rounding.*.margin_of_a_step_m",
+        "evidence.rounding.*.margin_with_restoring_m",
+    )  # fmt: skip
+
+
+ALIKE = 1e-9
+"""Numbers that follow from the scenario alone differ by less, relative."""
+_CONFORMS: Json = {"conformance": {"agrees": True, "first_difference": None}}
+_MET: Json = {"met": True, "missed": 0, "first_missed": None}
+_WIRED: Json = {"agrees": True, "differences": 0, "first_difference": None}
+"""What the evidence says of running code that conforms."""
+
+
+def _rounding(recorded: Json, lost_m: Mapping[str, float], scenario: Json) -> None:
+    """What rounding may take from each kind of pairs, in a step and while the gain restores it."""
+    same("kinds of pairs", sorted(recorded), sorted(lost_m))
+    restored = scenario["control"]["avoidance_gain_1_s"] * scenario["control"]["period_s"]
+    for name, lost in lost_m.items():
+        if math.isfinite(lost):
+            due = {"margin_of_a_step_m": lost * restored, "margin_with_restoring_m": lost}
+            for key, value in due.items():
+                close(f"rounding: {key}", recorded[name][key], value, within=ALIKE * value, about=name)
 
 
 def _wiring(recorded: Json, scenario: Json) -> None:
@@ -261,7 +291,16 @@ def _recorded_of_gate(claim: Json, scenario: Json) -> Found:
         _wiring(wired, scenario)
     for team in evidence["controller"]:
         same("inequalities missed by the running controller", team["missed"], 0)
-    return Found.with_margin("proved", min(layer["worst_slack_m_s"] for layer in evidence["layer"]), within=0.0)
+    worst = min(layer["worst_slack_m_s"] for layer in evidence["layer"])
+    lowest = [layer["composition"] for layer in evidence["layer"] if layer["worst_slack_m_s"] == worst]
+    holds("where the margin is attained", claim["where"]["composition"] in lowest, claim["where"], str(lowest))
+    found = Found.with_margin("proved", worst, within=0.0, layer=[_MET] * len(compositions))
+    found = found.also(wiring=[_WIRED] * len(compositions))
+    return found.having_judged(
+        "where.composition", "evidence.method_d", "evidence.layer.*.composition", "evidence.layer.*.worst_slack_m_s",
+        "evidence.wiring.*.composition", "evidence.wiring.*.views.*", "evidence.wiring.*.least_times_bound.*",
+        "evidence.controller.*.missed",
+    )  # fmt: skip
 
 
 def _recorded_of_dist(claim: Json, scenario: Json) -> Found:
@@ -273,8 +312,26 @@ def _recorded_of_dist(claim: Json, scenario: Json) -> Found:
     agrees("least distances", evidence["least_distances_m"], bounds, within=SMALL)
     for row in evidence["runs"]:
         same("bounds broken by a disturbed run", row["broken"], 0, about=row["scene"])
+        _worst_of_a_disturbed_run(row, bounds)
     covered = [row["worst_margin_m"] for row in evidence["runs"] if not row["unmet"]]
-    return Found.with_margin("proved", min(covered), within=0.0)
+    lowest = [row["where"] for row in evidence["runs"] if row["worst_margin_m"] == min(covered)]
+    places = [{key: where[key] for key in ("scene", "attack", "robot", "t_s")} for where in lowest]
+    holds("where the margin is attained", claim["where"] in places, claim["where"], str(places))
+    found = Found.with_margin("proved", min(covered), within=0.0, disturbance_m_s=w, **_CONFORMS)
+    return found.having_judged(
+        "where.*", "evidence.least_distances_m.*", "evidence.runs.*.scene", "evidence.runs.*.broken",
+        "evidence.runs.*.worst_margin_m",
+        *(f"evidence.runs.*.where.{key}" for key in ("scene", "distance_m", "bound_m", "safe_distance_m")),
+    )  # fmt: skip
+
+
+def _worst_of_a_disturbed_run(row: Json, bounds_m: Mapping[str, float]) -> None:
+    """The worst margin is that of the distance there, to a bound that is one of a kind of pairs."""
+    where, about = row["where"], row["scene"]
+    same("scene of the worst margin", where["scene"], row["scene"], about=about)
+    close("worst margin", row["worst_margin_m"], where["distance_m"] - where["bound_m"], within=SMALL, about=about)
+    known = any(abs(where["bound_m"] - bound) <= SMALL for bound in bounds_m.values())
+    holds("bound of the worst margin", known, where["bound_m"], str(bounds_m), about=about)
 
 
 def _recorded_of_zeno(claim: Json, scenario: Json) -> Found:
@@ -287,7 +344,11 @@ def _recorded_of_zeno(claim: Json, scenario: Json) -> Found:
     error = Fraction(ROUNDOFF) * (Fraction(float(scenario["duration_s"])) + kept) + abs(meant - kept)
     rounding = math.nextafter(float(error), math.inf)
     close("rounding of the dwell", evidence["rounding_s"], rounding, within=1e-24)
-    return Found.with_margin("proved", SMALL - rounding, within=1e-16)
+    bound = float(scenario["decision"]["min_inter_event_s"] or SHORTEST_S)
+    agrees("where the margin is attained", claim["where"], {"bound_s": bound}, within=0.0)
+    conforms = {"disagreements": 0, "first": None}
+    found = Found.with_margin("proved", SMALL - rounding, within=1e-16, bound_s=bound, conformance=conforms)
+    return found.having_judged("where.bound_s", "evidence.rounding_s", "evidence.spacer")
 
 
 def _recorded_of_live(claim: Json, scenario: Json) -> Found:
@@ -301,7 +362,9 @@ def _recorded_of_live(claim: Json, scenario: Json) -> Found:
         same("given back before its time", row["given_back"], False)
         at_most("excess of a run's lag", row["largest_excess_m"], gate["lag_m"], within=SMALL)
     excess = max(row["largest_excess_m"] for row in evidence["runs"])
-    return Found.with_margin("proved", gate["lag_m"] - excess, within=SMALL)
+    return Found.with_margin("proved", gate["lag_m"] - excess, within=SMALL).having_judged(
+        "evidence.disturbance_m_s", "evidence.runs.*.given_back"
+    )
 
 
 def _recorded_of_wait(claim: Json, scenario: Json) -> Found:
@@ -324,14 +387,16 @@ def _recorded_of_wait(claim: Json, scenario: Json) -> Found:
     reasons = {reason for row in evidence["attacks"] for reason in row["reasons"]}
     due = {"over", "exhausted", "no_progress"}
     same("reasons seen under attack", sorted(due & reasons), sorted(due))
-    return Found.with_margin("proved", bound - max(longest), within=SMALL)
+    return Found.with_margin("proved", bound - max(longest), within=SMALL).having_judged(
+        "evidence.bound_s", "evidence.attacks.*.attack"
+    )
 
 
 def _recorded_of_iso(claim: Json, scenario: Json) -> Found:
     """The running trigger missed nothing that was due in a step, and invented nothing."""
     compared = claim["evidence"]["conformance"]
     same("crossings missed or invented by the running trigger", [compared["missed"], compared["spurious"]], [0, 0])
-    return Found("proved")
+    return Found("proved", facts={"conformance": {"missed": 0, "spurious": 0, "first": None}})
 
 
 _RECORDED: dict[str, Any] = {

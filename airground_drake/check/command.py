@@ -122,6 +122,9 @@ def _printable(text: str) -> str:
 def _print(lines: Sequence[Line]) -> None:
     for line in lines:
         print(_printable(f"{line.claim:<12}{line.run or '-':<8} {line.outcome}: {line.text}"))
+    taken = _as_recorded(lines)
+    values, keys = sum(sum(each["keys"].values()) for each in taken), sum(len(each["keys"]) for each in taken)
+    print(f"{values} values under {keys} keys of claims are taken as recorded: --json lists them")
     counts = _counts(lines)
     print(f"{len(lines)} checks: {', '.join(f'{count} {outcome}' for outcome, count in counts.items())}")
 
@@ -134,8 +137,19 @@ def _counts(lines: Sequence[Line]) -> dict[str, int]:
 
 
 def _document(folder: Path, lines: Sequence[Line]) -> dict[str, Any]:
-    checks = [_strict(asdict(line)) for line in lines]
-    return {"schema": SCHEMA, "report": str(folder), "checks": checks, "summary": _counts(lines)}
+    checks = [{key: _strict(value) for key, value in asdict(line).items() if key != "as_recorded"} for line in lines]
+    return {
+        "schema": SCHEMA,
+        "report": str(folder),
+        "checks": checks,
+        "as_recorded": _strict(_as_recorded(lines)),
+        "summary": _counts(lines),
+    }
+
+
+def _as_recorded(lines: Sequence[Line]) -> list[dict[str, Any]]:
+    """By claim and run, the keys that are taken as recorded, and how many values each has."""
+    return [{"claim": line.claim, "run": line.run, "keys": line.as_recorded} for line in lines if line.as_recorded]
 
 
 def _strict(value: Any) -> Any:

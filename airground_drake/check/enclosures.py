@@ -23,7 +23,7 @@ from typing import Any
 from .certificates import rational
 from .files import Files, Json, content_of, parse_json
 from .polynomials import bounded, number
-from .rules import SMALL, Disagreement, Found, NotEstablished, holds, same
+from .rules import SMALL, Disagreement, Found, NotEstablished, close, holds, same
 
 DIGITS = 100
 NARROW = Fraction(1, 10**12)
@@ -61,6 +61,10 @@ class Rule:
         """Threshold at u."""
         return u * self.noise**2 / (2 * self.drift)
 
+    def u(self, zeta_m: Fraction) -> Fraction:
+        """The u of a threshold."""
+        return 2 * zeta_m * self.drift / self.noise**2
+
     def residual(self, u: Fraction, ratio: Fraction) -> Decimal:
         """f(u) for r = ratio."""
         x = decimal(u)
@@ -93,6 +97,8 @@ def root(claim: Json, files: Files, scenario: Json) -> Found:
             found = _the_code_returns_the_root(claim, rule, ends)
         else:
             found = _the_root_is_the_minimum(claim, rule, saved["enclosures"], ends)
+        floats = {name: [float(number(end)) for end in both] for name, both in saved["enclosures"].items()}
+        found = found.also(statements=true, enclosures=floats)
         return found.counted(len(saved["statements"]))
 
 
@@ -120,21 +126,41 @@ def _the_code_returns_the_root(claim: Json, rule: Rule, ends: tuple[Fraction, Fr
         inside = low - NARROW * high <= value <= high + NARROW * high
         between = f"between {float(low)!r} and {float(high)!r}"
         holds("the code's threshold is the root", inside, float(value), between)
-    return Found.with_margin("proved", float(NARROW * high - outside), within=1e-24)
+    found = Found.with_margin("proved", float(NARROW * high - outside), within=1e-24)
+    return found.having_judged("evidence.running_threshold_m")
 
 
 def _the_root_is_the_minimum(claim: Json, rule: Rule, saved: Json, ends: tuple[Fraction, Fraction]) -> Found:
     """The root of the printed equation has a larger risk; by at least the margin. With c1 = c2 it is the same root."""
+    _risks_are_those_of_their_thresholds(claim, rule, ends)
+    facts = {"threshold_in_force_m": claim["inputs"]["zeta_m"]}
     if rule.c1 == rule.c2:
-        return Found("proved")
+        return Found("proved", facts=facts).having_judged(*RISKS)
     printed = _enclosure(rule, saved, "printed_u", "printed_zeta_m", rule.c1 / rule.c2)
     too_low = rule.c1 < rule.c2
     near, other = (ends[0], printed[1]) if too_low else (ends[1], printed[0])
     apart = other < near if too_low else near < other
     holds("the enclosures are apart", apart, f"{float(other)!r}", f"{'below' if too_low else 'above'} {float(near)!r}")
-    running = claim["evidence"]["risk_difference_to_the_running_code"]
-    holds("the running risk is the certified one", running <= SMALL, running, "1e-9 or less")
-    return Found.with_margin("proved", float(rule.risk(other) - rule.risk(near)))
+    return Found.with_margin("proved", float(rule.risk(other) - rule.risk(near)), **facts).having_judged(*RISKS)
+
+
+RISKS = (
+    "evidence.risk_at_the_root", "evidence.threshold_judged_m", "evidence.risk_at_the_threshold_judged",
+    "evidence.risk_at_the_threshold_in_force", "evidence.risk_difference_to_the_running_code",
+)  # fmt: skip
+
+
+def _risks_are_those_of_their_thresholds(claim: Json, rule: Rule, ends: tuple[Fraction, Fraction]) -> None:
+    """The threshold judged is the root; the running code's risks there, and at the one in force, are the formula's."""
+    evidence, root_m = claim["evidence"], float(rule.zeta_m(ends[0]))
+    close("threshold judged", evidence["threshold_judged_m"], root_m, within=SMALL * root_m)
+    for place, zeta_m in (
+        ("root", root_m), ("threshold_judged", root_m), ("threshold_in_force", claim["inputs"]["zeta_m"]),
+    ):  # fmt: skip
+        risk = float(rule.risk(rule.u(rational(zeta_m))))
+        close("risk", evidence[f"risk_at_the_{place}"], risk, within=SMALL * abs(risk), about=place)
+    off = evidence["risk_difference_to_the_running_code"]
+    holds("the running risk is the certified one", 0.0 <= off <= SMALL, off, "0 to 1e-9")
 
 
 def _statements_are_true(statements: list[Json]) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from .files import Json
 from .law import PLANE, Inequalities, avoiding, inequalities, least_spare, limited
 from .proposals import Proposal, accepted_at
-from .rules import SMALL, Array, Disagreement, Flags, Found
+from .rules import SMALL, Array, Disagreement, Flags, Found, agrees, holds
 from .run import Run
 
 COMMAND_M_S = 1e-6
@@ -18,6 +18,8 @@ COMMAND_M_S = 1e-6
 BINDING_M_S, DOUBT_M_S = 1e-9, 1e-10
 """An inequality binds where the law has the first to spare at most; of one closer to that than the second, rounding
 decides."""
+WHERE_M_S = 1e-8
+"""Recorded and recomputed differences from the law may differ by this."""
 SIDES = (-1.0, 1.0)
 """Before and after."""
 ON_TOP = ("b", "c")
@@ -27,10 +29,12 @@ ON_TOP = ("b", "c")
 class Robot(NamedTuple):
     """Commands of a robot and the law's, (S, 3) each, and what is executed by the messages and by the signals, (S,).
 
-    `spare_m_s` is what the law has to spare of the avoidance inequality that leaves the least, (S,).
+    `t_s` are the times of the samples, (S,); `spare_m_s` is what the law has to spare of the avoidance inequality that
+    leaves the least, (S,).
     """
 
     name: str
+    t_s: Array
     recorded: Array
     law: Array
     executing: Flags
@@ -53,11 +57,22 @@ def execution(run: Run, claim: Json) -> Found:
     if run.scenario["uav"]["task"] == "formation":
         robots.append(_uav(run))
     margin = COMMAND_M_S - max(float(robot.away_m_s.max()) for robot in robots)
-    facts = {"samples": len(run.sample_s), "robots": {r.name: {"executing": int(r.executing.sum())} for r in robots}}
+    formation = run.scenario["uav"]["task"] == "formation"
+    facts = {
+        "samples": len(run.sample_s),
+        "robots": {
+            r.name: {"executing": int(r.executing.sum()), "largest_difference_m_s": float(r.away_m_s.max())}
+            for r in robots
+        },
+        "not_judged": [] if formation else [f"{run.uav}: task {run.scenario['uav']['task']}"],
+        "tolerance_m_s": COMMAND_M_S,
+    }
+    _counts_of_binding(robots, claim["evidence"]["robots"])
+    _where(robots, claim["where"])
     least, most = (sum(r.tested(BINDING_M_S + side * DOUBT_M_S) for r in robots) for side in (-1.0, 1.0))
     wrong = [(k, r) for r in robots for k in np.flatnonzero(~(r.away_m_s <= COMMAND_M_S) | (r.executing != r.said))[:1]]
     if not wrong:
-        return Found("holds", margin, margin, facts, within=1e-8).counted(least, most)
+        return Found("holds", margin, margin, facts, within=1e-8).counted(least, most).having_judged(*JUDGED)
     if claim["status"] == "holds":
         k, robot = min(wrong, key=lambda one: int(one[0]))
         when = float(run.sample_s[k])
@@ -66,8 +81,58 @@ def execution(run: Run, claim: Json) -> Found:
             raise Disagreement("what is executed is what was accepted", said, due, robot.name, when)
         rule = "the command is the law's"
         raise Disagreement(rule, robot.recorded[k].tolist(), robot.law[k].tolist(), robot.name, when)
+    _first_wrong(wrong, run, claim["counterexample"])
     negative = margin if margin < 0.0 else None
-    return Found("refuted", negative, negative, facts, within=1e-8).counted(least, most)
+    found = Found("refuted", negative, negative, facts, within=1e-8).counted(least, most)
+    return found.having_judged(*JUDGED, *(f"counterexample.{key}" for key in SHOWN))
+
+
+JUDGED = ("where.robot", "where.t_s", "evidence.robots.*.binding", "evidence.robots.*.executing_and_binding")
+SHOWN = (
+    "robot", "t_s", "accepted_by_the_messages", "accepted_by_the_signals", "command_m_s", "law_m_s", "difference_m_s",
+)  # fmt: skip
+"""What is recorded of a sample at which a command is not the law's."""
+
+
+def _counts_of_binding(robots: list[Robot], recorded: Json) -> None:
+    """How many commands an inequality binds, all and while something is executed; rounding may decide."""
+    for robot in robots:
+        for key, which in (("binding", np.full(len(robot.law), True)), ("executing_and_binding", robot.executing)):
+            spare = robot.spare_m_s[which]
+            least, most = (int((spare <= BINDING_M_S + side * DOUBT_M_S).sum()) for side in SIDES)
+            count = recorded[robot.name][key]
+            possible = type(count) is int and least <= count <= most
+            holds(f"commands counted as {key}", possible, count, f"{least} to {most}", about=robot.name)
+
+
+def _where(robots: list[Robot], recorded: Json) -> None:
+    """The command that differs most from the law, or one that differs as much."""
+    by_name = {robot.name: robot for robot in robots}
+    holds("where the margin is attained", recorded["robot"] in by_name, recorded["robot"], str([*by_name]))
+    robot = by_name[recorded["robot"]]
+    there = np.abs(robot.t_s - recorded["t_s"]) <= SMALL
+    largest = max(float(each.away_m_s.max()) for each in robots)
+    attained = there.any() and float(robot.away_m_s[there].max()) >= largest - WHERE_M_S
+    holds("where the margin is attained", attained, recorded["t_s"], "a sample of the largest difference",
+          about=robot.name, t_s=recorded["t_s"])  # fmt: skip
+
+
+def _first_wrong(wrong: list[tuple[np.intp, Robot]], run: Run, recorded: Json) -> None:
+    """The counterexample is the first sample at which a command, or what is executed, is not the law's."""
+    first = min(k for k, _ in wrong)
+    names = [robot.name for k, robot in wrong if k == first]
+    when = float(run.sample_s[first])
+    holds("robot of the counterexample", recorded["robot"] in names, recorded["robot"], str(names), t_s=when)
+    robot = next(robot for k, robot in wrong if k == first and robot.name == recorded["robot"])
+    due = {
+        "t_s": when,
+        "accepted_by_the_messages": bool(robot.executing[first]),
+        "accepted_by_the_signals": bool(robot.said[first]),
+        "command_m_s": robot.recorded[first].tolist(),
+        "law_m_s": robot.law[first].tolist(),
+        "difference_m_s": float(robot.away_m_s[first]),
+    }
+    agrees("counterexample", recorded, due, within=1e-8, about=robot.name, t_s=when)
 
 
 def around(run: Run, robot: str) -> Inequalities:
@@ -95,7 +160,7 @@ def _ugv(run: Run, ugv: str) -> Robot:
         law[closer], away[closer] = tried[closer], off[closer]
     executing = np.array([proposal is not None for proposal in accepted])
     spare = least_spare(law, around(run, ugv))
-    return Robot(ugv, recorded, law, executing, _said(run, ugv, executing), spare)
+    return Robot(ugv, run.sample_s, recorded, law, executing, _said(run, ugv, executing), spare)
 
 
 def _said(run: Run, ugv: str, executing: Flags) -> Flags:
@@ -142,4 +207,5 @@ def _uav(run: Run) -> Robot:
     given = around(run, run.uav)
     law = avoiding(limited(wish, uav["max_speed_m_s"]), given, "augmented")
     never = np.zeros(len(law), dtype=bool)
-    return Robot(run.uav, run.command_m_s[run.uav][run.chosen_row], law, never, never, least_spare(law, given))
+    recorded = run.command_m_s[run.uav][run.chosen_row]
+    return Robot(run.uav, run.sample_s, recorded, law, never, never, least_spare(law, given))

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,7 +27,7 @@ NO_DIFFERENCE = 1e-6
 CHOICES = ("refuse", "accept")
 
 
-def gate_feas(run: Run, _: Json) -> Found:
+def gate_feas(run: Run, claim: Json) -> Found:
     """GATE-FEAS: situation, plan and answer; the margin is the part of a tolerance that rounding leaves."""
     if silent_ugvs(run):
         return Found("not_run")
@@ -44,8 +46,31 @@ def gate_feas(run: Run, _: Json) -> Found:
         mine = [decision for decision in decisions if decision.ugv == ugv]
         _answers_follow_the_rules(run, mine)
         _every_proposal_is_decided_on(run, ugv, mine)
-    found = Found("holds", 0.0, 1.0, {"decisions": len(decisions)}) if decisions else Found("holds")
-    return found.counted(len(decisions))
+    if not decisions:
+        return Found("holds", facts={"decisions": 0}).counted(0)
+    facts = {
+        "decisions": len(decisions),
+        "wrong": 0,
+        "reasons": reasons_of(run),
+        "without_a_plan": [f"decision of {each.ugv} at t = {each.t_s} s" for each in decisions if not each.planned],
+    }
+    slack = partial(_slack, [decision for decision in decisions if decision.planned], claim["evidence"])
+    found = Found("holds", 0.0, 1.0, facts).counted(len(decisions))
+    return found.judging(slack, "evidence.largest_slack_m", "evidence.plans_with_slack")
+
+
+def reasons_of(run: Run) -> dict[str, int]:
+    """How many decisions have each reason."""
+    return dict(Counter(map(str, run.decisions["reason"])))
+
+
+def _slack(planned: list[Decision], recorded: Json) -> None:
+    """The largest slack of a plan, and how many have any; of one within rounding of none either may be said."""
+    slack = [-float(each.gaps_m(each.positions_m).min(initial=np.inf)) for each in planned]
+    close("largest slack", recorded["largest_slack_m"], max([0.0, *slack]), within=SMALL)
+    least, most = (sum(value > side * SMALL for value in slack) for side in (1.0, -1.0))
+    count = recorded["plans_with_slack"]
+    holds("plans with slack", type(count) is int and least <= count <= most, count, f"{least} to {most}")
 
 
 class Answer(NamedTuple):
@@ -73,8 +98,11 @@ def _in_time(run: Run) -> Found:
         mine = [answer for answer in answers if answer.ugv == ugv]
         _decisions_come_when_due(run, mine)
         _every_proposal_is_decided_on(run, ugv, mine)
-    found = Found("holds", 0.0, 1.0, {"decisions": len(answers)}) if answers else Found("holds")
-    return found.counted(len(answers))
+    if not answers:
+        return Found("holds", facts={"decisions": 0}).counted(0)
+    number = len(answers)
+    facts = {"decisions": number, "comparisons": 2 * number, "wrong": 0, "reasons": reasons_of(run)}
+    return Found("holds", 0.0, 1.0, facts).counted(number)
 
 
 def _decisions_come_when_due(run: Run, decisions: Sequence[Decision | Answer]) -> None:

@@ -84,9 +84,27 @@ def _avoidance(scenario: Json) -> Json:
 
 
 def _built_from(scenario: Json) -> Json:
-    """What the diagram that is compared is built from: all that says who must keep which distance and how fast."""
-    uav = {**scenario["uav"], "task": "formation"}
-    return {**{name: scenario[name] for name in ("ugvs", "obstacles", "safe_distance", "control")}, "uav": uav}
+    """What the diagram of method (d) that is compared is built from: the scenario, without what others may add.
+
+    Of names, texts, seed, verdicts, policies, runs and routes nothing comes into the controllers.
+    """
+    return {
+        **scenario,
+        **_WITHOUT_OTHERS,
+        "uav": {**scenario["uav"], "task": "formation"},
+        "intervention": {**_INTERVENTION, "period_s": scenario["intervention"]["period_s"]},
+        "gatekeeper": {**scenario["gatekeeper"], "route": "relaxed"},
+        "runs": {"d": {"method": "d", "composition": "augmented", "stalls_m": {}, "expected": {}}},
+    }
+
+
+_WITHOUT_OTHERS: Json = {
+    "name": "built", "seed": 0, "title": "", "description": "",
+    "claims": {}, "expected": {}, "reproduction": [], "choices": [],
+}  # fmt: skip
+"""What is of the scenario's own, and of no controller."""
+_INTERVENTION: Json = {"retry_s": 1.0, "ranking": "predicted", "budget_s": 2.0, "policies": []}
+"""An intervention where a scenario says nothing of it."""
 
 
 def _method_d(scenario: Json) -> Json:

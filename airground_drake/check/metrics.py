@@ -74,6 +74,8 @@ def _ends_and_counts(run: Run, metrics: Json) -> None:
         same("counts of events", metrics["event_counts"][robot], counts, about=robot)
     close("duration", metrics["duration_s"], run.t_s[-1] - run.t_s[0], within=SMALL)
     agrees("wall-clock time", metrics["wall_s"], run.wall_s, within=0.0)
+    factor = metrics["duration_s"] / run.wall_s if run.wall_s else None
+    agrees("simulated seconds per second", metrics["realtime_factor"], factor, within=SMALL)
 
 
 def _gatekeeper(run: Run, recorded: Json) -> None:

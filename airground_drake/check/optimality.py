@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from .decisions import Decision, decisions_of, silent_ugvs
 from .files import Json
-from .rules import SMALL, Array, Flags, Found, NotEstablished, at_most, close, holds
+from .rules import SMALL, Array, Flags, Found, NotEstablished, at_most, close, holds, same
 from .run import Run
 
 TIE = 1e-9
@@ -29,6 +30,8 @@ HALF_PLANE_ROUTES = ("relaxed", "branch_and_bound")
 """Routes whose lower bound is about distances along recorded normals."""
 BLOCK_ROUTES = ("enumeration", "branch_and_bound")
 """Routes that choose one mode for each block."""
+MOST_LISTED = 5
+"""Gaps that the evidence lists at most."""
 NARROW = 1e-5
 """Width of an enclosure, relative, from which on better shares are looked for at ties."""
 TIED_M = 1e-5
@@ -41,7 +44,7 @@ PROBE = 1e-3
 """Change of omega by which curvature is found."""
 
 
-def gate_sur(run: Run, _: Json) -> Found:
+def gate_sur(run: Run, claim: Json) -> Found:
     """GATE-SUR: (28)-(29), and an integrated rounding error of half a stage at most."""
     if silent_ugvs(run):
         return Found("not_run")
@@ -50,9 +53,28 @@ def gate_sur(run: Run, _: Json) -> Found:
     for decision in rounded:
         _rounded_by_the_rule(decision)
     if not rounded:
-        return Found("not_run") if decisions else Found("holds").counted(0)
-    margin = max(0.0, min(decision.dt_s / 2.0 - rounding_error_s(decision) for decision in rounded))
-    return Found.with_margin("holds", margin, decisions=len(decisions)).counted(len(rounded))
+        return Found("not_run") if decisions else Found("holds", facts={"decisions": 0}).counted(0)
+    left = {(each.ugv, each.t_s): each.dt_s / 2.0 - rounding_error_s(each) for each in rounded}
+    facts: Json = {
+        "decisions": len(decisions),
+        "without_relaxation": [_label(each) for each in decisions if not len(each.relaxed)],
+        "bound_s": rounded[0].dt_s / 2.0,
+        "largest_error_s": rounded[0].dt_s / 2.0 - min(left.values()),
+    }
+    found = Found.with_margin("holds", max(0.0, min(left.values())), **facts).counted(len(rounded))
+    return found.judging(partial(_where, claim["where"], left, left, SMALL), "where.robot", "where.t_s")
+
+
+def _label(decision: Decision) -> str:
+    return f"decision of {decision.ugv} at t = {decision.t_s} s"
+
+
+def _where(recorded: Json, least: Numbers, most: Numbers, slop: float) -> None:
+    """The margin is attained at a decision of which no other is sure to have less: margins between least and most."""
+    key = (recorded["robot"], recorded["t_s"])
+    holds("where the margin is attained", key in least, str(key), "a decision")
+    least_of_all = min(most.values())
+    holds("where the margin is attained", least[key] <= least_of_all + slop, least[key], least_of_all, about=str(key))
 
 
 def rounding_error_s(decision: Decision) -> float:
@@ -78,6 +100,10 @@ def _at(decision: Decision) -> Json:
     return {"about": f"decision of {decision.ugv}", "t_s": decision.t_s}
 
 
+Numbers = dict[tuple[str, float], float]
+"""By robot and time of a decision."""
+
+
 class Enclosure(NamedTuple):
     """Bounds of the least cost of the plans that a route chooses from."""
 
@@ -85,7 +111,7 @@ class Enclosure(NamedTuple):
     upper: float
 
 
-def gate_opt(run: Run, _: Json) -> Found:
+def gate_opt(run: Run, claim: Json) -> Found:
     """GATE-OPT: no plan costs more than 5 % of the cheaper constant plan's cost above the optimum of its problem.
 
     A gap is negative where the plan, by exact distances, costs less than the optimum along half-planes.
@@ -97,9 +123,11 @@ def gate_opt(run: Run, _: Json) -> Found:
     for decision in planned:
         _no_dearer_than_constant_plans(decision)
     if route not in (*HALF_PLANE_ROUTES, *BLOCK_ROUTES):
-        return Found("inconclusive" if decisions else "holds").counted(len(planned))
+        return Found("inconclusive" if decisions else "holds", facts={"decisions": len(decisions)}).counted(
+            len(planned)
+        )
     if not decisions:
-        return Found("holds").counted(0)
+        return Found("holds", facts={"decisions": 0}).counted(0)
     halfplanes = route in HALF_PLANE_ROUTES
     if not planned or any(halfplanes and decision.normals is None for decision in planned):
         return Found("inconclusive").counted(len(planned))
@@ -112,14 +140,50 @@ def gate_opt(run: Run, _: Json) -> Found:
         gaps.append([(own - optimum.upper) / decision.scale, (own - optimum.lower) / decision.scale])
     least, most = np.max(gaps, axis=0)
     if most <= LARGEST_GAP:
-        found = Found("holds", LARGEST_GAP - float(most), LARGEST_GAP - float(least), {"bounded": len(planned)})
-        return found.counted(len(planned))
+        facts = {
+            "decisions": len(decisions),
+            "bounded": len(planned),
+            "without_a_plan": [_label(each) for each in decisions if not each.planned],
+            "without_a_bound": [],
+            "gap_too_wide_to_decide": [],
+        }
+        found = Found("holds", LARGEST_GAP - float(most), LARGEST_GAP - float(least), facts).counted(len(planned))
+        of_gaps = partial(_evidence_on_gaps, claim, planned, np.array(gaps))
+        return found.judging(
+            of_gaps, "where.robot", "where.t_s", "evidence.largest_gap", "evidence.median_gap",
+            "evidence.widest_enclosure", *(f"evidence.largest_gaps.*.{key}" for key in ("robot", "t_s", "gap")),
+        )  # fmt: skip
     if least <= LARGEST_GAP:
         raise NotEstablished("the largest gap", f"it is between {least:.9g} and {most:.9g}, allowed {LARGEST_GAP}")
     for decision, (_lowest, highest) in zip(planned, gaps, strict=True):
         if highest > LARGEST_GAP:
             _no_plan_of_blocks_is_much_cheaper(decision)
     return Found("inconclusive").counted(len(planned))
+
+
+def _evidence_on_gaps(claim: Json, planned: list[Decision], gaps: Array) -> None:
+    """Largest and median gap are possible ones; those listed are of decisions with such gaps, the largest first."""
+    evidence, slop = claim["evidence"], SMALL
+    keys = [(each.ugv, each.t_s) for each in planned]
+    least, most = (dict(zip(keys, column, strict=True)) for column in gaps.T.tolist())
+    low, high = np.median(gaps, axis=0)
+    median = evidence["median_gap"]
+    holds("median gap", low - slop <= median <= high + slop, median, f"{low:.9g} to {high:.9g}")
+    width = evidence["widest_enclosure"]
+    holds("widest enclosure", 0.0 <= width <= NARROW, width, f"0 to {NARROW}")
+    listed = evidence["largest_gaps"]
+    same("number of gaps that are listed", len(listed), min(MOST_LISTED, len(planned)))
+    for entry in listed:
+        key = (entry["robot"], entry["t_s"])
+        holds("a gap is of a decision", key in least, str(key), "a decision with a plan")
+        there = least[key] - slop <= entry["gap"] <= most[key] + slop
+        holds("a gap that is listed", there, entry["gap"], f"{least[key]:.9g} to {most[key]:.9g}", about=str(key))
+    by_size = sorted((entry["gap"] for entry in listed), reverse=True)
+    same("gaps are listed by size", [entry["gap"] for entry in listed], by_size)
+    left_out = [least[key] for key in least if key not in [(entry["robot"], entry["t_s"]) for entry in listed]]
+    at_most("gap that is not listed", max(left_out, default=-np.inf), by_size[-1], within=slop)
+    same("largest gap", evidence["largest_gap"], by_size[0])
+    same("where the margin is attained", claim["where"], {key: listed[0][key] for key in ("robot", "t_s")})
 
 
 def _no_dearer_than_constant_plans(decision: Decision) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 
@@ -17,14 +18,37 @@ AT_REST_M = 1e-3
 """Standing still: no farther than this from the end."""
 
 
-def live_goal(run: Run, _: Json) -> Found:
+def live_goal(run: Run, claim: Json) -> Found:
     """LIVE-GOAL: every robot ended at its target, or standing where the scenario declares that it stalls."""
-    ends = [*_ends(run)]
-    margin = min(margin for _, _, margin in ends)
-    conditions = [{"robot": robot, "condition": what, "margin_m": margin} for robot, what, margin in ends]
+    conditions = [*_ends(run)]
+    margin = min(float(entry["margin_m"]) for entry in conditions)
     found = Found.with_margin("holds" if margin >= 0.0 else "refuted", margin, conditions=conditions)
-    farther = [float(np.linalg.norm(run.position_m[robot][0] - place)) - near for robot, place, near in _goals(run)]
-    return found.counted(sum(each > SMALL for each in farther), sum(each > -SMALL for each in farther))
+    farther = {
+        robot: float(np.linalg.norm(run.position_m[robot][0] - place)) - near for robot, place, near in _goals(run)
+    }
+    _worst_end(claim, margin)
+    least, most = ([robot for robot in farther if farther[robot] > side * SMALL] for side in (1.0, -1.0))
+    went = claim["evidence"]["had_a_way_to_go"]
+    possible = {*least} <= {*went} <= {*most} and went == [robot for robot in farther if robot in went]
+    holds("who had a way to go", possible, str(went), str(most))
+    return found.counted(len(least), len(most)).having_judged(
+        "where.robot", "where.condition", "evidence.had_a_way_to_go.*",
+        *(f"counterexample.{key}" for key in CONDITION),
+    )  # fmt: skip
+
+
+CONDITION = ("robot", "condition", "point_m", "final_m", "distance_m", "moved_m", "margin_m")
+"""What is recorded of a condition on the end of a robot."""
+
+
+def _worst_end(claim: Json, margin_m: float) -> None:
+    """Where the margin is attained, and the counterexample if it is negative, is a condition of least margin."""
+    where, shown = claim["where"], claim["counterexample"]
+    listed = [entry for entry in claim["evidence"]["conditions"] if entry["margin_m"] <= margin_m + SMALL]
+    places = [{key: entry[key] for key in ("robot", "condition")} for entry in listed]
+    holds("where the margin is attained", where in places, str(where), str(places))
+    if shown:
+        holds("counterexample", shown == listed[places.index(where)], str(shown), "the condition of least margin")
 
 
 def _goals(run: Run) -> Iterator[tuple[str, Array, float]]:
@@ -45,25 +69,34 @@ def _above_the_centroid_m(run: Run) -> Array:
     return np.asarray(centroid + np.array([0.0, 0.0, run.scenario["uav"]["altitude_m"]]))
 
 
-def _ends(run: Run) -> Iterator[tuple[str, str, float]]:
-    """Robot, condition and margin in m, in the order of the report."""
+def _ends(run: Run) -> Iterator[Json]:
+    """What is recorded of each condition, in the order of the report."""
     scenario = run.scenario
     stalls, arrival = scenario["runs"][run.name]["stalls_m"], scenario["arrival_tolerance_m"]
-    end = {robot: run.position_m[robot][-1] for robot in run.robots}
     for ugv in run.ugvs:
-        short = float(np.linalg.norm(end[ugv] - scenario["ugvs"][ugv]["target_m"]))
+        target = np.array(scenario["ugvs"][ugv]["target_m"])
         if ugv in stalls:
-            off = float(np.linalg.norm(end[ugv] - stalls[ugv]))
-            yield ugv, "at its stall point", scenario["stall_tolerance_m"] - off
-            yield ugv, "stands", AT_REST_M - _moved_at_the_end_m(run, ugv)
-            yield ugv, "short of its target", short - arrival
+            yield _end(run, ugv, "at its stall point", np.array(stalls[ugv]), scenario["stall_tolerance_m"])
+            moved = _moved_at_the_end_m(run, ugv)
+            yield {"robot": ugv, "condition": "stands", "moved_m": moved, "margin_m": AT_REST_M - moved}
+            short = float(np.linalg.norm(run.position_m[ugv][-1] - target))
+            yield {"robot": ugv, "condition": "short of its target", "margin_m": short - arrival}
         else:
-            yield ugv, "at its target", arrival - short
+            yield _end(run, ugv, "at its target", target, arrival)
     if stalls:
-        off = float(np.linalg.norm(end[run.uav] - _above_the_centroid_m(run)))
-        yield run.uav, "over the centroid of the UGVs", arrival - off
+        yield _end(run, run.uav, "over the centroid of the UGVs", _above_the_centroid_m(run), arrival)
     else:
-        yield run.uav, "at its target", arrival - float(np.linalg.norm(end[run.uav] - scenario["uav"]["target_m"]))
+        yield _end(run, run.uav, "at its target", np.array(scenario["uav"]["target_m"]), arrival)
+
+
+def _end(run: Run, robot: str, condition: str, point_m: Array, tolerance_m: float) -> Json:
+    """That a robot ended within a tolerance of a point."""
+    final = run.position_m[robot][-1]
+    distance = float(np.linalg.norm(final - point_m))
+    places = {"point_m": point_m.tolist(), "final_m": final.tolist()}
+    return {
+        "robot": robot, "condition": condition, **places, "distance_m": distance, "margin_m": tolerance_m - distance,
+    }  # fmt: skip
 
 
 def _moved_at_the_end_m(run: Run, robot: str) -> float:
@@ -73,7 +106,7 @@ def _moved_at_the_end_m(run: Run, robot: str) -> float:
     return float(np.linalg.norm(places - places[-1], axis=1).max())
 
 
-def comm(run: Run, _: Json) -> Found:
+def comm(run: Run, claim: Json) -> Found:
     """COMM: proposals and decisions only while their UGV or their cause is intervened on, and not too many of them.
 
     Too many are more than an always-on scheme has.
@@ -98,10 +131,21 @@ def comm(run: Run, _: Json) -> Found:
     duration, n = run.scenario["duration_s"] + SMALL, len(run.ugvs)
     spent = {"proposal": proposals, "decision": len(run.decisions)}
     always_on = {"proposal": n * int(duration / planning_s), "decision": n * int(duration / gating_s) if gated else 0}
-    saved = [1.0 - spent[kind] / most for kind, most in always_on.items() if most]
+    saved = {kind: 1.0 - spent[kind] / most for kind, most in always_on.items() if most}
     status = "holds" if all(spent[kind] <= most for kind, most in always_on.items()) else "refuted"
-    found = Found.with_margin(status, min(saved), spent=spent, always_on=always_on) if saved else Found(status)
-    return found.counted(proposals)
+    per_ugv = {
+        ugv: {
+            "proposal": len(run.times_s(ugv, "proposal")),
+            "decision": len(decided_s(run, ugv)),
+            "intervals_s": run.interventions_s(ugv).tolist(),
+        }
+        for ugv in run.ugvs
+    }
+    facts: Json = {"spent": spent, "always_on": always_on, "saved": saved, "ugvs": per_ugv, "outside_interventions": []}
+    found = Found.with_margin(status, min(saved.values()), **facts) if saved else Found(status, facts=facts)
+    over = {"spent": spent, "always_on": always_on} if status == "refuted" else None
+    shown = partial(same, "counterexample", claim["counterexample"], over)
+    return found.counted(proposals).judging(shown, "counterexample")
 
 
 def decided_s(run: Run, ugv: str) -> Array:
@@ -138,13 +182,18 @@ def _no_strays(run: Run, ugv: str, kind: str, times_s: Array, issued_s: Array, a
     holds(f"a {kind} only during interventions", np.array(inside, bool), times_s, "during one", about=ugv, t_s=times_s)
 
 
-def gate_time(run: Run, _: Json) -> Found:
+def gate_time(run: Run, claim: Json) -> Found:
     """GATE-TIME: the 99th percentile of the CPU times, rounded up to an order statistic, is below the period."""
     times, period = np.array(run.decision_times_s, dtype=np.float64), float(run.scenario["gatekeeper"]["period_s"])
     if not len(run.decisions):
-        return Found("not_run") if any(map(run.talk_is_due, run.ugvs)) else Found("holds").counted(0)
+        missing = any(map(run.talk_is_due, run.ugvs))
+        return Found("not_run") if missing else Found("holds", facts={"count": 0}).counted(0)
     same("one time for each decision", len(times), len(run.decisions))
     holds("times are not negative", times >= 0.0, times, "0 or more")
     p50, p99 = (float(np.quantile(times, level, method="higher")) for level in (0.5, 0.99))
     facts = {"p50_s": p50, "p99_s": p99, "max_s": float(times.max()), "period_s": period, "count": len(times)}
-    return Found.with_margin("holds" if p99 < period else "refuted", period - p99, **facts).counted(len(times))
+    facts["over_period"] = int((times >= period).sum())
+    slowest = {"decision": int(times.argmax()), "time_s": float(times.max())} if p99 >= period else None
+    found = Found.with_margin("holds" if p99 < period else "refuted", period - p99, **facts)
+    shown = partial(same, "counterexample", claim["counterexample"], slowest)
+    return found.counted(len(times)).judging(shown, "counterexample")

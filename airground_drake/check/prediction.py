@@ -53,10 +53,10 @@ def gate_model(run: Run, _: Json) -> Found:
     if silent_ugvs(run):
         return Found("not_run")
     if run.method == "d":
-        return outcomes(run) if len(run.decisions) else Found("holds").counted(0)
+        return outcomes(run) if len(run.decisions) else Found("holds", facts={"decisions": 0}).counted(0)
     decisions = decisions_of(run)
     if not decisions:
-        return Found("holds").counted(0)
+        return Found("holds", facts={"decisions": 0}).counted(0)
     loops = Loops(*(np.stack(part) for part in zip(*(_loop(run, each) for each in decisions), strict=True)))
     off = 0.0
     for accepted, choice in enumerate(CHOICES):
@@ -66,8 +66,8 @@ def gate_model(run: Run, _: Json) -> Found:
             at: Json = {"about": f"decision of {decision.ugv}", "t_s": decision.t_s}
             close(f"velocity of mode {choice}", recorded.ravel(), modes[k].ravel(), within=VELOCITY_M_S, **at)
             off = max(off, float(np.abs(recorded - modes[k]).max()))
-    found = Found.with_margin("holds", VELOCITY_M_S - off, within=1e-7, decisions=len(decisions))
-    return found.counted(len(decisions))
+    facts = {"decisions": len(decisions), "largest_difference_m_s": off}
+    return Found.with_margin("holds", VELOCITY_M_S - off, within=1e-7, **facts).counted(len(decisions))
 
 
 def _loop(run: Run, decision: Decision) -> tuple[Array, ...]:

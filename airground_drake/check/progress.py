@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from .decisions import silent_ugvs
+from .feasibility import reasons_of
 from .files import Json
 from .foresight import foreseen, on_which, rows_of
 from .rules import SMALL, Array, Found, at_most, close, same
@@ -37,18 +38,25 @@ def live_prog(run: Run, _: Json) -> Found:
         return Found("not_run")
     rows = rows_of(run)
     if not rows:
-        return Found("holds").counted(0)
-    longest, accepted = 0.0, 0
+        return Found("holds", facts={"decisions": 0}).counted(0)
+    longest, accepted, farthest = 0.0, 0, 0.0
     for ugv in run.ugvs:
         state, last = _Ugv(), None
         for row in [row for row in rows if row["robot"] == ugv]:
             _follow(run, row, last, state)
             if row["decision"] == "accept":
                 longest = max(longest, row["t_s"] - state.on_time_s)
+                farthest = max(farthest, row["lag_m"] - row["predicted_lag_m"])
                 accepted += 1
             last = row
-    found = Found.with_margin("holds", run.scenario["gatekeeper"]["behind_s"] - longest, decisions=len(rows))
-    return found.counted(accepted)
+    facts = {
+        "decisions": len(rows),
+        "executing": accepted,
+        "farthest_behind_prediction_m": farthest,
+        "reasons": reasons_of(run),
+        "most_tries": max(row["tries"] for row in rows),
+    }
+    return Found.with_margin("holds", run.scenario["gatekeeper"]["behind_s"] - longest, **facts).counted(accepted)
 
 
 def _follow(run: Run, row: dict[str, Any], last: dict[str, Any] | None, state: _Ugv) -> None:

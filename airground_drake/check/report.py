@@ -5,15 +5,16 @@ from __future__ import annotations
 import json
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache, partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from .certificates import prove
 from .command import LIMIT_S
 from .enclosures import root
 from .events import check_events
+from .evidence import check_entry, nothing_besides
 from .execution import execution
 from .feasibility import gate_feas
 from .files import Files, Json, canonical, is_plain, names_in, read_bytes, read_folder, read_json, sha256
@@ -104,6 +105,7 @@ class Line:
         t_s: when in the run; None where there is no time.
         recorded: what the files say, of a broken rule.
         recomputed: what follows from them.
+        as_recorded: by key, how many values of the claim's entry were not established: see `evidence.py`.
     """
 
     claim: str
@@ -115,6 +117,14 @@ class Line:
     t_s: float | None = None
     recorded: Any = None
     recomputed: Any = None
+    as_recorded: Mapping[str, int] = field(default_factory=dict)
+
+
+class Agreed(NamedTuple):
+    """What agrees, in words, and what of it was taken as recorded."""
+
+    text: str
+    as_recorded: Mapping[str, int]
 
 
 def check_report(folder: Path, limit_s: float = LIMIT_S) -> list[Line]:
@@ -193,11 +203,13 @@ def _lines(folder: Path, there: Sequence[str], report: Json, limit_s: float) -> 
         yield attempt(claim["id"], claim["run"], partial(_judge, claim, scenario, decide))
 
 
-def _attempt(limit_s: float, claim: str, run: str, check: Callable[[], str]) -> Line:
+def _attempt(limit_s: float, claim: str, run: str, check: Callable[[], str | Agreed]) -> Line:
     """What a check says, as a line; whatever goes wrong in it is not agreement."""
     try:
         with at_most_s(limit_s):
-            return Line(str(claim), str(run), AGREES, check())
+            said = check()
+            agreed = said if isinstance(said, Agreed) else Agreed(said, {})
+            return Line(str(claim), str(run), AGREES, agreed.text, as_recorded=agreed.as_recorded)
     except Disagreement as broken:
         when = "" if broken.t_s is None else f" at t = {broken.t_s:.9g} s"
         about = f" ({broken.about})" if broken.about else ""
@@ -282,12 +294,12 @@ def _outcome(claim: Json) -> str:
     return NOT_EXERCISED if idle else str(claim["status"])
 
 
-def _judge(claim: Json, scenario: Json, decide: Callable[[Json], Found]) -> str:
+def _judge(claim: Json, scenario: Json, decide: Callable[[Json], Found]) -> Agreed:
     """Compare a recorded verdict with what the claim's own formula gives."""
     status, foreign = claim["status"], is_foreign(claim["id"], scenario)
     if foreign:
-        possible = expected_of_foreign(claim, scenario)
-        holds("expected verdict", claim["expected"] in possible, claim["expected"], " or ".join(possible))
+        due = expected_of_foreign(claim, scenario)
+        holds("expected verdict", claim["expected"] in due, claim["expected"], " or ".join(due))
     else:
         same("expected verdict", claim["expected"], expectations(scenario).get((claim["run"], claim["id"])))
     may_be_kept = claim["run"] == "" and status not in UNDECIDED
@@ -311,17 +323,18 @@ def _judge(claim: Json, scenario: Json, decide: Callable[[Json], Found]) -> str:
     same("verdict", status, found.status)
     if not remark:
         _counted_as_here(claim, found)
-    margin = claim["margin"]
+    margin: float | None = claim["margin"]
     if found.least is None or found.most is None or margin is None:
         same("margin", margin, found.least)
     else:
         slop = found.within + 1e-6 * abs(margin)
         possible = found.least if found.least == found.most else f"{found.least} to {found.most}"
         holds("margin", found.least - slop <= margin <= found.most + slop, margin, possible)
-    agrees("evidence", claim["evidence"], found.facts, within=1e-8)
+    taken = check_entry(claim, found, whole=not remark and status not in UNDECIDED)
     if _outcome(claim) == NOT_EXERCISED:
-        return f"{status}, nothing to check"
-    return f"{status}{remark}" if margin is None else f"{status}{remark}, margin {margin:.6g} {claim['unit']}".rstrip()
+        return Agreed(f"{status}, nothing to check", taken)
+    attained = "" if margin is None else f", margin {margin:.6g} {claim['unit']}".rstrip()
+    return Agreed(f"{status}{remark}{attained}", taken)
 
 
 def _counted_as_here(claim: Json, found: Found) -> None:
@@ -344,6 +357,7 @@ def _check_metrics(run: Run, metrics_text: str) -> str:
 def _decide_of_run(run: Run, claim_text: str) -> Found:
     """What a claim's formula gives; the same for the same run and the same recorded claim."""
     claim, known = json.loads(claim_text), claims_of(run.method, run.scenario["gatekeeper"]["route"])
+    same("inputs", claim["inputs"], {})
     if claim["id"] not in known:
         raise NotEstablished("the claim is known", f"known on this run: {', '.join(known)}", claim["id"])
     return known[claim["id"]](run, claim)
@@ -356,8 +370,9 @@ def _decide_of_model(claim_text: str, files: Files, scenario_text: str) -> Found
     if claim["id"] not in OF_MODEL:
         raise NotEstablished("the claim is known", f"known: {', '.join(OF_MODEL)}", claim["id"])
     same("SHA-256 of certificates", claim["certificates"], {name: sha256(content) for name, content in files})
-    same("inputs", sorted(claim["inputs"]), sorted(inputs_of(claim["id"], scenario)))
-    agrees("inputs", claim["inputs"], inputs_of(claim["id"], scenario), within=1e-12)
+    inputs = inputs_of(claim["id"], scenario)
+    agrees("inputs", claim["inputs"], inputs, within=1e-12)
+    nothing_besides("inputs", claim["inputs"], inputs)
     return OF_MODEL[claim["id"]](claim, files, scenario)
 
 

@@ -6,7 +6,7 @@ what it should be third. So nothing is rejected without saying why.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -66,6 +66,10 @@ class Found:
         within: by which a recorded margin may differ.
         exercised: how often the claim was put to the test, at least and at most: they differ where rounding decides
             whether something counts; None: not counted here.
+        judged: keys of `where`, `counterexample` and `evidence` that the claim's own rules have judged; what is in
+            `facts` need not be named. See `evidence.py`.
+        rules: to be applied to the entry once the verdict is known to be right: what breaks one of these breaks the
+            entry, and is no refutation of the claim.
     """
 
     status: str
@@ -74,6 +78,20 @@ class Found:
     facts: Mapping[str, Any] = field(default_factory=dict)
     within: float = SMALL
     exercised: tuple[int, int] | None = None
+    judged: tuple[str, ...] = ()
+    rules: tuple[Callable[[], None], ...] = ()
+
+    def having_judged(self, *keys: str) -> Found:
+        """The same, with further keys of the claim's entry that its rules have judged."""
+        return replace(self, judged=(*self.judged, *keys))
+
+    def judging(self, rule: Callable[[], None], *keys: str) -> Found:
+        """The same, with a further rule about the claim's entry, and the keys that it judges."""
+        return replace(self.having_judged(*keys), rules=(*self.rules, rule))
+
+    def also(self, **facts: Any) -> Found:
+        """The same, with further facts."""
+        return replace(self, facts={**self.facts, **facts})
 
     def counted(self, least: int, most: int | None = None) -> Found:
         """The same, with how often the claim was put to the test."""

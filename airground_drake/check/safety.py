@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from itertools import chain
 from typing import NamedTuple
@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .files import Json
-from .rules import SMALL, Array, Disagreement, Found, agrees, close, holds, same
+from .rules import SMALL, Array, Disagreement, Found, agrees, at_most, close, holds, same
 from .run import Run
 from .scenario import Pair
 
@@ -60,8 +60,32 @@ def safe_trace(run: Run, claim: Json) -> Found:
     margin = min(margins.values())
     worst = claim["where"]["first"], claim["where"]["second"]
     close("pair of least margin", margins[worst], margin, within=SMALL, about=", ".join(worst))
-    found = Found.with_margin("holds" if margin >= -SMALL else "refuted", margin)
+    same("time of least distance", claim["where"]["t_s"], by_names[worst]["t_s"], about=", ".join(worst))
+    status = "holds" if margin >= -SMALL else "refuted"
+    found = Found.with_margin(status, margin, tolerance_m=SMALL, pairs_in_all=len(known)).having_judged(*JUDGED)
+    if claim["counterexample"]:
+        of_the_pair = {key: claim["counterexample"].get(key) for key in by_names[worst]}
+        same("counterexample", of_the_pair, by_names[worst], about=", ".join(worst))
+        found = found.having_judged(*(f"counterexample.{key}" for key in PAIR_KEYS), *snapshot(run, claim))
     return found.counted(close_by, close_by + doubtful)
+
+
+PAIR_KEYS = ("first", "second", "safe_distance_m", "min_distance_m", "margin_m", "t_s", "row", "exercised")
+"""What is recorded of a pair; that it is exercised is judged where rounding does not decide it."""
+JUDGED = ("where.first", "where.second", "where.t_s", *(f"evidence.pairs.*.{key}" for key in PAIR_KEYS))
+
+
+def snapshot(run: Run, claim: Json) -> tuple[str, ...]:
+    """Places at the time of a counterexample, and velocities just after it; returns the keys that this has judged."""
+    shown = claim["counterexample"]
+    when = shown["t_s"]
+    row = min(int(np.searchsorted(run.t_s, when + SMALL)), len(run.t_s) - 1)
+    for name, place in shown["positions_m"].items():
+        close("place in the counterexample", place, run.place_m(name, when), within=SMALL, about=name, t_s=when)
+    for name, velocity in shown["velocities_m_s"].items():
+        now = run.command_m_s[name][row]
+        close("velocity in the counterexample", velocity, now, within=SMALL, about=name, t_s=when)
+    return "counterexample.positions_m.*", "counterexample.velocities_m_s.*"
 
 
 def _evidence_on_a_pair(run: Run, pair: Pair, least_m: float, recorded: Json) -> None:
@@ -71,18 +95,41 @@ def _evidence_on_a_pair(run: Run, pair: Pair, least_m: float, recorded: Json) ->
     close("margin of a pair", recorded["margin_m"], least_m - pair.safe_m, within=SMALL, about=about, t_s=when)
     close("distance at the recorded time", recorded["min_distance_m"], there, within=SMALL, about=about, t_s=when)
     agrees("safe distance", recorded["safe_distance_m"], pair.safe_m, within=0.0, about=about)
+    row = recorded["row"]
+    holds("row of the least distance", type(row) is int and 0 < row < len(run.t_s), row, "a row", about=about)
+    within = run.t_s[row - 1] - SMALL <= when <= run.t_s[row] + SMALL
+    holds("row of the least distance", within, row, "the one at the end of the segment", about=about, t_s=when)
 
 
 class Hypothesis(NamedTuple):
     """A hypothesis of SAFE-INV at some instants: it holds where its margin is not negative.
 
-    Of an avoidance inequality `kind` says who moves and what it avoids, such as `ugv beside obstacle`.
+    Of an avoidance inequality `kind` says who moves and what it avoids, such as `ugv beside obstacle`. `about` are the
+    robots that it is about, as recorded; where there is another one at each instant, `others` has their names.
     """
 
     name: str
+    unit: str
     t_s: Array
     margin: Array
+    about: Mapping[str, str] = {}
+    others: tuple[str, ...] = ()
     kind: str = ""
+
+    @property
+    def who(self) -> tuple[str, str]:
+        """The hypothesis, and the robot: of these the evidence has the least margin."""
+        return self.name, next(iter(self.about.values()), "")
+
+    def margin_at(self, recorded: Json) -> float | None:
+        """The margin at an instant as recorded, that is of the other one there; None if there is none."""
+        there = np.abs(self.t_s - recorded["t_s"]) <= SMALL
+        if self.others:
+            there &= np.array([other == recorded.get("second") for other in self.others])
+        described = {"hypothesis": self.name, **self.about, "unit": self.unit}
+        if not there.any() or any(recorded.get(key) != value for key, value in described.items()):
+            return None
+        return float(self.margin[there].min())
 
 
 KINDS = ("ugv beside obstacle", "uav beside obstacle", "ugv beside ugv", "ugv beside uav", "uav beside ugv")
@@ -113,7 +160,7 @@ def safe_hyp(run: Run, claim: Json) -> Found:
     found = [*_constants(run), *_velocities(run), *_inequalities(run)]
     in_range = sum(len(each.margin) for each in found if each.name == "avoidance")
     broken = [(each, k) for each in found for k in np.flatnonzero(~(each.margin >= -SMALL))[:1]]
-    leading = "avoidance"
+    leading, judged = "avoidance", ["where.*", "evidence.worst.*.*", "evidence.inequalities_that_bind.*"]
     if broken:
         first, k = min(broken, key=lambda one: float(one[0].t_s[one[1]]))
         when = float(first.t_s[k])
@@ -122,24 +169,72 @@ def safe_hyp(run: Run, claim: Json) -> Found:
         leading = claim["where"]["hypothesis"]
         earliest = sorted({each.name for each, j in broken if each.t_s[j] <= when + SMALL})
         holds("hypothesis broken first", leading in earliest, leading, " or ".join(earliest), t_s=when)
+        close("time of the counterexample", claim["counterexample"]["t_s"], when, within=SMALL)
+        at_most("margin of the counterexample", claim["counterexample"]["margin"], 0.0, t_s=when)
+        _is_attained(found, claim["counterexample"], "counterexample", (*LISTED, "positions_m", "velocities_m_s"))
+        judged += ["counterexample.*", *snapshot(run, claim)]
     margins = [float(each.margin.min()) for each in found if each.name == leading and len(each.margin)]
     status = "refuted" if broken else "holds"
     margin = min(margins, default=None)
+    _worst(found, claim["evidence"]["worst"])
+    _where(claim, leading, margin)
     least, most = _binding(found, claim["evidence"]["inequalities_that_bind"])
-    return Found(status, margin, margin, {"inequalities_in_range": in_range}).counted(least, most)
+    facts = {"inequalities_in_range": in_range, "tolerance_m_s": SMALL}
+    return Found(status, margin, margin, facts).counted(least, most).having_judged(*judged)
+
+
+LISTED = ("hypothesis", "robot", "first", "second", "other", "t_s", "margin", "unit")
+"""What is recorded of a hypothesis at an instant."""
+
+
+def _is_attained(found: list[Hypothesis], recorded: Json, what: str, keys: tuple[str, ...] = LISTED) -> None:
+    """A margin is attained at the instant, and by those, that are recorded with it."""
+    strange = sorted({*recorded} - {*keys})
+    same(f"keys of {what}", strange, [])
+    there = [at for each in found if (at := each.margin_at(recorded)) is not None]
+    about = f"{recorded['hypothesis']}, {recorded.get('robot', recorded.get('first', ''))}"
+    when = recorded["t_s"]
+    holds(f"{what} is of an instant of the run", bool(there), str(recorded), "one that there is", about=about, t_s=when)
+    off = min(abs(at - recorded["margin"]) for at in there)
+    holds(f"margin of {what}", off <= SMALL, recorded["margin"], str(there), about=about, t_s=when)
+
+
+def _worst(found: list[Hypothesis], recorded: list[Json]) -> None:
+    """The least margin of each hypothesis and robot, and where it is attained."""
+    least: dict[tuple[str, str], float] = {}
+    for each in found:
+        if len(each.margin):
+            least[each.who] = min(least.get(each.who, np.inf), float(each.margin.min()))
+    named = [(str(entry["hypothesis"]), str(entry.get("robot", entry.get("first", "")))) for entry in recorded]
+    same("hypotheses in the evidence", sorted(map(list, named)), sorted(map(list, least)))
+    for who, entry in zip(named, recorded, strict=True):
+        close("least margin", entry["margin"], least[who], within=SMALL, about=", ".join(who), t_s=entry["t_s"])
+        _is_attained(found, entry, "least margin")
+
+
+def _where(claim: Json, leading: str, margin: float | None) -> None:
+    """Where the margin is attained: one of the least ones of the leading hypothesis."""
+    listed = [entry for entry in claim["evidence"]["worst"] if entry["hypothesis"] == leading]
+    lowest = [entry for entry in listed if margin is not None and entry["margin"] <= margin + SMALL]
+    places = [{key: entry[key] for key in entry if key not in ("margin", "unit")} for entry in lowest]
+    there = claim["where"] in places or (margin is None and claim["where"] == {})
+    holds("where the margin is attained", there, str(claim["where"]), str(places))
 
 
 def _constants(run: Run) -> Iterator[Hypothesis]:
     """A h <= 1; every pair starts at its safe distance; the sensing range covers d + (closing speed) h."""
     control, start = run.scenario["control"], run.t_s[:1]
     h = control["period_s"]
-    yield Hypothesis("gain: A h <= 1", start, np.array([1.0 - control["avoidance_gain_1_s"] * h]))
+    yield Hypothesis("gain: A h <= 1", "1", start, np.array([1.0 - control["avoidance_gain_1_s"] * h]))
     first = {name: place[0] for name, place in run.position_m.items()}
-    offset = np.array([first[pair.robot] - first[pair.other] for pair in run.pairs])
-    safe, closing = np.array([(pair.safe_m, pair.closing_m_s) for pair in run.pairs]).T
-    each = np.repeat(start, len(safe))
-    yield Hypothesis("safe start", each, np.linalg.norm(offset, axis=1) - safe)
-    yield Hypothesis("sensing range", each, control["sensing_range_m"] - safe - closing * h)
+    for robot in dict.fromkeys(pair.robot for pair in run.pairs):
+        pairs = [pair for pair in run.pairs if pair.robot == robot]
+        others, about = tuple(pair.other for pair in pairs), {"first": robot}
+        offset = np.array([first[robot] - first[other] for other in others])
+        safe, closing = np.array([(pair.safe_m, pair.closing_m_s) for pair in pairs]).T
+        each = np.repeat(start, len(safe))
+        yield Hypothesis("safe start", "m", each, np.linalg.norm(offset, axis=1) - safe, about, others)
+        yield Hypothesis("sensing range", "m", each, control["sensing_range_m"] - safe - closing * h, about, others)
 
 
 def _velocities(run: Run) -> Iterator[Hypothesis]:
@@ -147,13 +242,18 @@ def _velocities(run: Run) -> Iterator[Hypothesis]:
     begins = run.t_s[:-1]
     segment = np.flatnonzero(np.diff(run.t_s) >= SMALL)
     sample = np.searchsorted(run.sample_s, begins[segment] + SMALL, side="right") - 1
+    samples = run.t_s[run.sample_row]
+    spacing = np.diff(np.append(samples, run.t_s[-1]))
+    yield Hypothesis("sampling", "s", samples, run.scenario["control"]["period_s"] - spacing)
     for robot, spec in run.robots.items():
         v = run.command_m_s[robot]
         drift = np.linalg.norm(v[segment + 1] - v[run.chosen_row][sample], axis=1)
-        yield Hypothesis("zero-order hold", begins[segment], -drift)
-        yield Hypothesis("speed limit", begins, spec["max_speed_m_s"] - np.linalg.norm(v[1:], axis=1))
+        about = {"robot": robot}
+        yield Hypothesis("zero-order hold", "m/s", begins[segment], -drift, about)
+        spare = spec["max_speed_m_s"] - np.linalg.norm(v[1:], axis=1)
+        yield Hypothesis("speed limit", "m/s", begins, spare, about)
         if robot != run.uav:
-            yield Hypothesis("planar motion", begins, -np.abs(v[1:, 2]))
+            yield Hypothesis("planar motion", "m/s", begins, -np.abs(v[1:, 2]), about)
 
 
 def _inequalities(run: Run) -> Iterator[Hypothesis]:
@@ -163,7 +263,8 @@ def _inequalities(run: Run) -> Iterator[Hypothesis]:
         kind = f"{sort[pair.robot]} beside {sort.get(pair.other, 'obstacle')}"
         spare = avoidance_spare_m_s(run, pair, run.command_m_s[pair.robot][run.chosen_row])
         seen = np.isfinite(spare)
-        yield Hypothesis("avoidance", run.sample_s[seen], spare[seen], kind)
+        about = {"robot": pair.robot, "other": pair.other}
+        yield Hypothesis("avoidance", "m/s", run.sample_s[seen], spare[seen], about, kind=kind)
 
 
 def avoidance_spare_m_s(run: Run, pair: Pair, v_m_s: Array) -> Array:

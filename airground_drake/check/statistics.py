@@ -101,8 +101,16 @@ def ddm(claim: Json, files: Files, scenario: Json) -> Found:
         close("(17)", time["formula"], experiment.decision_time_s(), within=SMALL, about=experiment.name)
         close("(18)", error["formula"], experiment.error_rate(), within=SMALL, about=experiment.name)
         margins += [_margin(time, experiment.decision_time_s()), _margin(error, experiment.error_rate())]
-    found = Found.with_margin("supported" if min(margins) >= 0.0 else "refuted", min(margins))
-    return found.counted(sum(experiment.paths for experiment in experiments))
+    paths = sum(experiment.paths for experiment in experiments)
+    status = "supported" if min(margins) >= 0.0 else "refuted"
+    found = Found.with_margin(status, min(margins), paths=paths, family_level=LEVEL, comparisons=rows)
+    lowest = [row for row, margin in zip(rows, margins, strict=True) if margin <= min(margins) + SMALL]
+    places = [{key: row[key] for key in ("experiment", "quantity")} for row in lowest]
+    holds("where the margin is attained", claim["where"] in places, claim["where"], str(places))
+    if claim["counterexample"]:
+        shown = claim["counterexample"]
+        holds("counterexample", shown in lowest, str(shown), "a comparison of least margin")
+    return found.counted(paths).having_judged("where.*", "counterexample")
 
 
 def _counts_are_possible(row: Json, experiment: Experiment) -> None:
@@ -174,7 +182,7 @@ def refine(claim: Json, files: Files, scenario: Json) -> Found:
     close("noise steps", np.sort(counts.dt_s)[::-1], dt, within=1e-12)
     levels, leak = levels_of(scenario), scenario["decision"]["leak_1_s"]
     expected = np.array([expected_bare(float(step), duration, leak, float(dt[0])) for step in dt])
-    exponent = {name: float(_fit(dt, counts.of[name].mean(axis=0))[1]) for name in SERIES[:2]}
+    fits = {name: [float(value) for value in _fit(dt, counts.of[name].mean(axis=0))] for name in SERIES[:2]}
     intervals = {name: _interval(dt, counts.of[name]) for name in SERIES[:2]}
     bias = float(_fit(dt, expected)[1]) + 0.5
     most = int(duration / levels.dwell_s + SMALL) + 1 if levels.dwell_s > 0.0 else None
@@ -182,18 +190,36 @@ def refine(claim: Json, files: Files, scenario: Json) -> Found:
         **{name: _series(values) for name, values in counts.of.items()},
         "dt_s": dt.tolist(),
         "expected_bare": expected.tolist(),
-        "fit": {name: {"exponent": exponent[name], "interval": list(intervals[name])} for name in exponent},
+        "fit": {
+            name: {
+                "intercept": c, "exponent": p, "correction": b, "interval": list(intervals[name]),
+                "at_dt": (np.exp(c + b * np.sqrt(dt)) * dt**p).tolist(),
+            }
+            for name, (c, p, b) in fits.items()
+        },
         "bias": bias,
         "most_triggers": most,
         "duration_s": duration,
         "noise_m_sqrt_s": intensity,
+        "own_noise_m_sqrt_s": scenario["decision"]["noise_m_sqrt_s"],
         "leak_1_s": leak,
         "paths": PATHS,
-    }
+        "seed": SEED,
+        "level": LEVEL,
+    }  # fmt: skip
     (low, high), (ours_low, ours_high) = intervals["bare"], intervals["automaton"]
-    bare_slack = min(-0.5 - low + abs(bias), high + abs(bias) + 0.5, DIVERGES_BELOW - high)
-    automaton_slack = min(-ours_low, ours_high, FLAT_WITHIN - max(-ours_low, ours_high))
-    slack = min(bare_slack, automaton_slack)
+    spare = {
+        "bare exponent: -1/2 is not below its interval": -0.5 - low + abs(bias),
+        "bare exponent: -1/2 is not above its interval": high + abs(bias) + 0.5,
+        "bare exponent: well below 0": DIVERGES_BELOW - high,
+        "automaton's exponent: 0 is not below its interval": -ours_low,
+        "automaton's exponent: 0 is not above its interval": ours_high,
+        "automaton's exponent: close to 0": FLAT_WITHIN - max(-ours_low, ours_high),
+    }
+    slack = min(spare.values())
+    lowest = [condition for condition in spare if spare[condition] <= slack + SMALL]
+    condition = claim["where"]["condition"]
+    holds("where the margin is attained", condition in lowest, condition, " or ".join(lowest))
     spread = counts.of["bare"].std(axis=0, ddof=1) / math.sqrt(PATHS)
     as_expected = bool((np.abs(counts.of["bare"].mean(axis=0) - expected) <= STANDARD_ERRORS * spread).all())
     status = "supported" if as_expected else "inconclusive"
@@ -203,7 +229,7 @@ def refine(claim: Json, files: Files, scenario: Json) -> Found:
         status = "inconclusive"
     elif slack < -SMALL:
         status = "refuted"
-    return Found.with_margin(status, slack, **facts).counted(PATHS)
+    return Found.with_margin(status, slack, **facts).counted(PATHS).having_judged("where.condition")
 
 
 def _steps_of(scenario: Json) -> tuple[Array, float, float]:
