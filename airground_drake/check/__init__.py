@@ -7,19 +7,23 @@ establishes.
 
     files, limits              strict reading; sizes and times beyond which nothing is looked at
     rules, scenario            what a broken rule says; what a scenario declares
-    run, events, metrics       a trace that is of its run and obeys its law of motion; what follows from it
+    run, nearness              a trace that is of its run and obeys its law of motion; what comes near at all in it
+    events, metrics            what follows from a trace
     safety                     SAFE-TRACE, SAFE-HYP
     law, proposals, execution  EXEC: the control law, what was accepted when, commands
     triggers                   ZENO-TRACE, THR-TRIG
     outcome                    LIVE-GOAL, COMM, GATE-TIME
     decisions                  a recorded decision, its problem (26), predictions (23) and costs (25)
     feasibility                GATE-FEAS
-    prediction                 GATE-MODEL
+    foresight, prediction      GATE-MODEL: what comes of accepting and refusing under method (d); mode velocities
+    progress                   LIVE-PROG
     optimality                 GATE-SUR, GATE-OPT
-    polynomials, certificates  SAFE-LEMMA, SAFE-INV, SAFE-GATE, SAFE-DIST, ZENO-PROOF, THR-ISO; obligations.json
+    polynomials, certificates  SAFE-LEMMA, SAFE-INV, SAFE-GATE, SAFE-DIST, ZENO-PROOF, LIVE-GATE, LIVE-WAIT, THR-ISO;
+                               obligations.json
     enclosures                 THR-ROOT, THR-OPT
     statistics                 THR-DDM, ZENO-REFINE
     inputs                     the constants that a claim about the model must be about
+    evidence                   what of a claim's entry is established, and what is taken as recorded
     report                     verdicts, their expectations, and the verdict over all of them
     command                    the command line
 """

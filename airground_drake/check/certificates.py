@@ -237,7 +237,7 @@ def _recorded_of_inv(claim: Json, scenario: Json) -> Found:
     holds("where the margin is attained", worst >= max(lost.values()) * (1.0 - ALIKE), claim["where"], str(lost))
     found = Found.with_margin("proved" if left >= 0.0 else "inconclusive", left, within=1e-15)
     return found.also(**_CONFORMS, composition=_MET | {"composition": "augmented"}, wiring=_WIRED).having_judged(
-        "where.pair", "evidence.wiring.composition", "evidence.wiring.views.*", "evidence.wiring.least_times_bound.*",
+        "where.pair", "evidence.wiring.composition", "evidence.wiring.views.*",
         "evidence.sensing_range_spare_m.*", "evidence.rounding.*.margin_of_a_step_m",
         "evidence.rounding.*.margin_with_restoring_m",
     )  # fmt: skip
@@ -298,7 +298,7 @@ def _recorded_of_gate(claim: Json, scenario: Json) -> Found:
     found = found.also(wiring=[_WIRED] * len(compositions))
     return found.having_judged(
         "where.composition", "evidence.method_d", "evidence.layer.*.composition", "evidence.layer.*.worst_slack_m_s",
-        "evidence.wiring.*.composition", "evidence.wiring.*.views.*", "evidence.wiring.*.least_times_bound.*",
+        "evidence.wiring.*.composition", "evidence.wiring.*.views.*",
         "evidence.controller.*.missed",
     )  # fmt: skip
 
@@ -312,7 +312,7 @@ def _recorded_of_dist(claim: Json, scenario: Json) -> Found:
     agrees("least distances", evidence["least_distances_m"], bounds, within=SMALL)
     for row in evidence["runs"]:
         same("bounds broken by a disturbed run", row["broken"], 0, about=row["scene"])
-        _worst_of_a_disturbed_run(row, bounds)
+        _worst_of_a_disturbed_run(row, {bounds[kind.name]: kind.safe_m for kind in kinds_of(scenario)})
     covered = [row["worst_margin_m"] for row in evidence["runs"] if not row["unmet"]]
     lowest = [row["where"] for row in evidence["runs"] if row["worst_margin_m"] == min(covered)]
     places = [{key: where[key] for key in ("scene", "attack", "robot", "t_s")} for where in lowest]
@@ -325,13 +325,19 @@ def _recorded_of_dist(claim: Json, scenario: Json) -> Found:
     )  # fmt: skip
 
 
-def _worst_of_a_disturbed_run(row: Json, bounds_m: Mapping[str, float]) -> None:
-    """The worst margin is that of the distance there, to a bound that is one of a kind of pairs."""
+def _worst_of_a_disturbed_run(row: Json, bounds_m: Mapping[float, float]) -> None:
+    """The worst margin is that of the distance there, to a bound that is one of a kind of pairs.
+
+    Args:
+        row: the run.
+        bounds_m: safe distance by bound.
+    """
     where, about = row["where"], row["scene"]
     same("scene of the worst margin", where["scene"], row["scene"], about=about)
     close("worst margin", row["worst_margin_m"], where["distance_m"] - where["bound_m"], within=SMALL, about=about)
-    known = any(abs(where["bound_m"] - bound) <= SMALL for bound in bounds_m.values())
-    holds("bound of the worst margin", known, where["bound_m"], str(bounds_m), about=about)
+    both = [where["bound_m"], where["safe_distance_m"]]
+    known = any(max(abs(both[0] - bound), abs(both[1] - safe)) <= SMALL for bound, safe in bounds_m.items())
+    holds("bound of the worst margin", known, both, str(bounds_m), about=about)
 
 
 def _recorded_of_zeno(claim: Json, scenario: Json) -> Found:

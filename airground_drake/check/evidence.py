@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
+from functools import cache
 from typing import Any
 
 from .files import Json
@@ -43,9 +44,9 @@ _CONFORMANCE = tuple(f"evidence.conformance.{key}" for key in ("points", "unseen
 _LAYER = ("states", "inequalities", "worst_loss_over_rounding", "largest_gain_in_speed")
 _WIRING = (
     "states", "inequalities", "commands", "executed", "proposals", "never_bound", "never_bound_count",
-    "least_slack_m_s",
+    "least_times_bound", "least_slack_m_s",
 )  # fmt: skip
-_EVERYWHERE = ("evidence.reason", *_SECOND_OPINION, *_ANSWERS)
+_EVERYWHERE = ("from_cache", "evidence.reason", *_SECOND_OPINION, *_ANSWERS)
 
 AS_RECORDED: Mapping[str, tuple[str, ...]] = {
     "GATE-FEAS": ("evidence.comparisons",),
@@ -119,9 +120,14 @@ def check_entry(claim: Json, found: Found, *, whole: bool) -> Mapping[str, int]:
     established = {path for path, _ in _leaves(found.facts, ("evidence",))} | {("evidence", "stl", "agrees")}
     judged = [*found.judged, *(f"evidence.stl.checks.*.{key}" for key in ("run", "claim", "ours"))]
     taken: Counter[str] = Counter({"from_cache": 1} if claim.get("from_cache") else {})
+    known: dict[tuple[str, ...], bool] = {}
     for part in PARTS:
         for path, value in _leaves(claim[part], (part,)):
-            if path in established or _first(judged, path) or _is_nothing(path, value):
+            if path in established or _is_nothing(path, value):
+                continue
+            if path not in known:
+                known[path] = _first(judged, path) is not None
+            if known[path]:
                 continue
             key = _first(as_recorded(claim["id"]), path) or (None if whole else part)
             holds("something establishes the evidence", key is not None, value, "nothing does", about=".".join(path))
@@ -160,10 +166,15 @@ def _is_nothing(path: tuple[str, ...], value: Any) -> bool:
 def _first(keys: Any, path: tuple[str, ...]) -> str | None:
     """The first of the keys that a path is below of, or is."""
     for key in keys:
-        parts = key.split(".")
+        parts = _parts(key)
         if len(parts) <= len(path) and all(mine in ("*", its) for mine, its in zip(parts, path, strict=False)):
             return str(key)
     return None
+
+
+@cache
+def _parts(key: str) -> tuple[str, ...]:
+    return tuple(key.split("."))
 
 
 def _second_opinion(claim: Json) -> None:

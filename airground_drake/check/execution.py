@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -67,12 +68,10 @@ def execution(run: Run, claim: Json) -> Found:
         "not_judged": [] if formation else [f"{run.uav}: task {run.scenario['uav']['task']}"],
         "tolerance_m_s": COMMAND_M_S,
     }
-    _counts_of_binding(robots, claim["evidence"]["robots"])
-    _where(robots, claim["where"])
     least, most = (sum(r.tested(BINDING_M_S + side * DOUBT_M_S) for r in robots) for side in (-1.0, 1.0))
     wrong = [(k, r) for r in robots for k in np.flatnonzero(~(r.away_m_s <= COMMAND_M_S) | (r.executing != r.said))[:1]]
     if not wrong:
-        return Found("holds", margin, margin, facts, within=1e-8).counted(least, most).having_judged(*JUDGED)
+        return _judging(Found("holds", margin, margin, facts, within=1e-8).counted(least, most), robots, claim)
     if claim["status"] == "holds":
         k, robot = min(wrong, key=lambda one: int(one[0]))
         when = float(run.sample_s[k])
@@ -81,13 +80,19 @@ def execution(run: Run, claim: Json) -> Found:
             raise Disagreement("what is executed is what was accepted", said, due, robot.name, when)
         rule = "the command is the law's"
         raise Disagreement(rule, robot.recorded[k].tolist(), robot.law[k].tolist(), robot.name, when)
-    _first_wrong(wrong, run, claim["counterexample"])
     negative = margin if margin < 0.0 else None
     found = Found("refuted", negative, negative, facts, within=1e-8).counted(least, most)
-    return found.having_judged(*JUDGED, *(f"counterexample.{key}" for key in SHOWN))
+    shown = partial(_first_wrong, wrong, run, claim["counterexample"])
+    return _judging(found, robots, claim).judging(shown, *(f"counterexample.{key}" for key in SHOWN))
 
 
-JUDGED = ("where.robot", "where.t_s", "evidence.robots.*.binding", "evidence.robots.*.executing_and_binding")
+def _judging(found: Found, robots: list[Robot], claim: Json) -> Found:
+    """With the rules about where the margin is attained, and about what is counted besides."""
+    found = found.judging(partial(_where, robots, claim["where"]), "where.robot", "where.t_s")
+    counts = partial(_counts_of_binding, robots, claim["evidence"]["robots"])
+    return found.judging(counts, "evidence.robots.*.binding", "evidence.robots.*.executing_and_binding")
+
+
 SHOWN = (
     "robot", "t_s", "accepted_by_the_messages", "accepted_by_the_signals", "command_m_s", "law_m_s", "difference_m_s",
 )  # fmt: skip

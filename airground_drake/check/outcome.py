@@ -26,15 +26,17 @@ def live_goal(run: Run, claim: Json) -> Found:
     farther = {
         robot: float(np.linalg.norm(run.position_m[robot][0] - place)) - near for robot, place, near in _goals(run)
     }
-    _worst_end(claim, margin)
     least, most = ([robot for robot in farther if farther[robot] > side * SMALL] for side in (1.0, -1.0))
-    went = claim["evidence"]["had_a_way_to_go"]
-    possible = {*least} <= {*went} <= {*most} and went == [robot for robot in farther if robot in went]
-    holds("who had a way to go", possible, str(went), str(most))
-    return found.counted(len(least), len(most)).having_judged(
-        "where.robot", "where.condition", "evidence.had_a_way_to_go.*",
-        *(f"counterexample.{key}" for key in CONDITION),
-    )  # fmt: skip
+    went = partial(_had_a_way_to_go, claim["evidence"]["had_a_way_to_go"], least, most)
+    found = found.counted(len(least), len(most)).judging(went, "evidence.had_a_way_to_go")
+    shown = (f"counterexample.{key}" for key in CONDITION)
+    return found.judging(partial(_worst_end, claim, margin), "where.robot", "where.condition", *shown)
+
+
+def _had_a_way_to_go(recorded: list[str], least: list[str], most: list[str]) -> None:
+    """Those who were farther than the tolerance from where they must end; rounding may decide."""
+    possible = {*least} <= {*recorded} and recorded == [robot for robot in most if robot in recorded]
+    holds("who had a way to go", possible, str(recorded), str(most))
 
 
 CONDITION = ("robot", "condition", "point_m", "final_m", "distance_m", "moved_m", "margin_m")

@@ -80,6 +80,9 @@ def snapshot(run: Run, claim: Json) -> tuple[str, ...]:
     shown = claim["counterexample"]
     when = shown["t_s"]
     row = min(int(np.searchsorted(run.t_s, when + SMALL)), len(run.t_s) - 1)
+    named = {value for value in shown.values() if isinstance(value, str) and value in run.position_m}
+    same("things in the counterexample", sorted(shown["positions_m"]), sorted(named))
+    same("robots in the counterexample", sorted(shown["velocities_m_s"]), sorted(named & {*run.robots}))
     for name, place in shown["positions_m"].items():
         close("place in the counterexample", place, run.place_m(name, when), within=SMALL, about=name, t_s=when)
     for name, velocity in shown["velocities_m_s"].items():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import math
-from functools import lru_cache
+from functools import lru_cache, partial
 from statistics import NormalDist
 from typing import Any, NamedTuple
 
@@ -106,11 +106,15 @@ def ddm(claim: Json, files: Files, scenario: Json) -> Found:
     found = Found.with_margin(status, min(margins), paths=paths, family_level=LEVEL, comparisons=rows)
     lowest = [row for row, margin in zip(rows, margins, strict=True) if margin <= min(margins) + SMALL]
     places = [{key: row[key] for key in ("experiment", "quantity")} for row in lowest]
-    holds("where the margin is attained", claim["where"] in places, claim["where"], str(places))
-    if claim["counterexample"]:
-        shown = claim["counterexample"]
-        holds("counterexample", shown in lowest, str(shown), "a comparison of least margin")
-    return found.counted(paths).having_judged("where.*", "counterexample")
+    found = found.judging(partial(_one_of, "where the margin is attained", claim["where"], places), "where")
+    shown = lowest if status == "refuted" else [None]
+    return found.counted(paths).judging(
+        partial(_one_of, "counterexample", claim["counterexample"], shown), "counterexample"
+    )
+
+
+def _one_of(rule: str, recorded: Any, possible: list[Any]) -> None:
+    holds(rule, recorded in possible, str(recorded), str(possible))
 
 
 def _counts_are_possible(row: Json, experiment: Experiment) -> None:
@@ -218,8 +222,6 @@ def refine(claim: Json, files: Files, scenario: Json) -> Found:
     }
     slack = min(spare.values())
     lowest = [condition for condition in spare if spare[condition] <= slack + SMALL]
-    condition = claim["where"]["condition"]
-    holds("where the margin is attained", condition in lowest, condition, " or ".join(lowest))
     spread = counts.of["bare"].std(axis=0, ddof=1) / math.sqrt(PATHS)
     as_expected = bool((np.abs(counts.of["bare"].mean(axis=0) - expected) <= STANDARD_ERRORS * spread).all())
     status = "supported" if as_expected else "inconclusive"
@@ -229,7 +231,10 @@ def refine(claim: Json, files: Files, scenario: Json) -> Found:
         status = "inconclusive"
     elif slack < -SMALL:
         status = "refuted"
-    return Found.with_margin(status, slack, **facts).counted(PATHS).having_judged("where.condition")
+    found = Found.with_margin(status, slack, **facts).counted(PATHS)
+    attained = partial(_one_of, "where the margin is attained", claim["where"].get("condition"), lowest)
+    found = found.judging(attained, "where.condition")
+    return found.having_judged("counterexample") if status == "refuted" else found
 
 
 def _steps_of(scenario: Json) -> tuple[Array, float, float]:

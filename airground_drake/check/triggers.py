@@ -300,15 +300,21 @@ def zeno_trace(run: Run, claim: Json) -> Found:
     if not gaps:
         same("where the margin is attained", claim["where"], {})
         return Found("holds", facts=facts).counted(0)
-    smallest = claim["evidence"]["smallest_gap"]
     least = min(float(gap["gap_s"]) for gap in gaps)
+    found = Found.with_margin("holds" if least >= bound - SMALL else "refuted", least - bound, **facts)
+    return found.counted(len(gaps)).judging(
+        partial(_smallest_gap, claim, gaps), "where.*", "counterexample.*", "evidence.smallest_gap.*"
+    )
+
+
+def _smallest_gap(claim: Json, gaps: list[Json]) -> None:
+    """The gap in the evidence, and in a counterexample, is the smallest, or one as small."""
+    smallest, least = claim["evidence"]["smallest_gap"], min(float(gap["gap_s"]) for gap in gaps)
     close("smallest gap", smallest["gap_s"], least, within=0.0)
     holds("smallest gap", smallest in gaps, str(smallest), "one between two triggers")
     same("where the margin is attained", claim["where"], {key: smallest[key] for key in ("robot", "t_s")})
     if claim["counterexample"]:
         same("counterexample", claim["counterexample"], smallest)
-    found = Found.with_margin("holds" if least >= bound - SMALL else "refuted", least - bound, **facts)
-    return found.counted(len(gaps)).having_judged("where.*", "counterexample.*", "evidence.smallest_gap.*")
 
 
 def _columns_follow_the_events(run: Run, ugv: str) -> None:

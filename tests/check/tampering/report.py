@@ -378,13 +378,13 @@ def reproduction_changed(folder: Path) -> None:
         report["reproduction"][0].update(status="not_reproduced", ours=0.0)
 
 
-@ignored("a second engine's opinion: the checker is a third one, and takes no other's word")
+@refused_by("SAFE-TRACE", "number of a second engine")
 def second_engine_changed(folder: Path) -> None:
     with edited_claim(folder, "SAFE-TRACE") as claim:
         claim["evidence"]["stl"]["checks"][0]["robustness"] = 3.0
 
 
-@ignored("the rest of a counterexample, a snapshot of the instant, is the trace's, which is there to be looked at")
+@refused_by("SAFE-TRACE", "things in the counterexample", run="b")
 def snapshot_changed(folder: Path) -> None:
     with edited_claim(folder, "SAFE-TRACE", "b") as claim:
         claim["counterexample"]["positions_m"] = {}
