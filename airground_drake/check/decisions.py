@@ -15,6 +15,13 @@ LEAST_COST = 1e-6
 """Costs are compared relative to the cheaper constant plan's, but to no less than this: 1 mm of error for 1 s."""
 PLANNED = ("optimal", "budget_spent")
 """Statuses of decisions that rest on a plan; the others are refusals for want of one."""
+OF_OUTCOMES = (
+    "refuse_outcome_m2_s", "accept_outcome_m2_s", "refuse_stalls", "accept_stalls", "refuse_left_m", "accept_left_m",
+    "lag_m", "predicted_lag_m", "tries",
+)  # fmt: skip
+"""Columns about decisions by outcomes, which say nothing of those by problems (26)."""
+NOTHING = -1.0
+"""Stands where a column says nothing."""
 ARRAYS = (
     "initial_m", "accept_m_s", "refuse_m_s", "reference_m", "centres_m", "distances_m",
     "plan", "positions_m", "relaxed", "rounded", "normals",
@@ -141,6 +148,8 @@ def _decision(row: dict[Any, Any], problem: dict[Any, Any], stages: int) -> Deci
     scalars = [value for value in (*row.values(), *problem.values()) if isinstance(value, float)]
     numbers = np.concatenate([scalars, *flat.values()])
     holds("numbers of a decision are finite", np.isfinite(numbers), numbers, "a number", about=about, t_s=when)
+    for name in OF_OUTCOMES:
+        holds(f"nothing is said of {name}", row[name] == NOTHING, row[name], NOTHING, about=about, t_s=when)
     points = len(flat["distances_m"])
     for name, allowed in _sizes(stages, points, planned=row["status"] in PLANNED).items():
         holds(f"size of {name}", len(flat[name]) in allowed, len(flat[name]), str(allowed), about=about, t_s=when)

@@ -59,7 +59,32 @@ def rows_of(run: Run) -> list[dict[str, Any]]:
         about = f"decision of {row['robot']}"
         holds("numbers of a decision are finite", np.isfinite(numbers), numbers, "a number", about=about)
         holds("a decision is of a UGV", row["robot"] in run.ugvs, row["robot"], "a UGV of the run", about=about)
+        _nothing_where_nothing_is_said(row)
     return rows
+
+
+OF_PROBLEMS = (
+    "relaxed_first_stage", "objective", "route_bound", "gap", "objective_accept", "objective_refuse",
+    "accept_throughout", "refuse_throughout", "rounding_deviation_s", "predicted_clearance_m",
+)  # fmt: skip
+"""Columns about problem (26)."""
+OF_OUTCOMES = tuple(f"{choice}_{name}" for choice in CHOICES for name in ("outcome_m2_s", "stalls", "left_m"))
+"""Columns about what comes of a choice."""
+NOTHING = -1.0
+"""Stands where a column says nothing."""
+
+
+def _nothing_where_nothing_is_said(row: dict[str, Any]) -> None:
+    """No problem (26); outcomes only where they were looked at; lags while something is executed."""
+    about: dict[str, Any] = {"about": f"decision of {row['robot']}", "t_s": row["t_s"]}
+    looked, lags = any(row[name] >= 0.0 for name in OF_OUTCOMES), ("lag_m", "predicted_lag_m")
+    for name in (*OF_PROBLEMS, *(() if looked else OF_OUTCOMES)):
+        holds(f"nothing is said of {name}", row[name] == NOTHING, row[name], NOTHING, **about)
+    for name in lags:
+        there = row[name] >= 0.0 or row[name] == NOTHING
+        holds(f"{name} is a distance or nothing", there, row[name], NOTHING, **about)
+    for name in ("accept_stalls", "refuse_stalls") if looked else ():
+        holds(f"{name} is 0 or 1", row[name] in (0.0, 1.0), row[name], "0 or 1", **about)
 
 
 def outcomes(run: Run) -> Found:

@@ -123,7 +123,7 @@ class Run:
 
     @cached_property
     def command_m_s(self) -> dict[str, Array]:
-        """Velocity of each robot since the row before, (T, 3); the first row's means nothing."""
+        """Velocity of each robot since the row before, (T, 3); 0 in the first row."""
         return {robot: self.vector(robot, "v", "m_s") for robot in self.robots}
 
     @cached_property
@@ -224,6 +224,8 @@ def _run(name: str, scenario_text: str, entry_text: str, contents: tuple[bytes, 
     _robots_start_where_declared(run)
     _robots_are_where_their_commands_lead(run)
     _presets_are_those_of_the_scenario(run)
+    _nothing_is_commanded_before_the_start(run)
+    _flags_are_0_or_1(run)
     return run
 
 
@@ -266,6 +268,20 @@ def _robots_are_where_their_commands_lead(run: Run) -> None:
     for robot in run.robots:
         led = run.position_m[robot][:-1] + dt * run.command_m_s[robot][1:]
         close("law of motion", run.position_m[robot][1:], led, within=SMALL, about=robot, t_s=run.t_s[1:])
+
+
+def _nothing_is_commanded_before_the_start(run: Run) -> None:
+    """The first row is the start, to which no command has led."""
+    for robot in run.robots:
+        first = run.command_m_s[robot][0]
+        close("command before the start", first, np.zeros(3), within=0.0, about=robot, t_s=float(run.t_s[0]))
+
+
+def _flags_are_0_or_1(run: Run) -> None:
+    for ugv in run.ugvs:
+        flags = run.column(f"{ugv}.accepted")
+        holds("flag whether an intervention is executed", (flags == 0.0) | (flags == 1.0), flags, "0 or 1",
+              about=ugv, t_s=run.t_s)  # fmt: skip
 
 
 def _presets_are_those_of_the_scenario(run: Run) -> None:

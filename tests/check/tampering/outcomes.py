@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from check.tampering import base
 from check.tampering.base import edited_claim, edited_table, refused_by
 
 
@@ -116,3 +117,27 @@ def favours_to_nobody_done(folder: Path) -> None:
 def outcomes_miscounted(folder: Path) -> None:
     with edited_claim(folder, "GATE-MODEL") as claim:
         claim["evidence"]["outcomes"] += 2
+
+
+@refused_by("GATE-MODEL", "nothing is said of gap")
+def filler_changed(folder: Path) -> None:
+    with edited_table(folder, "decisions") as frame:
+        frame.loc[1, "gap"] = -1.002
+
+
+@refused_by("GATE-MODEL", "nothing is said of tries", run="c")
+def filler_changed_where_problems_are_solved(folder: Path) -> None:
+    with base.edited_table(folder, "decisions", "c") as frame:
+        frame.loc[1, "tries"] = -1.002
+
+
+@refused_by("events", "obstacles on the map of a proposal")
+def obstacle_on_the_map_moved(folder: Path) -> None:
+    with edited_table(folder, "proposals") as frame:
+        frame["mapped_m"] = [points + np.append(0.001, np.zeros(len(points) - 1)) for points in frame["mapped_m"]]
+
+
+@refused_by("events", "obstacles on the map of a proposal")
+def radius_on_the_map_changed(folder: Path) -> None:
+    with edited_table(folder, "proposals") as frame:
+        frame["mapped_radius_m"] = [radii + 0.001 for radii in frame["mapped_radius_m"]]

@@ -202,3 +202,15 @@ def trigger_late(folder: Path) -> None:
         for entry in entries:
             trigger = next(event for event in entry["events"] if event["kind"] == "trigger")
             trigger["t_s"] = late
+
+
+@refused_by("trace", "flag whether an intervention is executed")
+def flag_between_yes_and_no(folder: Path) -> None:
+    with edited_table(folder) as frame:
+        frame.loc[middle(frame), f"{UGV}.accepted"] = 0.5
+
+
+@refused_by("trace", "command before the start")
+def command_before_the_start(folder: Path) -> None:
+    with edited_table(folder) as frame:
+        frame.loc[0, f"{UGV}.vx_m_s"] = 0.001
