@@ -148,6 +148,16 @@ def test_noise_is_normal_and_has_the_intensity_of_the_scenario(case_a: Scenario)
     assert abs(np.corrcoef(steps[0], steps[1])[0, 1]) < 0.5  # each UGV has its own noise
 
 
+def test_noise_leaks_at_the_rate_of_the_scenario(case_a: Scenario) -> None:
+    """The same noise with and without a leak, by explicit Euler steps."""
+    case_a.decision.noise_m_sqrt_s, case_a.decision.threshold.zeta_m = 0.1, 50.0
+    noise = []
+    for case_a.decision.leak_1_s in (0.0, 0.5):
+        noise.append(Recorder(case_a, "a").simulate(1, 3.0).column("ugv1.noise_m"))
+    kept = 1.0 - 0.5 * case_a.decision.noise_period_s
+    np.testing.assert_allclose(noise[1][1:], kept * noise[1][:-1] + np.diff(noise[0]), atol=1e-12)
+
+
 def test_starting_above_the_threshold_triggers_at_once(case_a: Scenario) -> None:
     case_a.decision.threshold.zeta_m = 2.0  # UGV1 starts 2.35 m from its preset trajectory
     case_a.decision.release_m = 1.0
