@@ -17,6 +17,8 @@ MET_M_S = 1e-12
 """A velocity that misses an inequality by less meets it; a fast one, by less than this many times its speed, m/s."""
 CONTRADICTION_M_S = 1e-9
 """Inequalities that every velocity misses by more contradict each other."""
+ABOVE_LEAST = 1e-9
+"""What is missed by this much more than the least, relatively, is missed as little."""
 SHORTEST = 1e-9
 """A shorter normal, of what is nearly above a robot that stays in the plane, asks for nothing that it could do."""
 DEPENDENT = 1e-10
@@ -135,17 +137,14 @@ def _worked_out(wanted_m_s: Array, given: Inequalities) -> Array:
 
 
 def _least_missing(given: Inequalities) -> Array:
-    """By bisection of what is missed by everything, from what standing still misses."""
+    """By bisection of what is missed by everything, from what standing still misses; then the slowest."""
     low, high = np.zeros(len(given.bound)), np.maximum(0.0, given.bound.max(axis=1))
     still = np.zeros((len(high), 3))
-    best = still.copy()
     for _ in range(60):
         middle = (low + high) / 2.0
-        found, lacking = _by_active_sets(still, Inequalities(given.normal, given.bound - middle[:, None]))
-        met = lacking == 0.0
-        best[met] = found[met]
+        met = _by_active_sets(still, Inequalities(given.normal, given.bound - middle[:, None]))[1] == 0.0
         low, high = np.where(met, low, middle), np.where(met, middle, high)
-    return best
+    return _by_active_sets(still, Inequalities(given.normal, given.bound - (1.0 + ABOVE_LEAST) * high[:, None]))[0]
 
 
 def _by_active_sets(wanted_m_s: Array, given: Inequalities) -> tuple[Array, Array]:
@@ -156,6 +155,7 @@ def _by_active_sets(wanted_m_s: Array, given: Inequalities) -> tuple[Array, Arra
     """
     normal, bound = _relevant(wanted_m_s, given)
     best, lacking = wanted_m_s.copy(), np.maximum(0.0, -_spare(wanted_m_s, given)).max(axis=1)
+    lacking = np.where(lacking <= MET_M_S, 0.0, lacking)
     length = np.where(lacking == 0.0, 0.0, np.inf)
     at_once = max(1, NUMBERS // bound.size)
     for size in range(1, 4 if normal[:, :, 2].any() else 3):

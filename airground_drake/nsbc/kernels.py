@@ -16,6 +16,8 @@ MARGIN_M_S = 1e-12
 """Added to every bound in the projection, so that rounding leaves the bound itself satisfied, m/s."""
 CONTRADICTION_M_S = 1e-9
 """Constraints that every trial misses by more contradict each other; by less, it is rounding, m/s."""
+ABOVE_LEAST = 1e-9
+"""A violation larger than the least by this, relatively, is as good: no speed is spent on what is rounding."""
 DEPENDENT = 1e-20
 """Square of the sine of the angle between normals of which one says what the others say: 1e-10 rad."""
 
@@ -193,7 +195,7 @@ def _closest_feasible(lower: Array, normal: Array, bound: Array) -> Array:
 
 @njit(cache=True)
 def _least_violation(normal: Array, bound: Array) -> Array:
-    """Slowest velocity among those whose largest violation is least, to 1e-13 of what standing still violates.
+    """Slowest velocity among those whose largest violation is least, but for `ABOVE_LEAST` of it.
 
     Constraints contradict each other only where a robot is inside several safe distances at once. What the
     lower priorities ask for then has no say: they might be hostile.
@@ -201,25 +203,24 @@ def _least_violation(normal: Array, bound: Array) -> Array:
     low, high = 0.0, 0.0
     for k in range(len(bound)):
         high = max(high, bound[k] + MARGIN_M_S)  # standing still violates nothing by more
-    still, best = np.zeros(3), np.zeros(3)
+    still = np.zeros(3)
     while high - low > 1e-13 * high:
         middle = 0.5 * (low + high)
         if middle <= low or middle >= high:
             break
-        velocity, shortfall = _closest(still, normal, bound - middle, True)
-        if shortfall == 0.0:
-            high, best = middle, velocity
+        if _closest(still, normal, bound - middle, True)[1] == 0.0:
+            high = middle
         else:
             low = middle
-    return best
+    return _closest(still, normal, bound - (1.0 + ABOVE_LEAST) * high, True)[0]
 
 
 @njit(cache=True)
 def _closest(lower: Array, normal: Array, bound: Array, every: bool) -> tuple[Array, float]:
     """Closest velocity to `lower` under all constraints, and by how much it misses one, m/s (0: rounding at most).
 
-    By enumeration of active sets of at most three: a projection in R^3 needs no larger one (a planar robot:
-    two), so this is exact. Each trial is lower + J^+ (b - J lower), the augmented composition over that active
+    By enumeration of active sets of at most three, none among them: a projection in R^3 needs no larger one (a planar
+    robot: two), so this is exact. Each trial is lower + J^+ (b - J lower), the augmented composition over that active
     set. Of those that meet all constraints the closest one is taken, else the one that misses least. Where standing
     still meets all constraints, no projection is longer than `lower`, and those that nothing of its size can reach are
     left out, unless `every` one is asked for.
@@ -239,8 +240,9 @@ def _closest(lower: Array, normal: Array, bound: Array, every: bool) -> tuple[Ar
             level[count] = bound[k] + MARGIN_M_S
             planar = planar and normal[k, 2] == 0.0
             count += 1
-    best_cost, best_shortfall = np.inf, np.inf
-    best, trial = lower.copy(), np.empty(3)
+    tolerance = 0.5 * MARGIN_M_S + 1e-14 * reach
+    best, trial, best_cost = lower.copy(), np.empty(3), 0.0
+    best_shortfall = _shortfall(row, level, count, best, tolerance)
     active, across = np.empty(3, dtype=np.int64), np.empty((3, 3))
     for i in range(count):
         for j in range(i, count):
@@ -252,11 +254,7 @@ def _closest(lower: Array, normal: Array, bound: Array, every: bool) -> tuple[Ar
                 for a in range(3):
                     trial[a] = lower[a]
                 _meet(row, level, active[:size], across, trial)
-                shortfall = 0.0
-                for k in range(count):
-                    shortfall = max(shortfall, level[k] - _dot(row[k], trial))
-                if shortfall <= 0.5 * MARGIN_M_S + 1e-14 * max(reach, np.sqrt(_dot(trial, trial))):
-                    shortfall = 0.0
+                shortfall = _shortfall(row, level, count, trial, tolerance)
                 cost = 0.0
                 for a in range(3):
                     cost += (trial[a] - lower[a]) ** 2
@@ -265,6 +263,15 @@ def _closest(lower: Array, normal: Array, bound: Array, every: bool) -> tuple[Ar
                     for a in range(3):
                         best[a] = trial[a]
     return best, best_shortfall
+
+
+@njit(cache=True)
+def _shortfall(row: Array, level: Array, count: int, velocity: Array, tolerance: float) -> float:
+    """By how much a velocity misses one of the constraints, m/s; 0 if by no more than rounding."""
+    found = 0.0
+    for k in range(count):
+        found = max(found, level[k] - _dot(row[k], velocity))
+    return found if found > tolerance + 1e-15 * np.sqrt(_dot(velocity, velocity)) else 0.0
 
 
 @njit(cache=True)

@@ -136,3 +136,18 @@ def test_in_contact_rounding_decides_nothing(seed: int) -> None:
             found(np.array([[touches, inside, aside]])) for touches in (0.0, -1e-15, 1e-15, -1e-12, 1e-12)
         )
         assert np.array(beside) == pytest.approx(np.array([there] * 4), abs=1e-9)
+
+
+@given(SEEDS)
+def test_what_no_velocity_can_change_moves_nobody(seed: int) -> None:
+    """A UGV exactly below the UAV, inside their safe distance: it does not run to where a far obstacle's bound is."""
+    rng = np.random.default_rng(seed)
+    wanted, normal, bound = drawn(seed, planar=True)
+    normal = np.concatenate([normal, np.zeros((BATCH, 1, 3))], axis=1)
+    bound = np.concatenate([10.0 * bound, rng.uniform(1e-6, 1.0, (BATCH, 1))], axis=1)
+    for found in (
+        avoiding(wanted, Inequalities(normal, bound), "augmented", planar=True),
+        checker.avoiding(wanted, checker.Inequalities(normal, bound), "augmented"),
+        kernels.team_avoid(wanted, normal, bound, kernels.AUGMENTED),
+    ):
+        assert not found.any()
