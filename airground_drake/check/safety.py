@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from functools import lru_cache
+from functools import lru_cache, partial
 from itertools import chain
 from typing import NamedTuple
 
@@ -60,24 +60,30 @@ def safe_trace(run: Run, claim: Json) -> Found:
     margin = min(margins.values())
     worst = claim["where"]["first"], claim["where"]["second"]
     close("pair of least margin", margins[worst], margin, within=SMALL, about=", ".join(worst))
-    same("time of least distance", claim["where"]["t_s"], by_names[worst]["t_s"], about=", ".join(worst))
     status = "holds" if margin >= -SMALL else "refuted"
     found = Found.with_margin(status, margin, tolerance_m=SMALL, pairs_in_all=len(known)).having_judged(*JUDGED)
-    if claim["counterexample"]:
-        of_the_pair = {key: claim["counterexample"].get(key) for key in by_names[worst]}
-        same("counterexample", of_the_pair, by_names[worst], about=", ".join(worst))
-        found = found.having_judged(*(f"counterexample.{key}" for key in PAIR_KEYS), *snapshot(run, claim))
+    found = found.judging(partial(_where_pairs_meet, run, claim, by_names[worst]), *JUDGED_OF_THE_WORST)
     return found.counted(close_by, close_by + doubtful)
+
+
+def _where_pairs_meet(run: Run, claim: Json, worst: Json) -> None:
+    """Time of least distance, and the counterexample, are those of the pair of least margin."""
+    about, shown = f"{worst['first']}, {worst['second']}", claim["counterexample"]
+    same("time of least distance", claim["where"]["t_s"], worst["t_s"], about=about)
+    if shown:
+        same("counterexample", {key: shown.get(key) for key in worst}, worst, about=about)
+        _snapshot(run, shown)
 
 
 PAIR_KEYS = ("first", "second", "safe_distance_m", "min_distance_m", "margin_m", "t_s", "row", "exercised")
 """What is recorded of a pair; that it is exercised is judged where rounding does not decide it."""
-JUDGED = ("where.first", "where.second", "where.t_s", *(f"evidence.pairs.*.{key}" for key in PAIR_KEYS))
+JUDGED = ("where.first", "where.second", *(f"evidence.pairs.*.{key}" for key in PAIR_KEYS))
+SNAPSHOT = ("counterexample.positions_m.*", "counterexample.velocities_m_s.*")
+JUDGED_OF_THE_WORST = ("where.t_s", *(f"counterexample.{key}" for key in PAIR_KEYS), *SNAPSHOT)
 
 
-def snapshot(run: Run, claim: Json) -> tuple[str, ...]:
-    """Places at the time of a counterexample, and velocities just after it; returns the keys that this has judged."""
-    shown = claim["counterexample"]
+def _snapshot(run: Run, shown: Json) -> None:
+    """Places at the time of a counterexample, and velocities just after it, of the things that it names."""
     when = shown["t_s"]
     row = min(int(np.searchsorted(run.t_s, when + SMALL)), len(run.t_s) - 1)
     named = {value for value in shown.values() if isinstance(value, str) and value in run.position_m}
@@ -88,7 +94,6 @@ def snapshot(run: Run, claim: Json) -> tuple[str, ...]:
     for name, velocity in shown["velocities_m_s"].items():
         now = run.command_m_s[name][row]
         close("velocity in the counterexample", velocity, now, within=SMALL, about=name, t_s=when)
-    return "counterexample.positions_m.*", "counterexample.velocities_m_s.*"
 
 
 def _evidence_on_a_pair(run: Run, pair: Pair, least_m: float, recorded: Json) -> None:
@@ -163,7 +168,7 @@ def safe_hyp(run: Run, claim: Json) -> Found:
     found = [*_constants(run), *_velocities(run), *_inequalities(run)]
     in_range = sum(len(each.margin) for each in found if each.name == "avoidance")
     broken = [(each, k) for each in found for k in np.flatnonzero(~(each.margin >= -SMALL))[:1]]
-    leading, judged = "avoidance", ["where.*", "evidence.worst.*.*", "evidence.inequalities_that_bind.*"]
+    leading, first_s = "avoidance", None
     if broken:
         first, k = min(broken, key=lambda one: float(one[0].t_s[one[1]]))
         when = float(first.t_s[k])
@@ -172,18 +177,28 @@ def safe_hyp(run: Run, claim: Json) -> Found:
         leading = claim["where"]["hypothesis"]
         earliest = sorted({each.name for each, j in broken if each.t_s[j] <= when + SMALL})
         holds("hypothesis broken first", leading in earliest, leading, " or ".join(earliest), t_s=when)
-        close("time of the counterexample", claim["counterexample"]["t_s"], when, within=SMALL)
-        at_most("margin of the counterexample", claim["counterexample"]["margin"], 0.0, t_s=when)
-        _is_attained(found, claim["counterexample"], "counterexample", (*LISTED, "positions_m", "velocities_m_s"))
-        judged += ["counterexample.*", *snapshot(run, claim)]
+        first_s = when
     margins = [float(each.margin.min()) for each in found if each.name == leading and len(each.margin)]
     status = "refuted" if broken else "holds"
     margin = min(margins, default=None)
-    _worst(found, claim["evidence"]["worst"])
-    _where(claim, leading, margin)
     least, most = _binding(found, claim["evidence"]["inequalities_that_bind"])
     facts = {"inequalities_in_range": in_range, "tolerance_m_s": SMALL}
-    return Found(status, margin, margin, facts).counted(least, most).having_judged(*judged)
+    result = Found(status, margin, margin, facts).counted(least, most)
+    result = result.having_judged("evidence.inequalities_that_bind.*")
+    shown = tuple(f"counterexample.{key}" for key in LISTED)
+    result = result.judging(partial(_first_broken, run, claim, found, first_s), *shown, *SNAPSHOT)
+    result = result.judging(partial(_worst, claim, found), "evidence.worst.*.*")
+    return result.judging(partial(_where, claim, leading, margin), *(f"where.{key}" for key in LISTED))
+
+
+def _first_broken(run: Run, claim: Json, found: list[Hypothesis], first_s: float | None) -> None:
+    """The counterexample is of the first instant at which a hypothesis is broken."""
+    shown = claim["counterexample"]
+    if shown and first_s is not None:
+        close("time of the counterexample", shown["t_s"], first_s, within=SMALL)
+        at_most("margin of the counterexample", shown["margin"], 0.0, t_s=first_s)
+        _is_attained(found, shown, "counterexample", (*LISTED, "positions_m", "velocities_m_s"))
+        _snapshot(run, shown)
 
 
 LISTED = ("hypothesis", "robot", "first", "second", "other", "t_s", "margin", "unit")
@@ -202,8 +217,9 @@ def _is_attained(found: list[Hypothesis], recorded: Json, what: str, keys: tuple
     holds(f"margin of {what}", off <= SMALL, recorded["margin"], str(there), about=about, t_s=when)
 
 
-def _worst(found: list[Hypothesis], recorded: list[Json]) -> None:
+def _worst(claim: Json, found: list[Hypothesis]) -> None:
     """The least margin of each hypothesis and robot, and where it is attained."""
+    recorded = claim["evidence"]["worst"]
     least: dict[tuple[str, str], float] = {}
     for each in found:
         if len(each.margin):

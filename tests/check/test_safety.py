@@ -35,7 +35,7 @@ def test_a_distance_that_is_short_refutes(monkeypatch: pytest.MonkeyPatch, short
 @pytest.mark.parametrize(("margin", "broken"), [(0.0, False), (-5e-10, False), (-2e-9, True), (-0.5, True)])
 def test_a_broken_inequality_refutes(monkeypatch: pytest.MonkeyPatch, margin: float, broken: bool) -> None:
     kind = safety.KINDS[0]
-    found = safety.Hypothesis("avoidance", np.array([1.0]), np.array([margin]), kind)
+    found = safety.Hypothesis("avoidance", "m/s", np.array([1.0]), np.array([margin]), kind=kind)
     monkeypatch.setattr(safety, "_constants", lambda run: iter(()))
     monkeypatch.setattr(safety, "_velocities", lambda run: iter(()))
     monkeypatch.setattr(safety, "_inequalities", lambda run: iter([found]))
