@@ -26,7 +26,7 @@ import math
 from collections import Counter
 from collections.abc import Mapping
 from fractions import Fraction
-from functools import cache, lru_cache
+from functools import cache, lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -57,7 +57,8 @@ def prove(claim: Json, files: Files, scenario: Json) -> Found:
     if claim["status"] == "refuted":
         if claim["id"] == "ZENO-PROOF":
             bound = scenario["decision"]["min_inter_event_s"] or SHORTEST_S
-            return refuted_zeno_proof(claim, levels_of(scenario), bound)
+            found = refuted_zeno_proof(claim, levels_of(scenario), bound).also(conformance=_TRIGGER_CONFORMS)
+            return found.judging(partial(_rounding_of_the_dwell, claim["evidence"], scenario), "evidence.rounding_s")
         raise NotEstablished("a refutation is established again", "no way is known here")
     content = content_of(files, "obligations.json")
     obligations = _expanded(content)
@@ -342,19 +343,29 @@ def _worst_of_a_disturbed_run(row: Json, bounds_m: Mapping[float, float]) -> Non
 
 def _recorded_of_zeno(claim: Json, scenario: Json) -> Found:
     """The running trigger conforms; the margin is what rounding `triggered_at + dwell` leaves of 1e-9 s."""
-    evidence, dwell = claim["evidence"], levels_of(scenario).dwell_s
+    evidence = claim["evidence"]
     same("the proof is about the trigger in use", scenario["decision"]["trigger"], "automaton")
     same("states in which the running trigger does not conform", evidence["conformance"]["disagreements"], 0)
     same("an invariant exists for the scenario's numbers", evidence["spacer"], "an invariant exists")
+    rounding = _rounding_of_the_dwell(evidence, scenario)
+    bound = float(scenario["decision"]["min_inter_event_s"] or SHORTEST_S)
+    agrees("where the margin is attained", claim["where"], {"bound_s": bound}, within=0.0)
+    found = Found.with_margin("proved", SMALL - rounding, within=1e-16, bound_s=bound, conformance=_TRIGGER_CONFORMS)
+    return found.having_judged("where.bound_s", "evidence.rounding_s", "evidence.spacer")
+
+
+_TRIGGER_CONFORMS: Json = {"disagreements": 0, "first": None}
+"""What the evidence says of a running trigger that conforms."""
+
+
+def _rounding_of_the_dwell(evidence: Json, scenario: Json) -> float:
+    """What rounding `triggered_at + dwell` may take from a gap, s; the evidence has the same."""
+    dwell = levels_of(scenario).dwell_s
     meant, kept = rational(dwell), Fraction(float(dwell))
     error = Fraction(ROUNDOFF) * (Fraction(float(scenario["duration_s"])) + kept) + abs(meant - kept)
     rounding = math.nextafter(float(error), math.inf)
     close("rounding of the dwell", evidence["rounding_s"], rounding, within=1e-24)
-    bound = float(scenario["decision"]["min_inter_event_s"] or SHORTEST_S)
-    agrees("where the margin is attained", claim["where"], {"bound_s": bound}, within=0.0)
-    conforms = {"disagreements": 0, "first": None}
-    found = Found.with_margin("proved", SMALL - rounding, within=1e-16, bound_s=bound, conformance=conforms)
-    return found.having_judged("where.bound_s", "evidence.rounding_s", "evidence.spacer")
+    return rounding
 
 
 def _recorded_of_live(claim: Json, scenario: Json) -> Found:

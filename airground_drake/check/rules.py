@@ -79,13 +79,13 @@ class Found:
     within: float = SMALL
     exercised: tuple[int, int] | None = None
     judged: tuple[str, ...] = ()
-    rules: tuple[Callable[[], None], ...] = ()
+    rules: tuple[Callable[[], object], ...] = ()
 
     def having_judged(self, *keys: str) -> Found:
         """The same, with further keys of the claim's entry that its rules have judged."""
         return replace(self, judged=(*self.judged, *keys))
 
-    def judging(self, rule: Callable[[], None], *keys: str) -> Found:
+    def judging(self, rule: Callable[[], object], *keys: str) -> Found:
         """The same, with a further rule about the claim's entry, and the keys that it judges."""
         return replace(self.having_judged(*keys), rules=(*self.rules, rule))
 

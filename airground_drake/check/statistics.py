@@ -190,7 +190,7 @@ def refine(claim: Json, files: Files, scenario: Json) -> Found:
     intervals = {name: _interval(dt, counts.of[name]) for name in SERIES[:2]}
     bias = float(_fit(dt, expected)[1]) + 0.5
     most = int(duration / levels.dwell_s + SMALL) + 1 if levels.dwell_s > 0.0 else None
-    facts = {
+    facts: Json = {
         **{name: _series(values) for name, values in counts.of.items()},
         "dt_s": dt.tolist(),
         "expected_bare": expected.tolist(),
@@ -234,7 +234,32 @@ def refine(claim: Json, files: Files, scenario: Json) -> Found:
     found = Found.with_margin(status, slack, **facts).counted(PATHS)
     attained = partial(_one_of, "where the margin is attained", claim["where"].get("condition"), lowest)
     found = found.judging(attained, "where.condition")
-    return found.having_judged("counterexample") if status == "refuted" else found
+    too_many = most is not None and counts.of["automaton"].max() > most
+    shown = _too_many(counts, dt) if too_many else _not_so(claim["where"].get("condition", ""), facts, dt)
+    against = partial(_counterexample, claim["counterexample"], shown if status == "refuted" else None)
+    return found.judging(against, *(f"counterexample.{key}" for key in shown))
+
+
+def _counterexample(recorded: Json | None, shown: Json | None) -> None:
+    if shown is None:
+        same("counterexample", recorded, None)
+    else:
+        agrees("counterexample", recorded, shown, within=1e-8)
+
+
+def _too_many(counts: Counts, dt: Array) -> Json:
+    """The first path with the most triggers, which are more than the dwell admits."""
+    values = counts.of["automaton"]
+    i, j = (int(k) for k in np.argwhere(values == values.max())[0])
+    what = "more triggers than the dwell admits"
+    return {"what": what, "path": i, "dt_s": float(dt[j]), "triggers": float(values.max())}
+
+
+def _not_so(condition: str, facts: Json, dt: Array) -> Json:
+    """The condition of least margin, and the fit that does not meet it."""
+    which = SERIES["automaton" in condition]
+    fit = {key: facts["fit"][which][key] for key in ("exponent", "interval")}
+    return {"what": f"not so: {condition}", **fit, "dt_s": dt.tolist(), "mean": facts[which]["mean"]}
 
 
 def _steps_of(scenario: Json) -> tuple[Array, float, float]:

@@ -143,7 +143,14 @@ def refuted_zeno_proof(claim: Json, levels: Levels, bound_s: float) -> Found:
     at_most("two triggers of the automaton", 2 - len(triggers), 0)
     gap = float(np.diff(triggers).min())
     at_most("gap of two triggers", gap, bound_s)
-    return Found.with_margin("refuted", gap - bound_s)
+    shown = claim["counterexample"]
+    close("gap of the counterexample", [shown["gap_s"], shown["bound_s"]], [gap, bound_s], within=SMALL)
+    same("the running trigger was put through the run", shown["replayed"], True)
+    found = Found.with_margin("refuted", gap - bound_s, bound_s=bound_s, spacer="violated")
+    return found.having_judged(
+        *(f"counterexample.run.*.{key}" for key in ("t_s", "x_m", "mode", "trigger")),
+        "counterexample.gap_s", "counterexample.bound_s", "counterexample.replayed",
+    )  # fmt: skip
 
 
 def thr_trig(run: Run, claim: Json) -> Found:
