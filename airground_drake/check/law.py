@@ -14,7 +14,9 @@ from .rules import Array, Flags
 PLANE = np.array([1.0, 1.0, 0.0])
 """Directions in which a UGV can move."""
 MET_M_S = 1e-12
-"""A velocity that misses an inequality by less meets it; a fast one, by less than this many times its speed, m/s."""
+"""A velocity that misses an inequality by less, and by what rounding makes of its speed, meets it."""
+ROUNDING = 1e-15
+"""Relative."""
 CONTRADICTION_M_S = 1e-9
 """Inequalities that every velocity misses by more contradict each other."""
 ABOVE_LEAST = 1e-9
@@ -198,7 +200,7 @@ def _candidates(wanted_m_s: Array, given: Inequalities, active: Array) -> tuple[
     v += np.einsum("bcij,bcj->bci", inverse, due - np.einsum("bcij,bcj->bci", equations, v))
     rate = np.einsum("bkd,bcd->bck", given.normal, v)
     lacks = np.maximum(0.0, given.bound[:, None] - rate).max(axis=2)
-    lacks = np.where(lacks <= MET_M_S * np.maximum(1.0, np.linalg.norm(v, axis=2)), 0.0, lacks)
+    lacks = np.where(lacks <= MET_M_S + ROUNDING * np.linalg.norm(v, axis=2), 0.0, lacks)
     return v - wanted_m_s[:, None], np.where(usable, lacks, np.inf)
 
 
