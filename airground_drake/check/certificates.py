@@ -405,7 +405,7 @@ def _recorded_of_wait(claim: Json, scenario: Json) -> Found:
     due = {"over", "exhausted", "no_progress"}
     same("reasons seen under attack", sorted(due & reasons), sorted(due))
     return Found.with_margin("proved", bound - max(longest), within=SMALL).having_judged(
-        "evidence.bound_s", "evidence.attacks.*.attack"
+        "evidence.bound_s", "evidence.attacks.*.attack", "evidence.attacks.*.unexpected"
     )
 
 

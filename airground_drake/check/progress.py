@@ -55,8 +55,16 @@ def live_prog(run: Run, _: Json) -> Found:
         "farthest_behind_prediction_m": farthest,
         "reasons": reasons_of(run),
         "most_tries": max(row["tries"] for row in rows),
+        "leave_a_direction": _leaving_a_direction(run, rows),
     }
     return Found.with_margin("holds", run.scenario["gatekeeper"]["behind_s"] - longest, **facts).counted(accepted)
+
+
+def _leaving_a_direction(run: Run, rows: list[dict[str, Any]]) -> int:
+    """How many accepted proposals leave a direction of the plane to the own task."""
+    accepted = {(row["robot"], row["issued_s"]) for row in rows if row["decision"] == "accept"}
+    parts = [on_which(run, *proposal).projector[:2, :2] for proposal in accepted]
+    return sum(not np.allclose(part, np.eye(2)) for part in parts)
 
 
 def _follow(run: Run, row: dict[str, Any], last: dict[str, Any] | None, state: _Ugv) -> None:
