@@ -163,7 +163,7 @@ def gate_opt(run: Run, claim: Json) -> Found:
 
 def _evidence_on_gaps(claim: Json, planned: list[Decision], gaps: Array) -> None:
     """Largest and median gap are possible ones; those listed are of decisions with such gaps, the largest first."""
-    evidence, slop = claim["evidence"], SMALL
+    evidence, slop = claim["evidence"], GAP
     keys = [(each.ugv, each.t_s) for each in planned]
     least, most = (dict(zip(keys, column, strict=True)) for column in gaps.T.tolist())
     low, high = np.median(gaps, axis=0)
