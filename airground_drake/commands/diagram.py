@@ -40,7 +40,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from airground_drake.scenarios.load import load
 
     try:
-        files.make_folder(options.output, "the pictures")
         scenario, _ = load(options.scenario)
         with plugins.admitted(scenario, options.scenario, allow=options.allow_plugins):
             diagram, name = build_diagram(scenario, method=options.method), scenario.name
@@ -50,6 +49,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 raise UnknownNameError("part", options.part, parts)
             diagram, name = diagram.GetSubsystemByName(options.part), f"{name}_{options.part}"
         text = graphviz.dot(diagram, options.depth)
+        files.make_folder(options.output, "the pictures")
         for kind in options.format or ("dot", "svg"):
             path = options.output / f"{name}.{kind}"
             files.write_bytes(path, graphviz.drawn(text, kind))

@@ -223,8 +223,8 @@ CHECKER = (
     Mutant(
         "checker: distances within 5 cm",
         "check/safety.py",
-        '"holds" if margin >= -SMALL else "refuted", margin)',
-        '"holds" if margin >= -0.05 else "refuted", margin)',
+        'status = "holds" if margin >= -SMALL else "refuted"',
+        'status = "holds" if margin >= -0.05 else "refuted"',
         runs=BOTH,
         tamperings=("SAFE-TRACE",),
         tests=("tests/check/test_safety.py",),
@@ -362,7 +362,7 @@ CHECKER = (
     Mutant(
         "checker: a claim may be missing",
         "check/report.py",
-        'same("claims that there are", recorded, sorted(map(list, expectations(scenario))))',
+        'same("claims that there are", own, sorted(map(list, expectations(scenario))))',
         "pass",
         runs=(),
         tamperings=("report",),

@@ -18,6 +18,7 @@ from airground_drake import check
 from airground_drake.check.evidence import AS_RECORDED, KEYS, as_recorded
 from airground_drake.check.report import AGREES, KNOWN, check_report
 
+DOCS = Path(__file__).parents[2] / "docs"
 SAMPLE = 60
 """Numbers that the suite changes; `pytest --hypothesis-profile=fuzz` changes one of every key."""
 AS_RIGHT = "evidence.pairs.*.row"
@@ -100,7 +101,7 @@ def test_what_is_taken_as_recorded_is_said(report: Path, capsys: pytest.CaptureF
 
 
 def test_every_key_that_is_listed_is_in_the_documentation() -> None:
-    text = (Path(check.__file__).parents[2] / "docs" / "checker.md").read_text()
+    text = (DOCS / "checker.md").read_text()
     said = text[text.index("## Taken as recorded") : text.index("## What it reads")]
     for claim, keys in AS_RECORDED.items():
         item = next(item for item in said.split("\n- ") if item.startswith(f"**{claim}**"))
@@ -114,9 +115,9 @@ def test_every_module_and_claim_is_in_the_documentation() -> None:
     lines = [line for line in str(check.__doc__).splitlines() if line.startswith("    ")]
     listed = {word.strip(",") for line in lines for word in line[:31].split()}
     assert stems <= listed
-    text = (folder.parents[1] / "docs" / "checker.md").read_text()
+    text = (DOCS / "checker.md").read_text()
     said = text[text.index("## What each check establishes") : text.index("## Taken as recorded")]
-    summary = (folder.parents[1] / "docs" / "verification.md").read_text()
+    summary = (DOCS / "verification.md").read_text()
     for claim in KNOWN:
         assert re.search(rf"^- \*\*[^*]*\b{claim}\b[^*]*\*\*", said, re.MULTILINE), claim
         assert claim in summary, claim
