@@ -56,9 +56,9 @@ def _open_standard_streams() -> None:
     """Point those that are closed to nowhere, or what is opened next takes their place."""
     for name in ("stdin", "stdout", "stderr"):
         if getattr(sys, name) is None:
-            stream = open(os.devnull, "r+")  # noqa: SIM115 - on the least descriptor that is free
-            os.set_inheritable(stream.fileno(), True)
-            setattr(sys, name, stream)
+            nowhere = os.open(os.devnull, os.O_RDWR)  # the least descriptor that is free
+            os.set_inheritable(nowhere, True)
+            setattr(sys, name, os.fdopen(nowhere, "r+"))
 
 
 def run(main: Callable[[], int]) -> NoReturn:

@@ -27,7 +27,10 @@ CLAIMS = {claim.id: claim for claim in TRACE_CLAIMS}
 GATE = {"GATE-OPT", "GATE-SUR", "GATE-FEAS", "GATE-MODEL"}
 """Claims about recorded problems, which the synthetic runs do not have: see runs/test_gate_claims.py."""
 
-UNRECORDED = {"c": dict.fromkeys(GATE, "not_run"), "d": dict.fromkeys(("GATE-FEAS", "GATE-MODEL", "LIVE-PROG"), "error")}
+UNRECORDED = {
+    "c": dict.fromkeys(GATE, "not_run"),
+    "d": dict.fromkeys(("GATE-FEAS", "GATE-MODEL", "LIVE-PROG"), "error"),
+}
 """By method, what claims say where problems, or proposals and outcomes, are not in the trace, as in synthetic runs."""
 
 LAW = {"EXEC"}
