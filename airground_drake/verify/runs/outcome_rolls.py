@@ -338,13 +338,15 @@ def _round(place: Array, goal: Array, centres: Array, radii: Array) -> Array:
     rings = (centres[:, None] + radii[:, None, None] * (1.0 + 1e-9) * ring).reshape(-1, 2)
     free = (np.linalg.norm(rings[:, None] - centres, axis=2) >= radii).all(axis=1)
     nodes = np.concatenate([ends, rings[free]])
-    legs = nodes[None] - nodes[:, None]
-    lengths = np.linalg.norm(legs, axis=2)
-    clear = np.ones(lengths.shape, dtype=bool)
-    for centre, radius in zip(centres, radii, strict=True):
-        along = np.clip(((centre - nodes)[:, None] * legs).sum(axis=2) / np.maximum(lengths, 1e-150) ** 2, 0.0, 1.0)
-        nearest = nodes[:, None] + along[..., None] * legs - centre
-        clear &= np.linalg.norm(nearest, axis=2) >= radius * (1.0 - 1e-6)
+    x, y = nodes.T[:, :, None]
+    over, up = x.T - x, y.T - y  # from the first node to the second
+    squared = over**2 + up**2
+    clear = np.ones(squared.shape, dtype=bool)
+    for (right, above), radius in zip(centres, radii, strict=True):
+        along = np.clip(((right - x) * over + (above - y) * up) / np.maximum(squared, 1e-300), 0.0, 1.0)
+        nearest = np.square(x + along * over - right) + np.square(y + along * up - above)
+        clear &= nearest >= (radius * (1.0 - 1e-6)) ** 2
+    lengths = np.sqrt(squared)
     before = dijkstra(np.where(clear, lengths, 0.0), indices=0, return_predecessors=True)[1]
     if before[1] < 0:
         return np.empty((0, 2))

@@ -50,7 +50,7 @@ def closest(
         return found[:, None], possible & met
     found = wanted.copy()
     for k in range(bound.shape[1]):
-        rows = np.flatnonzero(((unit[:, k] * found).sum(axis=1) < level[:, k] - ROUNDING_M_S) & possible)
+        rows = np.flatnonzero((np.einsum("bd,bd->b", unit[:, k], found) < level[:, k] - ROUNDING_M_S) & possible)
         if rows.size:
             found[rows], met = _on_boundary(wanted[rows], unit[rows, : k + 1], level[rows, : k + 1], contradiction)
             possible[rows] &= met
