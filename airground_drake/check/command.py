@@ -23,7 +23,7 @@ Each line says what was checked, on which run, and
   agrees                     established again, with the recorded verdict, margin and evidence
   DISAGREES                  files contradict the verdict or each other: the rule, the time, both values
   cannot be re-established   a file cannot be read, or no way is known here to decide the claim
-Exit codes: 0 all agree; 1 not all; 2 usage, or no report."""
+Exit codes: 0 all agree; 1 not all; 2 usage, or no report; 4 a fault of the checker."""
 LIMIT_S = 300.0
 """CPU time that a check may take, s: those of a report of minutes take seconds."""
 MOST_S = 1e6

@@ -93,8 +93,11 @@ def _only(spec: Spec, options: argparse.Namespace) -> int:
 
     scenario = spec.draw(options.only)
     path = options.output or Path(f"{scenario.name}.yaml")
+    text = yaml.safe_dump(resolved(scenario), sort_keys=False, allow_unicode=True)
     with files.wanted(path, "a file for the scenario"):
-        files.write_text(path, yaml.safe_dump(resolved(scenario), sort_keys=False, allow_unicode=True))
+        if not (path.is_file() and path.read_bytes() == text.encode()):  # the same draw may be asked for again
+            files.try_to_create(path)
+            files.write_text(path, text)
     rows = rows_of(spec, options.only, _limits(options), allow_plugins=options.allow_plugins)
     for row in rows:
         margin = "" if math.isnan(row["margin"]) else f" {row['margin']:.6g} {row['unit']}"

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +31,20 @@ def test_a_limit_that_is_none_is_not_the_files_fault(limit: str, capsys: pytest.
     said = capsys.readouterr().err
     assert f"--limit-s: {limit!r} is not allowed; wanted: a number above 0, at most 1e+06" in said
     assert said.count("\n") == 1
+
+
+BROKEN = """
+import runpy
+from airground_drake.check import command
+command.main = lambda: 1 / 0
+runpy.run_module("airground_drake.check", run_name="__main__")
+"""
+
+
+def test_a_fault_of_the_checker_is_no_verdict() -> None:
+    done = subprocess.run([sys.executable, "-c", BROKEN], capture_output=True, text=True, check=False)
+    assert done.returncode == 4
+    assert "ZeroDivisionError" in done.stderr
 
 
 def test_help_explains_outcomes_and_exit_codes(capsys: pytest.CaptureFixture[str]) -> None:

@@ -57,6 +57,17 @@ def test_one_draw_alone_is_the_same_draw_and_a_scenario(
     scenario = load(tmp_path / "one.yaml")[0]
     assert scenario.name == "small_1"
     assert scenario.duration_s == 1.0
+    assert main([str(spec), "--only", "1", "-o", str(tmp_path / "one.yaml")]) == 0, "the same file again"
+
+
+def test_a_file_that_is_something_else_is_not_replaced_by_a_draw(
+    spec: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mine = tmp_path / "mine.yaml"
+    mine.write_text("mine", encoding="utf-8")
+    assert main([str(spec), "--only", "1", "-o", str(mine)]) == 2
+    assert f"{mine} exists" in capsys.readouterr().err
+    assert mine.read_text(encoding="utf-8") == "mine"
 
 
 @pytest.mark.parametrize(
@@ -73,10 +84,10 @@ def test_what_cannot_be_written(
     spec: Path, tmp_path: Path, more: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "file").write_text("mine")
-    output = tmp_path if "--only" in more else tmp_path / "file"
+    output = tmp_path / "file" / "one.yaml" if "--only" in more else tmp_path / "file"
     assert main([str(spec), "-o", str(output), *more]) == 2
     said = capsys.readouterr().err
-    assert f"{output} cannot be written: " in said
+    assert "cannot be written: " in said
     assert said.count("\n") == 1
 
 
