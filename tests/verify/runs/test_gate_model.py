@@ -17,7 +17,7 @@ from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Policy
 from airground_drake.simulation import simulate
 from airground_drake.trace import Trace
-from airground_drake.verify.runs import outcome_rolls
+from airground_drake.verify.runs import beginnings
 from airground_drake.verify.runs.proposals import proposals_of
 
 Run = Callable[[str, str], Trace]
@@ -48,7 +48,7 @@ def test_stages_of_several_control_periods_hold() -> None:
 
 
 def test_of_a_map_without_end_the_nearest_obstacles_count() -> None:
-    assert certified.MOST_CLAIMED == outcome_rolls.MOST_CLAIMED == foresight.MOST_CLAIMED == 64
+    assert certified.MOST_CLAIMED == beginnings.MOST_CLAIMED == foresight.MOST_CLAIMED == 64
     scenario = load("case_a", ["duration_s=15.5"])[0]
     scenario.runs, scenario.reproduction, scenario.choices = {"d": scenario.runs["d"]}, [], []
     scenario.intervention.policies = [Policy("towards", {"x_m": 6.0, "y_m": 5.0, "speed_m_s": 2.0})]
@@ -58,10 +58,10 @@ def test_of_a_map_without_end_the_nearest_obstacles_count() -> None:
     assert finding.status == "holds", finding
     assert finding.exercised
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(outcome_rolls, "MOST_CLAIMED", 0)
+        patch.setattr(beginnings, "MOST_CLAIMED", 0)
         sent = proposals_of(trace)[0]
-        assert len(outcome_rolls.known_discs(trace, "ugv1", sent.issued_s, sent)[0]) <= len(scenario.obstacles)
-    assert len(outcome_rolls.known_discs(trace, "ugv1", sent.issued_s, sent)[0]) >= 64
+        assert len(beginnings.known_discs(trace, "ugv1", sent.issued_s, sent)[0]) <= len(scenario.obstacles)
+    assert len(beginnings.known_discs(trace, "ugv1", sent.issued_s, sent)[0]) >= 64
 
 
 # ------------------------------------------------------------------------------------- mutants of the running code

@@ -14,7 +14,7 @@ from verify.judging import CLAIMS
 from airground_drake.scenarios.load import load
 from airground_drake.simulation import simulate
 from airground_drake.trace import Trace
-from airground_drake.verify.runs.outcome_rolls import bounds_of_way_left
+from airground_drake.verify.runs.way_left import bounds_of_way_left
 
 
 @pytest.fixture(scope="session")

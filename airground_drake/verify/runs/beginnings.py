@@ -1,0 +1,181 @@
+"""What a UGV knew when it decided about a proposal, and what it was to expect of the others, again from a trace."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from airground_drake.arrays import Array
+from airground_drake.errors import TraceError
+from airground_drake.trace import Trace
+from airground_drake.verify.claim import TIME_TOLERANCE_S
+from airground_drake.verify.engines.segments import corner_times, interpolate, travelled
+from airground_drake.verify.runs.pairs import Pair, pairs_of, radii_of
+from airground_drake.verify.runs.proposals import Sent
+
+NONE = np.empty(0), np.empty(0), np.empty(0)
+MOST_CLAIMED = 64
+"""Obstacles of a message that a UGV takes into account."""
+
+
+class Beginning(NamedTuple):
+    """What a decision's roll-outs begin with; S is the number of periods, K that of points to keep away from.
+
+    Attributes:
+        here: (3,), m.
+        preset: at the control samples, (S + 1, 3), m.
+        wanted: where the proposed motion is, (S + 1, 3), m.
+        chosen: its directions, (3, 3).
+        limit: speed limit, m/s.
+        periods: for which the proposal is executed.
+        settled: periods after which it is over when nothing moves any more.
+        points: if it is refused and if it is accepted, (2, S + 1, K, 3), m.
+        safe: distances to keep, (K,), m.
+        share: of the inequalities, (K,).
+        discs: how many of the points are obstacles: they come first.
+        goal: (3,), m.
+    """
+
+    here: Array
+    preset: Array
+    wanted: Array
+    chosen: Array
+    limit: float
+    periods: int
+    settled: int
+    points: Array
+    safe: Array
+    share: Array
+    discs: int
+    goal: Array
+
+    @property
+    def known(self) -> tuple[Array, Array]:
+        """Centres of the obstacles, (discs, 3), and the distances that are kept from them, (discs,), m."""
+        return self.points[0, 0, : self.discs], self.safe[: self.discs]
+
+
+def beginning(trace: Trace, robot: str, t: float, issued: float, sent: Sequence[Sent]) -> Beginning:
+    """What the roll-outs of a decision begin with, from the recorded signals.
+
+    Args:
+        trace: the run.
+        robot: the UGV that decides.
+        t: when it decides, s.
+        issued: when the proposal was issued, s.
+        sent: all proposals.
+
+    Raises:
+        TraceError: if the decision is on a proposal that was not sent.
+    """
+    scenario, gate, h = trace.scenario, trace.scenario["gatekeeper"], trace.scenario["control"]["period_s"]
+    on = [one for one in sent if (one.ugv, one.issued_s) == (robot, issued)]
+    if not on:
+        raise TraceError(f"the decision of {robot} at t = {t} s is on no proposal that was sent")
+    spec = scenario["ugvs"][robot]
+    corners, speed = np.asarray(spec["preset"]["waypoints_m"], dtype=np.float64), float(spec["preset"]["speed_m_s"])
+    arrives = float(corner_times(corners, speed)[-1]) if len(corners) > 1 else 0.0
+    longest = gate["longest_s"]
+    until = min(float(on[0].times_s[-1]), t + longest)
+    ends = min(max(until, arrives), t + longest) + gate["settling_s"]
+    after = h * np.arange(np.ceil((ends - t) / h) + 1.0)
+    discs, distances = known_discs(trace, robot, t, on[0])
+    pairs = [pair for pair in _among_robots(trace) if robot in (pair.first, pair.second)]
+    others = [_other(trace, robot, t, after, pair, sent) for pair in pairs]
+    fixed = np.broadcast_to(discs, (2, len(after), *discs.shape))
+    moving = np.array([each[0] for each in others]).reshape(len(others), 2, len(after), 3)
+    settled = max(until, arrives, t + gate["horizon_s"], *(end for _, _, _, end in others))
+    return Beginning(
+        here=interpolate(trace.t, trace.position(robot), t),
+        preset=travelled(corners, speed, t + after),
+        wanted=on[0].place(t + after),
+        chosen=on[0].chosen,
+        limit=float(spec["max_speed_m_s"]),
+        periods=max(0, int(np.ceil((until - t) / h - 1e-9))),
+        settled=round(np.ceil((settled - t) / h - 1e-9)),
+        points=np.concatenate([fixed, np.moveaxis(moving, 0, 2)], axis=2),
+        safe=np.array([*distances, *(each[1] for each in others)]),
+        share=np.array([1.0] * len(discs) + [each[2] for each in others]),
+        discs=len(discs),
+        goal=corners[-1],
+    )
+
+
+def _among_robots(trace: Trace) -> list[Pair]:
+    robots = set(trace.robots)
+    return trace.derived("robots", lambda: [pair for pair in pairs_of(trace) if pair.second in robots])
+
+
+def known_discs(trace: Trace, robot: str, t: float, on: Sent) -> tuple[Array, Array]:
+    """Obstacles that a UGV has sensed up to a time, and those of the message that it would not sense.
+
+    Of the latter no more than the `MOST_CLAIMED` nearest, and none with a negative radius.
+
+    Returns:
+        Centres, (k, 3), and the distances that the UGV keeps from them, (k,), m.
+    """
+    sensing, gate_s = trace.scenario["control"]["sensing_range_m"], trace.scenario["gatekeeper"]["period_s"]
+    samples = gate_s * np.arange(round(t / gate_s) + 1.0)
+    was = interpolate(trace.t, trace.position(robot), np.minimum(samples, t))
+    places = [o["position_m"] for o in trace.scenario["obstacles"].values()]
+    obstacles = np.array(places, dtype=np.float64).reshape(-1, 3)
+    seen = (np.linalg.norm(was[:, None] - obstacles, axis=2) <= sensing).any(axis=0)
+    hidden = np.linalg.norm(on.mapped_m - was[-1], axis=1) > sensing
+    told = np.column_stack([on.mapped_m, on.mapped_radius_m])[hidden & (on.mapped_radius_m >= 0.0)]
+    apart = np.linalg.norm(told[:, None, :3] - obstacles[seen], axis=2)
+    new = told[(apart > 1e-9).all(axis=1)]
+    order = np.linalg.norm(new[:, :3] - was[-1], axis=1).argsort(kind="stable")
+    radius = radii_of(trace)
+    own = np.array([radius[name] for name in trace.scenario["obstacles"]])
+    known = np.concatenate([np.column_stack([obstacles, own])[seen], new[order.argsort() < MOST_CLAIMED]])
+    return known[:, :3], trace.scenario["safe_distance"]["obstacle_m"] + (radius[robot] + known[:, 3])
+
+
+def _other(
+    trace: Trace, robot: str, t: float, after: Array, pair: Any, sent: Sequence[Sent]
+) -> tuple[tuple[Array, Array], float, float, float]:
+    """Where another robot is predicted to be, (S + 1, 3), m; its safe distance, its share, when its motion is over.
+
+    Twice: if the proposal is refused, and if it is accepted. What it has not accepted yet counts in the latter only.
+    """
+    other = pair.second if pair.first == robot else pair.first
+    row = min(int(np.searchsorted(trace.t, t - TIME_TOLERANCE_S)), len(trace.t) - 1)
+    place, velocity = interpolate(trace.t, trace.position(other), t), trace.command(other)[row]
+    coasting = place + np.minimum(after, trace.scenario["gatekeeper"]["horizon_s"])[:, None] * velocity
+    asked, accepted = asked_of(trace, other, t, sent)
+    if asked is None:
+        return (coasting, coasting), pair.safe_m, pair.share, -np.inf
+    goes = asked.place(t + after) + np.exp(-after)[:, None] * (place - asked.place(t))
+    return (goes if accepted else coasting, goes), pair.safe_m, pair.share, float(asked.times_s[-1])
+
+
+def asked_of(trace: Trace, ugv: str, t: float, sent: Sequence[Sent]) -> tuple[Sent | None, bool]:
+    """The proposal in force for a UGV at a sample of the gatekeeper, unless it has refused it by the sample before.
+
+    A proposal in force is one that the UGV decides about at that sample. Besides: whether it has accepted it by then.
+    """
+    when, on, answers = _answers_of(trace).get(ugv, NONE)
+    now = np.flatnonzero(np.abs(when - t) <= TIME_TOLERANCE_S)
+    if not now.size:
+        return None, False
+    issued = float(on[now[0]])
+    before = np.flatnonzero((on == issued) & (when < t - TIME_TOLERANCE_S))
+    answer = str(answers[before[-1]]) if before.size else ""
+    if answer == "refuse":
+        return None, False
+    return next((one for one in sent if (one.ugv, one.issued_s) == (ugv, issued)), None), answer == "accept"
+
+
+def _answers_of(trace: Trace) -> dict[str, tuple[Array, Array, Any]]:
+    """Of each UGV with decisions: their times, those of the proposals, s, and the answers, (D,) each."""
+
+    def found() -> dict[str, tuple[Array, Array, Any]]:
+        by_ugv = trace.decisions.groupby("robot", sort=False)
+        columns = {
+            str(ugv): [rows[name].to_numpy() for name in ("t_s", "issued_s", "decision")] for ugv, rows in by_ugv
+        }
+        return {ugv: (when, on, answers) for ugv, (when, on, answers) in columns.items()}
+
+    return trace.derived("answers", found)
