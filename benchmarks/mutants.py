@@ -1,11 +1,15 @@
 """Every mutant, and what catches it: `python benchmarks/mutants.py [--only WORD] [--jobs 1] [--json FILE] [--page P]`.
 
 A mutant is one edit of the package (`benchmarks/mutation/of_*.py`), made in a temporary copy; one that does not apply
-is an error. On each copy short runs are simulated, judged by their claims and by the independent checker, until one
-says something else than on the package as it is; only if none does, the proofs that are about the edited code,
-tampered reports (for the checker), and at last the tests that concern the file. Prints a line for each. `--json`
-keeps the results in a file, to which a later call adds; `--page` writes them as a page of the documentation
-(docs/mutants.md). Exit code 1 if a mutant survives that is not known to be equivalent.
+is an error. On each copy short runs are simulated; those that go another way than on the package as it is are judged by
+their claims and by the independent checker, until one says something else; only if none does, the proofs that are about
+the edited code, tampered reports (for the checker), and at last the tests that concern the file. Prints a line for
+each. `--json` keeps the results in a file, to which a later call adds; `--page` writes them as a page of the
+documentation (docs/mutants.md). Exit code 1 if a mutant survives that is not known to be equivalent.
+
+`--drawn N --seed S` judges N mutants that nobody has written, drawn at random from the code that produces a run
+(`benchmarks/mutation/drawn.py`), in place of the list. What survives is for a person to look at: most of it is
+equivalent, or within what is specified.
 """
 
 from __future__ import annotations
@@ -28,7 +32,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from mutation import of_checkers, of_code
+from mutation import drawn, of_checkers, of_code
 from mutation.mutant import PACKAGE, Mutant
 from mutation.page import page
 
@@ -42,6 +46,8 @@ LONGEST_S = 900
 """Time of a command, s: a mutant may run for ever."""
 NOT_COMPARED = ("GATE-TIME",)
 """Claims that depend on what else the machine does."""
+RUNS_STAY = ("check", "report", "verify")
+"""Folders of what judges: whatever is edited there, runs go the same way."""
 
 
 @dataclass
@@ -55,6 +61,7 @@ class Result:
         equivalent: why nothing can, if nothing did.
         seconds: that it took.
         commit: of the code on which it was judged; empty if that was not kept.
+        changed: the probes whose runs went another way than on the package as it is.
     """
 
     name: str
@@ -66,6 +73,7 @@ class Result:
     equivalent: str = ""
     seconds: float = 0.0
     commit: str = ""
+    changed: list[str] = field(default_factory=list)
 
 
 class Copy:
@@ -164,7 +172,7 @@ class Bench:
         described = ("git", "describe", "--always", "--dirty", "--exclude", "*")
         self.commit = subprocess.run(described, cwd=ROOT, capture_output=True, text=True, check=False).stdout.strip()
         probes = sorted({run for mutant in mutants for run in mutant.runs})
-        found = here.probe("runs", *probes)
+        found = here.probe("runs", *probes) + here.probe("ways", *probes)
         if wrong := [each for each in found if each[2] in ("stops", "disagrees", "error")]:
             sys.exit(f"the package as it is does not pass: {wrong}")
         self.baseline = {(source, where): status for source, where, status, _ in found}
@@ -187,7 +195,7 @@ class Bench:
             copy.close()
 
     def judge(self, mutant: Mutant, quick: bool = False) -> Result:
-        """Make the edit in a free copy, and see what catches it; `quick`: without tampered reports and tests."""
+        """Make the edit in a free copy, and see what catches it; `quick`: no more than runs."""
         copy, started = self.copies.get(), time.perf_counter()
         result = Result(mutant.name, mutant.path, mutant.old, mutant.new, commit=self.commit)
         edited = copy.compiled_with(mutant.path)
@@ -195,7 +203,7 @@ class Bench:
             if mutant.compiled(copy.folder):
                 copy.forget_compiled(edited)
             mutant.apply(copy.folder)
-            result.stage, result.by = self._caught(mutant, copy, quick)
+            result.stage, result.by = self._caught(mutant, copy, result.changed, quick)
         finally:
             copy.restore(edited)
             self.copies.put(copy)
@@ -204,26 +212,32 @@ class Bench:
         result.seconds = round(time.perf_counter() - started, 1)
         return result
 
-    def _caught(self, mutant: Mutant, copy: Copy, quick: bool) -> tuple[str, list[str]]:
-        for name in mutant.runs:
+    def _caught(self, mutant: Mutant, copy: Copy, changed: list[str], quick: bool) -> tuple[str, list[str]]:
+        names = list(mutant.runs)
+        if not mutant.path.startswith(RUNS_STAY):
+            if by := self._differences(found := copy.probe("ways", *names), "run"):
+                return "claim", by
+            changed += [where for source, where, digest, _ in found if digest != self.baseline[source, where]]
+            names = changed
+        for name in names:
             if by := self._differences(copy.probe("runs", name)):
                 claims = [each for each in by if not each.startswith("checker")]
                 return ("claim" if claims else "checker"), by
-        if mutant.proofs and (by := self._differences(copy.probe("proofs", *mutant.proofs))):
-            return "proof", by
         if quick:
             return "nothing", []
+        if mutant.proofs and (by := self._differences(copy.probe("proofs", *mutant.proofs))):
+            return "proof", by
         if mutant.tamperings:
             found = copy.probe("tamperings", str(self.report), *mutant.tamperings)
             if found:
                 return "tampering", [f"{each[0]}: {each[2]}" for each in found]
         return ("test", [failed]) if mutant.tests and (failed := self._failing(mutant, copy)) else ("nothing", [])
 
-    def _differences(self, found: list[list[str]]) -> list[str]:
-        """What is not as on the package as it is."""
+    def _differences(self, found: list[list[str]], only: str = "") -> list[str]:
+        """What is not as on the package as it is; of one source, if it is named."""
         by = []
         for source, where, status, rule in found:
-            if source not in NOT_COMPARED and status != self.baseline.get((source, where)):
+            if source not in NOT_COMPARED and only in ("", source) and status != self.baseline.get((source, where)):
                 by.append(f"{source} ({where}): {status}{f', {rule}' if rule else ''}")
         return by
 
@@ -245,16 +259,19 @@ def main() -> int:
     parser.add_argument("--jobs", type=int, default=1, help="copies that are judged side by side (default: 1)")
     parser.add_argument("--json", type=Path, help="file for the results; those in it of other mutants are kept")
     parser.add_argument("--missing", action="store_true", help="only those that the file of --json does not have")
-    parser.add_argument("--quick", action="store_true", help="no tampered reports and tests; what survives is left out")
+    parser.add_argument("--quick", action="store_true", help="runs only; what survives of the list is left out")
+    parser.add_argument("--drawn", type=int, metavar="N", help="N mutants drawn at random; --only: words in paths")
+    parser.add_argument("--seed", type=int, default=0, help="of the drawing (default: 0)")
     parser.add_argument("--report", type=Path, help="a report of case B to tamper with (default: made)")
     parser.add_argument("--page", type=Path, help="page of the documentation, of all results in the file of --json")
     options = parser.parse_args()
+    mutants = MUTANTS if options.drawn is None else drawn.draw(ROOT, options.drawn, options.seed, options.only)
     kept: dict[str, Any] = {}
     if options.json and options.json.exists():
         kept = {each["name"]: each for each in json.loads(options.json.read_text(encoding="utf-8"))}
-    edits = {mutant.name: (mutant.path, mutant.old, mutant.new) for mutant in MUTANTS}
+    edits = {mutant.name: (mutant.path, mutant.old, mutant.new) for mutant in mutants}
     kept = {name: each for name, each in kept.items() if edits.get(name) == (each["path"], each["old"], each["new"])}
-    wanted = [m for m in MUTANTS if not options.only or any(w in f"{m.name} {m.path}" for w in options.only)]
+    wanted = [m for m in mutants if not options.only or any(w in f"{m.name} {m.path}" for w in options.only)]
     wanted = [m for m in wanted if not (options.missing and m.name in kept)]
     wanted.sort(key=lambda m: m.compiled(ROOT))  # those last whose callers are compiled again
     if wanted:
@@ -263,15 +280,16 @@ def main() -> int:
             with ThreadPoolExecutor(options.jobs) as pool, closing(bench):
                 for done in as_completed([pool.submit(bench.judge, mutant, options.quick) for mutant in wanted]):
                     result = done.result()
-                    if options.quick and result.stage == "nothing":
+                    if options.quick and result.stage == "nothing" and options.drawn is None:
                         continue
-                    print(f"{result.name}: {result.stage}: {'; '.join(result.by) or result.equivalent}", flush=True)
+                    says = "; ".join(result.by) or result.equivalent or f"runs changed: {', '.join(result.changed)}"
+                    print(f"{result.name}: {result.stage}: {says}", flush=True)
                     kept[result.name] = asdict(result)
                     if options.json:
                         options.json.write_text(json.dumps([*kept.values()], indent=1), encoding="utf-8")
-    results = [kept[mutant.name] for mutant in MUTANTS if mutant.name in kept]
+    results = [kept[mutant.name] for mutant in mutants if mutant.name in kept]
     if options.page:
-        others = [mutant.name for mutant in MUTANTS if mutant.name not in kept]
+        others = [mutant.name for mutant in mutants if mutant.name not in kept]
         options.page.write_text(page(results, others), encoding="utf-8")
     print(dict(Counter(each["stage"] for each in results)))
     return int(any(each["stage"] == "nothing" and not each["equivalent"] for each in results))

@@ -42,3 +42,28 @@ def test_names_are_unique_and_what_is_run_exists(listed: Any) -> None:
         assert set(mutant.runs) <= set(probe.PROBES)
         assert set(mutant.proofs) <= set(MODEL_CLAIMS)
         assert [test for test in mutant.tests if not (ROOT / test).exists()] == []
+
+
+def test_drawn_mutants_apply_once_and_are_the_same_for_a_seed(listed: Any) -> None:
+    drawn = import_module("mutation.drawn")
+    found = drawn.draw(ROOT, 200, seed=0)
+    assert found == drawn.draw(ROOT, 200, seed=0)
+    assert len({m.name for m in found}) == 200
+    assert {m.path for m in drawn.draw(ROOT, 20, seed=0, only=["nsbc/law"])} == {"nsbc/law.py"}
+    for mutant in found:
+        text = (ROOT / "airground_drake" / mutant.path).read_text(encoding="utf-8")
+        assert text.count(mutant.old) == 1
+        assert mutant.old != mutant.new
+        compile(text.replace(mutant.old, mutant.new), mutant.path, "exec")
+        assert [test for test in mutant.tests if not (ROOT / test).exists()] == []
+
+
+def test_what_is_edited_at_random_is_code_and_nothing_else(listed: Any) -> None:
+    drawn = import_module("mutation.drawn")
+    text = 'def f(x: float = 1.0) -> "int":\n    """1 + 1."""\n    if x < 2:\n        raise ValueError("2 + 2")\n'
+    found = {text[: e.start] + e.new + text[e.end :] for e in drawn.Source(text).edits()}
+    assert found == {
+        text.replace("= 1.0", "= 1.1"), text.replace("= 1.0", "= 0.0"), text.replace("x < 2", "x <= 2"),
+        text.replace("x < 2", "x > 2"), text.replace("x < 2", "x < 3"), text.replace("x < 2", "x < 1"),
+        text.replace("x < 2", "not (x < 2)"),
+    }  # fmt: skip

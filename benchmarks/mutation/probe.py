@@ -2,16 +2,19 @@
 
     python probe.py
 
-reads requests from standard input, a line of JSON each: [file, "runs" | "proofs" | "tamperings" | "report", names].
+reads requests from standard input, a line of JSON each: [file, "ways" | "runs" | "proofs" | "tamperings" | "report",
+names].
 Each is answered by a child process, which imports the package as it is then and writes its findings to the file: lists
 of source, where, status and rule, the source being a claim, `checker: <claim>`, `run` or a tampering. A line with the
-child's exit code follows on standard output. Other packages are imported once, before.
+child's exit code follows on standard output. Other packages are imported once, before. A child that needs too much time
+or memory is ended.
 """
 
 from __future__ import annotations
 
 import json
 import os
+import resource
 import sys
 import tempfile
 import traceback
@@ -39,25 +42,36 @@ PROBES = {
 Findings = list[list[Any]]
 
 
+def ways(names: list[str]) -> Findings:
+    """Runs alone: a digest of all that each leaves behind."""
+    from airground_drake import files, trace
+    from airground_drake.errors import AirgroundError
+
+    found: Findings = []
+    for name in names:
+        with tempfile.TemporaryDirectory() as there:
+            try:
+                trace.save(_simulated(name)[1], Path(there))
+            except AirgroundError as error:
+                return [*found, ["run", name, "stops", str(error)]]
+            found.append(["way", name, files.sha256((Path(there) / "meta.json").read_bytes()), ""])
+    return found
+
+
 def runs(names: list[str]) -> Findings:
     """Every verdict, and every check of the independent checker that does not agree."""
     from airground_drake import files, trace
     from airground_drake.check.report import AGREES, check_report
     from airground_drake.errors import AirgroundError
     from airground_drake.report import document
-    from airground_drake.scenarios.load import load
-    from airground_drake.simulation import simulate
     from airground_drake.verify import verify
     from airground_drake.verify.stl import cross_check as stl
 
     found: Findings = []
     for name in names:
-        source, run = PROBES[name]
-        scenario = load(source)[0]
-        scenario.runs = {run: scenario.runs[run]}
-        scenario.reproduction, scenario.choices = [], []
+        run = PROBES[name][1]
         try:
-            of_run = simulate(scenario, run)
+            scenario, of_run = _simulated(name)
         except AirgroundError as error:
             found.append(["run", name, "stops", str(error)])
             continue
@@ -71,6 +85,18 @@ def runs(names: list[str]) -> Findings:
             lines = [line for line in check_report(folder) if line.run]
         found += [[f"checker: {line.claim}", name, "disagrees", line.rule] for line in lines if line.outcome != AGREES]
     return found
+
+
+def _simulated(name: str) -> tuple[Any, Any]:
+    """The scenario of a probe with its one run, and the trace."""
+    from airground_drake.scenarios.load import load
+    from airground_drake.simulation import simulate
+
+    source, run = PROBES[name]
+    scenario = load(source)[0]
+    scenario.runs = {run: scenario.runs[run]}
+    scenario.reproduction, scenario.choices = [], []
+    return scenario, simulate(scenario, run)
 
 
 def proofs(names: list[str]) -> Findings:
@@ -107,7 +133,9 @@ OTHERS = (
     "sympy", "yaml", "z3",
 )  # fmt: skip
 """Packages that every child needs."""
-KINDS = {"runs": runs, "proofs": proofs, "tamperings": tamperings, "report": report}
+LONGEST_CPU_S, MOST_BYTES = 300, 12 << 30
+"""Of a child: a mutant may run for ever, or remember everything."""
+KINDS = {"ways": ways, "runs": runs, "proofs": proofs, "tamperings": tamperings, "report": report}
 
 
 def serve() -> None:
@@ -124,6 +152,8 @@ def serve() -> None:
 def _answer(file: str, kind: str, names: list[str]) -> None:
     """In the child; it does not return."""
     code = 1
+    resource.setrlimit(resource.RLIMIT_CPU, (LONGEST_CPU_S, LONGEST_CPU_S))
+    resource.setrlimit(resource.RLIMIT_DATA, (MOST_BYTES, MOST_BYTES))
     try:
         os.dup2(2, 1)  # what is printed must not be taken for an answer
         Path(file).write_text(json.dumps(KINDS[kind](names)), encoding="utf-8")
