@@ -19,6 +19,10 @@ EVENT_S = 1e-5
 """Recorded and recomputed events may differ by this: ten times the accuracy of the simulator's event isolation."""
 VARIABLE_M = 1e-6
 """Recorded and recomputed decision variables may differ by this: x moves less within the event isolation."""
+NOISE_M = 1e-8
+"""Noise moves by less within 1e-9 s, and rows closer than that are one."""
+LARGEST_SAMPLE = 9.0
+"""Of normal samples, in standard deviations: one in 1e19 is larger."""
 SUPERVISING, INTERVENING, REFRACTORY = 0.0, 1.0, 2.0
 MODE_NAMES = ("SUPERVISING", "INTERVENING", "REFRACTORY")
 
@@ -170,6 +174,7 @@ def thr_trig(run: Run, claim: Json) -> Found:
         least += _transitions(steps, before_s=float(run.t_s[-1]) - EVENT_S, at_once_s=EVENT_S)
         most += _transitions(steps, before_s=np.inf, at_once_s=0.0)
         _modes_are_the_automatons(run, ugv, steps)
+        _noise_moves_as_it_must(run, ugv)
     largest_s = {ugv: max(lags) for ugv, lags in lags_s.items() if lags}
     facts, worst_s = run.levels._asdict(), max(largest_s.values(), default=None)
     found = Found("holds", facts=facts) if worst_s is None else Found.with_margin("holds", EVENT_S - worst_s, **facts)
@@ -282,6 +287,24 @@ def _modes_are_the_automatons(run: Run, ugv: str, steps: list[Step]) -> None:
     after = modes[np.searchsorted(times, run.t_s + EVENT_S)]
     recorded = run.column(f"{ugv}.mode")
     holds("mode", (recorded == before) | (recorded == after), recorded, after, about=ugv, t_s=run.t_s)
+
+
+def _noise_moves_as_it_must(run: Run, ugv: str) -> None:
+    """(15) from 0: from row to row by Euler's method, with one sample for each period of the noise."""
+    decision, noise = run.scenario["decision"], run.column(f"{ugv}.noise_m")
+    close("noise at the start", noise[0], 0.0, within=NOISE_M, about=ugv, t_s=float(run.t_s[0]))
+    steps: dict[int, list[tuple[float, float, float]]] = {}
+    for begin, end, before, after in zip(run.t_s, run.t_s[1:], noise, noise[1:], strict=False):
+        step = float(end - begin)
+        driven = float(after - before * (1.0 - decision["leak_1_s"] * step))
+        steps.setdefault(int((begin + end) / (2.0 * decision["noise_period_s"])), []).append((step, driven, float(end)))
+    most = LARGEST_SAMPLE * decision["noise_m_sqrt_s"] / decision["noise_period_s"] ** 0.5
+    for within in steps.values():
+        longest, driven, _ = max(within)
+        at = np.array([when for _, _, when in within])
+        found, lasts = (np.array([step[k] for step in within]) for k in (1, 0))
+        close("noise of one sample", found, driven / longest * lasts, within=NOISE_M, about=ugv, t_s=at)
+        at_most("sample of the noise", abs(driven), most * longest, within=NOISE_M, about=ugv, t_s=float(at[0]))
 
 
 def zeno_trace(run: Run, claim: Json) -> Found:

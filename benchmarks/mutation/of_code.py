@@ -509,6 +509,7 @@ DECISION = (
         "integrated_noise(count, 2.0 * given.noise_m_sqrt_s,",
         proofs=("THR-DDM",),
     ),
+    Mutant("the noise grows in place of leaking", "components.py", "A=-leak * eye", "A=leak * eye"),
     Mutant(
         "the noise leaks 10 % faster",
         "components.py",

@@ -79,10 +79,11 @@ class _Simulation:
     def advance(self, begin: float, end: float) -> None:
         rate = self.scenario["decision"]["noise_m_sqrt_s"] * self.rng.standard_normal(self.n) / math.sqrt(end - begin)
         while begin < end:
-            found = [event for i in range(self.n) if (event := self.next_event(i, begin, end, rate[i]))]
+            drift = rate - self.scenario["decision"]["leak_1_s"] * self.noise
+            found = [event for i in range(self.n) if (event := self.next_event(i, begin, end, drift[i]))]
             until, i, mode = min(found, default=(end, -1, 0))
             self.position = self.position + (until - begin) * self.command
-            self.noise = self.noise + (until - begin) * rate
+            self.noise = self.noise + (until - begin) * drift
             self.record(until)
             if i >= 0:
                 self.transit(i, mode, until)

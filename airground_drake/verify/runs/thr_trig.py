@@ -15,6 +15,7 @@ from airground_drake.trace import Trace
 from airground_drake.verify.claim import TraceClaim
 from airground_drake.verify.engines.segments import NormSignal
 from airground_drake.verify.finding import Finding
+from airground_drake.verify.runs.decision_noise import noise_conflict
 from airground_drake.verify.runs.trigger_record import Conflict, Transition, column_conflict, recorded_events
 from airground_drake.verify.runs.trigger_replay import decision_variable, transitions
 
@@ -45,21 +46,25 @@ class ThrTrig(TraceClaim):
     summary = "The UAV stepped in exactly when the error reached the threshold: never late, never without cause."
     statement = (
         "The UAV triggered exactly when the decision variable reached the threshold, none missing and none spurious; "
-        "a crossing inside the minimum inter-event time triggers at its end if the variable is still above."
+        "a crossing inside the minimum inter-event time triggers at its end if the variable is still above. The noise "
+        "in the variable moves as (15) has it, by one sample for each of its periods."
     )
     formula = (
         "recorded triggers and releases = those of the automaton run on x(t) = ||rho_rd(t) - rho(t)|| + n(t), "
-        "times equal within 1e-5 s; recorded x equal within 1e-6 m at every row"
+        "times equal within 1e-5 s; recorded x equal within 1e-6 m at every row; n(0) = 0, and between rows "
+        "n' = s w_k / sqrt(h) - leak n with one w_k, |w_k| <= 9, for each period h of the noise"
     )
     latex = (
         r"x(t) = \lVert \rho_{rd}(t) - \rho(t) \rVert + n(t)",
         r"\text{recorded triggers and releases} = \text{automaton}(x), \quad |\Delta t| \le 10^{-5} \text{ "
         r"s}, \quad |\Delta x| \le 10^{-6} \text{ m}",
+        r"n(0) = 0, \quad \dot n = \sigma w_k / \sqrt{h} - \lambda n, \quad |w_k| \le 9",
     )
     method = (
         "x is rebuilt from positions, noise and the scenario's preset, cut at the preset's corners and at its turning "
         "points (closed form) into monotone pieces; crossings are then sign changes, located by Brent's method to "
-        "1e-12 s. The automaton is run again on it and its events, and the mode column, are compared one by one."
+        "1e-12 s. The automaton is run again on it and its events, and the mode column, are compared one by one. Where "
+        "a period of the noise has several rows, all must have the same sample, given the leak."
     )
     equations = "(15), (20)"
     assumptions = (
@@ -68,9 +73,10 @@ class ThrTrig(TraceClaim):
         "Events in the last 1e-5 s of the run may be on either side of its end.",
     )
     does_not_establish = (
-        "That the threshold is a good one (THR-ROOT, THR-OPT), that the noise has the stated distribution (THR-DDM), "
-        "or anything about a Wiener path between the noise samples. Where x only touches a level to within rounding, "
-        "1e-12 m, a trigger and none are equally right and the verdict follows the rounding."
+        "That the threshold is a good one (THR-ROOT, THR-OPT); that the noise has the stated distribution (THR-DDM), "
+        "or the stated leak where no period of the noise has a row within; or anything about a Wiener path between the "
+        "noise samples. Where x only touches a level to within rounding, 1e-12 m, a trigger and none are equally right "
+        "and the verdict follows the rounding."
     )
 
     exercised_by = "transitions of the automaton that were due"
@@ -99,7 +105,10 @@ class ThrTrig(TraceClaim):
             recorded = recorded_events(trace, ugv)
             expected = [(time, EVENT_KINDS[kind]) for time, kind in predicted if kind in EVENT_KINDS]
             lag, mismatch = _compare(expected, recorded, x)
-            found = (mismatch, column_conflict(trace, ugv, recorded), _signal_conflict(trace, ugv, x, predicted))
+            found = (
+                mismatch, column_conflict(trace, ugv, recorded), _signal_conflict(trace, ugv, x, predicted),
+                noise_conflict(trace, ugv),
+            )  # fmt: skip
             wrong += [{"robot": ugv, **conflict} for conflict in found if conflict is not None]
             lags += [(lag, ugv)] if expected else []
             evidence.append(

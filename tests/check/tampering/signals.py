@@ -145,6 +145,13 @@ def noise_and_decision_variable_changed(folder: Path) -> None:
         frame[f"{UGV}.noise_m"] += 0.01
 
 
+@refused_by("THR-TRIG", "noise at the start")
+def noise_from_elsewhere(folder: Path) -> None:
+    with edited_table(folder) as frame:
+        for column in ("decision_variable_m", "noise_m"):
+            frame[f"{UGV}.{column}"] += 1e-7
+
+
 @refused_by("trace", "preset trajectory")
 def preset_changed(folder: Path) -> None:
     with edited_table(folder) as frame:

@@ -61,6 +61,34 @@ def test_wrong_signals_are_refuted(name: str) -> None:
     assert judge("THR-TRIG", SIGNALS[name](run_of("d"))).status == "refuted"
 
 
+def leaking() -> Trace:
+    """Noise that triggers within its periods, so that these have rows within."""
+    decision = Decision(
+        Threshold(zeta_m=0.5), release_m=0.4, min_inter_event_s=0.1, noise_m_sqrt_s=1.0, leak_1_s=0.5
+    )  # fmt: skip
+    return simulate(lone([0.0] * 3, [0.2, 0.0, 0.0], STILL, 10.0, decision=decision), drive=at_rest)
+
+
+NOISE: dict[str, Callable[[Trace], Trace]] = {
+    "other leak": lambda trace: with_scenario(trace, decision__leak_1_s=0.49),
+    "no leak": lambda trace: with_scenario(trace, decision__leak_1_s=0.0),
+    "grows": lambda trace: with_scenario(trace, decision__leak_1_s=-0.5),
+    "longer periods": lambda trace: with_scenario(trace, decision__noise_period_s=0.05),
+    "a tenth of the intensity": lambda trace: with_scenario(trace, decision__noise_m_sqrt_s=0.1),
+    "no noise": lambda trace: with_scenario(trace, decision__noise_m_sqrt_s=0.0),
+    "from elsewhere": lambda trace: bumped("ugv1.noise_m", 1e-7, row=0)(trace),
+}
+
+
+def test_noise_moves_by_one_sample_a_period() -> None:
+    assert judge("THR-TRIG", leaking()).status == "holds"
+
+
+@pytest.mark.parametrize("name", NOISE)
+def test_noise_that_moves_otherwise_is_refuted(name: str) -> None:
+    assert counterexample("THR-TRIG", NOISE[name](leaking()))["what"].startswith("noise")
+
+
 @pytest.mark.parametrize("column", ["noise_m", "decision_variable_m", "mode", "triggers", "triggered_at_s"])
 def test_missing_trigger_data_is_an_error(column: str) -> None:
     assert judge("THR-TRIG", dropped(f"ugv2.{column}")(run_of("d"))).status == "error"
