@@ -29,6 +29,9 @@ from airground_drake.nsbc.team import Team
 from airground_drake.registry import ROUTES, Method
 from airground_drake.scenarios.schema import Decision, Scenario
 
+SAME_TIME = 1e-12
+"""Vertices of presets this close, s or relatively, differ by rounding: times are sums of some quotients."""
+
 
 def make_avoidance(scenario: Scenario, composition: Composition = "augmented") -> Avoidance:
     """The set-based avoidance layer."""
@@ -200,8 +203,14 @@ def positions(rows: Sequence[Sequence[float]]) -> Array:
 
 
 def stack_presets(presets: list[Motion]) -> PiecewisePolynomial:
-    """All presets as one trajectory of 3n components over the union of their vertices."""
+    """All presets as one trajectory of 3n components over the union of their vertices.
+
+    Vertices of several presets that only rounding keeps apart are one: a velocity over so short a time is rounding.
+    """
     times = np.unique(np.concatenate([preset.times for preset in presets]))
+    kept = np.append(np.diff(times) > SAME_TIME * np.maximum(1.0, times[1:]), True)
+    kept[0] = True
+    times = times[kept]
     samples = np.concatenate([preset.sample(times) for preset in presets], axis=1)
     return PiecewisePolynomial.FirstOrderHold(times, samples.T)
 

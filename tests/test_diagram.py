@@ -5,12 +5,15 @@ from __future__ import annotations
 import ast
 from pathlib import Path
 
+import numpy as np
 import pytest
 from pydrake.systems.framework import LeafSystem
 
 import airground_drake
 from airground_drake import graphviz
+from airground_drake.components import stack_presets
 from airground_drake.diagram import RECORDED, build_diagram
+from airground_drake.nsbc.motion import Motion
 from airground_drake.registry import METHODS
 from airground_drake.scenarios.load import load
 
@@ -54,6 +57,17 @@ def test_every_system_and_port_has_a_name() -> None:
             for i in range(system.num_input_ports()):
                 assert not system.get_input_port(i).get_name().startswith("u0")
             assert type(system).__doc__
+
+
+def test_corners_of_two_presets_that_rounding_keeps_apart_are_one() -> None:
+    """At 24 s, between the ends of the two, a velocity over four units in the last place would be one of rounding."""
+    ends = [24.0, 24.0 - 4e-15, 24.0 + 4e-15]
+    presets = [Motion(np.array([0.0, end]), np.array([[9.7, 7.0, 0.0], [-9.7, -7.1, 0.0]])) for end in ends]
+    together = stack_presets(presets)
+    rates = together.EvalDerivative(24.0, 1).reshape(-1, 3)
+    assert all(min(np.abs(rate - side).max() for side in (presets[0].at(1.0)[1], 0.0)) < 1e-9 for rate in rates)
+    assert together.value(24.0).ravel() == pytest.approx(np.tile([-9.7, -7.1, 0.0], 3), abs=1e-12)
+    assert together.start_time() == 0.0
 
 
 @pytest.mark.parametrize("method", METHODS)
