@@ -13,7 +13,9 @@ from .rules import Array, Flags
 
 PLANE = np.array([1.0, 1.0, 0.0])
 """Directions in which a UGV can move."""
-MET_M_S = 1e-12
+MARGIN_M_S = 1e-12
+"""The closest velocity keeps its inequalities by this much: the corner of two nearly parallel ones depends on it."""
+MET_M_S = 5e-13
 """A velocity that misses an inequality by less, and by what rounding makes of its speed, meets it."""
 ROUNDING = 1e-15
 """Relative."""
@@ -123,19 +125,18 @@ def _closest(wanted_m_s: Array, given: Inequalities, _: str) -> Array:
 def _worked_out(wanted_m_s: Array, given: Inequalities) -> Array:
     """The closest velocities; where inequalities contradict each other, the slowest that miss them least.
 
-    The latter are shortened until the inequalities hold that standing still meets but for rounding.
+    They are shortened until the inequalities hold that standing still meets but for rounding.
     """
-    found, lacking = _by_active_sets(wanted_m_s, given)
+    kept = Inequalities(given.normal, given.bound + MARGIN_M_S)
+    found, lacking = _by_active_sets(wanted_m_s, kept)
     torn = lacking > CONTRADICTION_M_S
     if torn.any():
-        contradicting = given.rows(torn)
-        slowest = _least_missing(contradicting)
-        rate = (contradicting.normal * slowest[:, None]).sum(axis=2)
-        least = np.minimum(contradicting.bound, 0.0)
-        late = (rate < least) & (contradicting.bound <= CONTRADICTION_M_S)
-        factor = np.where(late, least / np.where(late, rate, 1.0), 1.0).min(axis=1)
-        found[torn] = slowest * factor[:, None]
-    return found
+        found[torn] = _least_missing(kept.rows(torn))
+    rate = (given.normal * found[:, None]).sum(axis=2)
+    least = np.minimum(given.bound, 0.0)
+    late = (rate < least) & (given.bound <= CONTRADICTION_M_S)
+    factor = np.where(late, least / np.where(late, rate, 1.0), 1.0).min(axis=1)
+    return np.asarray(found * factor[:, None])
 
 
 def _least_missing(given: Inequalities) -> Array:
@@ -144,25 +145,28 @@ def _least_missing(given: Inequalities) -> Array:
     still = np.zeros((len(high), 3))
     for _ in range(60):
         middle = (low + high) / 2.0
-        met = _by_active_sets(still, Inequalities(given.normal, given.bound - middle[:, None]))[1] == 0.0
+        less = Inequalities(given.normal, given.bound - middle[:, None])
+        met = _by_active_sets(still, less, every=True)[1] == 0.0
         low, high = np.where(met, low, middle), np.where(met, middle, high)
-    return _by_active_sets(still, Inequalities(given.normal, given.bound - (1.0 + ABOVE_LEAST) * high[:, None]))[0]
+    least = Inequalities(given.normal, given.bound - (1.0 + ABOVE_LEAST) * high[:, None])
+    return _by_active_sets(still, least, every=True)[0]
 
 
-def _by_active_sets(wanted_m_s: Array, given: Inequalities) -> tuple[Array, Array]:
+def _by_active_sets(wanted_m_s: Array, given: Inequalities, *, every: bool = False) -> tuple[Array, Array]:
     """The closest velocity (B, 3) that meets all inequalities, and what it lacks (B,): one of the candidates is it.
 
     A candidate is the velocity closest to what is wanted with some inequalities met exactly. At most as many are
-    needed as there are directions. Where no candidate meets all, the one that misses least is returned.
+    needed as there are directions. Where no candidate meets all, the one that misses least is returned. Inequalities
+    that cannot matter are left out, unless `every` one is asked for.
     """
-    normal, bound = _relevant(wanted_m_s, given)
+    normal, bound = _relevant(wanted_m_s, given, every=every)
     best, lacking = wanted_m_s.copy(), np.maximum(0.0, -_spare(wanted_m_s, given)).max(axis=1)
     lacking = np.where(lacking <= MET_M_S, 0.0, lacking)
     length = np.where(lacking == 0.0, 0.0, np.inf)
     at_once = max(1, NUMBERS // bound.size)
     for size in range(1, 4 if normal[:, :, 2].any() else 3):
-        every = combinations(range(bound.shape[1]), size)
-        while active := [*islice(every, at_once)]:
+        sets = combinations(range(bound.shape[1]), size)
+        while active := [*islice(sets, at_once)]:
             step, lacks = _candidates(wanted_m_s, Inequalities(normal, bound), np.array(active))
             size_of, met = np.linalg.norm(step, axis=2), lacks == 0.0
             first = np.argmin(np.where(met, size_of, np.inf), axis=1)
@@ -217,14 +221,14 @@ def _completed(unit: Array) -> tuple[Array, Array]:
     return np.stack(rest, axis=2), sine
 
 
-def _relevant(wanted_m_s: Array, given: Inequalities) -> Inequalities:
+def _relevant(wanted_m_s: Array, given: Inequalities, *, every: bool) -> Inequalities:
     """The inequalities that can be active, as few columns as there are at most in a sample, most demanding first.
 
-    Where standing still meets all, the closest velocity is no faster than what is wanted, and what lets that speed
-    pass in every direction is never active.
+    Where standing still meets all but for rounding, the closest velocity is no faster than what is wanted, and what
+    lets that speed pass in every direction is never active; unless `every` one is asked for.
     """
     reach = np.linalg.norm(wanted_m_s, axis=1) + 1e-6
-    demands = (given.bound.max(axis=1, initial=-np.inf) > 0.0)[:, None]
+    demands = every | (given.bound.max(axis=1, initial=-np.inf) > CONTRADICTION_M_S)[:, None]
     can = np.isfinite(given.bound) & (demands | (given.bound > -reach[:, None]))
     bound = np.where(can, given.bound, -np.inf)
     order = np.argsort(-bound, axis=1, kind="stable")[:, : max(1, int(can.sum(axis=1).max(initial=0)))]

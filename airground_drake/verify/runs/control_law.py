@@ -16,6 +16,9 @@ PLANE = np.array([1.0, 1.0, 0.0])
 """Directions in which a UGV can move."""
 ON_TOP = ("b", "c")
 """Methods that put an accepted intervention above the avoidance inequalities, as (20) does."""
+MARGIN_M_S = 1e-12
+"""The law's closest velocity keeps its inequalities by this much, m/s. Where two of them are nearly parallel, such as
+those of a robot squeezed between an obstacle and another robot, their corner is elsewhere without it, by far more."""
 
 
 class Inequalities(NamedTuple):
@@ -76,11 +79,11 @@ def avoiding(below: Array, given: Inequalities, composition: str, *, planar: boo
         ]
         return velocity
     axes = 2 if planar else 3
-    found, met = closest(below[missed, :axes], normal[:, :, :axes], bound)
+    level = bound + MARGIN_M_S
+    found, met = closest(below[missed, :axes], normal[:, :, :axes], level)
     if not met.all():
-        torn = normal[~met, :, :axes], bound[~met]
-        found[~met] = shortened(least_violation(*torn), *torn)
-    velocity[missed, :axes] = found
+        found[~met] = least_violation(normal[~met, :, :axes], level[~met])
+    velocity[missed, :axes] = shortened(found, normal[:, :, :axes], bound)
     return velocity
 
 

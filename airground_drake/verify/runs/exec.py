@@ -31,9 +31,8 @@ from airground_drake.verify.runs.proposals import Sent, accepted_at
 
 COMMAND_TOLERANCE_M_S = 1e-6
 """A command may differ from the law by this, m/s. Both are evaluated at the same recorded positions and differ by
-rounding (1e-13 m/s), by the 1e-12 m/s that the controller adds to every bound, and by what a corner of two nearly
-parallel inequalities makes of that: at most a millionfold, for the controller treats anything flatter as parallel. In
-100 s it is 0.1 mm."""
+rounding (1e-13 m/s), and by what a corner of two nearly parallel inequalities makes of that: it divides by the sine of
+their angle, 1e-10 at least, for the controller treats anything flatter as parallel. In 100 s it is 0.1 mm."""
 BINDING_M_S = 1e-9
 """An inequality binds where the law's command has less to spare, m/s."""
 
@@ -76,7 +75,8 @@ class Exec(TraceClaim):
         "own = lim(rho_rd' + B (rho_rd - rho)); int(v) = lim(v + J^+ J (rho_int' + Lambda (rho_int - rho) - v)); "
         "nothing accepted: v = avoid(own); accepted: v = int(avoid(own)) under (b), (c), v = avoid(int(own)) under "
         "(d); UAV: v = avoid(lim(mean v_j + C (mean rho_j + altitude - rho))); avoid(u) = argmin ||v - u||^2 s.t. "
-        "n_k.v >= b_k (recursion_*: (5) as printed); |recorded - v| <= 1e-6 m/s; accepted = what the messages say"
+        "n_k.v >= b_k + 1e-12 m/s (recursion_*: (5) as printed); |recorded - v| <= 1e-6 m/s; accepted = what the "
+        "messages say"
     )
     latex = (
         r"u_{\text{own}} = \operatorname{lim}(\dot\rho_{rd} + B (\rho_{rd} - \rho))",
@@ -89,15 +89,16 @@ class Exec(TraceClaim):
         r"v_{\text{UAV}} = \operatorname{avoid}(\operatorname{lim}(\bar v + C (\bar\rho + z_{\text{UAV}} - "
         r"\rho)))",
         r"\operatorname{avoid}(u) = \operatorname{argmin}_v \lVert v - u \rVert^2 \text{ subject to } "
-        r"n_k^\top v \ge b_k",
+        r"n_k^\top v \ge b_k + 10^{-12} \text{ m/s}",
         r"\lVert v_{\text{recorded}} - v \rVert \le 10^{-6} \text{ m/s}",
     )
     method = (
         "Evaluated again in plain numpy at each multiple of the control period, at the recorded positions, from "
         "the scenario and the table of proposals. The closest velocity is found by another algorithm than the "
-        "controller's (constraints one by one, each reducing the dimension), so also where inequalities bind; where "
-        "they contradict each other it is the slowest of those that miss them least, shortened until those hold that "
-        "standing still meets but for 1e-9 m/s. What is accepted follows from "
+        "controller's (constraints one by one, each reducing the dimension), so also where inequalities bind, each "
+        "with the 1e-12 m/s that the controller adds to it; where they contradict each other it is the slowest of "
+        "those that miss them least. It is shortened until those hold that standing still meets but for 1e-9 m/s. What "
+        "is accepted follows from "
         "proposals, modes, answers and the periods, not from the signal `accepted`, which has to agree. At a corner of "
         "a preset or proposed motion either rate counts."
     )

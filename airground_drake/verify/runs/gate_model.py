@@ -30,8 +30,8 @@ from airground_drake.verify.runs.pairs import pairs_of
 from airground_drake.verify.runs.proposals import Sent, accepted_at, proposals_of
 
 VELOCITY_TOLERANCE_M_S = 1e-6
-"""Recorded and recomputed mode velocities may differ by this, m/s: rounding of two algorithms, 1e-12 m/s at a corner of
-two inequalities, which the closed loop damps; a corner of nearly parallel ones enlarges it."""
+"""Recorded and recomputed mode velocities may differ by this, m/s: rounding of two algorithms, which the closed loop
+damps; a corner of nearly parallel inequalities enlarges it."""
 OUTCOME_TOLERANCE = 1e-6
 """Recorded and recomputed outcomes may differ by this, relative, or in m^2 s: they are sums over such velocities."""
 LEFT_TOLERANCE_M = 1e-3

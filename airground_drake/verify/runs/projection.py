@@ -14,10 +14,10 @@ from airground_drake.arrays import Array
 
 Flags = npt.NDArray[np.bool_]
 
-PARALLEL = 1e-9
+PARALLEL = 1e-10
 """A normal this short, in a plane into which it was projected, is that of a parallel plane: its inequality says nothing
 there but how far apart the two are."""
-ROUNDING_M_S = 1e-12
+ROUNDING_M_S = 5e-13
 """Velocities that miss an inequality by less meet it, m/s."""
 CONTRADICTION_M_S = 1e-9
 """Inequalities that nothing meets by more contradict each other, m/s; the controller tells them apart by the same."""

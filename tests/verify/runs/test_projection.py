@@ -83,6 +83,23 @@ def test_nearly_parallel_inequalities(seed: int, planar: bool, angle: float, dem
     assert (np.abs(again - ours) <= allowed).all()
 
 
+@given(SEEDS, st.sampled_from([1e-3, 1e-5, 1e-7, 1e-9]), st.sampled_from([0.0, 1e-10, 1e-8]))
+def test_a_robot_squeezed_between_two_goes_to_the_same_corner(seed: int, angle: float, gap: float) -> None:
+    """Between an obstacle and another robot, nearly opposite: what each bound is kept by decides where they meet."""
+    rng = np.random.default_rng(seed)
+    towards = rng.uniform(0.0, 2.0 * np.pi, size=(BATCH, 1)) + np.array([0.0, np.pi, 1.0])
+    towards[:, 1] += angle * rng.uniform(0.5, 1.5, size=BATCH) * rng.choice([-1.0, 1.0], size=BATCH)
+    normal = np.stack([np.cos(towards), np.sin(towards), np.zeros_like(towards)], axis=2)
+    bound = -gap * rng.uniform(0.1, 1.0, size=(BATCH, 3))
+    bound[:, 2] = -50.0
+    wanted = 2.0 * rng.normal(size=(BATCH, 3)) * [1.0, 1.0, 0.0]
+    running = kernels.team_avoid(wanted, normal, bound, kernels.AUGMENTED)
+    ours = avoiding(wanted, Inequalities(normal, bound), "augmented", planar=True)
+    again = checker.avoiding(wanted, checker.Inequalities(normal, bound), "augmented")
+    assert ours == pytest.approx(running, abs=1e-6)
+    assert again == pytest.approx(running, abs=1e-6)
+
+
 def _flattest(normal: Array) -> Array:
     """1 / the least sine between two normals (B, K, 3), or volume of three, squared; (B,)."""
     least = np.ones(len(normal))
