@@ -21,8 +21,8 @@ ROUNDING = 1e-15
 """Relative."""
 CONTRADICTION_M_S = 1e-9
 """Inequalities that every velocity misses by more contradict each other."""
-ABOVE_LEAST = 1e-9
-"""What is missed by this much more than the least, relatively, is missed as little."""
+ABOVE_LEAST, ABOVE_LEAST_M_S = 1e-9, 1e-11
+"""What is missed by this much more than the least, relatively and in m/s, is missed as little."""
 SHORTEST = 1e-9
 """A shorter normal, of what is nearly above a robot that stays in the plane, asks for nothing that it could do."""
 DEPENDENT = 1e-10
@@ -148,7 +148,7 @@ def _least_missing(given: Inequalities) -> Array:
         less = Inequalities(given.normal, given.bound - middle[:, None])
         met = _by_active_sets(still, less, every=True)[1] == 0.0
         low, high = np.where(met, low, middle), np.where(met, middle, high)
-    least = Inequalities(given.normal, given.bound - (1.0 + ABOVE_LEAST) * high[:, None])
+    least = Inequalities(given.normal, given.bound - (1.0 + ABOVE_LEAST) * high[:, None] - ABOVE_LEAST_M_S)
     return _by_active_sets(still, least, every=True)[0]
 
 

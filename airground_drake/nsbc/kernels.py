@@ -18,6 +18,9 @@ CONTRADICTION_M_S = 1e-9
 """Constraints that every trial misses by more contradict each other; by less, it is rounding, m/s."""
 ABOVE_LEAST = 1e-9
 """A violation larger than the least by this, relatively, is as good: no speed is spent on what is rounding."""
+ABOVE_LEAST_M_S = 1e-11
+"""So is one that is larger by this, m/s: between two points in opposite directions but for rounding, a velocity along
+both boundaries, as fast as the nearest far obstacle allows, would be better by what rounding makes of that speed."""
 DEPENDENT = 1e-20
 """Square of the sine of the angle between normals of which one says what the others say: 1e-10 rad."""
 
@@ -195,7 +198,7 @@ def _closest_feasible(lower: Array, normal: Array, bound: Array) -> Array:
 
 @njit(cache=True)
 def _least_violation(normal: Array, bound: Array) -> Array:
-    """Slowest velocity among those whose largest violation is least, but for `ABOVE_LEAST` of it.
+    """Slowest velocity among those whose largest violation is least, but for `ABOVE_LEAST` of it and `ABOVE_LEAST_M_S`.
 
     Constraints contradict each other only where a robot is inside several safe distances at once. What the
     lower priorities ask for then has no say: they might be hostile.
@@ -212,7 +215,7 @@ def _least_violation(normal: Array, bound: Array) -> Array:
             high = middle
         else:
             low = middle
-    return _closest(still, normal, bound - (1.0 + ABOVE_LEAST) * high, True)[0]
+    return _closest(still, normal, bound - ((1.0 + ABOVE_LEAST) * high + ABOVE_LEAST_M_S), True)[0]
 
 
 @njit(cache=True)

@@ -21,8 +21,9 @@ ROUNDING_M_S = 5e-13
 """Velocities that miss an inequality by less meet it, m/s."""
 CONTRADICTION_M_S = 1e-9
 """Inequalities that nothing meets by more contradict each other, m/s; the controller tells them apart by the same."""
-ABOVE_LEAST = 1e-9
-"""A violation that is larger than the least by this, relatively, is as good: no speed is spent on what is rounding."""
+ABOVE_LEAST, ABOVE_LEAST_M_S = 1e-9, 1e-11
+"""A violation that is larger than the least by the first, relatively, and by the second, m/s, is as good: no speed is
+spent on what is rounding."""
 
 
 def closest(
@@ -98,7 +99,7 @@ def shortened(velocity: Array, normal: Array, bound: Array) -> Array:
 def least_violation(normal: Array, bound: Array) -> Array:
     """The slowest of the velocities that miss inequalities by as little as possible, (B, d), m/s; by bisection.
 
-    What is `ABOVE_LEAST` more, relatively, is as little.
+    What is more by `ABOVE_LEAST`, relatively, and `ABOVE_LEAST_M_S` is as little.
     """
     still = np.zeros((normal.shape[0], normal.shape[2]))
     low = np.zeros(len(bound))
@@ -107,4 +108,5 @@ def least_violation(normal: Array, bound: Array) -> Array:
         middle = 0.5 * (low + high)
         met = closest(still, normal, bound - middle[:, None], contradiction=0.0)[1]
         high, low = np.where(met, middle, high), np.where(met, low, middle)
-    return closest(still, normal, bound - (1.0 + ABOVE_LEAST) * high[:, None], contradiction=0.0)[0]
+    enough = (1.0 + ABOVE_LEAST) * high[:, None] + ABOVE_LEAST_M_S
+    return closest(still, normal, bound - enough, contradiction=0.0)[0]

@@ -100,6 +100,23 @@ def test_a_robot_squeezed_between_two_goes_to_the_same_corner(seed: int, angle: 
     assert again == pytest.approx(running, abs=1e-6)
 
 
+@given(SEEDS, st.sampled_from([1e-8, 1e-6, 1e-4]))
+def test_between_two_that_both_push_rounding_makes_no_speed(seed: int, demand: float) -> None:
+    """Opposite directions but for rounding: along both boundaries it is 16 m/s to that of a far obstacle."""
+    rng = np.random.default_rng(seed)
+    towards = rng.uniform(0.0, 2.0 * np.pi, size=(BATCH, 1)) + np.array([0.0, np.pi, 2.0, -2.5])
+    towards[:, 1] += 10.0 ** rng.uniform(-17.0, -15.0, size=BATCH)
+    normal = np.stack([np.cos(towards), np.sin(towards), np.zeros_like(towards)], axis=2)
+    bound = np.hstack([demand * rng.uniform(0.1, 1.0, size=(BATCH, 2)), np.full((BATCH, 2), [-16.0, -30.0])])
+    wanted = 2.0 * rng.normal(size=(BATCH, 3)) * [1.0, 1.0, 0.0]
+    running = kernels.team_avoid(wanted, normal, bound, kernels.AUGMENTED)
+    assert (np.linalg.norm(running, axis=1) <= demand).all()
+    ours = avoiding(wanted, Inequalities(normal, bound), "augmented", planar=True)
+    again = checker.avoiding(wanted, checker.Inequalities(normal, bound), "augmented")
+    assert ours == pytest.approx(running, abs=1e-10)
+    assert again == pytest.approx(running, abs=1e-10)
+
+
 def _flattest(normal: Array) -> Array:
     """1 / the least sine between two normals (B, K, 3), or volume of three, squared; (B,)."""
     least = np.ones(len(normal))
