@@ -235,10 +235,11 @@ def _way_left(found: Foreseen, left_m: float, choice: str, about: dict[str, Any]
         return
     end, goal = found.places_m[-1], found.goal_m
     direct = float(np.linalg.norm((goal - end)[:2]))
-    at_most(f"{choice}: straight way", direct, left_m, within=LEFT_M, **about)
-    if left_m > direct + LEFT_M:
+    within = max(LEFT_M, OUTCOME * left_m)
+    at_most(f"{choice}: straight way", direct, left_m, within=within, **about)
+    if left_m > direct + within:
         around = _way_around_m(end, goal, found.discs_m, found.safe_m)
-        at_most(f"{choice}: way left", left_m, around, within=LEFT_M, **about)
+        at_most(f"{choice}: way left", left_m, around, within=within, **about)
 
 
 def _way_around_m(start: Array, goal: Array, discs_m: Array, safe_m: Array) -> float:

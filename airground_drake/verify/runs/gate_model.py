@@ -35,7 +35,8 @@ damps; a corner of nearly parallel inequalities enlarges it."""
 OUTCOME_TOLERANCE = 1e-6
 """Recorded and recomputed outcomes may differ by this, relative, or in m^2 s: they are sums over such velocities."""
 LEFT_TOLERANCE_M = 1e-3
-"""A recorded way may be this much outside its bounds, m: the recomputed end is not quite the recorded one."""
+"""A recorded way may be outside its bounds by this, m, or by `OUTCOME_TOLERANCE` of it: the recomputed end is not quite
+the recorded one."""
 BLOCKS = 6
 """Of stages, for each of which the plans that a decision's plan is compared with choose a mode."""
 MOST_REGRETS = 12
@@ -163,7 +164,8 @@ def judge_outcomes(trace: Trace, rows: Sequence[Row]) -> Finding:
             compared.append(Off(row, f"{choice}: outcome, m^2 s", cost - due, allowed, recomputed=due, recorded=cost))
             largest = max(largest, abs(cost - due) / allowed)
             short = max(0.0, found.least_left_m - left, left - found.most_left_m)
-            compared.append(Off(row, f"{choice}: way left, m", short, LEFT_TOLERANCE_M, recorded=left))
+            within = max(LEFT_TOLERANCE_M, OUTCOME_TOLERANCE * left)
+            compared.append(Off(row, f"{choice}: way left, m", short, within, recorded=left))
     finding = Finding(
         "holds",
         margin=1.0 - largest,

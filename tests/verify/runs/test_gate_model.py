@@ -13,7 +13,7 @@ from verify.judging import judge
 from airground_drake.check import foresight
 from airground_drake.gatekeeper import certified, outcome, prediction
 from airground_drake.gatekeeper.closed_loop import ClosedLoop
-from airground_drake.scenarios.load import load
+from airground_drake.scenarios.load import from_data, load, resolved
 from airground_drake.scenarios.schema import Policy
 from airground_drake.simulation import simulate
 from airground_drake.trace import Trace
@@ -45,6 +45,34 @@ def test_stages_of_several_control_periods_hold() -> None:
     finding = judge("GATE-MODEL", simulate(scenario, "c"))
     assert finding.status == "holds", finding
     assert finding.evidence["decisions"] > 5
+
+
+@pytest.mark.parametrize("claim", ["EXEC", "GATE-MODEL"])
+def test_a_queue_along_an_axis_is_squeezed_and_holds(queue: Trace, claim: str) -> None:
+    """Each between two others and in contact with both: predicted to be pushed by both, it may leap for kilometres."""
+    finding = judge(claim, queue)
+    assert finding.status == "holds", finding
+    assert queue.decisions["refuse_left_m"].max() > 1e3
+
+
+@pytest.fixture(scope="module")
+def queue() -> Trace:
+    """Seven UGVs behind each other, before a gap between two obstacles that is as wide as a point."""
+    data = resolved(load("minimal")[0])
+    ends = [([-6.0 - 3.0 * i, 0.0, 0.0], [14.0 - 3.0 * i, 0.0, 0.0]) for i in range(7)]
+    data["ugvs"] = {
+        f"u{i}": {
+            "start_m": start, "target_m": end, "max_speed_m_s": 3.0, "preset": {"waypoints_m": [start, end]},
+        }
+        for i, (start, end) in enumerate(ends)
+    }  # fmt: skip
+    data["obstacles"] = {f"o{i}": {"position_m": [0.0, y, 0.0]} for i, y in enumerate((2.0, -2.0))}
+    data["uav"] = {"start_m": [-15.0, 0.0, 2.0], "target_m": [5.0, 0.0, 2.0]}
+    data["control"] |= {"period_s": 0.05, "sensing_range_m": 6.0}
+    data["gatekeeper"] |= {"period_s": 0.1, "stages": 30}
+    data["intervention"]["period_s"] = 0.1
+    data["decision"] |= {"noise_period_s": 0.05, "threshold": {"zeta_m": 2.0}}
+    return simulate(from_data(data | {"duration_s": 9.5}, "queue"), "d")
 
 
 def test_of_a_map_without_end_the_nearest_obstacles_count() -> None:
