@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 
 from .files import Json
-from .proposals import proposals_of
-from .rules import SMALL, Array, Found, holds, same
+from .proposals import answers_of, proposals_of, taken_back_s
+from .rules import SMALL, Array, Found, at_most, holds, same
 from .run import Run
 
 AT_REST_S = 1.0
@@ -129,6 +130,8 @@ def comm(run: Run, claim: Json) -> Found:
         silent = not len(run.times_s(ugv, "proposal")) or (gated and not len(decided))
         if silent and run.talk_is_due(ugv):
             return Found("not_run")
+        _proposals_stand_as_long_as_they_must(run, ugv)
+    _obstacles_are_what_the_uav_knew(run)
     proposals = sum(event["kind"] == "proposal" for event in run.events)
     duration, n = run.scenario["duration_s"] + SMALL, len(run.ugvs)
     spent = {"proposal": proposals, "decision": len(run.decisions)}
@@ -182,6 +185,56 @@ def _no_strays(run: Run, ugv: str, kind: str, times_s: Array, issued_s: Array, a
             )
         )
     holds(f"a {kind} only during interventions", np.array(inside, bool), times_s, "during one", about=ugv, t_s=times_s)
+
+
+def _proposals_stand_as_long_as_they_must(run: Run, ugv: str) -> None:
+    """None is decided on once it is taken back; one in force is replaced only where joint plans may be the reason."""
+    mine, answers = [p for p in proposals_of(run) if p.ugv == ugv], answers_of(run, ugv)
+    ends_s = {p.issued_s: taken_back_s(run, p, mine, answers) for p in mine}
+    for when, issued, _ in answers:
+        at_most("a decision before the proposal is taken back", when, ends_s.get(issued, np.inf), about=ugv, t_s=when)
+    sent_s = [p.issued_s for p in proposals_of(run)]
+    for before, after in pairwise(mine):
+        now = after.issued_s + SMALL
+        over = before.times_s[-1] <= now or taken_back_s(run, before, [before], answers) <= now + SMALL
+        joint = max(sent_s.count(p.issued_s) for p in (before, after)) > 1 or after.cause != ugv
+        holds("a proposal stands until it is over", over or joint, after.policy, before.policy, about=ugv, t_s=now)
+
+
+def _obstacles_are_what_the_uav_knew(run: Run) -> None:
+    """Beyond its own map: all that UGVs sensed at refusals that it has noticed, and nothing that no UGV has told it.
+
+    It notices the last answer to a proposal before that is taken back.
+    """
+    obstacles = [*run.scenario["obstacles"].values()]
+    known = {(*map(float, o["position_m"]), float(o["radius_m"])) for o in obstacles if o["known_to_uav"]}
+    known |= {(*map(float, place), 0.0) for place in run.scenario["uav"]["phantoms_m"]}
+    surely: list[tuple[float, set[tuple[float, ...]]]] = []
+    perhaps: list[tuple[float, set[tuple[float, ...]]]] = []
+    for proposal in proposals_of(run):
+        mine, answers = [p for p in proposals_of(run) if p.ugv == proposal.ugv], answers_of(run, proposal.ugv)
+        end = taken_back_s(run, proposal, mine, answers)
+        on_it = [(when, yes) for when, issued, yes in answers if issued == proposal.issued_s]
+        perhaps += [(when, _sensed(run, proposal.ugv, when, SMALL)) for when, yes in on_it if not yes]
+        before = [(when, yes) for when, yes in on_it if when < end - 2.0 * SMALL]
+        if before and not before[-1][1] and np.isfinite(end):
+            surely.append((end, _sensed(run, proposal.ugv, before[-1][0], -SMALL)))
+    for proposal in proposals_of(run):
+        if ":" in proposal.policy:
+            continue
+        t, about = proposal.issued_s, f"proposal to {proposal.ugv}"
+        rows = np.column_stack([proposal.mapped_m, proposal.mapped_radius_m]).tolist()
+        said = {tuple(row) for row in rows} - known
+        least = {disc for end, discs in surely if end <= t + 2.0 * SMALL for disc in discs} - known
+        most = {disc for when, discs in perhaps if when < t - SMALL for disc in discs} - known
+        holds("obstacles that the UAV knows of", least <= said <= most, str(said), str(least), about=about, t_s=t)
+
+
+def _sensed(run: Run, ugv: str, t_s: float, margin_m: float) -> set[tuple[float, ...]]:
+    """Obstacles, centre and radius, within sensing range and a margin of a UGV."""
+    reach, here = run.scenario["control"]["sensing_range_m"] + margin_m, run.place_m(ugv, t_s)
+    discs = [(*map(float, o["position_m"]), float(o["radius_m"])) for o in run.scenario["obstacles"].values()]
+    return {disc for disc in discs if np.linalg.norm(here - np.array(disc[:3])) <= reach}
 
 
 def gate_time(run: Run, claim: Json) -> Found:

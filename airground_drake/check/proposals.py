@@ -110,9 +110,9 @@ def accepted_at(run: Run, ugv: str) -> list[Proposal | None]:
     it; under method (b) always.
     """
     mine = [proposal for proposal in proposals_of(run) if proposal.ugv == ugv]
-    answers = _answers(run, ugv)
+    answers = answers_of(run, ugv)
     plan_s, gate_s = (run.scenario[part]["period_s"] for part in ("intervention", "gatekeeper"))
-    ends_s = [_taken_back_s(run, proposal, mine, answers) for proposal in mine]
+    ends_s = [taken_back_s(run, proposal, mine, answers) for proposal in mine]
     found: list[Proposal | None] = []
     for t in run.sample_s:
         planned, decided = plan_s * np.floor(t / plan_s + 1e-6), gate_s * np.floor(t / gate_s + 1e-6)
@@ -125,15 +125,13 @@ def accepted_at(run: Run, ugv: str) -> list[Proposal | None]:
     return found
 
 
-def _answers(run: Run, ugv: str) -> list[tuple[float, float, bool]]:
+def answers_of(run: Run, ugv: str) -> list[tuple[float, float, bool]]:
     """Time of each decision of a UGV, time of issue of the proposal that it is on, whether it accepts."""
     rows = run.decisions[run.decisions["robot"] == ugv].to_dict("records")
     return sorted((float(row["t_s"]), float(row["issued_s"]), row["decision"] == "accept") for row in rows)
 
 
-def _taken_back_s(
-    run: Run, proposal: Proposal, mine: list[Proposal], answers: list[tuple[float, float, bool]]
-) -> float:
+def taken_back_s(run: Run, proposal: Proposal, mine: list[Proposal], answers: list[tuple[float, float, bool]]) -> float:
     """A little later than the planning instant at which a proposal is taken back, infinite if it never is.
 
     That is the first at which another is sent, neither the UGV nor the one that it is to make way for is intervened

@@ -534,6 +534,18 @@ INTERVENTION = (
         "a refusal is not noticed", "intervention/planner.py", "answers, i) == REFUSE for i", "answers, i) == 2.0 for i"
     ),
     Mutant(
+        "answers are decided on and not sent",
+        "systems/gatekeeper.py",
+        "output.SetFromVector(self._memory(context).answers)",
+        "pass",
+    ),
+    Mutant(
+        "UGVs report what is out of their sight",
+        "gatekeeper/sample.py",
+        "away <= self._law.avoidance.sensing_range",
+        "away >= self._law.avoidance.sensing_range",
+    ),
+    Mutant(
         "proposals are not withdrawn after a release",
         "intervention/planner.py",
         "            if name not in called and desk.cause not in called:\n",

@@ -13,6 +13,7 @@ from airground_drake.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S, TraceClaim
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.interventions import GATED_METHODS, causes_of, intervening, talk_is_due
+from airground_drake.verify.runs.standing import map_conflicts, standing_conflicts
 
 
 class Comm(TraceClaim):
@@ -26,7 +27,9 @@ class Comm(TraceClaim):
     )
     formula = (
         "every proposal and decision in [trigger, release + intervention period + gatekeeper period]; "
-        "proposals <= n floor(duration / intervention period), decisions <= n floor(duration / gatekeeper period)"
+        "proposals <= n floor(duration / intervention period), decisions <= n floor(duration / gatekeeper period); "
+        "no decision on a proposal that is withdrawn, none in force replaced but by or in a joint plan; "
+        "map of a proposal = known and phantom obstacles, then all sensed by UGVs at refusals that the UAV has noticed"
     )
     latex = (
         r"t_{\text{message}} \in [t_{\text{trigger}}, t_{\text{release}} + h_{\text{UAV}} + h_{\text{gate}}]",
@@ -37,12 +40,15 @@ class Comm(TraceClaim):
         "Counts of proposal events and of decisions (each one solve and one answer), each looked up in the intervals "
         "in which the mode column of the UGV, or of the one whose trigger is the proposal's cause, says "
         "'intervening'. After a release the UAV withdraws its proposal at its next "
-        "planning instant and the gatekeeper notices at its next sample: hence the allowance of one period each."
+        "planning instant and the gatekeeper notices at its next sample: hence the allowance of one period each. What "
+        "UGVs sensed at refusals follows from their positions; the UAV notices a refusal at the next planning instant, "
+        "if the proposal is in force until then. When a proposal is withdrawn follows as for EXEC."
     )
     equations = "(20), (26)"
     assumptions = (
         "Always-on means a proposal per planning period and a decision per gatekeeper period, for every UGV.",
         "Every proposal sent and every decision made is recorded.",
+        "Policies of others may send another map than the UAV's.",
     )
     does_not_establish = (
         "Bytes on a channel, or the cost of supervising: the UAV observes all UGVs all the time, which is not counted. "
@@ -92,13 +98,16 @@ class Comm(TraceClaim):
         most = {"proposal": n * int(duration / planning), "decision": n * int(duration / gating) if gated else 0}
         spent = {kind: sum(int(entry[kind]) for entry in per_ugv.values()) for kind in most}
         saved = {kind: 1.0 - spent[kind] / most[kind] for kind in most if most[kind]}
+        misused = list[dict[str, Any]]()
+        if not strays and len(trace.proposals):
+            misused = [*map_conflicts(trace), *standing_conflicts(trace)]
         over = None if all(spent[kind] <= most[kind] for kind in most) else {"spent": spent, "always_on": most}
         return Finding(
-            "refuted" if strays or over else "holds",
-            margin=None if strays else min(saved.values(), default=None),
+            "refuted" if strays or over or misused else "holds",
+            margin=None if strays or misused else min(saved.values(), default=None),
             unit="fraction saved",
             quantity="messages or decisions saved against always-on",
-            counterexample=min(strays, key=lambda stray: float(stray["t_s"])) if strays else over,
+            counterexample=min(strays + misused, key=lambda stray: float(stray["t_s"]), default=over),
             evidence={
                 "spent": spent,
                 "always_on": most,

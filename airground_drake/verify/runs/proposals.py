@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from airground_drake.verify.engines.segments import interpolate
 from airground_drake.verify.runs.control_law import selected
 from airground_drake.verify.runs.control_samples import control_samples
 from airground_drake.verify.runs.interventions import GATED_METHODS
+
+Answer = tuple[float, float, bool]
+"""Time of a decision, s, time of issue of the proposal that it is on, s, and whether it accepts."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,15 +129,11 @@ def _accepted_at(trace: Trace, ugv: str) -> list[Sent | None]:
     if not mine:
         return [None] * len(t)
     gated = trace.meta["method"] in GATED_METHODS
-    table = trace.decisions[trace.decisions["robot"] == ugv]
-    columns = (table[name].tolist() for name in ("t_s", "issued_s", "decision"))
-    answers = sorted(
-        (float(t_s), float(issued), answer == "accept") for t_s, issued, answer in zip(*columns, strict=True)
-    )
+    answers = answers_of(trace, ugv)
     times = np.array([answer[0] for answer in answers])
     gate_s = trace.scenario["gatekeeper"]["period_s"]
     plan_s = trace.scenario["intervention"]["period_s"]
-    ends = [_withdrawn_s(trace, ugv, sent, mine, answers) for sent in mine]
+    ends = [withdrawn_s(trace, ugv, sent, mine, answers) for sent in mine]
     found: list[Sent | None] = []
     for now in t:
         planned = plan_s * np.floor(now / plan_s + 1e-6)
@@ -152,7 +151,14 @@ def _accepted_at(trace: Trace, ugv: str) -> list[Sent | None]:
     return found
 
 
-def _withdrawn_s(trace: Trace, ugv: str, sent: Sent, mine: list[Sent], answers: list[Any]) -> float:
+def answers_of(trace: Trace, ugv: str) -> list[Answer]:
+    """Every decision of a UGV, by time."""
+    table = trace.decisions[trace.decisions["robot"] == ugv]
+    columns = (table[name].tolist() for name in ("t_s", "issued_s", "decision"))
+    return sorted((float(t_s), float(issued), answer == "accept") for t_s, issued, answer in zip(*columns, strict=True))
+
+
+def withdrawn_s(trace: Trace, ugv: str, sent: Sent, mine: Sequence[Sent], answers: Sequence[Answer]) -> float:
     """The planning instant at which a proposal is taken back, s; infinite if it never is."""
     period = trace.scenario["intervention"]["period_s"]
     called = (trace.column(f"{ugv}.mode") == 1.0) | (trace.column(f"{sent.cause}.mode") == 1.0)

@@ -117,13 +117,13 @@ FORMULAS = (
             "message": "true for 1e-9 s from each proposal and decision of a UGV; one set of signals per UGV",
             "intervening": "true from each trigger event to the next release event, 1e-9 s wider on both sides",
         },
-        "", stl_signals.messages, "dense",
+        "", stl_signals.messages, "dense", relation="implied",
     ),
     StlFormula(
         "COMM", "not more than always-on",
         "always ((proposals <= {most_proposals!r}) and (decisions <= {most_decisions!r}))",
         {"proposals": "number of proposal events so far", "decisions": "number of decisions so far"}, "messages",
-        stl_signals.counts,
+        stl_signals.counts, relation="implied",
     ),
     StlFormula(
         "LIVE-GOAL", "ends", "(eventually always (goal_m >= 0)) and (always (rest_m >= 0))",

