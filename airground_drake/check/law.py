@@ -160,6 +160,7 @@ def _by_active_sets(wanted_m_s: Array, given: Inequalities, *, every: bool = Fal
     that cannot matter are left out, unless `every` one is asked for.
     """
     normal, bound = _relevant(wanted_m_s, given, every=every)
+    rounding = 0.0 if every else ROUNDING  # it makes fast velocities look better than slow ones
     best, lacking = wanted_m_s.copy(), np.maximum(0.0, -_spare(wanted_m_s, given)).max(axis=1)
     lacking = np.where(lacking <= MET_M_S, 0.0, lacking)
     length = np.where(lacking == 0.0, 0.0, np.inf)
@@ -167,7 +168,7 @@ def _by_active_sets(wanted_m_s: Array, given: Inequalities, *, every: bool = Fal
     for size in range(1, 4 if normal[:, :, 2].any() else 3):
         sets = combinations(range(bound.shape[1]), size)
         while active := [*islice(sets, at_once)]:
-            step, lacks = _candidates(wanted_m_s, Inequalities(normal, bound), np.array(active))
+            step, lacks = _candidates(wanted_m_s, Inequalities(normal, bound), np.array(active), rounding)
             size_of, met = np.linalg.norm(step, axis=2), lacks == 0.0
             first = np.argmin(np.where(met, size_of, np.inf), axis=1)
             pick = np.arange(len(best)), np.where(met.any(axis=1), first, np.argmin(lacks, axis=1))
@@ -179,7 +180,7 @@ def _by_active_sets(wanted_m_s: Array, given: Inequalities, *, every: bool = Fal
     return best, lacking
 
 
-def _candidates(wanted_m_s: Array, given: Inequalities, active: Array) -> tuple[Array, Array]:
+def _candidates(wanted_m_s: Array, given: Inequalities, active: Array, rounding: float) -> tuple[Array, Array]:
     """How far from what is wanted the velocities are that meet the active inequalities (C, size) exactly.
 
     Each solves three equations: those of the active inequalities and, in the directions that are orthogonal to their
@@ -204,7 +205,7 @@ def _candidates(wanted_m_s: Array, given: Inequalities, active: Array) -> tuple[
     v += np.einsum("bcij,bcj->bci", inverse, due - np.einsum("bcij,bcj->bci", equations, v))
     rate = np.einsum("bkd,bcd->bck", given.normal, v)
     lacks = np.maximum(0.0, given.bound[:, None] - rate).max(axis=2)
-    lacks = np.where(lacks <= MET_M_S + ROUNDING * np.linalg.norm(v, axis=2), 0.0, lacks)
+    lacks = np.where(lacks <= MET_M_S + rounding * np.linalg.norm(v, axis=2), 0.0, lacks)
     return v - wanted_m_s[:, None], np.where(usable, lacks, np.inf)
 
 

@@ -226,8 +226,10 @@ def _closest(lower: Array, normal: Array, bound: Array, every: bool) -> tuple[Ar
     robot: two), so this is exact. Each trial is lower + J^+ (b - J lower), the augmented composition over that active
     set. Of those that meet all constraints the closest one is taken, else the one that misses least. Where standing
     still meets all constraints, no projection is longer than `lower`, and those that nothing of its size can reach are
-    left out, unless `every` one is asked for.
+    left out, unless `every` one is asked for. Then nothing is allowed for the rounding of fast velocities either, which
+    would make them look better than slow ones.
     """
+    rounding = 0.0 if every else 1e-15
     worst = 0.0
     for k in range(len(bound)):
         worst = max(worst, bound[k])
@@ -245,7 +247,7 @@ def _closest(lower: Array, normal: Array, bound: Array, every: bool) -> tuple[Ar
             count += 1
     tolerance = 0.5 * MARGIN_M_S + 1e-14 * reach
     best, trial, best_cost = lower.copy(), np.empty(3), 0.0
-    best_shortfall = _shortfall(row, level, count, best, tolerance)
+    best_shortfall = _shortfall(row, level, count, best, tolerance, rounding)
     active, across = np.empty(3, dtype=np.int64), np.empty((3, 3))
     for i in range(count):
         for j in range(i, count):
@@ -257,7 +259,7 @@ def _closest(lower: Array, normal: Array, bound: Array, every: bool) -> tuple[Ar
                 for a in range(3):
                     trial[a] = lower[a]
                 _meet(row, level, active[:size], across, trial)
-                shortfall = _shortfall(row, level, count, trial, tolerance)
+                shortfall = _shortfall(row, level, count, trial, tolerance, rounding)
                 cost = 0.0
                 for a in range(3):
                     cost += (trial[a] - lower[a]) ** 2
@@ -269,12 +271,12 @@ def _closest(lower: Array, normal: Array, bound: Array, every: bool) -> tuple[Ar
 
 
 @njit(cache=True)
-def _shortfall(row: Array, level: Array, count: int, velocity: Array, tolerance: float) -> float:
-    """By how much a velocity misses one of the constraints, m/s; 0 if by no more than rounding."""
+def _shortfall(row: Array, level: Array, count: int, velocity: Array, tolerance: float, rounding: float) -> float:
+    """By how much a velocity misses one of the constraints, m/s; 0 if by no more than tolerance and rounding."""
     found = 0.0
     for k in range(count):
         found = max(found, level[k] - _dot(row[k], velocity))
-    return found if found > tolerance + 1e-15 * np.sqrt(_dot(velocity, velocity)) else 0.0
+    return found if found > tolerance + rounding * np.sqrt(_dot(velocity, velocity)) else 0.0
 
 
 @njit(cache=True)

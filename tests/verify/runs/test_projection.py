@@ -117,6 +117,15 @@ def test_between_two_that_both_push_rounding_makes_no_speed(seed: int, demand: f
     assert again == pytest.approx(running, abs=1e-10)
 
 
+def test_on_an_obstacle_below_the_uav_nothing_moves() -> None:
+    """There is no way out of where an obstacle is; what is nearly above asks for nothing that 5000 km/s would help."""
+    normal, bound = np.array([[[0.0, 0.0, 0.0], [-4e-6, 0.0, 0.0]]]), np.array([[6.0, -20.0]])
+    wanted = np.array([[1.0, 0.0, 0.0]])
+    assert not kernels.team_avoid(wanted, normal, bound, kernels.AUGMENTED).any()
+    assert not avoiding(wanted, Inequalities(normal, bound), "augmented", planar=True).any()
+    assert not checker.avoiding(wanted, checker.Inequalities(normal, bound), "augmented").any()
+
+
 def _flattest(normal: Array) -> Array:
     """1 / the least sine between two normals (B, K, 3), or volume of three, squared; (B,)."""
     least = np.ones(len(normal))
