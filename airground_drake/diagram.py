@@ -80,7 +80,8 @@ def build_diagram(
         monitor: watches the diagram while it runs; see `make_monitor`.
 
     Returns:
-        A Diagram whose default context has every robot at its start. Outputs: RECORDED. Inputs:
+        A Diagram whose default context has every robot at its start; to be simulated, a context needs an accuracy:
+        `context.SetAccuracy(1e-6)`. Outputs: RECORDED. Inputs:
         `disturbance_<robot>` (3), m/s, added to the robot's velocity; 0 where not connected. With a monitor, its
         output `violation`, too.
 

@@ -128,6 +128,21 @@ def test_it_runs_without_the_recorder(case_a: Scenario) -> None:
     assert np.linalg.norm(positions[0] - starts(case_a)[0]) > 0.5
 
 
+def test_another_simulator_goes_on_with_a_run() -> None:
+    """With a clone of the context in the middle of an intervention: triggers so far, and when, are not forgotten."""
+    diagram = build_diagram(load("minimal")[0], "d")
+    simulator = Simulator(diagram)
+    simulator.get_mutable_context().SetAccuracy(1e-6)
+    simulator.AdvanceTo(7.0)
+    clone = simulator.get_context().Clone()
+    simulator.AdvanceTo(8.0)
+    Simulator(diagram, clone).AdvanceTo(8.0)
+    for port in ("status", "team_position"):
+        there, here = (diagram.GetOutputPort(port).Eval(context) for context in (simulator.get_context(), clone))
+        assert here == pytest.approx(there, abs=1e-12)
+    assert diagram.GetOutputPort("status").Eval(clone)[1] == 1.0
+
+
 @pytest.mark.parametrize(
     ("asked", "built"),
     [

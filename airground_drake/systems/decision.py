@@ -34,6 +34,9 @@ from airground_drake.systems.lifetime import weakly
 FIELDS = 4
 """Numbers of the trigger's state per UGV: mode, triggers, triggered_at, released_at."""
 
+NOT_BEGUN = -1.0
+"""Beginning of the step, s, before there is one."""
+
 SHORTEST_S = 1e-9
 """Steps shorter than this are not looked into, s; what is due in one happens at its end. Ticks of different periods can
 be one unit in the last place apart, and Drake cannot isolate anything in such a step: it stops instead."""
@@ -78,7 +81,8 @@ class EventTrigger(LeafSystem):
     the step, and cannot change it back before the step ends: a dip below the release level and back within a step is
     isolated like any other crossing, and nothing is missed. At the isolated time the step ends, and the per-step
     update makes the transition; what is due at the beginning of a run, at once. The Context needs an accuracy
-    (`Context.SetAccuracy`), or events come at the ends of steps.
+    (`Context.SetAccuracy`): without it Drake stops at the first event, or with fixed steps it comes at the end of one.
+    A Simulator that is initialised in the middle of a run, such as one for a clone of its Context, goes on with it.
 
     Ports (n UGVs):
         in  `team_position` (3(n+1)) m; `reference` (6n), positions first; `noise` (n) m.
@@ -102,7 +106,7 @@ class EventTrigger(LeafSystem):
         self._reference = self.DeclareVectorInputPort("reference", 6 * count)
         self._noise = self.DeclareVectorInputPort("noise", count)
         status = self.DeclareDiscreteState(_pack([TriggerState()] * count))
-        self.DeclareDiscreteState(1 + 7 * count)
+        self.DeclareDiscreteState(np.array([NOT_BEGUN, *([0.0] * 7 * count)]))
         self.DeclareStateOutputPort("status", status)
         self.DeclareInitializationUnrestrictedUpdateEvent(weakly(self._start))
         self.DeclarePerStepDiscreteUpdateEvent(weakly(self.update))
@@ -122,6 +126,9 @@ class EventTrigger(LeafSystem):
         signals = self._signals(context)
         t, x = float(signals[0]), _norms(signals)
         discrete = state.get_mutable_discrete_state()
+        if NOT_BEGUN < discrete.value(1)[0] <= t:  # another simulator goes on with a run
+            discrete.set_value(1, signals)
+            return EventStatus.Succeeded()
         discrete.set_value(0, _pack([self._trigger.start(t, float(x[j])) for j in range(self._count)]))
         discrete.set_value(1, signals)
         return EventStatus.Succeeded()
