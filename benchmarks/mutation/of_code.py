@@ -418,6 +418,13 @@ DECISION = (
         tests=TRIGGER,
     ),
     Mutant(
+        "what is above the threshold at the start triggers after the first tick",
+        "systems/decision.py",
+        "discrete.set_value(0, _pack([self._trigger.start(t, float(x[j])) for j in range(self._count)]))",
+        "pass",
+        tests=TRIGGER,
+    ),
+    Mutant(
         "a crossing during the dwell is forgotten",
         "decision/trigger.py",
         "return self.rise(state, t) if x >= self.zeta else replace(state, mode=Mode.SUPERVISING)",

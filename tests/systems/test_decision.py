@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pathlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -18,6 +19,8 @@ from pydrake.trajectories import PiecewisePolynomial
 from airground_drake.arrays import Array
 from airground_drake.decision.trigger import Trigger
 from airground_drake.nsbc.motion import Motion
+from airground_drake.scenarios.load import load
+from airground_drake.simulation import simulate
 from airground_drake.systems.decision import FIELDS, EventTrigger
 from airground_drake.verify.engines.segments import NormSignal
 from airground_drake.verify.runs.trigger_replay import transitions
@@ -143,3 +146,10 @@ def test_events_are_those_of_the_replay(seed: int, zeta: float, share: float, dw
             continue  # closer than what is isolated apart
         assert times(status, 2, j) == pytest.approx(starts, abs=3e-6)
         assert times(status, 3, j) == pytest.approx(ends, abs=3e-6)
+
+
+def test_what_is_above_the_threshold_at_the_start_is_intervened_on_at_the_first_tick() -> None:
+    """The trigger comes before the planner's first update, not with the first step after it."""
+    scenario = load(str(pathlib.Path(__file__).parents[2] / "benchmarks/mutation/crowd.yaml"))[0]
+    proposals = simulate(scenario, "b").proposals
+    assert proposals["issued_s"].min() == 0.0
