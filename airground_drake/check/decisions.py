@@ -94,10 +94,28 @@ class Decision:
         return self.initial_m + self.dt_s * np.cumsum(velocity, axis=-2)
 
     def gaps_m(self, positions_m: Array, normals: Array | None = None) -> Array:
-        """Distances less d at the end of each stage, (..., N, m); along unit normals (N, m, 3) if given."""
+        """Distances less d at the end of each stage, (..., N, m); along normals (N, m, 3), if given, that are not 0."""
         away = positions_m[..., None, :] - self.centres_m
-        reach = np.linalg.norm(away, axis=-1) if normals is None else (away * normals).sum(axis=-1)
-        return reach - self.distances_m
+        if normals is None:
+            return np.asarray(np.linalg.norm(away, axis=-1) - self.distances_m)
+        asked = (normals != 0.0).any(axis=-1)
+        return np.where(asked, (away * normals).sum(axis=-1) - self.distances_m, 0.0)
+
+    @cached_property
+    def half_planes(self) -> Array | None:
+        """The normals, but 0 where the point is out of reach: in the box of a stage's positions none is within d.
+
+        The box is spanned by the sums of the smaller and of the larger velocities up to there.
+        """
+        if self.normals is None:
+            return None
+        slower = np.minimum(self.accept_m_s, self.refuse_m_s)
+        faster = np.maximum(self.accept_m_s, self.refuse_m_s)
+        lowest = self.initial_m + self.dt_s * np.cumsum(slower, axis=0)
+        highest = self.initial_m + self.dt_s * np.cumsum(faster, axis=0)
+        beyond = np.maximum(lowest[:, None] - self.centres_m, self.centres_m - highest[:, None])
+        distance = np.linalg.norm(np.maximum(beyond, 0.0), axis=-1)
+        return np.where((distance < self.distances_m)[..., None], self.normals, 0.0)
 
     def cost(self, positions_m: Array, normals: Array | None = None) -> Array:
         """(25): sum_k e_k ||rho_rd - rho_k||^2 + dt b u_k^2, u_k being what the distances lack at most; (...)."""

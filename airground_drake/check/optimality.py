@@ -133,7 +133,7 @@ def gate_opt(run: Run, claim: Json) -> Found:
         return Found("inconclusive").counted(len(planned))
     gaps = []
     for decision in planned:
-        normals = decision.normals if halfplanes else None
+        normals = decision.half_planes if halfplanes else None
         optimum = _cheapest_of_blocks(decision, normals) if route in BLOCK_ROUTES else enclose(decision)
         _bound_and_gap_are_not_overstated(decision, optimum, normals)
         own = float(decision.cost(decision.positions_m))
@@ -197,8 +197,8 @@ def _bound_and_gap_are_not_overstated(decision: Decision, found: Enclosure, norm
     """Normals are unit vectors; the recorded lower bound is one; the gap is between its cost and what is best known."""
     row, scale, at = decision.row, decision.scale, _at(decision)
     bound, own = row["route_bound"], float(decision.cost(decision.positions_m, normals))
-    if normals is not None:
-        lengths = np.linalg.norm(normals, axis=2)
+    if decision.normals is not None and normals is not None:
+        lengths = np.linalg.norm(decision.normals, axis=2)
         close("normals are unit vectors", lengths, np.ones_like(lengths), within=SMALL, **at)
     at_most("lower bound against the plan's cost", bound, own, within=OVERSTATED * scale, **at)
     at_most("lower bound against the optimum", bound, found.upper, within=OVERSTATED * scale, **at)
@@ -233,7 +233,7 @@ def _no_plan_of_blocks_is_much_cheaper(decision: Decision) -> None:
 
 
 def enclose(decision: Decision) -> Enclosure:
-    """Bounds of the least cost of a relaxed plan, omega in [0, 1]^N, with distances along the recorded normals.
+    """Bounds of the least cost of a relaxed plan, omega in [0, 1]^N, with distances along the half-planes.
 
     That cost J is convex. Above: its value at any plan, such as the recorded relaxation omega*. Below: slack u_k, the
     most that a point lacks at stage k, is at least w_k = sum_j l_kj (what point j lacks) for any shares l_kj >= 0 with
@@ -246,7 +246,7 @@ def enclose(decision: Decision) -> Enclosure:
     same, as `_shares_at_ties` finds them. Where costs are tiny, omega* is a solver's, no minimiser to so many digits:
     the tangent is then taken at the minimiser of the smooth function.
     """
-    normals, omega = decision.normals, decision.relaxed
+    normals, omega = decision.half_planes, decision.relaxed
     if normals is None or not len(omega):
         raise NotEstablished("the optimum is bounded", "no relaxation is recorded", f"decision at {decision.t_s} s")
     positions = decision.positions_of(omega)
@@ -276,7 +276,7 @@ def _slopes(decision: Decision, forces: Array) -> Array:
 
 def _smooth(decision: Decision, omega: Array, shares: Array) -> tuple[float, Array]:
     """The smooth function of `enclose` for shares (N, m) of the points in what is lacking, and its slopes (N,)."""
-    dt, positions, normals = decision.dt_s, decision.positions_of(omega), decision.normals
+    dt, positions, normals = decision.dt_s, decision.positions_of(omega), decision.half_planes
     error = positions - decision.reference_m
     slack = np.maximum(0.0, (shares * -decision.gaps_m(positions, normals)).sum(axis=1))
     of_error = (decision.error_weights_1_m2[:, None] * error**2).sum()

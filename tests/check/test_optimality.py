@@ -43,9 +43,9 @@ def least_cost(problem: Decision, steps: int = 20000) -> float:
     omega, best = problem.relaxed.copy(), np.inf
     for k in range(steps // 100):
         values = problem.cost(
-            problem.positions_of(np.clip(omega + 1e-6 * np.eye(len(omega)), 0.0, 1.0)), problem.normals
+            problem.positions_of(np.clip(omega + 1e-6 * np.eye(len(omega)), 0.0, 1.0)), problem.half_planes
         )
-        here = float(problem.cost(problem.positions_of(omega), problem.normals))
+        here = float(problem.cost(problem.positions_of(omega), problem.half_planes))
         best = min(best, here)
         omega = np.clip(omega - 0.05 / np.sqrt(k + 1.0) * (values - here) / 1e-6, 0.0, 1.0)
     return best

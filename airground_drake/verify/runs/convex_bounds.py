@@ -33,7 +33,7 @@ class Enclosure:
 
 
 def enclose(rows: Sequence[Row]) -> list[Enclosure]:
-    """Bounds of the optimum over omega in [0, 1]^N of the cost with distances along the normals.
+    """Bounds of the optimum over omega in [0, 1]^N of the cost with distances along the half-planes' normals.
 
     For any multipliers l_kj >= 0 of u_k >= d_j - n_kj.(rho_k - o_kj), minimising the Lagrangian over u leaves
     q(omega) - sum_k (sum_j l_kj)^2 / (4 dt b), q convex and quadratic, of which the tangent at any omega* is below
@@ -54,7 +54,7 @@ def enclose(rows: Sequence[Row]) -> list[Enclosure]:
 
 def _bounds(row: Row, omega: Array, multiplier: Array) -> Enclosure:
     """Those of `enclose` for a plan (N,) and multipliers (N, m), 1/m."""
-    dt, slack, normals = row.dt, row.slack_weight, row["normals"]
+    dt, slack, normals = row.dt, row.slack_weight, row.half_planes
     error = row.error_weight * row.lasting[:, None]
     positions = row.positions(omega)
     away = positions - row["reference_m"]
@@ -72,7 +72,7 @@ def _minimiser(row: Row, multiplier: Array) -> Array:
     """Where in the box q is least: bounded least squares, the multipliers' forces being shifts of the reference."""
     n = len(row["reference_m"])
     weight = row.error_weight * row.lasting[:, None]
-    force = np.einsum("km,kmi->ki", multiplier, row["normals"])
+    force = np.einsum("km,kmi->ki", multiplier, row.half_planes)
     aim = row["reference_m"] + force / (2.0 * weight) - row.positions(np.zeros(n))
     change = row.dt * (row["accept_m_s"] - row["refuse_m_s"])
     reached = np.tril(np.ones((n, n)))[:, None, :] * change.T  # (stage, axis, omega)
@@ -103,10 +103,10 @@ def _solve(rows: Sequence[Row]) -> tuple[list[Array], list[Array]]:
     points = [len(row["distances_m"]) for row in rows]
     at = np.repeat(np.arange(total), np.repeat(points, stages))  # inequality by inequality, its stage
     count = len(at)
-    normals = np.concatenate([row["normals"].reshape(-1, 1, 3) for row in rows])
+    normals = np.concatenate([row.half_planes.reshape(-1, 1, 3) for row in rows])
     facing = sparse.bsr_matrix((normals, at, np.arange(count + 1)), shape=(count, 3 * total)).tocsr()
     picks = sparse.csr_matrix((np.ones(count), at, np.arange(count + 1)), shape=(count, total))
-    least = np.concatenate([-row.gaps(row["reference_m"], row["normals"]).ravel() for row in rows])
+    least = np.concatenate([-row.gaps(row["reference_m"], row.half_planes).ravel() for row in rows])
     of_error = np.sqrt(np.concatenate([row.error_weight * row.lasting / row.scale for row in rows]))
     of_slack = np.sqrt([row.dt * row.slack_weight / row.scale for row in rows])
     e = cp.Variable(3 * total)

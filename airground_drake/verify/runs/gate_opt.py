@@ -81,7 +81,8 @@ class GateOpt(ProblemClaim):
     )
     equations = "(25)-(27)"
     assumptions = (
-        "The optimum is that of the recorded problem: mode velocities, and unit normals, are data.",
+        "The optimum is that of the recorded problem: mode velocities, and unit normals, are data. A half-plane is "
+        "part of it only where some plan can come nearer than d: elsewhere (26d) asks for nothing.",
         "Route 'enumeration' and 'branch_and_bound' choose one mode for each of 10 blocks of stages.",
     )
     does_not_establish = (
@@ -176,7 +177,7 @@ class Bounded:
 
 def bound(rows: Sequence[Row], route: str) -> list[Bounded]:
     """Bounds for each decision, by the way that suits the route."""
-    normals = [row["normals"] if route in HALF_PLANE_ROUTES else None for row in rows]
+    normals = [row.half_planes if route in HALF_PLANE_ROUTES else None for row in rows]
     if route in DWELL_ROUTES:
         optima = [cheapest_of_blocks(row, along) for row, along in zip(rows, normals, strict=True)]
     else:
@@ -211,7 +212,8 @@ def compare_bounds(row: Row, found: Enclosure, normals: Array | None) -> Iterato
     loser = max(given["objective_accept"], given["objective_refuse"])
     best = min(own, loser, *(float(row.cost(positions, normals)) for positions in known))
     if normals is not None:
-        yield Off(row, "length of a normal, minus 1", np.linalg.norm(normals, axis=2) - 1.0, POSITION_TOLERANCE_M)
+        lengths = np.linalg.norm(row["normals"], axis=2)
+        yield Off(row, "length of a normal, minus 1", lengths - 1.0, POSITION_TOLERANCE_M)
     more = {"route_bound": lower, "optimum_at_least": found.lower, "optimum_at_most": found.upper}
     yield Off(row, "lower bound above the plan's cost", max(0.0, lower - own) / scale, OVERSTATED, cost=own)
     yield Off(row, "lower bound overstated", max(0.0, lower - found.upper) / scale, OVERSTATED, **more)

@@ -74,10 +74,29 @@ class Row:
         return self["initial_m"] + self.dt * np.cumsum(velocity, axis=-2)
 
     def gaps(self, positions: Array, normals: Array | None = None) -> Array:
-        """Distances minus d at the end of each stage, (..., N, m), m; along unit normals (N, m, 3) if given."""
+        """Distances minus d at the end of each stage, (..., N, m), m; along normals (N, m, 3) if given.
+
+        Normals are unit vectors, or 0 where nothing is asked: the gap there is 0.
+        """
         away = positions[..., None, :] - self["centres_m"]
-        reach = np.linalg.norm(away, axis=-1) if normals is None else np.einsum("...kmi,kmi->...km", away, normals)
-        return reach - self["distances_m"]
+        if normals is None:
+            return np.linalg.norm(away, axis=-1) - self["distances_m"]
+        reach = np.einsum("...kmi,kmi->...km", away, normals)
+        return np.where(normals.any(axis=-1), reach - self["distances_m"], 0.0)
+
+    @cached_property
+    def half_planes(self) -> Array:
+        """Normals of the half-planes in place of (26d), (N, m, 3): 0 where no plan can come nearer than d.
+
+        At the end of a stage plans are between the sums of the smaller and of the larger velocities so far.
+        """
+        low, high = (
+            self["initial_m"] + self.dt * np.cumsum(one(self["accept_m_s"], self["refuse_m_s"]), axis=0)[:, None]
+            for one in (np.minimum, np.maximum)
+        )
+        away = np.clip(self["centres_m"], low, high) - self["centres_m"]
+        near = np.linalg.norm(away, axis=-1) < self["distances_m"]
+        return near[..., None] * self["normals"]
 
     def clearance(self, positions: Array, normals: Array | None = None) -> Array:
         """The least of the `gaps` of each stage, (..., N), m; infinite without points."""

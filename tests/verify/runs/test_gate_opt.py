@@ -43,6 +43,24 @@ def test_the_example_is_not_trivial(relaxed: Trace) -> None:
     assert evidence["widest_enclosure"] < 1e-6
 
 
+def test_where_no_plan_can_come_near_a_half_plane_asks_for_nothing(relaxed: Trace) -> None:
+    """Turned round, it would ask for metres; routes leave it out, and so do the claim and the checker."""
+    row = rows_of(relaxed)[2]
+    idle = ~row.half_planes.any(axis=2)
+    assert idle.any()
+    assert not idle.all()
+
+    def turned(given: dict[str, Any], problem: dict[str, Any]) -> None:
+        problem["normals"] = np.where(idle[..., None], -row["normals"], row["normals"]).ravel()
+
+    trace = with_decision(relaxed, turned)
+    found, before = OPT.judge(trace), OPT.judge(relaxed)
+    assert found.status == "holds"
+    assert found.evidence["largest_gap"] == pytest.approx(before.evidence["largest_gap"], abs=1e-8)
+    again, plan = rows_of(trace)[2], row["positions_m"]
+    assert again.cost(plan, again["normals"]) > 2.0 * again.cost(plan, again.half_planes)
+
+
 def test_a_complete_decision_without_its_evidence_is_an_error(relaxed: Trace) -> None:
     def without(name: str) -> DecisionEdit:
         def edit(row: dict[str, Any], problem: dict[str, Any]) -> None:
