@@ -256,16 +256,18 @@ def simulate(
     Args:
         scenario: from a file or made in Python.
         run: name of one of its runs.
-        seed: of the decision noise; default: the scenario's.
+        seed: of the decision noise, in place of the scenario's.
         watch: is told the time, s, at every step.
 
     Raises:
-        ScenarioError: if the scenario is not valid.
+        ScenarioError: if the scenario, or the seed, is not valid.
         UnknownNameError: if it has no such run.
         PluginError: if it names a policy, route or task that cannot be made.
         SimulationError: if Drake or a system stops; names the run and the time.
     """
-    return Recorder(scenario, run).simulate(seed, watch=watch)
+    if seed is not None:
+        scenario = validated(scenario, {"seed": seed})
+    return Recorder(scenario, run).simulate(watch=watch)
 
 
 def _distinct(t: Array, command: Array) -> npt.NDArray[np.intp]:

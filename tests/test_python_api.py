@@ -92,6 +92,12 @@ def test_overrides_as_a_dict() -> None:
         load("case_a", {"seed": object()})
 
 
+@pytest.mark.parametrize("seed", [-1, 1.5, 2**40])
+def test_a_seed_is_checked_like_that_of_a_file(case_a: Scenario, seed: Any) -> None:
+    with pytest.raises(ScenarioError, match=f"seed: {seed} is not allowed"):
+        simulate(case_a, "d", seed=seed)
+
+
 def test_unknown_names_say_what_is_allowed(case_a: Scenario) -> None:
     with pytest.raises(UnknownNameError, match="unknown run 'z'; allowed: a, b, c, d"):
         simulate(case_a, "z")
