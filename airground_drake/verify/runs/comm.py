@@ -23,7 +23,9 @@ class Comm(TraceClaim):
     summary = "The UAV talked only while it was needed, and less than if it always talked."
     statement = (
         "Messages and gatekeeper solves were spent only while the UGV concerned, or the one that it was asked to make "
-        "way for, was being intervened on, and no more of them than an always-on scheme would have spent."
+        "way for, was being intervened on, and no more of them than an always-on scheme would have spent. "
+        "No proposal was decided on once it was taken back, or replaced while it was in force but by or in a joint "
+        "plan; what it said of obstacles was what the UAV knew: its own map, and what UGVs sensed when they refused."
     )
     formula = (
         "every proposal and decision in [trigger, release + intervention period + gatekeeper period]; "

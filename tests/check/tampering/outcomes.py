@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from check.tampering import base
-from check.tampering.base import edited_claim, edited_table, refused_by
+from check.tampering.base import edited_claim, edited_entries, edited_table, refused_by
 
 
 def change(folder: Path, where: Callable[[pd.DataFrame], Any], **values: Any) -> None:
@@ -141,3 +141,36 @@ def obstacle_on_the_map_moved(folder: Path) -> None:
 def radius_on_the_map_changed(folder: Path) -> None:
     with edited_table(folder, "proposals") as frame:
         frame["mapped_radius_m"] = [radii + 0.001 for radii in frame["mapped_radius_m"]]
+
+
+@refused_by("COMM", "obstacles that the UAV knows of")
+def obstacle_known_before_it_was_told(folder: Path) -> None:
+    with edited_table(folder, "proposals") as frame:
+        for name in ("mapped_m", "mapped_radius_m"):
+            frame[name] = [frame[name].iloc[-1]] * len(frame)
+
+
+@refused_by("COMM", "obstacles that the UAV knows of")
+def obstacle_forgotten(folder: Path) -> None:
+    with edited_table(folder, "proposals") as frame:
+        for name in ("mapped_m", "mapped_radius_m"):
+            frame[name] = [frame[name].iloc[0]] * len(frame)
+
+
+@refused_by("COMM", "a decision before the proposal is taken back")
+def decision_on_what_was_taken_back(folder: Path) -> None:
+    change(folder, first_refused, t_s=lambda value: value + 1.0)
+
+
+@refused_by("COMM", "a proposal stands until it is over")
+def proposal_replaced_while_in_force(folder: Path) -> None:
+    with edited_table(folder, "proposals") as proposals, edited_table(folder, "decisions") as decisions:
+        issued_s, replaced_s = decisions.loc[first_accepted(decisions), ["issued_s", "t_s"]].iloc[0]
+        decisions.loc[(decisions["issued_s"] == issued_s) & (decisions["t_s"] > replaced_s), "issued_s"] = replaced_s
+        again = proposals[proposals["issued_s"] == issued_s].assign(issued_s=replaced_s)
+        both = pd.concat([proposals, again]).sort_values("issued_s", ignore_index=True)
+    base.write_table(folder, both, "proposals")
+    with edited_entries(folder) as entries:
+        for entry in entries:
+            sent = next(e for e in entry["events"] if e["kind"] == "proposal" and e["t_s"] == issued_s)
+            entry["events"] = sorted([*entry["events"], {**sent, "t_s": replaced_s}], key=lambda event: event["t_s"])

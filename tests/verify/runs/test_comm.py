@@ -80,9 +80,9 @@ def told(run: Callable[[str, str], Trace]) -> Trace:
 
 
 def with_map(trace: Trace, row: int, points: list[float], radii: list[float]) -> Trace:
-    proposals = trace.proposals.copy()
-    proposals.at[row, "mapped_m"], proposals.at[row, "mapped_radius_m"] = points, radii  # noqa: PD008
-    return replace(trace, proposals=proposals)
+    columns = {name: trace.proposals[name].tolist() for name in ("mapped_m", "mapped_radius_m")}
+    columns["mapped_m"][row], columns["mapped_radius_m"][row] = points, radii
+    return replace(trace, proposals=trace.proposals.assign(**columns))
 
 
 def test_the_obstacles_in_proposals_are_what_the_uav_knew(told: Trace) -> None:
