@@ -251,7 +251,7 @@ def enclose(decision: Decision) -> Enclosure:
         raise NotEstablished("the optimum is bounded", "no relaxation is recorded", f"decision at {decision.t_s} s")
     positions = decision.positions_of(omega)
     upper = float(decision.cost(positions, normals))
-    lacking = -decision.gaps_m(positions, normals)
+    lacking = np.where((normals != 0.0).any(axis=-1), -decision.gaps_m(positions, normals), -np.inf)
     shares = np.eye(lacking.shape[1])[lacking.argmax(axis=1)] if lacking.shape[1] else lacking
     lower = _lower_bound(decision, omega, shares)
     if lacking.shape[1] and upper - lower > NARROW * decision.scale:

@@ -75,6 +75,17 @@ def test_a_relaxation_that_is_a_little_off_is_enclosed_as_narrowly(off: float) -
     assert 0.0 < found.lower <= found.upper <= found.lower + NARROW * tiny.scale
 
 
+def test_a_half_plane_of_a_point_that_no_plan_can_come_near_asks_for_nothing() -> None:
+    """Turned round, it would ask for metres."""
+    near = [1.5, 0.3, 0.0]
+    problem = decision(np.full(12, 0.5), [near, [50.0, 0.0, 0.0]], 0.0)
+    turned = replace(problem, normals=problem.normals * np.array([1.0, -1.0])[:, None])
+    alone = enclose(decision(np.full(12, 0.5), [near], 0.0))
+    for each in (problem, turned):
+        found = enclose(each)
+        assert (found.lower, found.upper) == pytest.approx((alone.lower, alone.upper), rel=1e-12)
+
+
 def test_least_squares_are_not_negative() -> None:
     rng = np.random.default_rng(2)
     for _ in range(20):
