@@ -192,7 +192,7 @@ def _dot(a: Array, b: Array) -> float:
 @njit(cache=True)
 def _closest_feasible(lower: Array, normal: Array, bound: Array) -> Array:
     """Closest velocity to `lower` under all constraints; where none meets them, see `_least_violation`."""
-    velocity, shortfall = _closest(lower, normal, bound, False)
+    velocity, shortfall = _closest(lower, normal, bound, False, False)
     return velocity if shortfall <= CONTRADICTION_M_S else _least_violation(normal, bound)
 
 
@@ -211,15 +211,15 @@ def _least_violation(normal: Array, bound: Array) -> Array:
         middle = 0.5 * (low + high)
         if middle <= low or middle >= high:
             break
-        if _closest(still, normal, bound - middle, True)[1] == 0.0:
+        if _closest(still, normal, bound - middle, True, True)[1] == 0.0:
             high = middle
         else:
             low = middle
-    return _closest(still, normal, bound - ((1.0 + ABOVE_LEAST) * high + ABOVE_LEAST_M_S), True)[0]
+    return _closest(still, normal, bound - ((1.0 + ABOVE_LEAST) * high + ABOVE_LEAST_M_S), True, False)[0]
 
 
 @njit(cache=True)
-def _closest(lower: Array, normal: Array, bound: Array, every: bool) -> tuple[Array, float]:
+def _closest(lower: Array, normal: Array, bound: Array, every: bool, any_one: bool) -> tuple[Array, float]:
     """Closest velocity to `lower` under all constraints, and by how much it misses one, m/s (0: rounding at most).
 
     By enumeration of active sets of at most three, none among them: a projection in R^3 needs no larger one (a planar
@@ -227,7 +227,7 @@ def _closest(lower: Array, normal: Array, bound: Array, every: bool) -> tuple[Ar
     set. Of those that meet all constraints the closest one is taken, else the one that misses least. Where standing
     still meets all constraints, no projection is longer than `lower`, and those that nothing of its size can reach are
     left out, unless `every` one is asked for. Then nothing is allowed for the rounding of fast velocities either, which
-    would make them look better than slow ones.
+    would make them look better than slow ones. With `any_one`, the first that meets all is as good as the closest.
     """
     rounding = 0.0 if every else 1e-15
     worst = 0.0
@@ -247,19 +247,22 @@ def _closest(lower: Array, normal: Array, bound: Array, every: bool) -> tuple[Ar
             count += 1
     tolerance = 0.5 * MARGIN_M_S + 1e-14 * reach
     best, trial, best_cost = lower.copy(), np.empty(3), 0.0
-    best_shortfall = _shortfall(row, level, count, best, tolerance, rounding)
+    best_shortfall = _shortfall(row, level, count, best, tolerance, rounding, np.inf)
     active, across = np.empty(3, dtype=np.int64), np.empty((3, 3))
+    independent = np.ones(4, dtype=np.bool_)  # the first 0, 1, 2, 3 of the active ones
     for i in range(count):
         for j in range(i, count):
             for m in range(j, j + 1 if planar or j == i else count):
                 active[0], active[1], active[2] = i, j, m
                 size = 1 if j == i else 2 if m == j else 3
-                if not _across(row, active[:size], across):
+                independent[size] = independent[size - 1] and _across(row, active[:size], across)
+                if not independent[size]:
                     continue
                 for a in range(3):
                     trial[a] = lower[a]
                 _meet(row, level, active[:size], across, trial)
-                shortfall = _shortfall(row, level, count, trial, tolerance, rounding)
+                enough = 0.0 if any_one else best_shortfall
+                shortfall = _shortfall(row, level, count, trial, tolerance, rounding, enough)
                 cost = 0.0
                 for a in range(3):
                     cost += (trial[a] - lower[a]) ** 2
@@ -267,36 +270,45 @@ def _closest(lower: Array, normal: Array, bound: Array, every: bool) -> tuple[Ar
                     best_shortfall, best_cost = shortfall, cost
                     for a in range(3):
                         best[a] = trial[a]
+                    if any_one and shortfall == 0.0:
+                        return best, shortfall
     return best, best_shortfall
 
 
 @njit(cache=True)
-def _shortfall(row: Array, level: Array, count: int, velocity: Array, tolerance: float, rounding: float) -> float:
-    """By how much a velocity misses one of the constraints, m/s; 0 if by no more than tolerance and rounding."""
+def _shortfall(
+    row: Array, level: Array, count: int, velocity: Array, tolerance: float, rounding: float, enough: float
+) -> float:
+    """By how much a velocity misses one of the constraints, m/s; 0 if by no more than tolerance and rounding.
+
+    Of one that misses by more than `enough` it is not found how much more.
+    """
+    allowed = tolerance + rounding * np.sqrt(_dot(velocity, velocity))
     found = 0.0
     for k in range(count):
         found = max(found, level[k] - _dot(row[k], velocity))
-    return found if found > tolerance + rounding * np.sqrt(_dot(velocity, velocity)) else 0.0
+        if found > allowed and found > enough:
+            return found
+    return found if found > allowed else 0.0
 
 
 @njit(cache=True)
 def _across(row: Array, active: npt.NDArray[np.int64], across: Array) -> bool:
-    """Of each active constraint the part of its normal that is orthogonal to the normals before it, by Gram-Schmidt.
+    """Of the last active constraint the part of its normal that is orthogonal to those before it, by Gram-Schmidt.
 
-    Written into `across`; False where the normals are dependent but for rounding, so that a smaller set says the same.
+    Written into `across`, where those of the ones before it stand; False where its normal depends on theirs but for
+    rounding, so that a smaller set says the same.
     """
-    for k in range(len(active)):
-        for a in range(3):
-            across[k, a] = row[active[k], a]
-        for _ in range(2):  # once leaves a part of the normals before, by rounding, as large as what is orthogonal
-            for n in range(k):
-                share = _dot(across[n], across[k]) / _dot(across[n], across[n])
-                for a in range(3):
-                    across[k, a] -= share * across[n, a]
-        squared = _dot(row[active[k]], row[active[k]])
-        if squared < 1e-18 or _dot(across[k], across[k]) <= DEPENDENT * squared:
-            return False
-    return True
+    k = len(active) - 1
+    for a in range(3):
+        across[k, a] = row[active[k], a]
+    for _ in range(2):  # once leaves a part of the normals before, by rounding, as large as what is orthogonal
+        for n in range(k):
+            share = _dot(across[n], across[k]) / _dot(across[n], across[n])
+            for a in range(3):
+                across[k, a] -= share * across[n, a]
+    squared = _dot(row[active[k]], row[active[k]])
+    return squared >= 1e-18 and _dot(across[k], across[k]) > DEPENDENT * squared
 
 
 @njit(cache=True)
