@@ -206,15 +206,20 @@ def _least_violation(normal: Array, bound: Array) -> Array:
     low, high = 0.0, 0.0
     for k in range(len(bound)):
         high = max(high, bound[k] + MARGIN_M_S)  # standing still violates nothing by more
-    still = np.zeros(3)
+    still, in_conflict = np.zeros(3), np.arange(len(bound))  # which are enough to rule `low` out
     while high - low > 1e-13 * high:
         middle = 0.5 * (low + high)
         if middle <= low or middle >= high:
             break
-        if _closest(still, normal, bound - middle, True, True)[1] == 0.0:
+        found, missed = _closest(still, normal[in_conflict], bound[in_conflict] - middle, True, True)
+        if missed == 0.0 and len(in_conflict) < len(bound):
+            found, missed = _closest(still, normal, bound - middle, True, True)
+        if missed == 0.0:
             high = middle
         else:
             low = middle
+            lacking = bound - middle - normal @ found
+            in_conflict = np.flatnonzero(lacking >= -CONTRADICTION_M_S)
     return _closest(still, normal, bound - ((1.0 + ABOVE_LEAST) * high + ABOVE_LEAST_M_S), True, False)[0]
 
 
@@ -261,8 +266,7 @@ def _closest(lower: Array, normal: Array, bound: Array, every: bool, any_one: bo
                 for a in range(3):
                     trial[a] = lower[a]
                 _meet(row, level, active[:size], across, trial)
-                enough = 0.0 if any_one else best_shortfall
-                shortfall = _shortfall(row, level, count, trial, tolerance, rounding, enough)
+                shortfall = _shortfall(row, level, count, trial, tolerance, rounding, best_shortfall)
                 cost = 0.0
                 for a in range(3):
                     cost += (trial[a] - lower[a]) ** 2
