@@ -149,6 +149,35 @@ def test_another_simulator_goes_on_with_a_run() -> None:
     assert diagram.GetOutputPort("status").Eval(clone)[1] == 1.0
 
 
+def test_a_simulator_initialised_again_begins_anew_before_its_first_step_and_goes_on_after_it() -> None:
+    diagram = build_diagram(load("minimal")[0], "d")
+    simulator = Simulator(diagram)
+    context = simulator.get_mutable_context()
+    context.SetAccuracy(1e-6)
+    plant = diagram.GetSubsystemByName("world").GetSubsystemByName("ugv1_plant")
+    home = plant.GetMyContextFromRoot(context).get_continuous_state_vector().CopyToVector()
+
+    def put(away_m: float) -> None:
+        plant.GetMyMutableContextFromRoot(context).SetContinuousState(home + [0.0, away_m, 0.0])
+        simulator.Initialize()
+
+    def triggers() -> float:
+        return float(diagram.GetOutputPort("status").Eval(context)[1])
+
+    put(0.0)
+    assert triggers() == 0.0
+    put(5.0)
+    assert triggers() == 1.0
+    put(0.0)
+    assert triggers() == 0.0
+    simulator.AdvanceTo(0.5)
+    assert triggers() == 0.0
+    put(5.0)
+    assert triggers() == 1.0
+    put(0.0)
+    assert triggers() == 1.0
+
+
 @pytest.mark.parametrize(
     ("asked", "built"),
     [

@@ -35,7 +35,7 @@ FIELDS = 4
 """Numbers of the trigger's state per UGV: mode, triggers, triggered_at, released_at."""
 
 NOT_BEGUN = -1.0
-"""Beginning of the step, s, before there is one."""
+"""Beginning of the run and of the step, s, before there is one."""
 
 SHORTEST_S = 1e-9
 """Steps shorter than this are not looked into, s; what is due in one happens at its end. Ticks of different periods can
@@ -82,13 +82,15 @@ class EventTrigger(LeafSystem):
     isolated like any other crossing, and nothing is missed. At the isolated time the step ends, and the per-step
     update makes the transition; what is due at the beginning of a run, at once. The Context needs an accuracy
     (`Context.SetAccuracy`): without it Drake stops at the first event, or with fixed steps it comes at the end of one.
-    A Simulator that is initialised in the middle of a run, such as one for a clone of its Context, goes on with it.
+    A Simulator that is initialised in the middle of a run, such as one for a clone of its Context, goes on with it; one
+    that is initialised again before its first step, or for an earlier time, begins anew.
 
     Ports (n UGVs):
         in  `team_position` (3(n+1)) m; `reference` (6n), positions first; `noise` (n) m.
         out `status` (4n): per UGV mode (see Mode), number of triggers, time of the last trigger, s, and of
             the last release, s (-1 before the first).
-    State: the status; the beginning of the step: time, s, positions and references (3n each), m, and noise (n), m.
+    State: the status; the beginning of the step: time, s, positions and references (3n each), m, and noise (n), m;
+        the beginning of the run, s.
     Rate: one update per step of the simulator.
     """
 
@@ -107,6 +109,7 @@ class EventTrigger(LeafSystem):
         self._noise = self.DeclareVectorInputPort("noise", count)
         status = self.DeclareDiscreteState(_pack([TriggerState()] * count))
         self.DeclareDiscreteState(np.array([NOT_BEGUN, *([0.0] * 7 * count)]))
+        self.DeclareDiscreteState(np.array([NOT_BEGUN]))
         self.DeclareStateOutputPort("status", status)
         self.DeclareInitializationUnrestrictedUpdateEvent(weakly(self._start))
         self.DeclarePerStepDiscreteUpdateEvent(weakly(self.update))
@@ -123,14 +126,15 @@ class EventTrigger(LeafSystem):
         return gathered(context.get_time(), position, reference, self._noise.Eval(context))
 
     def _start(self, context: Context, state: State) -> EventStatus:
-        signals = self._signals(context)
-        t, x = float(signals[0]), _norms(signals)
-        discrete = state.get_mutable_discrete_state()
-        if NOT_BEGUN < discrete.value(1)[0] <= t:  # another simulator goes on with a run
-            discrete.set_value(1, signals)
-            return EventStatus.Succeeded()
-        discrete.set_value(0, _pack([self._trigger.start(t, float(x[j])) for j in range(self._count)]))
-        discrete.set_value(1, signals)
+        now, discrete = self._signals(context), state.get_mutable_discrete_state()
+        before, begun, run_begun = (discrete.value(k) for k in range(3))
+        if run_begun[0] < begun[0] <= now[0]:  # another simulator goes on with a run
+            discrete.set_value(0, self._after(before, now, now))
+        else:
+            t, x = float(now[0]), _norms(now)
+            discrete.set_value(0, _pack([self._trigger.start(t, float(x[j])) for j in range(self._count)]))
+            discrete.set_value(2, now[:1])
+        discrete.set_value(1, now)
         return EventStatus.Succeeded()
 
     def nothing_due(self, context: Context) -> float:
@@ -144,14 +148,18 @@ class EventTrigger(LeafSystem):
         """Make the transitions that have become due in the step that ends, and begin another: the per-step update."""
         now, begun, before = self._signals(context), *(context.get_discrete_state(k).value() for k in (1, 0))
         if self._anything_due(before, begun, now):
-            least, most = self._excursions(begun, now)
-            status = before.reshape(-1, FIELDS).copy()
-            t, x = float(now[0]), _norms(now)
-            for j in np.flatnonzero(transitions_due(before, t, least, most, self._levels)):
-                status[j] = _pack([self._moved(_unpack(status[j]), t, float(x[j]), float(least[j]), float(most[j]))])
-            discrete.set_value(0, status.ravel())
+            discrete.set_value(0, self._after(before, begun, now))
         discrete.set_value(1, now)
         return EventStatus.Succeeded()
+
+    def _after(self, before: Array, begun: Array, now: Array) -> Array:
+        """Status once the transitions that became due in a step are made."""
+        least, most = self._excursions(begun, now)
+        status = before.reshape(-1, FIELDS).copy()
+        t, x = float(now[0]), _norms(now)
+        for j in np.flatnonzero(transitions_due(before, t, least, most, self._levels)):
+            status[j] = _pack([self._moved(_unpack(status[j]), t, float(x[j]), float(least[j]), float(most[j]))])
+        return status.ravel()
 
     def _anything_due(self, status: Array, begun: Array, now: Array) -> bool:
         if self._bends(begun, now):
