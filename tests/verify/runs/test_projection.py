@@ -167,18 +167,17 @@ def test_in_contact_rounding_decides_nothing(seed: int) -> None:
     """A robot at the safe distance of one, and inside that of another behind it: on which side rounding puts it."""
     rng = np.random.default_rng(seed)
     angle = rng.uniform(0.0, 2.0 * np.pi) + np.array([0.0, np.pi + rng.uniform(-0.2, 0.2), rng.uniform(1.0, 2.0)])
-    normal = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(3)])[None]
-    wanted = 3.0 * rng.normal(size=(1, 3)) * [1.0, 1.0, 0.0]
+    touches = np.array([0.0, -1e-15, 1e-15, -1e-12, 1e-12])
+    normal = np.tile(np.column_stack([np.cos(angle), np.sin(angle), np.zeros(3)]), (len(touches), 1, 1))
+    wanted = np.tile(3.0 * rng.normal(size=3) * [1.0, 1.0, 0.0], (len(touches), 1))
     inside, aside = rng.uniform(0.1, 2.0), rng.uniform(-1.0, 0.0)
+    bound = np.column_stack([touches, np.full_like(touches, inside), np.full_like(touches, aside)])
     for found in (
-        lambda bound: avoiding(wanted, Inequalities(normal, bound), "augmented", planar=True),
-        lambda bound: checker.avoiding(wanted, checker.Inequalities(normal, bound), "augmented"),
-        lambda bound: kernels.team_avoid(wanted, normal, bound, kernels.AUGMENTED),
+        avoiding(wanted, Inequalities(normal, bound), "augmented", planar=True),
+        checker.avoiding(wanted, checker.Inequalities(normal, bound), "augmented"),
+        kernels.team_avoid(wanted, normal, bound, kernels.AUGMENTED),
     ):
-        there, *beside = (
-            found(np.array([[touches, inside, aside]])) for touches in (0.0, -1e-15, 1e-15, -1e-12, 1e-12)
-        )
-        assert np.array(beside) == pytest.approx(np.array([there] * 4), abs=1e-9)
+        assert found[1:] == pytest.approx(np.tile(found[0], (len(touches) - 1, 1)), abs=1e-9)
 
 
 @given(SEEDS)
