@@ -32,7 +32,7 @@ class ScenarioError(AirgroundError):
         """Build the one-line message from its parts."""
         self.source, self.key, self.value, self.allowed = source, key, value, allowed
         where = f"{source}: {key}: " if key else f"{source}: "
-        fault = str(value) if isinstance(value, Fault) else f"{_short(repr(value))} is not allowed"
+        fault = str(value) if isinstance(value, Fault) else f"{short(repr(value))} is not allowed"
         super().__init__(one_line(f"{where}{fault}; {allowed}"))
 
 
@@ -72,7 +72,7 @@ class UnknownNameError(AirgroundError):
         """Build the one-line message from its parts."""
         self.kind, self.name, self.allowed = kind, name, tuple(allowed)
         options = ", ".join(self.allowed) or "none"
-        super().__init__(one_line(f"unknown {kind} {_short(repr(name))}; allowed: {options}"))
+        super().__init__(one_line(f"unknown {kind} {short(repr(name))}; allowed: {options}"))
 
 
 class PluginError(AirgroundError):
@@ -114,7 +114,8 @@ class TraceError(AirgroundError):
     """A trace that is missing, truncated, tampered with or not finite."""
 
 
-def _short(text: str) -> str:
+def short(text: str) -> str:
+    """A text as long as a message may quote: its beginning, if it is longer."""
     return text if len(text) <= VALUE_WIDTH else f"{text[: VALUE_WIDTH - 3]}..."
 
 

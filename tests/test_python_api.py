@@ -158,7 +158,7 @@ def test_a_simulator_initialised_again_begins_anew_before_its_first_step_and_goe
     home = plant.GetMyContextFromRoot(context).get_continuous_state_vector().CopyToVector()
 
     def put(away_m: float) -> None:
-        plant.GetMyMutableContextFromRoot(context).SetContinuousState(home + [0.0, away_m, 0.0])
+        plant.GetMyMutableContextFromRoot(context).SetContinuousState(home + np.array([0.0, away_m, 0.0]))
         simulator.Initialize()
 
     def triggers() -> float:

@@ -23,7 +23,7 @@ import numpy as np
 import yaml
 
 from airground_drake import files
-from airground_drake.errors import Fault, ScenarioError
+from airground_drake.errors import Fault, ScenarioError, short
 from airground_drake.scenarios import validate
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.scenarios.shipped import shipped, shipped_files
@@ -324,7 +324,7 @@ def _compose(text: str, source: str) -> yaml.Node:
 
 def _override(root: yaml.Node, override: str) -> yaml.Node:
     """The document with one value replaced; the document itself is left as it is, as aliases may share nodes."""
-    source = f"--set {override}"
+    source = f"--set {short(override)}"
     key, equals, value = override.partition("=")
     if not equals or not key.strip():
         raise ScenarioError(source, "", override, "wanted: dotted.key=value, such as control.period_s=0.05")

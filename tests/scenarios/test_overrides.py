@@ -88,3 +88,9 @@ def test_the_digest_depends_on_how_overrides_are_split(write: Write) -> None:
 def test_bad_override(override: str, fragments: list[str]) -> None:
     text = message("case_a", [override])
     assert all(fragment in text for fragment in fragments), text
+
+
+def test_of_a_long_override_its_beginning_is_quoted() -> None:
+    text = message("case_a", [f"ugvs={{{', '.join(f'r{k}: {{start_m: [{k}, 0, 0]}}' for k in range(50))}}}"])
+    assert text.startswith("--set ugvs={r0: {start_m: [0, 0, 0]}")
+    assert len(text) < 300

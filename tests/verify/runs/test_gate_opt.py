@@ -44,7 +44,7 @@ def test_the_example_is_not_trivial(relaxed: Trace) -> None:
 
 
 def test_where_no_plan_can_come_near_a_half_plane_asks_for_nothing(relaxed: Trace) -> None:
-    """Turned round, it would ask for metres; routes leave it out, and so does the claim (and the checker: tests/check/test_optimality.py)."""
+    """Turned round, it would ask for metres; routes leave it out, and so does the claim."""
     row = rows_of(relaxed)[2]
     idle = ~row.half_planes.any(axis=2)
     assert idle.any()
