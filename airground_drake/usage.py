@@ -29,6 +29,13 @@ class Parser(argparse.ArgumentParser):
         raise SystemExit(refuse(f"{message}; see {self.prog} --help"))
 
 
+def overridable(parser: argparse.ArgumentParser) -> None:
+    """Add the option `--set`."""
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="KEY=VALUE", help="override a key of the scenario"
+    )
+
+
 def whole(least: int, most: float = math.inf) -> Callable[[str], int]:
     """What takes an argument that is a whole number, `least` and `most` included."""
     up_to = "on" if most == math.inf else f"to {most}"

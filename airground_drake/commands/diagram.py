@@ -10,7 +10,7 @@ from airground_drake import files
 from airground_drake.errors import AirgroundError, UnknownNameError
 from airground_drake.registry import METHODS
 from airground_drake.scenarios import plugins
-from airground_drake.usage import Parser, refuse, whole
+from airground_drake.usage import Parser, overridable, refuse, whole
 
 FORMATS = ("dot", "svg", "pdf", "png")
 
@@ -24,6 +24,7 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument("--depth", type=whole(1), default=1, metavar="N", help="levels of the first graph (default: 1)")
     parser.add_argument("--format", action="append", choices=FORMATS, help="may be repeated (default: dot and svg)")
     parser.add_argument("-o", "--output", type=Path, default=Path(), metavar="DIR", help="default: this folder")
+    overridable(parser)
     parser.add_argument(plugins.OPTION, action="store_true", help=plugins.HELP)
     return parser
 
@@ -40,7 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from airground_drake.scenarios.load import load
 
     try:
-        scenario, _ = load(options.scenario)
+        scenario, _ = load(options.scenario, options.set)
         with plugins.admitted(scenario, options.scenario, allow=options.allow_plugins):
             diagram, name = build_diagram(scenario, method=options.method), scenario.name
         if options.part is not None:

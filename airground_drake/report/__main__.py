@@ -30,7 +30,7 @@ from airground_drake.report import folder
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.estimate import DEFAULT_LIMITS, GIB, Limits
 from airground_drake.scenarios.shipped import AUDIT, shipped
-from airground_drake.usage import EXIT_TOOL, Parser, positive, refuse
+from airground_drake.usage import EXIT_TOOL, Parser, overridable, positive, refuse
 
 if TYPE_CHECKING:
     from airground_drake.scenarios.schema import Scenario
@@ -128,9 +128,7 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--format", type=_formats, default=FORMATS, help="comma-separated: html,json,junit (default: all)"
     )
-    parser.add_argument(
-        "--set", action="append", default=[], metavar="KEY=VALUE", help="override a key of the scenario"
-    )
+    overridable(parser)
     parser.add_argument("--seed", type=int, metavar="N", help="seed of the decision noise")
     parser.add_argument(
         "--no-cache", action="store_true", help="redo every proof instead of reusing one whose inputs are unchanged"
