@@ -26,7 +26,8 @@ from airground_drake.campaign.distributions import KINDS, Key, combinations, mad
 from airground_drake.campaign.rows import TIMES
 from airground_drake.errors import Fault, ScenarioError
 from airground_drake.registry import RUN_CLAIMS
-from airground_drake.scenarios.load import from_data, load, read_data, shipped
+from airground_drake.scenarios.document import read_data
+from airground_drake.scenarios.load import from_data, load, shipped
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.finding import PLAIN_NAME
 

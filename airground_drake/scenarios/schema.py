@@ -1,10 +1,10 @@
 """The scenario file as dataclasses: every key, its unit (in the key's name) and its meaning.
 
-pydrake's YAML reader fills them (`load.py`), which is why they are mutable and use lists: after loading and
-validation (`validate.py`) nothing changes them. Positions are in the world frame, z up, the ground at z = 0.
+`typed.py` fills them by their type hints. They are mutable, for scenarios changed in Python; after validation
+(`validate.py`) nothing changes them. Positions are in the world frame, z up, the ground at z = 0.
 """
 
-# No `from __future__ import annotations` here: pydrake's reader needs the types themselves, not their names.
+# No `from __future__ import annotations` here: `typed.py` needs the types themselves, not their names.
 from dataclasses import dataclass, field
 
 Vector = list[float]

@@ -12,7 +12,8 @@ import yaml
 from scenarios.cases import CASE_A, DATA, SMALL, Write, case_a, message
 
 from airground_drake.errors import ScenarioError
-from airground_drake.scenarios.load import MAX_BYTES, load, resolved, shipped
+from airground_drake.scenarios.document import MAX_BYTES
+from airground_drake.scenarios.load import load, resolved, shipped
 
 
 @pytest.mark.parametrize("name", shipped())
