@@ -24,7 +24,8 @@ establishes.
     statistics                 THR-DDM, ZENO-REFINE
     inputs                     the constants that a claim about the model must be about
     evidence                   what of a claim's entry is established, and what is taken as recorded
-    report                     verdicts, their expectations, and the verdict over all of them
+    claims, verdict            what decides each claim, and what is expected of it; a recorded verdict against that
+    overall, report            the verdict over all of them, and the files; all checks, a line each
     command                    the command line
 """
 

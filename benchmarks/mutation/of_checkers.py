@@ -361,7 +361,7 @@ CHECKER = (
     ),
     Mutant(
         "checker: a claim may be missing",
-        "check/report.py",
+        "check/overall.py",
         'same("claims that there are", own, sorted(map(list, expectations(scenario))))',
         "pass",
         runs=(),
@@ -369,9 +369,9 @@ CHECKER = (
     ),
     Mutant(
         "checker: undecided agrees",
-        "check/report.py",
+        "check/verdict.py",
         "    if status in UNDECIDED and found.status != status:\n",
-        '    if status in UNDECIDED:\n        return "undecided"\n    if False:\n',
+        '    if status in UNDECIDED:\n        return Agreed("undecided", {})\n    if False:\n',
         runs=(),
         tamperings=("SAFE-TRACE", "SAFE-HYP", "EXEC", "THR-TRIG", "report", "GATE-TIME"),
     ),

@@ -9,7 +9,7 @@ import pytest
 from check.tampering.base import attempt, edited_report, read_json
 from check.tampering.counts import COUNT
 
-from airground_drake.check import report as checker
+from airground_drake.check import claims as checker
 from airground_drake.statuses import EXPECTATIONS, STATUSES, meets, outcome
 
 
@@ -32,5 +32,5 @@ def test_expectations_and_outcomes_mean_the_same_to_the_checker(count: int | Non
     for status, one, other in product(STATUSES, EXPECTATIONS, EXPECTATIONS):
         claim = {"status": status, "exercised": count}
         for expected in (one, f"{one} or {other}"):
-            assert checker._meets(expected, claim) == meets(expected, status, count), (expected, claim)
-        assert checker._outcome(claim) == outcome(status, count)
+            assert checker.meets(expected, claim) == meets(expected, status, count), (expected, claim)
+        assert checker.outcome_of(claim) == outcome(status, count)

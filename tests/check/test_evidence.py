@@ -15,8 +15,9 @@ from check.tampering.base import claim_of, copy, edited_claim, write
 from hypothesis import settings
 
 from airground_drake import check
+from airground_drake.check.claims import KNOWN
 from airground_drake.check.evidence import AS_RECORDED, KEYS, as_recorded
-from airground_drake.check.report import AGREES, KNOWN, check_report
+from airground_drake.check.report import AGREES, check_report
 
 DOCS = Path(__file__).parents[2] / "docs"
 SAMPLE = 60
