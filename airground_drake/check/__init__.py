@@ -20,6 +20,7 @@ establishes.
     optimality                 GATE-SUR, GATE-OPT
     polynomials, certificates  SAFE-LEMMA, SAFE-INV, SAFE-GATE, SAFE-DIST, ZENO-PROOF, LIVE-GATE, LIVE-WAIT, THR-ISO;
                                obligations.json
+    conformance                what their records say besides: that running code conforms, and what rounding takes
     enclosures                 THR-ROOT, THR-OPT
     statistics                 THR-DDM, ZENO-REFINE
     inputs                     the constants that a claim about the model must be about

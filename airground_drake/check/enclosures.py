@@ -20,9 +20,8 @@ from decimal import Decimal, localcontext
 from fractions import Fraction
 from typing import Any
 
-from .certificates import rational
 from .files import Files, Json, content_of, parse_json
-from .polynomials import bounded, number
+from .polynomials import bounded, number, rational
 from .rules import SMALL, Disagreement, Found, NotEstablished, close, holds, same
 
 DIGITS = 100

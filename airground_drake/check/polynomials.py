@@ -93,6 +93,11 @@ def number(text: str) -> Fraction:
     return bounded(Fraction(text))
 
 
+def rational(value: float) -> Fraction:
+    """The decimal that a number prints as."""
+    return Fraction(repr(float(value)))
+
+
 @lru_cache(maxsize=4096)
 def parse(text: str) -> Polynomial:
     """A sum of products of numbers and names, such as "2*h*r - 1/2*d"; no powers, no brackets.
