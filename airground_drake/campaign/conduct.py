@@ -53,9 +53,12 @@ def conduct(
         The evidence, strict JSON.
 
     Raises:
+        ScenarioError: if code of others is named that is not allowed.
         FolderError: if the folder cannot be used.
         OSError: if it cannot be written.
     """
+    if not allow_plugins:
+        spec.refuse_plugins()
     store = Store(folder, _manifest(spec), resume=resume)
     try:
         met = False

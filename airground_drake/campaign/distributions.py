@@ -160,7 +160,9 @@ def combinations(drawn: Mapping[str, Key]) -> int:
 def _halton(size: int, seed: int, index: int) -> Array:
     if size == 0:
         return np.empty(0)
-    return np.asarray(qmc.Halton(size, rng=np.random.default_rng(seed)).fast_forward(index).random(1)[0])
+    points = qmc.Halton(size, rng=np.random.default_rng(seed))
+    points.num_generated = index  # `fast_forward` makes all that it leaves out
+    return np.asarray(points.random(1)[0])
 
 
 def _uniform(given: Any) -> Uniform:
@@ -173,7 +175,7 @@ def _uniform(given: Any) -> Uniform:
 
 def _log_uniform(given: Any) -> LogUniform:
     low, high = given
-    if not 0.0 < low <= high < math.inf:
+    if not (0.0 < low <= high < math.inf and high / low < math.inf):
         raise ValueError
     return LogUniform(float(low), float(high))
 

@@ -118,6 +118,7 @@ def _claim(run: str, claim: str, rows: pd.DataFrame, drawn: pd.DataFrame) -> Jso
         "claim": claim,
         **counts._asdict(),
         "not_as_expected": int((~rows["as_expected"]).sum()),
+        "differs": int((~rows["as_expected"] & ~rows["status"].isin(UNDECIDED)).sum()),
         "fixed": list(counts.interval(anytime=False)),
         "anytime": list(counts.interval(anytime=True)),
         "unit": str(rows["unit"].iloc[0]),

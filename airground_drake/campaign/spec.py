@@ -16,19 +16,21 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
+import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from airground_drake.campaign.course import Course
-from airground_drake.campaign.distributions import KINDS, Key, combinations, made, stream, values_of
+from airground_drake.campaign.distributions import KINDS, Choice, Key, combinations, made, stream, values_of
 from airground_drake.campaign.rows import TIMES
 from airground_drake.errors import Fault, ScenarioError
 from airground_drake.registry import RUN_CLAIMS
+from airground_drake.scenarios import plugins
 from airground_drake.scenarios.document import read_data
 from airground_drake.scenarios.load import from_data, load, shipped
-from airground_drake.scenarios.schema import Scenario
+from airground_drake.scenarios.schema import MAX_NAME, Scenario
 from airground_drake.verify.finding import PLAIN_NAME
 
 KEYS = ("name", "title", "scenario", "runs", "seed", "set", "draw", "course", "claims", "marks")
@@ -111,8 +113,25 @@ class Spec:
             except ValueError as error:
                 raise ScenarioError(self.source, COURSE, Fault(str(error)), "wanted: a larger field") from None
         scenario = self._with(overrides | dict(values))
+        _known(self.runs, scenario.runs, self.source, "runs")
         runs = {run: scenario.runs[run] for run in self.runs} if self.runs else scenario.runs
-        return replace(scenario, name=f"{self.name}_{index}", runs=runs)
+        return replace(scenario, name=f"{_identifier(self.name)[: MAX_NAME - 1 - len(str(index))]}_{index}", runs=runs)
+
+    def refuse_plugins(self) -> None:
+        """Refuse code of others, in the scenario or in anything that may be drawn.
+
+        Raises:
+            ScenarioError: if any is named; says where, and how to allow it.
+        """
+        plugins.refuse(self.base(), self.scenario)
+        first = self.values(0)
+        for key, drawn in self.drawn.items():
+            for value in drawn.distribution.values if isinstance(drawn.distribution, Choice) else ():
+                try:
+                    scenario = self.scenario_of(first | {key: value}, 0)
+                except ScenarioError:
+                    continue  # such a draw is invalid
+                plugins.refuse(scenario, self.source)
 
     def _with(self, overrides: Mapping[str, Any]) -> Scenario:
         """The scenario with values by dotted key; raises as `draw`."""
@@ -153,6 +172,12 @@ def load_spec(path: Path) -> Spec:
     _known(spec.runs, spec.base().runs, source, "runs")
     _known(spec.claims, tuple(RUN_CLAIMS), source, "claims")
     return spec
+
+
+def _identifier(name: str) -> str:
+    """A campaign's name as the beginning of a scenario's."""
+    plain = re.sub(r"\W", "_", name, flags=re.ASCII)
+    return f"_{plain}" if plain[0].isdigit() else plain
 
 
 def _judged_part(scenario: str) -> dict[str, Any]:
@@ -231,7 +256,7 @@ def _distribution(given: Any, source: str, key: str) -> Key:
 
 def _course(given: Any, source: str) -> Course:
     fields = {field.name: field.default for field in dataclasses.fields(Course)}
-    values = _mapping(given or {}, source, "course", tuple(fields))
+    values = _mapping({} if given is None else given, source, "course", tuple(fields))
     return Course(
         **{name: _course_value(value, fields[name], source, f"course.{name}") for name, value in values.items()}
     )

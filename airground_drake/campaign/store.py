@@ -88,7 +88,8 @@ class Store:
         part = _table([row for rows in self._lately.values() for row in rows])
         buffer = io.BytesIO()
         part.to_parquet(buffer, index=False)
-        number = len(list((self.folder / PARTS).glob("*.parquet")))
+        taken = [int(path.stem.removeprefix("part-")) for path in (self.folder / PARTS).glob("part-[0-9]*.parquet")]
+        number = 1 + max(taken, default=-1)
         files.write_bytes(self.folder / PARTS / f"part-{number:06d}.parquet", buffer.getvalue())
         os.ftruncate(self._journal, 0)
         self._in_parts.append(part)
@@ -131,13 +132,20 @@ def _manifest(folder: Path) -> dict[str, Any] | None:
 
 def _read_parts(folder: Path) -> pd.DataFrame:
     """Rows of all parts, of each index those of the first part that has it."""
-    parts = [pd.read_parquet(path) for path in sorted((folder / PARTS).glob("*.parquet"))]
+    parts = [_read_part(path) for path in sorted((folder / PARTS).glob("*.parquet"))]
     seen: set[int] = set()
     kept = [_table([])]
     for part in parts:
         kept.append(part[~part["index"].isin(seen)])
         seen |= set(part["index"])
     return pd.concat(kept, ignore_index=True)
+
+
+def _read_part(path: Path) -> pd.DataFrame:
+    part = pd.read_parquet(path)
+    if missing := [name for name in COLUMNS if name not in part]:
+        raise FolderError(one_line(f"{path} has no column {missing[0]!r}; allowed: parts as campaigns write them"))
+    return part
 
 
 def _read_journal(path: Path, known: set[int]) -> tuple[dict[int, list[Row]], int]:
@@ -152,6 +160,8 @@ def _read_journal(path: Path, known: set[int]) -> tuple[dict[int, list[Row]], in
         if not line.endswith(b"\n"):
             break
         whole += len(line)
+        if not isinstance(rows, list) or not rows or not all(isinstance(row, dict) and "index" in row for row in rows):
+            raise FolderError(one_line(f"{path} has a line that is no draw: {line.decode(errors='replace')[:80]}"))
         index = rows[0]["index"]
         if index not in known:
             found[index] = rows

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import json
+import math
 import time
 from collections.abc import Collection, Mapping
 from functools import cache, partial
@@ -48,12 +49,21 @@ def rows_at(
     spec: Spec, values: Mapping[str, Any], index: int, limits: Limits, *, allow_plugins: bool = False
 ) -> list[Row]:
     """The same for any values by dotted key, on the course of a draw."""
-    common = blank() | {"index": index, "drawn": json.dumps(dict(values), allow_nan=False)}
+    common = blank() | {"index": index, "drawn": json.dumps(_strict(dict(values)), allow_nan=False)}
     try:
         scenario = spec.scenario_of(values, index)
     except ScenarioError as error:
         return [common | {"ended": INVALID, "what": one_line(str(error))}]
     return rows_of_scenario(spec, scenario, limits, allow_plugins=allow_plugins, common=common)
+
+
+def _strict(value: Any) -> Any:
+    """What is drawn as strict JSON: what is not finite, which no scenario takes, in words."""
+    if isinstance(value, dict):
+        return {name: _strict(each) for name, each in value.items()}
+    if isinstance(value, list):
+        return [_strict(each) for each in value]
+    return str(value) if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def rows_of_scenario(

@@ -24,6 +24,8 @@ _CONFORMS: Json = {"conformance": {"agrees": True, "first_difference": None}}
 _MET: Json = {"met": True, "missed": 0, "first_missed": None}
 _WIRED: Json = {"agrees": True, "differences": 0, "first_difference": None}
 """What the evidence says of running code that conforms."""
+A_POINT: Json = {"point": {"position_m": [0.0, 0.0, 0.0], "radius_m": 0.0, "known_to_uav": True}}
+"""An obstacle of no size."""
 TRIGGER_CONFORMS: Json = {"disagreements": 0, "first": None}
 """What the evidence says of a running trigger that conforms."""
 
@@ -114,9 +116,13 @@ def _recorded_of_dist(claim: Json, scenario: Json) -> Found:
     gain = scenario["control"]["avoidance_gain_1_s"]
     bounds = {kind.name: kind.safe_m - w / kind.share / gain for kind in kinds_of(scenario)}
     agrees("least distances", evidence["least_distances_m"], bounds, within=SMALL)
+    with_a_point = kinds_of(scenario | {"obstacles": A_POINT})  # the experiment has obstacles of its own
+    pairs = {(kind.safe_m, kind.share) for kind in (*kinds_of(scenario), *with_a_point)}
+    pairs.add((float(scenario["safe_distance"]["obstacle_m"]), 1.0))
+    admitted = {safe - w / share / gain: safe for safe, share in pairs}
     for row in evidence["runs"]:
         same("bounds broken by a disturbed run", row["broken"], 0, about=row["scene"])
-        _worst_of_a_disturbed_run(row, {bounds[kind.name]: kind.safe_m for kind in kinds_of(scenario)})
+        _worst_of_a_disturbed_run(row, admitted)
     covered = [row["worst_margin_m"] for row in evidence["runs"] if not row["unmet"]]
     lowest = [row["where"] for row in evidence["runs"] if row["worst_margin_m"] == min(covered)]
     places = [{key: where[key] for key in ("scene", "attack", "robot", "t_s")} for where in lowest]

@@ -15,6 +15,7 @@ from airground_drake.scenarios import plugins
 from airground_drake.scenarios.estimate import DEFAULT_LIMITS, Limits
 from airground_drake.scenarios.shipped import argument
 from airground_drake.side_by_side import processors
+from airground_drake.statuses import UNDECIDED
 from airground_drake.usage import EXIT_TOOL, Parser, positive, refuse, whole
 
 if TYPE_CHECKING:
@@ -91,6 +92,8 @@ def _only(spec: Spec, options: argparse.Namespace) -> int:
     from airground_drake.campaign.work import rows_of
     from airground_drake.scenarios.load import resolved
 
+    if not options.allow_plugins:
+        spec.refuse_plugins()
     scenario = spec.draw(options.only)
     path = options.output or Path(f"{scenario.name}.yaml")
     text = yaml.safe_dump(resolved(scenario), sort_keys=False, allow_unicode=True)
@@ -103,7 +106,9 @@ def _only(spec: Spec, options: argparse.Namespace) -> int:
         margin = "" if math.isnan(row["margin"]) else f" {row['margin']:.6g} {row['unit']}"
         print(f"{row['run']:12} {row['claim'] or row['ended']:12} {row['status'] or row['what']}{margin}")
     print(f"airground report {argument(path)}")
-    return 0 if all(row["as_expected"] for row in rows) else EXIT_REFUTED
+    if any(row["status"] and row["status"] not in UNDECIDED and not row["as_expected"] for row in rows):
+        return EXIT_REFUTED
+    return 0 if all(row["as_expected"] for row in rows) else EXIT_UNDECIDED
 
 
 def _limits(options: argparse.Namespace) -> Limits:
@@ -112,7 +117,7 @@ def _limits(options: argparse.Namespace) -> Limits:
 
 def _code(found: dict[str, Any]) -> int:
     claims = found["claims"]
-    if any(claim["not_as_expected"] and claim["refuted"] for claim in claims):
+    if any(claim["differs"] for claim in claims):
         return EXIT_REFUTED
     open_ = any(claim["undecided"] for claim in claims) or found["ended"].keys() - {"judged", "invalid"}
     return EXIT_UNDECIDED if open_ or not claims else 0
@@ -124,7 +129,10 @@ def _summary(found: dict[str, Any]) -> str:
     for claim in found["claims"]:
         low, high = claim["fixed"]
         bounds = f"probability of a violation {low:.2g} to {high:.2g}" if claim["tested"] else "never put to the test"
-        lines.append(
-            f"  {claim['run']:10} {claim['claim']:12} {claim['refuted']} of {claim['tested']} refuted, {bounds}"
-        )
+        differs = f"; {claim['differs']} not as expected" if claim["differs"] else ""
+        found_ = f"{claim['refuted']} of {claim['tested']} refuted, {bounds}{differs}"
+        lines.append(f"  {claim['run']:10} {claim['claim']:12} {found_}")
+    if found["not_judged"]:
+        first = found["not_judged"][0]
+        lines.append(f"  first that was not judged: draw {first['index']}, {first['ended']}: {first['what']}")
     return "\n".join(lines)

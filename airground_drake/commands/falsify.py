@@ -96,6 +96,8 @@ def _run(spec: Spec, options: argparse.Namespace) -> int:
         raise ScenarioError(spec.source, "draw", Fault("nothing is drawn"), "wanted: keys to search over")
     if options.sampler not in SAMPLERS and is_plugin(options.sampler) and not options.allow_plugins:
         raise ScenarioError("--sampler", "", options.sampler, plugins.WANTED)
+    if not options.allow_plugins:
+        spec.refuse_plugins()
     with plugins.beside(spec.source, allow=options.allow_plugins):
         sampler = SAMPLERS.make(options.sampler, of=Sampler, dimensions=dimensions(spec.drawn), seed=spec.seed)
     path: Path = options.output or Path(f"{spec.name}_{options.sampler.rpartition(':')[2]}.yaml")

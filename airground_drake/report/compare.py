@@ -82,8 +82,13 @@ def _usable(document: Document) -> None:
         raise ValueError(f"its overall status is none of {', '.join(VERDICTS)}")
     for claim in document["claims"]:
         _rank(ORDER, _outcome(claim))
-        if not isinstance(claim["margin"], float | int | None):
-            raise TypeError("a margin is no number")
+        if not isinstance(claim["margin"], float | int | None) or not isinstance(claim["exercised"], int | None):
+            raise TypeError("a margin or a count is no number")
+        if not isinstance(claim["expected"], str | None):
+            raise TypeError("an expectation is no text")
+    for event in (event for run in document["runs"].values() for event in run["events"]):
+        if not (isinstance(event["t_s"], float | int) and math.isfinite(event["t_s"])):
+            raise TypeError("the time of an event is no number")
     for row in document["reproduction"]:
         _rank(ROWS, row["status"])
 

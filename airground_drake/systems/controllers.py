@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from pydrake.common.value import Value
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
-from airground_drake.arrays import Array
+from airground_drake.arrays import Array, read_only
 from airground_drake.intervention.messages import accepted_proposals
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance, limit_speed
@@ -140,7 +140,7 @@ class UavController(LeafSystem):
             positions: of all robots, (n + 1, 3), m.
             ugv_commands: of the UGVs, at the sample before, (n, 3), m/s.
         """
-        task = self._task(positions[:-1], ugv_commands, self._altitude, self._gain)
+        task = self._task(read_only(positions[:-1]), read_only(ugv_commands), self._altitude, self._gain)
         lower = limit_speed(task.velocity(positions[-1:]), self._max_speed)
         spaces = self.avoidance.half_spaces(positions[-1:], self._mobility, self._neighbourhood.around(positions))
         velocity: Array = self.avoidance.apply(lower, spaces)[0]

@@ -13,7 +13,7 @@ import numpy as np
 from airground_drake import files
 from airground_drake.errors import TraceError, described
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.statuses import PASSING, Status, meets
+from airground_drake.statuses import PASSING, STATUSES, Status, meets
 from airground_drake.trace import Trace
 from airground_drake.verify.finding import Finding
 
@@ -213,8 +213,10 @@ def require_count(claim: Claim, finding: Finding) -> None:
     """Check that a claim that says what exercises it has counted that, so that no pass is taken for more than it is.
 
     Raises:
-        ValueError: if it passes without a count, or the count is none.
+        ValueError: if its status is none, if it passes without a count, or the count is none.
     """
+    if finding.status not in STATUSES:
+        raise ValueError(f"{claim.id} found {finding.status!r}; allowed: {', '.join(STATUSES)}")
     count = finding.exercised
     if count is None and claim.exercised_by and finding.status in PASSING:
         raise ValueError(f"{claim.id} passes without a count of {claim.exercised_by}")

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from properties import examples
-from scipy.stats import kstest, norm
+from scipy.stats import kstest, norm, qmc
 
 from airground_drake.campaign.distributions import KINDS, Key, combinations, dimensions, made, values_at, values_of
 
@@ -89,9 +89,17 @@ def test_halton_points_fill_a_box_more_evenly_than_random_ones() -> None:
     assert len({p["x"] for p in points}) == 64
 
 
+def test_a_late_halton_point_is_found_without_those_before() -> None:
+    drawn = {"x": made("halton", [0.0, 1.0]), "y": made("halton", [0.0, 1.0])}
+    points = qmc.Halton(2, rng=np.random.default_rng(3)).fast_forward(1000)
+    assert list(values_of(drawn, 3, 1000).values()) == points.random(1)[0].tolist()
+    assert 0.0 <= values_of(drawn, 3, 10**12)["x"] < 1.0
+
+
 @pytest.mark.parametrize(
     ("kind", "given"),
     [
+        ("log_uniform", [1e-300, 1e300]),
         ("uniform", [1.0]), ("uniform", [2.0, 1.0]), ("uniform", [[1.0], [2.0, 3.0]]), ("uniform", ["a", "b"]),
         ("uniform", 3), ("log_uniform", [0.0, 1.0]), ("normal", [0.0, 0.0]), ("normal", [1.0]), ("integer", [0.5, 2]),
         ("integer", [3, 2]), ("choice", []), ("choice", "abc"), ("grid", {}), ("halton", [0.0, float("nan")]),

@@ -87,6 +87,7 @@ def test_a_course_without_room_is_a_draw_that_cannot_be_made(tmp_path: Path) -> 
         ("scenario: minimal\ndraw: {seed: {unifrom: [0, 1]}}", "did you mean uniform?"),
         ("scenario: minimal\ndraw: {seed: {uniform: [1, 0]}}", "draw.seed.uniform: [1, 0] is not allowed; wanted"),
         ("scenario: minimal\ncourse: {ugvs: 0}", "course.ugvs"),
+        ("scenario: minimal\ncourse: []", "wanted: a mapping"),
         ("scenario: minimal\ncourse: {hidden: 2}", "a share, 0 to 1"),
         ("scenario: minimal\ncourse: {width: 2}", "did you mean width_m?"),
         ("scenario: minimal\nmarks: {arrival: 2}", "did you mean arrival_s?"),

@@ -74,6 +74,38 @@ def test_a_long_journal_becomes_a_part(tmp_path: Path, monkeypatch: pytest.Monke
     assert indices(store) == sorted(2 * list(range(7)))
 
 
+def test_a_part_that_was_removed_is_made_again_and_takes_no_others_place(tmp_path: Path) -> None:
+    for index in range(3):
+        store = Store(tmp_path / "c", MANIFEST, resume=index > 0)
+        store.add(draw(index))
+        store.close()
+    (tmp_path / "c" / "parts" / "part-000000.parquet").unlink()
+    store = Store(tmp_path / "c", MANIFEST, resume=True)
+    assert store.finished == {1, 2}
+    store.add(draw(0))
+    store.close()
+    assert sorted({*read(tmp_path / "c")[1]["index"]}) == [0, 1, 2]
+
+
+@pytest.mark.parametrize("line", ["[]", "{}", "5", "null", '[{"run": "d"}]'])
+def test_a_journal_of_something_else_is_refused(line: str, tmp_path: Path) -> None:
+    Store(tmp_path / "c", MANIFEST, resume=False).close()
+    (tmp_path / "c" / JOURNAL).write_text(f"{line}\n")
+    with pytest.raises(FolderError, match="a line that is no draw"):
+        Store(tmp_path / "c", MANIFEST, resume=True)
+
+
+@pytest.mark.parametrize("column", ["index", "margin"])
+def test_a_part_without_a_column_is_refused(column: str, tmp_path: Path) -> None:
+    store = Store(tmp_path / "c", MANIFEST, resume=False)
+    store.add(draw(0))
+    store.close()
+    part = tmp_path / "c" / "parts" / "part-000000.parquet"
+    pd.read_parquet(part).drop(columns=column).to_parquet(part)
+    with pytest.raises(FolderError, match=f"no column '{column}'"):
+        Store(tmp_path / "c", MANIFEST, resume=True)
+
+
 def test_a_folder_of_something_else_or_of_another_campaign_is_refused(tmp_path: Path) -> None:
     (tmp_path / "photos").mkdir()
     (tmp_path / "photos" / "me.png").write_bytes(b"")

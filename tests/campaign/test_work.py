@@ -51,6 +51,14 @@ def test_a_draw_that_makes_no_scenario_is_counted_as_such(spec: Spec) -> None:
     assert row["ended"] == INVALID
 
 
+def test_numbers_that_are_none_and_runs_that_are_not_there_make_no_scenario_either(spec: Spec) -> None:
+    (row,) = work.rows_at(spec, {"decision.noise_m_sqrt_s": float("nan")}, 5, DEFAULT_LIMITS)
+    assert (row["ended"], row["drawn"]) == (INVALID, '{"decision.noise_m_sqrt_s": "nan"}')
+    without = replace(spec, runs=("d",))
+    (row,) = work.rows_at(without, {"runs": {"b": {"method": "b"}}}, 5, DEFAULT_LIMITS)
+    assert (row["ended"], "runs: 'd' is not allowed" in row["what"]) == (INVALID, True)
+
+
 def test_code_of_others_is_not_imported(spec: Spec) -> None:
     own = replace(spec, fixed={"intervention.policies": [{"name": "no_such_module:Policy"}]})
     (row,) = work.rows_of(own, 0, DEFAULT_LIMITS)

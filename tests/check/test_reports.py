@@ -31,6 +31,7 @@ GATED = ("runs={c: {method: c}, d: {method: d}}", "reproduction=[]")
     [
         (["gatekeeper.switching_margin=0", "gatekeeper.min_dwell_s=0.3", *GATED], {"reversed", "dwell", "not_cheaper"}),
         (["ugvs.ugv1.preset.speed_m_s=0.2", "ugvs.ugv2.preset.speed_m_s=0.2"], set()),  # nothing triggers
+        (["obstacles={}", "choices=[]", *GATED], set()),  # those of SAFE-DIST's experiment are its own
         (["gatekeeper.period_s=30", *GATED], set()),  # a proposal, and the run ends before a decision is due
         (["decision.trigger=bare", "duration_s=11.01"], {"not_cheaper"}),  # ZENO-PROOF is refuted by a run
     ],
@@ -46,7 +47,9 @@ def test_reports_of_changed_scenarios_agree(
     assert check.main([str(tmp_path / "r")]) == 0, capsys.readouterr().out
 
 
-def _with_a_claim_of_others(report: Path, folder: Path, expected: str, *, declared: dict[str, str]) -> None:
+def _with_a_claim_of_others(
+    report: Path, folder: Path, expected: str, *, declared: dict[str, str], shown: dict[str, str] | None = None
+) -> None:
     """Put a claim that the scenario adds into a copy of a report, about run d and about the model."""
     copy(report, folder)
     with edited_scenarios(folder) as scenarios:
@@ -58,7 +61,7 @@ def _with_a_claim_of_others(report: Path, folder: Path, expected: str, *, declar
         for run in ("d", ""):
             entry = dict(claim_of(document, "ZENO-TRACE" if run else "SAFE-LEMMA", run))
             document["claims"].append(entry | {"id": "MINE", "status": expected, "expected": expected, "evidence": {}})
-            document["claims"][-1]["counterexample"] = {"what": "shown"} if expected == "refuted" else None
+            document["claims"][-1]["counterexample"] = shown if expected == "refuted" else None
             document["claims"][-1]["exercised"] = 1
         count = document["overall"]["counts"]
         count[expected] = count.get(expected, 0) + 2
@@ -67,11 +70,17 @@ def _with_a_claim_of_others(report: Path, folder: Path, expected: str, *, declar
     mend(folder)
 
 
+@pytest.mark.parametrize("shown", [{"what": "shown"}, None])
 @pytest.mark.parametrize(("expected", "declared"), [("holds", {}), ("refuted", {"MINE": "refuted"})])
 def test_claims_of_others_are_known_but_not_established(
-    expected: str, declared: dict[str, str], report: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    expected: str,
+    declared: dict[str, str],
+    shown: dict[str, str] | None,
+    report: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    _with_a_claim_of_others(report, tmp_path / "r", expected, declared=declared)
+    _with_a_claim_of_others(report, tmp_path / "r", expected, declared=declared, shown=shown)
     assert check.main(["--json", str(tmp_path / "r")]) == 1
     checks = json.loads(capsys.readouterr().out)["checks"]
     left = [(one["claim"], one["run"], one["outcome"]) for one in checks if one["outcome"] != "agrees"]

@@ -91,6 +91,42 @@ def test_what_cannot_be_written(
     assert said.count("\n") == 1
 
 
+@pytest.mark.parametrize(
+    ("changes", "code", "says"),
+    [
+        ("runs: {a: {method: a, expected: {SAFE-TRACE: refuted}}}", 1, "2 not as expected"),
+        ("runs: {a: {method: a, expected: {THR-TRIG: exercised}}}", 1, "2 not as expected"),
+        ("duration_s: -1", 3, "first that was not judged: draw 0, invalid: "),
+    ],
+)
+def test_what_is_not_as_expected_is_exit_code_1(
+    changes: str, code: int, says: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "2024-my.team.yaml"  # no identifier, as names of scenarios are
+    set_ = f"set: {{duration_s: 1.0, {changes}}}" if code == 1 else "set: {}"
+    drawn = "draw:\n  duration_s: {grid: [-1.0, -2.0]}\n" if code != 1 else "draw:\n  seed: {grid: [1, 2]}\n"
+    path.write_text(f"scenario: minimal\nclaims: [SAFE-TRACE, THR-TRIG]\n{set_}\n{drawn}", encoding="utf-8")
+    assert main([str(path), "-o", str(tmp_path / "out"), "--jobs", "1"]) == code
+    assert says in capsys.readouterr().out
+    assert main([str(path), "-o", str(tmp_path / "one.yaml"), "--only", "0"]) == (1 if code == 1 else 2)
+
+
+@pytest.mark.parametrize(
+    "given",
+    ["set: {uav.task: 'mine:Task'}", "draw:\n  intervention.policies: {choice: [[], [{name: 'mine:Mine'}]]}"],
+)
+def test_code_of_others_is_refused_before_anything_is_drawn(
+    given: str, spec: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    spec.write_text(f"scenario: minimal\n{given}\n", encoding="utf-8")
+    for arguments in (["-n", "2", "-o", str(tmp_path / "out")], ["--only", "0", "-o", str(tmp_path / "one.yaml")]):
+        assert main([str(spec), *arguments]) == 2
+        error = capsys.readouterr().err
+        assert "--allow-plugins" in error
+        assert "mine:" in error
+    assert not (tmp_path / "out").exists()
+
+
 def test_a_rule_that_is_none(spec: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main([str(spec), "--stop-when", "x"]) == 2
     assert "wanted: CLAIM < PROBABILITY" in capsys.readouterr().err

@@ -81,8 +81,11 @@ def test_checkers_that_fail_are_errors() -> None:
     def crash(trace: Trace) -> Finding:
         raise ZeroDivisionError("division")
 
+    def unknown(trace: Trace) -> Finding:
+        return Finding("ok", margin=1.0, exercised=1)  # type: ignore[arg-type]
+
     claim = Failing()
-    for behaviour in (crash, lambda trace: Finding("holds", margin=float("nan")), lambda trace: None):
+    for behaviour in (crash, lambda trace: Finding("holds", margin=float("nan")), unknown, lambda trace: None):
         claim.finding = behaviour
         assert claim.judge(run_of("d")).status == "error"
     assert TraceClaim.applies(claim, run_of("a"))
