@@ -40,7 +40,10 @@ class Stopping:
             UnknownNameError: if there is no such claim about runs.
         """
         found = _RULE.fullmatch(text)
-        value = float(found["value"]) if found else 0.0
+        try:
+            value = float(found["value"]) if found else 0.0
+        except ValueError:
+            value = 0.0
         if found is None or not 0.0 < value < 1.0:
             raise ValueError(f"{text!r} is not allowed; wanted: CLAIM < PROBABILITY or CLAIM > PROBABILITY")
         if found["claim"] not in RUN_CLAIMS:

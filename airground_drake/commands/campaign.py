@@ -53,7 +53,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         Exit code: 0 every claim as expected in every draw, 1 one differs, 2 usage, bad spec or folder, 3 something
         was undecided or a draw could not be judged, 4 tool error.
     """
-    options = parser().parse_args(arguments)
+    of_command = parser()
+    options = of_command.parse_args(arguments)
+    if options.only is not None and (options.resume or options.stop_when or options.number is not None):
+        of_command.error("--only is one draw alone: -n, --resume and --stop-when do not go with it")
     from airground_drake.campaign.spec import load_spec
 
     try:

@@ -71,7 +71,17 @@ def test_a_file_that_is_something_else_is_not_replaced_by_a_draw(
 
 
 @pytest.mark.parametrize(
-    "arguments", ["-n 0", "--only x", "--only -1", "-n 2 --jobs -1", "--limit-steps nan", "--limit-steps 0"]
+    "arguments",
+    [
+        "-n 0",
+        "--only x",
+        "--only -1",
+        "-n 2 --jobs -1",
+        "--limit-steps nan",
+        "--limit-steps 0",
+        "--only 2 --resume",
+        "--only 2 -n 3",
+    ],
 )
 def test_usage(spec: Path, arguments: str) -> None:
     with pytest.raises(SystemExit) as end:
@@ -127,8 +137,9 @@ def test_code_of_others_is_refused_before_anything_is_drawn(
     assert not (tmp_path / "out").exists()
 
 
-def test_a_rule_that_is_none(spec: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main([str(spec), "--stop-when", "x"]) == 2
+@pytest.mark.parametrize("rule", ["x", "SAFE-TRACE < e", "SAFE-TRACE < 2"])
+def test_a_rule_that_is_none(rule: str, spec: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([str(spec), "--stop-when", rule]) == 2
     assert "wanted: CLAIM < PROBABILITY" in capsys.readouterr().err
 
 
