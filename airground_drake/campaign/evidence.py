@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
+from pandas.api.types import is_numeric_dtype
 from scipy.stats import chi2_contingency, qmc
 
 from airground_drake.arrays import Array
@@ -21,6 +22,8 @@ WORST = 5
 """Runs of least margin that are listed for each claim."""
 BINS = 4
 """Of a key, in maps of where a claim fails: quarters of its draws."""
+MOST_VALUES = 12
+"""Different texts of a key, such as lists of policies, in such maps."""
 MOST_POINTS = 1000
 """Draws that the discrepancy is computed from: its cost grows with their square."""
 QUANTILES = (0.0, 0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 1.0)
@@ -174,8 +177,10 @@ def _by_chance(table: Array) -> float:
 
 
 def _parts(values: pd.Series) -> pd.Series | None:
-    """The quarter, or the value, that each draw of a key is in, as text; None if they are all in one."""
-    if values.dtype == object or values.nunique() <= BINS:
+    """The quarter, or the value, that each draw of a key is in, as text; None if all are in one, or texts too many."""
+    if not is_numeric_dtype(values) and values.nunique() > MOST_VALUES:
+        return None
+    if not is_numeric_dtype(values) or values.nunique() <= BINS:
         found = values.astype(str)
     else:
         found = (

@@ -69,6 +69,20 @@ def test_reports_and_stopping_rules_agree_on_what_was_tested(status: str, exerci
     assert claim["tested"] == 3 * tested
 
 
+def test_values_that_are_no_numbers_can_be_where_a_claim_fails_unless_there_are_too_many() -> None:
+    """Also under the pandas whose text is no object: lists of policies are drawn as such."""
+    rng = np.random.default_rng(0)
+    policies = [[], [{"name": "hostile"}], [{"name": "towards"}], [{"name": "noisy"}], None, True]
+    rows = []
+    for i in range(400):
+        drawn = {"policies": policies[i % 6], "gain": rng.random(), "label": f"draw {i}"}
+        rows.append(row(i, "refuted" if i % 6 == 1 else "holds", drawn=json.dumps(drawn)))
+    (claim,) = conclude(rows)["claims"]
+    assert sorted(claim["fails_where"]["keys"]) == ["gain", "policies"]
+    bad = [cell for cell in claim["fails_where"]["cells"] if cell["refuted"]]
+    assert {cell["where"]["policies"] for cell in bad} == {'[{"name": "hostile"}]'}
+
+
 def test_it_finds_the_keys_by_which_a_claim_fails() -> None:
     rng = np.random.default_rng(0)
     rows = []
