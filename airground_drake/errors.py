@@ -76,7 +76,7 @@ class UnknownNameError(AirgroundError):
 
 
 class PluginError(AirgroundError):
-    """A class named in a scenario that cannot be imported, is of another kind, or does not take its parameters."""
+    """A class named in a scenario that cannot be imported, is of another kind, or does not do what its kind does."""
 
 
 class PolicyError(AirgroundError):

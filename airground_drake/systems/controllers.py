@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+import numpy as np
 from pydrake.common.value import Value
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
 from airground_drake.arrays import Array, read_only
+from airground_drake.errors import PluginError, short
 from airground_drake.intervention.messages import accepted_proposals
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance, limit_speed
@@ -111,7 +113,7 @@ class UavController(LeafSystem):
             gain: of the task, 1/s.
             altitude: m.
             task: made at each sample from positions (n, 3), m, and velocities (n, 3), m/s, of the UGVs, altitude and
-                gain; its velocity for one robot is wanted.
+                gain; asked for the velocity of one robot, (1, 3), m/s.
         """
         super().__init__()
         n = len(team.ugvs)
@@ -139,9 +141,20 @@ class UavController(LeafSystem):
         Args:
             positions: of all robots, (n + 1, 3), m.
             ugv_commands: of the UGVs, at the sample before, (n, 3), m/s.
+
+        Raises:
+            PluginError: if the task asks for what is no velocity.
         """
         task = self._task(read_only(positions[:-1]), read_only(ugv_commands), self._altitude, self._gain)
-        lower = limit_speed(task.velocity(positions[-1:]), self._max_speed)
+        lower = limit_speed(_velocity_of(task, positions[-1:]), self._max_speed)
         spaces = self.avoidance.half_spaces(positions[-1:], self._mobility, self._neighbourhood.around(positions))
         velocity: Array = self.avoidance.apply(lower, spaces)[0]
         return velocity
+
+
+def _velocity_of(task: Task, position: Array) -> Array:
+    asked = np.asarray(task.velocity(position))
+    if asked.shape != position.shape or asked.dtype.kind not in "fiu" or not np.isfinite(asked).all():
+        given, wanted = short(repr(asked.tolist())), f"wanted: {position.shape} finite numbers, m/s"
+        raise PluginError(f"the UAV's task {type(task).__name__} asks for {given} as velocity; {wanted}")
+    return asked.astype(np.float64, copy=False)

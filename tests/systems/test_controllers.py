@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from airground_drake.arrays import Array
 from airground_drake.components import make_avoidance, make_team
+from airground_drake.errors import PluginError
 from airground_drake.nsbc.tasks import FormationTask
 from airground_drake.scenarios.load import load
 from airground_drake.systems.controllers import UavController
@@ -29,3 +32,19 @@ def test_a_task_cannot_change_where_the_controller_thinks_that_ugvs_are() -> Non
     own, plain = (controller.velocity(positions, np.zeros((2, 3))) for controller in controllers)
     assert own.tolist() == plain.tolist()
     assert positions[0].tolist() == [0.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    "asked", [np.full((1, 3), np.nan), [[0.0, np.inf, 0.0]], np.zeros((2, 3)), [0.0] * 3, "up", None]
+)
+def test_a_task_that_asks_for_no_velocity_is_named(asked: Any) -> None:
+    class Odd(FormationTask):
+        def velocity(self, position: Array) -> Any:
+            return asked
+
+    case_a = load("case_a")[0]
+    controller = UavController(make_team(case_a), make_avoidance(case_a), gain=1.0, altitude=2.0, task=Odd)
+    with pytest.raises(
+        PluginError, match=r"^the UAV's task Odd asks for .* as velocity; wanted: \(1, 3\) finite numbers"
+    ):
+        controller.velocity(np.zeros((3, 3)), np.zeros((2, 3)))
