@@ -15,6 +15,7 @@ import numpy as np
 from airground_drake.campaign.rows import DIED, INVALID, JUDGED, STOPPED, Row, blank
 from airground_drake.campaign.spec import Spec
 from airground_drake.errors import AirgroundError, ScenarioError, described, one_line
+from airground_drake.intervention.guard import time_limit
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.estimate import Limits, within
 from airground_drake.scenarios.schema import Scenario
@@ -23,13 +24,17 @@ from airground_drake.trace import Trace
 from airground_drake.verify import Verdict, verify
 
 
+class DrawOutOfTime(BaseException):
+    """A draw took longer than it may; neither an Exception nor an OutOfTime, which count as faults of policies."""
+
+
 def rows_of(spec: Spec, index: int, limits: Limits, *, allow_plugins: bool = False) -> list[Row]:
     """Simulate and judge one draw.
 
     Args:
         spec: of the campaign.
         index: of the draw.
-        limits: what its scenario may ask for; one that asks for more is `invalid`.
+        limits: what its scenario may ask for; one that asks for more is `invalid`, one that takes longer `stopped`.
         allow_plugins: whether code of others may be imported and run.
 
     Returns:
@@ -73,10 +78,16 @@ def rows_of_scenario(
     common = blank() if common is None else common
     try:
         within(scenario, limits)
-        with plugins.admitted(scenario, spec.scenario, allow=allow_plugins):
+        with (
+            plugins.admitted(scenario, spec.scenario, allow=allow_plugins),
+            plugins.beside(spec.source, allow=allow_plugins),
+            time_limit(limits.time, DrawOutOfTime),
+        ):
             return [row for run in scenario.runs for row in _rows_of_run(scenario, run, spec.claims, common)]
     except AirgroundError as error:
         return [common | {"ended": INVALID, "what": one_line(str(error))}]
+    except DrawOutOfTime as error:
+        return [common | {"ended": STOPPED, "what": str(error)}]
     finally:
         _keep_what_is_loaded()
         gc.collect()  # Python does not see how large a diagram is, and would wait for hundreds

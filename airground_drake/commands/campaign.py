@@ -41,6 +41,7 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster, such as tcp://host:8786")
     parser.add_argument("--stop-when", metavar="RULE", help="such as 'SAFE-TRACE < 1e-3': the anytime-valid bound")
     parser.add_argument("--limit-steps", type=positive, default=DEFAULT_LIMITS.work, metavar="N", help="of one draw")
+    parser.add_argument("--limit-time", type=positive, default=DEFAULT_LIMITS.time, metavar="S", help="of one draw")
     parser.add_argument("-q", "--quiet", action="store_true", help="no progress")
     parser.add_argument(plugins.OPTION, action="store_true", help=plugins.HELP)
     return parser
@@ -115,7 +116,7 @@ def _only(spec: Spec, options: argparse.Namespace) -> int:
 
 
 def _limits(options: argparse.Namespace) -> Limits:
-    return Limits(options.limit_steps, DEFAULT_LIMITS.memory)
+    return Limits(options.limit_steps, DEFAULT_LIMITS.memory, options.limit_time)
 
 
 def _code(found: dict[str, Any]) -> int:

@@ -1,12 +1,16 @@
-"""A time limit for policies in the process of the simulation; `process.py` has those of others."""
+"""A time limit for code in this process; `process.py` has policies in processes of their own."""
 
 from __future__ import annotations
 
 import signal
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
+
+_AT_ONCE_S = 1e-6
+"""The least that a timer is set to; 0 would turn it off."""
 
 
 class OutOfTime(BaseException):
@@ -14,23 +18,27 @@ class OutOfTime(BaseException):
 
 
 @contextmanager
-def time_limit(seconds: float) -> Iterator[None]:
-    """Raise OutOfTime in the body after so many seconds of wall-clock time.
+def time_limit(seconds: float, error: type[BaseException] = OutOfTime) -> Iterator[None]:
+    """Raise an error in the body after so many seconds of wall-clock time.
 
     By an interval timer: it works in the main thread of a process, on systems that have such timers (a body
     that never returns to the Python interpreter is interrupted only when it does). Elsewhere there is no limit.
+    A limit within another is cut to what that leaves, which then raises its own error as soon as the inner has ended.
     """
     if threading.current_thread() is not threading.main_thread() or not hasattr(signal, "setitimer"):
         yield
         return
 
     def interrupt(number: int, frame: FrameType | None) -> None:
-        raise OutOfTime(f"not done after {seconds:g} s")
+        raise error(f"not done after {seconds:g} s")
 
+    outer, started = signal.getitimer(signal.ITIMER_REAL)[0], time.monotonic()
     before = signal.signal(signal.SIGALRM, interrupt)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
+    signal.setitimer(signal.ITIMER_REAL, min(seconds, outer) if outer else seconds)
     try:
         yield
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, before)
+        if outer:
+            signal.setitimer(signal.ITIMER_REAL, max(outer - (time.monotonic() - started), _AT_ONCE_S))

@@ -45,10 +45,12 @@ class Limits(NamedTuple):
     Attributes:
         work: steps.
         memory: bytes.
+        time: by the clock, s, for a draw of a campaign, whatever was estimated: code of others may never end.
     """
 
     work: float = 1e7
     memory: float = 8.0 * GIB
+    time: float = 3600.0
 
 
 DEFAULT_LIMITS = Limits()

@@ -6,6 +6,7 @@ import json
 import math
 from dataclasses import replace
 from pathlib import Path
+from textwrap import dedent
 
 import pytest
 
@@ -73,3 +74,25 @@ def test_a_run_that_stops_is_a_row(spec: Spec, monkeypatch: pytest.MonkeyPatch) 
     rows = work.rows_of(spec, 5, DEFAULT_LIMITS)
     assert [row["ended"] for row in rows] == [STOPPED] * len(spec.draw(5).runs)
     assert "t0 < ti" in rows[0]["what"]
+
+
+SLOW = """
+    class Route:
+        def solve(self, problem, budget):
+            while True:
+                pass
+"""
+
+
+def test_a_draw_that_never_ends_is_stopped(spec: Spec, tmp_path: Path) -> None:
+    """By code of others that is found beside the spec."""
+    (tmp_path / "slow.py").write_text(dedent(SLOW), encoding="utf-8")
+    changes = {
+        "gatekeeper.route": "slow.py:Route",
+        "runs": {"c": {"method": "c"}},
+        "decision.threshold.zeta_m": 0.5,
+        "decision.release_m": 0.2,
+    }
+    hangs = replace(spec, fixed=changes)
+    (row,) = work.rows_of(hangs, 0, Limits(time=1.0), allow_plugins=True)
+    assert (row["ended"], row["what"]) == (STOPPED, "not done after 1 s")

@@ -79,6 +79,7 @@ def test_a_file_that_is_something_else_is_not_replaced_by_a_draw(
         "-n 2 --jobs -1",
         "--limit-steps nan",
         "--limit-steps 0",
+        "--limit-time 0",
         "--only 2 --resume",
         "--only 2 -n 3",
     ],
