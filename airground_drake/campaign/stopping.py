@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Collection
 from dataclasses import dataclass
 
 from airground_drake.campaign.rows import Row, is_tested
@@ -32,12 +33,16 @@ class Stopping:
         self._counts: dict[str, list[int]] = {}
 
     @classmethod
-    def parse(cls, text: str) -> Stopping:
+    def parse(cls, text: str, claims: Collection[str] = ()) -> Stopping:
         """A rule from its text.
+
+        Args:
+            text: such as 'SAFE-TRACE < 1e-4'.
+            claims: identifiers of those that are judged; empty: all about runs.
 
         Raises:
             ValueError: if it is none.
-            UnknownNameError: if there is no such claim about runs.
+            UnknownNameError: if no such claim is judged.
         """
         found = _RULE.fullmatch(text)
         try:
@@ -46,8 +51,8 @@ class Stopping:
             value = 0.0
         if found is None or not 0.0 < value < 1.0:
             raise ValueError(f"{text!r} is not allowed; wanted: CLAIM < PROBABILITY or CLAIM > PROBABILITY")
-        if found["claim"] not in RUN_CLAIMS:
-            raise UnknownNameError("claim about runs", found["claim"], RUN_CLAIMS)
+        if found["claim"] not in (judged := claims or tuple(RUN_CLAIMS)):
+            raise UnknownNameError("claim that is judged", found["claim"], judged)
         return cls(found["claim"], found["sign"] == "<", value)
 
     def met(self, rows: list[Row]) -> bool:

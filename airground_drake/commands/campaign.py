@@ -74,7 +74,7 @@ def _all(spec: Spec, options: argparse.Namespace) -> int:
     from airground_drake.campaign.conduct import conduct
     from airground_drake.campaign.stopping import Stopping
 
-    stopping = Stopping.parse(options.stop_when) if options.stop_when else None
+    stopping = Stopping.parse(options.stop_when, spec.claims) if options.stop_when else None
     folder = options.output or Path("campaigns") / spec.name
     jobs = options.jobs or processors()
     with (

@@ -147,3 +147,5 @@ def test_rules_that_are_none() -> None:
             Stopping.parse(text)
     with pytest.raises(UnknownNameError):
         Stopping.parse("SAFE-INV < 0.1")
+    with pytest.raises(UnknownNameError, match=r"allowed: SAFE-TRACE$"):
+        Stopping.parse("COMM < 0.1", ["SAFE-TRACE"])
