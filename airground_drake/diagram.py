@@ -52,7 +52,7 @@ class Model:
         team: names, safe distances, speed limits.
         zeta: decision threshold in force, m.
         planner: the UAV's planner.
-        gatekeeper: the optimising gatekeeper (methods (c), (d)), else None.
+        gatekeeper: of methods (c) and (d), else None.
     """
 
     diagram: Diagram
@@ -75,15 +75,15 @@ def build_diagram(
     Args:
         scenario: from a file or made in Python.
         method: default: that of the scenario's last run.
-        composition: of the UGVs' avoidance tasks; default: 'augmented', without a method that of the last run.
+        composition: of the UGVs' avoidance tasks; default: 'augmented', or without `method` that of the last run.
         plants: makes the plant of each robot. The claims are about the default, `first_order_plant`.
         monitor: watches the diagram while it runs; see `make_monitor`.
 
     Returns:
         A Diagram whose default context has every robot at its start; to be simulated, a context needs an accuracy:
-        `context.SetAccuracy(1e-6)`. Outputs: RECORDED. Inputs:
-        `disturbance_<robot>` (3), m/s, added to the robot's velocity; 0 where not connected. With a monitor, its
-        output `violation`, too.
+        `context.SetAccuracy(1e-6)`. Outputs: RECORDED. Inputs: `disturbance_<robot>` (3), m/s, added to the robot's
+        velocity; 0 where not connected. With a monitor, its output `violation`, too. The scenario's seed has no part
+        in it: the noise is that of `diagram.SetRandomContext(context, RandomGenerator(seed))`.
 
     Raises:
         ScenarioError: if the scenario is not valid.

@@ -28,8 +28,6 @@ from airground_drake.campaign.work import rows_of
 from airground_drake.scenarios.estimate import DEFAULT_LIMITS
 
 SPEC = Path(__file__).parent / "campaigns" / "case_a.yaml"
-SHORT_S = 2.0
-"""Duration of a run where memory is measured, s."""
 
 
 def worked(spec: Spec, index: int) -> tuple[int, float]:
@@ -80,9 +78,9 @@ def rates(spec: Spec, number: int, jobs: list[int], pools: list[str]) -> list[di
     return found
 
 
-def grown(spec: Spec, number: int) -> list[dict[str, float]]:
+def grown(spec: Spec, number: int, duration_s: float) -> list[dict[str, float]]:
     """Resident memory of this process, MB, after so many short runs, and what it has grown by since the tenth."""
-    short, marks = replace(spec, fixed={**spec.fixed, "duration_s": SHORT_S}), []
+    short, marks = replace(spec, fixed={**spec.fixed, "duration_s": duration_s}), []
     runs, next_mark = 0, 10
     for index in range(number):
         runs += worked(short, index)[0]
@@ -103,13 +101,14 @@ def main() -> None:
     parser.add_argument("-n", "--number", type=int, default=40, help="draws (default: %(default)s; 0: no rates)")
     parser.add_argument("--jobs", type=int, nargs="*", default=[1, 2], help="processes (default: 1 2)")
     parser.add_argument("--pools", nargs="*", choices=POOLS, default=list(POOLS), help="besides this process")
-    parser.add_argument("--memory", type=int, default=0, metavar="RUNS")
+    parser.add_argument("--memory", type=int, default=0, metavar="RUNS", help="short runs in this process")
+    parser.add_argument("--short", type=float, default=2.0, metavar="S", help="their duration (default: %(default)s)")
     parser.add_argument("--json", type=Path, metavar="FILE")
     options = parser.parse_args()
     spec = load_spec(options.spec)
     found = {
         "rates": rates(spec, options.number, options.jobs, options.pools) if options.number else [],
-        "memory": grown(spec, options.memory),
+        "memory": grown(spec, options.memory, options.short),
     }
     if found["rates"]:
         print("\n" + pd.DataFrame(found["rates"]).to_string(index=False, float_format="%.3g"))

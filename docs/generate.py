@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import argparse
 import ast
+import html
 import inspect
 import json
 import re
 import textwrap
 from collections import defaultdict
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import airground_drake
 from airground_drake import files
+from airground_drake.commands import COMMANDS
 from airground_drake.registry import (
     METHODS,
     MODEL_CLAIMS,
@@ -88,6 +92,7 @@ def pages() -> dict[str, str]:
         "equations.md": equations(),
         "claims.md": claims(),
         "names.md": names(),
+        "commands.md": commands(),
         "scenario.md": scenario(),
         "extending.md": extending(),
         "../airground_drake/scenarios/scenario.schema.json": json_schema.text(installed=False),
@@ -184,6 +189,42 @@ def claims() -> str:
         if broken:
             lines += ["*Broken variants that it refutes:* " + "; ".join(broken) + ".", ""]
     return _page("Claims", "What each claim says of itself, as in every report.", lines)
+
+
+def commands() -> str:
+    """What every command takes."""
+    lines = []
+    for name, command in COMMANDS.items():
+        parser = import_module(command.module).parser()
+        lines += [f"## {name}", "", f"`{parser.prog}`: {parser.description}", ""]
+        for action in parser._actions:  # argparse gives them in no other way, but as text as wide as the terminal
+            if not isinstance(action, argparse._HelpAction):
+                lines.append(f"- {_argument(action)}: {html.escape((action.help or '') % vars(action), quote=False)}.")
+        said = (parser.epilog or "").splitlines()
+        if len(said) == 1:
+            said = [f"{said[0][:1].upper()}{said[0][1:].removesuffix('.')}."]
+        else:
+            said = ["Its help goes on:", "", *(f"    {line}" for line in said)] if said else []
+        lines += ["", *said, ""] if said else [""]
+    return _page(
+        "Commands",
+        "`airground COMMAND --help` says the same. `report`, `verify` and `check` are `python -m "
+        "airground_drake.report`, `.verify` and `.check`, too. Exit codes are, of every command: 0 done; 2 usage, or a "
+        "file or folder that cannot be used, with one line on standard error; 4 a fault of the tool, or of code of "
+        "others that it runs; 130 and 143 interrupted by SIGINT and SIGTERM; 141 whoever read the output has gone. "
+        "Other codes are a command's own.",
+        lines,
+    )
+
+
+def _argument(action: argparse.Action) -> str:
+    """An argument or option as it is written."""
+    choices = "{" + ",".join(map(str, action.choices)) + "}" if action.choices else ""
+    value = action.metavar or choices or (action.dest.upper() if action.option_strings else action.dest)
+    if not action.option_strings:
+        return f"`{value}`"
+    takes = f" {value}" if action.nargs != 0 else ""
+    return ", ".join(f"`{option}{takes}`" for option in action.option_strings)
 
 
 def names() -> str:

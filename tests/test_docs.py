@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from airground_drake.campaign.spec import load_spec
 from airground_drake.commands.falsify import main as falsify
 from airground_drake.report.__main__ import main
 from airground_drake.scenarios.load import load
@@ -78,7 +79,7 @@ def test_the_tutorial_from_an_empty_folder(tmp_path: Path) -> None:
     )
     assert done.returncode == 0, done.stdout + done.stderr
     assert "2 passed" in done.stdout
-    events = json.loads((tmp_path / "third" / "report.json").read_text())["runs"]["d"]["events"]
+    events = json.loads((tmp_path / "second" / "report.json").read_text())["runs"]["d"]["events"]
     assert [event["kind"] for event in events if event["robot"] == "ugv1"][-1] == "arrival"
     (sent,) = {event["policy"] for event in events if event["kind"] == "proposal"}
     assert sent == "left:Left"
@@ -110,3 +111,10 @@ def test_a_sampler_of_ones_own_looks_for_violations(tmp_path: Path, capsys: pyte
     command = [str(EXAMPLES / "pushed.yaml"), "--sampler", "my_robots/climb.py:Climb", "--allow-plugins"]
     assert falsify([*command, "-n", "6", "--jobs", "1", "-o", str(tmp_path / "worst.yaml")]) == 0
     assert "6 tried by my_robots/climb.py:Climb" in capsys.readouterr().out
+
+
+def test_the_spec_that_is_shown_makes_draws(tmp_path: Path) -> None:
+    (text,) = blocks(ROOT / "docs" / "campaigns.md", "yaml")
+    (tmp_path / "speeds.yaml").write_text(text, encoding="utf-8")
+    spec = load_spec(tmp_path / "speeds.yaml")
+    assert spec.draw(3).ugvs["ugv1"].preset.speed_m_s == spec.values(3)["ugvs.ugv1.preset.speed_m_s"]

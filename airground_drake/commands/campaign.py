@@ -33,15 +33,28 @@ def parser() -> argparse.ArgumentParser:
         "3 undecided, 4 tool error, 130 and 143 interrupted; what is finished is kept: --resume goes on with it",
     )
     parser.add_argument("spec", type=Path, help="YAML file: a scenario, and distributions over its keys")
-    parser.add_argument("-n", "--number", type=whole(1), metavar="N", help="draws (default: all combinations of grids)")
-    parser.add_argument("-o", "--output", type=Path, metavar="DIR", help="default: campaigns/<name>; new, or --resume")
+    parser.add_argument(
+        "-n", "--number", type=whole(1), metavar="N", help="draws (default: one, or all combinations of grids)"
+    )
+    parser.add_argument(
+        "-o", "--output", type=Path, metavar="DIR",
+        help="default: campaigns/<name>; new, or --resume; with --only, the file of the scenario",
+    )  # fmt: skip
     parser.add_argument("--resume", action="store_true", help="go on with what the folder has")
     parser.add_argument("--only", type=whole(0), metavar="INDEX", help="this draw alone; its scenario is written")
     parser.add_argument("--jobs", type=whole(1), metavar="N", help="processes (default: one for each processor)")
     parser.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster, such as tcp://host:8786")
-    parser.add_argument("--stop-when", metavar="RULE", help="such as 'SAFE-TRACE < 1e-3': the anytime-valid bound")
-    parser.add_argument("--limit-steps", type=positive, default=DEFAULT_LIMITS.work, metavar="N", help="of one draw")
-    parser.add_argument("--limit-time", type=positive, default=DEFAULT_LIMITS.time, metavar="S", help="of one draw")
+    parser.add_argument(
+        "--stop-when", metavar="RULE", help="end early, such as at 'SAFE-TRACE < 1e-2': the anytime-valid bound"
+    )
+    parser.add_argument(
+        "--limit-steps", type=positive, default=DEFAULT_LIMITS.work, metavar="N",
+        help="a draw that asks for more is invalid: robots moved by one step, over all runs (default: %(default).0g)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--limit-time", type=positive, default=DEFAULT_LIMITS.time, metavar="S",
+        help="a draw that takes longer is stopped (default: %(default)g)",
+    )  # fmt: skip
     parser.add_argument("-q", "--quiet", action="store_true", help="no progress")
     parser.add_argument(plugins.OPTION, action="store_true", help=plugins.HELP)
     return parser

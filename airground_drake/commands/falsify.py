@@ -37,7 +37,7 @@ def parser() -> argparse.ArgumentParser:
         prog="airground falsify",
         description="Search the space of a campaign for a scenario that violates a claim, and make it small.",
         epilog="exit codes: 0 no counterexample, 1 one was found, 2 usage, bad spec or output, 3 nothing was judged, "
-        "4 tool error",
+        "4 tool error, 130 and 143 interrupted",
     )
     parser.add_argument("spec", type=Path, help="YAML file of a campaign")
     parser.add_argument("--claim", default="SAFE-TRACE", metavar="ID", help="claim about runs (default: %(default)s)")

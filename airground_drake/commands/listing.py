@@ -15,7 +15,7 @@ Lines = Iterator[tuple[str, str]]
 
 def parser() -> argparse.ArgumentParser:
     """What the command line takes."""
-    parser = Parser(prog="airground list", description=__doc__.partition(": ")[2])
+    parser = Parser(prog="airground list", description=f"List {__doc__.partition(': ')[2]}")
     parser.add_argument("kind", nargs="?", choices=tuple(KINDS), help="default: all of them")
     parser.add_argument("--schema", action="store_true", help="the JSON Schema of scenario files instead, for editors")
     return parser

@@ -49,8 +49,8 @@ class Ugv:
 class Uav:
     """The UAV: a spatial first-order robot whose `task` is to fly over the centroid of the UGVs, eqs (9)-(10).
 
-    Another task is named as `module:Class`. `phantoms_m` are obstacles on its map that are not there, points without a
-    radius. Its own body is a ball of radius `radius_m`.
+    Another task is named as `module:Class` or `file.py:Class`. `phantoms_m` are obstacles on its map that are
+    not there, points without a radius. Its own body is a ball of radius `radius_m`.
     """
 
     name: str = "uav"
@@ -60,7 +60,7 @@ class Uav:
     target_m: Vector = field(default_factory=list, metadata=REQUIRED)
     """Where it is to end."""
     altitude_m: float = 2.0
-    """Height over the centroid of the UGVs."""
+    """Height over the centroid of the UGVs; more than `air_ground_m` and both radii."""
     task: str = "formation"
     """What it does below obstacle avoidance."""
     max_speed_m_s: float = 10.0
@@ -116,7 +116,7 @@ class Control:
     intervention_gain_1_s: float = field(default=1.5, metadata=FROM_ZERO)
     """Of tracking an intervention, (14)."""
     sensing_range_m: float = 4.0
-    """What is farther away is not seen; it must cover every safe distance plus a period's closing."""
+    """What is farther away is not seen; it must cover every safe distance with both radii and a period's closing."""
 
 
 @dataclass
@@ -229,7 +229,7 @@ class Gatekeeper:
     budget_nodes: int = 15000
     """Nodes of a search."""
     budget_share: float = 0.5
-    """Share of the sampling period, by the clock."""
+    """Share of the sampling period, by the clock; at most 1."""
     longest_s: float = 30.0
     """How long an accepted proposal is executed at most."""
     settling_s: float = 10.0
@@ -246,7 +246,7 @@ class Gatekeeper:
 
 @dataclass
 class Run:
-    """One simulation: a method (see `registry.METHODS`) and what is expected of it.
+    """One simulation: a method (see `airground list methods`) and what is expected of it.
 
     `stalls_m` names the UGVs that must end (to within `stall_tolerance_m`) at that point short of their
     target. `expected` maps claim identifiers to the expected verdict; a claim not named must hold. Where
@@ -315,7 +315,7 @@ class Scenario:
 
     `expected` maps identifiers of claims about the model (proofs and experiments, whatever the run) to the
     expected verdict; one that is not named must be proved, or supported if it is statistical. `claims` adds claims
-    to those of the package: `module:Class` by identifier.
+    to those of the package: `module:Class` or `file.py:Class` by identifier.
     """
 
     name: str = field(default_factory=str, metadata=REQUIRED)
@@ -333,7 +333,7 @@ class Scenario:
     stall_tolerance_m: float = 0.1
     """How close to its point in `stalls_m` a UGV must end."""
     ugvs: dict[str, Ugv] = field(default_factory=dict, metadata=REQUIRED)
-    """The UGVs, by name, in the order of all arrays."""
+    """The UGVs, 1 to 100, by name, in the order of all arrays."""
     uav: Uav = field(default_factory=Uav, metadata=REQUIRED)
     """The UAV."""
     obstacles: dict[str, Obstacle] = field(default_factory=dict)

@@ -2,7 +2,8 @@
 
 `verify(trace)` judges a run from its trace alone; `verify_model(scenario)` proves, or supports by experiments of
 its own, what holds whatever the run. Checkers of traces share no code with the controllers, the simulator or the
-optimiser whose work they judge; proofs take their constants from the objects that the simulation runs.
+optimiser whose work they judge; proofs take their constants from the scenario and hold the running objects against
+them, or read a relation off the running code.
 
 `claim.py` says what a claim is, `registry.py` which there are; `runs/` has those about a trace and `model/` those about
 the model, one claim in one file, named by its identifier; `engines/` proves and knows no claim; `stl/` is a second

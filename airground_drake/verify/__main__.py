@@ -30,6 +30,8 @@ def parser() -> argparse.ArgumentParser:
     parser = Parser(
         prog="airground verify",
         description="Judge claims anew, on a saved run or about a scenario's model; nothing is taken from a cache.",
+        epilog="exit codes: 0 all as the scenario expects, 1 one is not (or is undecided), 2 usage, or a run or "
+        "scenario that cannot be used, 4 tool error, 130 and 143 interrupted",
     )
     parser.add_argument("target", help="folder of a saved run (DIR/trace/RUN), or a scenario, shipped or a YAML file")
     parser.add_argument("claims", nargs="*", metavar="CLAIM", help="identifiers (default: all that apply)")

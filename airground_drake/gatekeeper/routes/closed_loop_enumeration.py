@@ -23,7 +23,7 @@ _CHUNK = 64
 
 
 class ClosedLoopEnumerationRoute:
-    """Exact minimum of (25) over the plans that are constant on blocks of N / `blocks` stages.
+    """Exact minimum of (25) over the plans that are constant on each of 10 blocks of the N stages.
 
     Not with the mode velocities of (23), which hold along the two constant plans only: every plan is rolled out on
     the closed loop that the UGV runs (`Problem.loop`), so that waiting shifts the way that follows. Two plans

@@ -17,7 +17,7 @@ from airground_drake.gatekeeper.solution import ConstantPlans, Solution, cheapes
 
 
 class EnumerationRoute:
-    """Exact minimum of (26) over the plans that are constant on blocks of N / `blocks` stages.
+    """Exact minimum of (26) over the plans that are constant on each of 10 blocks of the N stages.
 
     Mode velocities are data, so that a plan's cost is a sum over its stages and two plans share the cost of
     their common prefix. The tree of 2^blocks plans is searched depth first; a branch is cut where its cost so

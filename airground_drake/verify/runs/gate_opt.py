@@ -54,7 +54,7 @@ class GateOpt(ProblemClaim):
     """Width of an enclosure of the optimum, relative, up to which it decides anything."""
 
     id = "GATE-OPT"
-    summary = "Every plan of the gatekeeper was within 5 % of the best that there was."
+    summary = "Every plan cost at most 5 % more than the best of the problem that its route solves."
     statement = (
         "Every gatekeeper decision that rests on a plan costs at most 5 % of the cheaper constant plan's cost more "
         "than the optimum of the problem that its route solves, and neither its lower bound nor its gap is recorded "

@@ -25,7 +25,9 @@ class LiveGate(ModelClaim):
     """LIVE-GATE."""
 
     id = "LIVE-GATE"
-    summary = "Given room, an accepted intervention that leaves the UGV no direction is carried through to its end."
+    summary = (
+        "With room around it, an accepted intervention in all directions of the plane is carried through to its end."
+    )
     statement = (
         "Under method (d) an accepted intervention that leaves no direction of the plane to the UGV's own task is "
         "never given back before its time, and is over when its motion is, as long as there is room along the "

@@ -48,7 +48,7 @@ class ThrOpt(ModelClaim):
     """THR-OPT."""
 
     id = "THR-OPT"
-    summary = "The threshold in use is the one of least Bayes risk; that of the printed equation is not."
+    summary = "The threshold of least Bayes risk is the root of the corrected equation, not of the printed one."
     statement = (
         "Without initial deviation the root of the threshold equation is the only minimiser of the Bayes risk over all "
         "zeta > 0; the root of the printed equation is not one. With initial deviations of +-zeta/2 the risk is not "
