@@ -96,7 +96,14 @@ def pages() -> dict[str, str]:
         "scenario.md": scenario(),
         "extending.md": extending(),
         "../airground_drake/scenarios/scenario.schema.json": json_schema.text(installed=False),
+        "../airground_drake/check/mutants.json": _broken_variants(),
     }
+
+
+def _broken_variants() -> str:
+    """Claim and words of every broken variant of a proof, for the checker, which cannot ask the package."""
+    lines = ",\n ".join(json.dumps([mutant.claim, mutant.says], ensure_ascii=False) for mutant in mutants())
+    return f"[{lines}]\n"
 
 
 def extending() -> str:

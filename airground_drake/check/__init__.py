@@ -26,7 +26,7 @@ establishes.
     inputs                     the constants that a claim about the model must be about
     evidence                   what of a claim's entry is established, and what is taken as recorded
     claims, verdict            what decides each claim, and what is expected of it; a recorded verdict against that
-    overall, report            the verdict over all of them, and the files; all checks, a line each
+    overall, report            the verdict over all of them, and the files; all checks, a line each; mutants.json
     command                    the command line
 """
 

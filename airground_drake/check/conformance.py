@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from fractions import Fraction
 
 from .files import Json
@@ -207,11 +207,23 @@ def _recorded_of_wait(claim: Json, scenario: Json) -> Found:
     tries = [row["longest_try_s"] for row in evidence["attacks"]]
     at_most("time that a try takes", tries, gate["longest_s"] + gate["period_s"], within=SMALL)
     reasons = {reason for row in evidence["attacks"] for reason in row["reasons"]}
-    due = {"over", "exhausted", "no_progress"}
+    due = set(_due(gate))
     same("reasons seen under attack", sorted(due & reasons), sorted(due))
     return Found.with_margin("proved", bound - max(longest), within=SMALL).having_judged(
         "evidence.bound_s", "evidence.attacks.*.attack", "evidence.attacks.*.unexpected"
     )
+
+
+def _due(gate: Json) -> Iterator[str]:
+    """Why an intervention must have ended, or none begun, under attacks of at most 20,000 samples."""
+    h, longest_s = gate["period_s"], gate["longest_s"]
+    lasts_s = h * min(20_000, int(1.2 * gate["tries"] * (longest_s + gate["rest_s"]) / h))
+    if longest_s + 2.0 * h <= lasts_s:
+        yield "over"
+    if gate["tries"] * (longest_s + 2.0 * h) <= lasts_s:
+        yield "exhausted"
+    if gate["behind_s"] + 2.0 * h < min(longest_s, lasts_s):
+        yield "no_progress"
 
 
 def _recorded_of_iso(claim: Json, scenario: Json) -> Found:

@@ -17,17 +17,28 @@ from .scenario import apart_m
 
 
 class Event(NamedTuple):
-    """An event that follows from the rest of a trace."""
+    """An event that follows from the rest of a trace.
+
+    Attributes:
+        policy: of a proposal or an answer.
+        status: of the solution that an answer rests on.
+        obstacle: that was hit.
+    """
 
     t_s: float
     robot: str
     kind: str
     policy: str = ""
+    status: str = ""
+    obstacle: str = ""
 
     @classmethod
     def of(cls, recorded: Json) -> Event:
-        """A recorded one."""
-        return cls(float(recorded["t_s"]), recorded["robot"], recorded["kind"], recorded.get("policy", ""))
+        """A recorded one; its place is another rule's."""
+        said = {name: value for name, value in recorded.items() if name != "position_m"}
+        unknown = sorted(said.keys() - {*cls._fields})
+        holds("what is said of an event", not unknown, unknown, ", ".join(cls._fields), t_s=said["t_s"])
+        return cls(**{**said, "t_s": float(said["t_s"])})
 
 
 @lru_cache(maxsize=8)
@@ -85,7 +96,7 @@ def _answers(run: Run) -> Iterator[Event]:
         proposal = (row["robot"], row["issued_s"])
         if known.get(proposal) != row["decision"]:
             known[proposal] = row["decision"]
-            yield Event(row["t_s"], row["robot"], row["decision"], row["policy"])
+            yield Event(row["t_s"], row["robot"], row["decision"], row["policy"], row["status"])
 
 
 def _arrivals(run: Run) -> Iterator[Event]:
@@ -107,7 +118,7 @@ def _collisions(run: Run) -> Iterator[Event]:
                 continue
             hit = np.linalg.norm(run.position_m[robot] - run.position_m[obstacle], axis=1) < within
             begins = hit & ~np.append(False, hit[:-1])
-            yield from (Event(float(when), robot, "collision") for when in run.t_s[begins])
+            yield from (Event(float(when), robot, "collision", obstacle=obstacle) for when in run.t_s[begins])
 
 
 def _events_are_where_their_robots_were(run: Run) -> None:

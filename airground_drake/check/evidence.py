@@ -10,7 +10,7 @@ Keys are written with dots; `*` stands for any key, or for the entries of a list
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from typing import Any
 
@@ -185,6 +185,8 @@ def _second_opinion(claim: Json) -> None:
     checks = said["checks"]
     decided = decided and all(check["verdict"] in ("satisfied", "violated") for check in checks)
     same("whether a second engine agrees", said["agrees"], True if decided else None)
+    if claim["status"] == "refuted":
+        _found_something(checks)
     for check in checks:
         about = str(check["part"])
         same("what a second engine was asked about", [check["claim"], check["run"]], [claim["id"], claim["run"]])
@@ -195,3 +197,19 @@ def _second_opinion(claim: Json) -> None:
         same("number that a second engine's is compared with", check["ours"], ours, about=about)
         if decided and None not in (ours, check["robustness"]):
             close("number of a second engine", check["robustness"], ours, within=AGREEMENT, about=about)
+        if claim["status"] == "holds" and not _by_rounding(check):
+            said_so = check["verdict"]
+            holds("a second engine finds no violation", said_so != "violated", said_so, "no violation", about=about)
+
+
+def _found_something(checks: Sequence[Json]) -> None:
+    """What is refuted violates a formula that says the same, unless one could not be decided."""
+    alike = [check for check in checks if check["relation"] == "equivalent"]
+    wrong = bool(alike) and all(check["verdict"] == "satisfied" and not _by_rounding(check) for check in alike)
+    holds("a second engine finds a violation", not wrong, "every formula satisfied", "one violated")
+
+
+def _by_rounding(check: Json) -> bool:
+    """Whether rounding decides: the number, which is compared, is within what it may be off of the level asked for."""
+    asked = bool(check["compares"]) and check["robustness"] is not None
+    return asked and bool(abs(check["robustness"] + check["tolerance"]) <= AGREEMENT)

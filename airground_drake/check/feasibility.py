@@ -12,6 +12,7 @@ import numpy as np
 from .decisions import LEAST_COST, Decision, decisions_of, silent_ugvs
 from .files import Json
 from .foresight import rows_of
+from .proposals import proposals_of
 from .rules import SMALL, Array, Flags, Found, at_most, close, holds, same
 from .run import Run
 from .scenario import Pair
@@ -310,12 +311,18 @@ def _answer(decision: Decision, standing: str | None, stood_s: float, gate: Json
 
 
 def _every_proposal_is_decided_on(run: Run, ugv: str, decisions: Sequence[Decision | Answer]) -> None:
-    """A proposal that stands for a period, the UGV being intervened on all the time, is decided on."""
+    """A proposal that stands for a period of the planner and one of the gatekeeper is decided on.
+
+    It stands while the UGV, or the one that it is to make way for, is intervened on, unless another one replaces it,
+    its motion is over or the run ends.
+    """
     allowed_s = run.scenario["gatekeeper"]["period_s"] + run.scenario["intervention"]["period_s"] + SMALL
     answered = {decision.row["issued_s"] for decision in decisions}
-    sent, stays = run.times_s(ugv, "proposal"), run.interventions_s(ugv)
-    for k, issued in enumerate(sent):
-        replaced = k + 1 < len(sent) and sent[k + 1] <= issued + allowed_s
-        stands = ((stays[:, 0] <= issued + SMALL) & (stays[:, 1] > issued + allowed_s)).any()
-        if stands and not replaced:
+    sent = [proposal for proposal in proposals_of(run) if proposal.ugv == ugv]
+    for proposal in sent:
+        issued, until_s = proposal.issued_s, proposal.issued_s + allowed_s
+        stays = np.concatenate([run.interventions_s(name) for name in sorted({ugv, proposal.cause})])
+        called = ((stays[:, 0] <= issued + SMALL) & (stays[:, 1] > until_s)).any()
+        replaced = any(issued < other.issued_s <= until_s for other in sent)
+        if called and not replaced and proposal.times_s[-1] > until_s:
             holds("a proposal is decided on", issued in answered, "no decision", "a decision", about=ugv, t_s=issued)

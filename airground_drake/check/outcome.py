@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from functools import partial
 from itertools import pairwise
@@ -133,9 +134,12 @@ def comm(run: Run, claim: Json) -> Found:
         _proposals_stand_as_long_as_they_must(run, ugv)
     _obstacles_are_what_the_uav_knew(run)
     proposals = sum(event["kind"] == "proposal" for event in run.events)
-    duration, n = run.scenario["duration_s"] + SMALL, len(run.ugvs)
+    before, n = run.scenario["duration_s"] - SMALL, len(run.ugvs)  # the first instant is at 0
     spent = {"proposal": proposals, "decision": len(run.decisions)}
-    always_on = {"proposal": n * int(duration / planning_s), "decision": n * int(duration / gating_s) if gated else 0}
+    always_on = {
+        "proposal": n * math.ceil(before / planning_s),
+        "decision": n * math.ceil(before / gating_s) if gated else 0,
+    }
     saved = {kind: 1.0 - spent[kind] / most for kind, most in always_on.items() if most}
     status = "holds" if all(spent[kind] <= most for kind, most in always_on.items()) else "refuted"
     per_ugv = {

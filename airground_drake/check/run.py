@@ -220,6 +220,7 @@ def _run(name: str, scenario_text: str, entry_text: str, contents: tuple[bytes, 
     _is_of_the_run(meta, entry, scenario, name)
     run = Run(name, scenario, meta["events"], timings["decision_times_s"], timings["wall_s"], *tables)
     _rows_cover_the_run(run)
+    _decisions_come_by_time(run)
     _a_row_at_every_control_sample(run)
     _robots_start_where_declared(run)
     _robots_are_where_their_commands_lead(run)
@@ -242,6 +243,14 @@ def _is_of_the_run(meta: Json, entry: Json, scenario: Json, name: str) -> None:
     close("threshold in force", meta["zeta_m"], levels_of(scenario).zeta_m, within=SMALL)
     for key in SHARED:
         same(f"{key} in report.json", entry[key], meta[key])
+
+
+def _decisions_come_by_time(run: Run) -> None:
+    """What a decision rests on is before it in the table, too."""
+    for ugv in run.ugvs:
+        times = run.decisions.loc[run.decisions["robot"] == ugv, "t_s"].to_numpy(dtype=np.float64)
+        later = times[1:]
+        holds("decisions are in order", later > times[:-1], later, "after the one before", about=ugv, t_s=later)
 
 
 def _rows_cover_the_run(run: Run) -> None:

@@ -8,7 +8,7 @@ import pytest
 from random_scenarios import draw, tried
 
 from airground_drake.errors import ScenarioError
-from airground_drake.scenarios.load import from_data
+from airground_drake.scenarios.load import from_data, load
 from airground_drake.scenarios.schema import Scenario
 
 KINDS: dict[str, dict[str, dict[str, Any]]] = {
@@ -66,3 +66,18 @@ def test_points_are_listed_as_the_controllers_list_them() -> None:
     data = draw(326) | {"duration_s": 3.3}
     assert data["runs"]["c"]["composition"] == "recursion_listed"
     assert tried(from_data(data, "a crowd"))[2] == []
+
+
+def test_a_proposal_at_the_very_beginning_is_not_one_too_many() -> None:
+    """The UAV plans at t = 0, too: a run that is shorter than its period has one instant, not none."""
+    at_once = {
+        "ugvs.ugv1.start_m": [0.0, -5.0, 0.0],
+        "intervention.policies": [{"name": "hostile", "parameters": {"speed_m_s": 3.0}}],
+        "intervention.period_s": 0.3,
+        "duration_s": 0.2,
+        "runs": {"d": {"method": "d"}},
+    }
+    trace, verdicts, wrong = tried(load("minimal", at_once)[0])
+    assert wrong == []
+    assert len(trace.proposals) == 1
+    assert next(each.finding.status for each in verdicts if each.claim.id == "COMM") == "holds"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -29,14 +30,14 @@ class Comm(TraceClaim):
     )
     formula = (
         "every proposal and decision in [trigger, release + intervention period + gatekeeper period]; "
-        "proposals <= n floor(duration / intervention period), decisions <= n floor(duration / gatekeeper period); "
+        "proposals <= n ceil(duration / intervention period), decisions <= n ceil(duration / gatekeeper period); "
         "no decision on a proposal that is withdrawn, none in force replaced but by or in a joint plan; "
         "map of a proposal = known and phantom obstacles, then all sensed by UGVs at refusals that the UAV has noticed"
     )
     latex = (
         r"t_{\text{message}} \in [t_{\text{trigger}}, t_{\text{release}} + h_{\text{UAV}} + h_{\text{gate}}]",
-        r"\text{proposals} \le n \lfloor T / h_{\text{UAV}} \rfloor, \quad \text{decisions} \le n \lfloor T / "
-        r"h_{\text{gate}} \rfloor",
+        r"\text{proposals} \le n \lceil T / h_{\text{UAV}} \rceil, \quad \text{decisions} \le n \lceil T / "
+        r"h_{\text{gate}} \rceil",
     )
     method = (
         "Counts of proposal events and of decisions (each one solve and one answer), each looked up in the intervals "
@@ -96,8 +97,11 @@ class Comm(TraceClaim):
                     reason = f"{ugv} was in mode 'intervening', but the trace has no {kind}"
                     return Finding("not_run", evidence={"reason": reason, "faults": trace.meta["faults"]})
             per_ugv[ugv] = {kind: len(times) for kind, times in sent.items()} | {"intervals_s": intervals.tolist()}
-        n, duration = len(trace.ugvs), scenario["duration_s"] + TIME_TOLERANCE_S
-        most = {"proposal": n * int(duration / planning), "decision": n * int(duration / gating) if gated else 0}
+        n, before = len(trace.ugvs), scenario["duration_s"] - TIME_TOLERANCE_S  # the first instant is at 0
+        most = {
+            "proposal": n * math.ceil(before / planning),
+            "decision": n * math.ceil(before / gating) if gated else 0,
+        }
         spent = {kind: sum(int(entry[kind]) for entry in per_ugv.values()) for kind in most}
         saved = {kind: 1.0 - spent[kind] / most[kind] for kind in most if most[kind]}
         misused = list[dict[str, Any]]()

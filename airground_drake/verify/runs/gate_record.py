@@ -128,10 +128,12 @@ def rows_of(trace: Trace) -> list[Row]:
     """All decisions with their problems.
 
     Raises:
-        TraceError: if the tables do not belong together, a shape is wrong or a number is not finite.
+        TraceError: if the tables do not belong together, decisions are not in order, a shape is wrong or a number is
+            not finite.
     """
     if len(trace.problems) != len(trace.decisions):
         raise TraceError(f"{len(trace.decisions)} decisions, but {len(trace.problems)} problems")
+    _come_by_time(trace)
     gate, rows = trace.scenario["gatekeeper"], []
     for given, problem in zip(trace.decisions.to_dict("records"), trace.problems.to_dict("records"), strict=True):
         scalars = [float(problem[name]) for name in PROBLEM_SCALARS]
@@ -150,6 +152,13 @@ def rows_of(trace: Trace) -> list[Row]:
     return rows
 
 
+def _come_by_time(trace: Trace) -> None:
+    """Claims go through the decisions of a UGV as they come: what a decision rests on is before it."""
+    for ugv, times in trace.decisions.groupby("robot")["t_s"]:
+        if not (np.diff(times.to_numpy(dtype=np.float64)) > 0.0).all():
+            raise TraceError(f"the decisions of {ugv} are not in order of their times")
+
+
 def bare_row(given: dict[str, Any]) -> Row:
     """A decision without a problem."""
     return Row(given, -1.0, -1.0, -1.0, -1.0, {})
@@ -159,10 +168,11 @@ def bare_rows_of(trace: Trace) -> list[Row]:
     """All decisions by outcomes: they have no problem.
 
     Raises:
-        TraceError: if there is a problem all the same, or a number is not finite.
+        TraceError: if there is a problem all the same, decisions are not in order, or a number is not finite.
     """
     if len(trace.problems):
         raise TraceError(f"{len(trace.problems)} problems, though outcomes are compared")
+    _come_by_time(trace)
     rows = []
     for given in trace.decisions.to_dict("records"):
         row = bare_row({str(name): value for name, value in given.items()})

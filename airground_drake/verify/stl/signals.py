@@ -11,6 +11,7 @@ claims. Two kinds of signals:
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator
 from itertools import pairwise, zip_longest
 from typing import Any, NamedTuple
@@ -247,15 +248,15 @@ def counts(trace: Trace) -> Signals | None:
         return None
     scenario = trace.scenario
     n = len(trace.ugvs)
-    end = trace.scenario["duration_s"] + TIME_TOLERANCE_S
+    before = trace.scenario["duration_s"] - TIME_TOLERANCE_S  # the first instant is at 0
     gated = trace.meta["method"] in GATED_METHODS
     sent = {
         "proposals": np.sort([t for ugv in trace.ugvs for t in _times(trace, ugv, "proposal")]),
         "decisions": np.sort(trace.decisions["t_s"].to_numpy(dtype=np.float64)),
     }
     most = {
-        "most_proposals": float(n * (end // scenario["intervention"]["period_s"])),
-        "most_decisions": float(n * (end // scenario["gatekeeper"]["period_s"]) * gated),
+        "most_proposals": float(n * math.ceil(before / scenario["intervention"]["period_s"])),
+        "most_decisions": float(n * math.ceil(before / scenario["gatekeeper"]["period_s"]) * gated),
     }
     t = trace.t
     so_far = {kind: np.searchsorted(times, t + TIME_TOLERANCE_S).astype(np.float64) for kind, times in sent.items()}

@@ -52,6 +52,12 @@ def keep_decisions(folder: Path, kept: list[int]) -> None:
         timings["decision_times_s"] = [timings["decision_times_s"][row] for row in kept]
 
 
+@refused_by("trace", "decisions are in order")
+def decisions_in_another_order(folder: Path) -> None:
+    rows = len(read_table(folder, "decisions"))
+    keep_decisions(folder, [1, 0, *range(2, rows)])
+
+
 @refused_by("GATE-FEAS", "answer and its reason")
 def decision_flipped(folder: Path) -> None:
     set_decision(folder, 0, decision="accept")

@@ -35,6 +35,27 @@ def without_event(folder: Path, kind: str, run: str = RUN) -> None:
             del counts[kind]
 
 
+@refused_by("events", "events follow from signals and decisions")
+def status_of_an_answer_changed(folder: Path) -> None:
+    with edited_entries(folder) as entries:
+        for entry in entries:
+            first(entry, "accept")["status"] = "optimal"
+
+
+@refused_by("events", "what is said of an event")
+def something_added_to_an_event(folder: Path) -> None:
+    with edited_entries(folder) as entries:
+        for entry in entries:
+            first(entry, "trigger")["why"] = "stuck"
+
+
+@refused_by("events", "events follow from signals and decisions", run="b")
+def another_obstacle_was_hit(folder: Path) -> None:
+    with edited_entries(folder, "b") as entries:
+        for entry in entries:
+            first(entry, "collision")["obstacle"] = "obstacle_9"
+
+
 def exchange_traces(folder: Path) -> None:
     """Exchange the folders of two runs."""
     trace(folder, "b").rename(folder / "trace" / "x")

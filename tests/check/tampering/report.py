@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from pathlib import Path
+from typing import Any
 
 from check.tampering.base import (
     RUN,
@@ -17,6 +19,8 @@ from check.tampering.base import (
     refused_by,
     trace,
 )
+
+from airground_drake import check as checker
 
 GATED = ("GATE-FEAS", "GATE-MODEL", "GATE-TIME", "LIVE-PROG")
 
@@ -267,10 +271,49 @@ def difference_invented(folder: Path) -> None:
         report["overall"]["differs"] = [{"id": "COMM", "run": "d", "status": "refuted", "expected": "holds"}]
 
 
+@refused_by("report", "broken variants of proofs", run="")
+def mutant_of_ones_own(folder: Path) -> None:
+    with edited_report(folder) as report:
+        report["mutants"].append({"claim": "SAFE-INV", "mutant": "no gain", "refuted": False})
+
+
+def all_mutants(refuted: bool) -> list[Any]:
+    listed = json.loads((Path(checker.__file__).parent / "mutants.json").read_text(encoding="utf-8"))
+    came_to = {"status": "refuted", "refuted": True, "counterexample": {}, "error": None, "from_cache": False}
+    entries: list[Any] = [{"claim": claim, "mutant": says, **came_to} for claim, says in listed]
+    entries[0] |= {"status": "holds", "refuted": refuted, "counterexample": None}
+    return entries
+
+
 @refused_by("report", "verdict over all", run="")
 def mutant_that_survived(folder: Path) -> None:
     with edited_report(folder) as report:
-        report["mutants"].append({"claim": "SAFE-INV", "mutant": "no gain", "refuted": False})
+        report["mutants"], report["audit"] = all_mutants(refuted=False), []
+
+
+@refused_by("report", "whether a broken variant is refuted", run="")
+def mutant_that_survived_and_is_said_to_be_refuted(folder: Path) -> None:
+    with edited_report(folder) as report:
+        report["mutants"], report["audit"] = all_mutants(refuted=True), []
+
+
+@refused_by("report", "broken variants of proofs", run="")
+def audit_without_mutants(folder: Path) -> None:
+    with edited_report(folder) as report:
+        report["audit"] = [{"id": k, "demonstrated": True} for k in range(18)]
+
+
+@refused_by("ZENO-TRACE", "a second engine finds no violation")
+def second_engine_finds_a_violation(folder: Path) -> None:
+    with edited_claim(folder, "ZENO-TRACE", RUN) as claim:
+        claim["evidence"]["stl"]["checks"][0] |= {"verdict": "violated", "robustness": -1.0}
+
+
+@refused_by("SAFE-TRACE", "a second engine finds a violation", run="b")
+def second_engine_finds_nothing(folder: Path) -> None:
+    with edited_claim(folder, "SAFE-TRACE", "b") as claim:
+        for entry in claim["evidence"]["stl"]["checks"]:
+            entry["verdict"] = "satisfied"
 
 
 @refused_by("report", "choice", run="")

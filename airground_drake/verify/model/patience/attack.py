@@ -114,10 +114,12 @@ def _next(
         return proposal if name != "random" or rng.random() > 0.01 else None
     if name == "random" and rng.random() < 0.7:
         return None
+    if name == "stuck":
+        return _proposal(name, t, 2.0 * patience.longest, rng, away=10.0 * patience.lag)
     return _proposal(name, t, float(rng.choice([0.1, 1.0, 100.0])) * patience.longest, rng)
 
 
-def _proposal(name: str, t: float, lasts: float, rng: np.random.Generator) -> Proposal:
-    way: Array = rng.normal(size=(3, 3)) * [5.0, 5.0, 0.0]
+def _proposal(name: str, t: float, lasts: float, rng: np.random.Generator, away: float = 0.0) -> Proposal:
+    way: Array = rng.normal(size=(3, 3)) * [5.0, 5.0, 0.0] + [away, 0.0, 0.0]
     motion = Motion(t + lasts * np.array([0.0, 0.5, 1.0]), way)
     return Proposal("waste", t, motion, cause=FAVOURS.get(name, ""))
