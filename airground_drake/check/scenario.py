@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from fractions import Fraction
+from functools import lru_cache
 from itertools import combinations
 from typing import NamedTuple
 
@@ -92,8 +94,14 @@ def pairs_of(scenario: Json) -> list[Pair]:
     beside_robots = []
     for one, other in combinations(robots, 2):
         safe = apart_m(scenario, "air_ground_m" if other == uav else "ugv_m", robots[one], robots[other])
-        beside_robots.append(Pair(one, other, safe, limit[one] + limit[other], 0.5))
+        beside_robots.append(Pair(one, other, safe, _sum(limit[one], limit[other]), 0.5))
     return beside_obstacles + beside_robots
+
+
+@lru_cache(maxsize=10_000)
+def _sum(one: float, other: float) -> float:
+    """Of two decimals as they are written: 1.1 and 2.2 make 3.3."""
+    return float(Fraction(repr(one)) + Fraction(repr(other)))
 
 
 def apart_m(scenario: Json, kind: str, one: Json, other: Json) -> float:

@@ -19,8 +19,6 @@ from airground_drake.nsbc.motion import Motion
 
 SHARE = 0.8
 """Of a UGV's speed limit that a plan uses: the rest is for catching up with it."""
-MOST_REFUSALS = 3
-"""A UGV that is not triggered is not asked again once it has refused so often to make way."""
 MOST_PLANS = 4
 """Joint plans that are made at most for one proposal, each for more robots."""
 NARROWER = (1.0, 0.1, 0.01)
@@ -188,7 +186,7 @@ def _waits(mate: Teammate, t: float) -> bool:
 def _is_willing(mate: Teammate, t: float) -> bool:
     """Whether a UGV may be asked at time t, s."""
     just_asked = mate.proposal is not None and mate.proposal.issued == t
-    return not (mate.resting or just_asked) and (mate.triggered or mate.refusals < MOST_REFUSALS)
+    return not (mate.resting or just_asked)
 
 
 def _cost(seen: Observation, group: Sequence[int], found: Plan) -> tuple[float, ...]:

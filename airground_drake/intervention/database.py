@@ -19,6 +19,11 @@ from airground_drake.registry import POLICIES
 Ranking = Literal["listed", "predicted"]
 RANKINGS: tuple[Ranking, ...] = get_args(Ranking)
 
+FEW_REFUSALS = 2
+"""After so many a UGV that does not make way is asked as if it had never refused."""
+LEAST_REST_S = 1.0
+"""What is doubled then, if `retry` is less, s."""
+MOST_DOUBLINGS = 6
 PREDICTION_S = 3.0
 INTRUSION = 1000.0
 """Weight of squared intrusion against squared task error, as the gatekeeper's by default."""
@@ -129,16 +134,20 @@ class BehaviourDatabase:
             if isinstance(policy, GuestPolicy):
                 policy.close()
 
-    def after_refusal(self, desk: Desk, t: float, *, learnt: bool = False) -> Desk:
+    def after_refusal(self, desk: Desk, t: float, *, learnt: bool = False, favour: bool = False) -> Desk:
         """Memory of a UGV that has refused its proposal.
 
         Args:
             desk: with the proposal.
             t: time, s.
             learnt: whether the refusal has put an obstacle on the map: then a ranking starts anew.
+            favour: whether it was asked to make way: from the third refusal on it is left alone twice as long each
+                time, as what it refuses for may pass.
         """
-        turn = 0 if learnt and self.ranking == "predicted" else desk.turn + 1
-        return Desk(turn=turn, refusals=desk.refusals + 1, retry_at=t + self.retry, cause=desk.cause)
+        turn, rest = 0 if learnt and self.ranking == "predicted" else desk.turn + 1, self.retry
+        if favour and (often := desk.refusals + 1 - FEW_REFUSALS) > 0:
+            rest = max(self.retry, LEAST_REST_S) * 2.0 ** min(often, MOST_DOUBLINGS)
+        return Desk(turn=turn, refusals=desk.refusals + 1, retry_at=t + rest, cause=desk.cause)
 
     def plan(self, desk: Desk, seen: Observation) -> Planned:
         """Next proposal for a UGV that needs one, and those to others that go with it.

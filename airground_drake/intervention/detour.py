@@ -20,6 +20,10 @@ CHASED = 16
 """After so many strides the preset counts as running away."""
 
 
+LONGEST_FOLLOW_S = 600.0
+"""What is followed has a vertex for each SAMPLE_S."""
+
+
 class Detour(Policy):
     """Meet the preset trajectory again as early as possible, by the shortest safe path at a set speed.
 
@@ -33,11 +37,11 @@ class Detour(Policy):
         """Set the parameters.
 
         Raises:
-            ValueError: if the speed is not positive or another parameter negative.
+            ValueError: if the speed is not positive, another parameter negative, or `follow_s` above LONGEST_FOLLOW_S.
         """
-        if not (speed_m_s > 0.0 and clearance_m >= 0.0 and follow_s >= 0.0):
+        if not (speed_m_s > 0.0 and clearance_m >= 0.0 and 0.0 <= follow_s <= LONGEST_FOLLOW_S):
             raise ValueError(
-                f"detour needs speed_m_s > 0, clearance_m >= 0 and follow_s >= 0, "
+                f"detour needs speed_m_s > 0, clearance_m >= 0 and follow_s from 0 to {LONGEST_FOLLOW_S:g}, "
                 f"got {speed_m_s!r}, {clearance_m!r}, {follow_s!r}"
             )
         self.speed = speed_m_s
@@ -108,13 +112,11 @@ class Detour(Policy):
         height = seen.position[2]
         robots = [mate for mate in seen.team if mate.name != seen.robot and mate.standing and not _will_move(mate)]
         places = np.array([mate.position for mate in robots]).reshape(-1, 3)
-        # two targets may be as near to each other as the safe distance allows
-        parked = np.array([np.linalg.norm(mate.position - seen.target) for mate in robots])
-        least = np.array([seen.distance_to(mate) for mate in robots])
-        reach = np.concatenate(
-            [seen.obstacle_distances + self.clearance, np.clip(parked, least, least + self.clearance)]
-        )
+        least = np.concatenate([seen.obstacle_distances, [seen.distance_to(mate) for mate in robots]])
         around = np.concatenate([seen.obstacles, places])
+        # what is in the way may be as near to the target as the safe distance allows
+        from_target = np.linalg.norm(around - seen.preset.positions[-1], axis=1)
+        reach = np.clip(from_target, least, least + self.clearance)
         squared = reach**2 - (around[:, 2] - height) ** 2
         near = squared > 0.0
         return around[near, :2], np.sqrt(squared[near])

@@ -15,6 +15,8 @@ from airground_drake.intervention.messages import ACCEPT, REFUSE, Disc, Point, P
 from airground_drake.intervention.policy import Answered, Observation, Proposal, Teammate
 from airground_drake.nsbc.motion import Motion
 
+OVER = "over"
+"""Why a UGV gives back what it has executed to its end, which is no refusal."""
 STANDS_S = 1.0
 """A UGV stands once it has kept to one place for this long, s."""
 STANDS_M = 0.1
@@ -146,8 +148,9 @@ class Planner:
             answers: of the UGVs, (2n,), see `messages`.
             reports: what they sensed, see `messages`.
         """
-        refused = [answer_to(desk.proposal, answers, i) == REFUSE for i, desk in enumerate(memory.desks)]
-        reported = {disc for i, report in enumerate(reports) if refused[i] for disc in report.sensed}
+        no = [answer_to(desk.proposal, answers, i) == REFUSE for i, desk in enumerate(memory.desks)]
+        reported = {disc for i, report in enumerate(reports) if no[i] for disc in report.sensed}
+        refused = [no[i] and not (desk.is_due(t) and reports[i].reason == OVER) for i, desk in enumerate(memory.desks)]
         mapped = np.column_stack([self.mapped, np.broadcast_to(self.mapped_radii, len(self.mapped))])
         fresh = tuple(sorted(reported - set(memory.learnt) - set(map(tuple, mapped.tolist()))))
         learnt = memory.learnt + fresh
@@ -197,7 +200,7 @@ class Planner:
             if name not in called and desk.cause not in called:
                 desk = Desk()
             elif no:
-                desk = self.database.after_refusal(desk, t, learnt=learnt)
+                desk = self.database.after_refusal(desk, t, learnt=learnt, favour=name not in called)
             elif name not in called and desk.proposal is not None and desk.is_due(t):
                 desk = replace(desk, proposal=None, party=())
             found.append(desk)

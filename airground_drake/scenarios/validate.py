@@ -12,6 +12,8 @@ import unicodedata
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import fields, is_dataclass
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
+from fractions import Fraction
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -249,8 +251,9 @@ def _gains(scenario: Scenario) -> Problems:
     period = scenario.control.period_s
     for name in ("avoidance_gain_1_s", "motion_gain_1_s", "formation_gain_1_s", "intervention_gain_1_s"):
         gain = getattr(scenario.control, name)
-        if gain * period > 1.0:
-            yield f"control.{name}", gain, f"at most {1.0 / period:.9g} 1/s: gain * control.period_s must not exceed 1"
+        if _exactly(gain) * _exactly(period) > 1:  # as the proofs take them
+            most = _shown(1 / _exactly(period), ROUND_FLOOR)
+            yield f"control.{name}", gain, f"at most {most} 1/s: gain * control.period_s must not exceed 1"
 
 
 def _periods(scenario: Scenario) -> Problems:
@@ -268,6 +271,11 @@ def _periods(scenario: Scenario) -> Problems:
         yield "gatekeeper.horizon_s", gatekeeper.horizon_s, problem + fits * _multiple(gatekeeper.horizon_s, control)
     if not (_multiple(noise, control) or _multiple(control, noise)):
         yield "decision.noise_period_s", noise, f"{rule}, or go into it a whole number of times"
+    step, leak = min(control, noise), scenario.decision.leak_1_s
+    if leak * step > 1.0:
+        most = _shown(1 / _exactly(step), ROUND_FLOOR)
+        allowed = f"at most {most} 1/s: leak * {step:.9g} s, a step of the noise, must not exceed 1"
+        yield "decision.leak_1_s", leak, allowed
 
 
 def _multiple(of: float, unit: float) -> bool:
@@ -328,17 +336,33 @@ def _nearest_pairs(scenario: Scenario) -> list[tuple[str, _Body, _Body]]:
     return [*pairs, *(("obstacle_m", max(flier, ugvs[0]), each) for each in fixed)]
 
 
+def _exactly(number: float) -> Fraction:
+    """The decimal that a number prints as, which is what proofs take it for."""
+    return Fraction(repr(float(number)))
+
+
+def _shown(number: Fraction, rounding: str) -> str:
+    """A number of nine digits, rounded so that it is itself allowed."""
+    digits = Context(prec=9, rounding=rounding).divide(Decimal(number.numerator), Decimal(number.denominator))
+    return f"{digits:.9g}"
+
+
+def _closing(one: _Body, other: _Body, period: float) -> Fraction:
+    """How much nearer two can come in a control period, m."""
+    return (_exactly(one.speed) + _exactly(other.speed)) * _exactly(period)
+
+
 def _sensing(scenario: Scenario) -> Problems:
     """What is farther than the sensing range must not come within the safe distance in one control period."""
     period = scenario.control.period_s
     needed, kind, one, other = max(
-        (getattr(scenario.safe_distance, kind) + (a.radius + b.radius) + (a.speed + b.speed) * period, kind, a, b)
+        (_exactly(getattr(scenario.safe_distance, kind) + (a.radius + b.radius)) + _closing(a, b, period), kind, a, b)
         for kind, a, b in _nearest_pairs(scenario)
     )
-    if scenario.control.sensing_range_m < needed - TOLERANCE:
+    if _exactly(scenario.control.sensing_range_m) < needed:
         apart = f"safe_distance.{kind} {getattr(scenario.safe_distance, kind):.9g} m{_and(one.radius + other.radius)}"
         total = f"{apart} + closing {one.speed + other.speed:.9g} m/s * control.period_s {period:.9g} s"
-        allowed = f"at least {needed:.9g} m for {one.name} and {other.name}: {total}"
+        allowed = f"at least {_shown(needed, ROUND_CEILING)} m for {one.name} and {other.name}: {total}"
         yield "control.sensing_range_m", scenario.control.sensing_range_m, allowed
 
 

@@ -54,7 +54,7 @@ class UgvController(LeafSystem):
         self.DeclarePeriodicDiscreteUpdateEvent(law.avoidance.period, 0.0, weakly(self._update))
 
     def _update(self, context: Context, discrete: DiscreteValues) -> None:
-        positions = self._position.Eval(context).reshape(-1, 3)
+        positions = _finite(self._position.Eval(context)).reshape(-1, 3)
         reference, rate = self._reference.Eval(context).reshape(2, -1, 3)
         proposals = accepted_proposals(self._proposals.Eval(context), self._answers.Eval(context))
         velocity = self.velocity(context.get_time(), positions, reference, rate, proposals)
@@ -131,7 +131,7 @@ class UavController(LeafSystem):
         self.DeclarePeriodicDiscreteUpdateEvent(avoidance.period, 0.0, weakly(self._update))
 
     def _update(self, context: Context, discrete: DiscreteValues) -> None:
-        positions = self._position.Eval(context).reshape(-1, 3)
+        positions = _finite(self._position.Eval(context)).reshape(-1, 3)
         commands = self._ugv_command.Eval(context).reshape(-1, 3)
         discrete.set_value(0, self.velocity(positions, commands))
 
@@ -146,10 +146,17 @@ class UavController(LeafSystem):
             PluginError: if the task asks for what is no velocity.
         """
         task = self._task(read_only(positions[:-1]), read_only(ugv_commands), self._altitude, self._gain)
-        lower = limit_speed(_velocity_of(task, positions[-1:]), self._max_speed)
+        lower = limit_speed(_velocity_of(task, read_only(positions[-1:])), self._max_speed)
         spaces = self.avoidance.half_spaces(positions[-1:], self._mobility, self._neighbourhood.around(positions))
         velocity: Array = self.avoidance.apply(lower, spaces)[0]
         return velocity
+
+
+def _finite(positions: Array) -> Array:
+    """Positions, as they come from the plants; what is nowhere is avoided by nobody."""
+    if not np.isfinite(positions).all():
+        raise PluginError(f"positions are not finite, from a plant or a disturbance: {short(repr(positions.tolist()))}")
+    return positions
 
 
 def _velocity_of(task: Task, position: Array) -> Array:

@@ -13,7 +13,7 @@ from builders.observations import mate, seen
 from timeline import times
 from verify.judging import judge
 
-from airground_drake.intervention.coordinate import MOST_REFUSALS, Coordinate, predicted
+from airground_drake.intervention.coordinate import Coordinate, predicted
 from airground_drake.intervention.policy import Observation, Proposal
 from airground_drake.nsbc.motion import Motion
 from airground_drake.scenarios.schema import (
@@ -87,11 +87,10 @@ def test_a_robot_that_went_through_a_narrow_gap_is_led_back_through_it() -> None
 @pytest.mark.parametrize(
     "unwilling",
     [
-        {"refusals": MOST_REFUSALS},
         {"resting": True, "refusals": 1},
         {"proposal": Proposal("other", 10.0, Motion(np.array([11.0]), np.array([[2.0, 0.0, 0.0]])))},
     ],
-    ids=["refused often", "resting", "asked this instant"],
+    ids=["resting", "asked this instant"],
 )
 def test_who_is_unwilling_is_not_asked(unwilling: dict[str, Any]) -> None:
     assert Coordinate().propose(seen([COMES, replace(PARKED, **unwilling)], BAY)) is None

@@ -51,6 +51,19 @@ def test_targets_may_be_as_near_as_the_safe_distance_allows() -> None:
     assert motion.positions[-1].tolist() == [10.0, 0.0, 0.0]
 
 
+def test_an_obstacle_may_be_as_near_to_the_target_as_the_safe_distance_allows() -> None:
+    stuck = mate("ugv1", [0.0, 0.0], [10.0, 0.0])
+    beside = replace(seen([stuck]), obstacles=np.array([[10.0, 2.0, 0.0]]), obstacle_radii=np.zeros(1))
+    motion = DETOUR.propose(beside)
+    assert motion is not None
+    assert motion.positions[-1].tolist() == [10.0, 0.0, 0.0]
+
+
+def test_what_is_followed_is_no_longer_than_it_may_be() -> None:
+    with pytest.raises(ValueError, match="follow_s from 0 to 600"):
+        Detour(speed_m_s=1.0, follow_s=601.0)
+
+
 def test_who_keeps_to_one_place_stands() -> None:
     planner = make_planner(load("case_a")[0], METHODS["d"])
     places = np.zeros((3, 3))

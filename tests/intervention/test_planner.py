@@ -43,7 +43,12 @@ def planner(policy: Policy) -> Planner:
 
 
 def step(
-    uav: Planner, memory: PlannerMemory, t: float, intervening: str, answers: Mapping[str, float] | None = None
+    uav: Planner,
+    memory: PlannerMemory,
+    t: float,
+    intervening: str,
+    answers: Mapping[str, float] | None = None,
+    report: Report = NOBODY[0],
 ) -> PlannerMemory:
     """One planning instant; who is intervened on, and answers to the proposals in force, by name."""
     given = []
@@ -51,7 +56,7 @@ def step(
         issued = desk.proposal.issued if desk.proposal else -1.0
         given += [(answers or {}).get(name, SILENT), issued]
     called = [name in intervening.split() for name in UGVS]
-    return uav.plan(uav.watch(memory, t, PLACES), t, PLACES, called, np.array(given), NOBODY)
+    return uav.plan(uav.watch(memory, t, PLACES), t, PLACES, called, np.array(given), (report,) * 3)
 
 
 def in_force(memory: PlannerMemory) -> dict[str, tuple[float, str]]:
@@ -114,6 +119,31 @@ def test_who_refuses_its_own_rests_before_the_next() -> None:
     assert len(policy.seen) == 1
     assert in_force(step(uav, memory, 2.1, "one")) == {"one": (2.1, "one")}
     assert policy.seen[-1].refusals == 1
+
+
+def test_who_refuses_to_make_way_is_asked_again_after_longer_and_longer_rests() -> None:
+    class Asks(Policy):
+        def propose(self, seen: Observation) -> Mapping[str, Motion] | None:
+            return None if seen.team[1].resting else {"one": wait(0.05), "two": wait(1e4)}
+
+    uav = planner(Asks())
+    memory, asked = uav.start(), list[float]()
+    for k in range(10, 900):
+        memory = step(uav, memory, 0.1 * k, "one", {"two": REFUSE})
+        two = memory.desks[1].proposal
+        if two is not None and two.issued not in asked:
+            asked.append(two.issued)
+    assert np.diff(asked)[:6] == pytest.approx([1.1, 1.1, 2.1, 4.1, 8.1, 16.1], abs=1.0)
+
+
+def test_a_motion_that_was_executed_to_its_end_was_not_refused() -> None:
+    """The UAV may plan less often than UGVs decide: it sees that the UGV has given it back when it was over."""
+    uav = planner(Scripted({"one": wait(3.0)}, {"one": wait(9.0)}))
+    memory = step(uav, uav.start(), 1.0, "one")
+    memory = step(uav, memory, 1.1, "one", {"one": ACCEPT})
+    memory = step(uav, memory, 3.1, "one", {"one": REFUSE}, Report(reason="over"))
+    assert in_force(memory) == {"one": (3.1, "one")}
+    assert memory.desks[0].refusals == 0
 
 
 def test_after_nothing_the_uav_rests() -> None:

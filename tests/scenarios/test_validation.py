@@ -109,6 +109,7 @@ BAD: list[tuple[str, object, list[str]]] = [
     ("gatekeeper.horizon_s", 3.1, ["gatekeeper.horizon_s: 3.1", "horizon_s / stages", "multiple of"]),
     ("gatekeeper.stages", 7, ["gatekeeper.horizon_s: 3.0", "horizon_s / stages = 0.42857", "stages: 120 would do"]),
     ("decision.noise_period_s", 0.01, ["decision.noise_period_s: 0.01", "multiple of control.period_s"]),
+    ("decision.leak_1_s", 41, ["decision.leak_1_s: 41.0", "at most 40 1/s", "must not exceed 1"]),
     # decision
     ("decision.release_m", 0, ["decision.release_m: 0.0", "not below 1e-09"]),
     ("decision.release_m", 3, ["decision.release_m: 3.0", "less than the fixed threshold, 3 m"]),
@@ -151,6 +152,22 @@ def test_bodies_start_as_far_apart_as_their_radii_demand(write: Write) -> None:
     load(write(yaml.safe_dump(edit(data, "ugvs.two.start_m", [0.0, 2.75, 0.0]))))
     text = message(write(yaml.safe_dump(edit(data, "ugvs.two.start_m", [0.0, 2.7, 0.0]))))
     assert "two starts 2.7 m from one, at least safe_distance.ugv_m = 2 m + radii 0.75 m is needed" in text
+
+
+def test_limits_are_those_of_the_proofs_to_the_last_digit(write: Write) -> None:
+    """Decimals, not what floating-point numbers make of them; and what a message asks for is allowed."""
+    speeds = edit(edit(SMALL_DATA, "ugvs.one.max_speed_m_s", 1.1), "ugvs.two.max_speed_m_s", 2.2)
+    slow = edit(edit(edit(speeds, "uav.max_speed_m_s", 1.0), "control.period_s", 0.1), "decision.noise_period_s", 0.1)
+    slow = edit(edit(slow, "gatekeeper.period_s", 0.1), "intervention.period_s", 0.1)
+    slow = edit(edit(slow, "control.formation_gain_1_s", 1.0), "control.sensing_range_m", 2.33)
+    slow = edit(slow, "gatekeeper.stages", 30)
+    assert load(write(yaml.safe_dump(slow)))[0].control.sensing_range_m == 2.33
+    assert "at least 2.33 m for two and one" in message(
+        write(yaml.safe_dump(edit(slow, "control.sensing_range_m", 2.3299999999)))
+    )
+    assert "at most 33.3333333 1/s" in message(
+        write(yaml.safe_dump(edit(edit(SMALL_DATA, "control.period_s", 0.03), "control.motion_gain_1_s", 33.33333334)))
+    )
 
 
 def test_the_small_scenario_is_valid_otherwise(write: Write) -> None:

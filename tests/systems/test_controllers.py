@@ -6,9 +6,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import Diagram, DiagramBuilder
+from pydrake.systems.primitives import ConstantVectorSource, ZeroOrderHold
 
 from airground_drake.arrays import Array
 from airground_drake.components import make_avoidance, make_team
+from airground_drake.diagram import build_diagram
 from airground_drake.errors import PluginError
 from airground_drake.nsbc.tasks import FormationTask
 from airground_drake.scenarios.load import load
@@ -48,3 +52,32 @@ def test_a_task_that_asks_for_no_velocity_is_named(asked: Any) -> None:
         PluginError, match=r"^the UAV's task Odd asks for .* as velocity; wanted: \(1, 3\) finite numbers"
     ):
         controller.velocity(np.zeros((3, 3)), np.zeros((2, 3)))
+
+
+def test_a_task_cannot_move_the_uav_that_its_avoidance_sees() -> None:
+    class Writes(FormationTask):
+        def velocity(self, position: Array) -> Array:
+            position += 100.0
+            return super().velocity(position)
+
+    case_a = load("case_a")[0]
+    controller = UavController(make_team(case_a), make_avoidance(case_a), gain=1.0, altitude=2.0, task=Writes)
+    with pytest.raises(ValueError, match="read-only"):
+        controller.velocity(np.zeros((3, 3)), np.zeros((2, 3)))
+
+
+def test_a_robot_that_is_nowhere_ends_the_run() -> None:
+    """Nobody could keep away from it."""
+
+    def lost(robot: str, start: Array) -> Diagram:
+        builder = DiagramBuilder()
+        place = np.full(3, np.nan) if robot == "ugv2" else start
+        source = builder.AddSystem(ConstantVectorSource(place))
+        builder.ExportOutput(source.get_output_port())
+        sink = builder.AddSystem(ZeroOrderHold(0.1, 3))
+        builder.ExportInput(sink.get_input_port())
+        return builder.Build()
+
+    simulator = Simulator(build_diagram(load("case_a")[0], "d", plants=lost))
+    with pytest.raises(PluginError, match="positions are not finite"):
+        simulator.AdvanceTo(1.0)

@@ -7,6 +7,7 @@ compares the controllers of the built diagram with it.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import cached_property
 from itertools import combinations, product
 from typing import Any, NamedTuple
@@ -90,8 +91,13 @@ def _distances_and_speeds(team: Inputs) -> dict[str, set[tuple[float, float]]]:
         "uav_ugv": (team["air_ground_distance"], product([uav], ugvs)),
         "ugv_ugv": (team["ugv_distance"], combinations(ugvs, 2)),
     }
-    found = {name: {(d + (r + s), v + w) for (r, v), (s, w) in both} for name, (d, both) in pairs.items()}
+    found = {name: {(d + (r + s), _sum(v, w)) for (r, v), (s, w) in both} for name, (d, both) in pairs.items()}
     return {name: values for name, values in found.items() if values}
+
+
+def _sum(one: float, other: float) -> float:
+    """Of two decimals: 1.1 + 2.2 is 3.3 here, and not a little more."""
+    return float(Fraction(repr(float(one))) + Fraction(repr(float(other))))
 
 
 class Inequalities(NamedTuple):
