@@ -250,7 +250,7 @@ def _decisions_come_by_time(run: Run) -> None:
     for ugv in run.ugvs:
         times = run.decisions.loc[run.decisions["robot"] == ugv, "t_s"].to_numpy(dtype=np.float64)
         later = times[1:]
-        holds("decisions are in order", later > times[:-1], later, "after the one before", about=ugv, t_s=later)
+        holds("decisions are in order", later >= times[:-1], later, "not before the one above", about=ugv, t_s=later)
 
 
 def _rows_cover_the_run(run: Run) -> None:

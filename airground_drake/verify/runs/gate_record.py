@@ -155,7 +155,7 @@ def rows_of(trace: Trace) -> list[Row]:
 def _come_by_time(trace: Trace) -> None:
     """Claims go through the decisions of a UGV as they come: what a decision rests on is before it."""
     for ugv, times in trace.decisions.groupby("robot")["t_s"]:
-        if not (np.diff(times.to_numpy(dtype=np.float64)) > 0.0).all():
+        if not (np.diff(times.to_numpy(dtype=np.float64)) >= 0.0).all():
             raise TraceError(f"the decisions of {ugv} are not in order of their times")
 
 
