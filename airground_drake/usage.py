@@ -12,6 +12,8 @@ from typing import NoReturn
 from airground_drake.errors import one_line
 
 EXIT_USAGE, EXIT_TOOL = 2, 4
+MOST = 1e15
+"""Of numbers that an option takes."""
 
 
 def refuse(why: object, code: int = EXIT_USAGE) -> int:
@@ -53,11 +55,11 @@ def whole(least: int, most: float = math.inf) -> Callable[[str], int]:
 
 
 def positive(text: str) -> float:
-    """An argument that is a finite number above 0."""
+    """An argument that is a number above 0, at most MOST."""
     try:
         value = float(text)
     except ValueError:
         value = 0.0
-    if not 0.0 < value < math.inf:
-        raise argparse.ArgumentTypeError(f"{text!r} is not allowed; wanted: a finite number above 0")
+    if not 0.0 < value <= MOST:
+        raise argparse.ArgumentTypeError(f"{text!r} is not allowed; wanted: a number above 0, at most {MOST:g}")
     return value

@@ -15,7 +15,7 @@ from airground_drake.campaign.page import page
 from airground_drake.campaign.pool import Pool
 from airground_drake.campaign.rows import Row
 from airground_drake.campaign.spec import Spec
-from airground_drake.campaign.stopping import Stopping
+from airground_drake.campaign.stopping import InOrder, Stopping
 from airground_drake.campaign.store import Store
 from airground_drake.campaign.work import died, rows_of
 from airground_drake.progress import SILENT, Watch
@@ -61,11 +61,9 @@ def conduct(
         spec.refuse_plugins()
     store = Store(folder, _manifest(spec), resume=resume)
     try:
-        met = False
-        if stopping is not None:
-            for known in _known(store):
-                met = stopping.met(known)
         wanted = range(spec.combinations if number is None else number)
+        rule = InOrder(stopping, wanted) if stopping is not None else None
+        met = rule is not None and any(rule.met(index, rows) for index, rows in _known(store))
         left = [] if met else [index for index in wanted if index not in store.finished]
         watch.stage(spec.name, len(left), "draws")
         refuted = Counter[str]()
@@ -74,7 +72,7 @@ def conduct(
             store.add(rows)
             refuted.update(row["claim"] for row in rows if row["status"] == "refuted")
             watch.advance(1.0, _refuted(refuted))
-            if stopping is not None and stopping.met(rows):
+            if rule is not None and rule.met(index, rows):
                 break
         table = store.table()
     finally:
@@ -90,10 +88,13 @@ def _refuted(counts: Counter[str]) -> str:
     return "refuted: " + (", ".join(f"{claim} {count}" for claim, count in counts.most_common(3)) or "nothing")
 
 
-def _known(store: Store) -> Iterator[list[Row]]:
+def _known(store: Store) -> Iterator[tuple[int, list[Row]]]:
     """What an earlier call has finished, draw by draw."""
     for _, rows in store.table().groupby("index"):
-        yield [{str(name): value for name, value in row.items()} for row in rows.to_dict("records")]
+        yield (
+            int(rows["index"].iloc[0]),
+            [{str(name): value for name, value in row.items()} for row in rows.to_dict("records")],
+        )
 
 
 def _manifest(spec: Spec) -> dict[str, Any]:

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.stats import qmc, truncnorm
 
 from airground_drake.arrays import Array
+from airground_drake.scenarios.schema import MAX_SEED
 
 
 class Distribution(abc.ABC):
@@ -189,7 +190,7 @@ def _normal(given: Any) -> Normal:
 
 def _integer(given: Any) -> Integer:
     low, high = given
-    if type(low) is not int or type(high) is not int or low > high:
+    if type(low) is not int or type(high) is not int or not -MAX_SEED <= low <= high <= MAX_SEED:
         raise ValueError
     return Integer(low, high)
 
@@ -206,7 +207,7 @@ KINDS: dict[str, tuple[str, Callable[[Any], Key]]] = {
     "halton": (_ENDS, lambda given: Key(_uniform(given), EVEN)),
     "log_uniform": ("[low, high] with 0 < low", lambda given: Key(_log_uniform(given))),
     "normal": ("[mean, standard deviation], and [..., low, high] to cut it", lambda given: Key(_normal(given))),
-    "integer": ("[low, high], whole numbers", lambda given: Key(_integer(given))),
+    "integer": (f"[low, high], whole numbers up to {MAX_SEED}", lambda given: Key(_integer(given))),
     "choice": ("a list of values", lambda given: Key(_choice(given))),
     "grid": ("a list of values, gone through in turn", lambda given: Key(_choice(given), IN_TURN)),
 }
@@ -223,5 +224,5 @@ def made(name: str, given: Any) -> Key:
     wanted, make = KINDS[name]
     try:
         return make(given)
-    except (ValueError, TypeError):
+    except (ValueError, TypeError, OverflowError):
         raise ValueError(f"wanted: {wanted}") from None

@@ -41,12 +41,20 @@ class Most:
 
     def value(self, rows: Sequence[Row]) -> float:
         """Of the rows of a draw, with the sign changed; infinite where nothing was measured."""
-        values = [-float(row[self.column]) for row in rows if row["ended"] == JUDGED]
+        values = [-self._of(row) for row in rows if row["ended"] == JUDGED]
         return min((each for each in values if not math.isnan(each)), default=math.inf)
 
     def found(self, rows: Sequence[Row]) -> bool:
         """Whether the limit is passed."""
         return self.value(rows) < -self.limit
 
+    def _of(self, row: Row) -> float:
+        """Of a row; who does not arrive is later than all others."""
+        never = self.column == "arrival_s" and row["arrived"] < row["ugvs"]
+        return LATEST_S if never else float(row[self.column])
+
 
 Objective = Margin | Most
+
+LATEST_S = 1e9
+"""In place of infinity, which stands for what was not measured."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import itertools
+import uuid
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -122,19 +123,19 @@ def cluster(scheduler: str, timeout_s: float = 10.0) -> Iterator[Pool]:
 def _on_cluster(
     dask: Any, client: Any, work: Callable[[int], T], items: Iterable[int]
 ) -> Iterator[tuple[int, T | None]]:
-    """See `Pool`."""
-    waiting = iter(items)
+    """See `Pool`. A scheduler has one name for each item of all its clients; workers may come at any time."""
+    waiting, ours = iter(items), uuid.uuid4().hex
 
-    def submit(count: int) -> list[Any]:
-        some = itertools.islice(waiting, count)
-        return [client.submit(work, item, key=f"item-{item}", pure=False) for item in some]
+    def submit(under_way: int) -> list[Any]:
+        threads = sum(client.nthreads().values()) or 1
+        some = itertools.islice(waiting, max(0, AHEAD * threads - under_way))
+        return [client.submit(work, item, key=f"{ours}-{item}", pure=False) for item in some]
 
-    threads = sum(client.nthreads().values()) or 1
-    under_way = dask.as_completed(submit(AHEAD * threads), loop=client.loop)
+    under_way = dask.as_completed(submit(0), loop=client.loop)
     for future in under_way:
         item = int(future.key.rpartition("-")[2])
         yield item, _result(dask, future)
-        for more in submit(1):
+        for more in submit(under_way.count()):
             under_way.add(more)
 
 

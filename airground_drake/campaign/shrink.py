@@ -120,6 +120,10 @@ def _begun_later(data: Json) -> Iterator[Json]:
             yield _from(data, trace, first - spare)
 
 
+BESIDE_M = 1e-3
+"""From where a preset has ended to the waypoint that makes one of it."""
+
+
 def _from(data: Json, trace: Trace, t: float) -> Json:
     """The scenario from a time of its run on."""
     later = copy.deepcopy(data)
@@ -130,7 +134,9 @@ def _from(data: Json, trace: Trace, t: float) -> Json:
         motion = Motion.at_speed(waypoints, ugv["preset"]["speed_m_s"], start=0.0)
         here = trace.signals.loc[row, [f"{name}.ref_{axis}_m" for axis in "xyz"]].to_numpy(np.float64)
         ahead = motion.positions[motion.times > t + 1e-6]
-        ugv["preset"]["waypoints_m"] = [here.tolist(), *ahead.tolist()] if len(ahead) else [here.tolist()] * 2
+        if not len(ahead):  # where its preset has ended: two waypoints must differ
+            ahead = here[None] + [BESIDE_M, 0.0, 0.0]
+        ugv["preset"]["waypoints_m"] = [here.tolist(), *ahead.tolist()]
         ugv["start_m"] = trace.position(name)[row].tolist()
     uav = later["uav"]
     uav["start_m"] = trace.position(uav["name"])[row].tolist()

@@ -22,6 +22,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from airground_drake.arrays import LARGEST
 from airground_drake.campaign.course import Course
 from airground_drake.campaign.distributions import KINDS, Choice, Key, combinations, made, stream, values_of
 from airground_drake.campaign.rows import TIMES
@@ -30,9 +31,11 @@ from airground_drake.registry import RUN_CLAIMS
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.document import read_data
 from airground_drake.scenarios.load import from_data, load, shipped
-from airground_drake.scenarios.schema import MAX_NAME, Scenario
+from airground_drake.scenarios.schema import MAX_NAME, MAX_UGVS, Scenario
 from airground_drake.verify.finding import PLAIN_NAME
 
+MOST_OBSTACLES = 10_000
+"""That a course may draw."""
 KEYS = ("name", "title", "scenario", "runs", "seed", "set", "draw", "course", "claims", "marks")
 COURSE = "course"
 """Name of the random stream of maps and teams."""
@@ -267,10 +270,13 @@ def _course_value(value: Any, default: Any, source: str, key: str) -> Any:
     if isinstance(default, tuple):
         low, high = value if isinstance(value, list) and len(value) == 2 else (value, value)
         least = 1 if key.endswith("ugvs") else 0
-        if type(low) is not int or type(high) is not int or not least <= low <= high:
-            raise ScenarioError(source, key, value, f"wanted: a whole number from {least} on, or [least, most]")
+        most = MAX_UGVS if key.endswith("ugvs") else MOST_OBSTACLES
+        if type(low) is not int or type(high) is not int or not least <= low <= high <= most:
+            raise ScenarioError(source, key, value, f"wanted: a whole number from {least} to {most}, or [least, most]")
         return low, high
     share = key.endswith("hidden")
-    if isinstance(value, bool) or not isinstance(value, int | float) or not (0 <= value <= 1 if share else value > 0):
-        raise ScenarioError(source, key, value, "wanted: a share, 0 to 1" if share else "wanted: a positive number")
+    wrong = isinstance(value, bool) or not isinstance(value, int | float)
+    if wrong or not (0 <= value <= 1 if share else 0 < value <= LARGEST):
+        wanted = "a share, 0 to 1" if share else f"a positive number up to {LARGEST:g}"
+        raise ScenarioError(source, key, value, f"wanted: {wanted}")
     return float(value)

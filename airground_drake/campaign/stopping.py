@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 
 from airground_drake.campaign.rows import Row, is_tested
@@ -70,3 +70,22 @@ class Stopping:
         if self.below:
             return confidence_sequence(refuted + undecided, tested).high < self.value
         return confidence_sequence(refuted, tested).low > self.value
+
+
+class InOrder:
+    """Gives a rule the draws in the order of their numbers: that in which they end prefers those that are short."""
+
+    def __init__(self, rule: Stopping, wanted: Iterable[int]) -> None:
+        """Of these draws, by number."""
+        self._rule, self._wanted = rule, iter(wanted)
+        self._next = next(self._wanted, None)
+        self._waiting: dict[int, list[Row]] = {}
+
+    def met(self, index: int, rows: list[Row]) -> bool:
+        """One more draw has ended; whether those without a gap before them meet the rule now."""
+        self._waiting[index] = rows
+        met = False
+        while not met and self._next in self._waiting:
+            met = self._rule.met(self._waiting.pop(self._next))
+            self._next = next(self._wanted, None)
+        return met

@@ -140,5 +140,5 @@ def _happened(trace: Trace) -> Row:
 
 
 def _intervened(trace: Trace, ugv: str) -> float:
-    """For how long a UGV did what the UAV asked for, s; each row's state lasts until the next."""
-    return float(np.diff(trace.t) @ (trace.column(f"{ugv}.accepted")[:-1] != 0.0))
+    """For how long a UGV did what the UAV asked for, s; each row's state is in force up to it."""
+    return float(np.diff(trace.t) @ (trace.column(f"{ugv}.accepted")[1:] != 0.0))

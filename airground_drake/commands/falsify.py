@@ -142,6 +142,7 @@ def _save(search: Search, best: Best, path: Path, tests: int) -> None:
     """Write the scenario of the best point; beside it a small one, if it is a counterexample."""
     from airground_drake.campaign.shrink import shrink
     from airground_drake.scenarios.load import resolved
+    from airground_drake.scenarios.schema import MAX_NAME
 
     scenario = search.spec.scenario_of(search.values(best.point), 0)
     data = resolved(scenario)
@@ -151,7 +152,7 @@ def _save(search: Search, best: Best, path: Path, tests: int) -> None:
         if search.fails(alone):
             smaller, used = shrink(alone, search.fails, tests)
             small = _small(path)
-            _write(small, smaller | {"name": f"{scenario.name}_small"})
+            _write(small, smaller | {"name": f"{scenario.name[: MAX_NAME - len('_small')]}_small"})
             print(
                 f"made small with {used} runs: {len(smaller['ugvs'])} UGVs, {len(smaller['obstacles'])} obstacles, "
                 f"{smaller['duration_s']:g} s: airground report {argument(small)}"

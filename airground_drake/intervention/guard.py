@@ -9,6 +9,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
+_LONGEST_S = 1e9
+"""Thirty years: a timer takes no more than three hundred."""
 _AT_ONCE_S = 1e-6
 """The least that a timer is set to; 0 would turn it off."""
 
@@ -34,7 +36,7 @@ def time_limit(seconds: float, error: type[BaseException] = OutOfTime) -> Iterat
 
     outer, started = signal.getitimer(signal.ITIMER_REAL)[0], time.monotonic()
     before = signal.signal(signal.SIGALRM, interrupt)
-    signal.setitimer(signal.ITIMER_REAL, min(seconds, outer) if outer else seconds)
+    signal.setitimer(signal.ITIMER_REAL, min(seconds, outer or _LONGEST_S, _LONGEST_S))
     try:
         yield
     finally:

@@ -14,7 +14,7 @@ from airground_drake.campaign.evidence import evidence, strict
 from airground_drake.campaign.page import page
 from airground_drake.campaign.rows import COLUMNS, DIED, JUDGED, Row, blank
 from airground_drake.campaign.statistics import clopper_pearson, confidence_sequence
-from airground_drake.campaign.stopping import Stopping
+from airground_drake.campaign.stopping import InOrder, Stopping
 from airground_drake.campaign.work import died
 from airground_drake.errors import UnknownNameError
 
@@ -149,3 +149,17 @@ def test_rules_that_are_none() -> None:
         Stopping.parse("SAFE-INV < 0.1")
     with pytest.raises(UnknownNameError, match=r"allowed: SAFE-TRACE$"):
         Stopping.parse("COMM < 0.1", ["SAFE-TRACE"])
+
+
+def test_a_rule_is_given_draws_in_their_order_however_they_end() -> None:
+    """Else those that end soon would decide, and what takes long, and fails, would come too late."""
+    seen = list[int]()
+
+    class Rule(Stopping):
+        def met(self, rows: list[Row]) -> bool:
+            seen.append(rows[0]["index"])
+            return rows[0]["index"] == 3
+
+    in_order = InOrder(Rule("SAFE-TRACE", below=True, value=0.1), [0, 1, 3, 4])
+    met = [in_order.met(index, [row(index)]) for index in (4, 1, 3, 0)]
+    assert (met, seen) == ([False, False, False, True], [0, 1, 3])

@@ -36,6 +36,19 @@ def test_the_same_on_a_cluster_of_two_workers() -> None:
     assert sorted(found) == [(item, 3 * item) for item in range(40)]
 
 
+def test_campaigns_that_share_a_scheduler_get_their_own_results() -> None:
+    distributed = pytest.importorskip("distributed")
+    options = {"n_workers": 2, "threads_per_worker": 1, "processes": False, "dashboard_address": ":0"}
+    with (
+        distributed.LocalCluster(**options) as here,
+        cluster(here.scheduler_address) as one,
+        cluster(here.scheduler_address) as other,
+    ):
+        found = list(zip(one(partial(times, 3), range(20)), other(partial(times, 7), range(20)), strict=True))
+    assert sorted(each for each, _ in found) == [(item, 3 * item) for item in range(20)]
+    assert sorted(each for _, each in found) == [(item, 7 * item) for item in range(20)]
+
+
 def test_an_item_that_has_killed_its_workers_is_given_up_and_what_work_raises_is_raised() -> None:
     distributed = pytest.importorskip("distributed")
 

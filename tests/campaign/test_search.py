@@ -65,6 +65,9 @@ def test_objectives() -> None:
     most = Most("intervened_s", 3.0)
     assert most.value([row(), row(intervened_s=2.5), row(intervened_s=float("nan"))]) == -2.5
     assert (most.found([row()]), most.found([row(intervened_s=3.5)])) == (False, True)
+    last = Most("arrival_s", 20.0)
+    assert last.found([row(arrival_s=9.0, arrived=1, ugvs=2)]), "one that never arrives is later than any limit"
+    assert last.value([row(arrival_s=9.0, arrived=2, ugvs=2)]) == -9.0
 
 
 def test_what_does_not_matter_goes(monkeypatch: pytest.MonkeyPatch) -> None:
