@@ -14,6 +14,7 @@ from check.tampering.base import (
     edited_obligation,
     edited_report,
     ignored,
+    read_json,
     refused_by,
     seal_certificate,
     write,
@@ -230,6 +231,58 @@ def rounding_of_the_dwell_hidden(folder: Path) -> None:
     with edited_claim(folder, "ZENO-PROOF", "") as claim:
         claim["evidence"]["rounding_s"] = 0.0
         claim["margin"] = 1e-9
+
+
+def refute_zeno_proof(folder: Path, rows: list[tuple[float, float, str, bool]]) -> None:
+    """Make ZENO-PROOF a refutation by a run: time, s, x over the threshold, mode and trigger of each row."""
+    with edited_claim(folder, "ZENO-PROOF", "") as claim:
+        zeta, bound = claim["inputs"]["zeta_m"], claim["inputs"]["min_inter_event_s"]
+        run = [
+            {"t_s": when, "x_m": share * zeta, "mode": mode, "trigger": trigger} for when, share, mode, trigger in rows
+        ]
+        times = [row["t_s"] for row in run if row["trigger"]]
+        gap = times[1] - times[0]
+        evidence = {key: claim["evidence"][key] for key in ("bound_s", "conformance", "rounding_s")}
+        claim.update(
+            status="refuted", as_expected=False, margin=gap - bound, where={}, exercised=None,
+            evidence=evidence | {"spacer": "violated"},
+            counterexample={"run": run, "gap_s": gap, "bound_s": bound, "replayed": True},
+        )  # fmt: skip
+
+
+def bound_of_zeno_proof(folder: Path) -> float:
+    """The bound, s, which is the dwell."""
+    bound: float = claim_of(read_json(folder / "report.json"), "ZENO-PROOF", "")["inputs"]["min_inter_event_s"]
+    return bound
+
+
+@refused_by("ZENO-PROOF", "two triggers are closer than the bound", run="")
+def refuted_by_a_gap_that_is_the_bound(folder: Path) -> None:
+    bound = bound_of_zeno_proof(folder)
+    rest = (bound / 2.0, 0.0, "REFRACTORY", False)
+    refute_zeno_proof(folder, [(0.0, 1.0, "INTERVENING", True), rest, (bound, 1.0, "INTERVENING", True)])
+
+
+@refused_by("ZENO-PROOF", "mode of the automaton", run="")
+def refuted_by_rounding(folder: Path) -> None:
+    """The rounded sum of a time and the dwell is reached a little before the dwell is over."""
+    bound = bound_of_zeno_proof(folder)
+    early = next(t for k in range(1, 10_000) if Fraction((t := k / 10.0) + bound) < Fraction(t) + Fraction(bound))
+    rest = (early + bound / 2.0, 0.0, "REFRACTORY", False)
+    last = (early + bound, 1.0, "INTERVENING", True)
+    refute_zeno_proof(folder, [(early, 1.0, "INTERVENING", True), rest, last])
+
+
+@refused_by("ZENO-PROOF", "time goes on in a run", run="")
+def refuted_by_a_run_backwards_in_time(folder: Path) -> None:
+    released = (20.0, 0.0, "SUPERVISING", False)
+    refute_zeno_proof(folder, [(10.0, 1.0, "INTERVENING", True), released, (9.9, 1.0, "INTERVENING", True)])
+
+
+@refused_by("ZENO-PROOF", "a run begins at 0 or later", run="")
+def refuted_by_a_run_before_the_start(folder: Path) -> None:
+    released = (-1.0, 0.0, "SUPERVISING", False)
+    refute_zeno_proof(folder, [(-2.0, 1.0, "INTERVENING", True), released, (-0.9, 1.0, "INTERVENING", True)])
 
 
 @refused_by("SAFE-INV", "an obligation is proved", run="")
