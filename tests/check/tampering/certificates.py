@@ -147,6 +147,30 @@ def only_half_of_the_claim_shown(folder: Path) -> None:
         obligations[:] = [one for one in obligations if one["name"].endswith("_bound")]
 
 
+@refused_by("SAFE-INV", "the obligation is one of the claim's", run="")
+def obligation_invented(folder: Path) -> None:
+    """It expands, and follows from anything: its premise is false."""
+    invented = {
+        "name": "never_collides", "says": "no robot ever collides", "variables": [], "goal": "1", "hypotheses": {},
+        "strict": {"false": "-1"}, "equations": {}, "multiplier": [], "equation_multipliers": {},
+        "certificate": [{"coefficient": "1", "factors": [], "square": "1"}],
+    }  # fmt: skip
+    with edited_certificate(folder, "SAFE-INV") as obligations:
+        obligations.append(invented)
+    with edited_claim(folder, "SAFE-INV", "") as claim:
+        listed = claim["evidence"]["obligations"]
+        listed.append({**listed[0], "name": "never_collides"})
+        claim["exercised"] += 1
+
+
+@refused_by("LIVE-WAIT", "the obligation is one of the claim's", run="")
+def obligation_of_another_claim_put_in(folder: Path) -> None:
+    with edited_certificate(folder, "SAFE-LEMMA") as others:
+        borrowed = others[0]
+    with edited_certificate(folder, "LIVE-WAIT") as obligations:
+        obligations.append(borrowed)
+
+
 def without_obligation(folder: Path, claim: str, name: str) -> None:
     """Remove an obligation from a certificate and from the evidence."""
     with edited_certificate(folder, claim) as obligations:
