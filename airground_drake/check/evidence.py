@@ -86,7 +86,13 @@ AS_RECORDED: Mapping[str, tuple[str, ...]] = {
     "THR-ISO": ("evidence.conformance.steps", "evidence.conformance.within_rounding"),
     "THR-ROOT": ("evidence.cvc5_on_two_roots", "evidence.cvc5_says"),
     "THR-OPT": ("evidence.difference_quotient_with_deviation_ahead_1_m",),
-    "THR-DDM": ("evidence.pyddm",),
+    "THR-DDM": (
+        "evidence.pyddm",
+        *(
+            f"evidence.comparisons.*.{key}"
+            for key in ("wrong_decisions", "periods_sum", "periods_sum_of_squares")
+        ),
+    ),
 }  # fmt: skip
 """Keys of values that are taken as recorded, by claim: nothing here establishes them, and no verdict rests on them but
 where docs/checker.md says so."""

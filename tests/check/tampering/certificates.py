@@ -568,6 +568,65 @@ def variance_negative(folder: Path) -> None:
     edit_comparisons(folder, edit)
 
 
+def edit_comparison(folder: Path, **changes: Any) -> None:
+    """Change keys of the first comparison of THR-DDM, in the evidence and in the certificate."""
+
+    def edit(rows: list[Any]) -> None:
+        rows[0].update(changes)
+
+    edit_comparisons(folder, edit)
+
+
+@refused_by("THR-DDM", "numbers of a comparison", run="")
+def margin_of_a_comparison_changed(folder: Path) -> None:
+    edit_comparison(folder, margin=99.0)
+
+
+@refused_by("THR-DDM", "numbers of a comparison", run="")
+def score_of_a_comparison_changed(folder: Path) -> None:
+    edit_comparison(folder, z_score=0.0)
+
+
+@refused_by("THR-DDM", "quantities", run="")
+def unit_of_a_comparison_changed(folder: Path) -> None:
+    edit_comparison(folder, unit="h")
+
+
+@refused_by("THR-DDM", "what a comparison consists of", run="")
+def praise_put_into_a_comparison(folder: Path) -> None:
+    edit_comparison(folder, proved_by_experts=True)
+
+
+@refused_by("THR-DDM", "constants of an experiment", run="")
+def seed_of_an_experiment_changed(folder: Path) -> None:
+    def edit(rows: list[Any]) -> None:
+        for row in rows[:2]:
+            row["constants"]["seed"] = 1
+
+    edit_comparisons(folder, edit)
+
+
+@refused_by("THR-DDM", "counts of an experiment are whole numbers", run="")
+def half_a_period_counted(folder: Path) -> None:
+    def edit(rows: list[Any]) -> None:
+        for row in rows[:2]:
+            row["periods_sum"] += 0.5
+
+    edit_comparisons(folder, edit)
+
+
+@refused_by("THR-DDM", "numbers of all comparisons", run="")
+def quantile_of_all_comparisons_changed(folder: Path) -> None:
+    with edited_certificate(folder, "THR-DDM", "paths.json") as paths:
+        paths["normal_quantile"] = 9.0
+
+
+@refused_by("THR-DDM", "what paths.json consists of", run="")
+def praise_put_into_the_paths(folder: Path) -> None:
+    with edited_certificate(folder, "THR-DDM", "paths.json") as paths:
+        paths["proved_by_experts"] = 1
+
+
 def counts(folder: Path) -> pd.DataFrame:
     """The trigger counts of ZENO-REFINE."""
     return pd.read_csv(folder / "certificates" / "ZENO-REFINE" / "counts.csv")
