@@ -467,29 +467,116 @@ def statement(saved: Any, name: str) -> Any:
     return next(one for one in saved["statements"] if one["name"] == name)
 
 
-@refused_by("THR-OPT", "a sign is right", run="")
+IS_THE_CLAIMS = "the statement is the claim's"
+
+
+@refused_by("THR-OPT", IS_THE_CLAIMS, run="")
 def sign_turned(folder: Path) -> None:
     with statements(folder, "THR-OPT") as saved:
         statement(saved, "printed_risk")["sign"] = "<"
 
 
-@refused_by("THR-OPT", "a derivative is right", run="")
+@refused_by("THR-OPT", IS_THE_CLAIMS, run="")
 def derivative_changed(folder: Path) -> None:
     with statements(folder, "THR-OPT") as saved:
         one = statement(saved, "factorisation")
         one["derivative"] = one["derivative"].replace("+u)", "-u)")
 
 
-@refused_by("THR-OPT", "an expression has + - * / **, integers, names and exp", run="")
+@refused_by("THR-OPT", IS_THE_CLAIMS, run="")
 def code_in_a_statement(folder: Path) -> None:
     with statements(folder, "THR-OPT") as saved:
         statement(saved, "printed_risk")["expression"] = "open('x')"
 
 
-@refused_by("THR-OPT", "statements in the evidence", run="")
+@refused_by("THR-OPT", "statements of the claim", run="")
 def statement_removed(folder: Path) -> None:
     with statements(folder, "THR-OPT") as saved:
         saved["statements"].remove(statement(saved, "printed_risk"))
+
+
+@refused_by("THR-OPT", IS_THE_CLAIMS, run="")
+def statements_that_say_nothing(folder: Path) -> None:
+    """All names are there, but for those that enclose the turn they stand for 1 > 0."""
+    with statements(folder, "THR-OPT") as saved:
+        for one in saved["statements"]:
+            if not one["name"].startswith("turn"):
+                nothing = {"kind": "sign", "expression": "1", "sign": ">", "values": {}}
+                kept = {key: one[key] for key in ("name", "says")}
+                one.clear()
+                one.update(nothing | kept)
+
+
+@refused_by("THR-ROOT", "statements of the claim", run="")
+def statements_all_removed(folder: Path) -> None:
+    with statements(folder, "THR-ROOT") as saved:
+        saved["statements"] = []
+    with edited_claim(folder, "THR-ROOT", "") as claim:
+        claim["evidence"]["statements"] = {}
+        claim["exercised"] = 0
+
+
+@refused_by("THR-ROOT", "statements of the claim", run="")
+def statement_invented(folder: Path) -> None:
+    with statements(folder, "THR-ROOT") as saved:
+        one = {"kind": "sign", "name": "safe", "says": "", "expression": "1", "sign": ">", "values": {}}
+        saved["statements"].append(one)
+    with edited_claim(folder, "THR-ROOT", "") as claim:
+        claim["evidence"]["statements"]["safe"] = "true"
+        claim["exercised"] += 1
+
+
+@refused_by("THR-OPT", IS_THE_CLAIMS, run="")
+def statement_about_another_place(folder: Path) -> None:
+    """True, but at 1 and not at the ends of what is enclosed."""
+    with statements(folder, "THR-OPT") as saved:
+        statement(saved, "root_above")["values"]["u"] = "1"
+
+
+@refused_by("THR-OPT", "the enclosure is narrow", run="")
+def turn_enclosed_widely(folder: Path) -> None:
+    with statements(folder, "THR-OPT") as saved:
+        statement(saved, "turn_below")["values"]["u"] = "2"
+
+
+@refused_by("THR-OPT", "what is enclosed", run="")
+def enclosure_invented(folder: Path) -> None:
+    with statements(folder, "THR-OPT") as saved:
+        saved["enclosures"]["safe_m"] = ["1", "1"]
+    with edited_claim(folder, "THR-OPT", "") as claim:
+        claim["evidence"]["enclosures"]["safe_m"] = [1.0, 1.0]
+
+
+def edit_enclosure(folder: Path, name: str, ends: list[Fraction], **values: Fraction) -> None:
+    """Change something that THR-OPT encloses everywhere, and values of statements by name, with `__` for the key."""
+    with statements(folder, "THR-OPT") as saved:
+        saved["enclosures"][name] = [str(end) for end in ends]
+        for place, value in values.items():
+            one, _, key = place.partition("__")
+            statement(saved, one)["values"][key] = str(value)
+    with edited_claim(folder, "THR-OPT", "") as claim:
+        claim["evidence"]["enclosures"][name] = [float(end) for end in ends]
+
+
+@refused_by("THR-OPT", "the enclosure is narrow", run="")
+def drift_made_up(folder: Path) -> None:
+    edit_enclosure(folder, "drift_low_m_s", [Fraction(1), Fraction(1)])
+
+
+@refused_by("THR-OPT", IS_THE_CLAIMS, run="")
+def drift_moved(folder: Path) -> None:
+    edit_enclosure(folder, "drift_high_m_s", [Fraction(1), 1 + Fraction(1, 10**13)])
+
+
+@refused_by("THR-OPT", "a sign is right", run="")
+def slope_moved_with_its_statements(folder: Path) -> None:
+    low, high = Fraction(1), 1 + Fraction(1, 10**9)
+    edit_enclosure(folder, "ahead_slope_1_m", [low, high], ahead_from__bound=low, ahead_to__bound=high)
+
+
+@refused_by("THR-OPT", "the enclosure is narrow", run="")
+def slope_made_up(folder: Path) -> None:
+    edit_enclosure(folder, "ahead_slope_1_m", [Fraction(1), Fraction(1)])
 
 
 @refused_by("THR-ROOT", "the code's threshold is the root", run="")
