@@ -333,6 +333,102 @@ def broken_bound_recorded(folder: Path) -> None:
         claim["evidence"]["runs"][0]["broken"] = 1
 
 
+def pass_a_bound(folder: Path, **counts: int) -> None:
+    """Let the run whose margin is SAFE-DIST's come 0.5 m nearer than its bound, and say so as the margin."""
+    with edited_claim(folder, "SAFE-DIST", "") as claim:
+        row = next(row for row in claim["evidence"]["runs"] if row["scene"] == claim["where"]["scene"])
+        row["where"]["distance_m"] = row["where"]["bound_m"] - 0.5
+        row.update(worst_margin_m=-0.5, **counts)
+        claim["margin"] = -0.5
+
+
+@refused_by("SAFE-DIST", "bounds passed by a disturbed run", run="")
+def passed_bound_recorded(folder: Path) -> None:
+    pass_a_bound(folder)
+
+
+@refused_by("SAFE-DIST", "margin of a run that met all inequalities", run="")
+def passed_bound_recorded_as_uncovered(folder: Path) -> None:
+    pass_a_bound(folder, uncovered=1)
+
+
+@refused_by("SAFE-DIST", "inequalities missed by a disturbed run", run="")
+def passed_bound_recorded_as_unmet(folder: Path) -> None:
+    """What missed its inequalities is not covered by the claim; then something has to be missed."""
+    pass_a_bound(folder, uncovered=1, unmet=1)
+
+
+@refused_by("SAFE-DIST", "scenes of the disturbed runs", run="")
+def scenes_all_removed_but_the_best(folder: Path) -> None:
+    with edited_claim(folder, "SAFE-DIST", "") as claim:
+        runs = claim["evidence"]["runs"]
+        runs[:] = [row for row in runs if row["scene"] == "uav_low"]
+        claim["margin"] = runs[0]["worst_margin_m"]
+        claim["where"] = {key: runs[0]["where"][key] for key in ("scene", "attack", "robot", "t_s")}
+
+
+@refused_by("SAFE-DIST", "steps of the disturbed runs", run="")
+def disturbed_run_of_one_step(folder: Path) -> None:
+    with edited_claim(folder, "SAFE-DIST", "") as claim:
+        claim["evidence"]["runs"][0]["steps"] = 1
+
+
+@refused_by("SAFE-GATE", "slack of a layer that missed nothing", run="")
+def slack_of_the_layer_below_zero(folder: Path) -> None:
+    with edited_claim(folder, "SAFE-GATE", "") as claim:
+        claim["evidence"]["layer"][0]["worst_slack_m_s"] = claim["margin"] = -5.0
+
+
+@refused_by("SAFE-INV", "slack of a layer that missed nothing", run="")
+def slack_of_the_composition_below_zero(folder: Path) -> None:
+    with edited_claim(folder, "SAFE-INV", "") as claim:
+        claim["evidence"]["composition"]["worst_slack_m_s"] = -5.0
+
+
+@refused_by("SAFE-GATE", "inequalities missed by the running controller", run="")
+def miss_of_the_controller_without_its_count(folder: Path) -> None:
+    with edited_claim(folder, "SAFE-GATE", "") as claim:
+        claim["evidence"]["controller"][0]["worst_missed_by_m_s"] = 7.0
+
+
+@refused_by("SAFE-GATE", "controllers attacked", run="")
+def controller_not_attacked(folder: Path) -> None:
+    with edited_claim(folder, "SAFE-GATE", "") as claim:
+        claim["evidence"]["controller"].clear()
+
+
+@refused_by("LIVE-GATE", "runs of the running code", run="")
+def run_on_a_way_invented(folder: Path) -> None:
+    with edited_claim(folder, "LIVE-GATE", "") as claim:
+        invented = {"samples": 0, "given_back": False, "largest_excess_m": -1.0, "over_after_s": 1.0}
+        claim["evidence"]["runs"] = [invented]
+        claim["margin"] = claim["inputs"]["lag_m"] + 1.0
+
+
+def change_runs_on_ways(folder: Path, **changes: float) -> None:
+    """Change all runs of LIVE-GATE, and its margin with them."""
+    with edited_claim(folder, "LIVE-GATE", "") as claim:
+        for row in claim["evidence"]["runs"]:
+            row.update(changes)
+        excess = max(row["largest_excess_m"] for row in claim["evidence"]["runs"])
+        claim["margin"] = claim["inputs"]["lag_m"] - excess
+
+
+@refused_by("LIVE-GATE", "excess of a run's lag", run="")
+def lag_below_the_first_one(folder: Path) -> None:
+    change_runs_on_ways(folder, largest_excess_m=-1.0)
+
+
+@refused_by("LIVE-GATE", "samples of a run on a way", run="")
+def runs_without_samples(folder: Path) -> None:
+    change_runs_on_ways(folder, samples=0)
+
+
+@refused_by("LIVE-GATE", "when a run on a way is over", run="")
+def runs_over_at_another_time(folder: Path) -> None:
+    change_runs_on_ways(folder, over_after_s=1.0)
+
+
 @refused_by("SAFE-DIST", "least distances", run="")
 def bound_of_a_disturbed_run_changed(folder: Path) -> None:
     with edited_claim(folder, "SAFE-DIST", "") as claim:
