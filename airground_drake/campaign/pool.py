@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import itertools
+import threading
 import uuid
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -18,6 +19,8 @@ AHEAD = 4
 """Items that are handed out beforehand for each process."""
 IDLE_S = 300.0
 """A process that has had nothing to do for so long ends, s."""
+ENDING_S = 5.0
+"""A thread of the pool that has ended has so long to end, s."""
 THREADS = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL", "BLIS", "NUMEXPR")}
 """Environment of the processes: one thread each for numerical libraries."""
 
@@ -41,11 +44,14 @@ def local(jobs: int) -> Iterator[Pool]:
     """So many processes of this machine, which end in the end."""
     import loky  # takes a while, which other commands need not wait for
 
+    others = set(threading.enumerate())
     try:
         yield partial(_locally, jobs)
     finally:
         loky.get_reusable_executor(reuse=True).shutdown(wait=True, kill_workers=True)
         gc.collect()  # its semaphores are in cycles; those that are left when the command ends would be warned of
+        for thread in set(threading.enumerate()) - others:  # that which feeds a queue holds semaphores until it ends
+            thread.join(ENDING_S)
 
 
 def _locally(jobs: int, work: Callable[[int], T], items: Iterable[int]) -> Iterator[tuple[int, T | None]]:

@@ -21,7 +21,7 @@ establishes.
     polynomials, certificates  SAFE-LEMMA, SAFE-INV, SAFE-GATE, SAFE-DIST, ZENO-PROOF, LIVE-GATE, LIVE-WAIT, THR-ISO;
                                obligations.json
     conformance                what their records say besides: that running code conforms, and what rounding takes
-    enclosures                 THR-ROOT, THR-OPT
+    statements, enclosures     THR-ROOT, THR-OPT: what they consist of, and whether it is true
     statistics                 THR-DDM, ZENO-REFINE
     inputs                     the constants that a claim about the model must be about
     evidence                   what of a claim's entry is established, and what is taken as recorded

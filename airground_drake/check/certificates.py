@@ -13,11 +13,11 @@ An identity may prove something else than the claim. What a claim consists of is
 
     {"goal": polynomial, "nonnegative": [...], "positive": [...], "zero": [...]},
 
-the goal to be shown and the premises that may be used, no others: hypotheses, strict ones and equations. Names in
-capitals (DWELL, BOUND, GAIN, PERIOD) are numbers of the scenario. That these obligations together make the claim is the
-argument in the claim's own text. Some are there again with the scenario's numbers, `inside_obstacle` for `inside`
-between robots and obstacles and so on: then the numbers are put into goal and premises, and a premise that has become a
-number must be a true one.
+the goal to be shown and the premises that may be used, no others: hypotheses, strict ones and equations. There are no
+other obligations: whatever is named as proved is what the claim is said to consist of. Names in capitals (DWELL, BOUND,
+GAIN, PERIOD) are numbers of the scenario. That these obligations together make the claim is the argument in the claim's
+own text. Some are there again with the scenario's numbers, `inside_obstacle` for `inside` between robots and obstacles
+and so on: then the numbers are put into goal and premises, and a premise that has become a number must be a true one.
 """
 
 from __future__ import annotations
@@ -131,8 +131,11 @@ def listed() -> Json:
 
 
 def _consists_of_the_claim(claim: str, obligations: Mapping[str, Json], scenario: Json) -> None:
-    """Every obligation of the claim is there, with its goal and no premise besides; also with numbers."""
-    for name, (form, numbers) in _wanted(claim, scenario).items():
+    """The obligations of the claim are there, and no others, with their goals and no premise besides."""
+    wanted = _wanted(claim, scenario)
+    for name in obligations:
+        holds("the obligation is one of the claim's", name in wanted, name, str([*wanted]), about=name)
+    for name, (form, numbers) in wanted.items():
         holds("the obligation is there", name in obligations, "nothing", form["goal"], about=name)
         _is_the_listed_one(obligations[name], form, numbers)
 

@@ -20,6 +20,10 @@ SHORTEST_S = 1e-3
 ROUNDOFF = 2.0**-53
 ALIKE = 1e-9
 """Numbers that follow from the scenario alone differ by less, relative."""
+STEPS_UNDER_ATTACK = 4 * 250
+"""Control periods that a scene of SAFE-DIST is run for: under four attacks."""
+WAYS, LEGS = 4, 3
+"""Runs of LIVE-GATE, and legs of the way of each."""
 _CONFORMS: Json = {"conformance": {"agrees": True, "first_difference": None}}
 _MET: Json = {"met": True, "missed": 0, "first_missed": None}
 _WIRED: Json = {"agrees": True, "differences": 0, "first_difference": None}
@@ -36,6 +40,7 @@ def _recorded_of_inv(claim: Json, scenario: Json) -> Found:
     same("the running code conforms", evidence["conformance"]["agrees"], True)
     same("the running composition met its inequalities", evidence["composition"]["met"], True)
     same("inequalities missed by the composition", evidence["composition"]["missed"], 0)
+    _nothing_was_missed(evidence["composition"])
     _wiring(evidence["wiring"], scenario)
     h, reach = rational(scenario["control"]["period_s"]), rational(scenario["control"]["sensing_range_m"])
     spare = {
@@ -84,6 +89,12 @@ def _wiring(recorded: Json, scenario: Json) -> None:
             holds("an inequality of every two robots was seen to bind", bound > 0, bound, "1 or more", about=kind)
 
 
+def _nothing_was_missed(layer: Json) -> None:
+    """The slack of a running layer that met all its inequalities is not below 0."""
+    slack = layer["worst_slack_m_s"]
+    holds("slack of a layer that missed nothing", slack >= 0.0, slack, "0 or more", about=layer["composition"])
+
+
 def _recorded_of_gate(claim: Json, scenario: Json) -> Found:
     """The proof is about the augmented composition; the running layer and controller missed no inequality."""
     evidence, compositions = claim["evidence"], claim["inputs"]["method_d"]["compositions"]
@@ -92,11 +103,14 @@ def _recorded_of_gate(claim: Json, scenario: Json) -> Found:
     same("compositions attacked", [layer["composition"] for layer in evidence["layer"]], compositions)
     for layer in evidence["layer"]:
         same("the running layer met its inequalities", [layer["met"], layer["missed"]], [True, 0])
+        _nothing_was_missed(layer)
     same("compositions wired", [each["composition"] for each in evidence["wiring"]], compositions)
     for wired in evidence["wiring"]:
         _wiring(wired, scenario)
+    same("controllers attacked", len(evidence["controller"]), len(compositions))
     for team in evidence["controller"]:
-        same("inequalities missed by the running controller", team["missed"], 0)
+        nothing = [team["missed"], team["worst_missed_by_m_s"]]
+        same("inequalities missed by the running controller", nothing, [0, 0.0])
     worst = min(layer["worst_slack_m_s"] for layer in evidence["layer"])
     lowest = [layer["composition"] for layer in evidence["layer"] if layer["worst_slack_m_s"] == worst]
     holds("where the margin is attained", claim["where"]["composition"] in lowest, claim["where"], str(lowest))
@@ -105,7 +119,7 @@ def _recorded_of_gate(claim: Json, scenario: Json) -> Found:
     return found.having_judged(
         "where.composition", "evidence.method_d", "evidence.layer.*.composition", "evidence.layer.*.worst_slack_m_s",
         "evidence.wiring.*.composition", "evidence.wiring.*.views.*",
-        "evidence.controller.*.missed",
+        "evidence.controller.*.missed", "evidence.controller.*.worst_missed_by_m_s",
     )  # fmt: skip
 
 
@@ -120,19 +134,47 @@ def _recorded_of_dist(claim: Json, scenario: Json) -> Found:
     pairs = {(kind.safe_m, kind.share) for kind in (*kinds_of(scenario), *with_a_point)}
     pairs.add((float(scenario["safe_distance"]["obstacle_m"]), 1.0))
     admitted = {safe - w / share / gain: safe for safe, share in pairs}
+    same("scenes of the disturbed runs", [row["scene"] for row in evidence["runs"]], _scenes(scenario))
     for row in evidence["runs"]:
         same("bounds broken by a disturbed run", row["broken"], 0, about=row["scene"])
         _worst_of_a_disturbed_run(row, admitted)
+        _misses_of_a_disturbed_run(row)
     covered = [row["worst_margin_m"] for row in evidence["runs"] if not row["unmet"]]
+    holds("a disturbed run met all inequalities", bool(covered), "none", "one or more")
     lowest = [row["where"] for row in evidence["runs"] if row["worst_margin_m"] == min(covered)]
     places = [{key: where[key] for key in ("scene", "attack", "robot", "t_s")} for where in lowest]
     holds("where the margin is attained", claim["where"] in places, claim["where"], str(places))
     found = Found.with_margin("proved", min(covered), within=0.0, disturbance_m_s=w, **_CONFORMS)
     return found.having_judged(
         "where.*", "evidence.least_distances_m.*", "evidence.runs.*.scene", "evidence.runs.*.broken",
-        "evidence.runs.*.worst_margin_m",
+        "evidence.runs.*.worst_margin_m", "evidence.runs.*.steps",
         *(f"evidence.runs.*.where.{key}" for key in ("scene", "distance_m", "bound_m", "safe_distance_m")),
     )  # fmt: skip
+
+
+def _scenes(scenario: Json) -> list[str]:
+    """What the disturbed runs start from: of two UGVs only where the scenario has two."""
+    of_two = ["ugv_pair", "squeezed"] if len(scenario["ugvs"]) > 1 else []
+    return ["obstacle", "notch", "gap", "triangle", "uav_low", *of_two, "field"]
+
+
+def _misses_of_a_disturbed_run(row: Json) -> None:
+    """Inequalities are missed by more than 1e-9 m/s, or none is; a bound is passed by more than 1e-9 m, or none is.
+
+    Of a run that missed none no bound is passed: whatever passes one would have broken it.
+    """
+    about, passed = row["scene"], row["uncovered"] + row["broken"]
+    same("steps of the disturbed runs", row["steps"], STEPS_UNDER_ATTACK, about=about)
+    for key in ("unmet", "uncovered"):
+        count = row[key]
+        holds("counts of a disturbed run", type(count) is int and count >= 0, count, "0, 1, ...", about=about)
+    shortfall = row["worst_shortfall_m_s"]
+    missed = [row["unmet"] > 0, shortfall >= 0.0]
+    same("inequalities missed by a disturbed run", missed, [shortfall > SMALL, True], about=about)
+    margin = row["worst_margin_m"]
+    same("bounds passed by a disturbed run", passed > 0, margin < -SMALL, about=about)
+    if not row["unmet"]:
+        holds("margin of a run that met all inequalities", margin >= -SMALL, margin, "-1e-9 or more", about=about)
 
 
 def _worst_of_a_disturbed_run(row: Json, bounds_m: Mapping[float, float]) -> None:
@@ -179,14 +221,32 @@ def _recorded_of_live(claim: Json, scenario: Json) -> Found:
     gain = control["intervention_gain_1_s"]
     at_most("gain times period", gain * control["period_s"], 1.0)
     close("disturbance allowed", evidence["disturbance_m_s"], gain * gate["lag_m"], within=SMALL)
-    holds("the running code was run", bool(evidence["runs"]), "no run", "some")
+    same("runs of the running code", len(evidence["runs"]), WAYS)
     for row in evidence["runs"]:
         same("given back before its time", row["given_back"], False)
-        at_most("excess of a run's lag", row["largest_excess_m"], gate["lag_m"], within=SMALL)
+        excess = row["largest_excess_m"]
+        holds("excess of a run's lag, which has none at first", excess >= 0.0, excess, "0 or more")
+        at_most("excess of a run's lag", excess, gate["lag_m"], within=SMALL)
+        _samples_of_a_way(row, scenario)
     excess = max(row["largest_excess_m"] for row in evidence["runs"])
     return Found.with_margin("proved", gate["lag_m"] - excess, within=SMALL).having_judged(
-        "evidence.disturbance_m_s", "evidence.runs.*.given_back"
+        "evidence.disturbance_m_s", *(f"evidence.runs.*.{key}" for key in ("given_back", "samples", "over_after_s"))
     )
+
+
+def _samples_of_a_way(row: Json, scenario: Json) -> None:
+    """It is decided on once per period, the first time at 0, and is over at the first or second one after its end.
+
+    Each leg takes 3 s, or 3/10 of the longest try if that is less, and at least a control period.
+    """
+    gate, h = scenario["gatekeeper"], scenario["control"]["period_s"]
+    period = round(gate["period_s"] / h) * h
+    end = LEGS * max(1, round(min(3.0, 0.3 * gate["longest_s"]) / h)) * h
+    samples, over = row["samples"], row["over_after_s"]
+    possible = type(samples) is int and end - SMALL <= (samples - 1) * period <= end + 2.0 * period + SMALL
+    until = f"one per {period:.9g} s from 0 to {end:.9g} s"
+    holds("samples of a run on a way", possible, samples, until)
+    close("when a run on a way is over", over, (samples - 1) * period, within=SMALL)
 
 
 def _recorded_of_wait(claim: Json, scenario: Json) -> Found:

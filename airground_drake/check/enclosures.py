@@ -7,6 +7,7 @@ different signs. With q = exp u the Bayes risk is
     B(u) = c1 k/2 u (q - 1)/(q + 1) + c2/(q + 1),    dB/du = c1 q/(q + 1)^2 f(u):
 
 it falls up to the root and rises beyond it, so that the root of the printed equation, with 1/r, has a larger risk.
+The statements of a certificate are those of `statements.py`, each about what the certificate encloses.
 """
 
 from __future__ import annotations
@@ -16,23 +17,35 @@ import hashlib
 import random
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from decimal import Decimal, localcontext
+from decimal import MAX_EMAX, MIN_EMIN, Decimal, localcontext
 from fractions import Fraction
 from typing import Any
 
 from .files import Files, Json, content_of, parse_json
 from .polynomials import bounded, number, rational
 from .rules import SMALL, Disagreement, Found, NotEstablished, close, holds, same
+from .statements import (
+    LEVEL,
+    Ends,
+    are_the_claims,
+    of_a_deviation,
+    of_no_drift,
+    of_the_minimum,
+    of_the_printed_root,
+    of_the_root,
+    of_the_turn,
+    of_two_drifts,
+)
 
 DIGITS = 100
 NARROW = Fraction(1, 10**12)
 """Enclosures are at most this wide, and the code's threshold at most this far outside, relative."""
-LONGEST = 5000
-"""Characters of an expression; more would take for ever."""
+SLOPE_NARROW = Fraction(1, 10**8)
+"""Bounds of a slope are at most this far apart, relative."""
+BESIDE = Fraction(1e-12)
+"""At most so far from the code's threshold, relative, is where dB/dzeta changes its sign."""
 HIGHEST = 12
 """Power in an expression."""
-MOST_STATEMENTS = 200
-"""In a certificate."""
 
 
 @dataclass(frozen=True)
@@ -86,26 +99,89 @@ def root(claim: Json, files: Files, scenario: Json) -> Found:
     if claim["status"] == "refuted":
         raise NotEstablished("a refutation is established again", "no way is known here")
     saved, rule = parse_json(content_of(files, "statements.json"), "statements.json"), Rule.of(scenario)
-    with localcontext(prec=DIGITS):
+    same("what statements.json consists of", sorted(saved), ["argument", "constants", "enclosures", "statements"])
+    with localcontext(prec=DIGITS, Emax=MAX_EMAX, Emin=MIN_EMIN):
         same("constants", saved["constants"], {name: str(value) for name, value in rule.constants.items()})
         ends = _enclosure(rule, saved["enclosures"], "u", "zeta_m", rule.c2 / rule.c1)
-        _statements_are_true(saved["statements"])
-        true = {one["name"]: "true" for one in saved["statements"]}
-        same("statements in the evidence", claim["evidence"]["statements"], true)
         if claim["id"] == "THR-ROOT":
+            wanted, names = of_the_root(rule.constants, ends), ["u", "zeta_m"]
             found = _the_code_returns_the_root(claim, rule, ends)
         else:
+            wanted, names = _about_the_minimum(claim, rule, saved, ends)
             found = _the_root_is_the_minimum(claim, rule, saved["enclosures"], ends)
+        same("what is enclosed", sorted(saved["enclosures"]), sorted(names))
+        are_the_claims(saved["statements"], wanted)
+        _statements_are_true(wanted)
+        true = {one["name"]: "true" for one in wanted}
+        same("statements in the evidence", claim["evidence"]["statements"], true)
         floats = {name: [float(number(end)) for end in both] for name, both in saved["enclosures"].items()}
-        found = found.also(statements=true, enclosures=floats)
-        return found.counted(len(saved["statements"]))
+        return found.also(statements=true, enclosures=floats).counted(len(wanted))
 
 
-def _enclosure(rule: Rule, saved: Json, name: str, zeta: str, ratio: Fraction) -> tuple[Fraction, Fraction]:
-    """Two ends, a relative 1e-12 apart, between which f changes its sign; and the thresholds that belong to them."""
+def _about_the_minimum(claim: Json, rule: Rule, saved: Json, root: Ends) -> tuple[list[Json], list[str]]:
+    """The statements of THR-OPT, about what is enclosed; and the names of the latter.
+
+    Whatever the statements are about is narrow: that it is enclosed is what they say.
+    """
+    enclosures, constants = saved["enclosures"], rule.constants
+    running = rule.u(Fraction(float(claim["evidence"]["threshold_judged_m"])))
+    wanted = of_the_minimum(constants, root, (running * (1 - BESIDE), running * (1 + BESIDE)))
+    names = ["u", "zeta_m"]
+    if rule.c1 != rule.c2:
+        printed = _enclosure(rule, enclosures, "printed_u", "printed_zeta_m", rule.c1 / rule.c2)
+        wanted += of_the_printed_root(constants, root[rule.c1 > rule.c2], printed)
+        names += ["printed_u", "printed_zeta_m"]
+    for name, w in (("ahead", root[0] / 2), ("behind", -root[0] / 2)):
+        key = f"{name}_slope_1_m"
+        slope = _narrow(enclosures, key, SLOPE_NARROW)
+        wanted += of_a_deviation(constants, name, root, w, slope)
+        names.append(key)
+    turn = _narrow_above_0({"turn": _ends_of_the_turn(saved["statements"])}, "turn")
+    wanted += of_the_turn(turn)
+    zeta = rational(claim["inputs"]["zeta_m"])
+    for name, ratio in (("drift", rule.c2 / rule.c1), ("printed_drift", rule.c1 / rule.c2)):
+        m = ratio * rule.noise**2 / (4 * zeta**2)
+        if evaluate(LEVEL, {"m": decimal(m), "u": decimal(turn[0])}, Decimal) > 0:
+            wanted += of_no_drift(name, m, turn)
+            continue
+        keys = [f"{name}_{side}_m_s" for side in ("low", "high")]
+        low, high = (_u_of_drifts(rule, zeta, _narrow_above_0(enclosures, key)) for key in keys)
+        wanted += of_two_drifts(name, m, low, high)
+        names += keys
+    return wanted, names
+
+
+def _ends_of_the_turn(recorded: list[Json]) -> list[str]:
+    """Where (sinh u + u)/u^2 is least is enclosed in the statements only."""
+    values = {one["name"]: one.get("values", {}).get("u", "nothing") for one in recorded}
+    return [values.get(name, "nothing") for name in ("turn_below", "turn_above")]
+
+
+def _u_of_drifts(rule: Rule, zeta_m: Fraction, drifts_m_s: Ends) -> Ends:
+    """The u of a threshold with other drifts, of which it is a multiple."""
+    low, high = (2 * zeta_m * drift / rule.noise**2 for drift in drifts_m_s)
+    return low, high
+
+
+def _narrow_above_0(saved: Json, name: str) -> Ends:
+    """Two ends above 0, a relative 1e-12 apart."""
+    ends = _narrow(saved, name, NARROW)
+    holds("the enclosure is above 0", ends[0] > 0, saved[name], "above 0", about=name)
+    return ends
+
+
+def _narrow(saved: Json, name: str, width: Fraction) -> Ends:
+    """Two ends of one sign, at most so far apart, relative to the smaller one."""
     holds("the root is enclosed", name in saved, "nothing", "two ends", about=name)
     low, high = (number(end) for end in saved[name])
-    holds("the enclosure is narrow", 0 < low < high <= low * (1 + NARROW), saved[name], "1e-12 apart", about=name)
+    near = min(abs(low), abs(high)) if low * high > 0 else Fraction()
+    holds("the enclosure is narrow", 0 < high - low <= near * width, saved[name], f"{float(width)} apart", about=name)
+    return low, high
+
+
+def _enclosure(rule: Rule, saved: Json, name: str, zeta: str, ratio: Fraction) -> Ends:
+    """Two ends, a relative 1e-12 apart, between which f changes its sign; and the thresholds that belong to them."""
+    low, high = _narrow_above_0(saved, name)
     below, above = rule.residual(low, ratio), rule.residual(high, ratio)
     signs = f"{below:.3e}, {above:.3e}"
     holds("f changes its sign in the enclosure", below < 0 < above, signs, "below 0, above 0", about=name)
@@ -113,7 +189,7 @@ def _enclosure(rule: Rule, saved: Json, name: str, zeta: str, ratio: Fraction) -
     return low, high
 
 
-def _the_code_returns_the_root(claim: Json, rule: Rule, ends: tuple[Fraction, Fraction]) -> Found:
+def _the_code_returns_the_root(claim: Json, rule: Rule, ends: Ends) -> Found:
     """The running threshold, and the one in force if it is the Bayes-optimal one, are in the enclosure."""
     low, high = (rule.zeta_m(end) for end in ends)
     running = Fraction(float(claim["evidence"]["running_threshold_m"]))
@@ -129,7 +205,7 @@ def _the_code_returns_the_root(claim: Json, rule: Rule, ends: tuple[Fraction, Fr
     return found.having_judged("evidence.running_threshold_m")
 
 
-def _the_root_is_the_minimum(claim: Json, rule: Rule, saved: Json, ends: tuple[Fraction, Fraction]) -> Found:
+def _the_root_is_the_minimum(claim: Json, rule: Rule, saved: Json, ends: Ends) -> Found:
     """The root of the printed equation has a larger risk; by at least the margin. With c1 = c2 it is the same root."""
     _risks_are_those_of_their_thresholds(claim, rule, ends)
     facts = {"threshold_in_force_m": claim["inputs"]["zeta_m"]}
@@ -149,7 +225,7 @@ RISKS = (
 )  # fmt: skip
 
 
-def _risks_are_those_of_their_thresholds(claim: Json, rule: Rule, ends: tuple[Fraction, Fraction]) -> None:
+def _risks_are_those_of_their_thresholds(claim: Json, rule: Rule, ends: Ends) -> None:
     """The threshold judged is the root; the running code's risks there, and at the one in force, are the formula's."""
     evidence, root_m = claim["evidence"], float(rule.zeta_m(ends[0]))
     close("threshold judged", evidence["threshold_judged_m"], root_m, within=SMALL * root_m)
@@ -162,10 +238,9 @@ def _risks_are_those_of_their_thresholds(claim: Json, rule: Rule, ends: tuple[Fr
     holds("the running risk is the certified one", 0.0 <= off <= SMALL, off, "0 to 1e-9")
 
 
-def _statements_are_true(statements: list[Json]) -> None:
+def _statements_are_true(wanted: list[Json]) -> None:
     """Signs by evaluation, derivatives by dual numbers at points that follow from the statement's text."""
-    holds("there are not too many statements", len(statements) <= MOST_STATEMENTS, len(statements), MOST_STATEMENTS)
-    for one in statements:
+    for one in wanted:
         if one["kind"] == "sign":
             values = {name: decimal(number(text)) for name, text in one["values"].items()}
             value = evaluate(one["expression"], values, Decimal)
@@ -201,16 +276,8 @@ def _names(text: str) -> list[ast.Name]:
 
 
 def _parsed(text: str) -> ast.AST:
-    """The tree of an expression.
-
-    Raises:
-        Disagreement: if it is too long, or none.
-    """
-    holds("an expression is short", len(text) <= LONGEST, f"{len(text)} characters", f"at most {LONGEST}")
-    try:
-        return ast.parse(text, mode="eval").body
-    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-        raise Disagreement("an expression is one of Python's", text, type(error).__name__) from error
+    """The tree of an expression, one of `statements.py`."""
+    return ast.parse(text, mode="eval").body
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,8 @@ from .rules import SMALL, Array, Found, NotEstablished, agrees, close, holds, sa
 from .scenario import bayes_threshold_m, levels_of
 
 LEVEL = 0.99
+FIRST_SEED, CHANNELS = 20061, 32
+"""Of THR-DDM: seed of its first experiment, and how many UGVs it simulates at once."""
 ERROR_ALLOWANCE = 2e-4
 """Bias that the correction for sampling leaves in the error rate."""
 TIME_ALLOWANCE = 0.05
@@ -33,6 +35,7 @@ class Experiment(NamedTuple):
     zeta: float
     deviation: float
     paths: int
+    seed: int
 
     @property
     def period_s(self) -> float:
@@ -70,41 +73,44 @@ def experiments_of(scenario: Json) -> list[Experiment]:
     clear = noise * math.sqrt((math.sinh(1.0) + 1.0) / ratio)  # here the Bayes threshold is at u = 1
     bayes, printed = bayes_threshold_m(clear, noise, ratio), bayes_threshold_m(clear, noise, 1.0 / ratio)
     return [
-        Experiment("no deviation", drift, noise, zeta, 0.0, 10000),
-        Experiment("deviation ahead", drift, noise, zeta, 0.4 * zeta, 5000),
-        Experiment("deviation behind", drift, noise, zeta, -0.4 * zeta, 5000),
-        Experiment("other drift and noise", 4.0 * noise**2 / zeta, 2.0 * noise, zeta, -0.4 * zeta, 4000),
-        Experiment("Bayes threshold at u = 1", clear, noise, bayes, 0.0, 6000),
-        Experiment("printed threshold instead", clear, noise, printed, 0.0, 6000),
+        Experiment(*given, FIRST_SEED + k)
+        for k, given in enumerate(
+            (
+                ("no deviation", drift, noise, zeta, 0.0, 10000),
+                ("deviation ahead", drift, noise, zeta, 0.4 * zeta, 5000),
+                ("deviation behind", drift, noise, zeta, -0.4 * zeta, 5000),
+                ("other drift and noise", 4.0 * noise**2 / zeta, 2.0 * noise, zeta, -0.4 * zeta, 4000),
+                ("Bayes threshold at u = 1", clear, noise, bayes, 0.0, 6000),
+                ("printed threshold instead", clear, noise, printed, 0.0, 6000),
+            )
+        )
     ]
 
 
 def ddm(claim: Json, files: Files, scenario: Json) -> Found:
     """THR-DDM: (17)-(18) are in intervals of 99 % for all comparisons together, which follow from the counts."""
     saved = parse_json(content_of(files, "paths.json"), "paths.json")
-    rows, experiments = saved["comparisons"], experiments_of(scenario)
-    same("comparisons in the evidence", claim["evidence"]["comparisons"], rows)
-    same("number of comparisons", len(rows), 2 * len(experiments))
-    tail = (1.0 - LEVEL) / len(rows) / 2.0
-    margins = []
+    recorded, experiments = saved["comparisons"], experiments_of(scenario)
+    same("comparisons in the evidence", claim["evidence"]["comparisons"], recorded)
+    same("number of comparisons", len(recorded), 2 * len(experiments))
+    tail = (1.0 - LEVEL) / len(recorded) / 2.0
+    quantile = NormalDist().inv_cdf(1.0 - tail)
+    given = {"channels": CHANNELS, "tail": tail, "normal_quantile": quantile}
+    same("what paths.json consists of", sorted(saved), sorted([*given, "comparisons"]))
+    agrees("numbers of all comparisons", saved, given, within=SMALL)
+    rows: list[Json] = []
+    margins: list[float] = []
     for k, experiment in enumerate(experiments):
-        time, error = rows[2 * k], rows[2 * k + 1]
-        for row in (time, error):
-            agrees("constants of an experiment", row["constants"], experiment.constants, within=SMALL)
-            counts = ("wrong_decisions", "periods_sum", "periods_sum_of_squares")
-            same("counts of an experiment", [row[key] for key in counts], [time[key] for key in counts])
-            same("experiment", row["experiment"], experiment.name)
-            _counts_are_possible(row, experiment)
-        same("quantities", [time["quantity"], error["quantity"]], ["mean decision time", "error rate"])
-        _time_interval(time, experiment, tail)
-        _error_interval(error, experiment, tail)
-        close("(17)", time["formula"], experiment.decision_time_s(), within=SMALL, about=experiment.name)
-        close("(18)", error["formula"], experiment.error_rate(), within=SMALL, about=experiment.name)
-        margins += [_margin(time, experiment.decision_time_s()), _margin(error, experiment.error_rate())]
+        both = recorded[2 * k : 2 * k + 2]
+        expected = _comparisons_of(experiment, _counts_of(both, experiment))
+        _time_interval(both[0], experiment, expected[0], tail)
+        _error_interval(both[1], experiment, both[1]["wrong_decisions"], tail)
+        rows += [_established(*each, experiment) for each in zip(both, expected, strict=True)]
+        margins += [_margin(row["interval"], ours.formula) for row, ours in zip(both, expected, strict=True)]
     paths = sum(experiment.paths for experiment in experiments)
     status = "supported" if min(margins) >= 0.0 else "refuted"
     found = Found.with_margin(status, min(margins), paths=paths, family_level=LEVEL, comparisons=rows)
-    lowest = [row for row, margin in zip(rows, margins, strict=True) if margin <= min(margins) + SMALL]
+    lowest = [row for row, margin in zip(recorded, margins, strict=True) if margin <= min(margins) + SMALL]
     places = [{key: row[key] for key in ("experiment", "quantity")} for row in lowest]
     found = found.judging(partial(_one_of, "where the margin is attained", claim["where"], places), "where")
     shown = lowest if status == "refuted" else [None]
@@ -117,36 +123,90 @@ def _one_of(rule: str, recorded: Any, possible: list[Any]) -> None:
     holds(rule, recorded in possible, str(recorded), str(possible))
 
 
-def _counts_are_possible(row: Json, experiment: Experiment) -> None:
-    n, total, squares = experiment.paths, row["periods_sum"], row["periods_sum_of_squares"]
-    wrong = row["wrong_decisions"]
+class Passages(NamedTuple):
+    """What came of the paths of an experiment: all that is taken as recorded of it."""
+
+    wrong_decisions: int
+    periods_sum: int
+    periods_sum_of_squares: int
+
+
+def _counts_of(both: list[Json], experiment: Experiment) -> Passages:
+    """The counts in both rows of an experiment, which are the same, and such as its paths can have."""
+    time, error = (Passages(*(row[key] for key in Passages._fields)) for row in both)
+    same("counts of an experiment", error._asdict(), time._asdict(), about=experiment.name)
+    whole = all(type(count) is int for count in time)
+    holds("counts of an experiment are whole numbers", whole, str([*time]), "0, 1, ...", about=experiment.name)
+    n, wrong, total, squares = experiment.paths, *time
     holds("wrong decisions", 0 <= wrong <= n, wrong, f"0 to {n}", about=experiment.name)
     holds("sum of periods", total >= n, total, f"at least one in each of {n} paths", about=experiment.name)
-    holds("sum of squares", squares * n >= total**2, squares, f"at least {total**2 / n}", about=experiment.name)
+    holds("sum of squares", squares * n > total**2, squares, f"more than {total**2 / n}", about=experiment.name)
+    return time
 
 
-def _margin(row: Json, formula: float) -> float:
+class Comparison(NamedTuple):
+    """An estimate, its standard deviation, and the value of the formula, by its number in the paper."""
+
+    quantity: str
+    unit: str
+    estimate: float
+    deviation: float
+    equation: str
+    formula: float
+
+
+def _comparisons_of(experiment: Experiment, counts: Passages) -> tuple[Comparison, Comparison]:
+    """Of the mean decision time, s, and of the error rate; the sampled time is a quarter of a period late."""
+    n, wrong, total, squares = experiment.paths, *counts
+    time_s = (total / n - 0.25) * experiment.period_s
+    spread_s = math.sqrt((squares * n - total**2) / (n * n * (n - 1))) * experiment.period_s
+    rate = wrong / n
+    spread = math.sqrt(max(rate * (1.0 - rate), 1.0 / n) / n)
+    return (
+        Comparison("mean decision time", "s", time_s, spread_s, "(17)", experiment.decision_time_s()),
+        Comparison("error rate", "", rate, spread, "(18)", experiment.error_rate()),
+    )
+
+
+def _established(row: Json, ours: Comparison, experiment: Experiment) -> Json:
+    """A recorded comparison, all but its counts: it follows from them, and has nothing besides.
+
+    Its interval is right already; what depends on that and on the formula's value is made of the recorded ones.
+    """
+    about = f"{experiment.name}, {ours.quantity}"
+    same("experiment", row["experiment"], experiment.name, about=about)
+    same("quantities", [row["quantity"], row["unit"]], [ours.quantity, ours.unit], about=about)
+    same("constants of an experiment", sorted(row["constants"]), sorted(experiment.constants), about=about)
+    agrees("constants of an experiment", row["constants"], experiment.constants, within=SMALL, about=about)
+    agrees("estimate", row["estimate"], ours.estimate, within=SMALL, about=about)
+    close(ours.equation, row["formula"], ours.formula, within=SMALL, about=about)
+    made: Json = {
+        "z_score": (row["estimate"] - row["formula"]) / ours.deviation,
+        "margin": _margin(row["interval"], row["formula"]),
+    }
+    agrees("numbers of a comparison", row, made, within=SMALL, about=about)
+    known = ("experiment", "quantity", "unit", "constants", "estimate", "interval", "formula", *made)
+    same("what a comparison consists of", sorted(row), sorted([*known, *Passages._fields]), about=about)
+    return {key: row[key] for key in known}
+
+
+def _margin(interval: list[float], formula: float) -> float:
     """Half-widths by which the formula is inside the interval."""
-    low, high = row["interval"]
+    low, high = interval
     return 2.0 * min(formula - low, high - formula) / (high - low)
 
 
-def _time_interval(row: Json, experiment: Experiment, tail: float) -> None:
-    """Normal, widened by the bias of the correction; the sampled time is a quarter of a period late."""
-    n, period = experiment.paths, experiment.period_s
-    mean = row["periods_sum"] / n
-    spread = math.sqrt((row["periods_sum_of_squares"] - row["periods_sum"] * mean) / (n - 1.0) / n)
-    half = NormalDist().inv_cdf(1.0 - tail) * spread + TIME_ALLOWANCE
-    interval = [(mean - 0.25 - half) * period, (mean - 0.25 + half) * period]
-    agrees("interval of the decision time", row["interval"], interval, within=1e-7, about=experiment.name)
-    agrees("estimate", row["estimate"], (mean - 0.25) * period, within=SMALL, about=experiment.name)
+def _time_interval(row: Json, experiment: Experiment, time: Comparison, tail: float) -> None:
+    """Normal, widened by the bias of the correction."""
+    half_s = NormalDist().inv_cdf(1.0 - tail) * time.deviation + TIME_ALLOWANCE * experiment.period_s
+    ends = [time.estimate - half_s, time.estimate + half_s]
+    agrees("interval of the decision time", row["interval"], ends, within=1e-7, about=experiment.name)
 
 
-def _error_interval(row: Json, experiment: Experiment, tail: float) -> None:
+def _error_interval(row: Json, experiment: Experiment, wrong: int, tail: float) -> None:
     """Clopper and Pearson's, widened by the bias: at an end the counts, or more extreme ones, have probability tail."""
-    n, wrong = experiment.paths, row["wrong_decisions"]
+    n = experiment.paths
     low, high = row["interval"][0] + ERROR_ALLOWANCE, row["interval"][1] - ERROR_ALLOWANCE
-    agrees("estimate", row["estimate"], wrong / n, within=SMALL, about=experiment.name)
     what = "interval of the error rate: probability of the counts at its end"
     if wrong:
         close(what, _probability(n, wrong, n, low), tail, within=1e-5 * tail, about=f"{experiment.name}, low end")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import partial
 from itertools import pairwise, zip_longest
 from typing import NamedTuple
@@ -129,32 +130,50 @@ def automaton(x: Variable, levels: Levels) -> list[Step]:
 
 def refuted_zeno_proof(claim: Json, levels: Levels, bound_s: float) -> Found:
     """ZENO-PROOF refuted: the recorded run is one of the automaton, and has two triggers closer than the bound."""
-    recorded = claim["counterexample"]["run"]
-    triggers: list[float] = []
-    mode, rested = SUPERVISING, -np.inf
-    for row in recorded:
-        when, x = row["t_s"], row["x_m"]
-        before = mode
-        if mode == REFRACTORY and when >= rested:
-            mode = SUPERVISING
-        if mode == SUPERVISING and x >= levels.zeta_m:
-            mode, rested = INTERVENING, when + levels.dwell_s
-            triggers.append(when)
-        elif before == INTERVENING and x <= levels.release_m and x < levels.zeta_m:
-            mode = SUPERVISING if when >= rested else REFRACTORY
-        same("mode of the automaton", row["mode"], MODE_NAMES[int(mode)], t_s=when)
-        same("trigger of the automaton", row["trigger"], mode == INTERVENING and triggers[-1] == when, t_s=when)
-    at_most("two triggers of the automaton", 2 - len(triggers), 0)
-    gap = float(np.diff(triggers).min())
-    at_most("gap of two triggers", gap, bound_s)
     shown = claim["counterexample"]
-    close("gap of the counterexample", [shown["gap_s"], shown["bound_s"]], [gap, bound_s], within=SMALL)
+    _time_goes_on([row["t_s"] for row in shown["run"]])
+    triggers = _triggers_of_the_automaton(shown["run"], levels)
+    at_most("two triggers of the automaton", 2 - len(triggers), 0)
+    gap = min(after - before for before, after in pairwise(triggers))
+    holds("two triggers are closer than the bound", gap < Fraction(bound_s), float(gap), f"less than {bound_s!r}")
+    close("gap of the counterexample", [shown["gap_s"], shown["bound_s"]], [float(gap), bound_s], within=SMALL)
     same("the running trigger was put through the run", shown["replayed"], True)
-    found = Found.with_margin("refuted", gap - bound_s, bound_s=bound_s, spacer="violated")
+    found = Found.with_margin("refuted", float(gap) - bound_s, bound_s=bound_s, spacer="violated")
     return found.having_judged(
         *(f"counterexample.run.*.{key}" for key in ("t_s", "x_m", "mode", "trigger")),
         "counterexample.gap_s", "counterexample.bound_s", "counterexample.replayed",
     )  # fmt: skip
+
+
+def _time_goes_on(times_s: list[float]) -> None:
+    """A run begins at 0 or later, and no row of it is at, or before, the time of the row above."""
+    for before, when in pairwise([-np.inf, *times_s]):
+        holds("a run begins at 0 or later", when >= 0.0, when, "0 or more", t_s=when)
+        holds("time goes on in a run", when > before, when, f"more than {before!r}", t_s=when)
+
+
+def _triggers_of_the_automaton(run: list[Json], levels: Levels) -> list[Fraction]:
+    """When the automaton triggers on the recorded run, s; the recorded modes and triggers are its own.
+
+    Times are compared exactly: that `trigger + dwell` is rounded makes no two triggers closer.
+    """
+    triggers: list[Fraction] = []
+    mode = SUPERVISING
+    for row in run:
+        when, x = Fraction(row["t_s"]), row["x_m"]
+        rested = not triggers or when >= triggers[-1] + Fraction(levels.dwell_s)
+        before = mode
+        if mode == REFRACTORY and rested:
+            mode = SUPERVISING
+        if mode == SUPERVISING and x >= levels.zeta_m:
+            mode = INTERVENING
+            triggers.append(when)
+        elif before == INTERVENING and x <= levels.release_m and x < levels.zeta_m:
+            mode = SUPERVISING if rested else REFRACTORY
+        same("mode of the automaton", row["mode"], MODE_NAMES[int(mode)], t_s=row["t_s"])
+        triggered = mode == INTERVENING and triggers[-1] == when
+        same("trigger of the automaton", row["trigger"], triggered, t_s=row["t_s"])
+    return triggers
 
 
 def thr_trig(run: Run, claim: Json) -> Found:

@@ -331,8 +331,8 @@ LAW = (
     Mutant(
         "the UAV without a speed limit",
         "systems/controllers.py",
-        "lower = limit_speed(task.velocity(positions[-1:]), self._max_speed)",
-        "lower = task.velocity(positions[-1:])",
+        "lower = limit_speed(_velocity_of(task, read_only(positions[-1:])), self._max_speed)",
+        "lower = _velocity_of(task, read_only(positions[-1:]))",
     ),
     Mutant(
         "UGVs sampled at half the rate",
@@ -574,7 +574,7 @@ INTERVENTION = (
     Mutant(
         "the rest after a refusal ignored",
         "intervention/database.py",
-        "refusals=desk.refusals + 1, retry_at=t + self.retry,",
+        "refusals=desk.refusals + 1, retry_at=t + rest,",
         "refusals=desk.refusals + 1, retry_at=t,",
         tests=PLANNER,
     ),
@@ -603,14 +603,14 @@ INTERVENTION = (
     Mutant(
         "detours inside the safe distance",
         "intervention/detour.py",
-        "[seen.obstacle_distances + self.clearance, ",
-        "[0.8 * seen.obstacle_distances, ",
+        "reach = np.clip(from_target, least, least + self.clearance)",
+        "reach = 0.8 * least",
         tests=PLANNER,
     ),
     Mutant(
         "no time limit for policies",
         "intervention/guard.py",
-        "signal.setitimer(signal.ITIMER_REAL, seconds)",
+        "signal.setitimer(signal.ITIMER_REAL, min(seconds, outer or _LONGEST_S, _LONGEST_S))",
         "signal.setitimer(signal.ITIMER_REAL, 0.0)",
         tests=PLANNER,
     ),

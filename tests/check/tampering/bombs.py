@@ -88,17 +88,18 @@ def _expression(text: str) -> Callable[[Path], None]:
 
 
 EXPRESSIONS = {
-    "towers_of_powers": ("a number is short", "(((((((((q**12)**12)**12)**12)**12)**12)**12)**12)**12)"),
-    "nested_brackets": ("an expression is one of Python's", "(" * 2000 + "q" + ")" * 2000),
-    "many_signs": ("an expression is one of Python's", "-" * 4999 + "q"),
-    "constant_of_many_digits": ("a number is short", f"q*{'9' * 4000}"),
-    "long_expression": ("an expression is short", "q+" * 3000 + "q"),
-    "imported_expression": ("an expression has", "__import__('os')"),
+    "towers_of_powers": "(((((((((q**12)**12)**12)**12)**12)**12)**12)**12)**12)",
+    "nested_brackets": "(" * 2000 + "q" + ")" * 2000,
+    "many_signs": "-" * 4999 + "q",
+    "constant_of_many_digits": f"q*{'9' * 4000}",
+    "long_expression": "q+" * 3000 + "q",
+    "imported_expression": "__import__('os')",
 }
-for _name, (_rule, _text) in EXPRESSIONS.items():
+"""None is ever evaluated: an expression is the claim's, or the statement is refused."""
+for _name, _text in EXPRESSIONS.items():
     _edit = _expression(_text)
     _edit.__name__ = _name
-    refused_by("THR-OPT", _rule, run="")(_edit)
+    refused_by("THR-OPT", "the statement is the claim's", run="")(_edit)
 
 
 @refused_by(NO_REPORT, "regular files")

@@ -14,6 +14,7 @@ from check.tampering.base import (
     edited_obligation,
     edited_report,
     ignored,
+    read_json,
     refused_by,
     seal_certificate,
     write,
@@ -146,6 +147,30 @@ def only_half_of_the_claim_shown(folder: Path) -> None:
         obligations[:] = [one for one in obligations if one["name"].endswith("_bound")]
 
 
+@refused_by("SAFE-INV", "the obligation is one of the claim's", run="")
+def obligation_invented(folder: Path) -> None:
+    """It expands, and follows from anything: its premise is false."""
+    invented = {
+        "name": "never_collides", "says": "no robot ever collides", "variables": [], "goal": "1", "hypotheses": {},
+        "strict": {"false": "-1"}, "equations": {}, "multiplier": [], "equation_multipliers": {},
+        "certificate": [{"coefficient": "1", "factors": [], "square": "1"}],
+    }  # fmt: skip
+    with edited_certificate(folder, "SAFE-INV") as obligations:
+        obligations.append(invented)
+    with edited_claim(folder, "SAFE-INV", "") as claim:
+        listed = claim["evidence"]["obligations"]
+        listed.append({**listed[0], "name": "never_collides"})
+        claim["exercised"] += 1
+
+
+@refused_by("LIVE-WAIT", "the obligation is one of the claim's", run="")
+def obligation_of_another_claim_put_in(folder: Path) -> None:
+    with edited_certificate(folder, "SAFE-LEMMA") as others:
+        borrowed = others[0]
+    with edited_certificate(folder, "LIVE-WAIT") as obligations:
+        obligations.append(borrowed)
+
+
 def without_obligation(folder: Path, claim: str, name: str) -> None:
     """Remove an obligation from a certificate and from the evidence."""
     with edited_certificate(folder, claim) as obligations:
@@ -232,6 +257,58 @@ def rounding_of_the_dwell_hidden(folder: Path) -> None:
         claim["margin"] = 1e-9
 
 
+def refute_zeno_proof(folder: Path, rows: list[tuple[float, float, str, bool]]) -> None:
+    """Make ZENO-PROOF a refutation by a run: time, s, x over the threshold, mode and trigger of each row."""
+    with edited_claim(folder, "ZENO-PROOF", "") as claim:
+        zeta, bound = claim["inputs"]["zeta_m"], claim["inputs"]["min_inter_event_s"]
+        run = [
+            {"t_s": when, "x_m": share * zeta, "mode": mode, "trigger": trigger} for when, share, mode, trigger in rows
+        ]
+        times = [row["t_s"] for row in run if row["trigger"]]
+        gap = times[1] - times[0]
+        evidence = {key: claim["evidence"][key] for key in ("bound_s", "conformance", "rounding_s")}
+        claim.update(
+            status="refuted", as_expected=False, margin=gap - bound, where={}, exercised=None,
+            evidence=evidence | {"spacer": "violated"},
+            counterexample={"run": run, "gap_s": gap, "bound_s": bound, "replayed": True},
+        )  # fmt: skip
+
+
+def bound_of_zeno_proof(folder: Path) -> float:
+    """The bound, s, which is the dwell."""
+    bound: float = claim_of(read_json(folder / "report.json"), "ZENO-PROOF", "")["inputs"]["min_inter_event_s"]
+    return bound
+
+
+@refused_by("ZENO-PROOF", "two triggers are closer than the bound", run="")
+def refuted_by_a_gap_that_is_the_bound(folder: Path) -> None:
+    bound = bound_of_zeno_proof(folder)
+    rest = (bound / 2.0, 0.0, "REFRACTORY", False)
+    refute_zeno_proof(folder, [(0.0, 1.0, "INTERVENING", True), rest, (bound, 1.0, "INTERVENING", True)])
+
+
+@refused_by("ZENO-PROOF", "mode of the automaton", run="")
+def refuted_by_rounding(folder: Path) -> None:
+    """The rounded sum of a time and the dwell is reached a little before the dwell is over."""
+    bound = bound_of_zeno_proof(folder)
+    early = next(t for k in range(1, 10_000) if Fraction((t := k / 10.0) + bound) < Fraction(t) + Fraction(bound))
+    rest = (early + bound / 2.0, 0.0, "REFRACTORY", False)
+    last = (early + bound, 1.0, "INTERVENING", True)
+    refute_zeno_proof(folder, [(early, 1.0, "INTERVENING", True), rest, last])
+
+
+@refused_by("ZENO-PROOF", "time goes on in a run", run="")
+def refuted_by_a_run_backwards_in_time(folder: Path) -> None:
+    released = (20.0, 0.0, "SUPERVISING", False)
+    refute_zeno_proof(folder, [(10.0, 1.0, "INTERVENING", True), released, (9.9, 1.0, "INTERVENING", True)])
+
+
+@refused_by("ZENO-PROOF", "a run begins at 0 or later", run="")
+def refuted_by_a_run_before_the_start(folder: Path) -> None:
+    released = (-1.0, 0.0, "SUPERVISING", False)
+    refute_zeno_proof(folder, [(-2.0, 1.0, "INTERVENING", True), released, (-0.9, 1.0, "INTERVENING", True)])
+
+
 @refused_by("SAFE-INV", "an obligation is proved", run="")
 def obligation_left_open(folder: Path) -> None:
     with edited_claim(folder, "SAFE-INV", "") as claim:
@@ -254,6 +331,102 @@ def missed_inequality_recorded(folder: Path) -> None:
 def broken_bound_recorded(folder: Path) -> None:
     with edited_claim(folder, "SAFE-DIST", "") as claim:
         claim["evidence"]["runs"][0]["broken"] = 1
+
+
+def pass_a_bound(folder: Path, **counts: int) -> None:
+    """Let the run whose margin is SAFE-DIST's come 0.5 m nearer than its bound, and say so as the margin."""
+    with edited_claim(folder, "SAFE-DIST", "") as claim:
+        row = next(row for row in claim["evidence"]["runs"] if row["scene"] == claim["where"]["scene"])
+        row["where"]["distance_m"] = row["where"]["bound_m"] - 0.5
+        row.update(worst_margin_m=-0.5, **counts)
+        claim["margin"] = -0.5
+
+
+@refused_by("SAFE-DIST", "bounds passed by a disturbed run", run="")
+def passed_bound_recorded(folder: Path) -> None:
+    pass_a_bound(folder)
+
+
+@refused_by("SAFE-DIST", "margin of a run that met all inequalities", run="")
+def passed_bound_recorded_as_uncovered(folder: Path) -> None:
+    pass_a_bound(folder, uncovered=1)
+
+
+@refused_by("SAFE-DIST", "inequalities missed by a disturbed run", run="")
+def passed_bound_recorded_as_unmet(folder: Path) -> None:
+    """What missed its inequalities is not covered by the claim; then something has to be missed."""
+    pass_a_bound(folder, uncovered=1, unmet=1)
+
+
+@refused_by("SAFE-DIST", "scenes of the disturbed runs", run="")
+def scenes_all_removed_but_the_best(folder: Path) -> None:
+    with edited_claim(folder, "SAFE-DIST", "") as claim:
+        runs = claim["evidence"]["runs"]
+        runs[:] = [row for row in runs if row["scene"] == "uav_low"]
+        claim["margin"] = runs[0]["worst_margin_m"]
+        claim["where"] = {key: runs[0]["where"][key] for key in ("scene", "attack", "robot", "t_s")}
+
+
+@refused_by("SAFE-DIST", "steps of the disturbed runs", run="")
+def disturbed_run_of_one_step(folder: Path) -> None:
+    with edited_claim(folder, "SAFE-DIST", "") as claim:
+        claim["evidence"]["runs"][0]["steps"] = 1
+
+
+@refused_by("SAFE-GATE", "slack of a layer that missed nothing", run="")
+def slack_of_the_layer_below_zero(folder: Path) -> None:
+    with edited_claim(folder, "SAFE-GATE", "") as claim:
+        claim["evidence"]["layer"][0]["worst_slack_m_s"] = claim["margin"] = -5.0
+
+
+@refused_by("SAFE-INV", "slack of a layer that missed nothing", run="")
+def slack_of_the_composition_below_zero(folder: Path) -> None:
+    with edited_claim(folder, "SAFE-INV", "") as claim:
+        claim["evidence"]["composition"]["worst_slack_m_s"] = -5.0
+
+
+@refused_by("SAFE-GATE", "inequalities missed by the running controller", run="")
+def miss_of_the_controller_without_its_count(folder: Path) -> None:
+    with edited_claim(folder, "SAFE-GATE", "") as claim:
+        claim["evidence"]["controller"][0]["worst_missed_by_m_s"] = 7.0
+
+
+@refused_by("SAFE-GATE", "controllers attacked", run="")
+def controller_not_attacked(folder: Path) -> None:
+    with edited_claim(folder, "SAFE-GATE", "") as claim:
+        claim["evidence"]["controller"].clear()
+
+
+@refused_by("LIVE-GATE", "runs of the running code", run="")
+def run_on_a_way_invented(folder: Path) -> None:
+    with edited_claim(folder, "LIVE-GATE", "") as claim:
+        invented = {"samples": 0, "given_back": False, "largest_excess_m": -1.0, "over_after_s": 1.0}
+        claim["evidence"]["runs"] = [invented]
+        claim["margin"] = claim["inputs"]["lag_m"] + 1.0
+
+
+def change_runs_on_ways(folder: Path, **changes: float) -> None:
+    """Change all runs of LIVE-GATE, and its margin with them."""
+    with edited_claim(folder, "LIVE-GATE", "") as claim:
+        for row in claim["evidence"]["runs"]:
+            row.update(changes)
+        excess = max(row["largest_excess_m"] for row in claim["evidence"]["runs"])
+        claim["margin"] = claim["inputs"]["lag_m"] - excess
+
+
+@refused_by("LIVE-GATE", "excess of a run's lag", run="")
+def lag_below_the_first_one(folder: Path) -> None:
+    change_runs_on_ways(folder, largest_excess_m=-1.0)
+
+
+@refused_by("LIVE-GATE", "samples of a run on a way", run="")
+def runs_without_samples(folder: Path) -> None:
+    change_runs_on_ways(folder, samples=0)
+
+
+@refused_by("LIVE-GATE", "when a run on a way is over", run="")
+def runs_over_at_another_time(folder: Path) -> None:
+    change_runs_on_ways(folder, over_after_s=1.0)
 
 
 @refused_by("SAFE-DIST", "least distances", run="")
@@ -390,29 +563,116 @@ def statement(saved: Any, name: str) -> Any:
     return next(one for one in saved["statements"] if one["name"] == name)
 
 
-@refused_by("THR-OPT", "a sign is right", run="")
+IS_THE_CLAIMS = "the statement is the claim's"
+
+
+@refused_by("THR-OPT", IS_THE_CLAIMS, run="")
 def sign_turned(folder: Path) -> None:
     with statements(folder, "THR-OPT") as saved:
         statement(saved, "printed_risk")["sign"] = "<"
 
 
-@refused_by("THR-OPT", "a derivative is right", run="")
+@refused_by("THR-OPT", IS_THE_CLAIMS, run="")
 def derivative_changed(folder: Path) -> None:
     with statements(folder, "THR-OPT") as saved:
         one = statement(saved, "factorisation")
         one["derivative"] = one["derivative"].replace("+u)", "-u)")
 
 
-@refused_by("THR-OPT", "an expression has + - * / **, integers, names and exp", run="")
+@refused_by("THR-OPT", IS_THE_CLAIMS, run="")
 def code_in_a_statement(folder: Path) -> None:
     with statements(folder, "THR-OPT") as saved:
         statement(saved, "printed_risk")["expression"] = "open('x')"
 
 
-@refused_by("THR-OPT", "statements in the evidence", run="")
+@refused_by("THR-OPT", "statements of the claim", run="")
 def statement_removed(folder: Path) -> None:
     with statements(folder, "THR-OPT") as saved:
         saved["statements"].remove(statement(saved, "printed_risk"))
+
+
+@refused_by("THR-OPT", IS_THE_CLAIMS, run="")
+def statements_that_say_nothing(folder: Path) -> None:
+    """All names are there, but for those that enclose the turn they stand for 1 > 0."""
+    with statements(folder, "THR-OPT") as saved:
+        for one in saved["statements"]:
+            if not one["name"].startswith("turn"):
+                nothing = {"kind": "sign", "expression": "1", "sign": ">", "values": {}}
+                kept = {key: one[key] for key in ("name", "says")}
+                one.clear()
+                one.update(nothing | kept)
+
+
+@refused_by("THR-ROOT", "statements of the claim", run="")
+def statements_all_removed(folder: Path) -> None:
+    with statements(folder, "THR-ROOT") as saved:
+        saved["statements"] = []
+    with edited_claim(folder, "THR-ROOT", "") as claim:
+        claim["evidence"]["statements"] = {}
+        claim["exercised"] = 0
+
+
+@refused_by("THR-ROOT", "statements of the claim", run="")
+def statement_invented(folder: Path) -> None:
+    with statements(folder, "THR-ROOT") as saved:
+        one = {"kind": "sign", "name": "safe", "says": "", "expression": "1", "sign": ">", "values": {}}
+        saved["statements"].append(one)
+    with edited_claim(folder, "THR-ROOT", "") as claim:
+        claim["evidence"]["statements"]["safe"] = "true"
+        claim["exercised"] += 1
+
+
+@refused_by("THR-OPT", IS_THE_CLAIMS, run="")
+def statement_about_another_place(folder: Path) -> None:
+    """True, but at 1 and not at the ends of what is enclosed."""
+    with statements(folder, "THR-OPT") as saved:
+        statement(saved, "root_above")["values"]["u"] = "1"
+
+
+@refused_by("THR-OPT", "the enclosure is narrow", run="")
+def turn_enclosed_widely(folder: Path) -> None:
+    with statements(folder, "THR-OPT") as saved:
+        statement(saved, "turn_below")["values"]["u"] = "2"
+
+
+@refused_by("THR-OPT", "what is enclosed", run="")
+def enclosure_invented(folder: Path) -> None:
+    with statements(folder, "THR-OPT") as saved:
+        saved["enclosures"]["safe_m"] = ["1", "1"]
+    with edited_claim(folder, "THR-OPT", "") as claim:
+        claim["evidence"]["enclosures"]["safe_m"] = [1.0, 1.0]
+
+
+def edit_enclosure(folder: Path, name: str, ends: list[Fraction], **values: Fraction) -> None:
+    """Change something that THR-OPT encloses everywhere, and values of statements by name, with `__` for the key."""
+    with statements(folder, "THR-OPT") as saved:
+        saved["enclosures"][name] = [str(end) for end in ends]
+        for place, value in values.items():
+            one, _, key = place.partition("__")
+            statement(saved, one)["values"][key] = str(value)
+    with edited_claim(folder, "THR-OPT", "") as claim:
+        claim["evidence"]["enclosures"][name] = [float(end) for end in ends]
+
+
+@refused_by("THR-OPT", "the enclosure is narrow", run="")
+def drift_made_up(folder: Path) -> None:
+    edit_enclosure(folder, "drift_low_m_s", [Fraction(1), Fraction(1)])
+
+
+@refused_by("THR-OPT", IS_THE_CLAIMS, run="")
+def drift_moved(folder: Path) -> None:
+    edit_enclosure(folder, "drift_high_m_s", [Fraction(1), 1 + Fraction(1, 10**13)])
+
+
+@refused_by("THR-OPT", "a sign is right", run="")
+def slope_moved_with_its_statements(folder: Path) -> None:
+    low, high = Fraction(1), 1 + Fraction(1, 10**9)
+    edit_enclosure(folder, "ahead_slope_1_m", [low, high], ahead_from__bound=low, ahead_to__bound=high)
+
+
+@refused_by("THR-OPT", "the enclosure is narrow", run="")
+def slope_made_up(folder: Path) -> None:
+    edit_enclosure(folder, "ahead_slope_1_m", [Fraction(1), Fraction(1)])
 
 
 @refused_by("THR-ROOT", "the code's threshold is the root", run="")
@@ -489,6 +749,65 @@ def variance_negative(folder: Path) -> None:
             row["periods_sum_of_squares"] = 1
 
     edit_comparisons(folder, edit)
+
+
+def edit_comparison(folder: Path, **changes: Any) -> None:
+    """Change keys of the first comparison of THR-DDM, in the evidence and in the certificate."""
+
+    def edit(rows: list[Any]) -> None:
+        rows[0].update(changes)
+
+    edit_comparisons(folder, edit)
+
+
+@refused_by("THR-DDM", "numbers of a comparison", run="")
+def margin_of_a_comparison_changed(folder: Path) -> None:
+    edit_comparison(folder, margin=99.0)
+
+
+@refused_by("THR-DDM", "numbers of a comparison", run="")
+def score_of_a_comparison_changed(folder: Path) -> None:
+    edit_comparison(folder, z_score=0.0)
+
+
+@refused_by("THR-DDM", "quantities", run="")
+def unit_of_a_comparison_changed(folder: Path) -> None:
+    edit_comparison(folder, unit="h")
+
+
+@refused_by("THR-DDM", "what a comparison consists of", run="")
+def praise_put_into_a_comparison(folder: Path) -> None:
+    edit_comparison(folder, proved_by_experts=True)
+
+
+@refused_by("THR-DDM", "constants of an experiment", run="")
+def seed_of_an_experiment_changed(folder: Path) -> None:
+    def edit(rows: list[Any]) -> None:
+        for row in rows[:2]:
+            row["constants"]["seed"] = 1
+
+    edit_comparisons(folder, edit)
+
+
+@refused_by("THR-DDM", "counts of an experiment are whole numbers", run="")
+def half_a_period_counted(folder: Path) -> None:
+    def edit(rows: list[Any]) -> None:
+        for row in rows[:2]:
+            row["periods_sum"] += 0.5
+
+    edit_comparisons(folder, edit)
+
+
+@refused_by("THR-DDM", "numbers of all comparisons", run="")
+def quantile_of_all_comparisons_changed(folder: Path) -> None:
+    with edited_certificate(folder, "THR-DDM", "paths.json") as paths:
+        paths["normal_quantile"] = 9.0
+
+
+@refused_by("THR-DDM", "what paths.json consists of", run="")
+def praise_put_into_the_paths(folder: Path) -> None:
+    with edited_certificate(folder, "THR-DDM", "paths.json") as paths:
+        paths["proved_by_experts"] = 1
 
 
 def counts(folder: Path) -> pd.DataFrame:

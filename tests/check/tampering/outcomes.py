@@ -160,6 +160,7 @@ def obstacle_forgotten(folder: Path) -> None:
 @refused_by("COMM", "a decision before the proposal is taken back")
 def decision_on_what_was_taken_back(folder: Path) -> None:
     change(folder, first_refused, t_s=lambda value: value + 1.0)
+    base.write_table(folder, base.read_table(folder, "decisions").sort_values("t_s", kind="stable"), "decisions")
 
 
 @refused_by("COMM", "a proposal stands until it is over")
