@@ -59,7 +59,7 @@ def conduct(
     """
     if not allow_plugins:
         spec.refuse_plugins()
-    store = Store(folder, _manifest(spec), resume=resume)
+    store = Store(folder, _manifest(spec, limits), resume=resume)
     try:
         wanted = range(spec.combinations if number is None else number)
         rule = InOrder(stopping, wanted) if stopping is not None else None
@@ -97,11 +97,12 @@ def _known(store: Store) -> Iterator[tuple[int, list[Row]]]:
         )
 
 
-def _manifest(spec: Spec) -> dict[str, Any]:
+def _manifest(spec: Spec, limits: Limits) -> dict[str, Any]:
     return {
         "name": spec.name,
         "spec_sha256": spec.digest,
         "scenario_sha256": spec.base_digest(),
         "package": version("airground_drake"),
         "drake": version("drake"),
+        "limits": limits._asdict(),
     }

@@ -17,11 +17,12 @@ from airground_drake.campaign.pool import Pool
 from airground_drake.campaign.rows import Row
 from airground_drake.campaign.search import Sampler
 from airground_drake.campaign.spec import Spec
-from airground_drake.campaign.work import rows_at, rows_of_scenario
+from airground_drake.campaign.work import rows_at, rows_of_scenario, trace_of
 from airground_drake.errors import PluginError, ScenarioError, described, one_line
 from airground_drake.progress import SILENT, Watch
 from airground_drake.scenarios.estimate import Limits
 from airground_drake.scenarios.load import from_data
+from airground_drake.trace import Trace
 
 
 @dataclass(frozen=True)
@@ -55,6 +56,14 @@ class Search:
         except ScenarioError:
             return False
         return self._judge(rows_of_scenario(self.spec, scenario, self.limits, allow_plugins=self.allow_plugins))[1]
+
+    def trace(self, data: dict[str, Any]) -> Trace | None:
+        """Of the first run of a scenario; None if it is not valid, or cannot be simulated."""
+        try:
+            scenario = from_data(data, "smaller scenario")
+        except ScenarioError:
+            return None
+        return trace_of(self.spec, scenario, self.limits, allow_plugins=self.allow_plugins)
 
     def _judge(self, rows: list[Row]) -> tuple[float, bool]:
         return self.objective.value(rows), self.objective.found(rows)

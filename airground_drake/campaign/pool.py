@@ -12,6 +12,7 @@ from functools import partial
 from typing import Any, Protocol, TypeVar
 
 from airground_drake.errors import AirgroundError, one_line
+from airground_drake.interruption import end_with_parent
 
 DEATHS = 2
 """An item in whose presence so many processes have died is given up."""
@@ -79,7 +80,8 @@ def _submitted(call: Callable[[], T], jobs: int) -> Any:
     import loky
 
     try:
-        return loky.get_reusable_executor(jobs, timeout=IDLE_S, env=THREADS).submit(call)
+        processes = loky.get_reusable_executor(jobs, timeout=IDLE_S, env=THREADS, initializer=end_with_parent)
+        return processes.submit(call)
     except loky.BrokenProcessPool as error:
         future = loky.Future()
         future.set_exception(error)

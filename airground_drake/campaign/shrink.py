@@ -7,14 +7,12 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from airground_drake.errors import AirgroundError
 from airground_drake.nsbc.motion import Motion
-from airground_drake.scenarios.load import from_data
-from airground_drake.simulation import simulate
 from airground_drake.trace import Trace
 
 DIGITS = (0, 1, 2, 3)
@@ -29,23 +27,34 @@ ROUNDED = ("ugvs", "obstacles", "uav", "control", "decision", "duration_s")
 Json = dict[str, Any]
 Fails = Callable[[Json], bool]
 """Whether a scenario is valid and fails, as before."""
+Traced = Callable[[Json], Trace | None]
+"""What comes of a scenario's run, if anything."""
 
 
-def shrink(data: Json, fails: Fails, tests: int) -> tuple[Json, int]:
+def shrink(data: Json, fails: Fails, traced: Traced, tests: int) -> tuple[Json, int]:
     """A smaller scenario that fails, too.
 
     Args:
         data: of a scenario that fails, as `scenarios.load.resolved` gives it; with a single run.
         fails: the test.
+        traced: simulates the run; not counted.
         tests: how often it may be used.
 
     Returns:
         The smallest one found, and how many tests it took.
     """
     used, changed = 0, True
+    steps = (
+        _without_policies,
+        _without_robots,
+        _without_obstacles,
+        partial(_later, traced),
+        partial(_shorter, traced),
+        _rounder,
+    )
     while changed and used < tests:
         changed = False
-        for smaller in (_without_policies, _without_robots, _without_obstacles, _later, _shorter, _rounder):
+        for smaller in steps:
             again = True
             while again and used < tests:
                 again = False
@@ -107,13 +116,13 @@ def _without_items(data: Json, *keys: str) -> Iterator[Json]:
         yield smaller
 
 
-def _later(data: Json) -> Iterator[Json]:
+def _later(traced: Traced, data: Json) -> Iterator[Json]:
     """Begin shortly before the first trigger, where the robots are by then."""
-    yield from _with_seeds(_begun_later(data))
+    yield from _with_seeds(_begun_later(traced, data))
 
 
-def _begun_later(data: Json) -> Iterator[Json]:
-    trace = _trace(data)
+def _begun_later(traced: Traced, data: Json) -> Iterator[Json]:
+    trace = traced(data)
     first = min((event["t_s"] for event in trace.events if event["kind"] == "trigger"), default=0.0) if trace else 0.0
     for spare in SPARE_S:
         if trace is not None and first > 1.5 * spare:
@@ -144,9 +153,9 @@ def _from(data: Json, trace: Trace, t: float) -> Json:
     return later
 
 
-def _shorter(data: Json) -> Iterator[Json]:
+def _shorter(traced: Traced, data: Json) -> Iterator[Json]:
     """End soon after the last event but arrivals, or in half the time; not before the first control period is over."""
-    trace = _trace(data)
+    trace = traced(data)
     ends = [data["duration_s"] * share for share in (0.25, 0.5, 0.75, 0.9)]
     if trace is not None:
         events = [event["t_s"] for event in trace.events if event["kind"] != "arrival"]
@@ -172,11 +181,3 @@ def _round(value: Any, digits: int) -> Any:
     if isinstance(value, list):
         return [_round(each, digits) for each in value]
     return round(value, digits) + 0.0 if isinstance(value, float) else value
-
-
-def _trace(data: Json) -> Trace | None:
-    try:
-        scenario = from_data(data, "shrunk")
-        return simulate(scenario, next(iter(scenario.runs)))
-    except AirgroundError:
-        return None

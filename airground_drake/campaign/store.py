@@ -52,8 +52,8 @@ class Store:
         there = sorted(path.name for path in folder.iterdir() if not files.is_partial(path))
         if there and not resume:
             raise FolderError(one_line(f"{folder} holds {there[0]!r}; allowed: a new or empty folder, or --resume"))
-        if there and _manifest(folder) != manifest:
-            raise FolderError(one_line(f"{folder} has another campaign, or another version of it; allowed: the same"))
+        if there:
+            _be_the_same(folder, manifest)
         files.sweep(folder)
         if not there:
             files.write_json(folder / MANIFEST, manifest)
@@ -120,6 +120,15 @@ def read(folder: Path) -> tuple[dict[str, Any], pd.DataFrame]:
     lately, _ = _read_journal(folder / JOURNAL, set(parts["index"]))
     both = pd.concat([parts, _table([row for rows in lately.values() for row in rows])], ignore_index=True)
     return manifest, both.sort_values("index", kind="stable", ignore_index=True)
+
+
+def _be_the_same(folder: Path, manifest: dict[str, Any]) -> None:
+    found = _manifest(folder)
+    if found is None:
+        raise FolderError(one_line(f"{folder} has no campaign to resume: no {MANIFEST} of ours"))
+    other = sorted(key for key in {*found, *manifest} if found.get(key) != manifest.get(key))
+    if other:
+        raise FolderError(one_line(f"{folder} has another campaign ({', '.join(other)}); allowed: the same"))
 
 
 def _manifest(folder: Path) -> dict[str, Any] | None:

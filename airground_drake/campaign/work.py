@@ -6,7 +6,8 @@ import gc
 import json
 import math
 import time
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import contextmanager
 from functools import cache, partial
 from typing import Any
 
@@ -77,12 +78,7 @@ def rows_of_scenario(
     """Simulate and judge the runs of a scenario by the claims of a campaign; `common`: what all rows have."""
     common = blank() if common is None else common
     try:
-        within(scenario, limits)
-        with (
-            plugins.admitted(scenario, spec.scenario, allow=allow_plugins),
-            plugins.beside(spec.source, allow=allow_plugins),
-            time_limit(limits.time, DrawOutOfTime),
-        ):
+        with _within(spec, scenario, limits, allow_plugins=allow_plugins):
             return [row for run in scenario.runs for row in _rows_of_run(scenario, run, spec.claims, common)]
     except AirgroundError as error:
         return [common | {"ended": INVALID, "what": one_line(str(error))}]
@@ -91,6 +87,32 @@ def rows_of_scenario(
     finally:
         _keep_what_is_loaded()
         gc.collect()  # Python does not see how large a diagram is, and would wait for hundreds
+
+
+def trace_of(spec: Spec, scenario: Scenario, limits: Limits, *, allow_plugins: bool = False) -> Trace | None:
+    """Of the first run of a scenario, alike; None if that cannot be simulated."""
+    try:
+        with _within(spec, scenario, limits, allow_plugins=allow_plugins):
+            return simulate(scenario, next(iter(scenario.runs)))
+    except (Exception, SystemExit, DrawOutOfTime):  # code of others
+        return None
+
+
+@contextmanager
+def _within(spec: Spec, scenario: Scenario, limits: Limits, *, allow_plugins: bool) -> Iterator[None]:
+    """Code of others is found, or refused; what takes too long is stopped.
+
+    Raises:
+        AirgroundError: if the scenario asks for more than it may.
+        DrawOutOfTime: in the body.
+    """
+    within(scenario, limits)
+    with (
+        plugins.admitted(scenario, spec.scenario, allow=allow_plugins),
+        plugins.beside(spec.source, allow=allow_plugins),
+        time_limit(limits.time, DrawOutOfTime),
+    ):
+        yield
 
 
 def _rows_of_run(scenario: Scenario, run: str, claims: Collection[str], common: Row) -> list[Row]:

@@ -150,7 +150,7 @@ def _save(search: Search, best: Best, path: Path, tests: int) -> None:
     for run in scenario.runs if best.found else ():
         alone = data | {"runs": {run: data["runs"][run]}}
         if search.fails(alone):
-            smaller, used = shrink(alone, search.fails, tests)
+            smaller, used = shrink(alone, search.fails, search.trace, tests)
             small = _small(path)
             _write(small, smaller | {"name": f"{scenario.name[: MAX_NAME - len('_small')]}_small"})
             print(

@@ -70,8 +70,7 @@ def test_objectives() -> None:
     assert last.value([row(arrival_s=9.0, arrived=2, ugvs=2)]) == -9.0
 
 
-def test_what_does_not_matter_goes(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "_trace", lambda data: None)
+def test_what_does_not_matter_goes() -> None:
     data = resolved(load("warehouse")[0])
     data["runs"] = {"d": data["runs"]["d"]}
     matters = sorted(data["obstacles"])[2]
@@ -86,7 +85,7 @@ def test_what_does_not_matter_goes(monkeypatch: pytest.MonkeyPatch) -> None:
         there = candidate["obstacles"].get(matters)
         return there is not None and abs(there["position_m"][0] - needed) < 0.05 and candidate["duration_s"] > 3.0
 
-    small, used = shrink(data, fails, 300)
+    small, used = shrink(data, fails, lambda data: None, 300)
     assert fails(small)
     assert used <= 300
     assert list(small["obstacles"]) == [matters]
@@ -96,10 +95,9 @@ def test_what_does_not_matter_goes(monkeypatch: pytest.MonkeyPatch) -> None:
     assert round(small["obstacles"][matters]["position_m"][0], 1) == small["obstacles"][matters]["position_m"][0]
 
 
-def test_a_run_gets_no_shorter_than_a_control_period(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "_trace", lambda data: None)
+def test_a_run_gets_no_shorter_than_a_control_period() -> None:
     data = resolved(load("minimal")[0])
     period = data["control"]["period_s"]
-    shorter = [each["duration_s"] for each in module._shorter(data | {"duration_s": 1.5 * period})]
+    shorter = [each["duration_s"] for each in module._shorter(lambda data: None, data | {"duration_s": 1.5 * period})]
     assert shorter
     assert min(shorter) >= period

@@ -111,13 +111,14 @@ def test_a_folder_of_something_else_or_of_another_campaign_is_refused(tmp_path: 
     (tmp_path / "photos" / "me.png").write_bytes(b"")
     with pytest.raises(FolderError, match=r"holds 'me\.png'"):
         Store(tmp_path / "photos", MANIFEST, resume=False)
-    with pytest.raises(FolderError, match="another campaign"):
+    with pytest.raises(FolderError, match="no campaign to resume"):
         Store(tmp_path / "photos", MANIFEST, resume=True)
     Store(tmp_path / "c", MANIFEST, resume=False).close()
     with pytest.raises(FolderError, match="--resume"):
         Store(tmp_path / "c", MANIFEST, resume=False)
-    with pytest.raises(FolderError, match="another campaign"):
-        Store(tmp_path / "c", MANIFEST | {"spec_sha256": "1"}, resume=True)
+    for another in ({"spec_sha256": "1"}, {"limits": {"time": 2.0}}):
+        with pytest.raises(FolderError, match=rf"another campaign \({next(iter(another))}\)"):
+            Store(tmp_path / "c", MANIFEST | another, resume=True)
     with pytest.raises(FolderError, match="no campaign"):
         read(tmp_path / "photos")
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
-import os
-import signal
 import subprocess
 import sys
 import time
@@ -39,6 +38,8 @@ def test_it_runs_goes_on_and_says_what_it_found(spec: Path, tmp_path: Path, caps
     assert main([str(spec), "-n", "2", "-o", out, "--jobs", "1"]) == 0
     assert main([str(spec), "-n", "2", "-o", out]) == 2
     assert "--resume" in capsys.readouterr().err
+    assert main([str(spec), "-n", "4", "-o", out, "--resume", "--limit-time", "9"]) == 2
+    assert "another campaign (limits)" in capsys.readouterr().err
     assert main([str(spec), "-n", "4", "-o", out, "--jobs", "1", "--resume"]) == 0
     found = json.loads((tmp_path / "out" / "evidence.json").read_text())
     assert (found["draws"], found["ended"]) == (4, {"judged": 4})
@@ -144,6 +145,13 @@ def test_a_rule_that_is_none(rule: str, spec: Path, capsys: pytest.CaptureFixtur
     assert "wanted: CLAIM < PROBABILITY" in capsys.readouterr().err
 
 
+def _session(stat: Path) -> int:
+    with contextlib.suppress(OSError):  # it has ended
+        state, _, _, session = stat.read_text(errors="replace").rpartition(")")[2].split()[:4]
+        return int(session) if state not in "ZX" else 0
+    return 0
+
+
 def test_killed_in_the_midst_it_loses_nothing_that_was_finished(spec: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     command = [
@@ -166,8 +174,14 @@ def test_killed_in_the_midst_it_loses_nothing_that_was_finished(spec: Path, tmp_
         ):
             time.sleep(0.05)
     finally:
-        os.killpg(process.pid, signal.SIGKILL)
+        process.kill()
         process.wait()
+    left, waited = 1, 0.0
+    while left and waited < 30.0:  # its processes end with it, busy or not
+        left = sum(_session(stat) == process.pid for stat in Path("/proc").glob("[0-9]*/stat"))
+        time.sleep(0.1)
+        waited += 0.1
+    assert not left
     before = read(out)[1]
     assert len(before)
     assert main([str(spec), "-n", str(before["index"].max() + 2), "-o", str(out), "--jobs", "1", "--resume"]) == 0
