@@ -104,16 +104,15 @@ def _all(spec: Spec, options: argparse.Namespace) -> int:
 
 def _only(spec: Spec, options: argparse.Namespace) -> int:
     """One draw alone: its verdicts, and its scenario as a file that `report` takes."""
-    import yaml
-
     from airground_drake.campaign.work import rows_of
+    from airground_drake.scenarios.document import text_of
     from airground_drake.scenarios.load import resolved
 
     if not options.allow_plugins:
         spec.refuse_plugins()
     scenario = spec.draw(options.only)
     path = options.output or Path(f"{scenario.name}.yaml")
-    text = yaml.safe_dump(resolved(scenario), sort_keys=False, allow_unicode=True)
+    text = text_of(resolved(scenario))
     with files.wanted(path, "a file for the scenario"):
         if not (path.is_file() and path.read_bytes() == text.encode()):  # the same draw may be asked for again
             files.try_to_create(path)

@@ -161,7 +161,7 @@ def _save(search: Search, best: Best, path: Path, tests: int) -> None:
 
 
 def _write(path: Path, data: dict[str, Any]) -> None:
-    import yaml
+    from airground_drake.scenarios.document import text_of
 
-    files.write_text(path, yaml.safe_dump(data, sort_keys=False, allow_unicode=True))
+    files.write_text(path, text_of(data))
     print(one_line(str(path)))

@@ -65,9 +65,20 @@ class _Loader(yaml.BaseLoader):
         return node
 
 
+class _Dumper(yaml.SafeDumper):
+    """Quotes text that would be read as something else, by the rules of YAML 1.1 or 1.2."""
+
+
 for _name, (_pattern, _) in _SCALARS.items():
     if _pattern is not None:
-        _Loader.add_implicit_resolver(TAG + _name, re.compile(rf"(?:{_pattern})\Z"), None)
+        for _each in (_Loader, _Dumper):
+            _each.add_implicit_resolver(TAG + _name, re.compile(rf"(?:{_pattern})\Z"), None)
+
+
+def text_of(data: Mapping[str, Any]) -> str:
+    """A YAML file of ours from nested dicts, lists and scalars."""
+    text: str = yaml.dump(data, Dumper=_Dumper, sort_keys=False, allow_unicode=True)
+    return text
 
 
 def read_data(path: Path) -> tuple[Any, str]:

@@ -16,6 +16,7 @@ from scenarios.cases import SMALL, SMALL_DATA
 
 from airground_drake.errors import ScenarioError
 from airground_drake.scenarios import schema
+from airground_drake.scenarios.document import text_of
 from airground_drake.scenarios.load import load, resolved
 
 
@@ -65,7 +66,7 @@ def loads_or_explains(path: Path, content: bytes) -> None:
     path.write_bytes(content)
     scenario = load_if_valid(str(path))
     if scenario is not None:
-        path.write_text(yaml.safe_dump(resolved(scenario), sort_keys=False), encoding="utf-8")
+        path.write_text(text_of(resolved(scenario)), encoding="utf-8")
         assert load(str(path))[0] == scenario
 
 
