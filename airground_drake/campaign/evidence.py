@@ -14,7 +14,7 @@ from pandas.api.types import is_numeric_dtype
 from scipy.stats import chi2_contingency, qmc
 
 from airground_drake.arrays import Array
-from airground_drake.campaign.rows import JUDGED, TIMES, is_tested
+from airground_drake.campaign.rows import JUDGED, TIMES, UNFINISHED, is_tested
 from airground_drake.campaign.statistics import CONFIDENCE, clopper_pearson, confidence_sequence
 from airground_drake.statuses import UNDECIDED
 
@@ -35,9 +35,9 @@ class Counts(NamedTuple):
     """Of one claim in one run of the scenario, over all draws that put it to the test.
 
     Attributes:
-        tested: judged and exercised, or judged by a claim that does not count how often it was.
+        tested: judged and exercised, or judged by a claim that does not count how often it was; or not finished.
         refuted: violations.
-        undecided: of these; they count as violations in every upper bound.
+        undecided: of these, or not finished; they count as violations in every upper bound.
         idle: judged, but nothing could have refuted the claim: these count for nothing.
     """
 
@@ -47,12 +47,12 @@ class Counts(NamedTuple):
     idle: int
 
     @classmethod
-    def of(cls, rows: pd.DataFrame) -> Counts:
-        """From the rows of one claim and run."""
+    def of(cls, rows: pd.DataFrame, unfinished: int) -> Counts:
+        """From the rows of one claim and run, and how many more runs were not finished."""
         tested = _tested(rows)
         status = rows.loc[tested, "status"]
         refuted, undecided = int((status == "refuted").sum()), int(status.isin(UNDECIDED).sum())
-        return cls(int(tested.sum()), refuted, undecided, int((~tested).sum()))
+        return cls(int(tested.sum()) + unfinished, refuted, undecided + unfinished, int((~tested).sum()))
 
     def interval(self, *, anytime: bool) -> tuple[float, float]:
         """Bounds of the probability of a violation; what is undecided is none for the lower, one for the upper."""
@@ -77,6 +77,7 @@ def evidence(table: pd.DataFrame, marks: Mapping[str, float] | None = None) -> J
     runs = judged.drop_duplicates(["index", "run"])
     drawn = drawn_keys(first)
     failed = table[table["ended"] != JUDGED]
+    unfinished = failed.loc[failed["ended"].isin(UNFINISHED), "run"].value_counts()
     return {
         "confidence": CONFIDENCE,
         "draws": len(first),
@@ -85,7 +86,10 @@ def evidence(table: pd.DataFrame, marks: Mapping[str, float] | None = None) -> J
         "runs": len(runs),
         "simulated_s": float(runs["duration_s"].sum()),
         "claims": sorted(
-            (_claim(str(run), str(claim), rows, drawn) for (run, claim), rows in judged.groupby(["run", "claim"])),
+            (
+                _claim(rows, int(unfinished.get(run, 0) + unfinished.get("", 0)), drawn)
+                for (run, _), rows in judged.groupby(["run", "claim"])
+            ),
             key=lambda claim: (not claim["not_as_expected"], not claim["refuted"], not claim["undecided"]),
         ),
         "times": [_times(str(run), rows, marks or {}) for run, rows in runs.groupby("run")],
@@ -109,16 +113,14 @@ def drawn_keys(first: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame.from_dict(found, orient="index")
 
 
-def _claim(run: str, claim: str, rows: pd.DataFrame, drawn: pd.DataFrame) -> Json:
-    counts = Counts.of(rows)
+def _claim(rows: pd.DataFrame, unfinished: int, drawn: pd.DataFrame) -> Json:
+    counts = Counts.of(rows, unfinished)
     tested = rows[_tested(rows)]
     margins = tested[tested["margin"].notna()]
     worst = margins.nsmallest(WORST, "margin")
     violated = tested.set_index("index")["status"] == "refuted"
     return {
-        "run": run,
-        "method": str(rows["method"].iloc[0]),
-        "claim": claim,
+        **{key: str(rows[key].iloc[0]) for key in ("run", "method", "claim")},
         **counts._asdict(),
         "not_as_expected": int((~rows["as_expected"]).sum()),
         "differs": int((~rows["as_expected"] & ~rows["status"].isin(UNDECIDED)).sum()),

@@ -20,6 +20,8 @@ COLUMNS: dict[str, str] = {
 simulation), `died` (its process); such a row has no claim. `drawn` is strict JSON: values by key."""
 
 JUDGED, INVALID, STOPPED, DIED = "judged", "invalid", "stopped", "died"
+UNFINISHED = (STOPPED, DIED)
+"""Every claim of such a run is undecided; of all runs of a draw where a row names none."""
 
 TIMES = ("first_trigger_s", "arrival_s", "intervened_s", "wall_s")
 """Columns whose distributions are shown, s."""

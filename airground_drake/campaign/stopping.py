@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 
-from airground_drake.campaign.rows import Row, is_tested
+from airground_drake.campaign.rows import UNFINISHED, Row, is_tested
 from airground_drake.campaign.statistics import confidence_sequence
 from airground_drake.errors import UnknownNameError
 from airground_drake.registry import RUN_CLAIMS
@@ -31,6 +32,7 @@ class Stopping:
 
     def __post_init__(self) -> None:
         self._counts: dict[str, list[int]] = {}
+        self._unfinished = Counter[str]()
 
     @classmethod
     def parse(cls, text: str, claims: Collection[str] = ()) -> Stopping:
@@ -58,18 +60,20 @@ class Stopping:
     def met(self, rows: list[Row]) -> bool:
         """Count the rows of one more draw; whether every run of the scenario now meets the rule."""
         for row in rows:
+            self._unfinished[row["run"]] += row["ended"] in UNFINISHED
             if row["claim"] == self.claim and is_tested(row["status"], row["exercised"]):
                 counts = self._counts.setdefault(row["run"], [0, 0, 0])
                 counts[0] += row["status"] == "refuted"
                 counts[1] += row["status"] in UNDECIDED
                 counts[2] += 1
-        return bool(self._counts) and all(map(self._decides, self._counts.values()))
+        return bool(self._counts) and all(map(self._decides, self._counts))
 
-    def _decides(self, counts: list[int]) -> bool:
-        refuted, undecided, tested = counts
+    def _decides(self, run: str) -> bool:
+        refuted, undecided, tested = self._counts[run]
+        unfinished = self._unfinished[run] + self._unfinished[""]
         if self.below:
-            return confidence_sequence(refuted + undecided, tested).high < self.value
-        return confidence_sequence(refuted, tested).low > self.value
+            return confidence_sequence(refuted + undecided + unfinished, tested + unfinished).high < self.value
+        return confidence_sequence(refuted, tested + unfinished).low > self.value
 
 
 class InOrder:

@@ -12,7 +12,7 @@ import pytest
 
 from airground_drake.campaign.evidence import evidence, strict
 from airground_drake.campaign.page import page
-from airground_drake.campaign.rows import COLUMNS, DIED, JUDGED, Row, blank
+from airground_drake.campaign.rows import COLUMNS, DIED, INVALID, JUDGED, STOPPED, Row, blank
 from airground_drake.campaign.statistics import clopper_pearson, confidence_sequence
 from airground_drake.campaign.stopping import InOrder, Stopping
 from airground_drake.campaign.work import died
@@ -45,6 +45,19 @@ def test_untested_runs_count_for_nothing_and_undecided_ones_against_the_claim() 
     assert claim["anytime"] == pytest.approx([confidence_sequence(1, 92).low, confidence_sequence(2, 92).high])
     assert claim["not_as_expected"] == 2
     assert [each["index"] for each in claim["worst"]] == [0, 1, 2, 3, 4]
+
+
+def test_what_was_not_finished_is_undecided() -> None:
+    """A run that was stopped, and a draw whose process died; not one that was no valid scenario."""
+    gone = [blank() | {"index": 90, "run": "d", "ended": STOPPED, "drawn": "{}"}, *died(91)]
+    other = [blank() | {"index": 92, "run": "c", "ended": STOPPED, "drawn": "{}"}]
+    other += [blank() | {"index": 93, "ended": INVALID, "drawn": "{}"}]
+    rows = [row(i) for i in range(90)] + gone + other
+    (claim,) = conclude(rows)["claims"]
+    assert [claim[name] for name in ("tested", "refuted", "undecided", "idle")] == [92, 0, 2, 0]
+    assert claim["fixed"] == pytest.approx([0.0, clopper_pearson(2, 92).high])
+    value = confidence_sequence(2, 92).high
+    assert [Stopping("SAFE-TRACE", True, value * share).met(rows) for share in (0.999, 1.001)] == [False, True]
 
 
 def test_a_claim_that_nothing_tested_has_no_bound_but_the_whole_interval() -> None:
