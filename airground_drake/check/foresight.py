@@ -14,7 +14,7 @@ from .run import Run
 from .scenario import apart_m
 
 STILL_M = 0.05
-"""Less than this within the last second is at rest."""
+"""Less than this within the last second is at rest, or less than a tenth of what a slow UGV can do in a second."""
 OUTCOME = 1e-6
 """Recorded and recomputed outcomes may differ by this, relative, or in m^2 s."""
 TOLD = 1e-2
@@ -138,6 +138,7 @@ def foreseen(run: Run, ugv: str, t_s: float, issued_s: float) -> tuple[Foreseen,
     start, goal = run.place_m(ugv, t_s), preset.corners_m[-1]
     own, wanted = preset.position_m(t_s + after), asked.place_m(t_s + after)
     executed = (0, max(0, int(np.ceil((until - t_s) / h - SMALL))))
+    still_m = min(STILL_M, run.robots[ugv]["max_speed_m_s"] / 10.0)
     found = []
     for periods, around in zip(executed, ways, strict=True):
         points = np.concatenate(around, axis=1)
@@ -148,11 +149,11 @@ def foreseen(run: Run, ugv: str, t_s: float, issued_s: float) -> tuple[Foreseen,
             v = _command(run, ugv, places[-1], own[k : k + 2], intervention)
             places.append(places[-1] + h * avoiding(v, given, run.scenario["runs"][run.name]["composition"])[0])
             integral += h * float(((own[k + 1] - places[-1]) ** 2).sum())
-            if k >= settled and _resting(run, places, goal, h):
+            if k >= settled and _resting(run, places, goal, h, still_m):
                 break
         end, earlier = places[-1], places[max(0, len(places) - 1 - max(1, round(1.0 / h)))]
         home = bool(np.linalg.norm(end - goal) <= run.scenario["arrival_tolerance_m"])
-        stalls = not home and bool(np.linalg.norm(end - earlier) < STILL_M)
+        stalls = not home and bool(np.linalg.norm(end - earlier) < still_m)
         found.append(Foreseen(np.array(places), stalls, home, integral, goal, discs, distances))
     return found[0], found[1]
 
@@ -169,12 +170,12 @@ def _command(run: Run, ugv: str, place: Array, own: Array, asked: tuple[Array, A
     return limited((PLANE * (task[0] + projector @ (wish - task[0])))[None], limit)
 
 
-def _resting(run: Run, places: list[Array], goal: Array, h: float) -> bool:
+def _resting(run: Run, places: list[Array], goal: Array, h: float, still_m: float) -> bool:
     """Whether the roll-out may end: it is home, or has hardly moved for a second."""
     second = max(1, round(1.0 / h))
     if np.linalg.norm(goal - places[-1]) < run.scenario["arrival_tolerance_m"]:
         return True
-    return len(places) > second and bool(np.linalg.norm(places[-1] - places[-1 - second]) < 0.1 * STILL_M)
+    return len(places) > second and bool(np.linalg.norm(places[-1] - places[-1 - second]) < 0.1 * still_m)
 
 
 def _known_m(run: Run, ugv: str, t_s: float, asked: Proposal) -> tuple[Array, Array]:

@@ -16,7 +16,7 @@ goal will never get there: its terminal cost is infinite. Of two such the one th
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numba import njit
@@ -31,6 +31,8 @@ from airground_drake.nsbc.motion import Motion
 
 USELESS = 1e-6
 """Relative gain below which an intervention makes no difference."""
+STILL_SHARE = 0.1
+"""Of what a UGV can do in a second: `Outlook.still` is no more than this."""
 MOST_CIRCLES = 32
 """Among which a shortest way is looked for: it takes 10 ms, and eight times as long for twice as many."""
 
@@ -44,7 +46,7 @@ class Outlook:
         past: time that is rolled out when motion and preset trajectory are over, s.
         coasting: time for which a robot without a proposal is predicted to keep its velocity; then it stands, s.
         near: this close to the goal the own task is done, m.
-        still: less than this within the last second counts as being at rest, m.
+        still: less than this within the last second counts as being at rest, m; for slow UGVs it is less.
     """
 
     longest: float
@@ -136,6 +138,7 @@ def outcomes(
         look: how far to look.
     """
     h = law.avoidance.period
+    look = replace(look, still=min(look.still, STILL_SHARE * scene.max_speed))
     distances = np.broadcast_to(distances, len(discs))
     until = min(proposal.motion.end, scene.t + look.longest)
     ends = min(max(until, scene.preset.end), scene.t + look.longest) + look.past

@@ -20,7 +20,9 @@ OVER = "over"
 STANDS_S = 1.0
 """A UGV stands once it has kept to one place for this long, s."""
 STANDS_M = 0.1
-"""One place: no farther than this from where it came to a halt, m."""
+"""One place: no farther than this from where it came to a halt, m; for slow UGVs it is less."""
+STANDS_SHARE = 0.1
+"""Of what a UGV can do in `STANDS_S`: one place is no larger than this."""
 
 
 @dataclass(frozen=True)
@@ -123,7 +125,10 @@ class Planner:
         places: list[Point] = [(x, y, z) for x, y, z in positions[: len(self.ugvs)].tolist()]
         if not memory.halts:
             return replace(memory, halts=tuple(Halt(place, t) for place in places))
-        moved = [math.dist(halt.place, place) > STANDS_M for halt, place in zip(memory.halts, places, strict=True)]
+        moved = [
+            math.dist(halt.place, place) > min(STANDS_M, STANDS_SHARE * STANDS_S * speed)
+            for halt, place, speed in zip(memory.halts, places, self.max_speed.tolist(), strict=True)
+        ]
         if not any(moved):
             return memory
         halts = [Halt(places[i], t) if moved[i] else halt for i, halt in enumerate(memory.halts)]

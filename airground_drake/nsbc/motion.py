@@ -42,8 +42,8 @@ class Motion:
             if not (steps > 0.0).all():
                 raise ValueError("the times of a motion must increase strictly")
             slopes = (positions[1:] - positions[:-1]) / steps[:, None]
-        times.setflags(write=False)
-        positions.setflags(write=False)
+        for array in (times, positions, slopes):
+            array.setflags(write=False)
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "positions", positions)
         object.__setattr__(self, "_times", times.tolist())

@@ -52,6 +52,25 @@ def test_where_the_own_task_gets_there_a_detour_is_not_taken() -> None:
     assert not accept.better_than(refuse)
 
 
+def test_a_slow_robot_that_goes_on_does_not_stall() -> None:
+    scene, _ = situation()
+    slow = replace(scene, preset=Motion.at_speed(scene.preset.positions, 0.02), max_speed=0.02)
+    way = along((0.0, 0.0), (4.0, 1.0), (8.0, 0.0), speed=0.02)
+    for outcome in outcomes(slow, LAW, way, NONE, 2.0, (), LOOK):
+        assert not outcome.stalls
+        assert np.isfinite(outcome.cost)
+
+
+def test_a_slow_robot_stalls_in_front_of_a_wall() -> None:
+    scene, discs = situation((2.5, 1.0), (2.5, -1.0))
+    slow = replace(scene, preset=Motion.at_speed(scene.preset.positions, 0.04), max_speed=0.04)
+    way = along((0.0, 0.0), (0.0, 4.0), (8.0, 4.0), speed=0.04)
+    refuse, accept = outcomes(slow, LAW, way, discs, 2.0, (), replace(LOOK, longest=60.0))
+    assert refuse.stalls
+    assert not accept.stalls
+    assert accept.better_than(refuse)
+
+
 def test_a_proposal_to_stay_makes_no_difference_to_a_stall() -> None:
     scene, discs = situation((4.0, 1.0), (4.0, -1.0))
     refuse, accept = outcomes(scene, LAW, along((0.0, 0.0), (0.01, 0.0)), discs, 2.0, (), LOOK)

@@ -73,6 +73,14 @@ def test_who_keeps_to_one_place_stands() -> None:
     assert [halt.since for halt in later.halts] == [0.0, STANDS_S]
 
 
+def test_who_is_slow_does_not_stand_as_long_as_it_goes_on() -> None:
+    planner = replace(make_planner(load("case_a")[0], METHODS["d"]), max_speed=np.array([0.02, 0.02]))
+    places = np.zeros((3, 3))
+    memory = planner.watch(PlannerMemory(()), 0.0, places)
+    later = planner.watch(memory, STANDS_S, places + np.array([[0.02], [0.0], [0.0]]) / np.sqrt(3.0))
+    assert [halt.since for halt in later.halts] == [STANDS_S, 0.0]
+
+
 def test_bodies_are_gone_round_by_both_radii() -> None:
     stuck = mate("ugv1", [0.0, 0.0], [12.0, 0.0])
     parked = mate("ugv2", [6.0, 0.1], [6.0, 0.1], triggered=False, radius=0.5)

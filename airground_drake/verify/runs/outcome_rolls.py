@@ -19,7 +19,7 @@ from airground_drake.verify.runs.proposals import Sent
 from airground_drake.verify.runs.way_left import bounds_of_way_left
 
 STILL_M = 0.05
-"""Less than this within the last second is at rest, m."""
+"""Less than this within the last second is at rest, m; for a UGV that is slow, a tenth of what it can do then."""
 AT_ONCE = 5_000_000
 """Coordinates of what decisions that are rolled out side by side keep away from: they have to fit into the memory."""
 FAR_M = 1e9
@@ -155,6 +155,7 @@ def _followed(trace: Trace, choices: Choices) -> tuple[Array, Counts]:
     rates, wishes = (np.diff(part, axis=1) / h for part in (choices.preset, choices.wanted))
     place, limit, second = choices.here, choices.limit, max(1, round(1.0 / h))
     ways, done, earliest = [place], choices.lasting, int(choices.settled.min())
+    still = np.minimum(STILL_M, limit / 10.0)
     for k in range(int(choices.lasting.max())):
         around = inequalities(place, choices.points[:, k], choices.safe, choices.share, control, planar=True)
         task = tracking(place, choices.preset[:, k], rates[:, k], control["motion_gain_1_s"], limit)
@@ -168,7 +169,7 @@ def _followed(trace: Trace, choices: Choices) -> tuple[Array, Counts]:
             continue
         home = np.linalg.norm(choices.goal - place, axis=1) < scenario["arrival_tolerance_m"]
         moved = np.linalg.norm(place - ways[k + 1 - second], axis=1) if k + 1 >= second else np.full(len(place), np.inf)
-        resting = (home | (moved < 0.1 * STILL_M)) & (k >= choices.settled)
+        resting = (home | (moved < 0.1 * still)) & (k >= choices.settled)
         done = np.where(resting, np.minimum(done, k + 1), done)
         if (done <= k + 1).all():
             break
@@ -180,5 +181,5 @@ def _concluded(scenario: dict[str, Any], begun: Beginning, places: Array, integr
     if np.linalg.norm(end - begun.goal) <= scenario["arrival_tolerance_m"]:
         return Foreseen(places, False, integral, 0.0, 0.0)
     before = places[max(0, len(places) - 1 - max(1, round(1.0 / scenario["control"]["period_s"])))]
-    stalls = bool(np.linalg.norm(end - before) < STILL_M)
+    stalls = bool(np.linalg.norm(end - before) < min(STILL_M, begun.limit / 10.0))
     return Foreseen(places, stalls, integral, *bounds_of_way_left(end, begun.goal, *begun.known))
