@@ -157,7 +157,7 @@ def gate_opt(run: Run, claim: Json) -> Found:
         raise NotEstablished("the largest gap", f"it is between {least:.9g} and {most:.9g}, allowed {LARGEST_GAP}")
     for decision, (_lowest, highest) in zip(planned, gaps, strict=True):
         if highest > LARGEST_GAP:
-            _no_plan_of_blocks_is_much_cheaper(decision)
+            _no_plan_of_blocks_is_much_cheaper(decision, decision.half_planes if halfplanes else None)
     return Found("inconclusive").counted(len(planned))
 
 
@@ -226,9 +226,9 @@ def _cheapest_of_blocks(decision: Decision, normals: Array | None) -> Enclosure:
     return Enclosure(least, least)
 
 
-def _no_plan_of_blocks_is_much_cheaper(decision: Decision) -> None:
+def _no_plan_of_blocks_is_much_cheaper(decision: Decision, normals: Array | None) -> None:
     own = float(decision.cost(decision.positions_m))
-    shown = (own - _cheapest_of_blocks(decision, None).lower) / decision.scale
+    shown = (own - _cheapest_of_blocks(decision, normals).lower) / decision.scale
     at_most("gap to a plan of blocks", shown, LARGEST_GAP, **_at(decision))
 
 

@@ -9,11 +9,17 @@ import numpy as np
 
 from airground_drake.arrays import Array
 from airground_drake.gatekeeper.problem import Problem
+from airground_drake.gatekeeper.reachable_box import nearest_in_reach, within_reach
 
 
 def normals_along(problem: Problem, positions: Array) -> Array:
-    """Unit vectors (N, m, 3) from the points to a guiding trajectory (N, 3)."""
-    offset = positions[:, None, :] - problem.centres
+    """Unit vectors (N, m, 3) from the points to a guiding trajectory (N, 3).
+
+    Where no plan can come near, (26d) asks for nothing, and no half-plane shall: there they are from the points to
+    the nearest place that any plan could reach. All of them are beyond that half-plane.
+    """
+    guide = np.where(within_reach(problem)[:, :, None], positions[:, None, :], nearest_in_reach(problem))
+    offset = guide - problem.centres
     norm = np.sqrt(np.einsum("kmi,kmi->km", offset, offset))[:, :, None]
     if norm.min(initial=np.inf) > 1e-9:
         return offset / norm

@@ -15,12 +15,16 @@ from airground_drake.gatekeeper.cost import Terms
 from airground_drake.gatekeeper.problem import Kinematics, Problem
 
 
-def within_reach(problem: Problem) -> npt.NDArray[np.bool_]:
-    """(N, m): False where no relaxed plan can come within the safe distance, so that (26d) costs nothing there.
+def nearest_in_reach(problem: Problem) -> Array:
+    """Where in the box of each stage a plan could be nearest to each point, (N, m, 3), m."""
+    nearest: Array = _nearest(problem.kinematics, problem.terms)
+    return nearest
 
-    A half-plane in its place may still bind: it is conservative. Without it the bounds stay valid.
-    """
-    within: npt.NDArray[np.bool_] = _within_reach(problem.kinematics, problem.terms)
+
+def within_reach(problem: Problem) -> npt.NDArray[np.bool_]:
+    """(N, m): False where no relaxed plan can come within the safe distance, so that (26d) costs nothing there."""
+    squared = np.square(nearest_in_reach(problem) - problem.centres).sum(axis=2)
+    within: npt.NDArray[np.bool_] = squared < np.square(problem.distances)
     return within
 
 
@@ -39,18 +43,15 @@ def _grow(motion: Kinematics, k: int, low: Array, high: Array) -> None:
 
 
 @njit(cache=True)
-def _within_reach(motion: Kinematics, terms: Terms) -> npt.NDArray[np.bool_]:
-    stages, points = len(terms.reference), len(terms.distances)
-    within = np.zeros((stages, points), dtype=np.bool_)
+def _nearest(motion: Kinematics, terms: Terms) -> Array:
+    nearest = np.empty_like(terms.centres)
     low, high = motion.initial.copy(), motion.initial.copy()
-    for k in range(stages):
+    for k in range(len(terms.reference)):
         _grow(motion, k, low, high)
-        for m in range(points):
-            squared = 0.0
+        for m in range(len(terms.distances)):
             for a in range(3):
-                squared += max(0.0, low[a] - terms.centres[k, m, a], terms.centres[k, m, a] - high[a]) ** 2
-            within[k, m] = squared < terms.distances[m] ** 2
-    return within
+                nearest[k, m, a] = min(max(terms.centres[k, m, a], low[a]), high[a])
+    return nearest
 
 
 @njit(cache=True)

@@ -186,9 +186,9 @@ def bound(rows: Sequence[Row], route: str) -> list[Bounded]:
 
 
 def compare_with_blocks(each: Bounded, allowed: float) -> Off:
-    """A gap that is too wide is wrong only if a cheaper plan can be shown: rounding may cost that much."""
+    """A gap that is too wide is wrong only if the route's problem has a cheaper plan: rounding may cost that much."""
     row = each.row
-    shown = (float(row.cost(row["positions_m"])) - cheapest_of_blocks(row, None).lower) / row.scale
+    shown = (float(row.cost(row["positions_m"])) - cheapest_of_blocks(row, each.normals).lower) / row.scale
     return Off(row, "a plan of blocks is cheaper", max(0.0, shown), allowed)
 
 
