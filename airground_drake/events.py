@@ -6,7 +6,9 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
+from airground_drake.arrays import Array
 from airground_drake.trace import Trace
 
 
@@ -55,14 +57,41 @@ def _add_arrival(trace: Trace, robot: str, add: Any) -> None:
 
 
 def _add_collisions(trace: Trace, robot: str, add: Any) -> None:
-    """The first row of each visit within collision distance of an obstacle, from surface to surface."""
+    """Visits within collision distance, from surface to surface, of obstacles and of robots that are listed later."""
     scenario, position = trace.scenario, trace.position(robot)
-    own = scenario["ugvs"].get(robot, scenario["uav"])["radius_m"]
-    names, bodies = list(scenario["obstacles"]), scenario["obstacles"].values()
-    places = np.array([body["position_m"] for body in bodies], dtype=np.float64).reshape(-1, 3)
-    within = [scenario["safe_distance"]["collision_m"] + (own + obstacle["radius_m"]) for obstacle in bodies]
-    beside = np.maximum(np.maximum(position.min(axis=0) - places, places - position.max(axis=0)), 0.0)
-    for k in np.flatnonzero(np.linalg.norm(beside, axis=1) <= within):  # of the box around all its rows
-        hit = np.linalg.norm(position - places[k], axis=1) < within[k]
-        for row in np.flatnonzero(hit & ~np.append(False, hit[:-1])):
+    bodies = {**scenario["ugvs"], scenario["uav"]["name"]: scenario["uav"]}
+    own = bodies[robot]["radius_m"]
+    low, high = position.min(axis=0), position.max(axis=0)  # the box around its way
+
+    def within(body: dict[str, Any]) -> float:
+        return float(scenario["safe_distance"]["collision_m"]) + float(own + body["radius_m"])
+
+    names, there = list(scenario["obstacles"]), list(scenario["obstacles"].values())
+    places = np.array([body["position_m"] for body in there], dtype=np.float64).reshape(-1, 3)
+    beside = np.linalg.norm(np.maximum(np.maximum(low - places, places - high), 0.0), axis=1)
+    for k in np.flatnonzero(beside <= [within(body) for body in there]):
+        for row in visits(position - places[k], within(there[k])):
             add(trace.t[row], robot, "collision", obstacle=names[k])
+    for other in trace.robots[trace.robots.index(robot) + 1 :]:
+        way = trace.position(other)
+        apart = np.maximum(np.maximum(low - way.max(axis=0), way.min(axis=0) - high), 0.0)
+        if np.linalg.norm(apart) <= within(bodies[other]):
+            for row in visits(position - way, within(bodies[other])):
+                add(trace.t[row], robot, "collision", other=other)
+
+
+def visits(apart: Array, within: float) -> npt.NDArray[np.intp]:
+    """Rows, (K,), at which visits within a distance begin, m.
+
+    Args:
+        apart: relative positions, (T, 3), m; straight from row to row. A visit between two rows is given by the
+            first of them.
+        within: the distance, m.
+    """
+    near = np.linalg.norm(apart, axis=1) < within
+    start, step = apart[:-1], np.diff(apart, axis=0)
+    length = np.maximum(np.square(step).sum(axis=1), np.finfo(np.float64).tiny)
+    share = np.clip(-(start * step).sum(axis=1) / length, 0.0, 1.0)
+    passes = np.linalg.norm(start + share[:, None] * step, axis=1) < within
+    enters = near & ~np.append(False, near[:-1])
+    return np.flatnonzero(enters | np.append(passes & ~near[:-1] & ~near[1:], False))

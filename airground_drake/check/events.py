@@ -11,7 +11,7 @@ import numpy as np
 
 from .files import Json
 from .proposals import proposals_of
-from .rules import SMALL, Disagreement, close, holds, same
+from .rules import SMALL, Array, Disagreement, close, holds, same
 from .run import Run
 from .scenario import apart_m
 
@@ -23,6 +23,7 @@ class Event(NamedTuple):
         policy: of a proposal or an answer.
         status: of the solution that an answer rests on.
         obstacle: that was hit.
+        other: robot that was hit.
     """
 
     t_s: float
@@ -31,6 +32,7 @@ class Event(NamedTuple):
     policy: str = ""
     status: str = ""
     obstacle: str = ""
+    other: str = ""
 
     @classmethod
     def of(cls, recorded: Json) -> Event:
@@ -110,15 +112,31 @@ def _arrivals(run: Run) -> Iterator[Event]:
 
 
 def _collisions(run: Run) -> Iterator[Event]:
-    """The first row of each visit within collision distance of an obstacle, from surface to surface."""
-    for robot, body in run.robots.items():
-        for obstacle, other in run.scenario["obstacles"].items():
-            within = apart_m(run.scenario, "collision_m", body, other)
-            if run.apart_m[robot, obstacle] >= within:
-                continue
-            hit = np.linalg.norm(run.position_m[robot] - run.position_m[obstacle], axis=1) < within
-            begins = hit & ~np.append(False, hit[:-1])
-            yield from (Event(float(when), robot, "collision", obstacle=obstacle) for when in run.t_s[begins])
+    """Visits within collision distance of an obstacle or another robot, from surface to surface.
+
+    They begin at the first row that is so near, and one that is over before the next row, at the row before it.
+    """
+    bodies = {**run.robots, **run.scenario["obstacles"]}
+    for pair in run.pairs:
+        within = apart_m(run.scenario, "collision_m", bodies[pair.robot], bodies[pair.other])
+        if run.apart_m[pair.robot, pair.other] >= within:
+            continue
+        away = run.position_m[pair.robot] - run.position_m[pair.other]
+        near, passed = np.linalg.norm(away, axis=1) < within, _least_on_the_way(away) < within
+        for row in range(len(near)):
+            enters = near[row] and not (row and near[row - 1])
+            passes = row + 1 < len(near) and passed[row] and not near[row] and not near[row + 1]
+            if enters or passes:
+                hit = {"other" if pair.other in run.robots else "obstacle": pair.other}
+                yield Event(float(run.t_s[row]), pair.robot, "collision", **hit)
+
+
+def _least_on_the_way(away_m: Array) -> Array:
+    """Least length of relative positions (T, 3) on the straight line from each row to the next, (T - 1,)."""
+    begin, step = away_m[:-1], np.diff(away_m, axis=0)
+    length = np.maximum(np.square(step).sum(axis=1), np.finfo(np.float64).tiny)
+    share = np.clip(-(begin * step).sum(axis=1) / length, 0.0, 1.0)
+    return np.asarray(np.linalg.norm(begin + share[:, None] * step, axis=1))
 
 
 def _events_are_where_their_robots_were(run: Run) -> None:

@@ -137,8 +137,8 @@ BODIES = (
     Mutant(
         "collisions are of centres",
         "events.py",
-        '["collision_m"] + (own + obstacle["radius_m"])',
-        '["collision_m"]',
+        '["collision_m"]) + float(own + body["radius_m"])',
+        '["collision_m"])',
         runs=("bodies b",),
     ),
     Mutant(

@@ -1,0 +1,86 @@
+"""Events that follow from signals."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from builders.runs import passing_by
+from hypothesis import given
+from hypothesis import strategies as st
+from properties import examples
+
+from airground_drake import check, events
+from airground_drake.report.__main__ import main as write
+from airground_drake.trace import Trace, load
+
+PLACES = st.lists(st.tuples(*[st.integers(-4, 4)] * 2), min_size=1, max_size=12)
+
+
+def collisions(trace: Trace) -> list[dict[str, Any]]:
+    return [event for event in events.extract(trace, ()) if event["kind"] == "collision"]
+
+
+@examples(200)
+@given(PLACES, st.sampled_from([0.3, 0.9, 1.7]))
+def test_every_visit_is_found_once(places: list[tuple[int, int]], within: float) -> None:
+    """Against many points between the rows: visits begin where these come near."""
+    apart = np.array([[x, y, 0.0] for x, y in places])
+    fine, between = 400, np.arange(len(apart) - 1.0 + 1e-9, step=1.0 / 400)
+    dense = np.stack([np.interp(between, np.arange(len(apart)), axis) for axis in apart.T], axis=1)
+    near = np.linalg.norm(dense, axis=1) < within
+    begins = np.flatnonzero(near & ~np.append(False, near[:-1]))
+    expected = []
+    for k in begins.tolist():
+        ends = k + int(np.argmin(np.append(near[k:], False)))  # the first that is not near again
+        row = -(-k // fine)
+        expected.append(row if row * fine < ends else k // fine)
+    grazing = abs(np.linalg.norm(dense, axis=1).min() - within) < 0.02
+    if not grazing:
+        assert events.visits(apart, within).tolist() == expected
+
+
+def test_what_is_passed_between_two_rows_is_hit() -> None:
+    trace = passing_by(-1.99)  # 10 mm beside an obstacle's centre
+    assert [(event["robot"], event["obstacle"]) for event in collisions(trace)] == [("ugv1", "o")]
+    assert not collisions(passing_by(-1.94))
+
+
+@pytest.fixture(scope="module")
+def reckless(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The report of two UGVs that are led through a rock, too fast to be near it at any row, and then to one place."""
+    folder = tmp_path_factory.mktemp("reckless")
+    spec = folder / "reckless.yaml"
+    spec.write_text(
+        """\
+name: reckless
+title: Nobody looks
+duration_s: 12.0
+ugvs:
+  ugv1:
+    start_m: [0.0, 0.0, 0.0]
+    target_m: [13.0, 0.0, 0.0]
+    preset: {waypoints_m: [[0.0, 0.0, 0.0], [13.0, 0.0, 0.0]], speed_m_s: 1.5}
+  ugv2:
+    start_m: [20.0, 0.0, 0.0]
+    target_m: [8.0, 0.0, 0.0]
+    preset: {waypoints_m: [[20.0, 0.0, 0.0], [8.0, 0.0, 0.0]], speed_m_s: 1.5}
+    radius_m: 0.3
+uav: {start_m: [0.0, 9.0, 2.0], target_m: [10.0, 9.0, 2.0]}
+obstacles: {rock: {position_m: [5.03, 0.0, 0.0]}}
+intervention: {policies: [{name: towards, parameters: {x_m: 10.0, y_m: 0.0, speed_m_s: 5.9}}]}
+runs: {b: {method: b, expected: {SAFE-TRACE: refuted, SAFE-HYP: refuted, LIVE-GOAL: refuted}}}
+"""
+    )
+    assert write([str(spec), "-o", str(folder / "r"), "--format", "json", "-q"]) in (0, 1, 3)
+    return folder / "r"
+
+
+def test_a_rock_and_another_robot_are_hit(reckless: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    trace = load(reckless / "trace" / "b")
+    found = [(event["robot"], event.get("obstacle"), event.get("other")) for event in collisions(trace)]
+    assert found == [("ugv1", "rock", None), ("ugv1", None, "ugv2")]
+    assert np.linalg.norm(trace.position("ugv1") - [5.03, 0.0, 0.0], axis=1).min() > 0.05, "no row shows it"
+    assert check.main([str(reckless)]) == 0, capsys.readouterr().out
