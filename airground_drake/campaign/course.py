@@ -15,6 +15,9 @@ TRIES = 10_000
 BEYOND_M = 0.3
 """What starts and targets have beyond the safe distance, m."""
 
+REPLACES = ("ugvs", "obstacles", "uav.start_m", "uav.target_m")
+"""Keys of a scenario, dotted, that a course draws."""
+
 
 @dataclass(frozen=True)
 class Course:

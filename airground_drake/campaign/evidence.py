@@ -78,17 +78,19 @@ def evidence(table: pd.DataFrame, marks: Mapping[str, float] | None = None) -> J
     drawn = drawn_keys(first)
     failed = table[table["ended"] != JUDGED]
     unfinished = failed.loc[failed["ended"].isin(UNFINISHED), "run"].value_counts()
+    ended = pd.concat([failed, judged]).drop_duplicates("index")["ended"]  # one run that was not judged is enough
     return {
         "confidence": CONFIDENCE,
         "draws": len(first),
-        "ended": {str(name): int(count) for name, count in first["ended"].value_counts().items()},
+        "ended": {str(name): int(count) for name, count in ended.value_counts().items()},
         "not_judged": failed[["index", "run", "ended", "what"]].head(50).to_dict("records"),
         "runs": len(runs),
         "simulated_s": float(runs["duration_s"].sum()),
         "claims": sorted(
             (
                 _claim(rows, int(unfinished.get(run, 0) + unfinished.get("", 0)), drawn)
-                for (run, _), rows in judged.groupby(["run", "claim"])
+                for (run, claim), rows in judged.groupby(["run", "claim"])
+                if claim
             ),
             key=lambda claim: (not claim["not_as_expected"], not claim["refuted"], not claim["undecided"]),
         ),

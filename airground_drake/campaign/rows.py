@@ -17,7 +17,8 @@ COLUMNS: dict[str, str] = {
 """Columns of the dataset and their types: a row is what a claim says of a run; NaN where there is no such number.
 
 `ended` is `judged`, or what kept a draw from it, explained in `what`: `invalid` (no valid scenario), `stopped` (the
-simulation), `died` (its process); such a row has no claim. `drawn` is strict JSON: values by key."""
+simulation), `died` (its process); such a row has no claim, nor has that of a run that no claim is about. `drawn` is
+strict JSON: values by key."""
 
 JUDGED, INVALID, STOPPED, DIED = "judged", "invalid", "stopped", "died"
 UNFINISHED = (STOPPED, DIED)

@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from airground_drake.arrays import LARGEST
-from airground_drake.campaign.course import Course
+from airground_drake.campaign.course import REPLACES, Course
 from airground_drake.campaign.distributions import KINDS, Choice, Key, combinations, made, stream, values_of
 from airground_drake.campaign.rows import TIMES
 from airground_drake.errors import Fault, ScenarioError
@@ -172,6 +172,10 @@ def load_spec(path: Path) -> Spec:
         source,
         _judged_part(scenario),
     )  # fmt: skip
+    for key in spec.fixed if spec.course is not None else ():
+        if f"{key}.".startswith(tuple(f"{each}." for each in REPLACES)):
+            wanted = "wanted: a key that the course does not draw; one under draw comes after the course"
+            raise ScenarioError(source, f"set.{key}", Fault("the course would replace it"), wanted)
     _known(spec.runs, spec.base().runs, source, "runs")
     _known(spec.claims, tuple(RUN_CLAIMS), source, "claims")
     return spec

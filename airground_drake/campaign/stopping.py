@@ -61,8 +61,10 @@ class Stopping:
         """Count the rows of one more draw; whether every run of the scenario now meets the rule."""
         for row in rows:
             self._unfinished[row["run"]] += row["ended"] in UNFINISHED
-            if row["claim"] == self.claim and is_tested(row["status"], row["exercised"]):
-                counts = self._counts.setdefault(row["run"], [0, 0, 0])
+            if row["claim"] != self.claim and not (row["run"] and row["ended"] in UNFINISHED):
+                continue
+            counts = self._counts.setdefault(row["run"], [0, 0, 0])
+            if row["claim"] and is_tested(row["status"], row["exercised"]):
                 counts[0] += row["status"] == "refuted"
                 counts[1] += row["status"] in UNDECIDED
                 counts[2] += 1

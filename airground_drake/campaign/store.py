@@ -49,20 +49,24 @@ class Store:
         files.make_folder(folder, "the campaign")
         self.folder = folder
         manifest = {"schema": SCHEMA, **manifest}
-        there = sorted(path.name for path in folder.iterdir() if not files.is_partial(path))
+        there = sorted(path.name for path in folder.iterdir() if not _is_nothing(path))
         if there and not resume:
             raise FolderError(one_line(f"{folder} holds {there[0]!r}; allowed: a new or empty folder, or --resume"))
         if there:
             _be_the_same(folder, manifest)
-        files.sweep(folder)
-        if not there:
-            files.write_json(folder / MANIFEST, manifest)
         self._journal = os.open(folder / JOURNAL, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
         try:
             fcntl.flock(self._journal, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
+            if (folder / MANIFEST).exists():  # another command's, if the folder was empty a moment ago
+                _be_the_same(folder, manifest)
+        except (BlockingIOError, FolderError) as error:
             os.close(self._journal)
+            if isinstance(error, FolderError):
+                raise
             raise FolderError(one_line(f"{folder} is in use by another campaign command")) from None
+        files.sweep(folder)
+        if not there:
+            files.write_json(folder / MANIFEST, manifest)
         there_already = _read_parts(folder)
         self._in_parts = [there_already]
         self._lately, whole = _read_journal(folder / JOURNAL, set(there_already["index"]))
@@ -120,6 +124,11 @@ def read(folder: Path) -> tuple[dict[str, Any], pd.DataFrame]:
     lately, _ = _read_journal(folder / JOURNAL, set(parts["index"]))
     both = pd.concat([parts, _table([row for rows in lately.values() for row in rows])], ignore_index=True)
     return manifest, both.sort_values("index", kind="stable", ignore_index=True)
+
+
+def _is_nothing(path: Path) -> bool:
+    """What a command leaves that is killed before it has written the manifest."""
+    return files.is_partial(path) or (path.name == JOURNAL and path.stat().st_size == 0)
 
 
 def _be_the_same(folder: Path, manifest: dict[str, Any]) -> None:

@@ -124,7 +124,7 @@ def _rows_of_run(scenario: Scenario, run: str, claims: Collection[str], common: 
     except (Exception, SystemExit) as error:
         return [common | {"ended": STOPPED, "what": described(error)}]
     common |= {"ended": JUDGED, "wall_s": time.perf_counter() - started, **_happened(trace)}
-    return [common | _of_claim(verdict) for verdict in verdicts]
+    return [common | _of_claim(verdict) for verdict in verdicts] or [common | {"what": "no claim is about this run"}]
 
 
 def died(index: int) -> list[Row]:

@@ -98,7 +98,7 @@ def _all(spec: Spec, options: argparse.Namespace) -> int:
             spec, folder, processes, options.number, resume=options.resume, stopping=stopping,
             limits=_limits(options), allow_plugins=options.allow_plugins, watch=watch,
         )  # fmt: skip
-    print(f"{_summary(found)}\n{one_line(str(folder))}")
+    print(f"{_summary(found, looked=bool(options.stop_when or options.resume))}\n{one_line(str(folder))}")
     return _code(found)
 
 
@@ -124,7 +124,8 @@ def _only(spec: Spec, options: argparse.Namespace) -> int:
     print(f"airground report {argument(path)}")
     if any(row["status"] and row["status"] not in UNDECIDED and not row["as_expected"] for row in rows):
         return EXIT_REFUTED
-    return 0 if all(row["as_expected"] for row in rows) else EXIT_UNDECIDED
+    judged = [row for row in rows if row["claim"]]
+    return 0 if judged and all(row["as_expected"] for row in judged) else EXIT_UNDECIDED
 
 
 def _limits(options: argparse.Namespace) -> Limits:
@@ -139,11 +140,12 @@ def _code(found: dict[str, Any]) -> int:
     return EXIT_UNDECIDED if open_ or not claims else 0
 
 
-def _summary(found: dict[str, Any]) -> str:
+def _summary(found: dict[str, Any], *, looked: bool) -> str:
+    """As text; the bounds hold for a number of draws fixed beforehand, or, if somebody has looked, at any time."""
     ended = ", ".join(f"{count} {name}" for name, count in found["ended"].items())
     lines = [f"{found['name']}: {found['draws']} draws ({ended}), {found['simulated_s']:.0f} s simulated"]
     for claim in found["claims"]:
-        low, high = claim["fixed"]
+        low, high = claim["anytime" if looked else "fixed"]
         bounds = f"probability of a violation {low:.2g} to {high:.2g}" if claim["tested"] else "never put to the test"
         differs = f"; {claim['differs']} not as expected" if claim["differs"] else ""
         found_ = f"{claim['refuted']} of {claim['tested']} refuted, {bounds}{differs}"

@@ -16,6 +16,7 @@ from airground_drake.campaign.rows import COLUMNS, DIED, INVALID, JUDGED, STOPPE
 from airground_drake.campaign.statistics import clopper_pearson, confidence_sequence
 from airground_drake.campaign.stopping import InOrder, Stopping
 from airground_drake.campaign.work import died
+from airground_drake.commands.campaign import _code, _summary
 from airground_drake.errors import UnknownNameError
 
 NAN = float("nan")
@@ -57,7 +58,51 @@ def test_what_was_not_finished_is_undecided() -> None:
     assert [claim[name] for name in ("tested", "refuted", "undecided", "idle")] == [92, 0, 2, 0]
     assert claim["fixed"] == pytest.approx([0.0, clopper_pearson(2, 92).high])
     value = confidence_sequence(2, 92).high
+    rows = [each for each in rows if each["run"] != "c"]  # of which no rule is met
     assert [Stopping("SAFE-TRACE", True, value * share).met(rows) for share in (0.999, 1.001)] == [False, True]
+
+
+def test_one_run_that_was_not_finished_is_no_draw_that_was_judged() -> None:
+    stopped = blank() | {"run": "c", "ended": STOPPED, "what": "a route raised", "drawn": "{}"}
+    rows = [each for i in range(200) for each in (row(i, run="b"), stopped | {"index": i})]
+    found = conclude(rows)
+    assert found["ended"] == {STOPPED: 200}
+    assert [claim["run"] for claim in found["claims"]] == ["b"]
+    assert word(found) == ("open", "? 200 of 200 draws were not finished")
+    rule = Stopping.parse("SAFE-TRACE < 0.1")
+    assert not any(rule.met(rows[2 * i : 2 * i + 2]) for i in range(200))
+
+
+def test_a_rule_waits_for_a_run_that_puts_nothing_to_the_test() -> None:
+    rule = Stopping.parse("SAFE-TRACE < 0.1")
+    assert not any(rule.met([row(i, run="b"), row(i, run="c", exercised=0.0)]) for i in range(200))
+
+
+def word(found: dict[str, Any]) -> tuple[str, str]:
+    """How the banner of the page looks, and what it says."""
+    text = page(found | {"name": "x", "title": "", "spec": "x.yaml"}, pd.DataFrame(columns=list(COLUMNS)))
+    banner = re.search(r'<section class="banner (\w+)".*?<p class="word">(.*?)</p>', text, re.DOTALL)
+    assert banner is not None
+    return banner[1], " ".join(re.sub(r"<[^>]*>", " ", banner[2]).split())
+
+
+@pytest.mark.parametrize(
+    ("rows", "looks"),
+    [
+        ([row(0)], ("good", "✓ Every claim as expected")),
+        ([row(0, exercised=0.0, as_expected=False)], ("bad", "✗ 1 of 1 claims not as expected")),
+        ([row(0, "refuted")], ("bad", "✗ 1 of 1 claims not as expected")),
+        ([row(0, "refuted", as_expected=True)], ("good", "✓ Every claim as expected")),
+        ([row(0, "inconclusive")], ("open", "? 1 of 1 claims undecided in some draws")),
+        (died(0), ("open", "? 1 of 1 draws were not finished")),
+        ([row(0), *died(1)], ("open", "? 1 of 1 claims undecided in some draws")),
+        ([row(0, claim="", status="")], ("open", "? Nothing was judged")),
+    ],
+)
+def test_the_page_says_what_the_exit_code_says(rows: list[Row], looks: tuple[str, str]) -> None:
+    found = conclude(rows)
+    assert word(found) == looks
+    assert _code(found) == {"good": 0, "bad": 1, "open": 3}[looks[0]]
 
 
 def test_a_claim_that_nothing_tested_has_no_bound_but_the_whole_interval() -> None:
@@ -117,6 +162,12 @@ def test_draws_that_were_not_judged_are_listed() -> None:
     found = conclude([row(0), *died(1)])
     assert found["ended"] == {JUDGED: 1, DIED: 1}
     assert found["not_judged"][0]["index"] == 1
+
+
+def test_who_has_looked_is_told_the_bounds_that_hold_at_any_time() -> None:
+    found = conclude([row(i) for i in range(50)]) | {"name": "x"}
+    for looked, bound in ((False, clopper_pearson(0, 50)), (True, confidence_sequence(0, 50))):
+        assert f"violation 0 to {bound.high:.2g}" in _summary(found, looked=looked)
 
 
 def test_marks_are_found_in_distributions() -> None:

@@ -96,6 +96,7 @@ def test_a_course_without_room_is_a_draw_that_cannot_be_made(tmp_path: Path) -> 
         (f"scenario: minimal\ndraw: {{seed: {{integer: [0, 1{'0' * 400}]}}}}", "whole numbers up to 2147483647"),
         ("scenario: minimal\ncourse: {hidden: 2}", "a share, 0 to 1"),
         ("scenario: minimal\ncourse: {width: 2}", "did you mean width_m?"),
+        ("scenario: minimal\ncourse: {}\nset: {ugvs.ugv1.radius_m: 0.5}", "set.ugvs.ugv1.radius_m: the course would"),
         ("scenario: minimal\nmarks: {arrival: 2}", "did you mean arrival_s?"),
         ("scenario: minimal\nset: [1]", "dotted keys"),
         ("scenario: minimal\nset: {contrl.period_s: 1}", "did you mean control?"),

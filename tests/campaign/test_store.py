@@ -123,6 +123,27 @@ def test_a_folder_of_something_else_or_of_another_campaign_is_refused(tmp_path: 
         read(tmp_path / "photos")
 
 
+def test_of_two_that_begin_at_once_the_one_that_is_late_changes_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The second looks at the folder before, and writes to it after the first has begun."""
+    first: list[Store] = []
+
+    def late(path: Path) -> bool:
+        monkeypatch.undo()
+        first.append(Store(tmp_path / "c", MANIFEST, resume=False))
+        return True
+
+    (tmp_path / "c").mkdir()
+    (tmp_path / "c" / JOURNAL).touch()  # of one that was killed at once
+    monkeypatch.setattr(module, "_is_nothing", late)
+    with pytest.raises(FolderError, match="in use"):
+        Store(tmp_path / "c", MANIFEST | {"name": "another"}, resume=False)
+    first[0].add(draw(0))
+    first[0].close()
+    assert read(tmp_path / "c")[0]["name"] == MANIFEST["name"]
+
+
 def test_one_command_at_a_time(tmp_path: Path) -> None:
     store = Store(tmp_path / "c", MANIFEST, resume=False)
     with pytest.raises(FolderError, match="in use"):
