@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from subprocess import CalledProcessError
 
 import numpy as np
 from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
@@ -62,7 +63,7 @@ def write(scene: Scene, path: Path, speed: float) -> None:
                     for update in updates:
                         update(int(frame))
                     encoder.grab_frame()
-        except ValueError as error:  # what Pillow says if it was built without WebP
+        except (ValueError, OSError, CalledProcessError) as error:  # Pillow without WebP, ffmpeg without H.264
             raise ReplayError(f"{path}: no encoder here for {path.suffix}: {error}") from error
         files.write_bytes(path, part.read_bytes())
 

@@ -199,6 +199,8 @@ def _run(scenario: Scenario, trace: Trace) -> dict[str, Any]:
 def _lookup(resolved: Any, key: str) -> Any:
     """Value at a dotted path of the resolved scenario, None if there is none."""
     for part in key.split("."):
+        if isinstance(resolved, list):
+            resolved = {str(position): each for position, each in enumerate(resolved)}
         if not isinstance(resolved, dict) or part not in resolved:
             return None
         resolved = resolved[part]

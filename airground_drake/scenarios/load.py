@@ -123,12 +123,17 @@ def _texts(overrides: Overrides) -> list[str]:
     texts = []
     for key, value in overrides.items():
         try:
-            texts.append(f"{key}={json.dumps(simple(value))}")
+            texts.append(f"{key}={_yaml_of(json.dumps(simple(value), ensure_ascii=False))}")
         except (TypeError, ValueError) as error:
             raise ScenarioError(
                 "override", str(key), Fault(str(error)), "wanted: a number, text, list or dict"
             ) from None
     return texts
+
+
+def _yaml_of(text: str) -> str:
+    """JSON as YAML: any character as it is, where YAML takes the pairs of escapes that JSON has for halves."""
+    return "".join(each if " " <= each <= "~" else f"\\U{ord(each):08x}" for each in text)
 
 
 def _override(root: yaml.Node, override: str) -> yaml.Node:

@@ -43,6 +43,16 @@ def test_another_kind_of_file(scene: Scene, tmp_path: Path, name: str, says: str
         video.write(scene, tmp_path / name, 4.0)
 
 
+def test_an_ffmpeg_without_the_codec(scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "ffmpeg").write_text("#!/bin/sh\ncat > /dev/null\nexit 1\n")
+    (tmp_path / "ffmpeg").chmod(0o755)
+    monkeypatch.setattr(FFMpegWriter, "isAvailable", lambda: True)
+    monkeypatch.setattr(FFMpegWriter, "bin_path", lambda self: str(tmp_path / "ffmpeg"))
+    with pytest.raises(ReplayError, match=r"no encoder here for \.mp4"):
+        video.write(scene, tmp_path / "run.mp4", 60.0)
+    assert not (tmp_path / "run.mp4").exists()
+
+
 def test_without_ffmpeg(scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(FFMpegWriter, "isAvailable", lambda: False)
     with pytest.raises(ReplayError, match="needs the program ffmpeg"):

@@ -66,6 +66,7 @@ WORSE: dict[str, Callable[[Json], object]] = {
     "a row that is gone": lambda found: found["reproduction"].pop(),
     "a finding": lambda found: found["audit"][0].update(demonstrated=False),
     "a finding that is gone": lambda found: found["audit"].pop(),
+    "a claim that is missing": lambda found: found["overall"].update(status="inconclusive"),
     "a broken variant that survives": lambda found: found["mutants"][0].update(status="proved", refuted=False),
 }
 OTHER: dict[str, Callable[[Json], object]] = {
@@ -139,6 +140,7 @@ def test_what_is_no_report_is_exit_code_2(
         lambda found: claim(found, "a").update(margin="wide"),
         lambda found: found.update(provenance=3),
         lambda found: found["scenario"].update(name=["x"]),
+        lambda found: found["scenario"].pop("name"),
         lambda found: found["runs"]["c"]["events"][0].update(t_s="soon"),
         lambda found: claim(found, "a").update(exercised=10**30),
         lambda found: claim(found, "a").update(margin=float("inf")),

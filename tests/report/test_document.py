@@ -112,6 +112,20 @@ def test_audit_is_made_from_the_runs(scenario: Scenario, traces: dict[str, Trace
     assert timing["evidence"]["measured_trigger"] == {"run": "c", "t_s": 14.5}
 
 
+def test_the_trigger_is_due_at_the_threshold_in_force(scenario: Scenario, traces: dict[str, Trace]) -> None:
+    """Which under the rule 'bayes' is not `zeta_m`."""
+    lower = {name: replace(trace, meta=trace.meta | {"zeta_m": 1.0}) for name, trace in traces.items()}
+    _, timing = built(scenario, lower, FINE)["audit"]
+    assert timing["ours"] == pytest.approx((STALL[1] + np.sqrt(1.0 - 0.069**2)) / 0.5606)
+    assert timing["evidence"]["zeta_m"] == 1.0
+
+
+def test_a_choice_may_be_an_entry_of_a_list() -> None:
+    resolved = {"ugvs": {"ugv1": {"start_m": [1.0, 2.0]}}, "policies": [{"name": "detour"}]}
+    looked = [document._lookup(resolved, key) for key in ("ugvs.ugv1.start_m.1", "policies.0.name", "policies.1.name")]
+    assert looked == [2.0, "detour", None]
+
+
 def test_audit_leaves_out_what_the_runs_do_not_show(scenario: Scenario, traces: dict[str, Trace]) -> None:
     moving = {"a": make_trace(scenario, "a", GOING_ROUND), "c": traces["c"]}
     assert built(scenario, moving, FINE)["audit"] == []

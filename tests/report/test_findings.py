@@ -38,6 +38,14 @@ def test_what_is_computed_is_drawn_with_its_marks() -> None:
     assert all(figure.panels[0].table.rows and figure.beside == name for name, figure in drawn.items())
 
 
+def test_what_the_papers_table_says_no_override_changes() -> None:
+    overrides = ["decision.threshold.zeta_m=4", "decision.threshold.noise_m_sqrt_s=2", "decision.threshold.drift_m_s=1"]
+    kept, changed = (threshold_findings(load("case_a", given)[0], {}) for given in ([], overrides))
+    for number in (4, 5, 18):
+        before, after = (next(each for each in found if each["id"] == number) for found in (kept, changed))
+        assert (before["paper"], before["ours"], before["finding"]) == (after["paper"], after["ours"], after["finding"])
+
+
 def test_what_comes_of_runs_is_drawn_from_what_is_kept_of_them() -> None:
     ways = {
         "printed": {"preset_x_m": 1.3, "way_m": [[1.0, 0.0], [1.3, 3.0]]},

@@ -5,7 +5,12 @@ from __future__ import annotations
 import pytest
 from scenarios.cases import SMALL, Write, case_a, edit, message
 
-from airground_drake.scenarios.load import load, resolved
+from airground_drake.scenarios.load import load, resolved, validated
+
+
+@pytest.mark.parametrize("title", ["\U0001f697 \u00e9", "\\ud83d\\ude97", 'a "b" # c: \\', "1e5"])
+def test_text_that_is_given_as_a_value_is_that_text(title: str) -> None:
+    assert validated(load("minimal")[0], {"title": title}).title == title
 
 
 @pytest.mark.parametrize(

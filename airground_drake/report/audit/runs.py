@@ -95,7 +95,8 @@ def _timing(scenario: Scenario, traces: Mapping[str, Trace]) -> dict[str, Any] |
                 continue
             stall = MEASURES["stall_position"](traces[name], robot)
             preset = scenario.ugvs[robot].preset
-            travelled = _leaves_ball(preset, stall, scenario.decision.threshold.zeta_m) if stall else None
+            zeta = float(traces[name].meta["zeta_m"])
+            travelled = _leaves_ball(preset, stall, zeta) if stall else None
             if travelled is None:
                 continue
             reach = np.linspace(0.0, 1.2 * travelled, REFERENCE_POINTS)
@@ -116,7 +117,7 @@ def _timing(scenario: Scenario, traces: Mapping[str, Trace]) -> dict[str, Any] |
                     "run": name,
                     "robot": robot,
                     "stall_position_m": stall,
-                    "zeta_m": scenario.decision.threshold.zeta_m,
+                    "zeta_m": zeta,
                     "reference_travelled_m": travelled,
                     "trigger_at_printed_speed_s": travelled / PRINTED_SPEED_M_S,
                     "trigger_at_scenario_speed_s": travelled / preset.speed_m_s,
