@@ -125,11 +125,12 @@ def _try(search: Search, pool: Pool) -> None:
     Raises:
         ScenarioError: if it does not.
     """
+    from airground_drake.campaign.rows import JUDGED
     from airground_drake.campaign.work import rows_of
 
     spec = search.spec
     for _, rows in pool(partial(rows_of, spec, limits=search.limits, allow_plugins=search.allow_plugins), [0]):
-        if rows == []:
+        if rows and all(row["ended"] == JUDGED and not row["claim"] for row in rows):
             raise ScenarioError("--claim", "", spec.claims[0], f"wanted: one that applies to a run of {spec.source}")
 
 

@@ -64,10 +64,11 @@ def optimal_threshold(drift: float, noise: float, c1: float, c2: float) -> float
 
 
 def _bias(zeta: float, drift: float, noise: float, deviation: float) -> float:
-    """(1 - exp(-2 y0 a / s^2)) / (2 sinh(2 zeta a / s^2)), written so that it cannot overflow."""
+    """(1 - exp(-2 y0 a / s^2)) / (2 sinh(2 zeta a / s^2)), so that nothing overflows, and small y0 do not cancel."""
     u = 2.0 * zeta * drift / noise**2
     w = 2.0 * deviation * drift / noise**2
-    return (math.exp(-u) - math.exp(-u - w)) / -math.expm1(-2.0 * u)
+    share = math.exp(-u) * -math.expm1(-w) if abs(w) < 1.0 else math.exp(-u) - math.exp(-u - w)
+    return share / -math.expm1(-2.0 * u)
 
 
 def _check(zeta: float, drift: float, noise: float, deviation: float) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from decimal import Decimal, localcontext
 
 import numpy as np
 import pytest
@@ -54,6 +55,16 @@ def test_decision_time_and_error_rate_agree_with_the_martingale_identities(
     assert error_rate(zeta, drift, noise, deviation) == pytest.approx(p, rel=1e-9, abs=1e-12)
     mean = (zeta * (1 - 2 * p) - deviation) / drift
     assert decision_time(zeta, drift, noise, deviation) == pytest.approx(mean, rel=1e-6, abs=1e-9)
+
+
+@given(st.floats(-6.0, 2.0), POSITIVE, POSITIVE, st.floats(-0.9, 0.9))
+def test_nothing_cancels_however_weak_the_drift(power: float, noise: float, zeta: float, bias: float) -> None:
+    """Error rates by the scale function with 80 digits; beside them, (18) would lose all digits of small y0 a / s^2."""
+    drift, deviation = 10.0**power, bias * zeta
+    with localcontext(prec=80):
+        z, y0 = (2 * Decimal(drift) / Decimal(noise) ** 2 * Decimal(x) for x in (zeta, deviation))
+        lower = ((-y0).exp() - (-z).exp()) / (z.exp() - (-z).exp())
+    assert error_rate(zeta, drift, noise, deviation) == pytest.approx(float(lower), rel=1e-13, abs=4e-16)
 
 
 @pytest.mark.parametrize("bad", [0.0, -1.0, math.nan, math.inf])
