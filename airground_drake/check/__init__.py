@@ -15,7 +15,8 @@ establishes.
     outcome                    LIVE-GOAL, COMM, GATE-TIME
     decisions                  a recorded decision, its problem (26), predictions (23) and costs (25)
     feasibility                GATE-FEAS
-    foresight, prediction      GATE-MODEL: what comes of accepting and refusing under method (d); mode velocities
+    rollouts, foresight        GATE-MODEL under method (d): what comes of accepting and refusing
+    prediction                 GATE-MODEL: mode velocities
     progress                   LIVE-PROG
     optimality                 GATE-SUR, GATE-OPT
     polynomials, certificates  SAFE-LEMMA, SAFE-INV, SAFE-GATE, SAFE-DIST, ZENO-PROOF, LIVE-GATE, LIVE-WAIT, THR-ISO;

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from .law import PLANE, avoiding, inequalities, limited
 from .proposals import Proposal, proposals_of
+from .rollouts import Loop, Rolled, rolled_out
 from .rules import SMALL, Array, Found, at_most, close, holds, same
 from .run import Run
 from .scenario import apart_m
 
-STILL_M = 0.05
-"""Less than this within the last second is at rest, or less than a tenth of what a slow UGV can do in a second."""
 OUTCOME = 1e-6
 """Recorded and recomputed outcomes may differ by this, relative, or in m^2 s."""
 TOLD = 1e-2
@@ -27,27 +25,8 @@ MOST_CLAIMED = 64
 """Obstacles of a message that a UGV takes into account."""
 CHOICES = ("refuse", "accept")
 
-
-class Foreseen(NamedTuple):
-    """What comes of a choice.
-
-    Attributes:
-        places_m: at the control samples, (S + 1, 3).
-        stalls: whether it is at rest short of the goal in the end.
-        home: whether it is at the goal.
-        integral_m2_s: of the squared distance from the preset trajectory.
-        goal_m: end of the preset trajectory, (3,).
-        discs_m: obstacles that are known, (k, 3).
-        safe_m: distances to keep from them, (k,).
-    """
-
-    places_m: Array
-    stalls: bool
-    home: bool
-    integral_m2_s: float
-    goal_m: Array
-    discs_m: Array
-    safe_m: Array
+Asked = tuple[str, float, float]
+"""UGV, time of the decision, and time at which the proposal was sent, s."""
 
 
 def rows_of(run: Run) -> list[dict[str, Any]]:
@@ -94,7 +73,7 @@ def outcomes(run: Run) -> Found:
     for row in looked:
         about: dict[str, Any] = {"about": f"decision of {row['robot']}", "t_s": row["t_s"]}
         speed = run.scenario["ugvs"][row["robot"]]["preset"]["speed_m_s"]
-        for choice, found in zip(CHOICES, foreseen(run, row["robot"], row["t_s"], row["issued_s"]), strict=True):
+        for choice, found in zip(CHOICES, foreseen(run)[asked_in(row)], strict=True):
             left, recorded = row[f"{choice}_left_m"], row[f"{choice}_outcome_m2_s"]
             same(f"{choice}: stalls", row[f"{choice}_stalls"], float(found.stalls), **about)
             _way_left(found, left, choice, about)
@@ -114,68 +93,55 @@ def on_which(run: Run, ugv: str, issued_s: float) -> Proposal:
     return found[0]
 
 
-@lru_cache(maxsize=256)
-def foreseen(run: Run, ugv: str, t_s: float, issued_s: float) -> tuple[Foreseen, Foreseen]:
-    """What comes of refusing and of accepting a proposal at a time."""
+@lru_cache(maxsize=4)
+def foreseen(run: Run) -> dict[Asked, tuple[Rolled, Rolled]]:
+    """What comes of refusing and of accepting, for each decision that looked at it."""
+    each = [asked_in(row) for row in rows_of(run) if row["accept_stalls"] >= 0.0]
+    found = rolled_out(run, (loop for asked in each for loop in _loops(run, *asked)))
+    return {asked: (next(found), next(found)) for asked in each}
+
+
+def asked_in(row: dict[str, Any]) -> Asked:
+    """Of which UGV a decision is, when, and on the proposal of when."""
+    return row["robot"], row["t_s"], row["issued_s"]
+
+
+def _loops(run: Run, ugv: str, t_s: float, issued_s: float) -> tuple[Loop, Loop]:
+    """The closed loops of a UGV that refuses, and that accepts."""
     gate, h = run.scenario["gatekeeper"], run.scenario["control"]["period_s"]
     asked, preset = on_which(run, ugv, issued_s), run.presets[ugv]
     arrives = float(preset.corner_s[-1]) if len(preset.corner_s) else 0.0
     until = min(float(asked.times_s[-1]), t_s + gate["longest_s"])
     ends = min(max(until, arrives), t_s + gate["longest_s"]) + gate["settling_s"]
     after = h * np.arange(np.ceil((ends - t_s) / h) + 1.0)
-    discs, distances = _known_m(run, ugv, t_s, asked)
-    fixed, over = np.tile(discs, (len(after), 1, 1)), [until, arrives, float(t_s + gate["horizon_s"])]
-    ways: tuple[list[Array], list[Array]] = ([fixed], [fixed])  # if it is refused, if it is accepted
     views = [pair for pair in run.views[ugv] if pair.other in run.robots]
-    for pair in views:
-        refused, accepted, way_over = _way_of(run, pair.other, t_s, after)
-        ways[0].append(refused[:, None])
-        ways[1].append(accepted[:, None])
-        over.append(way_over)
-    safe = np.append(distances, [p.safe_m for p in views])
-    share = np.append(np.ones(len(discs)), [pair.share for pair in views])
-    settled = int(np.ceil((max(over) - t_s) / h - SMALL))
-    start, goal = run.place_m(ugv, t_s), preset.corners_m[-1]
-    own, wanted = preset.position_m(t_s + after), asked.place_m(t_s + after)
-    executed = (0, max(0, int(np.ceil((until - t_s) / h - SMALL))))
-    still_m = min(STILL_M, run.robots[ugv]["max_speed_m_s"] / 10.0)
-    found = []
-    for periods, around in zip(executed, ways, strict=True):
-        points = np.concatenate(around, axis=1)
-        places, integral = [start], 0.0
-        for k in range(len(after) - 1):
-            given = inequalities((places[-1] - points[k])[None], safe, share, run.scenario["control"], PLANE)
-            intervention = (wanted[k], wanted[k + 1], asked.projector) if k < periods else None
-            v = _command(run, ugv, places[-1], own[k : k + 2], intervention)
-            places.append(places[-1] + h * avoiding(v, given, run.scenario["runs"][run.name]["composition"])[0])
-            integral += h * float(((own[k + 1] - places[-1]) ** 2).sum())
-            if k >= settled and _resting(run, places, goal, h, still_m):
-                break
-        end, earlier = places[-1], places[max(0, len(places) - 1 - max(1, round(1.0 / h)))]
-        home = bool(np.linalg.norm(end - goal) <= run.scenario["arrival_tolerance_m"])
-        stalls = not home and bool(np.linalg.norm(end - earlier) < still_m)
-        found.append(Foreseen(np.array(places), stalls, home, integral, goal, discs, distances))
-    return found[0], found[1]
+    ways = [_way_of(run, pair.other, t_s, after) for pair in views]
+    over = max([until, arrives, float(t_s + gate["horizon_s"]), *(way_over for _, _, way_over in ways)])
+    discs, distances = _known_m(run, ugv, t_s, asked)
+    refusing = Loop(
+        start_m=run.place_m(ugv, t_s),
+        goal_m=preset.corners_m[-1],
+        own_m=preset.position_m(t_s + after),
+        asked_m=asked.place_m(t_s + after),
+        projector=asked.projector,
+        periods=0,
+        discs_m=discs,
+        disc_safe_m=distances,
+        others_m=_beside([refused for refused, _, _ in ways], len(after)),
+        other_safe_m=np.array([pair.safe_m for pair in views]),
+        other_share=np.array([pair.share for pair in views]),
+        settled=int(np.ceil((over - t_s) / h - SMALL)),
+        limit_m_s=run.robots[ugv]["max_speed_m_s"],
+    )
+    return refusing, refusing._replace(
+        periods=max(0, int(np.ceil((until - t_s) / h - SMALL))),
+        others_m=_beside([accepted for _, accepted, _ in ways], len(after)),
+    )
 
 
-def _command(run: Run, ugv: str, place: Array, own: Array, asked: tuple[Array, Array, Array] | None) -> Array:
-    """What is wanted below the inequalities, (1, 3): (6), and with an intervention (14) above it."""
-    control, limit = run.scenario["control"], run.robots[ugv]["max_speed_m_s"]
-    h = control["period_s"]
-    task = limited((PLANE * ((own[1] - own[0]) / h + control["motion_gain_1_s"] * (own[0] - place)))[None], limit)
-    if asked is None:
-        return task
-    here, there, projector = asked
-    wish = PLANE * ((there - here) / h + control["intervention_gain_1_s"] * (here - place))
-    return limited((PLANE * (task[0] + projector @ (wish - task[0])))[None], limit)
-
-
-def _resting(run: Run, places: list[Array], goal: Array, h: float, still_m: float) -> bool:
-    """Whether the roll-out may end: it is home, or has hardly moved for a second."""
-    second = max(1, round(1.0 / h))
-    if np.linalg.norm(goal - places[-1]) < run.scenario["arrival_tolerance_m"]:
-        return True
-    return len(places) > second and bool(np.linalg.norm(places[-1] - places[-1 - second]) < 0.1 * still_m)
+def _beside(ways: list[Array], samples: int) -> Array:
+    """Ways (S + 1, 3) of other robots as (S + 1, V, 3)."""
+    return np.stack(ways, axis=1) if ways else np.empty((samples, 0, 3))
 
 
 def _known_m(run: Run, ugv: str, t_s: float, asked: Proposal) -> tuple[Array, Array]:
@@ -229,7 +195,7 @@ def _asked_of(run: Run, ugv: str, t_s: float) -> tuple[Proposal | None, bool]:
     return None, False
 
 
-def _way_left(found: Foreseen, left_m: float, choice: str, about: dict[str, Any]) -> None:
+def _way_left(found: Rolled, left_m: float, choice: str, about: dict[str, Any]) -> None:
     """The way that is left is no shorter than straight, and no longer than one over points around the circles."""
     if found.home:
         same(f"{choice}: way left", left_m, 0.0, **about)
@@ -239,7 +205,7 @@ def _way_left(found: Foreseen, left_m: float, choice: str, about: dict[str, Any]
     within = max(LEFT_M, OUTCOME * left_m)
     at_most(f"{choice}: straight way", direct, left_m, within=within, **about)
     if left_m > direct + within:
-        around = _way_around_m(end, goal, found.discs_m, found.safe_m)
+        around = _way_around_m(end, goal, found.discs_m, found.disc_safe_m)
         at_most(f"{choice}: way left", left_m, around, within=within, **about)
 
 

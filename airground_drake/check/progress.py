@@ -10,7 +10,7 @@ import numpy as np
 from .decisions import silent_ugvs
 from .feasibility import reasons_of
 from .files import Json
-from .foresight import foreseen, on_which, rows_of
+from .foresight import asked_in, foreseen, on_which, rows_of
 from .rules import SMALL, Array, Found, at_most, close, same
 from .run import Run
 
@@ -122,7 +122,7 @@ def _accept(run: Run, row: dict[str, Any], state: _Ugv) -> float:
     """A try begins; returns how far the UGV is from where it is to be, m."""
     gate, t = run.scenario["gatekeeper"], row["t_s"]
     asked = on_which(run, row["robot"], row["issued_s"])
-    places = foreseen(run, row["robot"], t, row["issued_s"])[1].places_m
+    places = foreseen(run)[asked_in(row)][1].places_m
     instants = t + run.scenario["control"]["period_s"] * np.arange(float(len(places)))
     state.lags_m = np.linalg.norm((places - asked.place_m(instants)) @ asked.projector, axis=1)
     state.executing, state.tries, state.since_s, state.on_time_s = True, state.tries + 1, t, t
