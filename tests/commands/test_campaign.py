@@ -103,6 +103,7 @@ def test_what_cannot_be_written(
     assert said.count("\n") == 1
 
 
+@pytest.mark.usefixtures("in_this_process")
 @pytest.mark.parametrize(
     ("changes", "code", "says"),
     [

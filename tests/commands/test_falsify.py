@@ -61,12 +61,14 @@ def test_what_cannot_be_written_is_told_before_the_search(
     assert [path.name for path in tmp_path.iterdir()] == ["pushed.yaml"]
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_where_there_is_none_the_worst_is_kept(tmp_path: Path) -> None:
     assert falsified(tmp_path, "d") == 0
     assert load(tmp_path / "found.yaml")[0].name == "pushed_0"
     assert not (tmp_path / "found_small.yaml").exists()
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_a_time_is_made_long(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert falsified(tmp_path, "b", "--most", "intervened_s", "--limit", "0.1") == 1
     assert "largest intervened_s" in capsys.readouterr().out
@@ -93,6 +95,7 @@ def sampled(tmp_path: Path, ask: str = "return self.points", tell: str = "pass",
     return falsified(tmp_path, "d", "--sampler", "corner.py:Corner", *["--allow-plugins"][:allow])
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_a_sampler_of_ones_own_is_found_beside_the_spec(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert sampled(tmp_path, allow=False) == 2
     assert "--allow-plugins" in capsys.readouterr().err
@@ -101,6 +104,7 @@ def test_a_sampler_of_ones_own_is_found_beside_the_spec(tmp_path: Path, capsys: 
     assert load(tmp_path / "found.yaml")[0].obstacles["rock"].position_m == [5.0, 0.0, 0.0]
 
 
+@pytest.mark.usefixtures("in_this_process")
 @pytest.mark.parametrize(
     ("faulty", "said"),
     [
@@ -125,6 +129,7 @@ def test_a_sampler_that_fails_is_no_counterexample(
     assert not (tmp_path / "found.yaml").exists()
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_a_claim_that_applies_to_no_run_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert falsified(tmp_path, "d", "--claim", "GATE-OPT") == 2
     said = capsys.readouterr()
@@ -132,6 +137,7 @@ def test_a_claim_that_applies_to_no_run_is_refused(tmp_path: Path, capsys: pytes
     assert "--claim: 'GATE-OPT' is not allowed; wanted: one that applies to a run of" in said.err
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_where_nothing_is_judged_nothing_is_said_of_a_margin(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
