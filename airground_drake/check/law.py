@@ -25,6 +25,8 @@ ABOVE_LEAST, ABOVE_LEAST_M_S = 1e-9, 1e-11
 """What is missed by this much more than the least, relatively and in m/s, is missed as little."""
 SHORTEST = 1e-9
 """A shorter normal, of what is nearly above a robot that stays in the plane, asks for nothing that it could do."""
+NEAR_M_S = 1e-12
+"""The least that has to be missed is known to this, relatively where it is more than 1 m/s."""
 DEPENDENT = 1e-10
 """Sine of the angle between a normal and those before it up to which fewer of them say the same."""
 
@@ -140,16 +142,47 @@ def _worked_out(wanted_m_s: Array, given: Inequalities) -> Array:
 
 
 def _least_missing(given: Inequalities) -> Array:
-    """By bisection of what is missed by everything, from what standing still misses; then the slowest."""
-    low, high = np.zeros(len(given.bound)), np.maximum(0.0, given.bound.max(axis=1))
-    still = np.zeros((len(high), 3))
+    """The slowest velocities that miss no more than the least that has to be missed.
+
+    That is guessed, tried a little below and above, and found by bisection where the guess was wrong.
+    """
+    most = np.maximum(0.0, given.bound.max(axis=1))  # what standing still misses
+    guess = np.clip(_equally_missing(given), 0.0, most)
+    near = NEAR_M_S * np.maximum(1.0, guess)
+    low, high = np.maximum(0.0, guess - near), guess + near / 10.0
+    low = np.where(_lacking(given, low) > 0.0, low, 0.0)
+    high = np.where(_lacking(given, high) == 0.0, high, most)
     for _ in range(60):
-        middle = (low + high) / 2.0
-        less = Inequalities(given.normal, given.bound - middle[:, None])
-        met = _by_active_sets(still, less, every=True)[1] == 0.0
-        low, high = np.where(met, low, middle), np.where(met, middle, high)
+        on: Flags = high - low > 2.0 * near
+        if not on.any():
+            break
+        middle = (low[on] + high[on]) / 2.0
+        met = _lacking(given.rows(on), middle) == 0.0
+        low[on], high[on] = np.where(met, low[on], middle), np.where(met, middle, high[on])
     least = Inequalities(given.normal, given.bound - (1.0 + ABOVE_LEAST) * high[:, None] - ABOVE_LEAST_M_S)
-    return _by_active_sets(still, least, every=True)[0]
+    return _by_active_sets(np.zeros((len(high), 3)), least, every=True)[0]
+
+
+def _equally_missing(given: Inequalities) -> Array:
+    """The least of what velocities miss that miss two or more inequalities by the same, (B,): but for rounding, all."""
+    normal, bound = _relevant(np.zeros((len(given.bound), 3)), given, every=True)
+    asked, found = np.where(np.isfinite(bound), bound, 0.0), np.full(len(bound), np.inf)
+    at_once = max(1, NUMBERS // bound.size)
+    for size in range(2, 5 if normal[:, :, 2].any() else 4):
+        sets = combinations(range(bound.shape[1]), size)
+        while some := [*islice(sets, at_once)]:
+            n, b = normal[:, np.array(some)], asked[:, np.array(some)]
+            apart, due = n[:, :, 1:] - n[:, :, :1], b[:, :, 1:] - b[:, :, :1]
+            v = np.einsum("bcij,bcj->bci", np.linalg.pinv(apart), due)
+            missed = (bound[:, None] - np.einsum("bkd,bcd->bck", normal, v)).max(axis=2)
+            found = np.minimum(found, missed.min(axis=1))
+    return found
+
+
+def _lacking(given: Inequalities, may_m_s: Array) -> Array:
+    """What every velocity lacks if each inequality may be missed by so much, (B,)."""
+    less = Inequalities(given.normal, given.bound - may_m_s[:, None])
+    return _by_active_sets(np.zeros((len(may_m_s), 3)), less, every=True)[1]
 
 
 def _by_active_sets(wanted_m_s: Array, given: Inequalities, *, every: bool = False) -> tuple[Array, Array]:
@@ -213,13 +246,18 @@ def _completed(unit: Array) -> tuple[Array, Array]:
     """What unit vectors (B, C, size, 3) lack to a basis, (B, C, 3 - size, 3), and the least sine among them, (B, C)."""
     size, first = unit.shape[2], unit[:, :, 0]
     other = unit[:, :, 1] if size > 1 else np.eye(3)[np.argmin(np.abs(first), axis=2)]
-    across = np.cross(first, other)
+    across = _cross(first, other)
     sine = np.linalg.norm(across, axis=2)
     across /= np.where(sine > 0.0, sine, 1.0)[..., None]
     if size == 3:
         return unit[:, :, :0], np.minimum(sine, np.abs((across * unit[:, :, 2]).sum(axis=2)))
-    rest = [across] if size == 2 else [across, np.cross(first, across)]
+    rest = [across] if size == 2 else [across, _cross(first, across)]
     return np.stack(rest, axis=2), sine
+
+
+def _cross(a: Array, b: Array) -> Array:
+    """Of vectors along the last axis; numpy's own takes three times as long."""
+    return np.asarray(a[..., [1, 2, 0]] * b[..., [2, 0, 1]] - a[..., [2, 0, 1]] * b[..., [1, 2, 0]])
 
 
 def _relevant(wanted_m_s: Array, given: Inequalities, *, every: bool) -> Inequalities:
