@@ -18,8 +18,9 @@ from airground_drake.campaign.spec import Spec
 from airground_drake.campaign.stopping import InOrder, Stopping
 from airground_drake.campaign.store import Store
 from airground_drake.campaign.work import died, rows_of
+from airground_drake.errors import FolderError, LimitError, one_line
 from airground_drake.progress import SILENT, Watch
-from airground_drake.scenarios.estimate import DEFAULT_LIMITS, Limits
+from airground_drake.scenarios.estimate import DEFAULT_LIMITS, MOST_DRAWS, Limits
 
 EVIDENCE, PAGE = "evidence.json", "campaign.html"
 
@@ -54,14 +55,22 @@ def conduct(
 
     Raises:
         ScenarioError: if code of others is named that is not allowed.
-        FolderError: if the folder cannot be used.
+        FolderError: if the folder cannot be used, or has draws beyond the number.
+        LimitError: if the number is above `MOST_DRAWS`.
+        ValueError: if there is a rule to stop, and draws that are not independent.
         OSError: if it cannot be written.
     """
+    if stopping is not None and spec.dependent:
+        raise ValueError(f"--stop-when needs independent draws; not independent: {', '.join(spec.dependent)}")
+    wanted = range(spec.combinations if number is None else number)
+    if wanted.stop > MOST_DRAWS:
+        raise LimitError(spec.name, f"{wanted.stop} draws", f"{MOST_DRAWS} draws (-n)")
     if not allow_plugins:
         spec.refuse_plugins()
     store = Store(folder, _manifest(spec, limits), resume=resume)
     try:
-        wanted = range(spec.combinations if number is None else number)
+        if (last := max(store.finished, default=0)) >= wanted.stop:
+            raise FolderError(one_line(f"{folder} has draw {last}; allowed: -n {last + 1} or more"))
         rule = InOrder(stopping, wanted) if stopping is not None else None
         met = rule is not None and any(rule.met(index, rows) for index, rows in _known(store))
         left = [] if met else [index for index in wanted if index not in store.finished]
@@ -77,8 +86,11 @@ def conduct(
         table = store.table()
     finally:
         store.close()
-    of = {"name": spec.name, "title": spec.title, "spec": spec.source}
-    found: dict[str, Any] = strict(evidence(table, spec.marks)) | of
+    stopped = rule.last if rule is not None else None
+    of = {"name": spec.name, "title": spec.title, "spec": spec.source, "stopped": stopped}
+    if stopped is not None:  # what other processes had finished by then does not count
+        table = table[table["index"] <= stopped]
+    found: dict[str, Any] = strict(evidence(table, spec.marks, spec.dependent)) | of
     files.write_json(folder / EVIDENCE, found)
     files.write_text(folder / PAGE, page(found, table))
     return found

@@ -102,7 +102,7 @@ class Store:
         """Make a part of the journal."""
         if not self._lately:
             return
-        part = _table([row for rows in self._lately.values() for row in rows])
+        part = table_of([row for rows in self._lately.values() for row in rows])
         buffer = io.BytesIO()
         part.to_parquet(buffer, index=False)
         taken = [int(path.stem.removeprefix("part-")) for path in (self.folder / PARTS).glob("part-[0-9]*.parquet")]
@@ -114,7 +114,7 @@ class Store:
 
     def table(self) -> pd.DataFrame:
         """All rows of all finished draws, by index."""
-        lately = _table([row for rows in self._lately.values() for row in rows])
+        lately = table_of([row for rows in self._lately.values() for row in rows])
         both = pd.concat([*self._in_parts, lately], ignore_index=True)
         return both.sort_values("index", kind="stable", ignore_index=True)
 
@@ -137,7 +137,7 @@ def read(folder: Path) -> tuple[dict[str, Any], pd.DataFrame]:
         raise FolderError(one_line(f"{folder} has no campaign: no {MANIFEST} of ours"))
     parts = _read_parts(folder, manifest)
     lately, _ = _read_journal(folder / JOURNAL, manifest, set(parts["index"]))
-    both = pd.concat([parts, _table([row for rows in lately.values() for row in rows])], ignore_index=True)
+    both = pd.concat([parts, table_of([row for rows in lately.values() for row in rows])], ignore_index=True)
     return manifest, both.sort_values("index", kind="stable", ignore_index=True)
 
 
@@ -165,7 +165,7 @@ def _manifest(folder: Path) -> dict[str, Any] | None:
 
 def _read_parts(folder: Path, manifest: dict[str, Any]) -> pd.DataFrame:
     """Rows of all parts, by index."""
-    parts = [_table([]), *map(_read_part, sorted((folder / PARTS).glob("*.parquet")))]
+    parts = [table_of([]), *map(_read_part, sorted((folder / PARTS).glob("*.parquet")))]
     table = pd.concat(parts, ignore_index=True).sort_values("index", kind="stable", ignore_index=True)
     for _, rows in groupby(table[list(COLUMNS)].to_dict("records"), key=lambda row: row["index"]):
         _as_written(folder / PARTS, manifest, list(rows))
@@ -214,9 +214,10 @@ def _as_written(path: Path, manifest: dict[str, Any], rows: Sequence[Any]) -> li
     sealed = _sealed(manifest, rows)
     if [row["digest"] for row in sealed] != [row["digest"] for row in rows]:
         why = "its rows were changed, repeated or removed, or are of another campaign"
-        raise FolderError(one_line(f"{path}: draw {rows[0]['index']}: {why}; allowed: draws as the campaign wrote them"))
+        raise FolderError(one_line(f"{path}: draw {rows[0]['index']}: {why}; allowed: what the campaign wrote"))
     return sealed
 
 
-def _table(rows: Sequence[Row]) -> pd.DataFrame:
+def table_of(rows: Sequence[Row]) -> pd.DataFrame:
+    """Rows as a table with the columns and types of `COLUMNS`."""
     return pd.DataFrame(list(rows), columns=list(COLUMNS)).astype(COLUMNS)

@@ -39,6 +39,10 @@ PROGRAM = GIB // 2
 """Bytes of the program itself with its libraries."""
 
 
+MOST_DRAWS = 1_000_000
+"""Of a campaign, which holds their rows in memory: a claim of a run is a row of some 500 bytes."""
+
+
 class Limits(NamedTuple):
     """What a scenario may ask for.
 
