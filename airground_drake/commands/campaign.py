@@ -150,7 +150,7 @@ def _undecided(found: dict[str, Any]) -> list[str]:
             draws = ", ".join(map(str, claim["undecided_draws"]))
             lines.append(f"{_name(claim)}: {claim['undecided']} of {claim['tested']} runs, such as draw {draws}")
         elif claim["untested"]:
-            lines.append(f"{_name(claim)}: no draw put it to the test, as the scenario expects")
+            lines.append(f"{_name(claim)}: the scenario expects it to be tested, and no draw did")
     return lines if found["claims"] else [*lines, "nothing was judged"]
 
 

@@ -184,9 +184,7 @@ def test_no_interval_is_given_where_draws_are_not_independent() -> None:
     found = strict(evidence(table, dependent=["ugvs.u.start_m"])) | {"name": "x"}
     (claim,) = found["claims"]
     assert (claim["tested"], claim["fixed"], claim["anytime"]) == (9, None, None)
-    assert "No interval is given: intervals need independent draws, and the values of\n<code>ugvs.u.start_m<" in shown(
-        found
-    )
+    assert "come from a Halton sequence or a grid:\n<code>ugvs.u.start_m</code>.</p>" in shown(found)
     said = _summary(found, looked=False)
     assert "probability" not in said
     assert "no intervals: draws are not independent (ugvs.u.start_m)" in said
@@ -205,7 +203,7 @@ def test_exit_code_3_says_what_is_undecided() -> None:
         "SAFE-TRACE in run d: 2 of 3 runs, such as draw 7",
     ]
     said = _summary(conclude(rows[2:3]) | {"name": "x"}, looked=False).splitlines()
-    assert said[-1] == "  undecided: COMM in run d: no draw put it to the test, as the scenario expects"
+    assert said[-1] == "  undecided: COMM in run d: the scenario expects it to be tested, and no draw did"
 
 
 def test_draws_that_were_not_judged_are_listed() -> None:

@@ -138,7 +138,7 @@ def test_what_cannot_be_written(
         (
             "runs: {a: {method: a, expected: {LIVE-GOAL: refuted, THR-TRIG: exercised}}}",
             3,
-            "undecided: THR-TRIG in run a: no",
+            "undecided: THR-TRIG in run a: the",
         ),
         ("", 3, "first that was not judged: draw 0, invalid: "),
     ],
