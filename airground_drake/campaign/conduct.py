@@ -20,7 +20,8 @@ from airground_drake.campaign.store import Store
 from airground_drake.campaign.work import died, rows_of
 from airground_drake.errors import FolderError, LimitError, one_line
 from airground_drake.progress import SILENT, Watch
-from airground_drake.scenarios.estimate import DEFAULT_LIMITS, MOST_DRAWS, Limits
+from airground_drake.registry import RUN_CLAIMS
+from airground_drake.scenarios.estimate import DEFAULT_LIMITS, MOST_ROWS, Limits
 
 EVIDENCE, PAGE = "evidence.json", "campaign.html"
 
@@ -56,15 +57,17 @@ def conduct(
     Raises:
         ScenarioError: if code of others is named that is not allowed.
         FolderError: if the folder cannot be used, or has draws beyond the number.
-        LimitError: if the number is above `MOST_DRAWS`.
+        LimitError: if the rows would be more than `MOST_ROWS`.
         ValueError: if there is a rule to stop, and draws that are not independent.
         OSError: if it cannot be written.
     """
     if stopping is not None and spec.dependent:
         raise ValueError(f"--stop-when needs independent draws; not independent: {', '.join(spec.dependent)}")
     wanted = range(spec.combinations if number is None else number)
-    if wanted.stop > MOST_DRAWS:
-        raise LimitError(spec.name, f"{wanted.stop} draws", f"{MOST_DRAWS} draws (-n)")
+    rows = wanted.stop * len(spec.runs or spec.base().runs) * len(spec.claims or tuple(RUN_CLAIMS))
+    if rows > MOST_ROWS:
+        allowed = f"{MOST_ROWS:g} rows, one for each draw, run and claim"
+        raise LimitError(spec.name, f"{wanted.stop:.3g} draws ({rows:.3g} rows)", allowed)
     if not allow_plugins:
         spec.refuse_plugins()
     store = Store(folder, _manifest(spec, limits), resume=resume)

@@ -90,7 +90,6 @@ class Store:
         try:
             while left:  # a nearly full disk takes a part of it, without an error
                 left = left[os.write(self._journal, left) :]
-            os.fsync(self._journal)
         except OSError as error:
             raise OSError(error.errno, error.strerror, str(self.folder / JOURNAL)) from None
         self._lately[index] = sealed
@@ -164,12 +163,16 @@ def _manifest(folder: Path) -> dict[str, Any] | None:
 
 
 def _read_parts(folder: Path, manifest: dict[str, Any]) -> pd.DataFrame:
-    """Rows of all parts, by index."""
-    parts = [table_of([]), *map(_read_part, sorted((folder / PARTS).glob("*.parquet")))]
-    table = pd.concat(parts, ignore_index=True).sort_values("index", kind="stable", ignore_index=True)
-    for _, rows in groupby(table[list(COLUMNS)].to_dict("records"), key=lambda row: row["index"]):
-        _as_written(folder / PARTS, manifest, list(rows))
-    return table
+    """Rows of all parts."""
+    parts, seen = [table_of([])], set[int]()
+    for path in sorted((folder / PARTS).glob("*.parquet")):
+        parts.append(_read_part(path))
+        for index, rows in groupby(parts[-1].to_dict("records"), key=lambda row: int(row["index"])):
+            if index in seen:
+                raise _changed(path, index)
+            _as_written(path, manifest, list(rows))
+            seen.add(index)
+    return pd.concat(parts, ignore_index=True)
 
 
 def _read_part(path: Path) -> pd.DataFrame:
@@ -200,9 +203,9 @@ def _read_journal(path: Path, manifest: dict[str, Any], known: set[int]) -> tupl
 
 def _sealed(manifest: dict[str, Any], rows: Sequence[Row]) -> list[Row]:
     """The rows of a draw as strict JSON (None for NaN), each with the digest of all of them and of the campaign."""
-    plain = [{name: _plain(_KINDS[kind], row[name]) for name, kind in COLUMNS.items()} | {"digest": ""} for row in rows]
+    plain = [[_plain(_KINDS[kind], row[name]) for name, kind in COLUMNS.items() if name != "digest"] for row in rows]
     digest = files.sha256(json.dumps([manifest, plain], sort_keys=True, allow_nan=False).encode())
-    return [row | {"digest": digest} for row in plain]
+    return [dict(zip(COLUMNS, [*row, digest], strict=True)) for row in plain]
 
 
 def _plain(kind: type, value: Any) -> Any:
@@ -213,9 +216,13 @@ def _as_written(path: Path, manifest: dict[str, Any], rows: Sequence[Any]) -> li
     """The rows of a draw; refused if they are not those that were written."""
     sealed = _sealed(manifest, rows)
     if [row["digest"] for row in sealed] != [row["digest"] for row in rows]:
-        why = "its rows were changed, repeated or removed, or are of another campaign"
-        raise FolderError(one_line(f"{path}: draw {rows[0]['index']}: {why}; allowed: what the campaign wrote"))
+        raise _changed(path, rows[0]["index"])
     return sealed
+
+
+def _changed(path: Path, index: object) -> FolderError:
+    why = "its rows were changed, repeated or removed, or are of another campaign"
+    return FolderError(one_line(f"{path}: draw {index}: {why}; allowed: what the campaign wrote"))
 
 
 def table_of(rows: Sequence[Row]) -> pd.DataFrame:

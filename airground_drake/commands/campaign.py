@@ -13,7 +13,7 @@ from airground_drake.campaign.rows import UNFINISHED
 from airground_drake.errors import AirgroundError, FolderError, LimitError, ScenarioError, UnknownNameError, one_line
 from airground_drake.progress import told
 from airground_drake.scenarios import plugins
-from airground_drake.scenarios.estimate import DEFAULT_LIMITS, MOST_DRAWS, Limits
+from airground_drake.scenarios.estimate import DEFAULT_LIMITS, Limits
 from airground_drake.scenarios.shipped import argument
 from airground_drake.side_by_side import processors
 from airground_drake.usage import EXIT_TOOL, Parser, positive, refuse, whole
@@ -34,9 +34,8 @@ def parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("spec", type=Path, help="YAML file: a scenario, and distributions over its keys")
     parser.add_argument(
-        "-n", "--number", type=whole(1, MOST_DRAWS), metavar="N",
-        help="draws (default: one, or all combinations of grids)",
-    )  # fmt: skip
+        "-n", "--number", type=whole(1), metavar="N", help="draws (default: one, or all combinations of grids)"
+    )
     parser.add_argument(
         "-o", "--output", type=Path, metavar="DIR",
         help="default: campaigns/<name>; new, or --resume; with --only, the file of the scenario",

@@ -39,8 +39,8 @@ PROGRAM = GIB // 2
 """Bytes of the program itself with its libraries."""
 
 
-MOST_DRAWS = 1_000_000
-"""Of a campaign, which holds their rows in memory: a claim of a run is a row of some 500 bytes."""
+MOST_ROWS = 4_000_000
+"""Of a campaign, which holds them in memory: one for each draw, run and claim takes up to 1.7 kB (measured)."""
 
 
 class Limits(NamedTuple):

@@ -40,7 +40,7 @@ def test_after_a_rule_has_stopped_a_campaign_only_draws_up_to_the_stop_count(tmp
     assert last < 49
     for resume in (False, True):
         found = conduct(spec(tmp_path), out, draw_50_first, 100, resume=resume, stopping=rule)
-        assert (found["stopped"], found["draws"], found["claims"][0]["tested"]) == (last, last + 1, last + 1)
+        assert (found["draws"], found["claims"][0]["tested"], found["stopped"]) == (last + 1, last + 1, last)
         assert json.loads((out / EVIDENCE).read_text()) == found
         assert len(read(out)[1]) == 50 + last + 1  # the others are kept
         rule = Stopping.parse("SAFE-TRACE < 0.2")
