@@ -64,10 +64,10 @@ def conduct(
     if stopping is not None and spec.dependent:
         raise ValueError(f"--stop-when needs independent draws; not independent: {', '.join(spec.dependent)}")
     wanted = range(spec.combinations if number is None else number)
-    rows = wanted.stop * len(spec.runs or spec.base().runs) * len(spec.claims or tuple(RUN_CLAIMS))
-    if rows > MOST_ROWS:
+    asked = wanted.stop * len(spec.runs or spec.base().runs) * len(spec.claims or tuple(RUN_CLAIMS))
+    if asked > MOST_ROWS:
         allowed = f"{MOST_ROWS:g} rows, one for each draw, run and claim"
-        raise LimitError(spec.name, f"{wanted.stop:.3g} draws ({rows:.3g} rows)", allowed)
+        raise LimitError(spec.name, f"{wanted.stop:.3g} draws ({asked:.3g} rows)", allowed)
     if not allow_plugins:
         spec.refuse_plugins()
     store = Store(folder, _manifest(spec, limits), resume=resume)

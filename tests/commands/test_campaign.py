@@ -102,7 +102,7 @@ def test_more_draws_than_memory_holds_are_refused_before_anything_is_written(
     grids = "".join(f"  {key}: {{grid: [{values}]}}\n" for key in ("seed", "duration_s", "control.motion_gain_1_s"))
     spec.write_text(f"scenario: minimal\nclaims: [EXEC]\ndraw:\n{grids}", encoding="utf-8")
     assert main([str(spec), "-o", out]) == 2
-    assert capsys.readouterr().err == f"error: small asks for about 1.25e+11 draws (1.25e+11 rows); {allowed}"
+    assert capsys.readouterr().err == f"error: small asks for about 1.25e+11 draws (2.5e+11 rows); {allowed}"
     assert not (tmp_path / "out").exists()
 
 
