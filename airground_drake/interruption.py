@@ -8,7 +8,9 @@ says so in one line, and leaves. A process that is killed itself cannot do that:
 from __future__ import annotations
 
 import ctypes
+import fcntl
 import os
+import select
 import signal
 import sys
 import threading
@@ -128,6 +130,22 @@ def end_with_parent(how: signal.Signals = signal.SIGKILL) -> None:
     if sys.platform == "linux":
         with suppress(OSError, AttributeError):
             ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, how, 0, 0, 0)
+
+
+def end_with_pipe(reader: int) -> None:
+    """From now on this process is killed when the last writer of a pipe has gone, whatever it is doing, on Linux.
+
+    The kernel sees to it, as in `end_with_parent`, but the pipe belongs to a process, not to one of its threads.
+
+    Args:
+        reader: descriptor of the reading end of a pipe to which nothing is ever written.
+    """
+    if sys.platform == "linux":
+        fcntl.fcntl(reader, fcntl.F_SETOWN, os.getpid())
+        fcntl.fcntl(reader, fcntl.F_SETSIG, signal.SIGKILL)
+        fcntl.fcntl(reader, fcntl.F_SETFL, os.O_ASYNC)
+        if select.select([reader], [], [], 0.0)[0]:  # it had gone before
+            os._exit(1)
 
 
 class _Forks:

@@ -18,8 +18,10 @@ from airground_drake.campaign.spec import Spec
 from airground_drake.campaign.stopping import InOrder, Stopping
 from airground_drake.campaign.store import Store
 from airground_drake.campaign.work import died, rows_of
+from airground_drake.errors import FolderError, LimitError, one_line
 from airground_drake.progress import SILENT, Watch
-from airground_drake.scenarios.estimate import DEFAULT_LIMITS, Limits
+from airground_drake.registry import RUN_CLAIMS
+from airground_drake.scenarios.estimate import DEFAULT_LIMITS, MOST_ROWS, Limits
 
 EVIDENCE, PAGE = "evidence.json", "campaign.html"
 
@@ -54,14 +56,24 @@ def conduct(
 
     Raises:
         ScenarioError: if code of others is named that is not allowed.
-        FolderError: if the folder cannot be used.
+        FolderError: if the folder cannot be used, or has draws beyond the number.
+        LimitError: if the rows would be more than `MOST_ROWS`.
+        ValueError: if there is a rule to stop, and draws that are not independent.
         OSError: if it cannot be written.
     """
+    if stopping is not None and spec.dependent:
+        raise ValueError(f"--stop-when needs independent draws; not independent: {', '.join(spec.dependent)}")
+    wanted = range(spec.combinations if number is None else number)
+    asked = wanted.stop * len(spec.runs or spec.base().runs) * len(spec.claims or tuple(RUN_CLAIMS))
+    if asked > MOST_ROWS:
+        allowed = f"{MOST_ROWS:g} rows, one for each draw, run and claim"
+        raise LimitError(spec.name, f"{wanted.stop:.3g} draws ({asked:.3g} rows)", allowed)
     if not allow_plugins:
         spec.refuse_plugins()
     store = Store(folder, _manifest(spec, limits), resume=resume)
     try:
-        wanted = range(spec.combinations if number is None else number)
+        if (last := max(store.finished, default=0)) >= wanted.stop:
+            raise FolderError(one_line(f"{folder} has draw {last}; allowed: -n {last + 1} or more"))
         rule = InOrder(stopping, wanted) if stopping is not None else None
         met = rule is not None and any(rule.met(index, rows) for index, rows in _known(store))
         left = [] if met else [index for index in wanted if index not in store.finished]
@@ -77,8 +89,11 @@ def conduct(
         table = store.table()
     finally:
         store.close()
-    of = {"name": spec.name, "title": spec.title, "spec": spec.source}
-    found: dict[str, Any] = strict(evidence(table, spec.marks)) | of
+    stopped = rule.last if rule is not None else None
+    of = {"name": spec.name, "title": spec.title, "spec": spec.source, "stopped": stopped}
+    if stopped is not None:  # what other processes had finished by then does not count
+        table = table[table["index"] <= stopped]
+    found: dict[str, Any] = strict(evidence(table, spec.marks, spec.dependent)) | of
     files.write_json(folder / EVIDENCE, found)
     files.write_text(folder / PAGE, page(found, table))
     return found

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import combinations
 from typing import Any, NamedTuple
 
@@ -24,6 +24,10 @@ BINS = 4
 """Of a key, in maps of where a claim fails: quarters of its draws."""
 MOST_VALUES = 12
 """Different texts of a key, such as lists of policies, in such maps."""
+NOTHING_TO_DO_WITH = "seed"
+"""A key that explains no failure: quarters of the seeds of the noise have nothing in common."""
+BY_CHANCE = 0.05
+"""A map is shown if differences as large are less likely than this where no key matters."""
 MOST_POINTS = 1000
 """Draws that the discrepancy is computed from: its cost grows with their square."""
 QUANTILES = (0.0, 0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 1.0)
@@ -65,12 +69,13 @@ def _tested(rows: pd.DataFrame) -> pd.Series:
     return pd.Series(map(is_tested, rows["status"], rows["exercised"]), rows.index, dtype=bool)
 
 
-def evidence(table: pd.DataFrame, marks: Mapping[str, float] | None = None) -> Json:
+def evidence(table: pd.DataFrame, marks: Mapping[str, float] | None = None, dependent: Sequence[str] = ()) -> Json:
     """Everything that a campaign's page says, strict JSON.
 
     Args:
         table: rows of `rows.COLUMNS`.
         marks: values to be found in the distributions of `TIMES`, by column.
+        dependent: keys whose values are not independent from draw to draw; with any, claims have no intervals.
     """
     first = table.drop_duplicates("index")
     judged = table[table["ended"] == JUDGED]
@@ -81,6 +86,7 @@ def evidence(table: pd.DataFrame, marks: Mapping[str, float] | None = None) -> J
     ended = pd.concat([failed, judged]).drop_duplicates("index")["ended"]  # one run that was not judged is enough
     return {
         "confidence": CONFIDENCE,
+        "dependent": list(dependent),
         "draws": len(first),
         "ended": {str(name): int(count) for name, count in ended.value_counts().items()},
         "not_judged": failed[["index", "run", "ended", "what"]].head(50).to_dict("records"),
@@ -88,11 +94,11 @@ def evidence(table: pd.DataFrame, marks: Mapping[str, float] | None = None) -> J
         "simulated_s": float(runs["duration_s"].sum()),
         "claims": sorted(
             (
-                _claim(rows, int(unfinished.get(run, 0) + unfinished.get("", 0)), drawn)
+                _claim(rows, int(unfinished.get(run, 0) + unfinished.get("", 0)), drawn, bounded=not dependent)
                 for (run, claim), rows in judged.groupby(["run", "claim"])
                 if claim
             ),
-            key=lambda claim: (not claim["not_as_expected"], not claim["refuted"], not claim["undecided"]),
+            key=lambda claim: tuple(not claim[name] for name in ("differs", "refuted", "undecided", "untested")),
         ),
         "times": [_times(str(run), rows, marks or {}) for run, rows in runs.groupby("run")],
         "space": _space(drawn),
@@ -115,23 +121,25 @@ def drawn_keys(first: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame.from_dict(found, orient="index")
 
 
-def _claim(rows: pd.DataFrame, unfinished: int, drawn: pd.DataFrame) -> Json:
+def _claim(rows: pd.DataFrame, unfinished: int, drawn: pd.DataFrame, *, bounded: bool) -> Json:
     counts = Counts.of(rows, unfinished)
     tested = rows[_tested(rows)]
     margins = tested[tested["margin"].notna()]
     worst = margins.nsmallest(WORST, "margin")
     violated = tested.set_index("index")["status"] == "refuted"
+    undecided = rows["status"].isin(UNDECIDED)
     return {
         **{key: str(rows[key].iloc[0]) for key in ("run", "method", "claim")},
         **counts._asdict(),
-        "not_as_expected": int((~rows["as_expected"]).sum()),
-        "differs": int((~rows["as_expected"] & ~rows["status"].isin(UNDECIDED)).sum()),
-        "fixed": list(counts.interval(anytime=False)),
-        "anytime": list(counts.interval(anytime=True)),
+        "differs": int((~tested["as_expected"] & ~tested["status"].isin(UNDECIDED)).sum()),
+        "untested": not counts.tested and not rows["as_expected"].all(),
+        "fixed": list(counts.interval(anytime=False)) if bounded else None,
+        "anytime": list(counts.interval(anytime=True)) if bounded else None,
         "unit": str(rows["unit"].iloc[0]),
         "margins": _quantiles(margins["margin"].to_numpy()),
         "worst": worst[["index", "margin", "status"]].to_dict("records"),
         "refuted_draws": tested.loc[tested["status"] == "refuted", "index"].head(WORST).tolist(),
+        "undecided_draws": rows.loc[undecided, "index"].head(WORST).tolist(),
         "fails_where": _where(violated, drawn) if 0 < violated.sum() < len(violated) else None,
     }
 
@@ -157,8 +165,11 @@ def _quantiles(values: Array) -> dict[str, float]:
 
 
 def _where(violated: pd.Series, drawn: pd.DataFrame) -> Json | None:
-    """A map of the two keys by which violations differ most: of each pair of quarters, violations and runs."""
-    keys = drawn.loc[violated.index]
+    """A map of the two keys by which violations differ most: of each pair of quarters, violations and runs.
+
+    None if chance may be why they differ: the least p-value of all pairs, times their number (Bonferroni), tells.
+    """
+    keys = drawn.loc[violated.index].drop(columns=NOTHING_TO_DO_WITH, errors="ignore")
     parts = {str(key): part for key in keys if (part := _parts(keys[key])) is not None}
     tables = {
         pair: pd.crosstab([parts[key] for key in pair], violated.to_numpy())
@@ -167,12 +178,15 @@ def _where(violated: pd.Series, drawn: pd.DataFrame) -> Json | None:
     if not tables:
         return None
     pair = min(tables, key=lambda pair: _by_chance(tables[pair].to_numpy()))
+    chance = len(tables) * _by_chance(tables[pair].to_numpy())
+    if chance >= BY_CHANCE:
+        return None
     cells = [
         {"where": dict(zip(pair, at if isinstance(at, tuple) else (at,), strict=True)),
          "refuted": int(row.get(True, 0)), "runs": int(row.sum())}
         for at, row in tables[pair].iterrows()
     ]  # fmt: skip
-    return {"keys": list(pair), "by_chance": _by_chance(tables[pair].to_numpy()), "cells": cells}
+    return {"keys": list(pair), "by_chance": chance, "cells": cells}
 
 
 def _by_chance(table: Array) -> float:

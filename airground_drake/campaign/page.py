@@ -26,7 +26,7 @@ def page(found: dict[str, Any], table: pd.DataFrame) -> str:
     """The page.
 
     Args:
-        found: of `evidence.evidence`, with name, title and spec.
+        found: of `evidence.evidence`, with name, title, spec and stopped (the last draw that counts, or None).
         table: the rows that it is of.
     """
     return _environment().get_template("campaign.html.j2").render(found=found, figures=_figures(found, table))

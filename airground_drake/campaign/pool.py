@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import gc
 import itertools
+import logging
 import threading
 import uuid
 from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import CancelledError
 from contextlib import contextmanager
 from functools import partial
 from typing import Any, Protocol, TypeVar
@@ -131,7 +133,11 @@ def cluster(scheduler: str, timeout_s: float = 10.0) -> Iterator[Pool]:
 def _on_cluster(
     dask: Any, client: Any, work: Callable[[int], T], items: Iterable[int]
 ) -> Iterator[tuple[int, T | None]]:
-    """See `Pool`. A scheduler has one name for each item of all its clients; workers may come at any time."""
+    """See `Pool`. A scheduler has one name for each item of all its clients; workers may come at any time.
+
+    Raises:
+        AirgroundError: if the scheduler is lost.
+    """
     waiting, ours = iter(items), uuid.uuid4().hex
 
     def submit(under_way: int) -> list[Any]:
@@ -139,12 +145,17 @@ def _on_cluster(
         some = itertools.islice(waiting, max(0, AHEAD * threads - under_way))
         return [client.submit(work, item, key=f"{ours}-{item}", pure=False) for item in some]
 
-    under_way = dask.as_completed(submit(0), loop=client.loop)
-    for future in under_way:
-        item = int(future.key.rpartition("-")[2])
-        yield item, _result(dask, future)
-        for more in submit(under_way.count()):
-            under_way.add(more)
+    try:
+        under_way = dask.as_completed(submit(0), loop=client.loop)
+        for future in under_way:
+            item = int(future.key.rpartition("-")[2])
+            yield item, _result(dask, future)
+            for more in submit(under_way.count()):
+                under_way.add(more)
+    except (CancelledError, OSError) as error:
+        logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # or it shows how it fails to reconnect
+        lost = f"the Dask scheduler was lost ({type(error).__name__}); --resume goes on with what is finished"
+        raise AirgroundError(lost) from None
 
 
 def _result(dask: Any, future: Any) -> Any:

@@ -12,13 +12,13 @@ COLUMNS: dict[str, str] = {
     "triggers": "int64", "first_trigger_s": "float64", "arrived": "int64", "arrival_s": "float64",
     "decisions": "int64", "accepted": "int64", "faults": "int64", "duration_s": "float64",
     "intervened_s": "float64", "wall_s": "float64",
-    "drawn": "str",
+    "drawn": "str", "digest": "str",
 }  # fmt: skip
 """Columns of the dataset and their types: a row is what a claim says of a run; NaN where there is no such number.
 
 `ended` is `judged`, or what kept a draw from it, explained in `what`: `invalid` (no valid scenario), `stopped` (the
 simulation), `died` (its process); such a row has no claim, nor has that of a run that no claim is about. `drawn` is
-strict JSON: values by key."""
+strict JSON: values by key; `digest` is of all rows of a draw (see `store`)."""
 
 JUDGED, INVALID, STOPPED, DIED = "judged", "invalid", "stopped", "died"
 UNFINISHED = (STOPPED, DIED)

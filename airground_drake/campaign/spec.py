@@ -24,7 +24,7 @@ from typing import Any
 
 from airground_drake.arrays import LARGEST
 from airground_drake.campaign.course import REPLACES, Course
-from airground_drake.campaign.distributions import KINDS, Choice, Key, combinations, made, stream, values_of
+from airground_drake.campaign.distributions import KINDS, RANDOM, Choice, Key, combinations, made, stream, values_of
 from airground_drake.campaign.rows import TIMES
 from airground_drake.errors import Fault, ScenarioError
 from airground_drake.registry import RUN_CLAIMS
@@ -80,6 +80,11 @@ class Spec:
     def combinations(self) -> int:
         """Draws after which all grids have been gone through once."""
         return combinations(self.drawn)
+
+    @property
+    def dependent(self) -> list[str]:
+        """Keys whose values in one draw depend on those in others: `halton` and `grid`."""
+        return [key for key, drawn in self.drawn.items() if drawn.how != RANDOM]
 
     def values(self, index: int) -> dict[str, Any]:
         """What is drawn, by dotted key; `course` and its keys not among it."""

@@ -86,12 +86,14 @@ class InOrder:
         self._rule, self._wanted = rule, iter(wanted)
         self._next = next(self._wanted, None)
         self._waiting: dict[int, list[Row]] = {}
+        self.last: int | None = None
+        """The draw with which the rule was met."""
 
     def met(self, index: int, rows: list[Row]) -> bool:
         """One more draw has ended; whether those without a gap before them meet the rule now."""
         self._waiting[index] = rows
-        met = False
-        while not met and self._next in self._waiting:
-            met = self._rule.met(self._waiting.pop(self._next))
+        while self.last is None and self._next in self._waiting:
+            if self._rule.met(self._waiting.pop(self._next)):
+                self.last = self._next
             self._next = next(self._wanted, None)
-        return met
+        return self.last is not None

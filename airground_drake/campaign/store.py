@@ -5,7 +5,8 @@
     journal.jsonl     draws finished since the last part, a line of strict JSON each
 
 A draw is finished when its line is in the journal. From time to time the journal becomes a part; if the command is
-killed between the two, the same draws are in both, and the part counts. A last line that is torn is none.
+killed between the two, the same draws are in both, and the part counts. A last line that is torn is none. The rows of a
+draw carry a digest of the campaign and of them all: a draw whose rows were changed, repeated or removed is refused.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import json
 import math
 import os
 from collections.abc import Sequence
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -25,9 +27,10 @@ from airground_drake import files
 from airground_drake.campaign.rows import COLUMNS, Row
 from airground_drake.errors import FolderError, one_line
 
-SCHEMA = "airground_drake.campaign/1"
+SCHEMA = "airground_drake.campaign/2"
 MANIFEST, JOURNAL, PARTS = "campaign.json", "journal.jsonl", "parts"
 DRAWS_IN_A_PART = 500
+_KINDS: dict[str, type] = {"int64": int, "float64": float, "str": str, "bool": bool}
 
 
 class Store:
@@ -43,12 +46,12 @@ class Store:
 
         Raises:
             FolderError: if the folder cannot be written, or has another campaign or something else, or another command
-                has it open.
+                has it open, or rows that are not as they were written.
             OSError: if it cannot be read.
         """
         files.make_folder(folder, "the campaign")
         self.folder = folder
-        manifest = {"schema": SCHEMA, **manifest}
+        self._manifest = manifest = {"schema": SCHEMA, **manifest}
         there = sorted(path.name for path in folder.iterdir() if not _is_nothing(path))
         if there and not resume:
             raise FolderError(one_line(f"{folder} holds {there[0]!r}; allowed: a new or empty folder, or --resume"))
@@ -67,20 +70,29 @@ class Store:
         files.sweep(folder)
         if not there:
             files.write_json(folder / MANIFEST, manifest)
-        there_already = _read_parts(folder)
+        there_already = _read_parts(folder, manifest)
         self._in_parts = [there_already]
-        self._lately, whole = _read_journal(folder / JOURNAL, set(there_already["index"]))
+        self._lately, whole = _read_journal(folder / JOURNAL, manifest, set(there_already["index"]))
         os.ftruncate(self._journal, whole)
         self.finished = {*there_already["index"].tolist(), *self._lately}
 
     def add(self, rows: Sequence[Row]) -> None:
-        """Keep the rows of a draw: when this returns, it is finished."""
+        """Keep the rows of a draw: when this returns, it is finished.
+
+        Raises:
+            OSError: if they cannot be written, with the path; the draw is then not finished.
+        """
         (index,) = {row["index"] for row in rows}
         if index in self.finished:
             return
-        plain = [{k: None if isinstance(v, float) and math.isnan(v) else v for k, v in row.items()} for row in rows]
-        os.write(self._journal, (json.dumps(plain, allow_nan=False) + "\n").encode())
-        self._lately[index] = list(rows)
+        sealed = _sealed(self._manifest, rows)
+        left = (json.dumps(sealed, allow_nan=False) + "\n").encode()
+        try:
+            while left:  # a nearly full disk takes a part of it, without an error
+                left = left[os.write(self._journal, left) :]
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, str(self.folder / JOURNAL)) from None
+        self._lately[index] = sealed
         self.finished.add(index)
         if len(self._lately) >= DRAWS_IN_A_PART:
             self.flush()
@@ -89,7 +101,7 @@ class Store:
         """Make a part of the journal."""
         if not self._lately:
             return
-        part = _table([row for rows in self._lately.values() for row in rows])
+        part = table_of([row for rows in self._lately.values() for row in rows])
         buffer = io.BytesIO()
         part.to_parquet(buffer, index=False)
         taken = [int(path.stem.removeprefix("part-")) for path in (self.folder / PARTS).glob("part-[0-9]*.parquet")]
@@ -101,28 +113,30 @@ class Store:
 
     def table(self) -> pd.DataFrame:
         """All rows of all finished draws, by index."""
-        lately = _table([row for rows in self._lately.values() for row in rows])
+        lately = table_of([row for rows in self._lately.values() for row in rows])
         both = pd.concat([*self._in_parts, lately], ignore_index=True)
         return both.sort_values("index", kind="stable", ignore_index=True)
 
     def close(self) -> None:
         """Make a part of what is left, and let others have the folder."""
-        self.flush()
-        os.close(self._journal)
+        try:
+            self.flush()
+        finally:
+            os.close(self._journal)
 
 
 def read(folder: Path) -> tuple[dict[str, Any], pd.DataFrame]:
     """What identifies a campaign, and all rows of its finished draws, also while it runs.
 
     Raises:
-        FolderError: if the folder has no campaign.
+        FolderError: if the folder has no campaign, or rows that are not as they were written.
     """
     manifest = _manifest(folder)
     if manifest is None:
         raise FolderError(one_line(f"{folder} has no campaign: no {MANIFEST} of ours"))
-    parts = _read_parts(folder)
-    lately, _ = _read_journal(folder / JOURNAL, set(parts["index"]))
-    both = pd.concat([parts, _table([row for rows in lately.values() for row in rows])], ignore_index=True)
+    parts = _read_parts(folder, manifest)
+    lately, _ = _read_journal(folder / JOURNAL, manifest, set(parts["index"]))
+    both = pd.concat([parts, table_of([row for rows in lately.values() for row in rows])], ignore_index=True)
     return manifest, both.sort_values("index", kind="stable", ignore_index=True)
 
 
@@ -148,15 +162,17 @@ def _manifest(folder: Path) -> dict[str, Any] | None:
     return found if isinstance(found, dict) and found.get("schema") == SCHEMA else None
 
 
-def _read_parts(folder: Path) -> pd.DataFrame:
-    """Rows of all parts, of each index those of the first part that has it."""
-    parts = [_read_part(path) for path in sorted((folder / PARTS).glob("*.parquet"))]
-    seen: set[int] = set()
-    kept = [_table([])]
-    for part in parts:
-        kept.append(part[~part["index"].isin(seen)])
-        seen |= set(part["index"])
-    return pd.concat(kept, ignore_index=True)
+def _read_parts(folder: Path, manifest: dict[str, Any]) -> pd.DataFrame:
+    """Rows of all parts."""
+    parts, seen = [table_of([])], set[int]()
+    for path in sorted((folder / PARTS).glob("*.parquet")):
+        parts.append(_read_part(path))
+        for index, rows in groupby(parts[-1].to_dict("records"), key=lambda row: int(row["index"])):
+            if index in seen:
+                raise _changed(path, index)
+            _as_written(path, manifest, list(rows))
+            seen.add(index)
+    return pd.concat(parts, ignore_index=True)
 
 
 def _read_part(path: Path) -> pd.DataFrame:
@@ -166,25 +182,49 @@ def _read_part(path: Path) -> pd.DataFrame:
     return part
 
 
-def _read_journal(path: Path, known: set[int]) -> tuple[dict[int, list[Row]], int]:
+def _read_journal(path: Path, manifest: dict[str, Any], known: set[int]) -> tuple[dict[int, list[Row]], int]:
     """Rows by index, without those that are known, and the number of bytes up to the last whole line."""
     found: dict[int, list[Row]] = {}
     whole = 0
     for line in path.read_bytes().splitlines(keepends=True) if path.exists() else ():
-        try:
-            rows = json.loads(line)
-        except ValueError:
-            break
         if not line.endswith(b"\n"):
             break
         whole += len(line)
-        if not isinstance(rows, list) or not rows or not all(isinstance(row, dict) and "index" in row for row in rows):
-            raise FolderError(one_line(f"{path} has a line that is no draw: {line.decode(errors='replace')[:80]}"))
-        index = rows[0]["index"]
+        try:
+            rows = _as_written(path, manifest, json.loads(line))
+            index = rows[0]["index"]
+        except (ValueError, TypeError, LookupError):
+            cut = line.decode(errors="replace")[:80]
+            raise FolderError(one_line(f"{path} has a line that is no draw: {cut}")) from None
         if index not in known:
             found[index] = rows
     return found, whole
 
 
-def _table(rows: Sequence[Row]) -> pd.DataFrame:
+def _sealed(manifest: dict[str, Any], rows: Sequence[Row]) -> list[Row]:
+    """The rows of a draw as strict JSON (None for NaN), each with the digest of all of them and of the campaign."""
+    plain = [[_plain(_KINDS[kind], row[name]) for name, kind in COLUMNS.items() if name != "digest"] for row in rows]
+    digest = files.sha256(json.dumps([manifest, plain], sort_keys=True, allow_nan=False).encode())
+    return [dict(zip(COLUMNS, [*row, digest], strict=True)) for row in plain]
+
+
+def _plain(kind: type, value: Any) -> Any:
+    return None if kind is float and (value is None or math.isnan(value)) else kind(value)
+
+
+def _as_written(path: Path, manifest: dict[str, Any], rows: Sequence[Any]) -> list[Row]:
+    """The rows of a draw; refused if they are not those that were written."""
+    sealed = _sealed(manifest, rows)
+    if [row["digest"] for row in sealed] != [row["digest"] for row in rows]:
+        raise _changed(path, rows[0]["index"])
+    return sealed
+
+
+def _changed(path: Path, index: object) -> FolderError:
+    why = "its rows were changed, repeated or removed, or are of another campaign"
+    return FolderError(one_line(f"{path}: draw {index}: {why}; allowed: what the campaign wrote"))
+
+
+def table_of(rows: Sequence[Row]) -> pd.DataFrame:
+    """Rows as a table with the columns and types of `COLUMNS`."""
     return pd.DataFrame(list(rows), columns=list(COLUMNS)).astype(COLUMNS)

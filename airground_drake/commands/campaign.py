@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from airground_drake import files
-from airground_drake.errors import AirgroundError, FolderError, ScenarioError, UnknownNameError, one_line
+from airground_drake.campaign.rows import UNFINISHED
+from airground_drake.errors import AirgroundError, FolderError, LimitError, ScenarioError, UnknownNameError, one_line
 from airground_drake.progress import told
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.estimate import DEFAULT_LIMITS, Limits
 from airground_drake.scenarios.shipped import argument
 from airground_drake.side_by_side import processors
-from airground_drake.statuses import UNDECIDED
 from airground_drake.usage import EXIT_TOOL, Parser, positive, refuse, whole
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         spec = load_spec(options.spec)
         return _all(spec, options) if options.only is None else _only(spec, options)
-    except (ScenarioError, FolderError, UnknownNameError, ValueError) as error:
+    except (ScenarioError, LimitError, FolderError, UnknownNameError, ValueError) as error:
         return refuse(error)
     except (AirgroundError, OSError) as error:
         return refuse(error, EXIT_TOOL)
@@ -104,6 +104,8 @@ def _all(spec: Spec, options: argparse.Namespace) -> int:
 
 def _only(spec: Spec, options: argparse.Namespace) -> int:
     """One draw alone: its verdicts, and its scenario as a file that `report` takes."""
+    from airground_drake.campaign.evidence import evidence
+    from airground_drake.campaign.store import table_of
     from airground_drake.campaign.work import rows_of
     from airground_drake.scenarios.document import text_of
     from airground_drake.scenarios.load import resolved
@@ -122,10 +124,10 @@ def _only(spec: Spec, options: argparse.Namespace) -> int:
         margin = "" if math.isnan(row["margin"]) else f" {row['margin']:.6g} {row['unit']}"
         print(f"{row['run']:12} {row['claim'] or row['ended']:12} {row['status'] or row['what']}{margin}")
     print(f"airground report {argument(path)}")
-    if any(row["status"] and row["status"] not in UNDECIDED and not row["as_expected"] for row in rows):
-        return EXIT_REFUTED
-    judged = [row for row in rows if row["claim"]]
-    return 0 if judged and all(row["as_expected"] for row in judged) else EXIT_UNDECIDED
+    found = evidence(table_of(rows))
+    for what in _undecided(found):
+        print(f"undecided: {what}")
+    return _code(found)
 
 
 def _limits(options: argparse.Namespace) -> Limits:
@@ -133,11 +135,26 @@ def _limits(options: argparse.Namespace) -> Limits:
 
 
 def _code(found: dict[str, Any]) -> int:
-    claims = found["claims"]
-    if any(claim["differs"] for claim in claims):
+    if any(claim["differs"] for claim in found["claims"]):
         return EXIT_REFUTED
-    open_ = any(claim["undecided"] for claim in claims) or found["ended"].keys() - {"judged", "invalid"}
-    return EXIT_UNDECIDED if open_ or not claims else 0
+    return EXIT_UNDECIDED if _undecided(found) else 0
+
+
+def _undecided(found: dict[str, Any]) -> list[str]:
+    """What is undecided, in words: what exit code 3 stands for."""
+    draws, ended = found["draws"], found["ended"]
+    lines = [f"{ended[name]} of {draws} draws {name}" for name in UNFINISHED if name in ended]
+    for claim in found["claims"]:
+        if claim["undecided_draws"]:
+            draws = ", ".join(map(str, claim["undecided_draws"]))
+            lines.append(f"{_name(claim)}: {claim['undecided']} of {claim['tested']} runs, such as draw {draws}")
+        elif claim["untested"]:
+            lines.append(f"{_name(claim)}: the scenario expects it to be tested, and no draw did")
+    return lines if found["claims"] else [*lines, "nothing was judged"]
+
+
+def _name(claim: dict[str, Any]) -> str:
+    return f"{claim['claim']} in run {claim['run']}"
 
 
 def _summary(found: dict[str, Any], *, looked: bool) -> str:
@@ -145,12 +162,16 @@ def _summary(found: dict[str, Any], *, looked: bool) -> str:
     ended = ", ".join(f"{count} {name}" for name, count in found["ended"].items())
     lines = [f"{found['name']}: {found['draws']} draws ({ended}), {found['simulated_s']:.0f} s simulated"]
     for claim in found["claims"]:
-        low, high = claim["anytime" if looked else "fixed"]
-        bounds = f"probability of a violation {low:.2g} to {high:.2g}" if claim["tested"] else "never put to the test"
+        said = f"{claim['refuted']} of {claim['tested']} refuted"
+        if not claim["tested"]:
+            said += ", never put to the test"
+        elif bounds := claim["anytime" if looked else "fixed"]:
+            said += f", probability of a violation {bounds[0]:.2g} to {bounds[1]:.2g}"
         differs = f"; {claim['differs']} not as expected" if claim["differs"] else ""
-        found_ = f"{claim['refuted']} of {claim['tested']} refuted, {bounds}{differs}"
-        lines.append(f"  {claim['run']:10} {claim['claim']:12} {found_}")
+        lines.append(f"  {claim['run']:10} {claim['claim']:12} {said}{differs}")
+    if found["dependent"]:
+        lines.append(f"  no intervals: draws are not independent ({', '.join(found['dependent'])})")
     if found["not_judged"]:
         first = found["not_judged"][0]
         lines.append(f"  first that was not judged: draw {first['index']}, {first['ended']}: {first['what']}")
-    return "\n".join(lines)
+    return "\n".join([*lines, *(f"  undecided: {what}" for what in _undecided(found))])

@@ -13,10 +13,9 @@ import signal
 import socket
 import subprocess
 import sys
-import threading
 import weakref
 from collections.abc import Mapping
-from typing import Any
+from typing import IO, Any
 
 from airground_drake.errors import FAULT_WIDTH, AirgroundError, PluginError, PolicyError, one_line
 from airground_drake.intervention import frames
@@ -36,7 +35,7 @@ MEMORY = 4 * 2**30
 _PROGRAM = (
     "import json, sys; sys.path[:] = json.loads(sys.argv[2]); "
     "from airground_drake import confinement, interruption; "
-    "int(sys.argv[4]) and interruption.end_with_parent(); "
+    "interruption.end_with_pipe(int(sys.argv[4])); "
     "confinement.limit_memory(int(sys.argv[3])); confinement.leave_others_alone(); "
     "from airground_drake.intervention.worker import main; main(int(sys.argv[1]))"
 )
@@ -139,21 +138,21 @@ class _Process:
         """Start it, in a session of its own, with nothing open but one end of the channel."""
         ours, theirs = socket.socketpair()
         path = json.dumps([each for each in sys.path if isinstance(each, str)])
-        in_main = threading.current_thread() is threading.main_thread()
-        arguments = [str(theirs.fileno()), path, str(MEMORY), str(int(in_main))]
-        with theirs:
+        reader, writer = map(os.fdopen, os.pipe(), ("rb", "wb"))
+        arguments = [str(theirs.fileno()), path, str(MEMORY), str(reader.fileno())]
+        with theirs, reader:  # the policy ends with this process, which keeps the writer
             process = subprocess.Popen(
                 [sys.executable, "-P", "-c", _PROGRAM, *arguments],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
-                pass_fds=[theirs.fileno()],
+                pass_fds=[theirs.fileno(), reader.fileno()],
                 start_new_session=True,
                 env={**_ENVIRONMENT, **os.environ},
             )
         self._process, self._channel, self._asked = process, ours, -1
         _RUNNING.add(self)
-        self.end = weakref.finalize(self, _kill, process, ours, os.getpid())
+        self.end = weakref.finalize(self, _kill, process, ours, writer, os.getpid())
 
     def ask(self, question: Mapping[str, Any], limit_s: float) -> dict[str, Any]:
         """The answer to this very question.
@@ -180,9 +179,10 @@ class _Process:
 _RUNNING: weakref.WeakSet[_Process] = weakref.WeakSet()
 
 
-def _kill(process: subprocess.Popen[bytes], channel: socket.socket, owner: int) -> None:
+def _kill(process: subprocess.Popen[bytes], channel: socket.socket, alive: IO[bytes], owner: int) -> None:
     """End a process and its group, and wait for it."""
     channel.close()
+    alive.close()
     if os.getpid() != owner:  # a fork of the process that started it
         return
     with contextlib.suppress(ProcessLookupError, PermissionError):

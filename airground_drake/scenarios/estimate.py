@@ -39,6 +39,10 @@ PROGRAM = GIB // 2
 """Bytes of the program itself with its libraries."""
 
 
+MOST_ROWS = 4_000_000
+"""Of a campaign, which holds them in memory: one for each draw, run and claim takes up to 1.7 kB (measured)."""
+
+
 class Limits(NamedTuple):
     """What a scenario may ask for.
 

@@ -44,7 +44,7 @@ def test_untested_runs_count_for_nothing_and_undecided_ones_against_the_claim() 
     assert [claim[name] for name in ("tested", "refuted", "undecided", "idle")] == [92, 1, 1, 1]
     assert claim["fixed"] == pytest.approx([clopper_pearson(1, 92).low, clopper_pearson(2, 92).high])
     assert claim["anytime"] == pytest.approx([confidence_sequence(1, 92).low, confidence_sequence(2, 92).high])
-    assert claim["not_as_expected"] == 2
+    assert (claim["differs"], claim["undecided_draws"]) == (1, [91])
     assert [each["index"] for each in claim["worst"]] == [0, 1, 2, 3, 4]
 
 
@@ -78,9 +78,15 @@ def test_a_rule_waits_for_a_run_that_puts_nothing_to_the_test() -> None:
     assert not any(rule.met([row(i, run="b"), row(i, run="c", exercised=0.0)]) for i in range(200))
 
 
+def shown(found: dict[str, Any]) -> str:
+    """The page, without its figures."""
+    of = {"name": "x", "title": "", "spec": "x.yaml", "stopped": None}
+    return page(of | found, pd.DataFrame(columns=list(COLUMNS)))
+
+
 def word(found: dict[str, Any]) -> tuple[str, str]:
     """How the banner of the page looks, and what it says."""
-    text = page(found | {"name": "x", "title": "", "spec": "x.yaml"}, pd.DataFrame(columns=list(COLUMNS)))
+    text = shown(found)
     banner = re.search(r'<section class="banner (\w+)".*?<p class="word">(.*?)</p>', text, re.DOTALL)
     assert banner is not None
     return banner[1], " ".join(re.sub(r"<[^>]*>", " ", banner[2]).split())
@@ -90,7 +96,8 @@ def word(found: dict[str, Any]) -> tuple[str, str]:
     ("rows", "looks"),
     [
         ([row(0)], ("good", "✓ Every claim as expected")),
-        ([row(0, exercised=0.0, as_expected=False)], ("bad", "✗ 1 of 1 claims not as expected")),
+        ([row(0, exercised=0.0, as_expected=False)], ("open", "? 1 of 1 claims never put to the test")),
+        ([row(0), row(1, exercised=0.0, as_expected=False)], ("good", "✓ Every claim as expected")),
         ([row(0, "refuted")], ("bad", "✗ 1 of 1 claims not as expected")),
         ([row(0, "refuted", as_expected=True)], ("good", "✓ Every claim as expected")),
         ([row(0, "inconclusive")], ("open", "? 1 of 1 claims undecided in some draws")),
@@ -103,6 +110,7 @@ def test_the_page_says_what_the_exit_code_says(rows: list[Row], looks: tuple[str
     found = conclude(rows)
     assert word(found) == looks
     assert _code(found) == {"good": 0, "bad": 1, "open": 3}[looks[0]]
+    assert ("  undecided: " in _summary(found | {"name": "x"}, looked=False)) == (looks[0] == "open")
 
 
 def test_a_claim_that_nothing_tested_has_no_bound_but_the_whole_interval() -> None:
@@ -158,6 +166,46 @@ def test_it_finds_the_keys_by_which_a_claim_fails() -> None:
     assert sum(cell["refuted"] for cell in where["cells"]) == claim["refuted"]
 
 
+def test_neither_a_seed_nor_chance_explains_where_a_claim_fails() -> None:
+    """Nine draws whose seeds separate the violations, and gains that do not; then keys that have no effect."""
+    rows = [
+        row(i, "refuted" if i > 4 else "holds", drawn=json.dumps({"seed": i, "gain": float(i * 4 % 9)}))
+        for i in range(9)
+    ]
+    assert conclude(rows)["claims"][0]["fails_where"] is None
+    rng = np.random.default_rng(0)
+    drawn = [json.dumps({f"key{k}": value for k, value in enumerate(rng.random(12).tolist())}) for _ in range(60)]
+    rows = [row(i, "refuted" if i % 4 == 0 else "holds", drawn=each) for i, each in enumerate(drawn)]
+    assert conclude(rows)["claims"][0]["fails_where"] is None
+
+
+def test_no_interval_is_given_where_draws_are_not_independent() -> None:
+    table = pd.DataFrame([row(i) for i in range(9)], columns=list(COLUMNS)).astype(COLUMNS)
+    found = strict(evidence(table, dependent=["ugvs.u.start_m"])) | {"name": "x"}
+    (claim,) = found["claims"]
+    assert (claim["tested"], claim["fixed"], claim["anytime"]) == (9, None, None)
+    assert "come from a Halton sequence or a grid:\n<code>ugvs.u.start_m</code>.</p>" in shown(found)
+    said = _summary(found, looked=False)
+    assert "probability" not in said
+    assert "no intervals: draws are not independent (ugvs.u.start_m)" in said
+
+
+def test_sentences_of_the_page_are_apart() -> None:
+    text = " ".join(re.sub("<[^>]*>", " ", shown(conclude([row(0)]))).split())
+    assert "draw 0 (0 m). The worst again: airground campaign x.yaml --only 0" in text
+
+
+def test_exit_code_3_says_what_is_undecided() -> None:
+    rows = [row(0), row(7, "inconclusive"), row(1, claim="COMM", exercised=0.0, as_expected=False), *died(2)]
+    said = _summary(conclude(rows) | {"name": "x"}, looked=False).splitlines()
+    assert [line.removeprefix("  undecided: ") for line in said if "undecided" in line] == [
+        "1 of 4 draws died",
+        "SAFE-TRACE in run d: 2 of 3 runs, such as draw 7",
+    ]
+    said = _summary(conclude(rows[2:3]) | {"name": "x"}, looked=False).splitlines()
+    assert said[-1] == "  undecided: COMM in run d: the scenario expects it to be tested, and no draw did"
+
+
 def test_draws_that_were_not_judged_are_listed() -> None:
     found = conclude([row(0), *died(1)])
     assert found["ended"] == {JUDGED: 1, DIED: 1}
@@ -188,7 +236,7 @@ def test_the_page_escapes_what_was_drawn_and_has_no_scripts() -> None:
         for i in range(20)
     ]
     table = pd.DataFrame(rows, columns=list(COLUMNS)).astype(COLUMNS)
-    text = page(conclude(rows) | {"name": "<b>", "title": "", "spec": "a.yaml"}, table)
+    text = page(conclude(rows) | {"name": "<b>", "title": "", "spec": "a.yaml", "stopped": None}, table)
     assert "<script" not in text
     assert "<img" not in text
     assert "<b>" not in text

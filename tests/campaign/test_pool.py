@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from functools import partial
@@ -79,6 +80,43 @@ def test_an_item_that_has_killed_its_workers_is_given_up_and_what_work_raises_is
     assert module._result(distributed, Future(killed)) is None
     with pytest.raises(ZeroDivisionError):
         module._result(distributed, Future(ZeroDivisionError()))
+
+
+SCHEDULER = """
+import distributed, time
+options = {"n_workers": 1, "threads_per_worker": 1, "processes": False, "dashboard_address": ":0"}
+with distributed.LocalCluster(protocol="tcp", **options) as here:
+    print(here.scheduler_address, flush=True)
+    time.sleep(1000)
+"""
+
+CLIENT = """
+import itertools, os, signal, sys
+from airground_drake.campaign.pool import cluster
+from airground_drake.errors import AirgroundError
+
+try:
+    with cluster(sys.argv[1]) as pool:
+        for _ in pool(abs, itertools.count()):
+            os.kill(int(sys.argv[2]), signal.SIGKILL)
+except AirgroundError as error:
+    print(error)
+"""
+
+
+def test_a_scheduler_that_is_lost_is_one_line() -> None:
+    pytest.importorskip("distributed")
+    command = [sys.executable, "-c"]
+    with subprocess.Popen([*command, SCHEDULER], stdout=subprocess.PIPE, text=True) as scheduler:
+        assert scheduler.stdout is not None
+        address = scheduler.stdout.readline().strip()
+        try:
+            ran = subprocess.run([*command, CLIENT, address, str(scheduler.pid)], capture_output=True, text=True)
+        finally:
+            scheduler.kill()
+    lost = r"the Dask scheduler was lost \(\w+\); --resume goes on with what is finished\n"
+    assert re.fullmatch(lost, ran.stdout), ran.stderr
+    assert (ran.returncode, ran.stderr) == (0, "")
 
 
 def test_no_scheduler_is_one_line() -> None:

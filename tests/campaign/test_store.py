@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import errno
+import json
+from collections.abc import Callable
 from pathlib import Path
 
 import pandas as pd
@@ -104,6 +107,91 @@ def test_a_part_without_a_column_is_refused(column: str, tmp_path: Path) -> None
     pd.read_parquet(part).drop(columns=column).to_parquet(part)
     with pytest.raises(FolderError, match=f"no column '{column}'"):
         Store(tmp_path / "c", MANIFEST, resume=True)
+
+
+def edit_part(folder: Path, edit: Callable[[pd.DataFrame], pd.DataFrame]) -> None:
+    part = folder / "parts" / "part-000000.parquet"
+    edit(pd.read_parquet(part)).to_parquet(part, index=False)
+
+
+def edit_journal(folder: Path, edit: Callable[[pd.DataFrame], pd.DataFrame]) -> None:
+    *before, last = (folder / JOURNAL).read_text().splitlines()
+    rows = edit(pd.DataFrame(json.loads(last))).to_dict("records")
+    (folder / JOURNAL).write_text("\n".join([*before, json.dumps(rows)]) + "\n")
+
+
+@pytest.mark.parametrize("place", [edit_part, edit_journal])
+@pytest.mark.parametrize(
+    "edit",
+    [
+        lambda rows: pd.concat([rows] * 50),
+        lambda rows: rows.assign(status="fine"),
+        lambda rows: rows.assign(status="holds", as_expected=True),
+        lambda rows: rows.assign(index=10**9),
+        lambda rows: rows.assign(claim="SAFE"),
+        lambda rows: rows[:1],
+    ],
+    ids=["repeated", "unknown status", "turned into holds", "another index", "unknown claim", "dropped"],
+)
+def test_a_draw_whose_rows_were_changed_is_refused_by_its_number(
+    edit: Callable[[pd.DataFrame], pd.DataFrame], place: Callable[..., None], tmp_path: Path
+) -> None:
+    store = Store(tmp_path / "c", MANIFEST, resume=False)
+    refuted = [row | {"status": "refuted"} for row in draw(7)]
+    store.add(refuted)
+    if place is edit_part:
+        store.flush()
+    killed(store)
+    place(tmp_path / "c", lambda rows: rows)
+    again = Store(tmp_path / "c", MANIFEST, resume=True)
+    assert again.table()["status"].tolist() == ["refuted", "refuted"]
+    killed(again)
+    place(tmp_path / "c", edit)
+    for reading in (lambda: Store(tmp_path / "c", MANIFEST, resume=True), lambda: read(tmp_path / "c")):
+        with pytest.raises(FolderError, match=r"draw (7|1000000000): its rows were changed, repeated or removed"):
+            reading()
+
+
+def test_a_draw_of_another_campaign_or_a_part_that_is_there_twice_is_refused(tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        store = Store(tmp_path / name, MANIFEST | {"name": name}, resume=False)
+        store.add(draw(3))
+        store.close()
+    part = (tmp_path / "a" / "parts" / "part-000000.parquet").read_bytes()
+    for name, number in (("a", 1), ("b", 0)):
+        (tmp_path / name / "parts" / f"part-{number:06d}.parquet").write_bytes(part)
+        with pytest.raises(FolderError, match="draw 3: "):
+            read(tmp_path / name)
+
+
+def test_a_disk_that_takes_a_part_of_a_line_gets_the_rest_or_the_draw_is_not_finished(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store = Store(tmp_path / "c", MANIFEST, resume=False)
+    room, write = 10**6, module.os.write
+
+    def nearly_full(handle: int, data: bytes) -> int:
+        nonlocal room
+        if not room:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        taken = write(handle, data[: min(100, room)])
+        room -= taken
+        return taken
+
+    monkeypatch.setattr(module.os, "write", nearly_full)
+    store.add(draw(0))
+    store.add(draw(1))
+    room = 250
+    with pytest.raises(OSError, match=f"No space left on device: .*{JOURNAL}"):
+        store.add(draw(2))
+    monkeypatch.undo()
+    assert store.finished == {0, 1}
+    killed(store)
+    again = Store(tmp_path / "c", MANIFEST, resume=True)
+    assert again.finished == {0, 1}
+    again.add(draw(2))
+    killed(again)
+    assert indices(Store(tmp_path / "c", MANIFEST, resume=True)) == [0, 0, 1, 1, 2, 2]
 
 
 def test_a_folder_of_something_else_or_of_another_campaign_is_refused(tmp_path: Path) -> None:

@@ -91,6 +91,31 @@ def test_usage(spec: Path, arguments: str) -> None:
     assert end.value.code == 2
 
 
+def test_more_draws_than_memory_holds_are_refused_before_anything_is_written(
+    spec: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = str(tmp_path / "out")
+    allowed = "allowed: 4e+06 rows, one for each draw, run and claim\n"
+    assert main([str(spec), "-n", "10000000000", "-o", out]) == 2
+    assert capsys.readouterr().err == f"error: small asks for about 1e+10 draws (4e+10 rows); {allowed}"
+    values = ", ".join(map(str, range(5000)))
+    grids = "".join(f"  {key}: {{grid: [{values}]}}\n" for key in ("seed", "duration_s", "control.motion_gain_1_s"))
+    spec.write_text(f"scenario: minimal\nclaims: [EXEC]\ndraw:\n{grids}", encoding="utf-8")
+    assert main([str(spec), "-o", out]) == 2
+    assert capsys.readouterr().err == f"error: small asks for about 1.25e+11 draws (2.5e+11 rows); {allowed}"
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.usefixtures("in_this_process")
+def test_a_folder_with_draws_beyond_the_number_is_refused(
+    spec: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = str(tmp_path / "out")
+    assert main([str(spec), "-n", "3", "-o", out]) == 0
+    assert main([str(spec), "-n", "2", "-o", out, "--resume"]) == 2
+    assert f"{out} has draw 2; allowed: -n 3 or more" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("more", [["-n", "1", "--jobs", "1"], ["--only", "0"]])
 def test_what_cannot_be_written(
     spec: Path, tmp_path: Path, more: list[str], capsys: pytest.CaptureFixture[str]
@@ -107,21 +132,26 @@ def test_what_cannot_be_written(
 @pytest.mark.parametrize(
     ("changes", "code", "says"),
     [
-        ("runs: {a: {method: a, expected: {SAFE-TRACE: refuted}}}", 1, "2 not as expected"),
-        ("runs: {a: {method: a, expected: {THR-TRIG: exercised}}}", 1, "2 not as expected"),
-        ("duration_s: -1", 3, "first that was not judged: draw 0, invalid: "),
+        ("runs: {a: {method: a, expected: {LIVE-GOAL: holds}}}", 1, "2 not as expected"),
+        (
+            "runs: {a: {method: a, expected: {LIVE-GOAL: refuted, THR-TRIG: exercised}}}",
+            3,
+            "undecided: THR-TRIG in run a: the",
+        ),
+        ("", 3, "first that was not judged: draw 0, invalid: "),
     ],
 )
-def test_what_is_not_as_expected_is_exit_code_1(
+def test_what_is_not_as_expected_is_exit_code_1_and_what_is_open_3(
     changes: str, code: int, says: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "2024-my.team.yaml"  # no identifier, as names of scenarios are
-    set_ = f"set: {{duration_s: 1.0, {changes}}}" if code == 1 else "set: {}"
-    drawn = "draw:\n  duration_s: {grid: [-1.0, -2.0]}\n" if code != 1 else "draw:\n  seed: {grid: [1, 2]}\n"
-    path.write_text(f"scenario: minimal\nclaims: [SAFE-TRACE, THR-TRIG]\n{set_}\n{drawn}", encoding="utf-8")
+    set_ = f"set: {{duration_s: 1.0, {changes}}}" if changes else "set: {}"
+    drawn = "draw:\n  seed: {grid: [1, 2]}\n" if changes else "draw:\n  duration_s: {grid: [-1.0, -2.0]}\n"
+    path.write_text(f"scenario: minimal\nclaims: [LIVE-GOAL, THR-TRIG]\n{set_}\n{drawn}", encoding="utf-8")
     assert main([str(path), "-o", str(tmp_path / "out"), "--jobs", "1"]) == code
     assert says in capsys.readouterr().out
-    assert main([str(path), "-o", str(tmp_path / "one.yaml"), "--only", "0"]) == (1 if code == 1 else 2)
+    assert main([str(path), "-o", str(tmp_path / "one.yaml"), "--only", "0"]) == (code if changes else 2)
+    assert ("undecided: THR-TRIG in run a" in capsys.readouterr().out) == (bool(changes) and code == 3)
 
 
 @pytest.mark.parametrize(

@@ -99,18 +99,37 @@ def test_what_a_policy_has_started_ends_with_it(guests: dict[bool, GuestPolicy])
 
 
 STARTER = """
-import time
+import time, threading
+from dataclasses import replace
+from builders.hostile_policies import KINDS
+from builders.observations import mate, seen
 from airground_drake.intervention.process import GuestPolicy
-guest = GuestPolicy("airground_drake.intervention.detour:Detour", {"speed_m_s": 1.0}, 1.0)
-print(guest._process._process.pid, flush=True)
-time.sleep(1000)
+
+def hang():
+    guest = GuestPolicy("builders.hostile_policies:Hostile", {}, 1000.0)
+    print(guest._process._process.pid, flush=True)
+    team = seen([mate("a", (0, 0), (10, 0))], [])
+    guest.propose(replace(team, refusals=[*KINDS].index("loops_and_swallows_everything")))
+
+def in_a_thread():
+    thread = threading.Thread(target=hang)
+    thread.start()
+    thread.join()
+
+START()
 """
 
 
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
-def test_a_policys_process_ends_with_the_one_that_started_it(how: signal.Signals) -> None:
+@pytest.mark.parametrize("start", ["hang", "in_a_thread"])
+def test_a_policys_process_ends_with_the_one_that_started_it(start: str, how: signal.Signals) -> None:
+    """Though it hangs, and whether the main thread has started it or another one, as those of a Dask worker do."""
     with subprocess.Popen(
-        [sys.executable, "-c", STARTER], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+        [sys.executable, "-c", STARTER.replace("START", start)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+        env=os.environ | {"PYTHONPATH": str(Path(__file__).parents[1])},
     ) as starter:
         assert starter.stdout is not None
         worker = int(starter.stdout.readline())
