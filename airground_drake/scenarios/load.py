@@ -19,7 +19,7 @@ from airground_drake import files
 from airground_drake.errors import Fault, ScenarioError, short
 from airground_drake.scenarios import validate
 from airground_drake.scenarios.document import compose, nearest, of_data, read, simple, where, within_limits
-from airground_drake.scenarios.schema import Scenario
+from airground_drake.scenarios.schema import Scenario, Vector
 from airground_drake.scenarios.shipped import shipped
 from airground_drake.scenarios.typed import made, replaced
 
@@ -105,11 +105,20 @@ def _build(root: yaml.Node, source: str) -> Scenario:
     """The scenario of a document, checked."""
     within_limits(root)
     scenario: Scenario = made(root, Scenario, "", "")
+    if not scenario.uav.target_m:
+        scenario.uav.target_m = _over_the_targets(scenario)
     try:
         validate.check(scenario, source)
     except ScenarioError as error:
         raise ScenarioError(where(nearest(root, error.key)), error.key, error.value, error.allowed) from None
     return scenario
+
+
+def _over_the_targets(scenario: Scenario) -> Vector:
+    """Where the UAV's task (9) leads if every UGV reaches its target: over their centroid, [x, y, z], m."""
+    targets = [ugv.target_m for ugv in scenario.ugvs.values() if len(ugv.target_m) == 3]
+    x, y = (sum(target[axis] for target in targets) / max(len(targets), 1) for axis in range(2))
+    return [x, y, scenario.uav.altitude_m]
 
 
 def _texts(overrides: Overrides) -> list[str]:

@@ -57,8 +57,8 @@ class Uav:
     """What it is called in traces and reports."""
     start_m: Vector = field(default_factory=list, metadata=REQUIRED)
     """Where it starts."""
-    target_m: Vector = field(default_factory=list, metadata=REQUIRED)
-    """Where it is to end."""
+    target_m: Vector = field(default_factory=list)
+    """Where it is to end; left out or empty: over the centroid of the UGVs' targets, at `altitude_m`."""
     altitude_m: float = 2.0
     """Height over the centroid of the UGVs; more than `air_ground_m` and both radii."""
     task: str = "formation"
