@@ -178,6 +178,8 @@ def test_events_are_isolated_not_sampled(run: Runs) -> None:
 def test_bare_trigger_chatters_where_the_automaton_does_not(case_a: Scenario) -> None:
     """A task error that rests at the threshold, under noise: what the hysteresis and the dwell are for."""
     case_a.ugvs["ugv1"].preset.waypoints_m = [[3.3, 0.0, 0.0], [3.3, 8.1, 0.0]]
+    case_a.runs = {"a": Run("a", expected={"LIVE-GOAL": "refuted"})}
+    case_a.reproduction.clear()
     case_a.decision.leak_1_s = 2.0
     case_a.decision.noise_m_sqrt_s = 0.3
     counts = {}

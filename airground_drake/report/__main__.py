@@ -109,8 +109,8 @@ def _reported(options: argparse.Namespace, command: str, scenario: Scenario, dig
         )
     overall = report["overall"]
     if not options.quiet:
-        for fault in attention.faults(report["runs"]):
-            print(f"{fault.words}, run {fault.run}")
+        for item in attention.beforehand(report):
+            print(f"{item.words}{f', run {item.run}' if item.run else ''}")
         print(f"{scenario.name}: {overall['status'].replace('_', ' ')}. {overall['why']}\n{one_line(str(output))}")
     if options.open and "html" in options.format:
         webbrowser.open((output / "report.html").resolve().as_uri())

@@ -7,11 +7,14 @@ from dataclasses import dataclass
 from typing import Any
 
 from airground_drake.errors import one_line
+from airground_drake.scenarios.validate import preset_s
 from airground_drake.statuses import PASSING, UNDECIDED, outcome
 
 MAX_FAULT_CHARS = 300
 MAX_FAULTS = 3
 """Kinds of faults of a run that are listed; its section of the page has more."""
+MAX_NAMES = 3
+"""Robots that are listed in a line."""
 
 REFUSED = {
     "cheaper": "the plan that it preferred began by waiting",
@@ -53,12 +56,12 @@ class Item:
 def items(document: Mapping[str, Any]) -> list[Item]:
     """All of a report, in the order of the page.
 
-    Faults of policies and solvers come first, as they may explain the rest; then what is refuted, and what is open.
+    What may explain the rest comes first; then what is refuted, and what is open.
     """
     unexpected = [claim for claim in document["claims"] if not claim["as_expected"]]
     unexpected.sort(key=lambda claim: claim["status"] in UNDECIDED)
     return [
-        *faults(document["runs"]),
+        *beforehand(document),
         *(_of_claim(claim, document["runs"].get(claim["run"], {})) for claim in unexpected),
         *(Item("not_run", f"{each['why']}", each["id"], each["run"]) for each in document["overall"]["missing"]),
         *_of_the_paper(document),
@@ -137,8 +140,20 @@ def _of_the_paper(document: Mapping[str, Any]) -> Iterator[Item]:
         yield Item("not_as_expected", f"a broken variant was not refuted: {mutant}", anchor="mutants")
 
 
-def faults(runs: Mapping[str, Mapping[str, Any]]) -> Iterator[Item]:
-    """What went wrong in policies and solvers, run by run."""
+def beforehand(document: Mapping[str, Any]) -> Iterator[Item]:
+    """What the report begins with, on the terminal too: faults of policies and solvers, and runs that are cut short."""
+    yield from _of_faults(document["runs"])
+    scenario = document["scenario"]["resolved"]
+    longer = {name: preset_s(**ugv["preset"]) for name, ugv in scenario["ugvs"].items()}
+    longer = {name: time_s for name, time_s in longer.items() if time_s > scenario["duration_s"]}
+    if longer:
+        names = list(longer)
+        who = ", ".join(names[:MAX_NAMES]) + f" and {len(names) - MAX_NAMES} more" * (len(names) > MAX_NAMES)
+        ends = f"duration_s = {scenario['duration_s']:g} ends the runs before the presets of {who} do"
+        yield Item("inconclusive", f"{ends} ({max(longer.values()):.3g} s): they cannot be expected to arrive")
+
+
+def _of_faults(runs: Mapping[str, Mapping[str, Any]]) -> Iterator[Item]:
     for name, run in runs.items():
         kinds = faults_together(run["faults"])
         for kind in kinds[:MAX_FAULTS]:

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import fields, is_dataclass
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from fractions import Fraction
-from itertools import pairwise
+from itertools import pairwise, starmap
 from typing import NamedTuple
 
 import numpy as np
@@ -50,6 +50,7 @@ MAX_TEXT = 10_000  # characters
 NAME_PATTERN = "^[A-Za-z_][A-Za-z0-9_]*$"  # of a UGV, an obstacle, a run, a parameter
 CLAIM_PATTERN = f"^[A-Z][A-Z0-9-]{{0,{MAX_NAME - 1}}}$"
 SMALLEST = 1e-9  # of a positive number
+ARRIVES = "LIVE-GOAL"  # the claim that every UGV ends where it is to end
 TOLERANCE = 1e-9  # m between points; relative between periods
 _SHORT = 1.0 - 1e-5  # of a limit that is printed with six digits, so that what a message allows is allowed
 
@@ -245,6 +246,31 @@ def _presets(scenario: Scenario) -> Problems:
         if ugv.preset.speed_m_s > ugv.max_speed_m_s:
             allowed = f"at most the UGV's max_speed_m_s = {ugv.max_speed_m_s:.9g} m/s"
             yield f"ugvs.{name}.preset.speed_m_s", ugv.preset.speed_m_s, allowed
+
+
+def preset_s(waypoints_m: Sequence[Vector], speed_m_s: float) -> float:
+    """How long a preset trajectory takes, s."""
+    return sum(starmap(math.dist, pairwise(waypoints_m))) / speed_m_s
+
+
+def _ends(scenario: Scenario) -> Problems:
+    """A preset leads to its target, to within the tolerance, where a run expects the UGV there.
+
+    Runs that are shorter than a preset are cut short on purpose: their robots are not to arrive.
+    """
+    presets = [ugv.preset for ugv in scenario.ugvs.values()]
+    if max(preset_s(each.waypoints_m, each.speed_m_s) for each in presets) > scenario.duration_s:
+        return
+    for name, ugv in scenario.ugvs.items():
+        away, end = math.dist(ugv.preset.waypoints_m[-1], ugv.target_m), len(ugv.preset.waypoints_m) - 1
+        for run, spec in scenario.runs.items():
+            arrives = name not in spec.stalls_m and "refuted" not in alternatives(spec.expected.get(ARRIVES, "holds"))
+            if arrives and away > scenario.arrival_tolerance_m + TOLERANCE:
+                allowed = (
+                    f"at most arrival_tolerance_m = {scenario.arrival_tolerance_m:.9g} m from {name}'s target_m, where "
+                    f"run {run} expects it, not {away:.9g} m (or runs.{run}.expected.{ARRIVES}: refuted)"
+                )
+                yield f"ugvs.{name}.preset.waypoints_m.{end}", ugv.preset.waypoints_m[end], allowed
 
 
 def _gains(scenario: Scenario) -> Problems:
@@ -461,7 +487,7 @@ def _choices(scenario: Scenario) -> Problems:
 
 
 CHECKS: tuple[Callable[[Scenario], Problems], ...] = (
-    _finite, _bounds, _counts, _texts, _names, _options, _runs, _points, _presets, _gains, _periods, _release,
+    _finite, _bounds, _counts, _texts, _names, _options, _runs, _points, _presets, _ends, _gains, _periods, _release,
     _distances, _sensing, _extent, _clearances, _reproduction, _choices,
 )  # fmt: skip
 """Every rule; later ones rely on earlier ones (finite numbers, three coordinates)."""

@@ -84,6 +84,14 @@ def test_what_is_missing_faulty_or_not_the_paper_s(scenario: Scenario, traces: d
     assert [item.words for item in attention.items(report)][3] == "97 more kinds of faults"
 
 
+def test_a_run_that_ends_before_its_presets_do(scenario: Scenario, traces: dict[str, Trace]) -> None:
+    report = built(scenario, traces, FINE)
+    assert not attention.items(report)
+    report["scenario"]["resolved"]["duration_s"] = 15.0
+    (item,) = attention.items(report)
+    assert item.words.startswith("duration_s = 15 ends the runs before the presets of ugv1, ugv2 do (2")
+
+
 def fault(what: str, t_s: float) -> dict[str, Any]:
     return {"t_s": t_s, "robot": "ugv1", "policy": "mine", "what": what}
 

@@ -14,7 +14,7 @@ from scenarios.cases import CASE_A, DATA, SMALL, Write, case_a, message
 from airground_drake.errors import ScenarioError
 from airground_drake.scenarios.document import MAX_BYTES, text_of
 from airground_drake.scenarios.load import load, resolved, shipped, validated
-from airground_drake.scenarios.schema import Uav
+from airground_drake.scenarios.schema import Control, Preset, Scenario, Uav, Ugv
 
 
 @pytest.mark.parametrize("name", shipped())
@@ -161,3 +161,9 @@ def test_the_uav_ends_over_the_centroid_of_the_targets_unless_the_scenario_says_
     assert scenario.uav.target_m == [7.0, 3.0, 3.0]
     assert validated(replace(scenario, uav=Uav(start_m=[0.0, 2.0, 2.0]))).uav.target_m == [7.0, 3.0, 2.0]
     assert "ugvs.one.target_m: [5.0]" in message(silent, ["ugvs.one.target_m=[5]"])
+
+
+@pytest.mark.parametrize("part", [Scenario, Uav, Ugv, Preset, Control])
+def test_an_attribute_that_is_no_key_cannot_be_set(part: type) -> None:
+    with pytest.raises(AttributeError, match="has no attribute 'max_sped'"):
+        part().max_sped = 3.0

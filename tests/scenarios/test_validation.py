@@ -147,6 +147,19 @@ def test_bad_value(key: str, value: object, fragments: list[str], write: Write) 
     assert all(fragment in text for fragment in fragments), text
 
 
+def test_a_preset_ends_at_the_target_where_the_ugv_is_expected_there(write: Write) -> None:
+    data = edit(edit(SMALL_DATA, "duration_s", 15), "ugvs.two.preset.waypoints_m.1", [9, -5, 0])
+    text = message(write(yaml.safe_dump(data)))
+    assert "ugvs.two.preset.waypoints_m.1: [9.0, -5.0, 0.0] is not allowed; at most arrival_tolerance_m = 0.1 m" in text
+    for key, value in {
+        "runs.d.expected.LIVE-GOAL": "holds or refuted",
+        "runs.d.stalls_m.two": [4, 5, 0],
+        "arrival_tolerance_m": 10,
+        "duration_s": 5,  # too short for the preset: nobody is expected to arrive
+    }.items():
+        load(write(yaml.safe_dump(edit(data, key, value))))
+
+
 def test_bodies_start_as_far_apart_as_their_radii_demand(write: Write) -> None:
     data = edit(edit(SMALL_DATA, "ugvs.one.radius_m", 0.5), "ugvs.two.radius_m", 0.25)
     load(write(yaml.safe_dump(edit(data, "ugvs.two.start_m", [0.0, 2.75, 0.0]))))
