@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -105,13 +106,32 @@ def _build(root: yaml.Node, source: str) -> Scenario:
     """The scenario of a document, checked."""
     within_limits(root)
     scenario: Scenario = made(root, Scenario, "", "")
-    if not scenario.uav.target_m:
-        scenario.uav.target_m = _over_the_targets(scenario)
+    _complete(scenario)
     try:
         validate.check(scenario, source)
     except ScenarioError as error:
         raise ScenarioError(where(nearest(root, error.key)), error.key, error.value, error.allowed) from None
     return scenario
+
+
+def _complete(scenario: Scenario) -> None:
+    """Fill in what follows from other keys, and round a gain of 1/period down to where gain * period <= 1 exactly."""
+    if not scenario.uav.target_m:
+        scenario.uav.target_m = _over_the_targets(scenario)
+    control = scenario.control
+    for name in validate.GAINS:
+        setattr(control, name, _rounded_down(getattr(control, name), control.period_s))
+
+
+def _rounded_down(gain: float, period: float) -> float:
+    """A gain, 1/s; the largest number below it that proofs admit if it is 1/period but for rounding.
+
+    Proofs take numbers as the decimals that they print as: 3.3333333333333335 * 0.3 is 1 in floating point, and more
+    than 1 there. A smaller gain only demands less.
+    """
+    while gain * period == 1.0 < validate.exactly(gain) * validate.exactly(period):
+        gain = math.nextafter(gain, 0.0)
+    return gain
 
 
 def _over_the_targets(scenario: Scenario) -> Vector:

@@ -109,7 +109,7 @@ class Control:
     period_s: float = 0.025
     """Control period h of all robots."""
     avoidance_gain_1_s: float = field(default=3.0, metadata=FROM_ZERO)
-    """Of obstacle avoidance; gain times period at most 1, as for all gains."""
+    """Of obstacle avoidance; gain times period at most 1, as for all gains (1/period is rounded down to that)."""
     motion_gain_1_s: float = field(default=2.0, metadata=FROM_ZERO)
     """Of tracking the preset trajectory, (6)."""
     formation_gain_1_s: float = field(default=5.0, metadata=FROM_ZERO)
