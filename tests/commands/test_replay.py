@@ -85,7 +85,7 @@ def test_a_video(folder: Path, tmp_path: Path) -> None:
             ["{folder}", "-o", "{folder}.txt"],
             "report.txt cannot be written: File exists; wanted: a folder for the pages",
         ),
-        (["{folder}", "-o", "x.html"], "x.html is one file for the runs c, d; name a RUN, or a folder"),
+        (["{folder}", "-o", "{folder}.html"], "report.html is one file for the runs c, d; name a RUN, or a folder"),
         (["{folder}", "d", "--video", "{folder}/trace/d.webp"], "is in the report"),
         (["{folder}", "d", "--video", "d.avi"], "allowed: names that end in .webp or .mp4"),
     ],
