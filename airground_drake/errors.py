@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from pathlib import PurePath
+from traceback import walk_tb
 
 VALUE_WIDTH = 120
 """Longer values are cut in messages, characters."""
@@ -119,13 +121,26 @@ def short(text: str) -> str:
     return text if len(text) <= VALUE_WIDTH else f"{text[: VALUE_WIDTH - 3]}..."
 
 
-def described(error: BaseException) -> str:
-    """An exception of somebody else's code as one printable line of bounded length, whatever its `__str__` does."""
+def described(error: BaseException, function: object = None) -> str:
+    """An exception of somebody else's code as one printable line of bounded length, whatever its `__str__` does.
+
+    Args:
+        error: the exception.
+        function: a function of that code. The line begins with the place in its file where the exception came from,
+            such as `boom.py:5`, if it came from there.
+    """
     try:
-        text = f"{type(error).__name__}: {error}"[:FAULT_WIDTH]
+        text = f"{_place(error, function)}{type(error).__name__}: {error}"[:FAULT_WIDTH]
     except BaseException:  # its text is code of others, too
         text = "an exception that cannot be put into words"
     return one_line(text)
+
+
+def _place(error: BaseException, function: object) -> str:
+    """The last line of the function's file that the exception went through, and a space; '' if there is none."""
+    file = getattr(getattr(function, "__code__", None), "co_filename", None)
+    lines = [line for frame, line in walk_tb(error.__traceback__) if frame.f_code.co_filename == file]
+    return f"{PurePath(str(file)).name}:{lines[-1]} " if lines else ""
 
 
 def one_line(text: str) -> str:

@@ -13,6 +13,7 @@ from __future__ import annotations
 import ast
 import importlib
 import importlib.util
+import inspect
 import os
 import re
 import sys
@@ -128,7 +129,7 @@ class Registry:
 
         Raises:
             UnknownNameError: as `load`.
-            PluginError: as `load`, and if the class does not take these parameters.
+            PluginError: as `load`, and if the class does not take these parameters; says which it takes.
         """
         kind = self.load(name, of)
         try:
@@ -136,7 +137,8 @@ class Registry:
         except KeyboardInterrupt:
             raise
         except BaseException as error:
-            raise PluginError(f"{self.kind} {name!r} with {parameters}: {described(error)}") from None
+            why = _misfit(kind, parameters) or described(error)
+            raise PluginError(f"{self.kind} {name!r} with {parameters}: {why}") from None
 
     @contextmanager
     def adding(self, name: str, what: type) -> Iterator[None]:
@@ -149,6 +151,21 @@ class Registry:
             del self._added[name]
             if before is not None:
                 self._added[name] = before
+
+
+def _misfit(kind: type, parameters: Mapping[str, Any]) -> str:
+    """Why a class does not take these parameters, and which it takes; '' if it takes them, or cannot be asked."""
+    try:
+        signature = inspect.signature(kind)
+    except (TypeError, ValueError):
+        return ""
+    try:
+        signature.bind(**parameters)
+    except TypeError as error:
+        takes = [f"{each.name} (needed)" if each.default is each.empty else each.name
+                 for each in signature.parameters.values() if each.kind is not each.VAR_KEYWORD]  # fmt: skip
+        return f"{error}; allowed: {', '.join(takes) or 'none'}"
+    return ""
 
 
 def is_plugin(name: str) -> bool:

@@ -159,7 +159,12 @@ def draw(number: int, *, crowded: bool = False) -> dict[str, Any]:
             "horizon_s": stages * stage, "stages": stages, "error_weight_1_m2_s": float(rng.choice([1.0, 100.0])),
             "min_dwell_s": float(rng.choice([0.0, 0.2])),
         },
-        "runs": {method: {"method": method, "composition": _composition(rng, method)}},
+        "runs": {
+            method: {
+                "method": method, "composition": _composition(rng, method),
+                "expected": {"LIVE-GOAL": "holds or refuted"},  # presets lead anywhere
+            },
+        },
     }  # fmt: skip
 
 

@@ -54,6 +54,13 @@ def test_lines_are_short_enough_to_read(page: Path) -> None:
     assert max(map(len, page.read_text(encoding="utf-8").splitlines())) <= 120
 
 
+@pytest.mark.parametrize("name", ["README.md", "docs/index.md", "docs/verification.md"])
+def test_a_reader_learns_what_the_model_leaves_out(name: str) -> None:
+    text = (ROOT / name).read_text(encoding="utf-8")
+    assert "unicycles" in text
+    assert re.search(r"arrive instantly,\s+and\s+none\s+is\s+lost", text)
+
+
 def test_the_readme_shows_the_scenario_that_init_writes() -> None:
     shipped = (ROOT / "airground_drake" / "scenarios" / "minimal.yaml").read_text(encoding="utf-8")
     assert blocks(ROOT / "README.md", "yaml") == [re.sub(r"^#.*\n", "", shipped, flags=re.MULTILINE)]

@@ -62,6 +62,23 @@ def test_what_stands_for_nothing_is_named(name: str, error: type[Exception], sai
         POLICIES.load(name, of=Policy)
 
 
+@pytest.mark.parametrize(
+    ("name", "parameters", "said"),
+    [
+        ("detour", {}, "missing a required argument: 'speed_m_s'; allowed: speed_m_s (needed), clearance_m, follow_s"),
+        ("coordinate", {"max_sped": 3.0}, "got an unexpected keyword argument 'max_sped'; allowed: speed_m_s, clear"),
+        ("detour", {"speed_m_s": -1.0}, "ValueError: detour needs speed_m_s > 0"),
+    ],
+)
+def test_parameters_that_do_not_fit_are_told_with_those_that_do(
+    name: str, parameters: dict[str, float], said: str
+) -> None:
+    with pytest.raises(PluginError) as caught:
+        POLICIES.make(name, of=Policy, **parameters)
+    assert said in str(caught.value)
+    assert "TypeError" not in str(caught.value)
+
+
 def test_entry_points_of_other_packages(monkeypatch: pytest.MonkeyPatch) -> None:
     point = EntryPoint("orbit", "airground_drake.intervention.detour:Detour", POLICIES.group)
     monkeypatch.setattr(registry, "entry_points", lambda group: [point] if group == POLICIES.group else [])

@@ -19,7 +19,7 @@ from airground_drake.progress import Watch
 from airground_drake.report.reproduction import MEASURES
 from airground_drake.runs import simulate_all
 from airground_drake.scenarios.load import load, shipped
-from airground_drake.scenarios.schema import Obstacle, Preset, Run, Scenario, Ugv
+from airground_drake.scenarios.schema import Obstacle, Preset, Run, Scenario, Uav, Ugv
 from airground_drake.simulation import Recorder, simulate
 from airground_drake.trace import Trace
 from airground_drake.verify import verify
@@ -178,6 +178,8 @@ def test_events_are_isolated_not_sampled(run: Runs) -> None:
 def test_bare_trigger_chatters_where_the_automaton_does_not(case_a: Scenario) -> None:
     """A task error that rests at the threshold, under noise: what the hysteresis and the dwell are for."""
     case_a.ugvs["ugv1"].preset.waypoints_m = [[3.3, 0.0, 0.0], [3.3, 8.1, 0.0]]
+    case_a.runs = {"a": Run("a", expected={"LIVE-GOAL": "refuted"})}
+    case_a.reproduction.clear()
     case_a.decision.leak_1_s = 2.0
     case_a.decision.noise_m_sqrt_s = 0.3
     counts = {}
@@ -268,3 +270,14 @@ def test_the_soft_gate_accepts_a_predicted_intrusion_and_the_certified_one_is_sa
     safety = {name: verify(run("soft_gate", name))[0].finding for name in ("c", "d")}
     assert safety["c"].status == "refuted"
     assert safety["d"].status == "holds"
+
+
+def test_a_uav_without_a_target_of_its_own_arrives_where_its_task_leads() -> None:
+    """Two UGVs that are not side by side: the first thing that a new user writes."""
+    ways = {"one": ([0.0, 0.0, 0.0], [6.0, 0.0, 0.0]), "two": ([0.0, 5.0, 0.0], [7.0, 6.0, 0.0])}
+    scenario = Scenario(
+        name="new", duration_s=12.0, runs={"a": Run("a")}, uav=Uav(start_m=[0.0, 2.0, 2.0]),
+        ugvs={name: Ugv(start, end, Preset([start, end])) for name, (start, end) in ways.items()},
+    )  # fmt: skip
+    verdicts = {verdict.claim.id: verdict.finding.status for verdict in verify(simulate(scenario, "a"))}
+    assert verdicts["LIVE-GOAL"] == "holds"

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from airground_drake.replay.scene import Scene
 
 SCHEMA = "airground_drake.report/"
+ELSEWHERE = "it is left alone; name another place, with -o"
 SLOWEST, SPEED, FASTEST = 0.1, 4.0, 100.0
 """How fast a video may be, and is if nothing is said of it."""
 
@@ -29,7 +30,9 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument("folder", type=Path, metavar="DIR", help="folder of a report")
     parser.add_argument("run", nargs="?", metavar="RUN", help="default: all runs, a file each")
     to = parser.add_mutually_exclusive_group()
-    to.add_argument("-o", "--output", type=Path, metavar="DIR", help="for the pages; default: this folder")
+    to.add_argument(
+        "-o", "--output", type=Path, metavar="PLACE", help="folder for the pages, or a name.html for RUN (default: .)"
+    )
     to.add_argument("--live", action="store_true", help="write nothing; serve the pages on this machine")
     to.add_argument("--video", type=Path, metavar="FILE", help="write RUN as a video instead: .webp or .mp4")
     parser.add_argument("--speed", type=_speed, metavar="X", help=f"of the video (default: {SPEED:g})")
@@ -63,15 +66,43 @@ def main(arguments: Sequence[str] | None = None) -> int:
             video.write(_scene(options.folder, options.run), options.video, options.speed or SPEED)
             print(options.video)
         else:
-            output = options.output or Path()
-            _take(output, "the pages")
-            for name in chosen:
-                path = output / f"replay_{name}.html"
-                files.write_text(path, page(_scene(options.folder, name)))
+            for name, path in _paths(options.output or Path(), chosen).items():
+                _take(path.parent, "the pages")
+                mark = _mark(options.folder, name)
+                if path.exists() and not _has(path, mark):
+                    raise FolderError(one_line(f"{path} is not a replay of this run of {options.folder}; {ELSEWHERE}"))
+                files.write_text(path, f"{page(_scene(options.folder, name))}{mark}\n")
                 print(path)
     except (AirgroundError, OSError) as error:
         return refuse(error)
     return 0
+
+
+def _paths(output: Path, runs: Sequence[str]) -> dict[str, Path]:
+    """Where the page of each run goes: to a file of this name, or to a folder.
+
+    Raises:
+        FolderError: if it is one file for several runs.
+    """
+    if output.suffix != ".html":
+        return {name: output / f"replay_{name}.html" for name in runs}
+    if len(runs) > 1:
+        raise FolderError(one_line(f"{output} is one file for the runs {', '.join(runs)}; name a RUN, or a folder"))
+    return {runs[0]: output}
+
+
+def _mark(folder: Path, run: str) -> str:
+    """What the page of a run ends with: by it the page is known, also when the report has been made again."""
+    return f"<!-- airground replay {files.sha256(f'{folder.resolve()}/{run}'.encode())} -->"
+
+
+def _has(path: Path, mark: str) -> bool:
+    """Whether a file ends with a mark; what is not a plain file has none."""
+    if not path.is_file():
+        return False
+    with path.open("rb") as file:
+        file.seek(max(0, path.stat().st_size - 2 * len(mark)))
+        return mark.encode() in file.read(2 * len(mark))
 
 
 def _speed(text: str) -> float:

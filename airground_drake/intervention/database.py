@@ -205,7 +205,7 @@ class BehaviourDatabase:
         except PolicyError as fault:
             faults.append(Fault(seen.t, seen.robot, name, str(fault)))
         except (Exception, OutOfTime, SystemExit) as error:  # whatever a policy does, it must not stop the UAV
-            faults.append(Fault(seen.t, seen.robot, name, described(error)))
+            faults.append(Fault(seen.t, seen.robot, name, described(error, type(policy).propose)))
         return {}
 
 

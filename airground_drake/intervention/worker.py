@@ -43,5 +43,5 @@ def answer(policy: Policy, seen: Any) -> dict[str, Any]:
         if (size := sum(len(part) for motion in motions for part in motion)) > LONGEST // 2:
             raise ValueError(f"a proposal of {size} characters; at most {LONGEST // 2} are allowed")
     except BaseException as error:  # whatever a user's policy does, it counts as no intervention
-        return {"fault": described(error)}
+        return {"fault": described(error, type(policy).propose)}
     return {"motions": motions}

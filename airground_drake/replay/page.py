@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache
 from typing import Any
 
@@ -16,8 +17,9 @@ from airground_drake.replay.looks import (
     UAV_COLOR,
     UNSEEN_COLOR,
 )
-from airground_drake.replay.recording import recorded, robot_path
+from airground_drake.replay.recording import obstacle_path, recorded, robot_path
 from airground_drake.replay.scene import FRAMES_PER_S, MAX_NAMED_OBSTACLES, STATES, Scene
+from airground_drake.report.html import digest
 from airground_drake.report.templating import environment_of
 
 MAX_EVENTS = 300
@@ -31,9 +33,20 @@ def page(scene: Scene) -> str:
         ReplayError: if there is no port for Meshcat, or its page is not as expected.
     """
     html = str(recorded(scene).StaticHtml())
-    if html.count("</body>") != 1:
+    if html.count("</body>") != 1 or "<head>" not in html:
         raise ReplayError("the page of this version of Drake's Meshcat has no place for the time slider")
-    return html.replace("</body>", f"{_overlay().render(scene=scene, data=_data(scene), looks=_LOOKS)}\n</body>")
+    html = html.replace("</body>", f"{_overlay().render(scene=scene, data=_data(scene), looks=_LOOKS)}\n</body>")
+    scripts = _SCRIPT.findall(html.replace("\r\n", "\n"))  # as a browser reads them
+    meta = f'<meta http-equiv="Content-Security-Policy" content="{_POLICY} {" ".join(map(digest, scripts))}">'
+    return html.replace("<head>", f"<head>\n  {meta}", 1)
+
+
+_SCRIPT = re.compile(r"<script[^>]*>(.*?)</script>", re.DOTALL)
+_POLICY = (
+    "default-src 'none'; style-src 'unsafe-inline'; img-src data: blob:; connect-src data:; worker-src blob:; "
+    "base-uri 'none'; form-action 'none'; script-src"
+)
+"""Nothing from a network, and no script but those of the page; Meshcat makes its styles and its buffers as it runs."""
 
 
 _LOOKS = {
@@ -53,12 +66,12 @@ def _data(scene: Scene) -> dict[str, Any]:
         "frame_s": 1.0 / FRAMES_PER_S,
         "marks": STATE_MARKS,
         "robots": [
-            {"name": body.name, "path": robot_path(body).split("/")[1:], "ugv": body.kind == "UGV"}
-            for body in scene.robots
+            {"name": body.name, "path": robot_path(k).split("/")[1:], "ugv": body.kind == "UGV"}
+            for k, body in enumerate(scene.robots)
         ],
         "obstacles": [
-            {"name": obstacle.name, "path": ["obstacles", obstacle.name, "body"]}
-            for obstacle in (scene.obstacles if len(scene.obstacles) <= MAX_NAMED_OBSTACLES else ())
+            {"name": obstacle.name, "path": [*obstacle_path(k).split("/")[1:], "body"]}
+            for k, obstacle in enumerate(scene.obstacles if len(scene.obstacles) <= MAX_NAMED_OBSTACLES else ())
         ],
     }
 

@@ -44,21 +44,30 @@ def recorded(scene: Scene) -> Meshcat:
         raise ReplayError(f"Meshcat cannot listen on any port of this machine: {error}") from error
     _stage(meshcat, scene)
     for k, obstacle in enumerate(scene.obstacles):
-        _pillar(meshcat, obstacle, scene.mark_m * (1.0 + k / len(scene.obstacles)))
+        _pillar(meshcat, obstacle_path(k), obstacle, scene.mark_m * (1.0 + k / len(scene.obstacles)))
     for k, phantom in enumerate(scene.phantoms_m):
         _cylinder(meshcat, f"/phantoms/{k}", scene.mark_m, scene.mark_m, phantom, UNSEEN_COLOR, 0.5)
     animation = MeshcatAnimation(FRAMES_PER_S)
-    for body in scene.robots:
-        _robot(meshcat, animation, scene, body)
+    for k, body in enumerate(scene.robots):
+        _robot(meshcat, animation, k, body)
     for k, proposal in enumerate(scene.proposals):
         _proposal(meshcat, animation, scene, proposal, k)
     meshcat.SetAnimation(animation)
     return meshcat
 
 
-def robot_path(body: Body) -> str:
-    """Where a robot is in Meshcat's tree; below it is one child per state."""
-    return f"/robots/{body.name}"
+def robot_path(k: int) -> str:
+    """Where robot k is in Meshcat's tree; below it is one child per state.
+
+    The tree has numbers, no names: its nodes are JavaScript objects, in which `__proto__` or `constructor` is no
+    child's name.
+    """
+    return f"/robots/{k}"
+
+
+def obstacle_path(k: int) -> str:
+    """Where obstacle k is in Meshcat's tree."""
+    return f"/obstacles/{k}"
 
 
 def _rgba(color: str, alpha: float = 1.0) -> Rgba:
@@ -90,9 +99,8 @@ def _stage(meshcat: Meshcat, scene: Scene) -> None:
     meshcat.SetCameraPose(place, target)
 
 
-def _pillar(meshcat: Meshcat, obstacle: Pillar, height: float) -> None:
+def _pillar(meshcat: Meshcat, path: str, obstacle: Pillar, height: float) -> None:
     """An obstacle in its safe cylinder; no two of the same height, so that each is seen where they overlap."""
-    path = f"/obstacles/{obstacle.name}"
     color = OBSTACLE_COLOR if obstacle.known_to_uav else UNSEEN_COLOR
     _cylinder(meshcat, f"{path}/body", obstacle.radius_m, 2.0 * height, obstacle.centre_m, color)
     _cylinder(meshcat, f"{path}/safe", obstacle.safe_m, height, obstacle.centre_m, SAFE_COLOR, 0.2)
@@ -101,19 +109,19 @@ def _pillar(meshcat: Meshcat, obstacle: Pillar, height: float) -> None:
     meshcat.SetLine(f"{path}/rim", rim + obstacle.centre_m[:, None], 1.0, _rgba(SAFE_COLOR))
 
 
-def _robot(meshcat: Meshcat, animation: MeshcatAnimation, scene: Scene, body: Body) -> None:
-    path, r = robot_path(body), body.radius_m
-    meshcat.SetLine(f"/paths/{body.name}", body.positions.T, 1.0, _rgba(PATH_COLOR))
+def _robot(meshcat: Meshcat, animation: MeshcatAnimation, k: int, body: Body) -> None:
+    path, r = robot_path(k), body.radius_m
+    meshcat.SetLine(f"/paths/{k}", body.positions.T, 1.0, _rgba(PATH_COLOR))
     if body.kind == "UAV":
         _uav(meshcat, path, r)
-        _cylinder(meshcat, f"/shadows/{body.name}/disc", r, 0.02 * r, np.zeros(3), "#000000", 0.25)
-        _move(meshcat, animation, f"/shadows/{body.name}", body.positions * [1.0, 1.0, 0.0])
+        _cylinder(meshcat, f"/shadows/{k}/disc", r, 0.02 * r, np.zeros(3), "#000000", 0.25)
+        _move(meshcat, animation, f"/shadows/{k}", body.positions * [1.0, 1.0, 0.0])
     else:
         for state in range(len(STATES)):
             _ugv(meshcat, f"{path}/{state}", r, state)
             _show(meshcat, animation, f"{path}/{state}", body.states == state)
         for turn in (45.0, -45.0):
-            bar = f"/targets/{body.name}/{turn:g}"
+            bar = f"/targets/{k}/{turn:g}"
             meshcat.SetObject(bar, Box(2.4 * r, 0.35 * r, 0.05 * r), _rgba(PATH_COLOR))
             meshcat.SetTransform(bar, RigidTransform(RollPitchYaw(0.0, 0.0, np.radians(turn)), body.target_m))
     _move(meshcat, animation, path, body.positions)
@@ -146,7 +154,7 @@ def _proposal(meshcat: Meshcat, animation: MeshcatAnimation, scene: Scene, propo
     width = 0.35 * scene.mark_m
     height = scene.mark_m * (0.05 + 0.2 * k / len(scene.proposals))  # no two in the same plane
     for outcome in {span.outcome: None for span in proposal.spans}:
-        path = f"/proposals/{k}_{proposal.robot}/{outcome}"
+        path = f"/proposals/{k}/{outcome}"
         mesh = ribbon(proposal.path, width, None if outcome == "accepted" else 6.0 * width)
         if not mesh.faces.size:
             continue

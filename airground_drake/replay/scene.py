@@ -25,8 +25,10 @@ OWN, TRIGGERED, INTERVENED = range(3)
 MAX_NAMED_OBSTACLES = 8
 """If there are more obstacles, their names are not shown."""
 
-SMALLEST = 0.018
-"""Radius of what is a point, as a share of the larger side of the scene."""
+SMALLEST, LARGEST = 0.006, 0.018
+"""Radius of what is a point, as a share of the larger side of the scene: between these."""
+OF_SAFE_DISTANCE = 0.4
+"""Its share of the least safe distance on the ground: two points that keep it are drawn apart."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,10 @@ class Pillar:
 
 @dataclass(frozen=True)
 class Scene:
-    """A run. `times_s` (F,) are those of the frames, the last one the end; `low_m` and `high_m` bound what is shown."""
+    """A run. `times_s` (F,) are those of the frames, the last one the end; `low_m` and `high_m` bound what is shown.
+
+    `mark_m` is the radius of what is a point, as drawn.
+    """
 
     scenario: str
     run: str
@@ -67,16 +72,7 @@ class Scene:
     events: tuple[Mapping[str, Any], ...]
     low_m: Array
     high_m: Array
-
-    @property
-    def extent_m(self) -> float:
-        """The larger side in the plane, m."""
-        return float((self.high_m - self.low_m)[:2].max())
-
-    @property
-    def mark_m(self) -> float:
-        """Radius of what is a point, m."""
-        return SMALLEST * self.extent_m
+    mark_m: float
 
 
 def scene(trace: Trace, scenario: Scenario) -> Scene:
@@ -91,7 +87,9 @@ def scene(trace: Trace, scenario: Scenario) -> Scene:
     """
     times = frame_times(trace.t)
     low, high = _bounds(trace, scenario)
-    mark = SMALLEST * float((high - low)[:2].max())
+    extent = float((high - low)[:2].max())
+    apart = min(scenario.safe_distance.obstacle_m, scenario.safe_distance.ugv_m)
+    mark = min(max(SMALLEST * extent, OF_SAFE_DISTANCE * apart), LARGEST * extent)
     specs: dict[str, Ugv | Uav] = {**scenario.ugvs, scenario.uav.name: scenario.uav}
     robots = tuple(
         Body(
@@ -123,6 +121,7 @@ def scene(trace: Trace, scenario: Scenario) -> Scene:
         tuple(trace.events),
         low,
         high,
+        mark,
     )
 
 

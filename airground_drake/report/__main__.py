@@ -94,7 +94,7 @@ def _loaded(options: argparse.Namespace, command: str) -> int:
 
 
 def _reported(options: argparse.Namespace, command: str, scenario: Scenario, digest: str) -> int:
-    from airground_drake.report import make
+    from airground_drake.report import attention, make
     from airground_drake.verify.cache import cache_folder
 
     kept = None if options.no_cache else cache_folder()
@@ -109,6 +109,8 @@ def _reported(options: argparse.Namespace, command: str, scenario: Scenario, dig
         )
     overall = report["overall"]
     if not options.quiet:
+        for item in attention.beforehand(report):
+            print(f"{item.words}{f', run {item.run}' if item.run else ''}")
         print(f"{scenario.name}: {overall['status'].replace('_', ' ')}. {overall['why']}\n{one_line(str(output))}")
     if options.open and "html" in options.format:
         webbrowser.open((output / "report.html").resolve().as_uri())

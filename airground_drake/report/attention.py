@@ -6,7 +6,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from airground_drake.errors import one_line
+from airground_drake.scenarios.validate import preset_s
 from airground_drake.statuses import PASSING, UNDECIDED, outcome
+
+MAX_FAULT_CHARS = 300
+MAX_FAULTS = 3
+"""Kinds of faults of a run that are listed; its section of the page has more."""
+MAX_NAMES = 3
+"""Robots that are listed in a line."""
 
 REFUSED = {
     "cheaper": "the plan that it preferred began by waiting",
@@ -46,14 +54,17 @@ class Item:
 
 
 def items(document: Mapping[str, Any]) -> list[Item]:
-    """All of a report, in the order of the page: what is refuted first, then what is open, then the rest."""
+    """All of a report, in the order of the page.
+
+    What may explain the rest comes first; then what is refuted, and what is open.
+    """
     unexpected = [claim for claim in document["claims"] if not claim["as_expected"]]
     unexpected.sort(key=lambda claim: claim["status"] in UNDECIDED)
     return [
+        *beforehand(document),
         *(_of_claim(claim, document["runs"].get(claim["run"], {})) for claim in unexpected),
         *(Item("not_run", f"{each['why']}", each["id"], each["run"]) for each in document["overall"]["missing"]),
         *_of_the_paper(document),
-        *_of_faults(document["runs"]),
     ]
 
 
@@ -129,9 +140,43 @@ def _of_the_paper(document: Mapping[str, Any]) -> Iterator[Item]:
         yield Item("not_as_expected", f"a broken variant was not refuted: {mutant}", anchor="mutants")
 
 
+def beforehand(document: Mapping[str, Any]) -> Iterator[Item]:
+    """What the report begins with, on the terminal too: faults of policies and solvers, and runs that are cut short."""
+    yield from _of_faults(document["runs"])
+    scenario = document["scenario"]["resolved"]
+    longer = {name: preset_s(**ugv["preset"]) for name, ugv in scenario["ugvs"].items()}
+    longer = {name: time_s for name, time_s in longer.items() if time_s > scenario["duration_s"]}
+    if longer:
+        names = list(longer)
+        who = ", ".join(names[:MAX_NAMES]) + f" and {len(names) - MAX_NAMES} more" * (len(names) > MAX_NAMES)
+        ends = f"duration_s = {scenario['duration_s']:g} ends the runs before the presets of {who} do"
+        yield Item("inconclusive", f"{ends} ({max(longer.values()):.3g} s): they cannot be expected to arrive")
+
+
 def _of_faults(runs: Mapping[str, Mapping[str, Any]]) -> Iterator[Item]:
     for name, run in runs.items():
-        if run["faults"]:
-            count, policies = len(run["faults"]), sorted({str(fault["policy"]) for fault in run["faults"]})
-            words = f"{count} {'fault' if count == 1 else 'faults'} of {', '.join(policies)}"
-            yield Item("error", words, run=name, anchor="runs")
+        kinds = faults_together(run["faults"])
+        for kind in kinds[:MAX_FAULTS]:
+            count, first = kind["count"], f"first at {kind['first_s']:.2f} s"
+            often = f"{count} times, {first}" if count > 1 else f"once, at {kind['first_s']:.2f} s"
+            yield Item("error", f"{kind['what']} ({often})", run=name, about=f"policy {kind['policy']}", anchor="runs")
+        if len(kinds) > MAX_FAULTS:
+            yield Item("error", f"{len(kinds) - MAX_FAULTS} more kinds of faults", run=name, anchor="runs")
+
+
+def faults_together(faults: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """What went wrong in a run, each thing once: the policy, what it said (cut), how often, of whom, first and last."""
+    together: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
+    for fault in faults:
+        together.setdefault((str(fault["policy"]), str(fault["what"])), []).append(fault)
+    return [
+        {
+            "policy": one_line(policy),
+            "what": one_line(what if len(what) <= MAX_FAULT_CHARS else f"{what[:MAX_FAULT_CHARS]}…"),
+            "count": len(alike),
+            "robots": sorted({str(fault["robot"]) for fault in alike}),
+            "first_s": alike[0]["t_s"],
+            "last_s": alike[-1]["t_s"],
+        }
+        for (policy, what), alike in together.items()
+    ]

@@ -35,7 +35,6 @@ MAX_DIAGRAM_CHARS = 500_000
 MAX_JSON_CHARS = 4_000
 LINE_CHARS = 110
 MAX_DISTANCE_ROWS = 120
-MAX_FAULT_CHARS = 300
 MAX_FAULTS = 40
 """Different ones of a run that are listed."""
 
@@ -91,7 +90,7 @@ def _environment() -> Environment:
     style = stylesheet()
     scripts = [_template(name) for name in SCRIPTS]
     environment.filters.update(
-        num=number, value=value, pretty=pretty, together=faults_together, inline=Markup, mathml=mathml,
+        num=number, value=value, pretty=pretty, together=attention.faults_together, inline=Markup, mathml=mathml,
         evidence=evidence_tables, records=partial(evidence.tables, number=number), brief=brief,
     )  # fmt: skip
     environment.globals.update(
@@ -114,12 +113,13 @@ def _template(name: str) -> str:
 def security_policy(style: str, scripts: Sequence[str] = ()) -> str:
     """A page's content security policy: nothing but this style sheet and these scripts, from nowhere else."""
     return (
-        f"default-src 'none'; style-src {_digest(style)}; script-src {' '.join(map(_digest, scripts)) or NOTHING}; "
+        f"default-src 'none'; style-src {digest(style)}; script-src {' '.join(map(digest, scripts)) or NOTHING}; "
         "base-uri 'none'; form-action 'none'"
     )
 
 
-def _digest(text: str) -> str:
+def digest(text: str) -> str:
+    """A script or style sheet as a content security policy names it."""
     return f"'sha256-{b64encode(sha256(text.encode()).digest()).decode()}'"
 
 
@@ -189,24 +189,6 @@ def pretty(x: Any, limit: int = MAX_JSON_CHARS) -> str:
     """JSON for reading: what fits on a line is on a line; cut where it gets long."""
     text = "\n".join(map(one_line, _lay_out(x, "").split("\n")))
     return text if len(text) <= limit else f"{text[:limit]}\n… cut here; report.json has all of it"
-
-
-def faults_together(faults: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """What went wrong in a run, each thing once: the policy, what it said (cut), how often, of whom, first and last."""
-    together: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
-    for fault in faults:
-        together.setdefault((str(fault["policy"]), str(fault["what"])), []).append(fault)
-    return [
-        {
-            "policy": one_line(policy),
-            "what": one_line(what if len(what) <= MAX_FAULT_CHARS else f"{what[:MAX_FAULT_CHARS]}…"),
-            "count": len(alike),
-            "robots": sorted({str(fault["robot"]) for fault in alike}),
-            "first_s": alike[0]["t_s"],
-            "last_s": alike[-1]["t_s"],
-        }
-        for (policy, what), alike in together.items()
-    ]
 
 
 def _lay_out(x: Any, indent: str) -> str:

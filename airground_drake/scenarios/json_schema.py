@@ -135,7 +135,10 @@ def _value(kind: str, field: Field[Any], installed: bool) -> Schema:
         return {"type": "number", "minimum": 0 if "from_zero" in field.metadata else SMALLEST, "maximum": LARGEST}
     if field.name == "name":
         return _NAME
-    return _typed(field.type, field.name)
+    typed = _typed(field.type, field.name)
+    if field.type == schema.Vector and "required" not in field.metadata:
+        return typed | {"minItems": 0}
+    return typed
 
 
 _PLUGIN: Schema = {"type": "string", "pattern": PLUGIN_PATTERN}

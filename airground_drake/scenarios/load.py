@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,7 @@ from airground_drake import files
 from airground_drake.errors import Fault, ScenarioError, short
 from airground_drake.scenarios import validate
 from airground_drake.scenarios.document import compose, nearest, of_data, read, simple, where, within_limits
-from airground_drake.scenarios.schema import Scenario
+from airground_drake.scenarios.schema import Scenario, Vector
 from airground_drake.scenarios.shipped import shipped
 from airground_drake.scenarios.typed import made, replaced
 
@@ -105,11 +106,39 @@ def _build(root: yaml.Node, source: str) -> Scenario:
     """The scenario of a document, checked."""
     within_limits(root)
     scenario: Scenario = made(root, Scenario, "", "")
+    _complete(scenario)
     try:
         validate.check(scenario, source)
     except ScenarioError as error:
         raise ScenarioError(where(nearest(root, error.key)), error.key, error.value, error.allowed) from None
     return scenario
+
+
+def _complete(scenario: Scenario) -> None:
+    """Fill in what follows from other keys, and round a gain of 1/period down to where gain * period <= 1 exactly."""
+    if not scenario.uav.target_m:
+        scenario.uav.target_m = _over_the_targets(scenario)
+    control = scenario.control
+    for name in validate.GAINS:
+        setattr(control, name, _rounded_down(getattr(control, name), control.period_s))
+
+
+def _rounded_down(gain: float, period: float) -> float:
+    """A gain, 1/s; the largest number below it that proofs admit if it is 1/period but for rounding.
+
+    Proofs take numbers as the decimals that they print as: 3.3333333333333335 * 0.3 is 1 in floating point, and more
+    than 1 there. A smaller gain only demands less.
+    """
+    while gain * period == 1.0 < validate.exactly(gain) * validate.exactly(period):
+        gain = math.nextafter(gain, 0.0)
+    return gain
+
+
+def _over_the_targets(scenario: Scenario) -> Vector:
+    """Where the UAV's task (9) leads if every UGV reaches its target: over their centroid, [x, y, z], m."""
+    targets = [ugv.target_m for ugv in scenario.ugvs.values() if len(ugv.target_m) == 3]
+    x, y = (sum(target[axis] for target in targets) / max(len(targets), 1) for axis in range(2))
+    return [x, y, scenario.uav.altitude_m]
 
 
 def _texts(overrides: Overrides) -> list[str]:

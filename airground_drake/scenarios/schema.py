@@ -1,7 +1,8 @@
 """The scenario file as dataclasses: every key, its unit (in the key's name) and its meaning.
 
 `typed.py` fills them by their type hints. They are mutable, for scenarios changed in Python; after validation
-(`validate.py`) nothing changes them. Positions are in the world frame, z up, the ground at z = 0.
+(`validate.py`) nothing changes them. They have slots, so that Python refuses an attribute that is no key. Positions
+are in the world frame, z up, the ground at z = 0.
 """
 
 # No `from __future__ import annotations` here: `typed.py` needs the types themselves, not their names.
@@ -19,17 +20,17 @@ FROM_ZERO = {"from_zero": True}
 """Of a number that may be 0; every other number of the schema must be positive."""
 
 
-@dataclass
+@dataclass(slots=True)
 class Preset:
     """Preset trajectory rho_rd of a UGV: a polyline travelled at constant speed from t = 0, then held."""
 
     waypoints_m: list[Vector] = field(default_factory=list, metadata=REQUIRED)
-    """Its corners, at least two, the first one at t = 0."""
+    """Its corners, at least two: the first at t = 0, the last at the target wherever a run expects the UGV there."""
     speed_m_s: float = 1.0
     """Constant speed along it; not above the UGV's `max_speed_m_s`."""
 
 
-@dataclass
+@dataclass(slots=True)
 class Ugv:
     """One UGV: a planar first-order robot, a disc of radius `radius_m` on the ground."""
 
@@ -45,7 +46,7 @@ class Ugv:
     """Of its body, added to the safe distances of its pairs; 0: a point."""
 
 
-@dataclass
+@dataclass(slots=True)
 class Uav:
     """The UAV: a spatial first-order robot whose `task` is to fly over the centroid of the UGVs, eqs (9)-(10).
 
@@ -57,8 +58,8 @@ class Uav:
     """What it is called in traces and reports."""
     start_m: Vector = field(default_factory=list, metadata=REQUIRED)
     """Where it starts."""
-    target_m: Vector = field(default_factory=list, metadata=REQUIRED)
-    """Where it is to end."""
+    target_m: Vector = field(default_factory=list)
+    """Where it is to end; left out or empty: over the centroid of the UGVs' targets, at `altitude_m`."""
     altitude_m: float = 2.0
     """Height over the centroid of the UGVs; more than `air_ground_m` and both radii."""
     task: str = "formation"
@@ -71,7 +72,7 @@ class Uav:
     """Of its body, added to the safe distances of its pairs; 0: a point."""
 
 
-@dataclass
+@dataclass(slots=True)
 class Obstacle:
     """A ball to keep away from by the safe distance of (7)-(8); a point with the default radius."""
 
@@ -83,7 +84,7 @@ class Obstacle:
     """Of its body, added to the safe distances of its pairs; 0: a point."""
 
 
-@dataclass
+@dataclass(slots=True)
 class SafeDistance:
     """Safe distances d of (7)-(8), for each kind of pair, and the distance that counts as a collision.
 
@@ -101,14 +102,14 @@ class SafeDistance:
     """What is closer than this counts as a collision; less than the others."""
 
 
-@dataclass
+@dataclass(slots=True)
 class Control:
     """NSBC controllers of all robots: sampled with zero-order hold."""
 
     period_s: float = 0.025
     """Control period h of all robots."""
     avoidance_gain_1_s: float = field(default=3.0, metadata=FROM_ZERO)
-    """Of obstacle avoidance; gain times period at most 1, as for all gains."""
+    """Of obstacle avoidance; gain times period at most 1, as for all gains (1/period is rounded down to that)."""
     motion_gain_1_s: float = field(default=2.0, metadata=FROM_ZERO)
     """Of tracking the preset trajectory, (6)."""
     formation_gain_1_s: float = field(default=5.0, metadata=FROM_ZERO)
@@ -119,7 +120,7 @@ class Control:
     """What is farther away is not seen; it must cover every safe distance with both radii and a period's closing."""
 
 
-@dataclass
+@dataclass(slots=True)
 class Threshold:
     """Decision threshold zeta: rule 'fixed' takes zeta_m; 'bayes' minimises the Bayes risk (16)-(19)."""
 
@@ -137,7 +138,7 @@ class Threshold:
     """Noise that the Bayes risk takes."""
 
 
-@dataclass
+@dataclass(slots=True)
 class Decision:
     """DDM (15) and event trigger: 'automaton' (hysteresis, minimum inter-event time) or 'bare' (the paper's)."""
 
@@ -157,7 +158,7 @@ class Decision:
     """How often noise is drawn."""
 
 
-@dataclass
+@dataclass(slots=True)
 class Policy:
     """One entry of the UAV's behaviour database: a policy's name and its numbers."""
 
@@ -167,7 +168,7 @@ class Policy:
     """Its numbers, by name."""
 
 
-@dataclass
+@dataclass(slots=True)
 class Intervention:
     """The UAV's intervention behaviours; how often it plans, and how long it rests after a refusal.
 
@@ -188,7 +189,7 @@ class Intervention:
     """The behaviour database, in order."""
 
 
-@dataclass
+@dataclass(slots=True)
 class Gatekeeper:
     """The accept/refuse decision, eqs (21)-(29).
 
@@ -244,7 +245,7 @@ class Gatekeeper:
     """For how long."""
 
 
-@dataclass
+@dataclass(slots=True)
 class Run:
     """One simulation: a method (see `airground list methods`) and what is expected of it.
 
@@ -263,7 +264,7 @@ class Run:
     """Expected verdicts of claims about this run, by claim; unnamed ones must hold."""
 
 
-@dataclass
+@dataclass(slots=True)
 class Reproduction:
     """One row of the reproduction table: a measure of a run against the paper's value.
 
@@ -295,7 +296,7 @@ class Reproduction:
     """Another way to read the paper, in words."""
 
 
-@dataclass
+@dataclass(slots=True)
 class Choice:
     """Where a value that is not the paper's comes from: `source` is 'calibrated' or 'ours'."""
 
@@ -309,7 +310,7 @@ class Choice:
     """Why it is as it is."""
 
 
-@dataclass
+@dataclass(slots=True)
 class Scenario:
     """A scenario file. The order of `ugvs` and `obstacles` is the order of all arrays.
 

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import fields, is_dataclass
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from fractions import Fraction
-from itertools import pairwise
+from itertools import pairwise, starmap
 from typing import NamedTuple
 
 import numpy as np
@@ -49,7 +49,9 @@ MAX_STAGES = 1000
 MAX_TEXT = 10_000  # characters
 NAME_PATTERN = "^[A-Za-z_][A-Za-z0-9_]*$"  # of a UGV, an obstacle, a run, a parameter
 CLAIM_PATTERN = f"^[A-Z][A-Z0-9-]{{0,{MAX_NAME - 1}}}$"
+GAINS = ("avoidance_gain_1_s", "motion_gain_1_s", "formation_gain_1_s", "intervention_gain_1_s")
 SMALLEST = 1e-9  # of a positive number
+ARRIVES = "LIVE-GOAL"  # the claim that every UGV ends where it is to end
 TOLERANCE = 1e-9  # m between points; relative between periods
 _SHORT = 1.0 - 1e-5  # of a limit that is printed with six digits, so that what a message allows is allowed
 
@@ -247,12 +249,37 @@ def _presets(scenario: Scenario) -> Problems:
             yield f"ugvs.{name}.preset.speed_m_s", ugv.preset.speed_m_s, allowed
 
 
+def preset_s(waypoints_m: Sequence[Vector], speed_m_s: float) -> float:
+    """How long a preset trajectory takes, s."""
+    return sum(starmap(math.dist, pairwise(waypoints_m))) / speed_m_s
+
+
+def _ends(scenario: Scenario) -> Problems:
+    """A preset leads to its target, to within the tolerance, where a run expects the UGV there.
+
+    Runs that are shorter than a preset are cut short on purpose: their robots are not to arrive.
+    """
+    presets = [ugv.preset for ugv in scenario.ugvs.values()]
+    if max(preset_s(each.waypoints_m, each.speed_m_s) for each in presets) > scenario.duration_s:
+        return
+    for name, ugv in scenario.ugvs.items():
+        away, end = math.dist(ugv.preset.waypoints_m[-1], ugv.target_m), len(ugv.preset.waypoints_m) - 1
+        for run, spec in scenario.runs.items():
+            arrives = name not in spec.stalls_m and "refuted" not in alternatives(spec.expected.get(ARRIVES, "holds"))
+            if arrives and away > scenario.arrival_tolerance_m + TOLERANCE:
+                allowed = (
+                    f"at most arrival_tolerance_m = {scenario.arrival_tolerance_m:.9g} m from {name}'s target_m, where "
+                    f"run {run} expects it, not {away:.9g} m (or runs.{run}.expected.{ARRIVES}: refuted)"
+                )
+                yield f"ugvs.{name}.preset.waypoints_m.{end}", ugv.preset.waypoints_m[end], allowed
+
+
 def _gains(scenario: Scenario) -> Problems:
     period = scenario.control.period_s
-    for name in ("avoidance_gain_1_s", "motion_gain_1_s", "formation_gain_1_s", "intervention_gain_1_s"):
+    for name in GAINS:
         gain = getattr(scenario.control, name)
-        if _exactly(gain) * _exactly(period) > 1:  # as the proofs take them
-            most = _shown(1 / _exactly(period), ROUND_FLOOR)
+        if exactly(gain) * exactly(period) > 1:  # as the proofs take them
+            most = _shown(1 / exactly(period), ROUND_FLOOR)
             yield f"control.{name}", gain, f"at most {most} 1/s: gain * control.period_s must not exceed 1"
 
 
@@ -273,7 +300,7 @@ def _periods(scenario: Scenario) -> Problems:
         yield "decision.noise_period_s", noise, f"{rule}, or go into it a whole number of times"
     step, leak = min(control, noise), scenario.decision.leak_1_s
     if leak * step > 1.0:
-        most = _shown(1 / _exactly(step), ROUND_FLOOR)
+        most = _shown(1 / exactly(step), ROUND_FLOOR)
         allowed = f"at most {most} 1/s: leak * {step:.9g} s, a step of the noise, must not exceed 1"
         yield "decision.leak_1_s", leak, allowed
 
@@ -336,7 +363,7 @@ def _nearest_pairs(scenario: Scenario) -> list[tuple[str, _Body, _Body]]:
     return [*pairs, *(("obstacle_m", max(flier, ugvs[0]), each) for each in fixed)]
 
 
-def _exactly(number: float) -> Fraction:
+def exactly(number: float) -> Fraction:
     """The decimal that a number prints as, which is what proofs take it for."""
     return Fraction(repr(float(number)))
 
@@ -349,17 +376,17 @@ def _shown(number: Fraction, rounding: str) -> str:
 
 def _closing(one: _Body, other: _Body, period: float) -> Fraction:
     """How much nearer two can come in a control period, m."""
-    return (_exactly(one.speed) + _exactly(other.speed)) * _exactly(period)
+    return (exactly(one.speed) + exactly(other.speed)) * exactly(period)
 
 
 def _sensing(scenario: Scenario) -> Problems:
     """What is farther than the sensing range must not come within the safe distance in one control period."""
     period = scenario.control.period_s
     needed, kind, one, other = max(
-        (_exactly(getattr(scenario.safe_distance, kind) + (a.radius + b.radius)) + _closing(a, b, period), kind, a, b)
+        (exactly(getattr(scenario.safe_distance, kind) + (a.radius + b.radius)) + _closing(a, b, period), kind, a, b)
         for kind, a, b in _nearest_pairs(scenario)
     )
-    if _exactly(scenario.control.sensing_range_m) < needed:
+    if exactly(scenario.control.sensing_range_m) < needed:
         apart = f"safe_distance.{kind} {getattr(scenario.safe_distance, kind):.9g} m{_and(one.radius + other.radius)}"
         total = f"{apart} + closing {one.speed + other.speed:.9g} m/s * control.period_s {period:.9g} s"
         allowed = f"at least {_shown(needed, ROUND_CEILING)} m for {one.name} and {other.name}: {total}"
@@ -461,7 +488,7 @@ def _choices(scenario: Scenario) -> Problems:
 
 
 CHECKS: tuple[Callable[[Scenario], Problems], ...] = (
-    _finite, _bounds, _counts, _texts, _names, _options, _runs, _points, _presets, _gains, _periods, _release,
+    _finite, _bounds, _counts, _texts, _names, _options, _runs, _points, _presets, _ends, _gains, _periods, _release,
     _distances, _sensing, _extent, _clearances, _reproduction, _choices,
 )  # fmt: skip
 """Every rule; later ones rely on earlier ones (finite numbers, three coordinates)."""

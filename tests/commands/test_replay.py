@@ -40,6 +40,35 @@ def test_one_run_in_this_folder(folder: Path, tmp_path: Path, monkeypatch: pytes
     assert [path.name for path in tmp_path.glob("*.html")] == ["replay_d.html"]
 
 
+def test_one_run_in_a_file_of_this_name(folder: Path, tmp_path: Path) -> None:
+    assert main(["replay", str(folder), "d", "-o", str(tmp_path / "new" / "x.html")]) == 0
+    assert [path.name for path in (tmp_path / "new").iterdir()] == ["x.html"]
+    assert (tmp_path / "new" / "x.html").is_file()
+
+
+def test_a_page_is_replaced_by_its_own_report_only(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    other = tmp_path / "other"
+    shutil.copytree(folder, other)
+    page, place = tmp_path / "out" / "replay_d.html", ["-o", str(tmp_path / "out")]
+    assert main(["replay", str(folder), "d", *place]) == 0
+    before = page.read_bytes()
+    capsys.readouterr()
+    assert main(["replay", str(other), "d", *place]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith(f"error: {page} is not a replay of this run of {other}; it is left alone")
+    assert error.count("\n") == 1
+    assert main(["replay", str(folder), "c", "-o", str(page)]) == 2
+    assert page.read_bytes() == before
+    page.write_text("mine")
+    assert main(["replay", str(folder), "d", *place]) == 2
+    assert page.read_text() == "mine"
+    page.write_bytes(before)
+    assert main(["replay", str(folder), "d", *place]) == 0
+    assert page.read_bytes()[-90:] == before[-90:]
+
+
 def test_a_video(folder: Path, tmp_path: Path) -> None:
     assert main(["replay", str(folder), "d", "--video", str(tmp_path / "d.webp"), "--speed", "100"]) == 0
     assert (tmp_path / "d.webp").read_bytes()[8:12] == b"WEBP"
@@ -56,6 +85,7 @@ def test_a_video(folder: Path, tmp_path: Path) -> None:
             ["{folder}", "-o", "{folder}.txt"],
             "report.txt cannot be written: File exists; wanted: a folder for the pages",
         ),
+        (["{folder}", "-o", "{folder}.html"], "report.html is one file for the runs c, d; name a RUN, or a folder"),
         (["{folder}", "d", "--video", "{folder}/trace/d.webp"], "is in the report"),
         (["{folder}", "d", "--video", "d.avi"], "allowed: names that end in .webp or .mp4"),
     ],

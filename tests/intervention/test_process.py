@@ -17,14 +17,15 @@ import pytest
 from builders.hostile_policies import KILLS_OTHERS, KINDS
 from builders.observations import mate, seen
 
-from airground_drake.errors import PluginError, PolicyError
+from airground_drake.errors import FAULT_WIDTH, PluginError, PolicyError
 from airground_drake.intervention import process
 from airground_drake.intervention.codec import packed, packed_motions, unpacked, unpacked_motions
 from airground_drake.intervention.database import BehaviourDatabase, Desk, make_policy
-from airground_drake.intervention.policy import Observation, Proposal
+from airground_drake.intervention.policy import Observation, Policy, Proposal
 from airground_drake.intervention.process import LIVES, GuestPolicy
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.motion import Motion
+from airground_drake.registry import POLICIES
 from airground_drake.scenarios.load import load
 from airground_drake.simulation import simulate
 from airground_drake.verify.claim import TraceClaim
@@ -96,6 +97,29 @@ def test_what_a_policy_has_started_ends_with_it(guests: dict[bool, GuestPolicy])
     os.killpg(group, 0)
     guest.close()
     _gone(group)
+
+
+BOOM = """
+from airground_drake.intervention.policy import Policy
+class It(Policy):
+    def propose(self, seen): return self.plan(seen)
+    def plan(self, seen): return int("far too long " * 99)
+"""
+
+
+@pytest.mark.parametrize("kind", ["in a process of its own", "in this process"])
+def test_a_fault_begins_with_the_line_of_the_policy_that_it_came_from(
+    kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(str(tmp_path))
+    (tmp_path / "boom.py").write_text(BOOM)
+    guest = kind == "in a process of its own"
+    policy = GuestPolicy("boom.py:It", {}, LONG_S) if guest else POLICIES.make("boom.py:It", Policy)
+    (fault,) = BehaviourDatabase([("boom", policy)], ranking="listed").plan(Desk(), TEAM).faults
+    if isinstance(policy, GuestPolicy):
+        policy.close()
+    assert fault.what.startswith("boom.py:5 ValueError: invalid literal for int()")
+    assert len(fault.what) <= FAULT_WIDTH
 
 
 STARTER = """

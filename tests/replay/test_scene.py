@@ -66,3 +66,13 @@ def test_bodies_are_drawn_as_large_as_they_are(trace: Trace) -> None:
 
 def test_without_obstacles(trace: Trace) -> None:
     assert scenes.scene(trace, replace(make_scenario(), obstacles={})).obstacles == ()
+
+
+def test_points_that_keep_their_safe_distance_are_drawn_apart(trace: Trace, scenario: Scenario) -> None:
+    """Also in a scene so large that a point is small in it."""
+    far = replace(trace, signals=trace.signals.assign(**{"uav.x_m": trace.signals["uav.x_m"] + 120.0}))
+    made = scenes.scene(far, scenario)
+    assert (made.high_m - made.low_m).max() > 100.0
+    radii = [body.radius_m for body in (*made.robots, *made.obstacles)]
+    assert 2.0 * max(radii) < scenario.safe_distance.obstacle_m
+    assert min(radii) >= 0.005 * (made.high_m - made.low_m).max()

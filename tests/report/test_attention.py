@@ -69,16 +69,31 @@ def test_why_a_robot_was_not_helped(scenario: Scenario, traces: dict[str, Trace]
 
 def test_what_is_missing_faulty_or_not_the_paper_s(scenario: Scenario, traces: dict[str, Trace]) -> None:
     report = built(scenario, traces, FINE[:2])
-    report["runs"]["c"]["faults"] = [{"t_s": 1.0, "policy": "detour"}] * 2
+    report["runs"]["c"]["faults"] = [fault("boom.py:5 ValueError: no", 6.05)] * 14 + [fault("late", 9.0)]
     report["reproduction"][0] |= {"status": "not_reproduced", "why": "differs by 3 m"}
     report["overall"] |= {"undemonstrated": [7], "surviving_mutants": ["SAFE-INV: half"]}
     assert [(item.words, item.anchor) for item in attention.items(report)] == [
+        ("boom.py:5 ValueError: no (14 times, first at 6.05 s)", "runs"),
+        ("late (once, at 9.00 s)", "runs"),
         ("no claim was checked on the run", "claims"),
         ("A1, stalls at: differs by 3 m", "reproduction"),
         ("finding 7 about the paper", "audit"),
         ("a broken variant was not refuted: SAFE-INV: half", "mutants"),
-        ("2 faults of detour", "runs"),
     ]
+    report["runs"]["c"]["faults"] = [fault(f"ValueError: {k}", 1.0) for k in range(100)]
+    assert [item.words for item in attention.items(report)][3] == "97 more kinds of faults"
+
+
+def test_a_run_that_ends_before_its_presets_do(scenario: Scenario, traces: dict[str, Trace]) -> None:
+    report = built(scenario, traces, FINE)
+    assert not attention.items(report)
+    report["scenario"]["resolved"]["duration_s"] = 15.0
+    (item,) = attention.items(report)
+    assert item.words.startswith("duration_s = 15 ends the runs before the presets of ugv1, ugv2 do (2")
+
+
+def fault(what: str, t_s: float) -> dict[str, Any]:
+    return {"t_s": t_s, "robot": "ugv1", "policy": "mine", "what": what}
 
 
 def test_the_moment_is_drawn_where_there_is_one(scenario: Scenario, traces: dict[str, Trace]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 from collections.abc import Iterator
@@ -12,8 +13,9 @@ from typing import Any
 import pytest
 from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Browser, Page, sync_playwright
-from report.cases import FINE, verdict
+from report.cases import FINE, built, verdict
 
+from airground_drake.commands import index
 from airground_drake.report import audit, document, html
 from airground_drake.report.figures import draw, moments
 from airground_drake.report.figures.panels import Figure
@@ -146,3 +148,20 @@ def test_what_is_folded_is_not_printed(browser: Browser, page_file: Path) -> Non
     open_folds(everything)
     pages = [page.pdf().count(b"/Type /Page\n") for page in (closed, everything)]
     assert 0 < pages[0] < pages[1]
+
+
+def test_on_a_phone_the_list_of_reports_shows_every_verdict(
+    browser: Browser, scenario: Scenario, traces: dict[str, Trace], tmp_path: Path
+) -> None:
+    for name in ("reports_of_the_third_of_november_before_the_change", "b"):
+        (tmp_path / name).mkdir()
+        report = built(scenario, traces, FINE)
+        report["scenario"]["title"] = "A UGV that a rock stops, and a UAV that shows it the way round; " * 2
+        (tmp_path / name / "report.json").write_text(json.dumps(report))
+    assert index.main([str(tmp_path)]) == 0
+    page = opened(browser, tmp_path / index.PAGE, width=NARROW)
+    assert page.locator(".chip").count() == 2
+    places = "[...document.querySelectorAll('.chip, th a, code')].map((each) => each.getBoundingClientRect().right)"
+    assert max(page.evaluate(places)) <= NARROW
+    assert page.evaluate("[...document.querySelectorAll('.scroll')].every((e) => e.scrollWidth <= e.clientWidth)")
+    assert Axe().run(page, options={"resultTypes": ["violations"]}).violations_count == 0

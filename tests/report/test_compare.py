@@ -82,6 +82,9 @@ OTHER: dict[str, Callable[[Json], object]] = {
     "a value": lambda found: found["reproduction"][0].update(ours=[3.31, 5.1]),
 }
 
+ALWAYS_SHOWN = {"verdicts", "margins", "exercised", "events"}
+"""Parts of the page that say so where nothing changed."""
+
 
 @pytest.mark.parametrize(("change", "code"), [*((each, 1) for each in WORSE), *((each, 0) for each in OTHER)])
 def test_only_what_is_worse_is_a_regression(
@@ -98,6 +101,22 @@ def test_only_what_is_worse_is_a_regression(
     found = json.loads(capsys.readouterr().out)
     assert found["schema"] == compare.SCHEMA
     assert (found["regressions"] > 0) == bool(code)
+
+
+@pytest.mark.parametrize("change", [*WORSE, *OTHER])
+def test_every_kind_of_change_has_a_page(change: str, before: Json, tmp_path: Path) -> None:
+    after = copy.deepcopy(before)
+    (WORSE | OTHER)[change](after)
+    folders = [str(save(tmp_path / "before", before)), str(save(tmp_path / "after", after))]
+    page = tmp_path / "compare.html"
+    assert main([*folders, "--html", str(page)]) == (change in WORSE)
+    text = page.read_text(encoding="utf-8")
+    found = compare.compared(before, after)
+    for part in set(found) - {"regressions", "overall"}:
+        assert text.count(f'<h2 id="{part}">') == (bool(found[part]) or part in ALWAYS_SHOWN)
+        for each in found[part]:
+            about = str(each.get("claim") or each.get("id") or each["robot"])
+            assert f'<th scope="row">{about}' in text or f"<td>{about}</td>" in text
 
 
 def test_a_change_that_is_too_large_for_a_number_is_none(before: Json) -> None:

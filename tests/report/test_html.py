@@ -13,7 +13,7 @@ from html.parser import HTMLParser
 import pytest
 from report.cases import FINE, Kept, built, event, make_scenario, make_trace, make_traces, verdict
 
-from airground_drake.report import document, html, pages
+from airground_drake.report import attention, document, html, pages
 from airground_drake.report.figures import draw, moments
 from airground_drake.report.figures.panels import Figure
 from airground_drake.scenarios.schema import Run, Scenario
@@ -84,10 +84,10 @@ def hostile_page() -> str:
 def test_faults_are_told_once_each_cut_and_without_what_turns_or_breaks_lines() -> None:
     alike = [{"t_s": 0.5 * k, "robot": f"ugv{k % 2}", "policy": "p", "what": "ValueError: no"} for k in range(900)]
     other = {"t_s": 7.0, "robot": "ugv1", "policy": "q", "what": "\u202eevil\n\x1b[2J" + "x" * 9000}
-    one, cut = html.faults_together([*alike, other])
+    one, cut = attention.faults_together([*alike, other])
     assert (one["count"], one["first_s"], one["last_s"], one["robots"]) == (900, 0.0, 449.5, ["ugv0", "ugv1"])
     assert cut["what"].startswith("\\u202eevil\\n\\x1b[2J")
-    assert len(cut["what"]) < html.MAX_FAULT_CHARS + 30
+    assert len(cut["what"]) < attention.MAX_FAULT_CHARS + 30
     assert html.pretty({"a": "\u202e"}) == '{"a": "\\u202e"}'
 
 

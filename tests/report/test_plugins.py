@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import sys
 from collections.abc import Callable
@@ -59,14 +60,19 @@ def module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], s
     return write
 
 
-def test_a_run_with_hostile_policies_is_reported_as_it_was(report: Report, tmp_path: Path) -> None:
+def test_a_run_with_hostile_policies_is_reported_as_it_was(
+    report: Report, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     report("case_a")  # whose proofs are those of this scenario
     kinds = [list(KINDS).index(name) for name in IN_A_RUN]
     hostile = [{"name": "builders.hostile_policies:Hostile", "parameters": {"kind": kind}} for kind in kinds]
     policies = [*hostile, {"name": "detour", "parameters": {"speed_m_s": 2.8}}]
     changes = {"policies": policies, "ranking": "listed", "budget_s": 0.3, "period_s": 0.05, "retry_s": 1.0}
     arguments = ["--set", f"intervention={json.dumps(changes)}", "--set", "runs={d: {method: d}}", *ONE_RUN]
+    capsys.readouterr()
     assert main(["case_a", "-o", str(tmp_path), *arguments, "--allow-plugins"]) == 0
+    first = capsys.readouterr().out.splitlines()[0]
+    assert re.fullmatch(r"hostile_policies\.py:\d+ SystemExit: 0 \(.*at \d+\.\d\d s\), run d", first)
     document = json.loads((tmp_path / "report.json").read_text())
     assert {c["status"] for c in document["claims"] if c["id"] in ("SAFE-TRACE", "SAFE-HYP", "EXEC")} == {"holds"}
     said = " ".join(fault["what"] for fault in document["runs"]["d"]["faults"])

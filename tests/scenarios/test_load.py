@@ -13,7 +13,8 @@ from scenarios.cases import CASE_A, DATA, SMALL, Write, case_a, message
 
 from airground_drake.errors import ScenarioError
 from airground_drake.scenarios.document import MAX_BYTES, text_of
-from airground_drake.scenarios.load import load, resolved, shipped
+from airground_drake.scenarios.load import load, resolved, shipped, validated
+from airground_drake.scenarios.schema import Control, Preset, Scenario, Uav, Ugv
 
 
 @pytest.mark.parametrize("name", shipped())
@@ -149,3 +150,20 @@ def test_errors_name_the_line(old: str, new: str, fragments: list[str], write: W
     assert old in SMALL
     text = message(write(SMALL.replace(old, new)))
     assert all(fragment in text for fragment in fragments), text
+
+
+def test_the_uav_ends_over_the_centroid_of_the_targets_unless_the_scenario_says_where(write: Write) -> None:
+    assert load(write(SMALL))[0].uav.target_m == [9.0, 2.0, 2.0]
+    silent = write(SMALL.replace("uav: {start_m: [0, 2, 2], target_m: [9, 2, 2]}", "uav: {start_m: [0, 2, 2]}"))
+    assert load(silent)[0].uav.target_m == [9.0, 2.5, 2.0]
+    moved = ["ugvs.one.target_m=[5, 1, 0]", "ugvs.one.preset.waypoints_m.1=[5, 1, 0]", "uav.altitude_m=3"]
+    scenario = load(silent, moved)[0]
+    assert scenario.uav.target_m == [7.0, 3.0, 3.0]
+    assert validated(replace(scenario, uav=Uav(start_m=[0.0, 2.0, 2.0]))).uav.target_m == [7.0, 3.0, 2.0]
+    assert "ugvs.one.target_m: [5.0]" in message(silent, ["ugvs.one.target_m=[5]"])
+
+
+@pytest.mark.parametrize("part", [Scenario, Uav, Ugv, Preset, Control])
+def test_an_attribute_that_is_no_key_cannot_be_set(part: type) -> None:
+    with pytest.raises(AttributeError, match="has no attribute 'max_sped'"):
+        part().max_sped = 3.0

@@ -19,7 +19,7 @@ def test_text_that_is_given_as_a_value_is_that_text(title: str) -> None:
         ("seed=7", 7),
         ("control.sensing_range_m=5", 5.0),
         ("ugvs.ugv1.preset.speed_m_s=1e-1", 0.1),
-        ("ugvs.ugv1.preset.waypoints_m.1=[3.3, 14, 0]", [3.3, 14.0, 0.0]),
+        ("ugvs.ugv1.preset.waypoints_m.1=[3.3, 13.05, 0]", [3.3, 13.05, 0.0]),
         ("ugvs.ugv1.start_m.0=1.25", 1.25),
         ("intervention.policies.0.parameters.speed_m_s=3", 3.0),
         ("safe_distance.collision_m=0.1", 0.1),

@@ -94,7 +94,9 @@ def test_code_of_others_is_found_beside_the_scenario_file_wherever_it_runs(tmp_p
         twice = [POLICIES.load("tricks.py:Mine", of=policy.Policy) for _ in range(2)]
         assert twice[0] is twice[1]
     assert sys.path == before
-    assert {fault["what"] for fault in trace.meta["faults"]} == {"ValueError: asked beside, imported beside"}
+    assert {fault["what"] for fault in trace.meta["faults"]} == {
+        "tricks.py:6 ValueError: asked beside, imported beside"
+    }
 
 
 def test_what_is_not_found_says_where_it_was_looked_for(case_a: Scenario, tmp_path: Path) -> None:

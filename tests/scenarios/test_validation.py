@@ -6,6 +6,7 @@ import copy
 import dataclasses
 import math
 import re
+from fractions import Fraction
 from typing import Any
 
 import pytest
@@ -147,6 +148,19 @@ def test_bad_value(key: str, value: object, fragments: list[str], write: Write) 
     assert all(fragment in text for fragment in fragments), text
 
 
+def test_a_preset_ends_at_the_target_where_the_ugv_is_expected_there(write: Write) -> None:
+    data = edit(edit(SMALL_DATA, "duration_s", 15), "ugvs.two.preset.waypoints_m.1", [9, -5, 0])
+    text = message(write(yaml.safe_dump(data)))
+    assert "ugvs.two.preset.waypoints_m.1: [9.0, -5.0, 0.0] is not allowed; at most arrival_tolerance_m = 0.1 m" in text
+    for key, value in {
+        "runs.d.expected.LIVE-GOAL": "holds or refuted",
+        "runs.d.stalls_m.two": [4, 5, 0],
+        "arrival_tolerance_m": 10,
+        "duration_s": 5,  # too short for the preset: nobody is expected to arrive
+    }.items():
+        load(write(yaml.safe_dump(edit(data, key, value))))
+
+
 def test_bodies_start_as_far_apart_as_their_radii_demand(write: Write) -> None:
     data = edit(edit(SMALL_DATA, "ugvs.one.radius_m", 0.5), "ugvs.two.radius_m", 0.25)
     load(write(yaml.safe_dump(edit(data, "ugvs.two.start_m", [0.0, 2.75, 0.0]))))
@@ -168,6 +182,20 @@ def test_limits_are_those_of_the_proofs_to_the_last_digit(write: Write) -> None:
     assert "at most 33.3333333 1/s" in message(
         write(yaml.safe_dump(edit(edit(SMALL_DATA, "control.period_s", 0.03), "control.motion_gain_1_s", 33.33333334)))
     )
+
+
+@pytest.mark.parametrize("period", [0.3, 0.7, 0.049, 0.025, 0.1])
+def test_a_gain_of_one_over_the_period_is_accepted_whatever_becomes_of_its_last_digit(period: float) -> None:
+    common = dict.fromkeys(("control.period_s", "gatekeeper.period_s", "intervention.period_s"), period)
+    common |= {"gatekeeper.horizon_s": 10 * period, "gatekeeper.stages": 10, "decision.noise_period_s": period}
+    gains = {f"control.{name}": 1.0 / period for name in validate.GAINS}
+    control = load("minimal", {**common, **gains, "control.sensing_range_m": 20.0})[0].control
+    for name in validate.GAINS:
+        gain = getattr(control, name)
+        assert gain == pytest.approx(1.0 / period, rel=1e-15)
+        assert Fraction(repr(gain)) * Fraction(repr(period)) <= 1  # as proofs and checker take them
+    with pytest.raises(ScenarioError, match="must not exceed 1"):
+        load("minimal", {**common, **gains, "control.motion_gain_1_s": (1.0 + 1e-14) / period})
 
 
 def test_the_small_scenario_is_valid_otherwise(write: Write) -> None:
