@@ -39,7 +39,7 @@ from airground_drake.errors import TraceError
 
 T = TypeVar("T")
 
-SCHEMA = "airground_drake.trace/5"
+SCHEMA = "airground_drake.trace/6"
 
 DECISION_COLUMNS = {
     "t_s": "float64",
