@@ -93,6 +93,15 @@ def test_a_dip_below_the_release_level_within_a_step_is_a_release() -> None:
     assert times(status, 2)[1] == pytest.approx((4.0 + np.sqrt(9.0 - 0.25)) / 8.0, abs=2e-6)
 
 
+def test_a_dip_too_short_to_be_isolated_is_a_release_and_a_trigger_at_once() -> None:
+    """Below the threshold for less than what an event is isolated to: both transitions are made at the step's end."""
+    nearest = 3.0 - 1e-13  # x is below 3 m for 2e-10 s
+    status = run(Trigger.bare(3.0), straight((4e3, nearest, 0.0), (-4e3, nearest, 0.0)), 1.0)
+    released = times(status, 3)
+    assert released == [pytest.approx(0.5, abs=2e-6)]
+    assert times(status, 2) == [0.0, *released]
+
+
 def test_a_peak_at_a_corner_of_the_reference_is_a_trigger() -> None:
     """The reference turns back in the middle of a step: x is below the threshold at both updates."""
     preset = Motion(np.array([0.0, 0.45, 0.9]), np.array([[0.0, 0.0, 0.0], [4.5, 0.0, 0.0], [0.0, 0.0, 0.0]]))
