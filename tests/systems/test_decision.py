@@ -17,6 +17,7 @@ from pydrake.systems.primitives import Integrator, LogVectorOutput, TrajectorySo
 from pydrake.trajectories import PiecewisePolynomial
 
 from airground_drake.arrays import Array
+from airground_drake.components import integrated_noise
 from airground_drake.decision.trigger import Trigger
 from airground_drake.nsbc.motion import Motion
 from airground_drake.scenarios.load import load
@@ -162,3 +163,11 @@ def test_what_is_above_the_threshold_at_the_start_is_intervened_on_at_the_first_
     scenario = load(pathlib.Path(__file__).parents[2] / "benchmarks/mutation/crowd.yaml")[0]
     proposals = simulate(scenario, "b").proposals
     assert proposals["issued_s"].min() == 0.0
+
+
+@pytest.mark.parametrize("period", [0.25, 0.01])
+def test_a_sample_of_the_noise_moves_the_variable_by_what_its_period_is_worth(period: float) -> None:
+    """Held over a period h, w adds intensity sqrt(h) w: after any time T the variance is intensity^2 T."""
+    noise = integrated_noise(2, 0.4, 0.0, period)
+    np.testing.assert_allclose(period * noise.B(), 0.4 * np.sqrt(period) * np.eye(2), rtol=1e-12)
+    np.testing.assert_array_equal(integrated_noise(2, 0.4, 0.3, period).A(), -0.3 * np.eye(2))
