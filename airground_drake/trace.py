@@ -39,7 +39,7 @@ from airground_drake.errors import TraceError
 
 T = TypeVar("T")
 
-SCHEMA = "airground_drake.trace/5"
+SCHEMA = "airground_drake.trace/6"
 
 DECISION_COLUMNS = {
     "t_s": "float64",
@@ -71,7 +71,8 @@ DECISION_COLUMNS = {
     "predicted_lag_m": "float64",
     "tries": "float64",
 }
-"""Columns of `Trace.decisions`, one row per robot and gatekeeper call; -1 where a number does not apply. Those up to
+"""Columns of `Trace.decisions`, one row per robot and gatekeeper call; -1 where a number does not apply. `status` says
+how the route ended ('solver_failed': the best plan known decided), see `gatekeeper.solution`. Those up to
 `predicted_clearance_m` are of decisions by problem (26), the others of decisions by outcomes: what comes of either
 choice as `gatekeeper.outcome` has it (cost, 1 if it comes to rest short of the goal, way left), how far the UGV is
 behind the proposed motion, and how often it has gone along since it last rested."""

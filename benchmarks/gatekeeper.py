@@ -222,7 +222,7 @@ class CasadiRoute:
         high = np.concatenate([np.zeros(2 * stages), np.full(stages * points, np.inf)])
         solution = solver(x0=guess, lbx=lower, ubx=upper, lbg=np.concatenate(low), ubg=high)
         if not solver.stats()["success"]:
-            return constants.failed()
+            return cheapest(problem, constants.both, status="solver_failed")
         relaxed = np.clip(np.asarray(solution["x"]).ravel()[2 * stages : 3 * stages], 0.0, 1.0)
         return cheapest(problem, (problem.evaluate(sum_up_rounding(relaxed)), constants.accept, constants.refuse))
 
@@ -248,9 +248,9 @@ class ScipRoute:
         try:
             model.solve(solver="SCIP", scip_params={"limits/time": SCIP_LIMIT_S})
         except cvxpy.SolverError:
-            return constants.failed()
+            return cheapest(problem, constants.both, status="solver_failed")
         if model.status != "optimal" or omega.value is None:
-            return constants.failed()
+            return cheapest(problem, constants.both, status="solver_failed")
         plan = problem.evaluate((omega.value[:, 0] > 0.5).astype(float))
         return cheapest(problem, (plan, constants.accept, constants.refuse))
 
@@ -324,7 +324,7 @@ class Result:
 def row(name: str, result: Result, known: list[list[Known]], default: Result | None) -> list[Any]:
     """The columns from `route` on."""
     pairs = [(d, k) for i, ds in enumerate(result.solutions) for d, k in zip(ds, known[i * result.step], strict=True)]
-    decided = [(d, k) for d, k in pairs if d.has_plan]
+    decided = [(d, k) for d, k in pairs if d.status != "solver_failed"]
     excess = 100.0 * np.array([k.excess(d) for d, k in decided] or [np.nan])
     return [
         name, len(result.times),

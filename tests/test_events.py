@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -46,6 +48,23 @@ def test_what_is_passed_between_two_rows_is_hit() -> None:
     trace = passing_by(-1.99)  # 10 mm beside an obstacle's centre
     assert [(event["robot"], event["obstacle"]) for event in collisions(trace)] == [("ugv1", "o")]
     assert not collisions(passing_by(-1.94))
+
+
+@pytest.mark.parametrize("gap_m", [-1e-6, 1e-6])
+@pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
+def test_bodies_collide_when_their_surfaces_come_near_whose_radius_it_may_be(share: float, gap_m: float) -> None:
+    """The radius of one, of the other, or of both; for an obstacle and for another robot alike."""
+    trace = passing_by(-1.0)
+    apart = {"o": 1.0, "uav": float(np.linalg.norm(trace.position("ugv1") - trace.position("uav"), axis=1).min())}
+    assert apart["uav"] > 0.5
+    for other in apart:
+        radii = apart[other] - trace.scenario["safe_distance"]["collision_m"] - gap_m
+        given = deepcopy(trace.scenario)
+        given["ugvs"]["ugv1"]["radius_m"] = share * radii
+        (given["obstacles"]["o"] if other == "o" else given["uav"])["radius_m"] = (1.0 - share) * radii
+        found = collisions(replace(trace, meta={**trace.meta, "scenario": given}))
+        hit = [event.get("obstacle") or event.get("other") for event in found]
+        assert (other in hit) == (gap_m < 0.0)
 
 
 @pytest.fixture(scope="module")

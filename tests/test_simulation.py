@@ -72,6 +72,14 @@ def test_without_noise_the_decision_variable_is_the_norm_of_the_task_error(case_
         assert np.abs(of_run.column(f"{ugv}.decision_variable_m") - error).max() < 1e-6
 
 
+@pytest.mark.parametrize("name", ["case_a", "case_b"])
+def test_events_are_isolated_far_more_precisely_than_claims_ask_for(run: Runs, name: str) -> None:
+    (verdict,) = verify(run(name, "d"), ["THR-TRIG"])
+    found = {each["robot"]: each for each in verdict.finding.evidence["ugvs"]}["ugv1"]
+    assert len(found["events"]) == 2
+    assert found["worst_time_difference_s"] < 1e-7
+
+
 def test_same_seed_same_bytes_other_seed_other_trigger(case_a: Scenario, run: Runs, tmp_path: Path) -> None:
     recorder = Recorder(case_a, "d")
     trace.save(recorder.simulate(), tmp_path / "one")

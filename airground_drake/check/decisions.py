@@ -13,7 +13,7 @@ from .run import Run
 
 LEAST_COST = 1e-6
 """Costs are compared relative to the cheaper constant plan's, but to no less than this: 1 mm of error for 1 s."""
-PLANNED = ("optimal", "budget_spent")
+PLANNED = ("optimal", "budget_spent", "solver_failed")
 """Statuses of decisions that rest on a plan; the others are refusals for want of one."""
 OF_OUTCOMES = (
     "refuse_outcome_m2_s", "accept_outcome_m2_s", "refuse_stalls", "accept_stalls", "refuse_left_m", "accept_left_m",

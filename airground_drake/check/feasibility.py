@@ -297,11 +297,10 @@ def _answer(decision: Decision, standing: str | None, stood_s: float, gate: Json
         return "refuse", "no_plan"
     first = CHOICES[int(decision.plan[0])]
     if standing is None:
+        useful = row["objective"] < (1.0 - NO_DIFFERENCE) * row["refuse_throughout"]
         if first == "refuse":
-            return "refuse", "not_cheaper"
-        if row["objective"] >= (1.0 - NO_DIFFERENCE) * row["refuse_throughout"]:
-            return "refuse", "no_difference"
-        return "accept", "cheaper"
+            return "refuse", "waits" if useful else "not_cheaper"
+        return ("accept", "cheaper") if useful else ("refuse", "no_difference")
     enough = (1.0 - gate["switching_margin"]) * row[f"{standing}_throughout"]
     if first == standing or row["objective"] >= enough:
         return standing, "kept"

@@ -81,6 +81,8 @@ def _ends_and_counts(run: Run, metrics: Json) -> None:
 def _gatekeeper(run: Run, recorded: Json) -> None:
     same("number of decisions", recorded["calls"], len(run.decisions))
     same("counts of answers", recorded["decisions"], dict(Counter(map(str, run.decisions["decision"]))))
+    failures = int((run.decisions["status"] == "solver_failed").sum())
+    same("solver failures", recorded["solver_failures"], failures)
     same("counts of refusals", recorded["refusals"], _refusals(run))
     known = run.decisions["gap"][run.decisions["gap"] >= 0.0]
     agrees("largest recorded gap", recorded["max_gap"], float(known.max()) if len(known) else None, within=SMALL)
@@ -111,7 +113,7 @@ def _closest_call(run: Run, recorded: Json | None) -> None:
         return
     apart = np.abs(np.diff(costs[known], axis=1)[:, 0]) / np.maximum(costs[known].min(axis=1), 1e-12)
     row = run.decisions.iloc[known[int(np.argmin(apart))]]
-    named = {name: str(row[name]) for name in ("robot", "policy", "decision")}
-    valued = {name: float(row[name]) for name in ("t_s", "accept_throughout", "refuse_throughout")}
+    named = {name: str(row[name]) for name in ("robot", "policy", "decision", "reason")}
+    valued = {name: float(row[name]) for name in ("t_s", "objective", "accept_throughout", "refuse_throughout")}
     expected = {"relative_cost_margin": float(apart.min()), **named, **valued}
     agrees("closest call", recorded, expected, within=SMALL)

@@ -15,7 +15,7 @@ from airground_drake.intervention.messages import ACCEPT, SILENT
 from airground_drake.intervention.policy import Proposal
 
 USELESS = 1e-6
-"""Relative gain below which an intervention makes no difference: ten times the solver's tolerance."""
+"""Relative gain over refusing throughout below which nothing is gained: ten times the solver's tolerance."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Rules:
 
 
 Reason = Literal[
-    "cheaper", "not_cheaper", "no_difference", "kept", "dwell", "reversed", "no_plan",
+    "cheaper", "not_cheaper", "waits", "no_difference", "kept", "dwell", "reversed", "no_plan",
     "stalls", "makes_way", "exhausted", "no_progress", "over",
 ]  # fmt: skip
 """Why an answer is what it is: see `settle` for method (c), `certified` for method (d)."""
@@ -60,10 +60,11 @@ Reason = Literal[
 WORDS: dict[Reason, str] = {
     "cheaper": "the proposal leads to a better outcome than the UGV's own task",
     "not_cheaper": "the UGV's own task leads to as good an outcome or a better one",
+    "waits": "the best plan refuses now and accepts later",
     "no_difference": "the proposal would change nothing",
     "kept": "as answered before",
     "dwell": "as answered before: it is too early for another answer",
-    "reversed": "the other answer has become the cheaper one",
+    "reversed": "the best plan begins with the other answer, and is cheaper than this one throughout",
     "no_plan": "no outcome could be computed",
     "stalls": "with the proposal the UGV would come to rest short of its goal, no nearer than without",
     "makes_way": "the UGV makes way for the one whose trigger the proposal is for, and gets to its goal all the same",
@@ -132,6 +133,9 @@ class Decision:
 def in_words(decision: Decision) -> str:
     """Why the answer is what it is, as a sentence for the UAV."""
     words, grounds = WORDS[decision.reason], decision.grounds
+    if decision.reason == "waits" and isinstance(grounds, Planned):
+        accept, refuse = grounds.throughout
+        words += f": cost {grounds.solution.objective:.4g}, {accept:.4g} to accept throughout, {refuse:.4g} to refuse"
     if decision.reason == "stalls" and isinstance(grounds, Foreseen) and grounds.accept is not None:
         x, y, _ = grounds.accept.end
         words += f": at ({x:.2f}, {y:.2f}) m, {grounds.accept.left:.2f} m short"
@@ -153,11 +157,14 @@ def settle(
 ) -> tuple[bool, Reason]:
     """Whether the proposal is accepted, and why.
 
-    Without a plan it is refused, whatever stands. A new proposal is accepted if the best plan starts by accepting
-    it, unless it makes no difference. A standing answer is reversed only if the best plan starts with the other
-    choice and is cheaper, by the switching margin, than to keep the answer throughout, and not before the dwell is
-    over. (The best plan that keeps the answer for one more stage and then changes it costs nearly the same as the one
-    that changes it now: that comparison would decide nothing.)
+    Without a plan (the data are not finite) it is refused, whatever stands. A new proposal is accepted if the best plan
+    starts by accepting it, unless it makes no difference. If that plan accepts it later, the proposal is refused as
+    well, even if accepting throughout costs less than refusing throughout: so a UGV may wait for ever.
+
+    A standing answer is reversed only if the best plan starts with the other choice and is cheaper, by the switching
+    margin, than to keep the answer throughout, and not before the dwell is over. (The best plan that keeps the answer
+    for one more stage and then changes it costs nearly the same as the one that changes it now: that comparison would
+    decide nothing.)
 
     Args:
         solution: the route's.
@@ -181,8 +188,7 @@ def settle(
 
 
 def _first_answer(solution: Solution, throughout: tuple[float, float]) -> tuple[bool, Reason]:
-    if not solution.accept_first:
-        return False, "not_cheaper"
-    if not solution.objective < (1.0 - USELESS) * throughout[1]:
-        return False, "no_difference"
-    return True, "cheaper"
+    gains = solution.objective < (1.0 - USELESS) * throughout[1]
+    if solution.accept_first:
+        return (True, "cheaper") if gains else (False, "no_difference")
+    return False, "waits" if gains else "not_cheaper"

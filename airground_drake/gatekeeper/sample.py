@@ -18,6 +18,7 @@ from airground_drake.gatekeeper.history import History
 from airground_drake.gatekeeper.patience import Turn
 from airground_drake.gatekeeper.prediction import Horizon, Scene, predicted_problem
 from airground_drake.gatekeeper.routes.route import Route
+from airground_drake.gatekeeper.solution import after_failure
 from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT, Disc, Proposals, Report, Reports, answer_to
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.kernels import distances
@@ -207,8 +208,25 @@ class PaperGatekeepers(Gatekeepers):
         started = thread_time()
         problem = predicted_problem(self._scene(seen, i), self._law, proposal, self._judging.horizon)
         solution = self._judging.route.solve(problem, next(budgets))
+        if solution.status == "solver_failed":
+            solution = after_failure(problem, solution, self._rest_of_plan(seen, i, proposal))
         self.times_s.append(thread_time() - started)
         standing, stood = answer_to(proposal, seen.before.answers, i), seen.t - seen.before.since[i]
         throughout = costs_throughout(problem, solution)
         accepted, reason = settle(solution, throughout, standing, stood, self._judging.rules)
         return Decision(seen.t, i, proposal, accepted, reason, Planned(problem, solution, throughout))
+
+    def _rest_of_plan(self, seen: Situation, i: int, proposal: Proposal) -> Array | None:
+        """What the plan that was decided on at the sample before says from now on, (N,); None if there was none.
+
+        It ends earlier by a sampling period; its last choice stands for the rest.
+        """
+        for decision in reversed(seen.before.decisions[-len(self._team.ugvs) :]):
+            grounds = decision.grounds
+            if decision.robot == i and decision.proposal is proposal and isinstance(grounds, Planned):
+                plan = grounds.solution.plan
+                if plan is None:
+                    return None
+                passed = round((seen.t - decision.t) / grounds.problem.dt)
+                return plan[np.minimum(np.arange(len(plan)) + passed, len(plan) - 1)]
+        return None

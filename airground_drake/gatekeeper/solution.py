@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -12,7 +12,7 @@ from airground_drake.arrays import Array
 from airground_drake.gatekeeper.problem import Evaluation, Problem
 from airground_drake.gatekeeper.rounding import rounding_deviation
 
-Status = Literal["optimal", "budget_spent", "refused_budget_spent", "refused_solver_failed", "refused_not_finite"]
+Status = Literal["optimal", "budget_spent", "solver_failed", "refused_not_finite"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,8 +21,9 @@ class Solution:
 
     Attributes:
         accept_first: the first stage of the plan; False without one.
-        status: 'optimal': the route did all that it does; 'budget_spent': the best plan known when the budget
-            was spent, with its gap; else why there is none, so that the proposal is refused.
+        status: 'optimal': the route did all that it does; 'budget_spent', 'solver_failed': the best plan known when
+            the budget was spent or a solver failed, with its gap; 'refused_not_finite': no plan, so that the
+            proposal is refused.
         objective: cost (25) of the plan returned.
         route_bound: lower bound of the problem that the route solves, which is not (26) with the exact distances of
             (26d), whose optimum may be lower: relaxed or branched, for the same supporting
@@ -59,7 +60,7 @@ class Solution:
     @property
     def has_plan(self) -> bool:
         """Whether it rests on a plan, by its status."""
-        return self.status in ("optimal", "budget_spent")
+        return self.status in ("optimal", "budget_spent", "solver_failed")
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,11 +96,6 @@ class ConstantPlans:
         """False where finite data overflow in the cost."""
         return bool(np.isfinite(self.accept.objective) and np.isfinite(self.refuse.objective))
 
-    def failed(self) -> Solution:
-        """No solution, because the solver gave no optimum; the costs of the constant plans are the evidence."""
-        accept, refuse = self.accept.objective, self.refuse.objective
-        return Solution(False, "refused_solver_failed", objective_accept=accept, objective_refuse=refuse)
-
 
 def cheapest(
     problem: Problem,
@@ -117,7 +113,7 @@ def cheapest(
     Args:
         problem: what they are plans of.
         plans: at least one that starts by accepting and one that starts by refusing.
-        status: 'optimal' or 'budget_spent'.
+        status: any but a refusal.
         route_bound: of the cost (25), with distances measured along `normals` if there are any.
         gap: of the plans to that bound; with `normals` it is computed.
         normals: of half-planes, (N, m, 3).
@@ -154,22 +150,51 @@ def cut_short(
     plans: Sequence[Evaluation],
     bound: float,
     *,
+    status: Status = "budget_spent",
+    normals: Array | None = None,
     relaxed: Array | None = None,
     rounded: Array | None = None,
 ) -> Solution:
-    """The solution when the budget is spent: the best plan so far, and a bound for which no solver is needed.
+    """The solution when the budget is spent or a solver failed: the best plan so far, and a bound without a solver.
 
     Args:
         problem: what they are plans of.
         plans: as for `cheapest`.
         bound: lower bound of every plan.
+        status: 'budget_spent' or 'solver_failed'.
+        normals: as for `cheapest`.
         relaxed: as for `cheapest`.
         rounded: as for `cheapest`.
     """
     best = min(plan.objective for plan in plans)
     bound = min(bound, best)
     gap = relative_gap(best, bound)
-    return cheapest(problem, plans, status="budget_spent", route_bound=bound, gap=gap, relaxed=relaxed, rounded=rounded)
+    return cheapest(
+        problem, plans, status=status, route_bound=bound, gap=gap, normals=normals, relaxed=relaxed, rounded=rounded
+    )
+
+
+def after_failure(problem: Problem, solution: Solution, previous: Array | None) -> Solution:
+    """The solution after a solver failure: the cheapest of its own plan, the constant plans and the previous one.
+
+    Args:
+        problem: what they are plans of.
+        solution: the route's, with or without a plan.
+        previous: what is left of the plan decided on at the sample before, (N,); None if there is none.
+    """
+    constants = ConstantPlans.of(problem)
+    if not (problem.is_finite() and constants.are_finite()):
+        return Solution(False, "refused_not_finite")
+    known = [problem.evaluate(plan) for plan in (solution.plan, previous) if plan is not None]
+    bound = max(0.0, solution.route_bound)
+    found = cut_short(
+        problem, (*constants.both, *known), bound, status="solver_failed",
+        relaxed=solution.relaxed, rounded=solution.rounded,
+    )  # fmt: skip
+    if solution.normals is None or found.positions is None:
+        return found
+    along = problem.evaluate_half_planes(found.positions, solution.normals)
+    return replace(found, gap=relative_gap(along, found.route_bound), normals=solution.normals)
 
 
 def relative_gap(objective: float, route_bound: float) -> float:

@@ -17,8 +17,8 @@ MAX_NAMES = 3
 """Robots that are listed in a line."""
 
 REFUSED = {
-    "cheaper": "the plan that it preferred began by waiting",
-    "not_cheaper": "waiting always looked cheaper",
+    "waits": "the best plan began by refusing and accepted later",
+    "not_cheaper": "its own task looked as good, or better",
     "no_difference": "it would have changed nothing",
     "no_plan": "no outcome could be computed",
     "stalls": "with the proposal it would have come to rest short of its goal, no nearer than without",

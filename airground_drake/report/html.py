@@ -94,8 +94,8 @@ def _environment() -> Environment:
         evidence=evidence_tables, records=partial(evidence.tables, number=number), brief=brief,
     )  # fmt: skip
     environment.globals.update(
-        chips=CHIPS, outcome=outcome, max_faults=MAX_FAULTS, policy=Markup(security_policy(style, scripts)),
-        style=Markup(style), scripts=list(map(Markup, scripts)),
+        chips=CHIPS, refused=attention.REFUSED, outcome=outcome, max_faults=MAX_FAULTS,
+        policy=Markup(security_policy(style, scripts)), style=Markup(style), scripts=list(map(Markup, scripts)),
     )  # fmt: skip
     return environment
 

@@ -58,7 +58,8 @@ def gatekeeper(trace: Trace) -> dict[str, Any] | None:
     """Summary of the gatekeeper's decisions, None if it made none.
 
     Returns:
-        `calls`, `decisions` (decision -> count), `refusals` (robot -> reason -> proposals refused at the first
+        `calls`, `decisions` (decision -> count), `solver_failures` (decisions for which the solver failed, so
+        that they rest on the best plan known), `refusals` (robot -> reason -> proposals refused at the first
         answer), `max_gap` (largest optimality gap), `time_s` (p50, p99, max
         of the CPU times) and `closest_call`: where the costs of accepting and refusing were closest,
         relative to the smaller one, so that nobody has to trust a knife edge. None where not recorded.
@@ -72,6 +73,7 @@ def gatekeeper(trace: Trace) -> dict[str, Any] | None:
     return {
         "calls": len(table),
         "decisions": {str(name): int(count) for name, count in table["decision"].value_counts().sort_index().items()},
+        "solver_failures": int((table["status"] == "solver_failed").sum()),
         "refusals": _refusals(trace),
         "max_gap": float(gaps.max()) if len(gaps) else None,
         "time_s": {name: float(value) for name, value in time_s.items()} or None,
@@ -106,6 +108,8 @@ def _closest_call(trace: Trace) -> dict[str, Any] | None:
         "robot": str(row["robot"]),
         "policy": str(row["policy"]),
         "decision": str(row["decision"]),
+        "reason": str(row["reason"]),
+        "objective": float(row["objective"]),
         "accept_throughout": float(row["accept_throughout"]),
         "refuse_throughout": float(row["refuse_throughout"]),
     }

@@ -724,8 +724,8 @@ GATEKEEPER = (
     Mutant(
         "a first stage that refuses is accepted",
         "gatekeeper/answer.py",
-        '    if not solution.accept_first:\n        return False, "not_cheaper"',
-        '    if False:\n        return False, "not_cheaper"',
+        "    if solution.accept_first:",
+        "    if True:",
     ),
     Mutant(
         "the switching margin is a bonus",

@@ -91,6 +91,15 @@ def test_automaton_cycle() -> None:
     assert trigger.fall(state, 3.0).mode is Mode.SUPERVISING
 
 
+def test_an_intervention_lasts_until_the_release_level_is_reached() -> None:
+    trigger = Trigger(zeta=3.0, release=1.5, dwell=0.0)
+    state = trigger.rise(TriggerState(), 2.0)
+    for x in (2.999, 2.0, 1.501):
+        assert trigger.step(state, 3.0, x) is state
+    after = trigger.step(state, 3.0, 1.5)
+    assert (after.mode, after.released_at) == (Mode.SUPERVISING, 3.0)
+
+
 def test_above_the_threshold_at_the_start_triggers_at_once() -> None:
     assert Trigger(3.0, 1.5, 1.0).start(0.0, 3.0).triggers == 1
 

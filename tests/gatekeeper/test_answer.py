@@ -6,11 +6,11 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from builders.problems import STALL_POSITION, case_a_proposal
+from builders.problems import STALL_POSITION, case_a_proposal, random_problem
 from hypothesis import given
 from hypothesis import strategies as st
 
-from airground_drake.gatekeeper.answer import Rules, settle
+from airground_drake.gatekeeper.answer import Decision, Planned, Rules, in_words, settle
 from airground_drake.gatekeeper.prediction import predicted_problem
 from airground_drake.gatekeeper.routes.relaxed import RelaxedRoute
 from airground_drake.gatekeeper.solution import Solution
@@ -36,6 +36,20 @@ def test_a_new_proposal_is_judged_by_the_plan_alone() -> None:
     assert answer(10.0 - 1e-9, 10.0, SILENT, 0.0) == (False, "no_difference")
 
 
+def test_a_plan_that_accepts_later_is_named_as_such_with_its_cost() -> None:
+    """Accepting throughout costs less than refusing throughout, and still the proposal is refused."""
+    _, _, proposal, _ = case_a_proposal()
+    later = Solution(False, "optimal", objective=350.0)
+    throughout = 350.3, 468.8
+    assert settle(later, throughout, SILENT, 0.0, RULES) == (False, "waits")
+    never = replace(later, objective=throughout[1] * (1.0 - 1e-9))
+    assert settle(never, throughout, SILENT, 0.0, RULES) == (False, "not_cheaper")
+    words = in_words(Decision(0.0, 0, proposal, False, "waits", Planned(random_problem(0), later, throughout)))
+    assert words == (
+        "the best plan refuses now and accepts later: cost 350, 350.3 to accept throughout, 468.8 to refuse"
+    )
+
+
 def test_a_standing_answer_is_reversed_only_for_a_clear_gain() -> None:
     assert answer(10.5, 10.0, ACCEPT, 1.0) == (True, "kept")
     assert answer(10.0, 10.5, REFUSE, 1.0) == (False, "kept")
@@ -51,8 +65,8 @@ def test_no_reversal_before_the_dwell_is_over() -> None:
 
 @given(st.sampled_from([SILENT, ACCEPT, REFUSE]), st.floats(0.0, 1.0))
 def test_without_a_plan_everything_is_refused_at_once(standing: float, stood: float) -> None:
-    for status in ("refused_solver_failed", "refused_not_finite", "refused_budget_spent"):
-        assert settle(solution(1.0, 2.0, status), (1.0, 2.0), standing, stood, RULES) == (False, "no_plan")
+    without = solution(1.0, 2.0, "refused_not_finite")
+    assert settle(without, (1.0, 2.0), standing, stood, RULES) == (False, "no_plan")
 
 
 @given(

@@ -7,9 +7,9 @@ import pytest
 
 from airground_drake.gatekeeper.certified import CertifiedGatekeepers, reason_of
 from airground_drake.gatekeeper.outcome import Outcome, Outlook
-from airground_drake.gatekeeper.patience import Patience
+from airground_drake.gatekeeper.patience import Patience, Turn
 from airground_drake.gatekeeper.sample import Memory, Situation
-from airground_drake.intervention.messages import ACCEPT, REFUSE
+from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.law import UgvLaw
@@ -87,3 +87,57 @@ def test_only_another_ugv_is_made_way_for(cause: str, answer: float) -> None:
     proposal = Proposal("way", 0.0, STAYS, cause=cause)
     memory = gate.sample(0.05, (proposal, None), places, np.zeros((3, 3)), Memory.empty(2))
     assert memory.answers[0] == answer
+
+
+def making_way(issued: float, cause: str = "other") -> Proposal:
+    """One that "ugv" accepts as a favour to the other; with its own name for the cause it refuses."""
+    return Proposal("way", issued, STAYS, cause=cause)
+
+
+class Pair:
+    """Two UGVs, of which the first is asked to make way; time goes on by a sample at a time."""
+
+    def __init__(self) -> None:
+        self.gate = gatekeepers("ugv", "other")
+        self.places = np.array([[20.0, 0.0, 0.0], [0.0, 9.0, 0.0], [20.0, 0.0, 9.0]])
+        self.memory, self.t = Memory.empty(2), 0.0
+
+    def sees(self, proposal: Proposal | None) -> Turn:
+        self.t += 0.05
+        if not self.gate.idle((proposal, None), self.places, self.memory):
+            self.memory = self.gate.sample(self.t, (proposal, None), self.places, np.zeros((3, 3)), self.memory)
+        return self.memory.turns[0]
+
+
+def test_a_withdrawal_is_noticed_when_nothing_else_is_proposed() -> None:
+    pair = Pair()
+    assert pair.sees(making_way(0.0)).executing
+    turn = pair.sees(None)
+    assert not turn.executing
+    assert turn.since == pair.t
+    assert pair.memory.answers[:2] == (SILENT, -1.0)
+    assert pair.memory.commitments[0] is None
+
+
+def test_a_replaced_proposal_ends_its_try_whatever_becomes_of_the_next() -> None:
+    pair = Pair()
+    assert pair.sees(making_way(0.0)).executing
+    turn = pair.sees(making_way(0.05, cause="ugv"))
+    assert pair.memory.answers[0] == REFUSE
+    assert (turn.executing, turn.tries, turn.since) == (False, 1, pair.t)
+    assert pair.memory.commitments[0] is None
+
+
+def test_a_ugv_rests_while_proposals_keep_coming() -> None:
+    """It refuses them as exhausted, and accepts the first one after its rest."""
+    pair = Pair()
+    issued, said = 0.0, []
+    for _ in range(60):
+        pair.sees(making_way(issued))
+        said.append(pair.memory.decisions[-1].reason)
+        issued = round(issued + 0.05, 9)  # a new one each time
+    first = said.index("exhausted")
+    assert said[:first] == ["makes_way"] * 2
+    again = first + said[first:].index("makes_way")
+    assert set(said[first:again]) == {"exhausted"}
+    assert again - first == pytest.approx(1.0 / 0.05, abs=1)  # a rest of 1 s

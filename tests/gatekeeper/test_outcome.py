@@ -87,6 +87,22 @@ def test_no_roll_out_takes_longer_than_the_longest_try_and_what_comes_past_it() 
         assert len(outcome.positions) == round((LOOK.longest + LOOK.past) / LAW.avoidance.period) + 1
 
 
+def test_what_is_under_way_at_the_end_costs_the_way_that_is_left_as_well() -> None:
+    """Squared distances to the preset trajectory, and the time-to-go along the way left: L^3 / (3 v)."""
+    scene, _ = situation()
+    speed, look = 0.2, Outlook(longest=4.0, past=2.0)
+    slow = replace(scene, preset=Motion.at_speed(scene.preset.positions, speed), max_speed=1.0)
+    away = along((0.0, 0.0), (4.0, 0.0))
+    for outcome in outcomes(slow, LAW, away, NONE, 2.0, (), look):
+        t = LAW.avoidance.period * np.arange(1.0, len(outcome.positions))
+        error = np.square(slow.preset.sample(t) - outcome.positions[1:]).sum()
+        assert not outcome.stalls
+        assert outcome.left == pytest.approx(8.0 - outcome.end[0])
+        assert 1.0 < outcome.left < 7.5
+        expected = LAW.avoidance.period * error + outcome.left**3 / (3.0 * speed)
+        assert outcome.cost == pytest.approx(expected, rel=1e-9)
+
+
 def test_what_is_not_known_is_not_avoided_and_a_map_that_lies_costs_no_more_than_usefulness() -> None:
     scene, discs = situation((4.0, 1.0), (4.0, -1.0))
     assert not outcomes(scene, LAW, ROUND, NONE, 2.0, (), LOOK)[0].stalls

@@ -115,6 +115,15 @@ def test_the_predicted_cost_counts_intrusion_into_what_radii_demand() -> None:
     assert costs[3] > costs[0]
 
 
+@pytest.mark.parametrize("first", [True, False])
+def test_the_predicted_cost_counts_intrusion_into_every_teammate(first: bool) -> None:
+    own, parked = mate("ugv1", [0.0, 0.0], [12.0, 0.0]), mate("ugv2", [1.0, 0.0], [1.0, 0.0], triggered=False)
+    motions = {"ugv1": Motion(np.array([0.0]), np.zeros((1, 3)))}
+    alone = predicted_cost(motions, seen([own]))
+    team = (parked, own) if first else (own, parked)
+    assert predicted_cost(motions, replace(seen([own]), team=team)) > alone + 100.0
+
+
 @pytest.mark.parametrize("ratio", [1.0, 0.9999, 0.9])
 def test_a_preset_that_runs_away_is_met_with_few_paths(ratio: float, monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[float] = []

@@ -9,11 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from airground_drake.components import make_planner
 from airground_drake.intervention.database import BehaviourDatabase
 from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT, Report
 from airground_drake.intervention.planner import Planner, PlannerMemory
 from airground_drake.intervention.policy import Observation, Policy
 from airground_drake.nsbc.motion import Motion
+from airground_drake.registry import METHODS
+from airground_drake.scenarios.load import load
 
 PLACES = np.array([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [8.0, 0.0, 0.0], [0.0, 0.0, 3.0]])
 UGVS = ("one", "two", "three")
@@ -197,3 +200,27 @@ def test_radii_come_with_a_refusal_and_go_out_with_a_proposal() -> None:
     sent = memory.proposals[0]
     assert sent is not None
     assert np.array_equal(sent.mapped_radii, [3.0, 0.7])
+
+
+def test_a_policy_sees_each_robot_as_it_is() -> None:
+    """Positions, speed limits, and who stands: of that very robot, whichever UGV it is asked about."""
+    policy = Scripted()
+    uav = replace(planner(policy), max_speed=np.array([1.0, 2.0, 3.0]))
+    moved = PLACES + np.array([[0.0], [1.0], [0.0], [0.0]])
+    memory = uav.watch(uav.start(), 0.0, PLACES)
+    memory = uav.watch(memory, 1.0, moved)
+    uav.plan(memory, 1.0, moved, [True, True, True], np.array([SILENT, -1.0] * 3), NOBODY)
+    assert [seen.robot for seen in policy.seen] == list(UGVS)
+    for i, seen in enumerate(policy.seen):
+        np.testing.assert_array_equal(seen.position, moved[i])
+        np.testing.assert_array_equal(seen.others, [place for k, place in enumerate(moved) if k != i])
+        assert [each.max_speed for each in seen.team] == [1.0, 2.0, 3.0]
+        assert [each.standing for each in seen.team] == [True, False, True]
+        np.testing.assert_array_equal([each.position for each in seen.team], moved[:3])
+
+
+def test_the_planner_has_each_ugv_s_own_limits() -> None:
+    scenario = load("case_a", ["ugvs.ugv1.max_speed_m_s=2.5", "ugvs.ugv2.radius_m=0.1", "safe_distance.ugv_m=1.0"])[0]
+    made = make_planner(scenario, METHODS["d"])
+    assert made.max_speed.tolist() == [2.5, scenario.ugvs["ugv2"].max_speed_m_s] != [2.5, 2.5]
+    assert made.radii.tolist() == [0.0, 0.1]

@@ -120,6 +120,19 @@ def test_inequalities_hold_in_floating_point_from_any_safe_state(seed: int) -> N
     assert (slack >= -1e-9).all()
 
 
+@pytest.mark.parametrize("speed", [1.0, 1e4, 1e8])
+def test_a_velocity_is_scaled_back_until_no_inequality_is_missed_by_rounding(speed: float) -> None:
+    """However fast what is asked for: rounding of the projection grows with it, and what is left over is cut off."""
+    avoidance = Avoidance(3.0, 0.05)
+    for seed in range(60):
+        team, positions = scene(seed)
+        spaces = avoidance.half_spaces(positions, team.mobility, team.neighbourhood(slice(None)).around(positions))
+        lower = np.random.default_rng(seed).normal(size=positions.shape) * speed * team.mobility
+        for v, normal, bound in zip(avoidance.apply(lower, spaces), spaces.normal, spaces.bound, strict=True):
+            for (x, y, z), least in zip(normal.tolist(), bound.tolist(), strict=True):
+                assert x * v[0] + y * v[1] + z * v[2] >= min(least, 0.0)
+
+
 @examples(60)
 @given(SEEDS, st.booleans())
 def test_projection_is_the_exact_minimiser(seed: int, planar: bool) -> None:

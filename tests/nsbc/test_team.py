@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.team import Team
 
 TEAM = Team(
@@ -32,3 +33,15 @@ def test_both_of_a_pair_keep_the_same_to_the_bit() -> None:
 def test_points_keep_the_distance_of_their_kind() -> None:
     points = replace(TEAM, radius=0.0, obstacle_radius=0.0).neighbourhood(slice(None)).distance
     assert points.tolist() == [[2.0, 2.0, 1.5, 1.0], [2.0, 2.0, 1.5, 1.0], [2.0, 2.0, 1.0, 1.0]]
+
+
+def test_ugvs_stay_on_the_ground_whatever_is_above_them() -> None:
+    """Only the UAV has a third direction; what a UGV avoids from below pushes it sideways at most."""
+    assert TEAM.mobility.tolist() == [[1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [1.0, 1.0, 1.0]]
+    places = np.array([[0.0, 0.0, 0.0], [40.0, 0.0, 0.0], [0.1, 0.0, 1.0]])
+    avoidance = Avoidance(gain=3.0, period=0.05)
+    spaces = avoidance.half_spaces(places, TEAM.mobility, TEAM.neighbourhood(slice(None)).around(places))
+    velocity = avoidance.apply(np.zeros((3, 3)), spaces)
+    assert velocity[0, 0] < -0.1  # away from below the UAV
+    assert velocity[:2, 2].tolist() == [0.0, 0.0]
+    assert velocity[2, 2] > 0.1

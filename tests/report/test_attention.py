@@ -58,12 +58,12 @@ def test_why_a_robot_was_not_helped(scenario: Scenario, traces: dict[str, Trace]
     report = built(scenario, traces, [FINE[0], verdict("c", "refuted", counterexample=END), FINE[2]])
     refusals = report["runs"]["c"]["metrics"]["gatekeeper"]["refusals"]
     assert refusals == {}
-    refusals["ugv1"] = {"not_cheaper": 53}
+    refusals["ugv1"] = {"waits": 53}
     (item,) = attention.items(report)
-    assert item.words.endswith("; refused 53 times: waiting always looked cheaper")
+    assert item.words.endswith("; refused 53 times: the best plan began by refusing and accepted later")
     refusals["ugv1"] = {"not_cheaper": 1, "a_new_one": 2}
     assert attention.items(report)[0].words.endswith(
-        "; refused 3 times: a new one (2); waiting always looked cheaper (1)"
+        "; refused 3 times: a new one (2); its own task looked as good, or better (1)"
     )
 
 

@@ -213,6 +213,23 @@ def test_a_row_that_is_not_reproduced_shows(scenario: Scenario, traces: dict[str
     assert "differs by 3.9 s, 0.1 s are allowed; speed set" in text
 
 
+def test_the_reason_that_decided_is_shown_with_its_cost_and_so_is_a_failing_solver(
+    scenario: Scenario, traces: dict[str, Trace]
+) -> None:
+    """The best plan refused first: that accepting throughout costs less than refusing throughout decides nothing."""
+    decisions = traces["c"].decisions.assign(
+        decision="refuse", reason=["waits", "kept"], status=["optimal", "solver_failed"], objective=350.0,
+        accept_throughout=[350.3, 340.0], refuse_throughout=468.8, issued_s=14.6,
+    )  # fmt: skip
+    report = built(scenario, {**traces, "c": replace(traces["c"], decisions=decisions)}, FINE)
+    assert report["runs"]["c"]["metrics"]["gatekeeper"]["solver_failures"] == 1
+    text = " ".join(html.render(report, []).split())
+    assert "refuse: the best plan began by refusing and accepted later (cost 350 of the best plan, 350.3 to" in text
+    assert "ugv1 refused 1 proposal because the best plan began by refusing and accepted later" in text
+    assert "This is how method (c) starves a robot" in text
+    assert "the solver failed 1 time," in text
+
+
 def test_an_empty_report_renders(scenario: Scenario) -> None:
     empty = replace(scenario, runs={}, reproduction=[], choices=[])
     text = html.render(document.build(empty, "", {}, [], {}), [], "no svg")

@@ -17,6 +17,7 @@ from pydrake.systems.primitives import Integrator, LogVectorOutput, TrajectorySo
 from pydrake.trajectories import PiecewisePolynomial
 
 from airground_drake.arrays import Array
+from airground_drake.components import integrated_noise
 from airground_drake.decision.trigger import Trigger
 from airground_drake.nsbc.motion import Motion
 from airground_drake.scenarios.load import load
@@ -93,6 +94,15 @@ def test_a_dip_below_the_release_level_within_a_step_is_a_release() -> None:
     assert times(status, 2)[1] == pytest.approx((4.0 + np.sqrt(9.0 - 0.25)) / 8.0, abs=2e-6)
 
 
+def test_a_dip_too_short_to_be_isolated_is_a_release_and_a_trigger_at_once() -> None:
+    """Below the threshold for less than what an event is isolated to: both transitions are made at the step's end."""
+    nearest = 3.0 - 1e-13  # x is below 3 m for 2e-10 s
+    status = run(Trigger.bare(3.0), straight((4e3, nearest, 0.0), (-4e3, nearest, 0.0)), 1.0)
+    released = times(status, 3)
+    assert released == [pytest.approx(0.5, abs=2e-6)]
+    assert times(status, 2) == [0.0, *released]
+
+
 def test_a_peak_at_a_corner_of_the_reference_is_a_trigger() -> None:
     """The reference turns back in the middle of a step: x is below the threshold at both updates."""
     preset = Motion(np.array([0.0, 0.45, 0.9]), np.array([[0.0, 0.0, 0.0], [4.5, 0.0, 0.0], [0.0, 0.0, 0.0]]))
@@ -153,3 +163,11 @@ def test_what_is_above_the_threshold_at_the_start_is_intervened_on_at_the_first_
     scenario = load(pathlib.Path(__file__).parents[2] / "benchmarks/mutation/crowd.yaml")[0]
     proposals = simulate(scenario, "b").proposals
     assert proposals["issued_s"].min() == 0.0
+
+
+@pytest.mark.parametrize("period", [0.25, 0.01])
+def test_a_sample_of_the_noise_moves_the_variable_by_what_its_period_is_worth(period: float) -> None:
+    """Held over a period h, w adds intensity sqrt(h) w: after any time T the variance is intensity^2 T."""
+    noise = integrated_noise(2, 0.4, 0.0, period)
+    np.testing.assert_allclose(period * noise.B(), 0.4 * np.sqrt(period) * np.eye(2), rtol=1e-12)
+    np.testing.assert_array_equal(integrated_noise(2, 0.4, 0.3, period).A(), -0.3 * np.eye(2))

@@ -3,20 +3,26 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
+import numpy as np
 import pytest
+from builders.problems import random_problem
 
 from airground_drake import components
+from airground_drake.gatekeeper import sample
 from airground_drake.gatekeeper.answer import Rules
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.problem import Problem
-from airground_drake.gatekeeper.solution import ConstantPlans, Solution
+from airground_drake.gatekeeper.routes.enumeration import EnumerationRoute
+from airground_drake.gatekeeper.solution import ConstantPlans, Solution, after_failure
 from airground_drake.registry import ROUTES
+from airground_drake.report import metrics
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.simulation import Recorder, simulate
+from airground_drake.verify.judge import verify
 
 
 @dataclass
@@ -41,6 +47,79 @@ def test_opposite_answers_of_a_run_are_a_dwell_apart(case_a: Scenario, dwell: fl
         changes = of_one["t_s"][of_one["decision"] != of_one["decision"].shift()].to_numpy()
         assert (changes[1:] - changes[:-1] >= dwell - 1e-9).all()
     assert ("dwell" in set(decisions["reason"])) == (dwell > 0.05)
+
+
+@dataclass
+class FailingLater:
+    """A route whose solver fails at every second call, and that returns no plan then."""
+
+    calls: int = 0
+
+    def __post_init__(self) -> None:
+        self._route = EnumerationRoute()
+
+    def solve(self, problem: Problem, budget: Budget) -> Solution:
+        self.calls += 1
+        found = self._route.solve(problem, budget)
+        return found if self.calls % 2 else Solution(False, "solver_failed")
+
+
+def test_a_failing_solver_withdraws_no_acceptance_and_is_recorded(case_a: Scenario) -> None:
+    well = simulate(case_a, "c").decisions
+    case_a.gatekeeper.route = "failing"
+    with ROUTES.adding("failing", FailingLater):
+        trace = simulate(case_a, "c")
+    decisions = trace.decisions
+    failed = decisions[decisions["status"] == "solver_failed"]
+    assert len(failed) == len(decisions) // 2 > 10
+    assert set(decisions["decision"]) == set(well["decision"]) == {"accept"}
+    assert metrics.of_run(trace)["gatekeeper"]["solver_failures"] == len(failed)
+    constant = failed[["accept_throughout", "refuse_throughout"]].min(axis=1)
+    assert (failed["objective"] <= constant * (1.0 + 1e-9)).all()
+    assert [(v.claim.id, v.finding.status) for v in verify(trace, ["GATE-FEAS"])] == [("GATE-FEAS", "holds")]
+
+
+def test_after_a_failure_the_rest_of_the_plan_before_counts(case_a: Scenario, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is left of it after a sampling period, which is one stage; its last choice stands for the stage more."""
+    solutions: list[Solution] = []
+    before: list[np.ndarray | None] = []
+
+    class Listening(FailingLater):
+        def solve(self, problem: Problem, budget: Budget) -> Solution:
+            solutions.append(super().solve(problem, budget))
+            if solutions[-1].has_plan:
+                plan = problem.evaluate(np.arange(problem.stages) % 7 % 2.0)
+                solutions[-1] = replace(solutions[-1], plan=plan.omega, positions=plan.positions)
+            return solutions[-1]
+
+    def listening(problem: Problem, solution: Solution, previous: np.ndarray | None) -> Solution:
+        before.append(previous)
+        return after_failure(problem, solution, previous)
+
+    monkeypatch.setattr(sample, "after_failure", listening)
+    case_a.gatekeeper.route = "failing"
+    with ROUTES.adding("failing", Listening):
+        simulate(case_a, "c")
+    plans = [solution.plan for solution in solutions if solution.plan is not None]
+    assert len(before) > 10
+    for plan, rest in zip(plans, before, strict=False):
+        assert rest is not None
+        np.testing.assert_array_equal(rest, np.append(plan[1:], plan[-1]))
+
+
+def test_the_best_of_what_is_known_after_a_failure() -> None:
+    problem, failed = random_problem(0), Solution(False, "solver_failed")
+    constants = ConstantPlans.of(problem)
+    best = EnumerationRoute().solve(problem)
+    assert best.plan is not None
+    assert best.objective < constants.better.objective
+    assert after_failure(problem, failed, best.plan).objective == best.objective
+    for own, previous in ((failed, None), (failed, constants.better.omega)):
+        assert after_failure(problem, own, previous).objective == constants.better.objective
+    own = replace(best, status="solver_failed")
+    assert after_failure(problem, own, np.ones(problem.stages)).objective == best.objective
+    broken = replace(problem, initial=np.full(3, np.nan))
+    assert after_failure(broken, failed, best.plan).status == "refused_not_finite"
 
 
 def test_a_proposal_that_leads_nowhere_is_refused_under_d_and_the_uav_is_told_where() -> None:
@@ -71,7 +150,7 @@ class Watching:
 
     def solve(self, problem: Problem, budget: Budget) -> Solution:
         self.given.append(budget)
-        return ConstantPlans.of(problem).failed()
+        return Solution(False, "refused_not_finite")
 
 
 def recorded_budgets(scenario: Scenario, monkeypatch: pytest.MonkeyPatch, clock: Clock | None) -> list[Budget]:
@@ -107,15 +186,15 @@ def test_in_real_time_a_decision_has_half_the_sampling_period(
 
 
 @pytest.mark.parametrize("route", ROUTES.own)
-def test_with_no_time_left_every_proposal_is_refused(
+def test_with_no_time_left_the_better_constant_plan_decides(
     case_a: Scenario, monkeypatch: pytest.MonkeyPatch, route: str
 ) -> None:
-    """A clock that jumps a whole sampling period at each reading: nothing is ever evaluated in time."""
+    """A clock that jumps a whole sampling period at each reading: no solver is ever called."""
     case_a.gatekeeper.budget, case_a.gatekeeper.route = "wall_clock", route
     make = components.make_rules
     monkeypatch.setattr(components, "make_rules", lambda s: Rules(**{**make(s).__dict__, "clock": Clock(tick=0.05)}))
     decisions = simulate(case_a, "c").decisions
-    assert len(decisions)
-    assert set(decisions["decision"]) == {"refuse"}
-    assert set(decisions["status"]) == {"refused_budget_spent"}
-    assert set(decisions["reason"]) == {"no_plan"}
+    assert set(decisions["status"]) == {"budget_spent"}
+    best = decisions[["accept_throughout", "refuse_throughout"]].min(axis=1)
+    assert decisions["objective"].to_numpy() == pytest.approx(best.to_numpy(), rel=1e-9)
+    assert set(decisions["decision"]) == {"accept"}

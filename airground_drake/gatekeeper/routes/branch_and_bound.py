@@ -22,7 +22,7 @@ from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.convex_program import TeamProgram, team_program
 from airground_drake.gatekeeper.half_planes import normals_along
 from airground_drake.gatekeeper.problem import Problem
-from airground_drake.gatekeeper.routes.guard import guarded, unavoidable_cost
+from airground_drake.gatekeeper.routes.guard import guarded, how_it_ended, unavoidable_cost, without_optimum
 from airground_drake.gatekeeper.solution import ConstantPlans, Solution, cheapest, cut_short
 
 _SCALE = 10.0
@@ -53,8 +53,8 @@ class BranchAndBoundRoute:
     the same half-planes and dwell. Its "binaries" are binary to a tolerance only, so that the plan is rounded
     and evaluated exactly, and the cheapest of it and the constant plans is returned.
 
-    Anything but a proven optimum refuses. Of roll-outs among random discs some end so, because Clarabel
-    reports insufficient progress in a node; Drake hands no options on to it.
+    Anything but a proven optimum is a failure, which leaves the better constant plan. Of roll-outs among random discs
+    some end so, because Clarabel reports insufficient progress in a node; Drake hands no options on to it.
 
     Budget: nodes go to Drake's search, which explores at most 2^(blocks + 1) anyway. It can be neither
     interrupted nor given a time, and its relaxations no number of iterations; so with a deadline it gets
@@ -83,13 +83,11 @@ class BranchAndBoundRoute:
         try:
             found = _branch(team, budget) if self._licensed is None else _delegate(self._licensed, team, budget)
         except (RuntimeError, ValueError):  # Drake: "Unknown result", or a failing sub-solver
-            return constants.failed()
-        if found is None:
-            return constants.failed()
-        if found.binaries is None:
+            found = None
+        if found is _SPENT:
             return cut_short(problem, constants.both, unavoidable_cost(problem))
-        if not np.isfinite(found.binaries).all() or not np.isfinite(found.bound):
-            return constants.failed()
+        if found is None or not (np.isfinite(found.binaries).all() and np.isfinite(found.bound)):
+            return without_optimum(problem, constants, budget, normals)
         plan = problem.evaluate((team.ugvs[0].plan(found.binaries) > 0.5).astype(float))
         return cheapest(problem, (plan, *constants.both), route_bound=max(0.0, scale * found.bound), normals=normals)
 
@@ -104,13 +102,14 @@ def licensed_solver() -> Any:
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """What a search gave: binaries (B,), None if its nodes were spent; and a lower bound in the program's unit."""
+    """What a search gave: binaries (B,) and a lower bound in the program's unit."""
 
-    binaries: Array | None
+    binaries: Array
     bound: float
 
 
-_SPENT = Found(None, -1.0)
+_SPENT = Found(np.zeros(0), -1.0)
+"""What a search gave whose nodes were spent."""
 
 
 def _branch(team: TeamProgram, budget: Budget) -> Found | None:
@@ -134,8 +133,7 @@ def _delegate(solver: Any, team: TeamProgram, budget: Budget) -> Found | None:
     """The same by a solver of mixed-integer programs, at its default relative gap of 1e-4."""
     result = solver.Solve(team.program, None, _limits(solver, budget))
     if not result.is_success():
-        stopped = budget.spent() or result.get_solution_result() == SolutionResult.kIterationLimit
-        return _SPENT if stopped else None
+        return _SPENT if how_it_ended(result, budget) == "budget_spent" else None
     optimum = float(result.get_optimal_cost())
     return Found(np.asarray(result.GetSolution(team.ugvs[0].omega), dtype=float), optimum - 1e-4 * abs(optimum))
 

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from pydrake.solvers import MathematicalProgramResult, SolutionResult
+
+from airground_drake.arrays import Array
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.problem import Problem
 from airground_drake.gatekeeper.reachable_box import remaining_cost
-from airground_drake.gatekeeper.solution import ConstantPlans, Solution, cut_short
+from airground_drake.gatekeeper.solution import ConstantPlans, Solution, Status, cut_short
 
 Search = Callable[[Problem, ConstantPlans, Budget], Solution]
 """A route's own work on a finite problem, with its constant plans, while there is budget left."""
@@ -18,14 +21,12 @@ def guarded(problem: Problem, budget: Budget, search: Search, *, closed_loop: bo
 
     Args:
         problem: data of (26).
-        budget: asked before and after the constant plans are evaluated.
+        budget: asked when the constant plans are evaluated: there is always one of them to go by.
         search: what to do then.
         closed_loop: evaluate the constant plans on the closed loop.
     """
     if not problem.is_finite():
         return Solution(False, "refused_not_finite")
-    if budget.spent():
-        return Solution(False, "refused_budget_spent")
     constants = ConstantPlans.of_closed_loop(problem) if closed_loop else ConstantPlans.of(problem)
     if not constants.are_finite():
         return Solution(False, "refused_not_finite")
@@ -35,11 +36,27 @@ def guarded(problem: Problem, budget: Budget, search: Search, *, closed_loop: bo
     return search(problem, constants, budget)
 
 
-def without_optimum(problem: Problem, constants: ConstantPlans, budget: Budget) -> Solution:
-    """The solution when a solver gave nothing: for want of time the better constant plan, else a refusal."""
-    if budget.spent():
-        return cut_short(problem, constants.both, unavoidable_cost(problem))
-    return constants.failed()
+def without_optimum(
+    problem: Problem, constants: ConstantPlans, budget: Budget, normals: Array | None = None
+) -> Solution:
+    """The better constant plan, when a solver gave nothing: for want of time, or because it failed.
+
+    Args:
+        problem: what they are plans of.
+        constants: its constant plans.
+        budget: if it is spent, the solver wanted time.
+        normals: of half-planes that stand for (26d), (N, m, 3).
+    """
+    status: Status = "budget_spent" if budget.spent() else "solver_failed"
+    return cut_short(problem, constants.both, unavoidable_cost(problem), status=status, normals=normals)
+
+
+def how_it_ended(result: MathematicalProgramResult, budget: Budget) -> Status:
+    """How a solver ended: with an optimum, for want of budget, or by failing."""
+    if result.is_success():
+        return "optimal"
+    stopped = budget.spent() or result.get_solution_result() == SolutionResult.kIterationLimit
+    return "budget_spent" if stopped else "solver_failed"
 
 
 def unavoidable_cost(problem: Problem) -> float:

@@ -12,7 +12,6 @@ from pydrake.solvers import (
     MathematicalProgram,
     QuadraticConstraint,
     SnoptSolver,
-    SolutionResult,
     SolverOptions,
 )
 
@@ -21,8 +20,8 @@ from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.problem import Evaluation, Problem
 from airground_drake.gatekeeper.reachable_box import within_reach
 from airground_drake.gatekeeper.rounding import sum_up_rounding
-from airground_drake.gatekeeper.routes.guard import guarded, unavoidable_cost, without_optimum
-from airground_drake.gatekeeper.solution import ConstantPlans, Solution, cheapest, cut_short
+from airground_drake.gatekeeper.routes.guard import guarded, how_it_ended, unavoidable_cost, without_optimum
+from airground_drake.gatekeeper.solution import ConstantPlans, Solution, Status, cheapest, cut_short
 
 NlpSolver = Literal["snopt", "ipopt"]
 
@@ -83,29 +82,25 @@ class NonlinearRoute:
         return guarded(problem, budget, self._solve)
 
     def _solve(self, problem: Problem, constants: ConstantPlans, budget: Budget) -> Solution:
-        relaxed, finished = self._relax(problem, constants.better, budget)
+        relaxed, status = self._relax(problem, constants.better, budget)
         if relaxed is None:
             return without_optimum(problem, constants, budget)
         rounded = sum_up_rounding(relaxed)
         plans = (problem.evaluate(rounded), *constants.both)
-        if not finished:
-            return cut_short(problem, plans, unavoidable_cost(problem), relaxed=relaxed, rounded=rounded)
+        if status != "optimal":
+            bound = unavoidable_cost(problem)
+            return cut_short(problem, plans, bound, status=status, relaxed=relaxed, rounded=rounded)
         return cheapest(problem, plans, relaxed=relaxed, rounded=rounded)
 
-    def _relax(self, problem: Problem, start: Evaluation, budget: Budget) -> tuple[Array | None, bool]:
-        """Omega (N,), None where the solver failed, and whether it is a local optimum."""
+    def _relax(self, problem: Problem, start: Evaluation, budget: Budget) -> tuple[Array | None, Status]:
+        """Omega (N,) where the solver ended, None if that is no number; how it ended."""
         nlp = relaxation(problem, start)
         try:
             result = self._solver.Solve(nlp.program, nlp.guess, self._options(budget))
         except RuntimeError:
-            return None, False
+            return None, "solver_failed"
         omega = np.clip(result.GetSolution(nlp.omega), 0.0, 1.0)
-        finished = bool(result.is_success())
-        if not np.isfinite(omega).all():
-            return None, False
-        if not finished and not budget.spent() and result.get_solution_result() != SolutionResult.kIterationLimit:
-            return None, False
-        return omega, finished
+        return omega if np.isfinite(omega).all() else None, how_it_ended(result, budget)
 
     def _options(self, budget: Budget) -> SolverOptions:
         options = SolverOptions()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from pydrake.solvers import ClarabelSolver, MathematicalProgramResult, SolutionResult, SolverOptions
+from pydrake.solvers import ClarabelSolver, SolverOptions
 
 from airground_drake.arrays import Array
 from airground_drake.gatekeeper.budget import Budget
@@ -14,8 +14,8 @@ from airground_drake.gatekeeper.dual_bound import dual_bound, multipliers_at
 from airground_drake.gatekeeper.half_planes import normals_along
 from airground_drake.gatekeeper.problem import Problem
 from airground_drake.gatekeeper.rounding import sum_up_rounding
-from airground_drake.gatekeeper.routes.guard import guarded, unavoidable_cost, without_optimum
-from airground_drake.gatekeeper.solution import ConstantPlans, Solution, cheapest
+from airground_drake.gatekeeper.routes.guard import guarded, how_it_ended, unavoidable_cost, without_optimum
+from airground_drake.gatekeeper.solution import ConstantPlans, Solution, Status, cheapest
 
 _TOLERANCE = 1e-6
 
@@ -46,7 +46,8 @@ class RelaxedRoute:
     `route_bound` is computed from the multipliers by weak duality (`dual_bound`), so that it is a bound whatever
     the solver's tolerances, and also when its iterations ran out.
 
-    Budget: iterations and the time left go to the solver; there is no tree to search.
+    Budget: iterations and the time left go to the solver; there is no tree to search. If the solver fails, the omega
+    where it ended is rounded all the same: plans are evaluated exactly, whatever they come from.
 
     The program is built once for a number of stages and the weights, then only its coefficients change.
     """
@@ -62,23 +63,25 @@ class RelaxedRoute:
 
     def _solve(self, problem: Problem, constants: ConstantPlans, budget: Budget) -> Solution:
         normals = normals_along(problem, constants.better.positions)
-        relaxed, bound, finished = self._relax(problem, normals, constants.better.objective, budget)
+        relaxed, bound, status = self._relax(problem, normals, constants.better.objective, budget)
         if relaxed is None:
-            return without_optimum(problem, constants, budget)
+            return without_optimum(problem, constants, budget, normals)
         rounded = sum_up_rounding(relaxed)
         other = np.append(1.0 - rounded[0], rounded[1:])
         return cheapest(
             problem,
             (constants.accept, constants.refuse, problem.evaluate(rounded), problem.evaluate(other)),
-            status="optimal" if finished else "budget_spent",
+            status=status,
             route_bound=max(bound, unavoidable_cost(problem)),
             normals=normals,
             relaxed=relaxed,
             rounded=rounded,
         )
 
-    def _relax(self, problem: Problem, normals: Array, cost: float, budget: Budget) -> tuple[Array | None, float, bool]:
-        """Omega (N,), or None where the solver failed, the bound that follows, and whether it is an optimum."""
+    def _relax(
+        self, problem: Problem, normals: Array, cost: float, budget: Budget
+    ) -> tuple[Array | None, float, Status]:
+        """Omega (N,) where the solver ended, None if that is no number; the bound that follows; how it ended."""
         scale = _scale(cost)
         shape = Shape.of(problem, scale=scale)
         if shape not in self._programs:
@@ -88,22 +91,20 @@ class RelaxedRoute:
         rows = ugv.update(problem, normals)
         result = self._solver.Solve(team.program, None, _options(budget))
         omega = np.clip(result.GetSolution(ugv.omega), 0.0, 1.0)
-        finished = bool(result.is_success())
+        status = how_it_ended(result, budget)
         usable = np.isfinite(omega).all()
-        if not usable or not (finished or _stopped(result, budget)):
+        if not usable or status == "solver_failed":
             del self._programs[shape]  # a fresh workspace after a failure
-            return None, -math.inf, False
+        if not usable:
+            return None, -math.inf, status
         bound = dual_bound(problem, normals, omega, multipliers_at(problem, normals, problem.positions(omega)))
+        if status == "solver_failed":  # its multipliers and its cost are not to be relied on
+            return omega, bound, status
         if bound < (1.0 - 2.0 * _TOLERANCE) * scale * result.get_optimal_cost() and rows.any():
             multipliers = np.zeros(rows.shape)
             multipliers[rows] = scale * result.GetDualSolution(ugv.avoidance)
             bound = max(bound, dual_bound(problem, normals, omega, multipliers))
-        return omega, bound, finished
-
-
-def _stopped(result: MathematicalProgramResult, budget: Budget) -> bool:
-    """Whether the solver gave up for want of budget."""
-    return budget.spent() or result.get_solution_result() == SolutionResult.kIterationLimit
+        return omega, bound, status
 
 
 def _scale(cost: float) -> float:

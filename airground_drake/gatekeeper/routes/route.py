@@ -16,9 +16,10 @@ class Route(Protocol):
     A gatekeeper keeps one object for all its UGVs and samples, so that a route may keep programs or workspaces
     between calls. What it owes:
 
-    - It never raises, whatever the problem. Without a plan it returns a `Solution` whose status says why
-      ('refused_...') and whose `accept_first` is False. `guard.guarded` does this for data that are not finite,
-      for costs that overflow, and for a budget that is already spent.
+    - It never raises, whatever the problem. For data that are not finite, and costs that overflow, it returns
+      `Solution(False, "refused_not_finite")`, as `guard.guarded` does.
+    - If its solver fails, it returns the best plan that it has evaluated, with status 'solver_failed'. The gatekeeper
+      compares that with the previous plan, and with the constant plans (`solution.after_failure`).
     - It keeps the budget: the counts, and the deadline but for one step of its own. At the end of the budget it
       returns the best plan known, with status 'budget_spent'. Counts alone give the same solution on every machine
       and at every call.

@@ -295,11 +295,10 @@ def rule(row: Row, standing: str | None, stood: float, gate: dict[str, Any]) -> 
     if not row.planned:
         return False, "no_plan"
     if standing is None:
+        gains = given["objective"] < (1.0 - NO_DIFFERENCE) * given["refuse_throughout"]
         if row["plan"][0] != 1.0:
-            return False, "not_cheaper"
-        if given["objective"] >= (1.0 - NO_DIFFERENCE) * given["refuse_throughout"]:
-            return False, "no_difference"
-        return True, "cheaper"
+            return False, "waits" if gains else "not_cheaper"
+        return gains, "cheaper" if gains else "no_difference"
     accepted = standing == "accept"
     enough = (1.0 - gate["switching_margin"]) * given[f"{standing}_throughout"]
     cheaper = (row["plan"][0] == 1.0) != accepted and given["objective"] < enough

@@ -145,7 +145,7 @@ def rows_of(trace: Trace) -> list[Row]:
             raise TraceError(f"{row.label}: it or its problem has numbers that are not finite")
         if given["robot"] not in trace.ugvs or given["route"] != gate["route"]:
             raise TraceError(f"{row.label}: not of a UGV of the trace, or not by the scenario's route")
-        decided = given["status"] in ("optimal", "budget_spent")
+        decided = given["status"] in ("optimal", "budget_spent", "solver_failed")
         if row.planned != decided or (decided and row.data["positions_m"] is None):
             raise TraceError(f"{row.label}: a plan without positions, or not what its status {given['status']!r} says")
         rows.append(row)

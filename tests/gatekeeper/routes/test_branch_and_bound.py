@@ -28,7 +28,7 @@ def test_branch_and_bound_bounds_the_convexified_problem() -> None:
 
 
 @pytest.mark.parametrize("how", ["RuntimeError", "infeasible"])
-def test_a_failing_branch_and_bound_refuses(how: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_failing_branch_and_bound_leaves_the_better_constant_plan(how: str, monkeypatch: pytest.MonkeyPatch) -> None:
     class Search:
         Options = MixedIntegerBranchAndBound.Options
 
@@ -41,9 +41,10 @@ def test_a_failing_branch_and_bound_refuses(how: str, monkeypatch: pytest.Monkey
             return SolutionResult.kInfeasibleConstraints
 
     monkeypatch.setattr(branch_and_bound, "MixedIntegerBranchAndBound", Search)
-    solution = BranchAndBoundRoute().solve(random_problem(0))
-    assert not solution.accept_first
-    assert solution.status == "refused_solver_failed"
+    for seed in range(3):
+        solution = check_contract(BranchAndBoundRoute(), random_problem(seed))
+        assert solution.status == "solver_failed"
+        assert solution.objective == ConstantPlans.of(random_problem(seed)).better.objective
 
 
 def test_a_licensed_solver_gets_one_binary_per_stage(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -184,15 +184,12 @@ def ticking(deadline: int) -> Budget:
 def test_the_clock_ends_the_search(visited: list[int], monkeypatch: pytest.MonkeyPatch) -> None:
     problem = Instance(11).problem(60)
     best = BY_BLOCKS[10].solve(problem, UNLIMITED)
-    visited.clear()
-    late = BY_BLOCKS[10].solve(problem, ticking(1))
-    assert (late.status, late.accept_first, late.plan, visited) == ("refused_budget_spent", False, None, [])
     monkeypatch.setattr(closed_loop_enumeration, "_CHUNK", 8)
     objectives, gaps = [], []
-    for deadline in range(2, 6):
+    for deadline in range(1, 5):
         visited.clear()
         solution = BY_BLOCKS[10].solve(problem, ticking(deadline))
-        assert 16 * (deadline - 3) < sum(visited) <= 16 * (deadline - 2)
+        assert 16 * (deadline - 2) < sum(visited) <= 16 * (deadline - 1)
         assert solution.status == "budget_spent"
         objectives.append(solution.objective)
         gaps.append(solution.gap)

@@ -8,15 +8,19 @@ import cvxpy
 import numpy as np
 import pytest
 from builders.problems import INSTANCES, case_a_proposal, random_problem
+from gatekeeper.contract import check_contract
 from gatekeeper.formulas import cost
 from hypothesis import example, given
 from hypothesis import strategies as st
 from properties import examples
+from pydrake.solvers import SolutionResult
 
+from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.half_planes import normals_along
 from airground_drake.gatekeeper.prediction import predicted_problem
 from airground_drake.gatekeeper.problem import Problem
 from airground_drake.gatekeeper.routes.relaxed import RelaxedRoute
+from airground_drake.gatekeeper.solution import Solution
 
 
 def in_reach(problem: Problem) -> np.ndarray:
@@ -113,13 +117,19 @@ def test_numbers_that_are_not_finite_are_refused(field: str) -> None:
     assert solution.status == "refused_not_finite"
 
 
-def test_a_failing_solver_refuses(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("ended", [np.nan, 0.7])
+def test_a_failing_solver_leaves_the_best_plan_known(ended: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With the omega where it ended among them, if that is a number."""
+
     class Failed:
         def is_success(self) -> bool:
             return False
 
+        def get_solution_result(self) -> SolutionResult:
+            return SolutionResult.kSolverSpecificError
+
         def GetSolution(self, variables: np.ndarray) -> np.ndarray:
-            return np.full(len(variables), np.nan)
+            return np.full(len(variables), ended)
 
         def get_optimal_cost(self) -> float:
             return float("inf")
@@ -128,11 +138,16 @@ def test_a_failing_solver_refuses(monkeypatch: pytest.MonkeyPatch) -> None:
         def Solve(self, *arguments: object) -> Failed:
             return Failed()
 
-    route = RelaxedRoute()
-    monkeypatch.setattr(route, "_solver", Solver())
-    solution = route.solve(random_problem(0))
-    assert not solution.accept_first
-    assert solution.status == "refused_solver_failed"
+    class Fails:
+        def solve(self, problem: Problem, budget: Budget) -> Solution:
+            route = RelaxedRoute()
+            monkeypatch.setattr(route, "_solver", Solver())
+            return route.solve(problem, budget)
+
+    problem = random_problem(0)
+    solution = check_contract(Fails(), problem)
+    assert solution.status == "solver_failed"
+    assert (solution.rounded is None) == bool(np.isnan(ended))
     assert RelaxedRoute().solve(random_problem(0)).status == "optimal"
 
 

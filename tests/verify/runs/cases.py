@@ -155,6 +155,6 @@ def worst_plan(row: dict[str, Any], problem: dict[str, Any]) -> None:
 
 
 def refused_for_want_of_a_plan(row: dict[str, Any], problem: dict[str, Any]) -> None:
-    row |= {"status": "refused_solver_failed", "decision": "refuse", "reason": "no_plan"}
+    row |= {"status": "refused_not_finite", "decision": "refuse", "reason": "no_plan"}
     for name in ("plan", "positions_m", "relaxed", "rounded", "normals"):
         problem[name] = []
