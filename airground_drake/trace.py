@@ -39,12 +39,13 @@ from airground_drake.errors import TraceError
 
 T = TypeVar("T")
 
-SCHEMA = "airground_drake.trace/5"
+SCHEMA = "airground_drake.trace/6"
 
 DECISION_COLUMNS = {
     "t_s": "float64",
     "robot": "str",
     "policy": "str",
+    "number": "int64",
     "issued_s": "float64",
     "decision": "str",
     "reason": "str",
@@ -71,7 +72,8 @@ DECISION_COLUMNS = {
     "predicted_lag_m": "float64",
     "tries": "float64",
 }
-"""Columns of `Trace.decisions`, one row per robot and gatekeeper call; -1 where a number does not apply. Those up to
+"""Columns of `Trace.decisions`, one row per robot and gatekeeper call; -1 where a number does not apply. `number` is
+that of the proposal in `Trace.proposals`. Those up to
 `predicted_clearance_m` are of decisions by problem (26), the others of decisions by outcomes: what comes of either
 choice as `gatekeeper.outcome` has it (cost, 1 if it comes to rest short of the goal, way left), how far the UGV is
 behind the proposed motion, and how often it has gone along since it last rested."""
@@ -87,9 +89,11 @@ centres and normals (N x m x 3), distances (m), plan, relaxed and rounded omega 
 empty where the route has none. Normals are those of the half-planes that `route_bound` is about."""
 
 PROPOSAL_COLUMNS = (
-    "robot", "policy", "issued_s", "times_s", "positions_m", "selection", "mapped_m", "mapped_radius_m", "cause",
+    "number", "robot", "policy", "issued_s", "times_s", "positions_m", "selection", "mapped_m", "mapped_radius_m",
+    "cause",
 )  # fmt: skip
-"""Columns of `Trace.proposals`, one row per proposal sent: for which UGV, by which policy, when; the vertices of the
+"""Columns of `Trace.proposals`, one row per proposal sent: its number, which identifies it and counts from 0 in the
+order of sending; for which UGV, by which policy, when; the vertices of the
 motion that it asks for, times (M) and positions (M x 3, flattened in C order), and J_int of (12)-(14), (m x 3, ditto):
 the directions that it concerns, and the obstacles that the UAV knows, centres (k x 3, ditto) and radii (k); and the UGV
 whose trigger it was sent for: this one, or another one that it is to make way for."""

@@ -11,7 +11,7 @@ import pytest
 
 from airground_drake.intervention.database import BehaviourDatabase
 from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT, Report
-from airground_drake.intervention.planner import Planner, PlannerMemory
+from airground_drake.intervention.planner import Planner, PlannerMemory, sent_after
 from airground_drake.intervention.policy import Observation, Policy
 from airground_drake.nsbc.motion import Motion
 
@@ -53,10 +53,11 @@ def step(
     """One planning instant; who is intervened on, and answers to the proposals in force, by name."""
     given = []
     for name, desk in zip(UGVS, memory.desks, strict=True):
-        issued = desk.proposal.issued if desk.proposal else -1.0
-        given += [(answers or {}).get(name, SILENT), issued]
+        number = desk.proposal.number if desk.proposal else -1
+        given += [(answers or {}).get(name, SILENT), number]
     called = [name in intervening.split() for name in UGVS]
-    return uav.plan(uav.watch(memory, t, PLACES), t, PLACES, called, np.array(given), (report,) * 3)
+    watched = uav.watch(memory, t, PLACES)
+    return sent_after(memory, uav.plan(watched, t, PLACES, called, np.array(given), (report,) * 3), t)
 
 
 def in_force(memory: PlannerMemory) -> dict[str, tuple[float, str]]:
@@ -185,7 +186,7 @@ def test_radii_come_with_a_refusal_and_go_out_with_a_proposal() -> None:
     )
     memory = step(uav, uav.start(), 1.0, "one")
     sensed = Report(sensed=((2.0, 9.0, 0.0, 3.0), (5.0, 5.0, 0.0, 0.7)))
-    answers = np.array([REFUSE, 1.0, SILENT, -1.0, SILENT, -1.0])
+    answers = np.array([REFUSE, 0.0, SILENT, -1.0, SILENT, -1.0])
     memory = uav.plan(memory, 1.1, PLACES, [True, False, False], answers, (sensed, *NOBODY[1:]))
     assert memory.learnt == ((5.0, 5.0, 0.0, 0.7),)  # the other one is on the map
     memory = step(uav, memory, 3.0, "one")

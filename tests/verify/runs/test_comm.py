@@ -109,6 +109,8 @@ def test_a_proposal_stands_until_it_is_over_and_no_longer(told: Trace) -> None:
     last = told.proposals.iloc[[-1]]
     when = float(last["issued_s"].iloc[0]) + 0.2
     events = [e for e in told.events if e["kind"] == "proposal"][-1:]
-    twice = replace(told, proposals=pd.concat([told.proposals, last.assign(issued_s=when)], ignore_index=True))
+    twice = replace(
+        told, proposals=pd.concat([told.proposals, last.assign(issued_s=when, number=90)], ignore_index=True)
+    )
     twice = with_meta(twice, events=[*told.events, *({**event, "t_s": when} for event in events)])
     assert counterexample("COMM", twice)["kind"] in ("replaced while in force", "decision on what was withdrawn")
