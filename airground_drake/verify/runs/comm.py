@@ -26,13 +26,14 @@ class Comm(TraceClaim):
         "Messages and gatekeeper solves were spent only while the UGV concerned, or the one that it was asked to make "
         "way for, was being intervened on, and no more of them than an always-on scheme would have spent. "
         "No proposal was decided on once it was taken back, or replaced while it was in force but by or in a joint "
-        "plan, or while another UGV was intervened on, too; what it said of obstacles was what the UAV knew: its own map, and what UGVs sensed when they refused."
+        "plan, or while another UGV was intervened on, too; what it said of obstacles was what the UAV knew: its own "
+        "map, and what UGVs sensed when they refused."
     )
     formula = (
         "every proposal and decision in [trigger, release + intervention period + gatekeeper period]; "
         "proposals <= n ceil(duration / intervention period), decisions <= n ceil(duration / gatekeeper period); "
-        "no decision on a proposal that is withdrawn, none in force replaced but by or in a joint plan or while another "
-        "UGV is intervened on; "
+        "no decision on a proposal that is withdrawn, none in force replaced but by or in a joint plan or while "
+        "another UGV is intervened on; "
         "map of a proposal = known and phantom obstacles, then all sensed by UGVs at refusals that the UAV has noticed"
     )
     latex = (
