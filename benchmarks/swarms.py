@@ -31,8 +31,8 @@ from airground_drake.simulation import simulate
 from airground_drake.verify import verify
 
 CLAIMS = ("SAFE-TRACE", "SAFE-HYP", "EXEC", "THR-TRIG", "GATE-FEAS", "COMM")
-SLOW_CLAIMS, SELDOM = ("GATE-MODEL", "LIVE-PROG"), 5
-"""Claims that roll out decisions again, and how many runs there are for each on which they are judged."""
+SLOW_CLAIMS, SELDOM, FEW = ("GATE-MODEL", "LIVE-PROG"), 3, 15
+"""Claims that roll out decisions again are judged on one run of so many, of so many UGVs at most."""
 WHIMS = "whims"
 KINDS = ("circle", "grid", "maze")
 SAFE_M, SPACE_M = 0.8, 1.1
@@ -157,7 +157,8 @@ def judged(numbers: Iterable[int], folder: Path | None) -> int:
     spent: Counter[str] = Counter({"runs": 0, "wrong": 0})
     for number in numbers:
         data, started = scenario_of(number), time.process_time()
-        claims = (*CLAIMS, *SLOW_CLAIMS) if number % SELDOM == 0 else CLAIMS
+        slow = number % SELDOM == 0 and len(data["ugvs"]) <= FEW
+        claims = (*CLAIMS, *SLOW_CLAIMS) if slow else CLAIMS
         trace = simulate(from_data(data, data["name"]), "d")
         verdicts = [(verdict.claim.id, verdict.finding) for verdict in verify(trace, claims)]
         wrong = [(name, found) for name, found in verdicts if found.status != "holds"]

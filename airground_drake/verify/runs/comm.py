@@ -132,7 +132,7 @@ class Comm(TraceClaim):
                 "saved": saved,
                 "ugvs": per_ugv,
                 "outside_interventions": strays,
-                "intervened_on_without": silent,
+                **{f"without_{kind}s": ugvs for kind, ugvs in silent.items()},
             },
             exercised=spent["proposal"],
         )

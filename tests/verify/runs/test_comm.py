@@ -125,5 +125,5 @@ def test_a_ugv_that_no_policy_helps_does_not_keep_the_others_from_being_judged()
     trace = with_signals(run_of("d"), intervening)
     finding = judge("COMM", trace)
     assert finding.status == "holds"
-    assert finding.evidence["intervened_on_without"] == {"proposal": ["ugv2"], "decision": ["ugv2"]}
+    assert (finding.evidence["without_proposals"], finding.evidence["without_decisions"]) == (["ugv2"], ["ugv2"])
     assert judge("COMM", proposals(trace, 5.0)).status == "refuted"
