@@ -33,11 +33,10 @@ def extract(trace: Trace, sent: Iterable[tuple[str, float, str]]) -> list[dict[s
                     add(when, ugv, kind)
     for ugv, issued, policy in sent:
         add(issued, ugv, "proposal", policy=policy)
-    previous: dict[tuple[str, float], str] = {}
-    for row in trace.decisions[["t_s", "robot", "policy", "issued_s", "decision", "status"]].to_dict("records"):
-        key = (row["robot"], row["issued_s"])
-        if previous.get(key) != row["decision"]:
-            previous[key] = row["decision"]
+    previous: dict[int, str] = {}
+    for row in trace.decisions[["t_s", "robot", "policy", "number", "decision", "status"]].to_dict("records"):
+        if previous.get(row["number"]) != row["decision"]:
+            previous[row["number"]] = row["decision"]
             add(row["t_s"], row["robot"], row["decision"], policy=row["policy"], status=row["status"])
     for robot in trace.robots:
         _add_arrival(trace, robot, add)

@@ -157,6 +157,7 @@ def _decision(decision: Decision, robot: str, route: str) -> dict[str, Any]:
         "t_s": decision.t,
         "robot": robot,
         "policy": decision.proposal.policy,
+        "number": decision.proposal.number,
         "issued_s": decision.proposal.issued,
         "decision": "accept" if decision.accepted else "refuse",
         "reason": decision.reason,
@@ -200,7 +201,7 @@ def _proposals(sent: Sequence[tuple[str, Proposal]]) -> pd.DataFrame:
     """`Trace.proposals` of what was sent to whom."""
     rows = [
         (
-            robot, proposal.policy, float(proposal.issued), proposal.motion.times.tolist(),
+            proposal.number, robot, proposal.policy, float(proposal.issued), proposal.motion.times.tolist(),
             proposal.motion.positions.ravel().tolist(),
             np.asarray(proposal.selection, dtype=np.float64).ravel().tolist(),
             np.asarray(proposal.mapped, dtype=np.float64).ravel().tolist(),

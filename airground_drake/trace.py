@@ -35,7 +35,7 @@ import pandas as pd
 
 from airground_drake import files
 from airground_drake.arrays import Array, read_only
-from airground_drake.errors import TraceError
+from airground_drake.errors import TraceError, one_line
 
 T = TypeVar("T")
 
@@ -45,6 +45,7 @@ DECISION_COLUMNS = {
     "t_s": "float64",
     "robot": "str",
     "policy": "str",
+    "number": "int64",
     "issued_s": "float64",
     "decision": "str",
     "reason": "str",
@@ -71,8 +72,8 @@ DECISION_COLUMNS = {
     "predicted_lag_m": "float64",
     "tries": "float64",
 }
-"""Columns of `Trace.decisions`, one row per robot and gatekeeper call; -1 where a number does not apply. `status` says
-how the route ended ('solver_failed': the best plan known decided), see `gatekeeper.solution`. Those up to
+"""Columns of `Trace.decisions`, one row per robot and gatekeeper call; -1 where a number does not apply. `number` is
+that of the proposal in `Trace.proposals`. Those up to
 `predicted_clearance_m` are of decisions by problem (26), the others of decisions by outcomes: what comes of either
 choice as `gatekeeper.outcome` has it (cost, 1 if it comes to rest short of the goal, way left), how far the UGV is
 behind the proposed motion, and how often it has gone along since it last rested."""
@@ -88,12 +89,18 @@ centres and normals (N x m x 3), distances (m), plan, relaxed and rounded omega 
 empty where the route has none. Normals are those of the half-planes that `route_bound` is about."""
 
 PROPOSAL_COLUMNS = (
-    "robot", "policy", "issued_s", "times_s", "positions_m", "selection", "mapped_m", "mapped_radius_m", "cause",
+    "number", "robot", "policy", "issued_s", "times_s", "positions_m", "selection", "mapped_m", "mapped_radius_m",
+    "cause",
 )  # fmt: skip
-"""Columns of `Trace.proposals`, one row per proposal sent: for which UGV, by which policy, when; the vertices of the
+"""Columns of `Trace.proposals`, one row per proposal sent: its number, which identifies it and counts from 0 in the
+order of sending; for which UGV, by which policy, when; the vertices of the
 motion that it asks for, times (M) and positions (M x 3, flattened in C order), and J_int of (12)-(14), (m x 3, ditto):
 the directions that it concerns, and the obstacles that the UAV knows, centres (k x 3, ditto) and radii (k); and the UGV
 whose trigger it was sent for: this one, or another one that it is to make way for."""
+
+
+TABLES = ("signals", "decisions", "problems", "proposals")
+"""Attributes of `Trace` that are tables, each saved as a Parquet file of its name."""
 
 
 def no_proposals() -> pd.DataFrame:
@@ -217,12 +224,7 @@ def save(trace: Trace, folder: Path) -> list[str]:
         OSError: if the folder cannot be written.
         ValueError: if `meta` holds a number that is not finite.
     """
-    tables = {
-        "signals.parquet": trace.signals,
-        "decisions.parquet": trace.decisions,
-        "problems.parquet": trace.problems,
-        "proposals.parquet": trace.proposals,
-    }
+    tables = {f"{name}.parquet": getattr(trace, name) for name in TABLES}
     digests = {}
     for name, table in tables.items():
         buffer = io.BytesIO()
@@ -242,17 +244,19 @@ def load(folder: Path) -> Trace:
             `meta.json`.
     """
     try:
-        meta = json.loads((folder / "meta.json").read_text(encoding="utf-8"))
+        meta = json.loads(files.read_text(folder / "meta.json"))
         if meta.get("schema") != SCHEMA:
             raise TraceError(f"{folder}: schema {meta.get('schema')!r}, this version reads {SCHEMA!r}: simulate again")
-        timings = json.loads((folder / "timings.json").read_text(encoding="utf-8"))
-        tables = {}
-        for name, digest in meta.pop("files").items():
-            data = (folder / name).read_bytes()
-            if files.sha256(data) != digest:
-                raise TraceError(f"{folder / name}: its SHA-256 is not the one recorded in meta.json")
-            tables[name] = pd.read_parquet(io.BytesIO(data))
-        signals, decisions = tables["signals.parquet"], tables["decisions.parquet"]
-        return Trace(meta, signals, decisions, timings, tables["problems.parquet"], tables["proposals.parquet"])
-    except (OSError, KeyError, ValueError, AttributeError, RecursionError) as error:
-        raise TraceError(f"{folder}: not a readable trace: {error}") from error
+        timings = json.loads(files.read_text(folder / "timings.json"))
+        digests, tables = meta.pop("files"), {}
+        for name in TABLES:
+            path = folder / f"{name}.parquet"
+            data = files.read_bytes(path)
+            if files.sha256(data) != digests[path.name]:
+                raise TraceError(f"{path}: its SHA-256 is not the one recorded in meta.json")
+            tables[name] = files.read_table(data)
+        return Trace(meta, timings=timings, **tables)
+    except OSError as error:
+        raise TraceError(one_line(f"{error.filename}: {error.strerror}; wanted: a file of a saved run")) from error
+    except (LookupError, TypeError, ValueError, AttributeError, RecursionError) as error:
+        raise TraceError(one_line(f"{folder}: not a readable trace: {error}")) from error

@@ -52,7 +52,7 @@ class Tactic:
         lasts_s: duration of the motion.
         renew_s: a standing proposal is replaced after so long.
         pause_s: silence after a refusal, and before a renewal.
-        forge: whether a replacement pretends to be the proposal that was answered (the same time of issue).
+        forge: whether a replacement pretends to be the proposal that was answered (the same number and time of issue).
         jitter_m: by which each proposal differs from the one before.
         size_m: how far motions lead.
     """
@@ -106,7 +106,7 @@ class LyingPlanner(Planner):
         return self._speak(memory, t, positions, answers)
 
     def _speak(self, memory: PlannerMemory, t: float, positions: Array, answers: Array) -> PlannerMemory:
-        tactic, desks, sent = self.tactic, list(memory.desks), list(memory.sent)
+        tactic, desks = self.tactic, list(memory.desks)
         for i, desk in enumerate(desks):
             before, answer = desk.proposal, answer_to(desk.proposal, answers, i)
             if before is not None and before.issued == t:
@@ -115,17 +115,18 @@ class LyingPlanner(Planner):
             if over and tactic.pause_s > 0.0 and not (tactic.forge and answer == ACCEPT):
                 desks[i] = Desk(retry_at=t + tactic.pause_s)
             elif over or (before is None and t >= desk.retry_at):
-                issued = before.issued if before is not None and tactic.forge and answer == ACCEPT else t
-                proposal = self._proposal(i, t, issued, positions)
-                desks[i] = Desk(proposal, retry_at=t + tactic.renew_s)
-                sent.append((i, proposal))
+                forged = before if tactic.forge and answer == ACCEPT else None
+                desks[i] = Desk(self._proposal(i, t, forged, positions), retry_at=t + tactic.renew_s)
             elif before is not None and tactic.motion == "shadow" and tactic.forge:
-                desks[i] = replace(desk, proposal=self._proposal(i, t, before.issued, positions))
-        return replace(memory, desks=tuple(desks), sent=tuple(sent))
+                desks[i] = replace(desk, proposal=self._proposal(i, t, before, positions))
+        return replace(memory, desks=tuple(desks))
 
-    def _proposal(self, i: int, t: float, issued: float, positions: Array) -> Proposal:
+    def _proposal(self, i: int, t: float, forged: Proposal | None, positions: Array) -> Proposal:
+        """What UGV i is told, under the number and the time of another proposal if one is to be forged."""
         motion, mapped = self._motion(i, t, positions), self._map(i, positions)
-        return Proposal("lying", issued, motion, mapped=mapped, mapped_radii=self._radii(mapped), cause=self._cause(i))
+        number, issued = (-1, t) if forged is None else (forged.number, forged.issued)
+        more = {"mapped": mapped, "mapped_radii": self._radii(mapped), "cause": self._cause(i)}
+        return Proposal("lying", issued, motion, number=number, **more)
 
     def _cause(self, i: int) -> str:
         other = self.ugvs[(i + 1) % len(self.ugvs)]

@@ -209,6 +209,7 @@ def _sizes(stages: int, points: int, *, planned: bool) -> dict[str, tuple[int, .
 
 
 def silent_ugvs(run: Run) -> list[str]:
-    """UGVs that needed a decision, for they were intervened on or executed an intervention, and made none."""
-    decided = {*run.decisions["robot"]}
-    return [ugv for ugv in run.ugvs if ugv not in decided and (run.executed(ugv).any() or run.talk_is_due(ugv))]
+    """If nobody decided: UGVs that needed a decision, for they were intervened on or executed an intervention."""
+    if len(run.decisions):
+        return []
+    return [ugv for ugv in run.ugvs if run.executed(ugv).any() or run.talk_is_due(ugv)]

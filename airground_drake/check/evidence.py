@@ -46,7 +46,8 @@ _WIRING = (
     "states", "inequalities", "commands", "executed", "proposals", "never_bound", "never_bound_count",
     "least_times_bound", "least_slack_m_s",
 )  # fmt: skip
-_EVERYWHERE = ("from_cache", "evidence.reason", *_SECOND_OPINION, *_ANSWERS)
+_SILENT = ("evidence.without_decisions", "evidence.without_proposals")
+_EVERYWHERE = ("from_cache", "evidence.reason", *_SILENT, *_SECOND_OPINION, *_ANSWERS)
 
 AS_RECORDED: Mapping[str, tuple[str, ...]] = {
     "GATE-FEAS": ("evidence.comparisons",),

@@ -12,7 +12,7 @@ import numpy as np
 from .files import Json
 from .proposals import answers_of, proposals_of, taken_back_s
 from .rules import SMALL, Array, Found, at_most, holds, same
-from .run import Run
+from .run import INTERVENING, Run
 
 AT_REST_S = 1.0
 """A stalled UGV must have stood still for this long at the end."""
@@ -128,7 +128,7 @@ def comm(run: Run, claim: Json) -> Found:
         _no_strays(run, ugv, "proposal", sent, sent, planning_s + gating_s)
         issued = run.decisions.loc[run.decisions["robot"] == ugv, "issued_s"].to_numpy(dtype=np.float64)
         _no_strays(run, ugv, "decision", decided, issued, planning_s + gating_s)
-        silent = not len(run.times_s(ugv, "proposal")) or (gated and not len(decided))
+        silent = not any(event["kind"] == "proposal" for event in run.events) or (gated and not len(run.decisions))
         if silent and run.talk_is_due(ugv):
             return Found("not_run")
         _proposals_stand_as_long_as_they_must(run, ugv)
@@ -202,6 +202,8 @@ def _proposals_stand_as_long_as_they_must(run: Run, ugv: str) -> None:
         now = after.issued_s + SMALL
         over = before.times_s[-1] <= now or taken_back_s(run, before, [before], answers) <= now + SMALL
         joint = max(sent_s.count(p.issued_s) for p in (before, after)) > 1 or after.cause != ugv
+        row = min(int(np.searchsorted(run.t_s, after.issued_s - SMALL)), len(run.t_s) - 1)
+        joint |= any(run.column(f"{other}.mode")[row] == INTERVENING for other in run.ugvs if other != ugv)
         holds("a proposal stands until it is over", over or joint, after.policy, before.policy, about=ugv, t_s=now)
 
 

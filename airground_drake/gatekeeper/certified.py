@@ -77,7 +77,7 @@ class CertifiedGatekeepers(Gatekeepers):
                 decision, turns[i], commitments[i] = self._judge(seen, i, proposal, turns[i])
             self.times_s.append(thread_time() - started)
             decisions.append(decision)
-            answers += [ACCEPT if decision.accepted else REFUSE, proposal.issued]
+            answers += [ACCEPT if decision.accepted else REFUSE, proposal.number]
             reports.append(self._report(positions[i], decision))
         return replace(
             memory, answers=tuple(answers), reports=tuple(reports),

@@ -196,7 +196,7 @@ class PaperGatekeepers(Gatekeepers):
             decision = self._decide(seen, i, proposal, budgets)
             decisions.append(decision)
             answer = ACCEPT if decision.accepted else REFUSE
-            answers += [answer, proposal.issued]
+            answers += [answer, proposal.number]
             since.append(memory.since[i] if answer == answer_to(proposal, memory.answers, i) else t)
             reports.append(self._report(positions[i], decision))
         return replace(

@@ -152,7 +152,8 @@ class BehaviourDatabase:
     def plan(self, desk: Desk, seen: Observation) -> Planned:
         """Next proposal for a UGV that needs one, and those to others that go with it.
 
-        If no policy proposes anything, what is in force and has not run out stays so; otherwise the UAV rests.
+        If no policy proposes anything to this UGV, what is in force and has not run out stays so; otherwise the UAV
+        rests.
 
         Args:
             desk: memory of this UGV.
@@ -161,9 +162,7 @@ class BehaviourDatabase:
         seen = replace(seen, refusals=desk.refusals)
         candidates, faults = self._ranked(seen, desk.turn) if self.ranking == "predicted" else self._next(seen, desk)
         if not candidates:
-            if desk.is_due(seen.t):
-                desk = replace(desk, proposal=None, party=(), retry_at=seen.t + self.retry)
-            return Planned(desk, {}, faults)
+            return Planned(self._without_help(desk, seen.t), {}, faults)
         turn, name, motions = candidates[0]
         party = tuple(motions) if len(motions) > 1 else ()
         asked = {}
@@ -174,8 +173,12 @@ class BehaviourDatabase:
                 name, seen.t, motion, cause=cause, mapped=seen.obstacles, mapped_radii=seen.obstacle_radii
             )
             asked[robot] = replace(before, proposal=proposal, turn=turn, cause=cause, party=party)
-        own = asked.pop(seen.robot, replace(desk, proposal=None, party=(), retry_at=seen.t + self.retry))
+        own = asked.pop(seen.robot, self._without_help(desk, seen.t))
         return Planned(own, asked, faults)
+
+    def _without_help(self, desk: Desk, t: float) -> Desk:
+        """Desk of a UGV that was planned for in vain: what is in force stays so; otherwise the UAV rests."""
+        return replace(desk, proposal=None, party=(), retry_at=t + self.retry) if desk.is_due(t) else desk
 
     def _next(self, seen: Observation, desk: Desk) -> tuple[list[Candidate], list[Fault]]:
         """The first policy, from this turn on, that proposes."""

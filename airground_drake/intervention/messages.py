@@ -1,6 +1,6 @@
 """The bidirectional channel: proposals from the UAV, answers from the UGVs.
 
-An answer is two numbers per UGV: ACCEPT, REFUSE or SILENT, and the time of issue of the proposal that it
+An answer is two numbers per UGV: ACCEPT, REFUSE or SILENT, and the number of the proposal that it
 answers. An answer to another proposal than the one in force means nothing. With it comes a report: the obstacles
 that the UGV sensed when it decided, and why it answers so.
 """
@@ -45,7 +45,7 @@ Proposals = tuple[Proposal | None, ...]
 
 def answer_to(proposal: Proposal | None, answers: Sequence[float] | Array, robot: int) -> float:
     """The UGV's answer to this very proposal: ACCEPT, REFUSE or SILENT; answers (2n,) flattened."""
-    if proposal is None or answers[2 * robot + 1] != proposal.issued:
+    if proposal is None or answers[2 * robot + 1] != proposal.number:
         return SILENT
     return float(answers[2 * robot])
 

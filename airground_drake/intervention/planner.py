@@ -66,6 +66,26 @@ class PlannerMemory:
         return tuple(desk.proposal for desk in self.desks)
 
 
+def sent_after(before: PlannerMemory, after: PlannerMemory, t: float) -> PlannerMemory:
+    """Number the proposals that a planning instant has put on the desks, and note them as sent.
+
+    Every proposal that was not there before gets the next number and the time, whatever it came with: no planner can
+    send another motion under the number that a UGV has answered.
+
+    Args:
+        before: memory before the instant.
+        after: what the planner has made of it.
+        t: time, s.
+    """
+    sent, desks = list(before.sent), list(after.desks)
+    for i, (old, desk) in enumerate(zip(before.desks, after.desks, strict=True)):
+        if desk.proposal is not None and desk.proposal is not old.proposal:
+            proposal = replace(desk.proposal, number=len(sent), issued=t)
+            desks[i] = replace(desk, proposal=proposal)
+            sent.append((i, proposal))
+    return replace(after, desks=tuple(desks), sent=tuple(sent)) if len(sent) > len(before.sent) else after
+
+
 @dataclass(frozen=True, eq=False)
 class Planner:
     """The UAV's planner, on its own map, which may miss obstacles.
@@ -162,7 +182,7 @@ class Planner:
         discs = np.concatenate([mapped, np.array(learnt).reshape(-1, 4)])
         let_down = self._let_down(memory.desks, refused)
         desks = self._after_answers(memory.desks, t, intervening, refused, learnt=bool(fresh))
-        sent, faults = list(memory.sent), list(memory.faults)
+        faults = list(memory.faults)
         for i, robot in enumerate(self.ugvs):
             in_force = desks[i].proposal
             just_sent = in_force is not None and in_force.issued == t
@@ -189,11 +209,8 @@ class Planner:
             planned = self.database.plan(desks[i], seen)
             faults += planned.faults
             for j, name in enumerate(self.ugvs):
-                desk = planned.desk if j == i else planned.asked.get(name, desks[j])
-                if desk.proposal is not None and desk.proposal is not desks[j].proposal:
-                    sent.append((j, desk.proposal))
-                desks[j] = desk
-        return replace(memory, desks=tuple(desks), learnt=learnt, sent=tuple(sent), faults=tuple(faults))
+                desks[j] = planned.desk if j == i else planned.asked.get(name, desks[j])
+        return replace(memory, desks=tuple(desks), learnt=learnt, faults=tuple(faults))
 
     def _after_answers(
         self, desks: Sequence[Desk], t: float, intervening: Sequence[bool], refused: Sequence[bool], *, learnt: bool

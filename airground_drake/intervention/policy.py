@@ -112,7 +112,7 @@ class Proposal:
 
     Attributes:
         policy: name of the policy that made it.
-        issued: time of sending, s; identifies the proposal in the UGV's answer.
+        issued: time of sending, s.
         motion: desired value of the task over time: where the UGV is to be.
         selection: J_int, (m, 3), directions in which the UAV intervenes (default: all).
         mapped: obstacles that the UAV knows, (k, 3), m: a UGV judges by them how useful the proposal is, and nothing
@@ -120,6 +120,8 @@ class Proposal:
         cause: name of the UGV whose trigger it is sent for: another one's, if this UGV is asked to make way for it;
             empty: its own.
         mapped_radii: of the obstacles that the UAV knows, (k,), m, or one for all.
+        number: identifies the proposal in the UGV's answer. It is given when the proposal is sent, see
+            `planner.sent_after`; before that it is -1.
     """
 
     policy: str
@@ -129,6 +131,7 @@ class Proposal:
     mapped: Array = field(default_factory=lambda: np.empty((0, 3)))
     cause: str = ""
     mapped_radii: Array | float = 0.0
+    number: int = -1
 
     @cached_property
     def chosen(self) -> Array:

@@ -51,7 +51,7 @@ def _spans(trace: Trace, row: Mapping[Any, Any]) -> Iterator[Span]:
     robot, issued = row["robot"], float(row["issued_s"])
     issues = trace.proposals["issued_s"][trace.proposals["robot"] == robot].to_numpy(dtype=np.float64)
     until = float(min(issues[issues > issued], default=trace.t[-1]))
-    changes, last_s = _answers(trace, robot, issued, until)
+    changes, last_s = _answers(trace, row, until)
     ends = [change for change, _ in changes[1:]]
     ends.append(last_s if changes[-1][1] == "accepted" else max(last_s, changes[-1][0] + LINGER_S))
     for (start, outcome), end in zip(changes, ends, strict=True):
@@ -59,11 +59,11 @@ def _spans(trace: Trace, row: Mapping[Any, Any]) -> Iterator[Span]:
             yield Span(start, min(end, until), outcome)
 
 
-def _answers(trace: Trace, robot: str, issued: float, until: float) -> tuple[list[tuple[float, Outcome]], float]:
+def _answers(trace: Trace, row: Mapping[Any, Any], until: float) -> tuple[list[tuple[float, Outcome]], float]:
     """From when on a proposal stood how, and the last time that anything is known of it, s."""
+    robot, issued = row["robot"], float(row["issued_s"])
     changes: list[tuple[float, Outcome]] = [(issued, "asked")]
-    ours = (trace.decisions["robot"] == robot) & (trace.decisions["issued_s"] == issued)
-    decided = trace.decisions[ours]
+    decided = trace.decisions[trace.decisions["number"] == row["number"]]
     for t, decision in zip(decided["t_s"], decided["decision"], strict=True):
         if changes[-1][1] != _ANSWERS[decision]:
             changes.append((float(t), _ANSWERS[decision]))

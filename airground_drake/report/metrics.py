@@ -83,7 +83,7 @@ def gatekeeper(trace: Trace) -> dict[str, Any] | None:
 
 def _refusals(trace: Trace) -> dict[str, dict[str, int]]:
     """How many proposals each robot refused at its first answer, by reason."""
-    first = trace.decisions.drop_duplicates(["robot", "issued_s"])
+    first = trace.decisions.drop_duplicates("number")
     refused = first[first["decision"] == "refuse"]
     return {
         str(robot): {str(reason): int(count) for reason, count in rows["reason"].value_counts().items()}

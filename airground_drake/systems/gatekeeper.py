@@ -111,5 +111,5 @@ class DirectAcceptance(LeafSystem):
         )
 
     def _calc_answers(self, context: Context, output: BasicVector) -> None:
-        answers = [(SILENT, -1.0) if p is None else (ACCEPT, p.issued) for p in self._proposals.Eval(context)]
+        answers = [(SILENT, -1.0) if p is None else (ACCEPT, p.number) for p in self._proposals.Eval(context)]
         output.SetFromVector(np.array(answers).ravel())

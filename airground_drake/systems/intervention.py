@@ -6,7 +6,7 @@ from pydrake.common.value import AbstractValue, Value
 from pydrake.systems.framework import Context, EventStatus, LeafSystem, State
 
 from airground_drake.decision.excursion import INTERVENING
-from airground_drake.intervention.planner import Planner, PlannerMemory
+from airground_drake.intervention.planner import Planner, PlannerMemory, sent_after
 from airground_drake.systems.decision import FIELDS
 from airground_drake.systems.lifetime import weakly
 from airground_drake.systems.ticks import Ticks
@@ -14,6 +14,8 @@ from airground_drake.systems.ticks import Ticks
 
 class InterventionPlanner(LeafSystem):
     """Supervises every UGV; for those in mode INTERVENING the `Planner` makes proposals, (12)-(14).
+
+    The system numbers the proposals itself, see `sent_after`.
 
     Ports (n UGVs):
         in  `team_position` (3(n+1)) m; `status` (4n) from EventTrigger; `answers` (2n) and `reports`
@@ -65,5 +67,6 @@ class InterventionPlanner(LeafSystem):
             memory = self._planner.plan(memory, context.get_time(), positions, intervening, answers, reports)
         if memory is before:
             return EventStatus.DidNothing()
+        memory = sent_after(before, memory, context.get_time())
         state.get_mutable_abstract_state(self._memory).set_value(memory)
         return EventStatus.Succeeded()

@@ -532,7 +532,7 @@ INTERVENTION = (
     Mutant(
         "an answer to another proposal counts",
         "intervention/messages.py",
-        "if proposal is None or answers[2 * robot + 1] != proposal.issued:",
+        "if proposal is None or answers[2 * robot + 1] != proposal.number:",
         "if proposal is None:",
         proofs=("SAFE-GATE",),
     ),
@@ -764,15 +764,15 @@ GATEKEEPER = (
     Mutant(
         "(b) accepts nothing",
         "systems/gatekeeper.py",
-        "else (ACCEPT, p.issued) for p in",
-        "else (SILENT, p.issued) for p in",
+        "else (ACCEPT, p.number) for p in",
+        "else (SILENT, p.number) for p in",
         runs=("crowd b",),
     ),
     Mutant(
         "(b) refuses everything",
         "systems/gatekeeper.py",
-        "else (ACCEPT, p.issued) for p in",
-        "else (-ACCEPT, p.issued) for p in",
+        "else (ACCEPT, p.number) for p in",
+        "else (-ACCEPT, p.number) for p in",
         runs=("crowd b",),
     ),
     Mutant(

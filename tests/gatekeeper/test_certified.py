@@ -69,7 +69,7 @@ def test_the_first_sample_decides_and_what_makes_no_difference_is_refused() -> N
     """The motion keeps the UGV where it stands anyway."""
     memory = sampled(gatekeepers("ugv"), 0.05, 20.0, Proposal("way", 0.0, STAYS), Memory.empty(1))
     assert [decision.reason for decision in memory.decisions] == ["not_cheaper"]
-    assert memory.answers == (REFUSE, 0.0)
+    assert memory.answers == (REFUSE, -1.0)
 
 
 def test_a_favour_is_done_unless_it_strands_the_ugv() -> None:

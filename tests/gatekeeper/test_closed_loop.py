@@ -57,7 +57,7 @@ def test_switching_plans_are_those_of_the_running_controller_in_a_diagram(seed: 
         simulator.Initialize()
         driven = []
         for k, accepted in enumerate(omega):
-            answer = [ACCEPT if accepted else REFUSE, case.proposal.issued, REFUSE, -1.0]
+            answer = [ACCEPT if accepted else REFUSE, case.proposal.number, REFUSE, -1.0]
             built.GetInputPort("answers").FixValue(context, answer)
             simulator.AdvanceTo((k + 1) * H)  # the update that is due at its end waits for the next answer
             driven.append(plant.get_output_port().Eval(plant.GetMyContextFromRoot(context))[:3])

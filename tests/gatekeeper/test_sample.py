@@ -35,9 +35,9 @@ def test_the_dwell_of_an_answer_begins_anew_with_each_proposal() -> None:
     )
     gate, memory = Agreeing(team, law, [motion], judging), Memory.empty(1)
     since = []
-    for k, issued in enumerate((0.0, 0.0, 0.1, 0.1)):
-        proposal = Proposal("way", issued, motion)
+    for k, number in enumerate((0, 0, 1, 1)):
+        proposal = Proposal("way", 0.0, motion, number=number)
         memory = gate.sample(0.05 * (k + 1), (proposal,), np.zeros((2, 3)), np.zeros((2, 3)), memory)
-        assert memory.answers == (ACCEPT, issued)
+        assert memory.answers == (ACCEPT, number)
         since.append(memory.since[0])
     assert since == [0.05, 0.05, 0.05 * 3, 0.05 * 3]

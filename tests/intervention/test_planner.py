@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from airground_drake import components, load, simulate
+from airground_drake.arrays import Array
 from airground_drake.components import make_planner
 from airground_drake.intervention.database import BehaviourDatabase
-from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT, Report
-from airground_drake.intervention.planner import Planner, PlannerMemory
+from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT, Report, answer_to
+from airground_drake.intervention.planner import Planner, PlannerMemory, sent_after
 from airground_drake.intervention.policy import Observation, Policy
 from airground_drake.nsbc.motion import Motion
 from airground_drake.registry import METHODS
-from airground_drake.scenarios.load import load
+from airground_drake.verify import verify
 
 PLACES = np.array([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [8.0, 0.0, 0.0], [0.0, 0.0, 3.0]])
 UGVS = ("one", "two", "three")
@@ -56,10 +58,11 @@ def step(
     """One planning instant; who is intervened on, and answers to the proposals in force, by name."""
     given = []
     for name, desk in zip(UGVS, memory.desks, strict=True):
-        issued = desk.proposal.issued if desk.proposal else -1.0
-        given += [(answers or {}).get(name, SILENT), issued]
+        number = desk.proposal.number if desk.proposal else -1
+        given += [(answers or {}).get(name, SILENT), number]
     called = [name in intervening.split() for name in UGVS]
-    return uav.plan(uav.watch(memory, t, PLACES), t, PLACES, called, np.array(given), (report,) * 3)
+    watched = uav.watch(memory, t, PLACES)
+    return sent_after(memory, uav.plan(watched, t, PLACES, called, np.array(given), (report,) * 3), t)
 
 
 def in_force(memory: PlannerMemory) -> dict[str, tuple[float, str]]:
@@ -111,6 +114,68 @@ def test_without_a_better_plan_the_others_keep_their_parts() -> None:
     memory = step(uav, uav.start(), 1.0, "one")
     memory = step(uav, memory, 1.1, "one", {"two": REFUSE})
     assert in_force(memory) == {"one": (1.0, "one")}
+
+
+def test_a_plan_for_others_leaves_an_accepted_motion_in_force() -> None:
+    """The policies are asked about `one`, whose partner has refused, and help `three` only."""
+    uav = planner(Scripted({"one": wait(9.0), "two": wait(9.0)}, {"three": wait(8.0)}))
+    memory = step(uav, uav.start(), 1.0, "one")
+    accepted = memory.proposals[0]
+    memory = step(uav, memory, 1.1, "one three", {"one": ACCEPT, "two": REFUSE})
+    assert in_force(memory) == {"one": (1.0, "one"), "three": (1.1, "three")}
+    assert memory.proposals[0] is accepted
+
+
+def test_proposals_are_numbered_as_they_are_sent() -> None:
+    uav = planner(Scripted({"one": wait(2.0), "three": wait(9.0)}, {"one": wait(9.0), "two": wait(9.0)}))
+    memory = step(uav, uav.start(), 1.0, "one")
+    memory = step(uav, memory, 2.0, "one")
+    assert [(UGVS[i], sent.number, sent.issued) for i, sent in memory.sent] == [
+        ("one", 0, 1.0), ("three", 1, 1.0), ("one", 2, 2.0), ("two", 3, 2.0),
+    ]  # fmt: skip
+    assert [sent.number for sent in memory.proposals if sent] == [2, 3, 1]
+
+
+def test_a_motion_that_changes_is_a_new_proposal() -> None:
+    """Whatever number and time of issue a planner puts on it."""
+    uav = planner(Scripted({"one": wait(9.0)}))
+    before = step(uav, uav.start(), 1.0, "one")
+    accepted = before.proposals[0]
+    assert accepted is not None
+    answers = np.array([ACCEPT, accepted.number, SILENT, -1.0, SILENT, -1.0])
+    assert answer_to(accepted, answers, 0) == ACCEPT
+    desk = replace(before.desks[0], proposal=replace(accepted, motion=wait(5.0)))
+    after = sent_after(before, replace(before, desks=(desk, *before.desks[1:])), 2.0)
+    changed = after.proposals[0]
+    assert changed is not None
+    assert (changed.number, changed.issued) == (1, 2.0)
+    assert answer_to(changed, answers, 0) == SILENT
+    assert [sent for _, sent in after.sent] == [accepted, changed]
+
+
+class Swaps(Planner):
+    """Puts another motion into what a UGV has accepted, under the old number and time of issue."""
+
+    def plan(self, memory: PlannerMemory, t: float, positions: Array, *given: Any) -> PlannerMemory:
+        planned = super().plan(memory, t, positions, *given)
+        desks = list(planned.desks)
+        for i, desk in enumerate(desks):
+            if desk.proposal is not None and answer_to(desk.proposal, given[1], i) == ACCEPT:
+                motion = Motion(desk.proposal.motion.times, desk.proposal.motion.positions + np.array([0.0, 0.2, 0.0]))
+                desks[i] = replace(desk, proposal=replace(desk.proposal, motion=motion))
+        return replace(planned, desks=tuple(desks))
+
+
+def test_no_motion_is_executed_that_was_not_decided_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    def swapping(*given: Any) -> Planner:
+        honest = make_planner(*given)
+        return Swaps(**{each.name: getattr(honest, each.name) for each in fields(Planner)})
+
+    monkeypatch.setattr(components, "make_planner", swapping)
+    trace = simulate(load("case_a", ["duration_s=17"])[0], "d")
+    assert len(trace.proposals) > 2
+    assert trace.column("ugv1.accepted").any()
+    assert [verdict.finding.status for verdict in verify(trace, ["EXEC", "GATE-FEAS"])] == ["holds", "holds"]
 
 
 def test_who_refuses_its_own_rests_before_the_next() -> None:
@@ -188,7 +253,7 @@ def test_radii_come_with_a_refusal_and_go_out_with_a_proposal() -> None:
     )
     memory = step(uav, uav.start(), 1.0, "one")
     sensed = Report(sensed=((2.0, 9.0, 0.0, 3.0), (5.0, 5.0, 0.0, 0.7)))
-    answers = np.array([REFUSE, 1.0, SILENT, -1.0, SILENT, -1.0])
+    answers = np.array([REFUSE, 0.0, SILENT, -1.0, SILENT, -1.0])
     memory = uav.plan(memory, 1.1, PLACES, [True, False, False], answers, (sensed, *NOBODY[1:]))
     assert memory.learnt == ((5.0, 5.0, 0.0, 0.7),)  # the other one is on the map
     memory = step(uav, memory, 3.0, "one")

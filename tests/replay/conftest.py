@@ -18,8 +18,12 @@ from airground_drake.trace import DECISION_COLUMNS, PROPOSAL_COLUMNS, Trace
 def with_proposals(trace: Trace, issued: list[float], decisions: list[tuple[float, float, str]]) -> Trace:
     """A trace with proposals to ugv1 issued at some times, s, and decisions (time, time of issue, decision)."""
     path = np.array([[3.4, 5.1, 0.0], [6.5, 5.0, 0.0], [6.5, 5.0, 0.0], [6.5, 9.0, 0.0]]).ravel()
-    rows = [{"robot": "ugv1", "policy": "p", "issued_s": at, "positions_m": path, "cause": "ugv1"} for at in issued]
-    found = [{"t_s": t, "robot": "ugv1", "issued_s": at, "decision": what} for t, at, what in decisions]
+    one = {"robot": "ugv1", "policy": "p", "positions_m": path, "cause": "ugv1"}
+    rows = [one | {"number": k, "issued_s": at} for k, at in enumerate(issued)]
+    found = [
+        {"t_s": t, "robot": "ugv1", "number": issued.index(at), "issued_s": at, "decision": what}
+        for t, at, what in decisions
+    ]
     return replace(
         trace,
         proposals=pd.DataFrame(rows, columns=list(PROPOSAL_COLUMNS)),

@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from airground_drake.arrays import Array
-from airground_drake.errors import TraceError
 from airground_drake.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.segments import corner_times, interpolate, travelled
@@ -57,31 +56,26 @@ class Beginning(NamedTuple):
         return self.points[0, 0, : self.discs], self.safe[: self.discs]
 
 
-def beginning(trace: Trace, robot: str, t: float, issued: float, sent: Sequence[Sent]) -> Beginning:
+def beginning(trace: Trace, t: float, number: int, sent: Sequence[Sent]) -> Beginning:
     """What the roll-outs of a decision begin with, from the recorded signals.
 
     Args:
         trace: the run.
-        robot: the UGV that decides.
-        t: when it decides, s.
-        issued: when the proposal was issued, s.
+        t: when the UGV decides, s.
+        number: of the proposal that it decides on.
         sent: all proposals.
-
-    Raises:
-        TraceError: if the decision is on a proposal that was not sent.
     """
     scenario, gate, h = trace.scenario, trace.scenario["gatekeeper"], trace.scenario["control"]["period_s"]
-    on = [one for one in sent if (one.ugv, one.issued_s) == (robot, issued)]
-    if not on:
-        raise TraceError(f"the decision of {robot} at t = {t} s is on no proposal that was sent")
+    on = next(one for one in sent if one.number == number)
+    robot = on.ugv
     spec = scenario["ugvs"][robot]
     corners, speed = np.asarray(spec["preset"]["waypoints_m"], dtype=np.float64), float(spec["preset"]["speed_m_s"])
     arrives = float(corner_times(corners, speed)[-1]) if len(corners) > 1 else 0.0
     longest = gate["longest_s"]
-    until = min(float(on[0].times_s[-1]), t + longest)
+    until = min(float(on.times_s[-1]), t + longest)
     ends = min(max(until, arrives), t + longest) + gate["settling_s"]
     after = h * np.arange(np.ceil((ends - t) / h) + 1.0)
-    discs, distances = known_discs(trace, robot, t, on[0])
+    discs, distances = known_discs(trace, robot, t, on)
     pairs = [pair for pair in _among_robots(trace) if robot in (pair.first, pair.second)]
     others = [_other(trace, robot, t, after, pair, sent) for pair in pairs]
     fixed = np.broadcast_to(discs, (2, len(after), *discs.shape))
@@ -90,8 +84,8 @@ def beginning(trace: Trace, robot: str, t: float, issued: float, sent: Sequence[
     return Beginning(
         here=interpolate(trace.t, trace.position(robot), t),
         preset=travelled(corners, speed, t + after),
-        wanted=on[0].place(t + after),
-        chosen=on[0].chosen,
+        wanted=on.place(t + after),
+        chosen=on.chosen,
         limit=float(spec["max_speed_m_s"]),
         periods=max(0, int(np.ceil((until - t) / h - 1e-9))),
         settled=round(np.ceil((settled - t) / h - 1e-9)),
@@ -160,22 +154,20 @@ def asked_of(trace: Trace, ugv: str, t: float, sent: Sequence[Sent]) -> tuple[Se
     now = np.flatnonzero(np.abs(when - t) <= TIME_TOLERANCE_S)
     if not now.size:
         return None, False
-    issued = float(on[now[0]])
-    before = np.flatnonzero((on == issued) & (when < t - TIME_TOLERANCE_S))
+    number = on[now[0]]
+    before = np.flatnonzero((on == number) & (when < t - TIME_TOLERANCE_S))
     answer = str(answers[before[-1]]) if before.size else ""
     if answer == "refuse":
         return None, False
-    return next((one for one in sent if (one.ugv, one.issued_s) == (ugv, issued)), None), answer == "accept"
+    return next(one for one in sent if one.number == number), answer == "accept"
 
 
 def _answers_of(trace: Trace) -> dict[str, tuple[Array, Array, Any]]:
-    """Of each UGV with decisions: their times, those of the proposals, s, and the answers, (D,) each."""
+    """Of each UGV with decisions: their times, s, the numbers of the proposals, and the answers, (D,) each."""
 
     def found() -> dict[str, tuple[Array, Array, Any]]:
         by_ugv = trace.decisions.groupby("robot", sort=False)
-        columns = {
-            str(ugv): [rows[name].to_numpy() for name in ("t_s", "issued_s", "decision")] for ugv, rows in by_ugv
-        }
+        columns = {str(ugv): [rows[name].to_numpy() for name in ("t_s", "number", "decision")] for ugv, rows in by_ugv}
         return {ugv: (when, on, answers) for ugv, (when, on, answers) in columns.items()}
 
     return trace.derived("answers", found)

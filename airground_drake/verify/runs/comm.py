@@ -13,7 +13,7 @@ from airground_drake.errors import TraceError
 from airground_drake.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S, TraceClaim
 from airground_drake.verify.finding import Finding
-from airground_drake.verify.runs.interventions import GATED_METHODS, causes_of, intervening, talk_is_due
+from airground_drake.verify.runs.interventions import GATED_METHODS, intervening, talk_is_due
 from airground_drake.verify.runs.standing import map_conflicts, standing_conflicts
 
 
@@ -26,12 +26,14 @@ class Comm(TraceClaim):
         "Messages and gatekeeper solves were spent only while the UGV concerned, or the one that it was asked to make "
         "way for, was being intervened on, and no more of them than an always-on scheme would have spent. "
         "No proposal was decided on once it was taken back, or replaced while it was in force but by or in a joint "
-        "plan; what it said of obstacles was what the UAV knew: its own map, and what UGVs sensed when they refused."
+        "plan, or while another UGV was intervened on, too; what it said of obstacles was what the UAV knew: its own "
+        "map, and what UGVs sensed when they refused."
     )
     formula = (
         "every proposal and decision in [trigger, release + intervention period + gatekeeper period]; "
         "proposals <= n ceil(duration / intervention period), decisions <= n ceil(duration / gatekeeper period); "
-        "no decision on a proposal that is withdrawn, none in force replaced but by or in a joint plan; "
+        "no decision on a proposal that is withdrawn, none in force replaced but by or in a joint plan or while "
+        "another UGV is intervened on; "
         "map of a proposal = known and phantom obstacles, then all sensed by UGVs at refusals that the UAV has noticed"
     )
     latex = (
@@ -73,9 +75,12 @@ class Comm(TraceClaim):
         named = {e["robot"] for e in trace.events if e["kind"] == "proposal"} | set(trace.decisions["robot"])
         if strangers := named - set(trace.ugvs):
             raise TraceError(f"proposals or decisions for {sorted(strangers)}, which are not UGVs of the trace")
-        causes = causes_of(trace)
+        rows = trace.proposals.to_dict("records")
+        by_time = {(row["robot"], row["issued_s"]): str(row["cause"]) for row in rows}
+        by_number = {row["number"]: str(row["cause"]) for row in rows}
         strays: list[dict[str, Any]] = []
         per_ugv: dict[str, dict[str, Any]] = {}
+        silent: dict[str, list[str]] = {"proposal": [], "decision": []}
         for ugv in trace.ugvs:
             intervals = intervening(trace, ugv)
             sent = {
@@ -84,18 +89,21 @@ class Comm(TraceClaim):
                 ),
                 "decision": _decisions(trace, ugv, "t_s"),
             }
+            numbers = _decisions(trace, ugv, "number").tolist()
             if np.setdiff1d(_decisions(trace, ugv, "issued_s"), sent["proposal"]).size:
                 raise TraceError(f"{ugv}: a decision is about a proposal that is not among the events")
-            about = {"proposal": sent["proposal"], "decision": _decisions(trace, ugv, "issued_s")}
+            causes = {
+                "proposal": [by_time.get((ugv, t), ugv) for t in sent["proposal"].tolist()],
+                "decision": [by_number.get(number, ugv) for number in numbers],
+            }
             for kind, times in sent.items():
                 late = _outside(times, intervals, planning + gating)
-                for other in {*causes.values()} - {ugv}:
-                    asked = np.array([causes.get((ugv, float(issued)), ugv) == other for issued in about[kind]], bool)
+                for other in {*causes[kind]} - {ugv}:
+                    asked = np.array([cause == other for cause in causes[kind]], bool)
                     late &= ~asked | _outside(times, intervening(trace, other), planning + gating)
                 strays += [{"robot": ugv, "kind": kind, "t_s": float(time)} for time in times[late]]
                 if not times.size and (kind == "proposal" or gated) and talk_is_due(trace, ugv):
-                    reason = f"{ugv} was in mode 'intervening', but the trace has no {kind}"
-                    return Finding("not_run", evidence={"reason": reason, "faults": trace.meta["faults"]})
+                    silent[kind].append(ugv)
             per_ugv[ugv] = {kind: len(times) for kind, times in sent.items()} | {"intervals_s": intervals.tolist()}
         n, before = len(trace.ugvs), scenario["duration_s"] - TIME_TOLERANCE_S  # the first instant is at 0
         most = {
@@ -103,6 +111,10 @@ class Comm(TraceClaim):
             "decision": n * math.ceil(before / gating) if gated else 0,
         }
         spent = {kind: sum(int(entry[kind]) for entry in per_ugv.values()) for kind in most}
+        for kind, ugvs in silent.items():
+            if ugvs and not spent[kind]:
+                reason = f"{', '.join(ugvs)} were in mode 'intervening', but the trace has no {kind}"
+                return Finding("not_run", evidence={"reason": reason, "faults": trace.meta["faults"]})
         saved = {kind: 1.0 - spent[kind] / most[kind] for kind in most if most[kind]}
         misused = list[dict[str, Any]]()
         if not strays and len(trace.proposals):
@@ -120,6 +132,7 @@ class Comm(TraceClaim):
                 "saved": saved,
                 "ugvs": per_ugv,
                 "outside_interventions": strays,
+                **{f"without_{kind}s": ugvs for kind, ugvs in silent.items()},
             },
             exercised=spent["proposal"],
         )

@@ -125,7 +125,7 @@ def compare_times(trace: Trace, rows: Sequence[Row]) -> Iterator[Off]:
     for ugv in trace.ugvs:
         last: Row | None = None
         for row in (row for row in rows if row.given["robot"] == ugv):
-            if last is not None and last.given["issued_s"] != row.given["issued_s"]:
+            if last is not None and last.given["number"] != row.given["number"]:
                 last = None
             early = row.given["issued_s"] if last is None else last.given["t_s"] + period
             late = row.given["issued_s"] + period if last is None else early
@@ -143,7 +143,7 @@ def compare_proposals(trace: Trace, rows: Sequence[Row]) -> Iterator[Off]:
     make way for is intervened on all the time, or if the run ends.
     """
     allowed = trace.scenario["intervention"]["period_s"] + trace.scenario["gatekeeper"]["period_s"] + TIME_TOLERANCE_S
-    decided = {(row.given["robot"], row.given["issued_s"]) for row in rows}
+    decided = {row.given["number"] for row in rows}
     sent = proposals_of(trace)
     for one in sent:
         until = one.issued_s + allowed
@@ -153,7 +153,7 @@ def compare_proposals(trace: Trace, rows: Sequence[Row]) -> Iterator[Off]:
         if called and not replaced and one.times_s[-1] > until:
             given = dict.fromkeys(("decision", "reason", "status"), "")
             row = bare_row({"t_s": one.issued_s, "robot": one.ugv, "policy": one.policy, **given})
-            yield Off(row, "nothing is decided on a proposal", float((one.ugv, one.issued_s) not in decided), 0.0)
+            yield Off(row, "nothing is decided on a proposal", float(one.number not in decided), 0.0)
 
 
 def compare_situation(trace: Trace, row: Row) -> Iterator[Off]:
@@ -271,7 +271,7 @@ def compare_answers(trace: Trace, rows: Sequence[Row]) -> Iterator[Off]:
         for row in (row for row in rows if row.given["robot"] == ugv):
             given = row.given
             t = float(row.given["t_s"])
-            if last is not None and last.given["issued_s"] != given["issued_s"]:
+            if last is not None and last.given["number"] != given["number"]:
                 last = None
             standing = None if last is None else str(last.given["decision"])
             accept, reason = rule(row, standing, t - since, gate)

@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 
 from airground_drake.arrays import Array
-from airground_drake.errors import TraceError
 from airground_drake.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.segments import interpolate, travelled
@@ -178,22 +177,16 @@ def judge_outcomes(trace: Trace, rows: Sequence[Row]) -> Finding:
 
 
 def scenes_of(trace: Trace, rows: Sequence[Row], sent: Sequence[Sent]) -> Scenes:
-    """What each decision predicts from, by the signals at its time.
-
-    Raises:
-        TraceError: if a decision is on a proposal that is not among those sent.
-    """
+    """What each decision predicts from, by the signals at its time."""
     scenario, control = trace.scenario, trace.scenario["control"]
     stages = len(rows[0]["reference_m"])
     steps = stages * round(scenario["gatekeeper"]["horizon_s"] / stages / control["period_s"])
-    known = {(one.ugv, one.issued_s): one for one in sent}
+    known = {one.number: one for one in sent}
     pairs = list(pairs_of(trace))
     parts: list[list[Array]] = []
     for row in rows:
         t, robot = float(row.given["t_s"]), str(row.given["robot"])
-        if (robot, float(row.given["issued_s"])) not in known:
-            raise TraceError(f"{row.label}: it is on no proposal that was sent")
-        proposal = known[robot, float(row.given["issued_s"])]
+        proposal = known[row.given["number"]]
         spec = scenario["ugvs"][robot]
         after = t + control["period_s"] * np.arange(steps + 1.0)
         here = interpolate(trace.t, trace.position(robot), t)
@@ -264,10 +257,10 @@ def _realised(trace: Trace, rows: Sequence[Row]) -> dict[str, Any]:
     for row in rows:
         begin, ugv = float(row.given["t_s"]), str(row.given["robot"])
         yes = row.given["decision"] == "accept"
-        due = float(row.given["issued_s"]) if yes else None
+        due = row.given["number"] if yes else None
         first = int(np.searchsorted(t, begin - TIME_TOLERANCE_S))
-        issued = [None if one is None else one.issued_s for one in accepted[ugv][first:]]
-        other = next((k for k, found in enumerate(issued) if found != due), None)
+        numbers = [None if one is None else one.number for one in accepted[ugv][first:]]
+        other = next((k for k, found in enumerate(numbers) if found != due), None)
         until = min(float(trace.t[-1]), float(t[first + other]) if other is not None else np.inf)
         ends = begin + row.dt * np.arange(1.0, len(row["reference_m"]) + 1.0)
         stood += bool(ends[-1] <= until + TIME_TOLERANCE_S)
@@ -287,7 +280,7 @@ def _telling(rows: Sequence[Row]) -> npt.NDArray[np.intp]:
     seen: set[Any] = set()
     telling = []
     for k in planned:
-        key = rows[k].given["robot"], rows[k].given["issued_s"]
+        key = rows[k].given["number"]
         if key not in seen or rows[k].given["reason"] == "reversed":
             telling.append(k)
         seen.add(key)

@@ -237,6 +237,16 @@ def conclude(finding: Finding, compared: Iterable[Off]) -> Finding:
     return replace(finding, status="refuted", margin=None, counterexample=first.to_json())
 
 
+def without_decisions(trace: Trace) -> list[str]:
+    """UGVs that executed something, or were intervened on for long enough to decide on a proposal, but never decided.
+
+    That is a fault of the UGV only if it got a proposal that stood for long enough (GATE-FEAS) or executed something
+    (EXEC): the UAV's policies may have found nothing to propose. The other UGVs are judged all the same.
+    """
+    called = [ugv for ugv in trace.ugvs if (trace.column(f"{ugv}.accepted") != 0.0).any() or talk_is_due(trace, ugv)]
+    return [ugv for ugv in called if not (trace.decisions["robot"] == ugv).any()]
+
+
 class GateClaim(TraceClaim):
     """What the claims share: they are about the decisions of a gatekeeper, all of them recorded."""
 
@@ -248,16 +258,16 @@ class GateClaim(TraceClaim):
         """Decide the claim; without decisions it holds only if no UGV was long enough in intervention to need one."""
         if len(trace.decisions) and not len(trace.problems) and trace.meta["method"] in ON_TOP:
             return Finding("not_run", evidence={"reason": "the problems of the decisions were not recorded"})
-        for ugv in trace.ugvs:
-            needed = (trace.column(f"{ugv}.accepted") != 0.0).any() or talk_is_due(trace, ugv)
-            if needed and not (trace.decisions["robot"] == ugv).any():
-                reason = f"{ugv} was in mode 'intervening', but the trace has no decision of it"
-                return Finding("not_run", evidence={"reason": reason, "faults": trace.meta["faults"]})
+        without = without_decisions(trace)
+        if without and not len(trace.decisions):
+            reason = f"{', '.join(without)} were in mode 'intervening', but the trace has no decision"
+            return Finding("not_run", evidence={"reason": reason, "faults": trace.meta["faults"]})
         rows = trace.derived("rows", lambda: (rows_of if trace.meta["method"] in ON_TOP else bare_rows_of)(trace))
         if not rows:
             reason = "no UGV was intervened on: nothing to decide"
             return Finding("holds", evidence={"decisions": 0, "reason": reason}, exercised=0)
-        return self.judge_rows(trace, rows)
+        finding = self.judge_rows(trace, rows)
+        return replace(finding, evidence=finding.evidence | {"without_decisions": without})
 
     @abc.abstractmethod
     def judge_rows(self, trace: Trace, rows: list[Row]) -> Finding:

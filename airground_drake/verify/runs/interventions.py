@@ -18,12 +18,6 @@ def intervening(trace: Trace, ugv: str) -> Array:
     return trace.t[edges].reshape(-1, 2)
 
 
-def causes_of(trace: Trace) -> dict[tuple[str, float], str]:
-    """UGV whose trigger each proposal was sent for, by the UGV that it was sent to and the time of issue, s."""
-    rows = trace.proposals.to_dict("records")
-    return {(str(row["robot"]), float(row["issued_s"])): str(row["cause"]) for row in rows}
-
-
 def talk_is_due(trace: Trace, ugv: str) -> bool:
     """Whether a UGV is intervened on for longer than a proposal and a decision on it take."""
     periods = trace.scenario["intervention"]["period_s"] + trace.scenario["gatekeeper"]["period_s"]

@@ -129,15 +129,15 @@ class LiveProg(GateClaim):
 def leaving_a_direction(trace: Trace, sent: Sequence[Sent]) -> int:
     """How many accepted proposals leave a direction of the plane to the own task: LIVE-GATE assumes that none does."""
     accepted = trace.decisions[trace.decisions["decision"] == "accept"]
-    which = set(zip(accepted["robot"], accepted["issued_s"], strict=True))
-    whole = [np.allclose(one.chosen[:2, :2], np.eye(2)) for one in sent if (one.ugv, one.issued_s) in which]
+    which = set(accepted["number"])
+    whole = [np.allclose(one.chosen[:2, :2], np.eye(2)) for one in sent if one.number in which]
     return whole.count(False)
 
 
 def judge_decision(trace: Trace, row: Row, last: Row | None, patience: Patience, sent: Sequence[Sent]) -> Iterator[Off]:
     """A decision against the rules, from what is known of the UGV before; `patience` is brought up to date."""
     gate, given, t = trace.scenario["gatekeeper"], row.given, float(row.given["t_s"])
-    same = last is not None and last.given["issued_s"] == given["issued_s"]
+    same = last is not None and last.given["number"] == given["number"]
     standing = str(last.given["decision"]) if same and last is not None else None
     if patience.until is not None and standing != "accept" and last is not None:
         patience.until, patience.since = None, float(last.given["t_s"]) + gate["period_s"]
@@ -157,7 +157,7 @@ def judge_decision(trace: Trace, row: Row, last: Row | None, patience: Patience,
     elif standing == "refuse":
         answer = ("refuse", "kept")
     else:
-        on = next(one for one in sent if (one.ugv, one.issued_s) == (given["robot"], given["issued_s"]))
+        on = next(one for one in sent if one.number == given["number"])
         answer = _first(row, on, patience, gate)
         if answer[0] == "accept":
             places = foreseen(trace, given, sent)[1].places_m
@@ -178,7 +178,7 @@ def judge_decision(trace: Trace, row: Row, last: Row | None, patience: Patience,
 def _lags(trace: Trace, row: Row, patience: Patience, sent: Sequence[Sent]) -> tuple[float, float]:
     """How far from where it is to be the UGV is, and was predicted to be, m."""
     t, robot = float(row.given["t_s"]), str(row.given["robot"])
-    on = next(one for one in sent if (one.ugv, one.issued_s) == (robot, row.given["issued_s"]))
+    on = next(one for one in sent if one.number == row.given["number"])
     away = on.chosen @ (interpolate(trace.t, trace.position(robot), t) - on.place(t))
     assert patience.lags is not None
     k = min(round((t - patience.since) / trace.scenario["control"]["period_s"]), len(patience.lags) - 1)

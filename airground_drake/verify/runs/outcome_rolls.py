@@ -24,8 +24,8 @@ AT_ONCE = 5_000_000
 """Coordinates of what decisions that are rolled out side by side keep away from: they have to fit into the memory."""
 FAR_M = 1e9
 """A coordinate beyond every sensing range."""
-Key = tuple[str, float, float]
-"""Of a decision: UGV, time, and time of issue of the proposal, s."""
+Key = tuple[float, int]
+"""Of a decision: time, s, and number of the proposal."""
 Counts = npt.NDArray[np.int64]
 
 
@@ -49,12 +49,9 @@ def foreseen(trace: Trace, given: dict[str, Any], sent: Sequence[Sent]) -> tuple
         trace: the run.
         given: the decision's row.
         sent: all proposals.
-
-    Raises:
-        TraceError: if the decision is on a proposal that was not sent.
     """
     known = trace.derived("foreseen", lambda: _all_foreseen(trace, sent))
-    key = str(given["robot"]), float(given["t_s"]), float(given["issued_s"])
+    key = float(given["t_s"]), int(given["number"])
     if key not in known:
         known[key] = _rolled_out(trace, [beginning(trace, *key, sent)])[0]
     return known[key]
@@ -63,8 +60,7 @@ def foreseen(trace: Trace, given: dict[str, Any], sent: Sequence[Sent]) -> tuple
 def _all_foreseen(trace: Trace, sent: Sequence[Sent]) -> dict[Key, tuple[Foreseen, Foreseen]]:
     """What comes of either choice of all decisions for which that was recorded, many side by side."""
     rows = trace.decisions[trace.decisions["accept_stalls"] >= 0.0]
-    columns = (rows[name].tolist() for name in ("robot", "t_s", "issued_s"))
-    keys = [(str(robot), float(t), float(issued)) for robot, t, issued in zip(*columns, strict=True)]
+    keys = [(float(t), int(number)) for t, number in zip(rows["t_s"], rows["number"], strict=True)]
     found, begun = dict[Key, tuple[Foreseen, Foreseen]](), dict[Key, Beginning]()
     for k, key in enumerate(keys):
         begun[key] = beginning(trace, *key, sent)

@@ -16,8 +16,8 @@ from airground_drake.verify.runs.control_law import selected
 from airground_drake.verify.runs.control_samples import control_samples
 from airground_drake.verify.runs.interventions import GATED_METHODS
 
-Answer = tuple[float, float, bool]
-"""Time of a decision, s, time of issue of the proposal that it is on, s, and whether it accepts."""
+Answer = tuple[float, int, bool]
+"""Time of a decision, s, number of the proposal that it is on, and whether it accepts."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,6 +25,7 @@ class Sent:
     """A proposal: a row of `Trace.proposals`.
 
     Attributes:
+        number: identifies it.
         ugv: to whom.
         policy: by which.
         issued_s: when.
@@ -36,6 +37,7 @@ class Sent:
         cause: UGV whose trigger it is for: this one, or another one that it is to make way for.
     """
 
+    number: int
     ugv: str
     policy: str
     issued_s: float
@@ -67,7 +69,8 @@ def proposals_of(trace: Trace) -> list[Sent]:
     """All of them, as recorded.
 
     Raises:
-        TraceError: if one is none, or they are not those of the events.
+        TraceError: if one is none, two have the same number, they are not those of the events, or a decision is on
+            none of them.
     """
     return trace.derived("proposals", lambda: _proposals_of(trace))
 
@@ -91,14 +94,21 @@ def _proposals_of(trace: Trace) -> list[Sent]:
             raise TraceError(f"{label}: its cause {row['cause']!r} is no UGV whose trigger it can have been sent for")
         found.append(
             Sent(
-                str(row["robot"]), str(row["policy"]), float(row["issued_s"]), times, places.reshape(-1, 3),
-                selected(selection), mapped.reshape(-1, 3), radii, str(row["cause"]),
+                int(row["number"]), str(row["robot"]), str(row["policy"]), float(row["issued_s"]), times,
+                places.reshape(-1, 3), selected(selection), mapped.reshape(-1, 3), radii, str(row["cause"]),
             )
         )  # fmt: skip
     recorded = sorted((s.ugv, s.issued_s, s.policy) for s in found)
     events = sorted((e["robot"], float(e["t_s"]), e["policy"]) for e in trace.events if e["kind"] == "proposal")
     if recorded != events:
         raise TraceError(f"the proposals recorded are {recorded}, those of the events {events}")
+    known = {sent.number: (sent.ugv, sent.issued_s) for sent in found}
+    if len(known) != len(found):
+        raise TraceError("two proposals have the same number")
+    columns = (trace.decisions[name].tolist() for name in ("number", "robot", "issued_s"))
+    for number, ugv, issued in zip(*columns, strict=True):
+        if known and known.get(number) != (ugv, issued):  # decisions without any proposal are COMM's to refuse
+            raise TraceError(f"a decision of {ugv} is on proposal {number}, issued at {issued} s, which it never got")
     return sorted(found, key=lambda sent: sent.issued_s)
 
 
@@ -146,7 +156,7 @@ def _accepted_at(trace: Trace, ugv: str) -> list[Sent | None]:
             asked = gate_s * np.floor(now / gate_s + 1e-6)
             k = int(np.searchsorted(times, asked - TIME_TOLERANCE_S))
             given = answers[k] if k < len(answers) and abs(times[k] - asked) <= TIME_TOLERANCE_S else None
-            here = [sent for sent in here if given is not None and given[2] and given[1] == sent.issued_s]
+            here = [sent for sent in here if given is not None and given[2] and given[1] == sent.number]
         found.append(here[-1] if here else None)
     return found
 
@@ -154,8 +164,8 @@ def _accepted_at(trace: Trace, ugv: str) -> list[Sent | None]:
 def answers_of(trace: Trace, ugv: str) -> list[Answer]:
     """Every decision of a UGV, by time."""
     table = trace.decisions[trace.decisions["robot"] == ugv]
-    columns = (table[name].tolist() for name in ("t_s", "issued_s", "decision"))
-    return sorted((float(t_s), float(issued), answer == "accept") for t_s, issued, answer in zip(*columns, strict=True))
+    columns = (table[name].tolist() for name in ("t_s", "number", "decision"))
+    return sorted((float(t_s), int(number), answer == "accept") for t_s, number, answer in zip(*columns, strict=True))
 
 
 def withdrawn_s(trace: Trace, ugv: str, sent: Sent, mine: Sequence[Sent], answers: Sequence[Answer]) -> float:
@@ -164,7 +174,7 @@ def withdrawn_s(trace: Trace, ugv: str, sent: Sent, mine: Sequence[Sent], answer
     called = (trace.column(f"{ugv}.mode") == 1.0) | (trace.column(f"{sent.cause}.mode") == 1.0)
     t = trace.t
     later = [other.issued_s for other in mine if other.issued_s > sent.issued_s]
-    refused = [(when, yes) for when, issued, yes in answers if issued == sent.issued_s]
+    refused = [(when, yes) for when, number, yes in answers if number == sent.number]
     first = round(sent.issued_s / period) + 1
     for k in range(first, int(t[-1] / period + 1e-6) + 1):
         now = k * period

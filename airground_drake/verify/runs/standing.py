@@ -54,20 +54,23 @@ def standing_conflicts(trace: Trace) -> Iterator[dict[str, Any]]:
     """Decisions on proposals that had been withdrawn, and proposals that have replaced one in force for no reason.
 
     Proposals that are sent at the same instant may be parts of a joint plan: one of which another UGV has refused its
-    part may be replaced at any time, and so may any other proposal by a part of such a plan.
+    part may be replaced at any time, and so may any other proposal by a part of such a plan. While another UGV is
+    intervened on, too, any proposal may be replaced: the policies may have been asked about that one.
     """
     every = proposals_of(trace)
     together = Counter(sent.issued_s for sent in every)
     for ugv in trace.ugvs:
         answers, mine = answers_of(trace, ugv), [sent for sent in every if sent.ugv == ugv]
-        ends = {sent.issued_s: withdrawn_s(trace, ugv, sent, mine, answers) for sent in mine}
-        for when, issued, _ in answers:
-            if when > ends.get(issued, np.inf) + TIME_TOLERANCE_S:
-                late = {"withdrawn_s": ends[issued], "issued_s": issued}
+        ends = {sent.number: withdrawn_s(trace, ugv, sent, mine, answers) for sent in mine}
+        for when, number, _ in answers:
+            if when > ends[number] + TIME_TOLERANCE_S:
+                late = {"withdrawn_s": ends[number], "number": number}
                 yield {"robot": ugv, "kind": "decision on what was withdrawn", "t_s": when, **late}
         for before, after in pairwise(mine):
             t = after.issued_s + TIME_TOLERANCE_S
             alone = together[before.issued_s] == together[after.issued_s] == 1 and after.cause == ugv
+            row = min(int(np.searchsorted(trace.t, after.issued_s - TIME_TOLERANCE_S)), len(trace.t) - 1)
+            alone &= not any(trace.column(f"{other}.mode")[row] == 1.0 for other in trace.ugvs if other != ugv)
             if alone and withdrawn_s(trace, ugv, before, [before], answers) > t and before.times_s[-1] > t:
                 yield {"robot": ugv, "kind": "replaced while in force", "t_s": after.issued_s, "by": after.policy}
 
@@ -78,16 +81,16 @@ def _told(trace: Trace) -> Iterator[Told]:
     centres = np.array(discs).reshape(-1, 4)[:, :3]
     for ugv in trace.ugvs:
         answers, mine = answers_of(trace, ugv), [sent for sent in proposals_of(trace) if sent.ugv == ugv]
-        ends = {sent.issued_s: withdrawn_s(trace, ugv, sent, mine, answers) for sent in mine}
-        refused = [(when, issued) for when, issued, accepted in answers if not accepted]
-        for (when, issued), here in zip(
+        ends = {sent.number: withdrawn_s(trace, ugv, sent, mine, answers) for sent in mine}
+        refused = [(when, number) for when, number, accepted in answers if not accepted]
+        for (when, number), here in zip(
             refused, interpolate(trace.t, trace.position(ugv), np.array([when for when, _ in refused])), strict=True
         ):
             away = np.linalg.norm(centres - here, axis=1) - reach
             surely, possibly = ({disc for disc, far in zip(discs, away, strict=True) if far <= side * SENSED_M}
                                 for side in (-1.0, 1.0))  # fmt: skip
-            later = [other for other, on in refused if on == issued and other > when]
-            noticed = ends.get(issued, np.inf)
+            later = [other for other, on in refused if on == number and other > when]
+            noticed = ends[number]
             last = not any(other < noticed - TIME_TOLERANCE_S for other in later)
             in_time = last and when < noticed - TIME_TOLERANCE_S
             yield Told(when, noticed if in_time else np.inf, surely, possibly)

@@ -226,8 +226,9 @@ def messages(trace: Trace) -> Signals | None:
     pairs = {(ugv, ugv) for ugv in trace.ugvs} | {(row["robot"], row["cause"]) for row in issued}
     sets: list[dict[str, Samples]] = []
     for ugv, cause in sorted(pairs):
-        elsewhere = {row["issued_s"] for row in issued if row["robot"] == ugv and row["cause"] != cause}
-        own = table[(table["robot"] == ugv) & ~table["issued_s"].isin(elsewhere)]
+        other = [row for row in issued if row["robot"] == ugv and row["cause"] != cause]
+        own = table[(table["robot"] == ugv) & ~table["number"].isin([row["number"] for row in other])]
+        elsewhere = {row["issued_s"] for row in other}
         sent = [t for t in _times(trace, ugv, "proposal") if t not in elsewhere] + own["t_s"].tolist()
         spans = [span for name in {ugv, cause} for span in _stays(trace, name, end)]
         message = square(((t, t + PULSE_S) for t in sent), end + 1.0)

@@ -109,6 +109,21 @@ def test_a_proposal_stands_until_it_is_over_and_no_longer(told: Trace) -> None:
     last = told.proposals.iloc[[-1]]
     when = float(last["issued_s"].iloc[0]) + 0.2
     events = [e for e in told.events if e["kind"] == "proposal"][-1:]
-    twice = replace(told, proposals=pd.concat([told.proposals, last.assign(issued_s=when)], ignore_index=True))
+    twice = replace(
+        told, proposals=pd.concat([told.proposals, last.assign(issued_s=when, number=90)], ignore_index=True)
+    )
     twice = with_meta(twice, events=[*told.events, *({**event, "t_s": when} for event in events)])
     assert counterexample("COMM", twice)["kind"] in ("replaced while in force", "decision on what was withdrawn")
+
+
+def test_a_ugv_that_no_policy_helps_does_not_keep_the_others_from_being_judged() -> None:
+    """ugv2 is intervened on for a while without a proposal: the messages to ugv1 are judged all the same."""
+
+    def intervening(signals: pd.DataFrame) -> pd.DataFrame:
+        return signals.assign(**{"ugv2.mode": (signals["t_s"] > 9.0) * 1.0})
+
+    trace = with_signals(run_of("d"), intervening)
+    finding = judge("COMM", trace)
+    assert finding.status == "holds"
+    assert (finding.evidence["without_proposals"], finding.evidence["without_decisions"]) == (["ugv2"], ["ugv2"])
+    assert judge("COMM", proposals(trace, 5.0)).status == "refuted"

@@ -93,6 +93,7 @@ def test_no_decision_at_all() -> None:
     for claim in (FEAS, SUR, OPT):
         assert claim.judge(none).status == "holds"
         assert claim.judge(with_signals(none, intervening)).status == "not_run"
-        assert claim.judge(with_signals(trace, intervening)).status == "not_run"
+        others = claim.judge(with_signals(trace, intervening))  # those of ugv1 are judged all the same
+        assert (others.status, others.evidence["without_decisions"]) == ("holds", ["ugv2"])
         assert claim.judge(replace(trace, problems=trace.problems.iloc[:0])).status == "not_run"
         assert not claim.applies(with_meta(trace, method="b"))

@@ -214,8 +214,8 @@ def test_what_is_taken_back_within_two_periods_needs_no_decision(
     trace = run("case_b", "d")
     first = trace.proposals.iloc[0].to_dict()
     rows = [
-        {**first, "robot": robot, "issued_s": t, "times_s": [t, end], "positions_m": [0.0] * 6}
-        for robot, t, end in sent
+        {**first, "number": 90 + k, "robot": robot, "issued_s": t, "times_s": [t, end], "positions_m": [0.0] * 6}
+        for k, (robot, t, end) in enumerate(sent)
     ]
     events = [{"t_s": t, "robot": robot, "kind": "proposal", "policy": first["policy"]} for robot, t, _ in sent]
     meta = {**trace.meta, "events": [*trace.events, *events]}

@@ -55,7 +55,7 @@ class Asked(NamedTuple):
     Attributes:
         reference: presets, (n, 6): m, m/s.
         proposals: per UGV.
-        answers: (n, 2), one of ACCEPT, SILENT, REFUSE and the time of issue that is answered.
+        answers: (n, 2), one of ACCEPT, SILENT, REFUSE and the number of the proposal that is answered.
         feed_forward: velocity that the UAV is told of every UGV, (3,), m/s.
         wanted: (n + 1, 3), m/s, within speed limits.
         executed: (n,), whether there is an accepted proposal.
@@ -195,12 +195,12 @@ def hostile(inputs: Inputs, views: Views, state: State, rng: np.random.Generator
     followed = task + np.einsum("ika,ikb,ib->ia", kept, kept, intervention - task)
     wanted = limited(np.where(executed[:, None], planar * followed, task), views.max_speed[:-1])
 
-    issued = rng.integers(1, 100, n).astype(np.float64)
-    answers = np.column_stack([[ANSWERS[each] for each in how], issued + (how == "answered_another")])
+    numbers = rng.integers(1, 100, n)
+    answers = np.column_stack([[ANSWERS[each] for each in how], numbers + (how == "answered_another")])
     times, legs = np.array([TIME_S - 1.0, TIME_S + 1.0]), np.stack([there - rate, there + rate], axis=1)
     proposals = tuple(
         None if how[i] == "none"
-        else Proposal(f"hostile_{i}", float(issued[i]), Motion(times, legs[i]), bases[i, : rank[i]])
+        else Proposal(f"hostile_{i}", 0.0, Motion(times, legs[i]), bases[i, : rank[i]], number=int(numbers[i]))
         for i in range(n)
     )  # fmt: skip
 

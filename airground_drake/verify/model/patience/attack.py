@@ -9,6 +9,7 @@ beside theirs: each new proposal is to be accepted as long as it leaves any, so 
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -73,6 +74,8 @@ def _attack(name: str, patience: Patience, period: float) -> dict[str, Any]:
     for k in range(min(MOST_SAMPLES, int(1.2 * patience.most * (patience.longest + patience.rest) / period))):
         t, before, asked = k * period, accepted, proposal
         proposal = _next(name, proposal, memory, t, rng, patience)
+        if proposal is not None and proposal is not asked:
+            proposal = replace(proposal, number=k)
         if proposal is not None and name != "stuck":
             place = proposal.motion.at(t)[0]
         if before:
