@@ -1,7 +1,8 @@
-"""Writing files whole or not at all."""
+"""Writing files whole or not at all; reading what somebody else may have made; temporary folders."""
 
 from __future__ import annotations
 
+import fcntl
 import hashlib
 import json
 import os
@@ -9,7 +10,7 @@ import re
 import shutil
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,9 @@ from airground_drake.errors import FolderError, one_line
 
 _PARTIAL = re.compile(r"\..*\.(?P<pid>\d+)\.[a-z0-9_]+\.partial")
 """Name of a temporary file: the process that writes it is in it."""
+
+_TEMPORARY = "airground_drake."
+"""What the names of temporary folders begin with."""
 
 _open: set[str] = set()
 """Temporary files and folders of this process."""
@@ -69,17 +73,38 @@ def discard_partial() -> None:
 
 @contextmanager
 def temporary_folder() -> Iterator[Path]:
-    """A folder that is removed in the end, also where this process ends at once.
+    """A folder that is removed in the end, also where this process ends at once; if it is killed, by a later one.
 
     Raises:
         OSError: if it cannot be made.
     """
-    with tempfile.TemporaryDirectory(prefix="airground_drake.") as name:
-        _open.add(name)
-        try:
-            yield Path(name)
-        finally:
-            _open.discard(name)
+    sweep_temporary()
+    made = Path(tempfile.mkdtemp(prefix=f".{_TEMPORARY}"))
+    folder = made.with_name(made.name[1:])
+    _open.update((str(made), str(folder)))
+    lock = os.open(made, os.O_RDONLY)
+    try:
+        with suppress(OSError):  # a file system without such locks: no process will remove it
+            fcntl.flock(lock, fcntl.LOCK_EX)
+        made.rename(folder)  # `sweep_temporary` does not see it before it is locked
+        yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+        _open.difference_update((str(made), str(folder)))
+        os.close(lock)
+
+
+def sweep_temporary() -> None:
+    """Remove the temporary folders of this user's processes that were killed: nobody holds a lock on them any more."""
+    for path in Path(tempfile.gettempdir()).glob(f"{_TEMPORARY}*"):
+        with suppress(OSError):
+            lock = os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                if os.fstat(lock).st_uid == os.geteuid():
+                    shutil.rmtree(path, ignore_errors=True)
+            finally:
+                os.close(lock)
 
 
 def is_partial(path: Path) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from airground_drake import interruption
 
 if __name__ == "__main__":
-    interruption.end_on_signals()  # before the imports, which take seconds
+    interruption.begin()  # before the imports, which take seconds
 
 import argparse
 import json
