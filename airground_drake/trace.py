@@ -35,7 +35,7 @@ import pandas as pd
 
 from airground_drake import files
 from airground_drake.arrays import Array, read_only
-from airground_drake.errors import TraceError
+from airground_drake.errors import TraceError, one_line
 
 T = TypeVar("T")
 
@@ -93,6 +93,10 @@ PROPOSAL_COLUMNS = (
 motion that it asks for, times (M) and positions (M x 3, flattened in C order), and J_int of (12)-(14), (m x 3, ditto):
 the directions that it concerns, and the obstacles that the UAV knows, centres (k x 3, ditto) and radii (k); and the UGV
 whose trigger it was sent for: this one, or another one that it is to make way for."""
+
+
+TABLES = ("signals", "decisions", "problems", "proposals")
+"""Attributes of `Trace` that are tables, each saved as a Parquet file of its name."""
 
 
 def no_proposals() -> pd.DataFrame:
@@ -216,12 +220,7 @@ def save(trace: Trace, folder: Path) -> list[str]:
         OSError: if the folder cannot be written.
         ValueError: if `meta` holds a number that is not finite.
     """
-    tables = {
-        "signals.parquet": trace.signals,
-        "decisions.parquet": trace.decisions,
-        "problems.parquet": trace.problems,
-        "proposals.parquet": trace.proposals,
-    }
+    tables = {f"{name}.parquet": getattr(trace, name) for name in TABLES}
     digests = {}
     for name, table in tables.items():
         buffer = io.BytesIO()
@@ -241,17 +240,19 @@ def load(folder: Path) -> Trace:
             `meta.json`.
     """
     try:
-        meta = json.loads((folder / "meta.json").read_text(encoding="utf-8"))
+        meta = json.loads(files.read_text(folder / "meta.json"))
         if meta.get("schema") != SCHEMA:
             raise TraceError(f"{folder}: schema {meta.get('schema')!r}, this version reads {SCHEMA!r}: simulate again")
-        timings = json.loads((folder / "timings.json").read_text(encoding="utf-8"))
-        tables = {}
-        for name, digest in meta.pop("files").items():
-            data = (folder / name).read_bytes()
-            if files.sha256(data) != digest:
-                raise TraceError(f"{folder / name}: its SHA-256 is not the one recorded in meta.json")
-            tables[name] = pd.read_parquet(io.BytesIO(data))
-        signals, decisions = tables["signals.parquet"], tables["decisions.parquet"]
-        return Trace(meta, signals, decisions, timings, tables["problems.parquet"], tables["proposals.parquet"])
-    except (OSError, KeyError, ValueError, AttributeError, RecursionError) as error:
-        raise TraceError(f"{folder}: not a readable trace: {error}") from error
+        timings = json.loads(files.read_text(folder / "timings.json"))
+        digests, tables = meta.pop("files"), {}
+        for name in TABLES:
+            path = folder / f"{name}.parquet"
+            data = files.read_bytes(path)
+            if files.sha256(data) != digests[path.name]:
+                raise TraceError(f"{path}: its SHA-256 is not the one recorded in meta.json")
+            tables[name] = files.read_table(data)
+        return Trace(meta, timings=timings, **tables)
+    except OSError as error:
+        raise TraceError(one_line(f"{error.filename}: {error.strerror}; wanted: a file of a saved run")) from error
+    except (LookupError, TypeError, ValueError, AttributeError, RecursionError) as error:
+        raise TraceError(one_line(f"{folder}: not a readable trace: {error}")) from error
