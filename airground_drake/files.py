@@ -138,6 +138,8 @@ def write_bytes(path: Path, data: bytes) -> None:
         OSError: as the system reports it, with the path; the old file, if any, is then still there.
     """
     try:
+        if path.exists() and not path.is_file():  # the system would replace a device, too
+            raise OSError(errno.EINVAL, "not a regular file")
         path.parent.mkdir(parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.{os.getpid()}.", suffix=".partial")
         _open.add(name)

@@ -155,6 +155,8 @@ def run(main: Callable[[], int]) -> NoReturn:
         code = 128 + signal.SIGPIPE
     except OSError as error:
         code = refuse(error, EXIT_TOOL)
+    except MemoryError:
+        code = refuse("out of memory", EXIT_TOOL)
     except Exception:
         code = EXIT_TOOL
         with suppress(OSError):

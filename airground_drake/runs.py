@@ -14,6 +14,7 @@ import time
 import warnings
 from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from multiprocessing.connection import wait
 from multiprocessing.process import BaseProcess
@@ -107,7 +108,8 @@ def _simulate(scenario: Scenario, run: str, folder: Path, clock: Any) -> None:
         stopped = [error.run, error.t, error.what] if isinstance(error, SimulationError) else None
         plain = str(error) if isinstance(error, AirgroundError) else described(error)
         refused = isinstance(error, PluginError)
-        files.write_json(folder / FAILURE, {"what": plain, "refused": refused, "stopped": stopped})
+        with suppress(OSError):  # a full disk; the parent says that this process died
+            files.write_json(folder / FAILURE, {"what": plain, "refused": refused, "stopped": stopped})
 
 
 def _end(*_: object) -> None:
