@@ -32,7 +32,8 @@ ROUNDS = 10
 
 CURRENT_FOLDER = {"PYTHONSAFEPATH": "1", "NUMBA_CACHE_DIR": "", "NUMBA_CACHE_LOCATOR_CLASSES": ""}
 """Environment in which nothing in the current folder is executed. Child interpreters do not import from there, and
-numba's configuration file there does not choose a cache, from which numba would unpickle. What is set stays as it is."""
+numba's configuration file there does not choose a cache, from which numba would unpickle. The user's own settings stay.
+"""
 
 _PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36
 

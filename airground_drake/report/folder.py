@@ -122,7 +122,7 @@ def _belongs(name: str) -> bool:
 def _blocks(path: Path, name: str) -> bool:
     """Whether there is a file where a report has a folder, or the other way round, or a folder that is elsewhere."""
     there = path.is_dir()
-    return _belongs(name) and (there and path.is_symlink() or not (_FOLDERS if there else _FILES).fullmatch(name))
+    return _belongs(name) and ((there and path.is_symlink()) or not (_FOLDERS if there else _FILES).fullmatch(name))
 
 
 def _parts(folder: Path) -> list[Path]:
