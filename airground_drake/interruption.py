@@ -3,6 +3,10 @@
 Nothing is unwound: an exception out of a signal handler may be lost in a callback, and `with` blocks wait for pools
 that still work. The handler kills every process that descends from this one, removes this process's temporary files,
 says so in one line, and leaves. A process that is killed itself cannot do that: those that it has forked end with it.
+
+On Linux a command works in a child of the process that was started (`begin`). The parent only waits. If the child is
+killed, the parent ends and removes what the child has left, and says so. If the parent is killed, the child gets
+SIGTERM.
 """
 
 from __future__ import annotations
@@ -28,7 +32,82 @@ STOPPING = (signal.SIGINT, signal.SIGTERM)
 ROUNDS = 10
 """Searches for descendants at most: one that is killed may just have begun another."""
 
-_PR_SET_PDEATHSIG = 1
+CURRENT_FOLDER = {"PYTHONSAFEPATH": "1", "NUMBA_CACHE_DIR": "", "NUMBA_CACHE_LOCATOR_CLASSES": ""}
+"""Environment in which nothing in the current folder is executed. Child interpreters do not import from there, and
+numba's configuration file there does not choose a cache, from which numba would unpickle. The user's own settings stay.
+"""
+
+_PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36
+
+_exit_code: int | None = None
+"""End of a pipe to the parent that waits for this process: it believes an exit code only if it is told here, too."""
+
+
+def begin() -> None:
+    """What a command does first, before the imports that take seconds: see this module."""
+    for name, value in CURRENT_FOLDER.items():
+        os.environ.setdefault(name, value)
+    _open_standard_streams()
+    if sys.platform == "linux":
+        _go_on_in_a_child()
+    end_on_signals()
+
+
+def _go_on_in_a_child() -> None:
+    """Return in a child process; the parent waits for it, cleans up after it, and leaves with its exit code.
+
+    The parent adopts what the child's descendants leave behind, so that it finds all of them if the child is killed.
+    """
+    global _exit_code
+    told, _exit_code = os.pipe()
+    parent = os.getpid()
+    _prctl(_PR_SET_CHILD_SUBREAPER, 1)
+    child = os.fork()
+    if child == 0:
+        os.close(told)
+        end_with_parent(signal.SIGTERM)
+        if os.getppid() != parent:
+            os._exit(1)
+        return
+    os.close(_exit_code)
+    for each in STOPPING:
+        if signal.getsignal(each) is not signal.SIG_IGN:
+            signal.signal(each, lambda number, _: os.kill(child, number))
+    status: int | None = None
+    while status is None:
+        ended, found = os.wait()  # also for the children that this process has adopted
+        status = found if ended == child else None
+    for each in STOPPING:
+        signal.signal(each, signal.SIG_IGN)
+    code = os.waitstatus_to_exitcode(status)
+    os.set_blocking(told, False)
+    with suppress(BlockingIOError):
+        if os.read(told, 1) == bytes([code % 256]) and code >= 0:
+            os._exit(code)
+    end_descendants()
+    files.sweep_temporary()
+    _remove_semaphores(child)
+    refuse(f"the process of this command died ({ended_how(code)})", EXIT_TOOL)
+    os._exit(EXIT_TOOL)
+
+
+def ended_how(code: int) -> str:
+    """What the exit code of a process says, negative for a signal, in words."""
+    return f"signal {-code}" if code < 0 else f"exit code {code}"
+
+
+def _exit(code: int) -> NoReturn:
+    """Leave at once, and tell the parent that this is meant."""
+    if _exit_code is not None:
+        with suppress(OSError):
+            os.write(_exit_code, bytes([code % 256]))
+    os._exit(code)
+
+
+def _remove_semaphores(pid: int) -> None:
+    """Remove the semaphores of loky that a process has left; the process that would do so was killed with it."""
+    for path in Path("/dev/shm").glob(f"sem.loky-{pid}-*"):
+        path.unlink(missing_ok=True)
 
 
 def end_on_signals() -> None:
@@ -43,8 +122,10 @@ def end_on_signals() -> None:
         if os.getpid() == owner:  # what was forked has inherited this handler
             end_descendants()
             files.discard_partial()
+            _remove_semaphores(owner)
             with suppress(OSError):
                 os.write(stderr, _line(number, clear=os.isatty(stderr)))
+            _exit(128 + number)
         os._exit(128 + number)
 
     for each in STOPPING:
@@ -77,6 +158,8 @@ def run(main: Callable[[], int]) -> NoReturn:
         code = 128 + signal.SIGPIPE
     except OSError as error:
         code = refuse(error, EXIT_TOOL)
+    except MemoryError:
+        code = refuse("out of memory", EXIT_TOOL)
     except Exception:
         code = EXIT_TOOL
         with suppress(OSError):
@@ -89,7 +172,7 @@ def leave(code: int) -> NoReturn:
     for stream in (sys.stdout, sys.stderr):
         with suppress(OSError, ValueError):  # a reader that has gone, a stream that is closed
             stream.flush()
-    os._exit(code)
+    _exit(code)
 
 
 def _line(number: int, *, clear: bool) -> bytes:
@@ -128,8 +211,12 @@ def _descendants() -> list[int]:
 def end_with_parent(how: signal.Signals = signal.SIGKILL) -> None:
     """From now on this process is sent a signal when the thread that has started it ends, on Linux."""
     if sys.platform == "linux":
-        with suppress(OSError, AttributeError):
-            ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, how, 0, 0, 0)
+        _prctl(_PR_SET_PDEATHSIG, how)
+
+
+def _prctl(option: int, value: int) -> None:
+    with suppress(OSError, AttributeError):
+        ctypes.CDLL(None).prctl(option, value, 0, 0, 0)
 
 
 def end_with_pipe(reader: int) -> None:

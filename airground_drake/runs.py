@@ -14,6 +14,7 @@ import time
 import warnings
 from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from multiprocessing.connection import wait
 from multiprocessing.process import BaseProcess
@@ -99,7 +100,7 @@ def _simulate(scenario: Scenario, run: str, folder: Path, clock: Any) -> None:
     """Simulate a run in this process and save it, or what has kept it from being simulated; the clock goes with it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent's to heed
     signal.signal(signal.SIGTERM, _end)
-    interruption.end_with_parent(signal.SIGTERM)
+    interruption.end_with_parent()  # at once: code that never returns to the interpreter heeds no other signal
     folder.mkdir()
     try:
         trace.save(simulate(scenario, run, watch=partial(setattr, clock, "value")), folder)
@@ -107,7 +108,8 @@ def _simulate(scenario: Scenario, run: str, folder: Path, clock: Any) -> None:
         stopped = [error.run, error.t, error.what] if isinstance(error, SimulationError) else None
         plain = str(error) if isinstance(error, AirgroundError) else described(error)
         refused = isinstance(error, PluginError)
-        files.write_json(folder / FAILURE, {"what": plain, "refused": refused, "stopped": stopped})
+        with suppress(OSError):  # a full disk; the parent says that this process died
+            files.write_json(folder / FAILURE, {"what": plain, "refused": refused, "stopped": stopped})
 
 
 def _end(*_: object) -> None:
@@ -130,7 +132,7 @@ def _result(folder: Path, process: BaseProcess, what: str) -> Trace:
     if (folder / FAILURE).is_file():
         raise _noted((folder / FAILURE).read_bytes(), what)
     if code or not (folder / "meta.json").is_file():
-        how = f"signal {-code}" if code < 0 else f"exit code {code}"
+        how = interruption.ended_how(code)
         raise AirgroundError(one_line(f"{what}: the process that simulated it died ({how})"))
     return trace.load(folder)
 

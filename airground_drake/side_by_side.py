@@ -72,15 +72,6 @@ def side_by_side(
         _pieces = ()
 
 
-def apart(work: Callable[[], int]) -> int:
-    """What some work returns, done in a process of its own: what ends that process ends nothing else.
-
-    Raises:
-        AirgroundError: if the process ends without having returned.
-    """
-    return _started(work, "with claims of others", daemon=False)() if forks() else work()
-
-
 def begun(work: Callable[[], T]) -> Callable[[], T]:
     """Begin some work in a process of its own; what is returned waits for what comes of it, and is to be called once.
 
@@ -89,15 +80,13 @@ def begun(work: Callable[[], T]) -> Callable[[], T]:
     Raises:
         AirgroundError: when it is waited for, if the process ends without having returned.
     """
-    return _started(work, "that was begun", daemon=True) if forks() and processors() > 1 else work
-
-
-def _started(work: Callable[[], T], which: str, *, daemon: bool) -> Callable[[], T]:
+    if not forks() or processors() == 1:
+        return work
     context = multiprocessing.get_context("fork")
     receiver, sender = context.Pipe(duplex=False)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)  # idle threads of numerical libraries survive a fork
-        process = context.Process(target=lambda: sender.send(work()), daemon=daemon)
+        process = context.Process(target=lambda: sender.send(work()), daemon=True)
         process.start()
     sender.close()
 
@@ -106,7 +95,7 @@ def _started(work: Callable[[], T], which: str, *, daemon: bool) -> Callable[[],
             found: T = receiver.recv()
         except EOFError:
             process.join()
-            raise AirgroundError(f"a process {which} died (exit code {process.exitcode})") from None
+            raise AirgroundError(f"a process that was begun died (exit code {process.exitcode})") from None
         process.join()
         return found
 

@@ -18,6 +18,8 @@ MOST = 1e15
 
 def refuse(why: object, code: int = EXIT_USAGE) -> int:
     """Say in one line why a command is not done, if standard error takes it; returns the exit code."""
+    if isinstance(why, OSError) and why.filename is not None:
+        why = f"{why.filename}: {why.strerror}"
     with suppress(OSError):
         print(f"error: {one_line(str(why))}", file=sys.stderr)
     return code

@@ -216,10 +216,10 @@ def commands() -> str:
     return _page(
         "Commands",
         "`airground COMMAND --help` says the same. `report`, `verify` and `check` are `python -m "
-        "airground_drake.report`, `.verify` and `.check`, too. Exit codes are, of every command: 0 done; 2 usage, or a "
-        "file or folder that cannot be used, with one line on standard error; 4 a fault of the tool, or of code of "
-        "others that it runs; 130 and 143 interrupted by SIGINT and SIGTERM; 141 whoever read the output has gone. "
-        "Other codes are a command's own.",
+        "airground_drake.report`, `.verify` and `.check`, too, which import from the current folder first. Exit codes "
+        "are, of every command: 0 done; 2 usage, or a file or folder that cannot be used, with one line on standard "
+        "error; 4 a fault of the tool, or of code of others that it runs; 130 and 143 interrupted by SIGINT and "
+        "SIGTERM; 141 whoever read the output has gone. Other codes are a command's own.",
         lines,
     )
 

@@ -75,7 +75,7 @@ def test_what_follows_from_the_code_is_current() -> None:
 def test_the_tutorial_from_an_empty_folder(tmp_path: Path) -> None:
     """Its files as they come, its commands in the order of the page; the first one installs, which CI does."""
     steps = re.findall(r"```(\w+)\n(.*?)```", (ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8"), re.DOTALL)
-    script = ["set -eu", f'python() {{ {sys.executable} "$@"; }}', 'airground() { python -m airground_drake "$@"; }']
+    script = ["set -eu", f'python() {{ {sys.executable} "$@"; }}', 'airground() { python -P -m airground_drake "$@"; }']
     for language, text in steps:
         name = re.match(r"# file: (\S+)\n", text)
         script.append(f"cat > {name[1]} <<'END'\n{text}END" if language == "python" and name else text)

@@ -6,6 +6,7 @@ import errno
 import os
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -51,3 +52,18 @@ def test_what_a_killed_process_has_left_is_swept_and_nothing_else(tmp_path: Path
     files.sweep(tmp_path)
     assert not left.exists()
     assert all(path.exists() for path in kept)
+
+
+def test_a_temporary_folder_of_a_killed_process_is_swept_and_no_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    program = "import os; from airground_drake import files; made = files.temporary_folder(); "
+    program += "(made.__enter__() / 'trace').mkdir(); os.kill(os.getpid(), 9)"
+    subprocess.run([sys.executable, "-c", program], env={**os.environ, "TMPDIR": str(tmp_path)}, check=False)
+    (left,) = tmp_path.iterdir()
+    with files.temporary_folder() as mine, files.temporary_folder() as another:
+        assert not left.exists()
+        assert mine.is_dir()
+        assert another.is_dir()
+    assert os.listdir(tmp_path) == []

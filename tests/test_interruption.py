@@ -66,3 +66,58 @@ def test_work_that_is_done_ends_at_once_with_its_code_and_its_output() -> None:
     program += "threading.Thread(target=time.sleep, args=(600,)).start(); leave(3)"
     ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
     assert (ended.returncode, ended.stdout, ended.stderr) == (3, "done\n", "")
+
+
+BEGUN = """
+import os, signal, subprocess, sys, time
+from collections import deque
+from itertools import repeat
+from airground_drake import files, interruption
+
+interruption.begin()
+with files.temporary_folder():
+    open(f"/dev/shm/sem.loky-{os.getpid()}-of_the_test", "w").close()
+    if os.fork() == 0:  # in code that never returns to the interpreter no handler is called
+        os.write(int(sys.argv[2]), b"!")
+        deque(repeat(0), maxlen=0)
+    subprocess.Popen(["sleep", "600"], close_fds=False, start_new_session=True)
+    os.write(int(sys.argv[2]), b"%d" % os.getpid())
+    exec(sys.argv[1])
+    time.sleep(600)
+"""
+ENDS = {
+    "os.kill(os.getpid(), signal.SIGKILL)": (4, "the process of this command died (signal 9)"),
+    "os._exit(0)": (4, "the process of this command died (exit code 0)"),
+    "os.kill(os.getpid(), signal.SIGTERM)": (143, "interrupted (SIGTERM)"),
+    "os.kill(os.getppid(), signal.SIGINT)": (130, "interrupted (SIGINT)"),
+    "os.kill(os.getppid(), signal.SIGKILL)": (-9, "interrupted (SIGTERM)"),
+}
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="a command works in a child on Linux only")
+@pytest.mark.parametrize("end", ENDS)
+def test_whichever_process_of_a_command_is_killed_nothing_is_left(end: str, tmp_path: Path) -> None:
+    reader, writer = os.pipe()  # as above
+    command = [sys.executable, "-c", BEGUN, end, str(writer)]
+    with subprocess.Popen(
+        command, pass_fds=[writer], stderr=subprocess.PIPE, text=True, env={**os.environ, "TMPDIR": str(tmp_path)}
+    ) as process:
+        os.close(writer)
+        told = b"".join(iter(lambda: os.read(reader, 100), b""))
+        os.close(reader)
+        said = process.communicate()[1]
+    code, why = ENDS[end]
+    assert (process.returncode, said) == (code, f"error: {why}\n")
+    assert os.listdir(tmp_path) == []
+    worker = int(told.replace(b"!", b""))
+    assert not list(Path("/dev/shm").glob(f"sem.loky-{worker}-*"))
+
+
+def test_a_command_leaves_with_its_own_code_and_lets_others_go_on() -> None:
+    program = "import subprocess; from airground_drake.interruption import begin, leave; begin(); print('done'); "
+    program += "left = subprocess.Popen(['sleep', '600'], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL); "
+    program += "print(left.pid); leave(3)"
+    ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    done, pid = ended.stdout.split()
+    assert (ended.returncode, done, ended.stderr) == (3, "done", "")
+    os.kill(int(pid), signal.SIGKILL)  # such as a browser that shows the report: it is still there

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import os
+import select
 import signal
+import subprocess
+import sys
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -87,3 +91,35 @@ def test_what_a_process_notes_is_the_error_that_it_met() -> None:
     assert (type(refused), str(refused)) == (PluginError, r"no\nsuch thing")
     stopped = runs._noted(b'{"stopped": ["d", 1.5, "why"], "refused": false, "what": ""}', "")
     assert str(stopped) == "run d stopped at t = 1.5 s: why"
+
+
+ORPHAN = """
+import multiprocessing, os, sys, time
+from collections import deque
+from itertools import repeat
+from pathlib import Path
+from airground_drake import runs
+
+def spins(*_, **__):
+    os.write(int(sys.argv[2]), b"%d" % os.getpid())
+    deque(repeat(0), maxlen=0)  # never returns to the interpreter, which could heed a signal
+
+runs.simulate = spins
+multiprocessing.get_context("fork").Process(target=runs._simulate, args=(None, "a", Path(sys.argv[1]), None)).start()
+time.sleep(600)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere a process is not told that its parent has ended")
+def test_a_run_that_spins_ends_with_a_parent_that_is_killed(tmp_path: Path) -> None:
+    reader, writer = os.pipe()  # the run holds the writing end until it ends
+    command = [sys.executable, "-c", ORPHAN, str(tmp_path / "a"), str(writer)]
+    with subprocess.Popen(command, pass_fds=[writer]) as parent:
+        os.close(writer)
+        run = int(os.read(reader, 20))
+        parent.kill()
+    ended, _, _ = select.select([reader], [], [], 60.0)
+    os.close(reader)
+    if not ended:
+        os.kill(run, signal.SIGKILL)
+        pytest.fail("it is still there")

@@ -24,8 +24,9 @@ IDLE_S = 300.0
 """A process that has had nothing to do for so long ends, s."""
 ENDING_S = 5.0
 """A thread of the pool that has ended has so long to end, s."""
-THREADS = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL", "BLIS", "NUMEXPR")}
-"""Environment of the processes: one thread each for numerical libraries."""
+ENVIRONMENT = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL", "BLIS", "NUMEXPR")}
+"""Of the processes: one thread each for numerical libraries."""
+ENVIRONMENT["PYTHONSAFEPATH"] = "1"  # loky starts them with `-m`, which would import from the current folder
 
 T = TypeVar("T")
 
@@ -82,7 +83,7 @@ def _submitted(call: Callable[[], T], jobs: int) -> Any:
     import loky
 
     try:
-        processes = loky.get_reusable_executor(jobs, timeout=IDLE_S, env=THREADS, initializer=end_with_parent)
+        processes = loky.get_reusable_executor(jobs, timeout=IDLE_S, env=ENVIRONMENT, initializer=end_with_parent)
         return processes.submit(call)
     except loky.BrokenProcessPool as error:
         future = loky.Future()

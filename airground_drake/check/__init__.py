@@ -1,4 +1,4 @@
-"""An independent check of a report: `python -m airground_drake.check DIR`.
+"""An independent check of a report: `airground check DIR`.
 
 Every verdict in DIR/report.json is established again from DIR/trace/ and DIR/certificates/, by formulas that are
 written here from the statements of the claims; proofs in exact rational arithmetic. Only the standard library, numpy,

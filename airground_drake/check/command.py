@@ -46,7 +46,7 @@ class _Parser(argparse.ArgumentParser):
 def parser() -> argparse.ArgumentParser:
     """What the command line takes; it raises `UsageError`."""
     parser = _Parser(
-        prog="python -m airground_drake.check",
+        prog="airground check",
         description="Establish every verdict of a report again, from its files alone.",
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
@@ -85,7 +85,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         options = parser().parse_args(arguments)
     except UsageError as error:
-        return _refuse(f"{error}; usage: python -m airground_drake.check [--json] DIR")
+        return _refuse(f"{error}; usage: airground check [--json] DIR")
     except SystemExit:  # --help has been printed
         return 0
     import numpy as np

@@ -75,5 +75,5 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def entry() -> None:
     """Console script."""
-    interruption.end_on_signals()  # before the imports, which take seconds
+    interruption.begin()  # before the imports, which take seconds
     interruption.run(main)

@@ -51,7 +51,7 @@ def _write(place: Path) -> Path:
     from airground_drake.report import pages
 
     page = place / PAGE
-    if page.exists() and MARK not in page.read_text(encoding="utf-8", errors="replace"):
+    if page.exists() and MARK.encode() not in files.read_bytes(page):
         raise FolderError(f"{page} is not a list of reports that `airground index` has made; it is left alone")
     below = sorted(path.parent for path in place.glob("**/report.json") if path.parent != place)
     entries: list[dict[str, Any]] = []

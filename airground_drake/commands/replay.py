@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import argparse
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from airground_drake import files
 from airground_drake.errors import AirgroundError, FolderError, UnknownNameError, one_line
+from airground_drake.report.folder import is_report
 from airground_drake.usage import Parser, refuse
 
 if TYPE_CHECKING:
     from airground_drake.replay.scene import Scene
 
-SCHEMA = "airground_drake.report/"
 ELSEWHERE = "it is left alone; name another place, with -o"
 SLOWEST, SPEED, FASTEST = 0.1, 4.0, 100.0
 """How fast a video may be, and is if nothing is said of it."""
@@ -115,14 +114,6 @@ def _speed(text: str) -> float:
     return speed
 
 
-def _is_report(folder: Path) -> bool:
-    try:
-        schema = json.loads((folder / "report.json").read_text(encoding="utf-8"))["schema"]
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):
-        return False
-    return isinstance(schema, str) and schema.startswith(SCHEMA)
-
-
 def _runs(folder: Path) -> list[str]:
     """Names of the runs of a report that have left a trace.
 
@@ -130,7 +121,7 @@ def _runs(folder: Path) -> list[str]:
         FolderError: if it is no report, or one without runs.
     """
     found = sorted(path.parent.name for path in folder.glob("trace/*/meta.json"))
-    if not _is_report(folder):
+    if not is_report(folder):
         raise FolderError(one_line(f"{folder} is no report; allowed: a folder that `airground report` has written"))
     if not found:
         raise FolderError(one_line(f"{folder} has no runs to replay; allowed: a report with trace/RUN/meta.json"))
@@ -144,7 +135,7 @@ def _take(folder: Path, what: str) -> None:
         FolderError: if the folder is one of a report, or cannot be written.
     """
     for each in (folder.resolve(), *folder.resolve().parents):
-        if _is_report(each):
+        if is_report(each):
             raise FolderError(one_line(f"{folder} is in the report {each}, which is complete; name another, with -o"))
     files.make_folder(folder, what)
 

@@ -5,16 +5,14 @@ from __future__ import annotations
 from airground_drake import interruption
 
 if __name__ == "__main__":
-    interruption.end_on_signals()  # before the imports, which take seconds
+    interruption.begin()  # before the imports, which take seconds
 
 import argparse
 import shlex
 import sys
 import webbrowser
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from airground_drake.errors import (
     AirgroundError,
@@ -31,9 +29,6 @@ from airground_drake.scenarios import plugins
 from airground_drake.scenarios.estimate import DEFAULT_LIMITS, GIB, Limits
 from airground_drake.scenarios.shipped import AUDIT, shipped
 from airground_drake.usage import EXIT_TOOL, Parser, overridable, positive, refuse
-
-if TYPE_CHECKING:
-    from airground_drake.scenarios.schema import Scenario
 
 FORMATS = tuple(folder.PAGES)
 AUDITED = "case_a"
@@ -58,14 +53,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.list:
         print("\n".join([*shipped(), AUDIT]))
         return 0
-    command = ["python", "-m", "airground_drake.report", *(sys.argv[1:] if arguments is None else arguments)]
-    return _explained(partial(_loaded, options, shlex.join(command)))
-
-
-def _explained(work: Callable[[], int]) -> int:
-    """The exit code of some work, with a line for what has kept it from being done."""
+    command = ["airground", "report", *(sys.argv[1:] if arguments is None else arguments)]
     try:
-        return work()
+        return _reported(options, shlex.join(command))
     except LimitError as error:
         return refuse(f"{error}; see --limit-steps and --limit-memory")
     except (ScenarioError, PluginError, UnknownNameError, FolderError) as error:
@@ -76,8 +66,8 @@ def _explained(work: Callable[[], int]) -> int:
         return refuse(error, EXIT_TOOL)
 
 
-def _loaded(options: argparse.Namespace, command: str) -> int:
-    """Load the scenario and report on it: in a process of its own, where claims of others may end that process."""
+def _reported(options: argparse.Namespace, command: str) -> int:
+    """Load the scenario and report on it."""
     from airground_drake.scenarios.load import load
 
     overrides = [*options.set, *([] if options.seed is None else [f"seed={options.seed}"])]
@@ -85,16 +75,7 @@ def _loaded(options: argparse.Namespace, command: str) -> int:
     scenario, digest = load(AUDITED if audited else options.scenario, overrides)
     if audited:
         scenario.name, scenario.title, scenario.description = AUDIT, AUDIT_TITLE, AUDIT_DESCRIPTION
-    work = partial(_reported, options, command, scenario, digest)
-    if not (scenario.claims and options.allow_plugins):
-        return work()
-    from airground_drake.side_by_side import apart
-
-    return apart(partial(_explained, work))
-
-
-def _reported(options: argparse.Namespace, command: str, scenario: Scenario, digest: str) -> int:
-    from airground_drake.report import attention, make
+    from airground_drake.report import attention, make  # once the scenario is valid: this takes long to import
     from airground_drake.verify.cache import cache_folder
 
     kept = None if options.no_cache else cache_folder()

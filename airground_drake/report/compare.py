@@ -15,6 +15,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from airground_drake import files
 from airground_drake.errors import ReportError, one_line
 from airground_drake.report.folder import PAGES
 from airground_drake.statuses import UNDECIDED, outcome
@@ -51,9 +52,8 @@ def read(folder: Path) -> Document:
     """
     path = folder / PAGES["json"]
     try:
-        document = json.loads(
-            path.read_text(encoding="utf-8"), parse_constant=_finite, parse_float=_finite, parse_int=_short
-        )
+        text = files.read_text(path)
+        document = json.loads(text, parse_constant=_finite, parse_float=_finite, parse_int=_short)
         json.dumps(document, ensure_ascii=False).encode()  # no halves of characters
         if document["schema"] != REPORT:
             raise ValueError(f"its schema is not {REPORT}")

@@ -59,7 +59,7 @@ def build(
     claims = [
         {
             **verdict.to_json(),
-            "rerun": f"python -m airground_drake.verify trace/{verdict.run or some_run} {verdict.claim.id}"
+            "rerun": f"airground verify trace/{verdict.run or some_run} {verdict.claim.id}"
             + f" {OPTION}" * (verdict.claim.id in scenario.claims),
         }
         for verdict in verdicts

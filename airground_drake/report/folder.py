@@ -89,7 +89,7 @@ def clear(folder: Path) -> None:
 def is_report(folder: Path) -> bool:
     """Whether there is a report.json of ours in a folder."""
     try:
-        with (folder / PAGES["json"]).open("rb") as file:
+        with files.open_regular(folder / PAGES["json"]) as file:
             return _OURS.match(file.read(100)) is not None
     except OSError:
         return False
@@ -120,8 +120,9 @@ def _belongs(name: str) -> bool:
 
 
 def _blocks(path: Path, name: str) -> bool:
-    """Whether there is a file where a report has a folder, or the other way round."""
-    return _belongs(name) and not (_FOLDERS if path.is_dir() else _FILES).fullmatch(name)
+    """Whether there is a file where a report has a folder, or the other way round, or a folder that is elsewhere."""
+    there = path.is_dir()
+    return _belongs(name) and ((there and path.is_symlink()) or not (_FOLDERS if there else _FILES).fullmatch(name))
 
 
 def _parts(folder: Path) -> list[Path]:

@@ -115,7 +115,7 @@ def _read_bytes(name_or_path: str) -> tuple[str, bytes]:
     file: Traversable = shipped_files().get(name_or_path, Path(name_or_path))
     source = str(file)
     try:
-        with file.open("rb") as stream:
+        with file.open("rb") if name_or_path in shipped_files() else files.open_pipe(Path(name_or_path)) as stream:
             data = stream.read(MAX_BYTES + 1)
     except (FileNotFoundError, NotADirectoryError):
         close = suggestion(name_or_path, shipped())

@@ -5,10 +5,11 @@ from __future__ import annotations
 from airground_drake import interruption
 
 if __name__ == "__main__":
-    interruption.end_on_signals()  # before the imports, which take seconds
+    interruption.begin()  # before the imports, which take seconds
 
 import argparse
 import json
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -90,7 +91,7 @@ def _judge(target: str, wanted: Sequence[str], watch: Watch, *, allow_plugins: b
     from airground_drake.verify.registry import model_claims, run_claims
 
     folder = Path(target)
-    run = trace.load(folder) if (folder / "meta.json").is_file() else None
+    run = trace.load(folder) if os.path.lexists(folder / "meta.json") else None
     scenario = load(target)[0] if run is None else from_data(run.scenario, target)
     added = {name: place for name, place in scenario.claims.items() if not wanted or name in wanted}
     imported = None if run is None else [f"claims.{name}" for name in added]

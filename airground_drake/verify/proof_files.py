@@ -47,7 +47,7 @@ def proofs_of(folder: Path, limit_s: float = LIMIT_S) -> list[dict[str, Any]]:
         OSError: if the folder cannot be read or written.
     """
     scripts = sorted(folder.glob("certificates/*/*.smt2"))
-    found = solve([script.read_text(encoding="utf-8") for script in scripts], "cvc5_proof", limit_s)
+    found = solve([files.read_text(script) for script in scripts], "cvc5_proof", limit_s)
     index = [_kept(folder, script, result) for script, result in zip(scripts, found, strict=True)]
     files.write_json(folder / "proofs" / "index.json", index)
     return index

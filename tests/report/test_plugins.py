@@ -6,6 +6,7 @@ import json
 import os
 import re
 import shutil
+import subprocess
 import sys
 from collections.abc import Callable
 from importlib import resources
@@ -147,16 +148,47 @@ class It(TraceClaim):
 CLAIMS = {"on import": "import os; os._exit(0)", "when asked": CLAIM}
 
 
+LIMITS = """
+import os, resource
+from airground_drake.intervention.policy import Policy
+class It(Policy):
+    def __init__(self, *, above):
+        pid = os.getpid()
+        for _ in range(int(above)):
+            with open(f"/proc/{pid}/stat") as file:
+                pid = int(file.read().rpartition(")")[2].split()[1])
+        resource.prlimit(pid, resource.RLIMIT_CPU, (0, 0))
+    def propose(self, seen): return None
+"""
+
+
+def ended(folder: Path, *settings: str) -> tuple[int, list[str]]:
+    """Exit code of a report in `folder`, and what is said on standard error; its process ends, so not in this one."""
+    options = ["--format", "json", "--set", "duration_s=0.5", "--allow-plugins"]
+    options += [part for setting in settings for part in ("--set", setting)]
+    command = [sys.executable, "-m", "airground_drake.report", "minimal", "-o", str(folder / "out"), *options]
+    done = subprocess.run(
+        command, env={**os.environ, "PYTHONPATH": str(folder)}, capture_output=True, text=True, check=False
+    )
+    assert not (folder / "out" / "report.json").exists()
+    return done.returncode, done.stderr.splitlines()
+
+
 @pytest.mark.parametrize("when", CLAIMS)
-def test_a_claim_that_ends_its_process_is_no_report(
-    when: str, module: Callable[[str], str], tmp_path: Path, capfd: pytest.CaptureFixture[str]
+def test_a_claim_that_ends_its_process_is_no_report(when: str, module: Callable[[str], str], tmp_path: Path) -> None:
+    said = ended(tmp_path, f"claims={{MINE: '{module(CLAIMS[when])}'}}")
+    assert said == (4, ["error: the process of this command died (exit code 0)"])
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="`prlimit` is of Linux")
+@pytest.mark.parametrize(("above", "who"), [(1, "that simulated it"), (2, "of this command")])
+def test_a_policy_that_takes_time_away_from_another_process_is_one_line(
+    above: int, who: str, module: Callable[[str], str], tmp_path: Path
 ) -> None:
-    change = ["--set", f"claims={{MINE: '{module(CLAIMS[when])}'}}", "--set", "duration_s=0.5", "--allow-plugins"]
-    assert main(["minimal", "-o", str(tmp_path / "out"), "--format", "json", *change]) == 4
-    said = capfd.readouterr().err.strip().splitlines()
-    assert len(said) == 1
-    assert "died" in said[0]
-    assert not (tmp_path / "out" / "report.json").exists()
+    policy = f"{{name: '{module(LIMITS)}', parameters: {{above: {above}}}}}"
+    code, said = ended(tmp_path, f"intervention.policies=[{policy}]")
+    assert (code, len(said)) == (4, 1)
+    assert said[0].endswith(f"the process {who} died (signal 9)")
 
 
 @pytest.fixture

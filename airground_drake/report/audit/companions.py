@@ -103,7 +103,7 @@ def _soft_gate() -> Item:
         and ours["accepted"] > 0
         and ours["min_distance_m"] >= d - 1e-9,
         "evidence": evidence
-        | {"safe_distance_m": d, "command": "python -m airground_drake.report soft_gate"}
+        | {"safe_distance_m": d, "command": "airground report soft_gate"}
         | {"distance_to_the_nearest_obstacle": _gaps(traces)},
     }
 

@@ -94,7 +94,7 @@ def _ask(solver: Solver, script: str, limit_s: float) -> Result:
 
 def _started(solver: Solver) -> _Process:
     pipe = subprocess.PIPE
-    command = [sys.executable, "-m", "airground_drake.verify.engines.smt", solver]
+    command = [sys.executable, "-P", "-m", "airground_drake.verify.engines.smt", solver]
     return subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, bufsize=0)
 
 
