@@ -28,7 +28,7 @@ class Command(NamedTuple):
 COMMANDS: dict[str, Command] = {
     "report": Command("airground_drake.report.__main__", "simulate a scenario, check its claims, write the report"),
     "verify": Command("airground_drake.verify.__main__", "judge claims anew, on a saved run or about a model"),
-    "check": Command("airground_drake.check.command", "go over a report with the independent checker"),
+    "check": Command("airground_drake.commands.check", "check a report from its files alone"),
     "compare": Command("airground_drake.commands.compare", "say what has changed from one report to another"),
     "index": Command("airground_drake.commands.index", "list the reports in a folder on a page"),
     "proofs": Command("airground_drake.verify.proof_files", "write the proofs of a report for others' checkers"),
