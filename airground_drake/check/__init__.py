@@ -12,13 +12,13 @@ establishes.
     safety                     SAFE-TRACE, SAFE-HYP
     law, proposals, execution  EXEC: the control law, what was accepted when, commands
     triggers                   ZENO-TRACE, THR-TRIG
-    outcome                    LIVE-GOAL, COMM, GATE-TIME
+    outcome                    LIVE-GOAL, COMM
     decisions                  a recorded decision, its problem (26), predictions (23) and costs (25)
     feasibility                GATE-FEAS
     rollouts, foresight        GATE-MODEL under method (d): what comes of accepting and refusing
     prediction                 GATE-MODEL: mode velocities
     progress                   LIVE-PROG
-    optimality                 GATE-SUR, GATE-OPT
+    optimality                 GATE-OPT
     polynomials, certificates  SAFE-LEMMA, SAFE-INV, SAFE-GATE, SAFE-DIST, ZENO-PROOF, LIVE-GATE, LIVE-WAIT, THR-ISO;
                                obligations.json
     conformance                what their records say besides: that running code conforms, and what rounding takes

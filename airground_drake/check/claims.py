@@ -9,8 +9,8 @@ from .enclosures import root
 from .execution import execution
 from .feasibility import gate_feas
 from .files import Files, Json
-from .optimality import gate_opt, gate_sur
-from .outcome import comm, gate_time, live_goal
+from .optimality import gate_opt
+from .outcome import comm, live_goal
 from .prediction import gate_model
 from .progress import live_prog
 from .rules import Found
@@ -33,19 +33,14 @@ EVERY_RUN: Mapping[str, OfRun] = {
 WITH_MESSAGES: Mapping[str, OfRun] = {"COMM": comm}
 WITH_GATEKEEPER: Mapping[str, OfRun] = {
     "GATE-OPT": gate_opt,
-    "GATE-SUR": gate_sur,
     "GATE-FEAS": gate_feas,
     "GATE-MODEL": gate_model,
-    "GATE-TIME": gate_time,
 }
 WITH_OUTCOMES: Mapping[str, OfRun] = {
     "GATE-FEAS": gate_feas,
     "GATE-MODEL": gate_model,
-    "GATE-TIME": gate_time,
     "LIVE-PROG": live_prog,
 }
-ROUNDING_ROUTES = ("relaxed", "nonlinear")
-"""Routes that GATE-SUR is about."""
 PROVED = (
     "SAFE-LEMMA", "SAFE-INV", "SAFE-GATE", "SAFE-DIST", "ZENO-PROOF", "LIVE-GATE", "LIVE-WAIT", "THR-ISO",
 )  # fmt: skip
@@ -72,8 +67,8 @@ NOT_EXERCISED = "not_exercised"
 """How a claim counts that was established because nothing put it to the test."""
 
 
-def claims_of(method: str, route: str) -> dict[str, OfRun]:
-    """The claims about a run of a method, with a route of the gatekeeper."""
+def claims_of(method: str) -> dict[str, OfRun]:
+    """The claims about a run of a method."""
     found = dict(EVERY_RUN)
     if method != "a":
         found |= WITH_MESSAGES
@@ -81,8 +76,6 @@ def claims_of(method: str, route: str) -> dict[str, OfRun]:
         found |= WITH_OUTCOMES
     if method == "c":
         found |= WITH_GATEKEEPER
-        if route not in ROUNDING_ROUTES:
-            del found["GATE-SUR"]
     return found
 
 
@@ -97,7 +90,7 @@ def expectations(scenario: Json) -> dict[tuple[str, str], str]:
     declared = scenario["expected"].items()
     wanted |= {("", name): status for name, status in declared if not is_foreign(name, scenario)}
     for run, about in scenario["runs"].items():
-        for name in claims_of(about["method"], scenario["gatekeeper"]["route"]):
+        for name in claims_of(about["method"]):
             wanted[run, name] = about["expected"].get(name, "holds")
     return wanted
 

@@ -10,12 +10,12 @@ Keys are written with dots; `*` stands for any key, or for the entries of a list
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from functools import cache
 from typing import Any
 
 from .files import Json
-from .rules import Found, agrees, close, holds, same
+from .rules import Found, agrees, holds, same
 
 PARTS = ("where", "counterexample", "evidence")
 """Of a claim's entry: what it rests on."""
@@ -27,16 +27,6 @@ KEYS = frozenset(
     )
 )  # fmt: skip
 """What a claim's entry consists of."""
-AGREEMENT = 1e-10
-"""A second engine's robustness and the margin that it is compared with may differ by this."""
-
-_SECOND_OPINION = tuple(
-    f"evidence.stl.checks.*.{key}"
-    for key in (
-        "part", "formula", "signals", "semantics", "relation", "compares", "unit", "tolerance", "robustness",
-        "verdict", "engine", "reason",
-    )
-)  # fmt: skip
 _ANSWERS = tuple(
     f"evidence.obligations.*.{key}" for key in ("says", "certificate", "z3", "cvc5", "hypotheses", "detail")
 )
@@ -46,7 +36,7 @@ _WIRING = (
     "states", "inequalities", "commands", "executed", "proposals", "never_bound", "never_bound_count",
     "least_times_bound", "least_slack_m_s",
 )  # fmt: skip
-_EVERYWHERE = ("from_cache", "evidence.reason", *_SECOND_OPINION, *_ANSWERS)
+_EVERYWHERE = ("from_cache", "evidence.reason", *_ANSWERS)
 
 AS_RECORDED: Mapping[str, tuple[str, ...]] = {
     "GATE-FEAS": ("evidence.comparisons",),
@@ -119,12 +109,10 @@ def check_entry(claim: Json, found: Found, *, whole: bool) -> Mapping[str, int]:
         Disagreement: if a value is another, or its key is neither established nor to be taken as recorded.
     """
     same("what an entry consists of", sorted({*claim} - KEYS), [])
-    _second_opinion(claim)
     agrees("evidence", claim["evidence"], found.facts, within=1e-8)
     for rule in found.rules:
         rule()
-    established = {path for path, _ in _leaves(found.facts, ("evidence",))} | {("evidence", "stl", "agrees")}
-    judged = [*found.judged, *(f"evidence.stl.checks.*.{key}" for key in ("run", "claim", "ours"))]
+    established = {path for path, _ in _leaves(found.facts, ("evidence",))}
     taken: Counter[str] = Counter({"from_cache": 1} if claim.get("from_cache") else {})
     known: dict[tuple[str, ...], bool] = {}
     for part in PARTS:
@@ -132,7 +120,7 @@ def check_entry(claim: Json, found: Found, *, whole: bool) -> Mapping[str, int]:
             if path in established or _is_nothing(path, value):
                 continue
             if path not in known:
-                known[path] = _first(judged, path) is not None
+                known[path] = _first(found.judged, path) is not None
             if known[path]:
                 continue
             key = _first(as_recorded(claim["id"]), path) or (None if whole else part)
@@ -181,41 +169,3 @@ def _first(keys: Any, path: tuple[str, ...]) -> str | None:
 @cache
 def _parts(key: str) -> tuple[str, ...]:
     return tuple(key.split("."))
-
-
-def _second_opinion(claim: Json) -> None:
-    """What a second engine said is about this claim, and compared with its margins."""
-    if "stl" not in claim["evidence"]:
-        return
-    said, decided = claim["evidence"]["stl"], claim["status"] in ("holds", "refuted")
-    checks = said["checks"]
-    decided = decided and all(check["verdict"] in ("satisfied", "violated") for check in checks)
-    same("whether a second engine agrees", said["agrees"], True if decided else None)
-    if claim["status"] == "refuted":
-        _found_something(checks)
-    for check in checks:
-        about = str(check["part"])
-        same("what a second engine was asked about", [check["claim"], check["run"]], [claim["id"], claim["run"]])
-        worst = [
-            each["margin"] for each in claim["evidence"].get("worst", ()) if each["hypothesis"] in check["compares"]
-        ]
-        ours = claim["margin"] if check["compares"] == ["margin"] else min(worst, default=None)
-        same("number that a second engine's is compared with", check["ours"], ours, about=about)
-        if decided and None not in (ours, check["robustness"]):
-            close("number of a second engine", check["robustness"], ours, within=AGREEMENT, about=about)
-        if claim["status"] == "holds" and not _by_rounding(check):
-            said_so = check["verdict"]
-            holds("a second engine finds no violation", said_so != "violated", said_so, "no violation", about=about)
-
-
-def _found_something(checks: Sequence[Json]) -> None:
-    """What is refuted violates a formula that says the same, unless one could not be decided."""
-    alike = [check for check in checks if check["relation"] == "equivalent"]
-    wrong = bool(alike) and all(check["verdict"] == "satisfied" and not _by_rounding(check) for check in alike)
-    holds("a second engine finds a violation", not wrong, "every formula satisfied", "one violated")
-
-
-def _by_rounding(check: Json) -> bool:
-    """Whether rounding decides: the number, which is compared, is within what it may be off of the level asked for."""
-    asked = bool(check["compares"]) and check["robustness"] is not None
-    return asked and bool(abs(check["robustness"] + check["tolerance"]) <= AGREEMENT)

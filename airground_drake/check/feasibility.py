@@ -25,6 +25,10 @@ INSIDE_M = 1e-6
 """Closer than the safe distance by more than this, avoidance may ask for more speed than the limit."""
 NO_DIFFERENCE = 1e-6
 """Relative gain from which on a new proposal makes a difference."""
+TIE = 1e-9
+"""Deficits of sum-up rounding closer to 1/2 than this are a tie: either mode may follow."""
+ROUNDING_ROUTES = ("relaxed", "nonlinear")
+"""Routes that round a relaxed plan."""
 CHOICES = ("refuse", "accept")
 
 
@@ -43,6 +47,10 @@ def gate_feas(run: Run, claim: Json) -> Found:
             _plan_and_its_positions(decision)
             _costs_and_clearance(decision)
         _no_faster_than_the_limit(run, decision)
+    route = run.scenario["gatekeeper"]["route"]
+    rounded = [each for each in decisions if len(each.relaxed) and route in ROUNDING_ROUTES]
+    for decision in rounded:
+        _is_rounded_by_the_rule(decision)
     for ugv in run.ugvs:
         mine = [decision for decision in decisions if decision.ugv == ugv]
         _answers_follow_the_rules(run, mine)
@@ -54,6 +62,8 @@ def gate_feas(run: Run, claim: Json) -> Found:
         "wrong": 0,
         "reasons": reasons_of(run),
         "without_a_plan": [f"decision of {each.ugv} at t = {each.t_s} s" for each in decisions if not each.planned],
+        "rounded_plans": len(rounded),
+        "largest_rounding_error_s": max(map(rounding_error_s, rounded), default=0.0),
     }
     slack = partial(_slack, [decision for decision in decisions if decision.planned], claim["evidence"])
     found = Found("holds", 0.0, 1.0, facts).counted(len(decisions))
@@ -63,6 +73,25 @@ def gate_feas(run: Run, claim: Json) -> Found:
 def reasons_of(run: Run) -> dict[str, int]:
     """How many decisions have each reason."""
     return dict(Counter(map(str, run.decisions["reason"])))
+
+
+def rounding_error_s(decision: Decision) -> float:
+    """max_k |dt sum_(r <= k) (relaxed_r - rounded_r)|."""
+    return float(decision.dt_s * np.abs(np.cumsum(decision.relaxed - decision.rounded)).max())
+
+
+def _is_rounded_by_the_rule(decision: Decision) -> None:
+    """rounded_k = 1 where D_k >= 1/2, D_k = sum_(r <= k) relaxed_r - sum_(r < k) rounded_r."""
+    relaxed, rounded, at = decision.relaxed, decision.rounded, _at(decision)
+    close("relaxed omega is in [0, 1]", relaxed, np.clip(relaxed, 0.0, 1.0), within=0.0, **at)
+    holds("rounded omega is 0 or 1", (rounded == 0.0) | (rounded == 1.0), rounded, "0 or 1", **at)
+    deficit = np.cumsum(relaxed) - (np.cumsum(rounded) - rounded)
+    tie = np.abs(deficit - 0.5) <= TIE
+    holds("sum-up rounding", (rounded == (deficit >= 0.5)) | tie, rounded, (deficit >= 0.5) * 1.0, **at)
+    error = rounding_error_s(decision)
+    at_most("integrated rounding error", error, decision.dt_s / 2.0, within=TIE * decision.dt_s, **at)
+    close("recorded rounding error", decision.row["rounding_deviation_s"], error, within=TIE, **at)
+    close("relaxed first stage", decision.row["relaxed_first_stage"], relaxed[0], within=TIE, **at)
 
 
 def _slack(planned: list[Decision], recorded: Json) -> None:

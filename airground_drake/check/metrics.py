@@ -7,7 +7,7 @@ from collections import Counter
 import numpy as np
 
 from .files import Json
-from .rules import SMALL, agrees, at_most, close, same
+from .rules import SMALL, agrees, at_most, close, holds, same
 from .run import Run
 from .safety import least_distance_m
 from .scenario import Pair
@@ -85,9 +85,15 @@ def _gatekeeper(run: Run, recorded: Json) -> None:
     known = run.decisions["gap"][run.decisions["gap"] >= 0.0]
     agrees("largest recorded gap", recorded["max_gap"], float(known.max()) if len(known) else None, within=SMALL)
     times = np.array(run.decision_times_s, dtype=np.float64)
+    period = float(run.scenario["gatekeeper"]["period_s"])
+    same("gatekeeper's period", recorded["period_s"], period)
     if len(times):
-        quantiles = {"p50": float(np.quantile(times, 0.5)), "p99": float(np.quantile(times, 0.99))}
-        agrees("decision times", recorded["time_s"], {**quantiles, "max": float(times.max())}, within=SMALL)
+        same("one time for each decision", len(times), len(run.decisions))
+        holds("times are not negative", times >= 0.0, times, "0 or more")
+        levels = {"p50": 0.5, "p99": 0.99, "max": 1.0}
+        quantiles = {name: float(np.quantile(times, at, method="higher")) for name, at in levels.items()}
+        agrees("decision times", recorded["time_s"], quantiles, within=SMALL)
+        same("decisions that took a period or longer", recorded["late"], int((times >= period).sum()))
     _closest_call(run, recorded["closest_call"])
 
 

@@ -1,4 +1,4 @@
-"""GATE-SUR and GATE-OPT: how every decision was rounded, and how good its plan is."""
+"""GATE-OPT: how good the plan of every decision is."""
 
 from __future__ import annotations
 
@@ -12,8 +12,6 @@ from .files import Json
 from .rules import SMALL, Array, Flags, Found, NotEstablished, at_most, close, holds, same
 from .run import Run
 
-TIE = 1e-9
-"""Deficits of sum-up rounding closer to 1/2 than this are a tie: either mode may follow."""
 LARGEST_GAP = 0.05
 """Gap that a decision may have."""
 OVERSTATED = 1e-5
@@ -44,27 +42,6 @@ PROBE = 1e-3
 """Change of omega by which curvature is found."""
 
 
-def gate_sur(run: Run, claim: Json) -> Found:
-    """GATE-SUR: (28)-(29), and an integrated rounding error of half a stage at most."""
-    if silent_ugvs(run):
-        return Found("not_run")
-    decisions = decisions_of(run)
-    rounded = [decision for decision in decisions if len(decision.relaxed)]
-    for decision in rounded:
-        _rounded_by_the_rule(decision)
-    if not rounded:
-        return Found("not_run") if decisions else Found("holds", facts={"decisions": 0}).counted(0)
-    left = {(each.ugv, each.t_s): each.dt_s / 2.0 - rounding_error_s(each) for each in rounded}
-    facts: Json = {
-        "decisions": len(decisions),
-        "without_relaxation": [_label(each) for each in decisions if not len(each.relaxed)],
-        "bound_s": rounded[0].dt_s / 2.0,
-        "largest_error_s": rounded[0].dt_s / 2.0 - min(left.values()),
-    }
-    found = Found.with_margin("holds", max(0.0, min(left.values())), **facts).counted(len(rounded))
-    return found.judging(partial(_where, claim["where"], left, left, SMALL), "where.robot", "where.t_s")
-
-
 def _label(decision: Decision) -> str:
     return f"decision of {decision.ugv} at t = {decision.t_s} s"
 
@@ -75,25 +52,6 @@ def _where(recorded: Json, least: Numbers, most: Numbers, slop: float) -> None:
     holds("where the margin is attained", key in least, str(key), "a decision")
     least_of_all = min(most.values())
     holds("where the margin is attained", least[key] <= least_of_all + slop, least[key], least_of_all, about=str(key))
-
-
-def rounding_error_s(decision: Decision) -> float:
-    """max_k |dt sum_(r <= k) (relaxed_r - rounded_r)|."""
-    return float(decision.dt_s * np.abs(np.cumsum(decision.relaxed - decision.rounded)).max())
-
-
-def _rounded_by_the_rule(decision: Decision) -> None:
-    """rounded_k = 1 where D_k >= 1/2, D_k = sum_(r <= k) relaxed_r - sum_(r < k) rounded_r."""
-    relaxed, rounded, at = decision.relaxed, decision.rounded, _at(decision)
-    close("relaxed omega is in [0, 1]", relaxed, np.clip(relaxed, 0.0, 1.0), within=0.0, **at)
-    holds("rounded omega is 0 or 1", (rounded == 0.0) | (rounded == 1.0), rounded, "0 or 1", **at)
-    deficit = np.cumsum(relaxed) - (np.cumsum(rounded) - rounded)
-    tie = np.abs(deficit - 0.5) <= TIE
-    holds("sum-up rounding", (rounded == (deficit >= 0.5)) | tie, rounded, (deficit >= 0.5) * 1.0, **at)
-    error = rounding_error_s(decision)
-    at_most("integrated rounding error", error, decision.dt_s / 2.0, within=TIE * decision.dt_s, **at)
-    close("recorded rounding error", decision.row["rounding_deviation_s"], error, within=TIE, **at)
-    close("relaxed first stage", decision.row["relaxed_first_stage"], relaxed[0], within=TIE, **at)
 
 
 def _at(decision: Decision) -> Json:

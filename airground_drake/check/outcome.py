@@ -1,4 +1,4 @@
-"""LIVE-GOAL, COMM and GATE-TIME: what a run achieved, and what it spent on messages and computation."""
+"""LIVE-GOAL and COMM: what a run achieved, and what it spent on messages and computation."""
 
 from __future__ import annotations
 
@@ -239,20 +239,3 @@ def _sensed(run: Run, ugv: str, t_s: float, margin_m: float) -> set[tuple[float,
     reach, here = run.scenario["control"]["sensing_range_m"] + margin_m, run.place_m(ugv, t_s)
     discs = [(*map(float, o["position_m"]), float(o["radius_m"])) for o in run.scenario["obstacles"].values()]
     return {disc for disc in discs if np.linalg.norm(here - np.array(disc[:3])) <= reach}
-
-
-def gate_time(run: Run, claim: Json) -> Found:
-    """GATE-TIME: the 99th percentile of the CPU times, rounded up to an order statistic, is below the period."""
-    times, period = np.array(run.decision_times_s, dtype=np.float64), float(run.scenario["gatekeeper"]["period_s"])
-    if not len(run.decisions):
-        missing = any(map(run.talk_is_due, run.ugvs))
-        return Found("not_run") if missing else Found("holds", facts={"count": 0}).counted(0)
-    same("one time for each decision", len(times), len(run.decisions))
-    holds("times are not negative", times >= 0.0, times, "0 or more")
-    p50, p99 = (float(np.quantile(times, level, method="higher")) for level in (0.5, 0.99))
-    facts = {"p50_s": p50, "p99_s": p99, "max_s": float(times.max()), "period_s": period, "count": len(times)}
-    facts["over_period"] = int((times >= period).sum())
-    slowest = {"decision": int(times.argmax()), "time_s": float(times.max())} if p99 >= period else None
-    found = Found.with_margin("holds" if p99 < period else "refuted", period - p99, **facts)
-    shown = partial(same, "counterexample", claim["counterexample"], slowest)
-    return found.counted(len(times)).judging(shown, "counterexample")

@@ -26,7 +26,7 @@ from .run import Run
 
 DECIDED_FROM = ("id", "status", "where", "counterexample", "evidence", "inputs", "certificates")
 """What of a recorded claim its formula looks at; the rest is compared with what the formula gives."""
-REFUTED_BY_RULES = ("THR-TRIG", "COMM", "GATE-OPT", "GATE-SUR", "GATE-FEAS", "GATE-MODEL", "LIVE-PROG")
+REFUTED_BY_RULES = ("THR-TRIG", "COMM", "GATE-OPT", "GATE-FEAS", "GATE-MODEL", "LIVE-PROG")
 """Claims that any broken rule of theirs refutes; the others are refuted by their margin."""
 
 
@@ -94,7 +94,7 @@ def _counted_as_here(claim: Json, found: Found) -> None:
 @lru_cache(maxsize=256)
 def decide_of_run(run: Run, claim_text: str) -> Found:
     """What a claim's formula gives; the same for the same run and the same recorded claim."""
-    claim, known = json.loads(claim_text), claims_of(run.method, run.scenario["gatekeeper"]["route"])
+    claim, known = json.loads(claim_text), claims_of(run.method)
     same("inputs", claim["inputs"], {})
     if claim["id"] not in known:
         raise NotEstablished("the claim is known", f"known on this run: {', '.join(known)}", claim["id"])
