@@ -2,8 +2,7 @@
 
 A verdict is worse than before if it stands further down in `ORDER`, if it was as the scenario expected and no longer
 is, or if it is gone; so is a row of the reproduction table, by `ROWS`, a finding about the paper that is no longer
-demonstrated, and a broken variant of a proof that is no longer refuted. Numbers are compared to the last digit, but for
-what is measured by the clock.
+demonstrated, and a broken variant of a proof that is no longer refuted. Numbers are compared to the last digit.
 """
 
 from __future__ import annotations
@@ -36,8 +35,6 @@ OVERALL: tuple[tuple[str, ...], ...] = (("as_expected",), ("inconclusive",), ("n
 """Over all claims, likewise."""
 LONGEST_INTEGER = 18
 """Digits of an integer that is read."""
-MEASURED = frozenset({"GATE-TIME"})
-"""Claims whose margin is measured by the clock, and never the same."""
 
 Document = Mapping[str, Any]
 Change = dict[str, Any]
@@ -137,7 +134,7 @@ def _verdicts(before: Document, after: Document) -> Iterator[Change]:
 def _of_claims(before: Document, after: Document, field: str) -> Iterator[Change]:
     """Changes of a field of claims that are in both reports."""
     for (claim, run), old, new in _paired(before["claims"], after["claims"], "id", "run"):
-        if old and new and old[field] != new[field] and not (field == "margin" and claim in MEASURED):
+        if old and new and old[field] != new[field]:
             unit = {"unit": new["unit"]} if field == "margin" else {}
             yield {"claim": claim, "run": run, "before": old[field], "after": new[field], **unit}
 

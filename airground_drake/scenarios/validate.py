@@ -30,6 +30,7 @@ from airground_drake.registry import (
     MODEL_CLAIMS,
     PLUGIN,
     POLICIES,
+    RETIRED_CLAIMS,
     ROUTES,
     RUN_CLAIMS,
     UAV_TASKS,
@@ -197,6 +198,9 @@ def _runs(scenario: Scenario) -> Problems:
             yield from _one_of(f"runs.{name}.stalls_m.{robot}", robot, scenario.ugvs, "one of the UGVs")
         for claim, status in run.expected.items():
             known = (*RUN_CLAIMS, *scenario.claims)
+            if claim in RETIRED_CLAIMS:
+                yield f"runs.{name}.expected.{claim}", claim, f"no longer a claim, {RETIRED_CLAIMS[claim]}: remove it"
+                continue
             yield from _one_of(f"runs.{name}.expected.{claim}", claim, known, "one of the claims")
             yield from _expectation(f"runs.{name}.expected.{claim}", status)
     for claim, status in scenario.expected.items():

@@ -16,7 +16,6 @@ from airground_drake.verify.cache import find, found
 from airground_drake.verify.claim import ModelClaim, TraceClaim, Verdict
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.registry import model_claims, run_claims
-from airground_drake.verify.stl.cross_check import cross_check, merge
 
 
 def verify(trace: Trace, claims: Collection[str] | None = None, watch: Watch = SILENT) -> list[Verdict]:
@@ -85,9 +84,9 @@ def verify_model(
 def verify_all(
     scenario: Scenario, traces: Iterable[Trace], *, kept: Path | None = None, watch: Watch = SILENT
 ) -> list[Verdict]:
-    """Judge every claim: on runs of a scenario, with the second opinion of `stl`, and then about its model.
+    """Judge every claim: on runs of a scenario, and then about its model.
 
-    What `verify`, `cross_check` and `verify_model` find, side by side in processes of their own.
+    What `verify` and `verify_model` find, side by side in processes of their own.
 
     Args:
         scenario: its constants.
@@ -117,8 +116,7 @@ def _found(claim: ModelClaim, inputs: dict[str, Any], kept: Path | None) -> list
 
 
 def _judged(trace: Trace, claims: Sequence[TraceClaim]) -> list[Finding]:
-    own = _verdicts(trace, claims, [claim.judge(trace) for claim in claims])
-    return [verdict.finding for verdict in merge(own, cross_check(trace))]
+    return [claim.judge(trace) for claim in claims]
 
 
 def _model_verdicts(

@@ -133,16 +133,6 @@ CLAIMS = (
         tests=(f"{RUNS}/test_gate_model.py",),
     ),
     Mutant(
-        "GATE-SUR allows any rounding error",
-        "verify/runs/gate_sur.py",
-        "deviation, (0.5 + TIE) * row.dt)",
-        "deviation, (50.0 + TIE) * row.dt)",
-        runs=(),
-        tests=(f"{RUNS}/test_gate_sur.py",),
-        equivalent="survives: a plan that is rounded by the rule (28), which is judged beside it, is never farther off "
-        "than half a stage",
-    ),
-    Mutant(
         "half a run is enough",
         "verify/claim.py",
         "            if finding.status in PASSING:\n",
@@ -373,6 +363,6 @@ CHECKER = (
         "    if status in UNDECIDED and found.status != status:\n",
         '    if status in UNDECIDED:\n        return Agreed("undecided", {})\n    if False:\n',
         runs=(),
-        tamperings=("SAFE-TRACE", "SAFE-HYP", "EXEC", "THR-TRIG", "report", "GATE-TIME"),
+        tamperings=("SAFE-TRACE", "SAFE-HYP", "EXEC", "THR-TRIG", "report", "metrics"),
     ),
 )

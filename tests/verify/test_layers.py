@@ -14,7 +14,6 @@ PACKAGE = Path(airground_drake.__file__).parent
 ALLOWED: dict[str, set[str]] = {
     "engines": {"arrays", "interruption", "statuses", "verify.engines", "verify.finding"},
     "runs": {"arrays", "errors", "trace", "verify.engines", "verify.runs", "verify.claim", "verify.finding"},
-    "stl": {"arrays", "trace", "verify.runs", "verify.stl", "verify.claim", "verify.finding"},
 }
 """By folder of verify/, beginnings of what its modules may import of this package."""
 JUDGED = {"nsbc", "gatekeeper", "systems", "decision", "diagram", "simulation", "intervention"}
@@ -67,6 +66,6 @@ def test_what_runs_may_import_loads_nothing_that_is_judged() -> None:
 def test_the_shelves_of_model_do_not_import_each_other() -> None:
     assert len(SHELVES) > 3
     for shelf in SHELVES:
-        others = {f"verify.model.{other}" for other in SHELVES - {shelf}} | {"verify.runs", "verify.stl"}
+        others = {f"verify.model.{other}" for other in SHELVES - {shelf}} | {"verify.runs"}
         for path in (PACKAGE / "verify" / "model" / shelf).glob("*.py"):
             assert not [name for name in imported(path) if within(name, others)], path

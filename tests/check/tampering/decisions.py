@@ -106,7 +106,7 @@ def messages_all_removed(folder: Path) -> None:
         for entry in entries:
             entry["events"] = [e for e in entry["events"] if e["kind"] not in ("proposal", "accept", "refuse")]
     with edited_report(folder) as report:
-        for claim in ("GATE-OPT", "GATE-SUR", "GATE-FEAS", "GATE-TIME"):
+        for claim in ("GATE-OPT", "GATE-FEAS"):
             claim_of(report, claim)["margin"] = None
         claim_of(report, "COMM")["margin"] = 1.0
 
@@ -184,12 +184,12 @@ def gap_exaggerated(folder: Path) -> None:
         frame["gap"] += 0.01
 
 
-@refused_by("GATE-SUR", "recorded rounding error")
+@refused_by("GATE-FEAS", "recorded rounding error")
 def rounding_error_hidden(folder: Path) -> None:
     scale_decisions(folder, "rounding_deviation_s", 0.9)
 
 
-@refused_by("GATE-SUR", "relaxed first stage")
+@refused_by("GATE-FEAS", "relaxed first stage")
 def relaxed_first_stage_changed(folder: Path) -> None:
     with edited_table(folder, "decisions") as frame:
         frame["relaxed_first_stage"] = 1.0 - frame["relaxed_first_stage"]
@@ -211,13 +211,13 @@ def predicted_positions_moved(folder: Path) -> None:
     edit_arrays(folder, "positions_m", lambda positions: positions + 1e-3)
 
 
-@refused_by("GATE-SUR", "sum-up rounding")
+@refused_by("GATE-FEAS", "sum-up rounding")
 def relaxed_plan_changed(folder: Path) -> None:
     with edited_table(folder, "problems") as frame:
         frame.at[0, "relaxed"] = np.clip(frame.at[0, "relaxed"] + 0.1, 0.0, 1.0)
 
 
-@refused_by("GATE-SUR", "sum-up rounding")
+@refused_by("GATE-FEAS", "sum-up rounding")
 def rounded_plan_changed(folder: Path) -> None:
     edit_arrays(folder, "rounded", lambda rounded: np.roll(rounded, 1))
 
@@ -314,19 +314,19 @@ def relaxations_removed(folder: Path) -> None:
         edit_arrays(folder, name, lambda omega: omega[:0])
 
 
-@refused_by("GATE-TIME", "margin")
+@refused_by("metrics", "decision times")
 def decision_times_lowered(folder: Path) -> None:
     with edited_timings(folder) as timings:
         timings["decision_times_s"] = [0.1 * value for value in timings["decision_times_s"]]
 
 
-@refused_by("GATE-TIME", "one time for each decision")
+@refused_by("metrics", "one time for each decision")
 def decision_time_removed(folder: Path) -> None:
     with edited_timings(folder) as timings:
         del timings["decision_times_s"][-1]
 
 
-@refused_by("GATE-TIME", "times are not negative")
+@refused_by("metrics", "times are not negative")
 def decision_before_it_began(folder: Path) -> None:
     with edited_timings(folder) as timings:
         timings["decision_times_s"][0] = -1.0

@@ -92,7 +92,7 @@ def digest_of_a_table_removed(folder: Path) -> None:
         del meta["files"]["problems.parquet"]
 
 
-@refused_by("GATE-TIME", "one time for each decision")
+@refused_by("metrics", "one time for each decision")
 def times_are_no_list(folder: Path) -> None:
     with edited_timings(folder) as timings:
         timings["decision_times_s"] = timings["decision_times_s"][:1]

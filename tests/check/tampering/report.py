@@ -22,7 +22,7 @@ from check.tampering.base import (
 
 from airground_drake import check as checker
 
-GATED = ("GATE-FEAS", "GATE-MODEL", "GATE-TIME", "LIVE-PROG")
+GATED = ("GATE-FEAS", "GATE-MODEL", "LIVE-PROG")
 
 
 @refused_by("SAFE-TRACE", "as expected", run="b")
@@ -161,10 +161,16 @@ def condition_at_the_end_removed(folder: Path) -> None:
         del claim["evidence"]["conditions"][0]
 
 
-@refused_by("GATE-TIME", "evidence")
+@refused_by("metrics", "decision times")
 def median_time_changed(folder: Path) -> None:
-    with edited_claim(folder, "GATE-TIME") as claim:
-        claim["evidence"]["p50_s"] = 1e-4
+    with edited_report(folder) as report:
+        report["runs"][RUN]["metrics"]["gatekeeper"]["time_s"]["p50"] = 1e-4
+
+
+@refused_by("metrics", "decisions that took a period or longer")
+def late_decision_invented(folder: Path) -> None:
+    with edited_report(folder) as report:
+        report["runs"][RUN]["metrics"]["gatekeeper"]["late"] = 1
 
 
 @refused_by("THR-TRIG", "a counterexample comes with a refutation")
@@ -303,19 +309,6 @@ def audit_without_mutants(folder: Path) -> None:
         report["audit"] = [{"id": k, "demonstrated": True} for k in range(18)]
 
 
-@refused_by("ZENO-TRACE", "a second engine finds no violation")
-def second_engine_finds_a_violation(folder: Path) -> None:
-    with edited_claim(folder, "ZENO-TRACE", RUN) as claim:
-        claim["evidence"]["stl"]["checks"][0] |= {"verdict": "violated", "robustness": -1.0}
-
-
-@refused_by("SAFE-TRACE", "a second engine finds a violation", run="b")
-def second_engine_finds_nothing(folder: Path) -> None:
-    with edited_claim(folder, "SAFE-TRACE", "b") as claim:
-        for entry in claim["evidence"]["stl"]["checks"]:
-            entry["verdict"] = "satisfied"
-
-
 @refused_by("report", "choice", run="")
 def calibrated_value_misquoted(folder: Path) -> None:
     with edited_report(folder) as report:
@@ -419,12 +412,6 @@ def statement_of_a_claim_changed(folder: Path) -> None:
 def reproduction_changed(folder: Path) -> None:
     with edited_report(folder) as report:
         report["reproduction"][0].update(status="not_reproduced", ours=0.0)
-
-
-@refused_by("SAFE-TRACE", "number of a second engine")
-def second_engine_changed(folder: Path) -> None:
-    with edited_claim(folder, "SAFE-TRACE") as claim:
-        claim["evidence"]["stl"]["checks"][0]["robustness"] = 3.0
 
 
 @refused_by("SAFE-TRACE", "things in the counterexample", run="b")
