@@ -14,6 +14,17 @@ from .rules import SMALL, Array, Disagreement, close, holds, same
 from .run import Run
 from .scenario import apart_m
 
+NOTHING = -1.0
+"""Stands in a column of decisions that says nothing under the run's method."""
+OF_PROBLEMS = (
+    "relaxed_first_stage", "objective", "route_bound", "gap", "objective_accept", "objective_refuse",
+    "accept_throughout", "refuse_throughout", "rounding_deviation_s", "predicted_clearance_m",
+)  # fmt: skip
+OF_OUTCOMES = (
+    "refuse_outcome_m2_s", "accept_outcome_m2_s", "refuse_stalls", "accept_stalls", "refuse_left_m", "accept_left_m",
+    "lag_m", "predicted_lag_m", "tries",
+)  # fmt: skip
+
 
 class Event(NamedTuple):
     """An event that follows from the rest of a trace.
@@ -56,6 +67,7 @@ def check_events(run: Run) -> str:
     _events_follow_from_signals_and_decisions(run)
     _events_are_where_their_robots_were(run)
     _nothing_is_executed_before_it_was_proposed(run)
+    _decisions_are_on_proposals(run)
     return f"{len(run.events)} events"
 
 
@@ -151,3 +163,15 @@ def _nothing_is_executed_before_it_was_proposed(run: Run) -> None:
         executed = run.t_s[run.executed(ugv)]
         what = "an intervention is executed after it was proposed"
         holds(what, executed >= earliest, executed, f"not before {earliest} s", about=ugv, t_s=executed)
+
+
+def _decisions_are_on_proposals(run: Run) -> None:
+    """Each decision is on a proposal that was sent, and has nothing in the columns of the other method."""
+    key = ["robot", "issued_s", "policy"]
+    sent = set(run.proposals[key].itertuples(index=False, name=None))
+    unused = OF_OUTCOMES if run.method == "c" else OF_PROBLEMS
+    for row in run.decisions.to_dict("records"):
+        about, on = f"decision of {row['robot']}", tuple(row[name] for name in key)
+        holds("a decision is on a proposal", on in sent, str(on), "one that was sent", about=about, t_s=row["t_s"])
+        for name in unused:
+            same(f"nothing is said of {name}", row[name], NOTHING, about=about, t_s=row["t_s"])

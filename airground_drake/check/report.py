@@ -14,7 +14,7 @@ from .files import Json, is_plain, names_in, read_json
 from .limits import at_most_s, is_of_a_size
 from .rules import SMALL, Disagreement, Found, NotEstablished, close, holds, same
 from .run import Run, read_run
-from .safety import safe_hyp, safe_trace
+from .safety import safe_trace
 from .triggers import thr_trig, zeno_trace
 from .verdicts import NOT_EXERCISED, UNDECIDED, check_expectation, check_files, check_overall, outcome_of
 
@@ -22,7 +22,6 @@ AGREES, DISAGREES, OPEN = "agrees", "DISAGREES", "cannot be checked"
 
 DECIDED: Mapping[str, Callable[[Run], Found]] = {
     "SAFE-TRACE": safe_trace,
-    "SAFE-HYP": safe_hyp,
     "ZENO-TRACE": zeno_trace,
     "THR-TRIG": thr_trig,
 }
@@ -131,6 +130,8 @@ def _judge(claim: Json, scenario: Json, loaded: Callable[[str], Run]) -> str:
     found = DECIDED[name](loaded(claim["run"]))
     if status in UNDECIDED and found.status != status:
         raise NotEstablished("verdict", f"recorded {status!r}, which decides nothing; here it is {found.status!r}")
+    if found.because is not None and status == "holds":
+        raise found.because
     same("verdict", status, found.status)
     if found.because is not None:
         return f"{status} (broken: {found.because.rule})"

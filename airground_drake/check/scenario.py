@@ -32,10 +32,6 @@ class Pair(NamedTuple):
     closing_m_s: float
     share: float
 
-    def turned(self) -> Pair:
-        """The same pair, seen from the other robot."""
-        return self._replace(robot=self.other, other=self.robot)
-
 
 class Levels(NamedTuple):
     """The trigger: it triggers at `zeta_m`, releases below `release_m`, and rests until `dwell_s` after a trigger."""
@@ -69,13 +65,6 @@ class Preset:
         travelled = self.speed_m_s * np.asarray(t_s)
         return np.stack([np.interp(travelled, self.length_m, axis) for axis in self.corners_m.T], axis=-1)
 
-    def rate_m_s(self, t_s: Array) -> Array:
-        """Velocity at times (K,), none at a corner: (K, 3)."""
-        legs, lengths = np.diff(self.corners_m, axis=0), np.diff(self.length_m)[:, None]
-        along = np.divide(self.speed_m_s * legs, lengths, out=np.zeros_like(legs), where=lengths > 0.0)
-        leg = np.searchsorted(self.corner_s, t_s) if len(self.corner_s) else np.full(len(t_s), len(legs))
-        return np.asarray(np.append(along, np.zeros((1, 3)), axis=0)[leg])
-
 
 def robots_of(scenario: Json) -> dict[str, Json]:
     """Each robot's part of the scenario by name, the UGVs first, the UAV last."""
@@ -107,16 +96,6 @@ def _sum(one: float, other: float) -> float:
 def apart_m(scenario: Json, kind: str, one: Json, other: Json) -> float:
     """A distance of surfaces, of a kind of pair, as one of centres: with both radii."""
     return float(scenario["safe_distance"][kind]) + (float(one["radius_m"]) + float(other["radius_m"]))
-
-
-def views_of(scenario: Json) -> dict[str, list[Pair]]:
-    """The pairs as each robot sees them: obstacles, then the other robots, UGVs first, as recursion (5) lists them."""
-    found: dict[str, list[Pair]] = {robot: [] for robot in robots_of(scenario)}
-    for pair in pairs_of(scenario):
-        found[pair.robot].append(pair)
-        if pair.other in found:
-            found[pair.other].append(pair.turned())
-    return found
 
 
 def preset_of(scenario: Json, ugv: str) -> Preset:

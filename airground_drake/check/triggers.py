@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .rules import SMALL, Array, Disagreement, Found, at_most, close, holds, same
+from .rules import SMALL, Array, Disagreement, Found, at_most, close, holds
 from .run import Run
 from .scenario import Levels
 

@@ -10,7 +10,7 @@ from typing import Any
 from .files import Json, read_bytes, sha256
 from .rules import agrees, holds, same
 
-SCHEMA = "airground_drake.report/3"
+SCHEMA = "airground_drake.report/2"
 EXIT_CODES = {"as_expected": 0, "not_as_expected": 1, "inconclusive": 3}
 FINDINGS = 18
 """Number of findings about the paper in a report of `report audit`."""

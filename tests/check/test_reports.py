@@ -19,7 +19,7 @@ def test_an_untouched_report_agrees_everywhere(report: Path, capsys: pytest.Capt
     claims = json.loads((report / "report.json").read_text())["claims"]
     assert {(claim["id"], claim["run"] or "-") for claim in claims} <= {tuple(line.split()[:2]) for line in lines}
     assert all(" agrees: " in line for line in lines)
-    assert summary == f"{len(lines)} checks: {len(lines)} agrees, 0 DISAGREES, 0 cannot be re-established"
+    assert summary == f"{len(lines)} checks: {len(lines)} agrees, 0 DISAGREES, 0 cannot be checked"
 
 
 GATED = ("runs={c: {method: c}, d: {method: d}}", "reproduction=[]")
