@@ -81,7 +81,7 @@ def _is_shaped_like_a_report(report: Any) -> None:
     for key in ("scenario", "provenance", "overall", "runs", "files"):
         if not isinstance(report.get(key), dict):
             raise NotEstablished("it is a report", f"its {key!r} is missing or is no object", "report.json")
-    for key in ("claims", "audit"):
+    for key in ("claims", "audit", "choices"):
         listed = report.get(key)
         if not isinstance(listed, list) or not all(isinstance(entry, dict) for entry in listed):
             raise NotEstablished("it is a report", f"its {key!r} is missing or is no list of objects", "report.json")
@@ -126,7 +126,7 @@ def _judge(claim: Json, scenario: Json, loaded: Callable[[str], Run]) -> str:
     check_expectation(claim, scenario)
     name, status = claim["id"], claim["status"]
     if name not in DECIDED:
-        return f"expected {claim['expected']}"
+        return f"{status}, expected {claim['expected']}; not decided by the checker"
     found = DECIDED[name](loaded(claim["run"]))
     if status in UNDECIDED and found.status != status:
         raise NotEstablished("verdict", f"recorded {status!r}, which decides nothing; here it is {found.status!r}")

@@ -249,12 +249,12 @@ def attempt(report: Path, edit: Edit, *, mended: bool = True) -> Outcome:
     except checker.UsageError as error:
         return Outcome(2, [], str(error))
     if all(line.outcome == AGREES for line in found):
-        found = [Line(**line, by="judged again") for line in rebuild.lines(folder, judge=_judged)]
+        found = [Line(**line, by="judged again") for line in rebuild.lines(folder, judge=judged)]
     refused = [asdict(line) for line in found if line.outcome != AGREES]
     return Outcome(int(bool(refused)), refused, "")
 
 
-def _judged(scenario: Scenario, traces: Sequence[Trace]) -> list[Verdict]:
+def judged(scenario: Scenario, traces: Sequence[Trace]) -> list[Verdict]:
     """As `verify_all`, but what was judged before is taken from there: most tamperings leave most runs as they are."""
     found = [verdict for trace in traces for verdict in _of_run(_Content(trace, _key(trace)))]
     return found + _of_model(_Content(scenario, json.dumps(asdict(scenario))))

@@ -15,7 +15,6 @@ from check.tampering.events import without_event as without_event_of
 
 RUN = "c"
 """The run whose decisions are by problem (26)."""
-refused_by = partial(base.refused_by, run=RUN)
 claim_of = partial(base.claim_of, run=RUN)
 edited_entries = partial(base.edited_entries, run=RUN)
 edited_table = partial(base.edited_table, run=RUN)
