@@ -1,7 +1,7 @@
 """An independent check of a report: `python -m airground_drake.check DIR`.
 
-Every verdict in DIR/report.json is established again from DIR/trace/ and DIR/certificates/, by formulas that are
-written here from the statements of the claims; proofs in exact rational arithmetic. Only the standard library, numpy,
+Every verdict in DIR/report.json is established again from DIR/trace/ and the scenario, by formulas that are
+written here from the statements of the claims. Only the standard library, numpy,
 pandas and pyarrow are used: no Drake, no solver, nothing else of this package. docs/checker.md says what each rule
 establishes.
 
@@ -19,15 +19,13 @@ establishes.
     prediction                 GATE-MODEL: mode velocities
     progress                   LIVE-PROG
     optimality                 GATE-OPT
-    polynomials, certificates  SAFE-LEMMA, SAFE-INV, SAFE-GATE, SAFE-DIST, ZENO-PROOF, LIVE-GATE, LIVE-WAIT, THR-ISO;
-                               obligations.json
-    conformance                what their records say besides: that running code conforms, and what rounding takes
-    statements, enclosures     THR-ROOT, THR-OPT: what they consist of, and whether it is true
+    theorems                   hypotheses of SAFE-LEMMA, SAFE-INV, SAFE-GATE, SAFE-DIST, ZENO-PROOF, LIVE-WAIT, THR-ISO,
+                               THR-ROOT and THR-OPT
     statistics                 THR-DDM, ZENO-REFINE
     inputs                     the constants that a claim about the model must be about
     evidence                   what of a claim's entry is established, and what is taken as recorded
     claims, verdict            what decides each claim, and what is expected of it; a recorded verdict against that
-    overall, report            the verdict over all of them, and the files; all checks, a line each; mutants.json
+    overall, report            the verdict over all of them, and the files; all checks, a line each
     command                    the command line
 """
 

@@ -51,7 +51,7 @@ def parser() -> argparse.ArgumentParser:
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("report", metavar="DIR", type=Path, help="folder with report.json, trace/ and certificates/")
+    parser.add_argument("report", metavar="DIR", type=Path, help="folder with report.json and trace/")
     parser.add_argument(
         "--limit-s",
         type=_limit_s,

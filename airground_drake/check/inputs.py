@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from .files import Json
-from .scenario import apart_m, disturbance_m_s, extent_m, levels_of, robots_of, threshold_m
+from .scenario import apart_m, disturbance_m_s, kinds_of, levels_of, threshold_m
 
 
 def inputs_of(claim: str, scenario: Json) -> Json:
     """The inputs of a claim about the model."""
     match claim:
+        case "SAFE-LEMMA":
+            return {"pairs": _avoidance(scenario)["pairs"]}
         case "SAFE-INV":
-            return {**_avoidance(scenario), "scenario": _built_from(scenario)}
+            return _avoidance(scenario)
         case "SAFE-GATE":
-            return {**_avoidance(scenario), "method_d": _method_d(scenario), "scenario": _built_from(scenario)}
+            return {**_avoidance(scenario), "intervention_on_top": False}
         case "SAFE-DIST":
             return {**_avoidance(scenario), "disturbance_m_s": disturbance_m_s(scenario)}
         case "ZENO-PROOF":
@@ -23,7 +25,8 @@ def inputs_of(claim: str, scenario: Json) -> Json:
         case "LIVE-WAIT":
             return _patience(scenario)
         case "THR-ISO":
-            return _trigger(scenario)
+            noise, control = scenario["decision"]["noise_period_s"], scenario["control"]["period_s"]
+            return {**_trigger(scenario), "noise_period_s": noise, "period_s": control}
         case "ZENO-REFINE":
             noise = {key: scenario["decision"][key] for key in ("noise_m_sqrt_s", "leak_1_s", "noise_period_s")}
             return {**_trigger(scenario), **noise, "duration_s": float(scenario["duration_s"])}
@@ -59,58 +62,14 @@ def _widest_m(scenario: Json) -> float:
 
 
 def _avoidance(scenario: Json) -> Json:
-    """Constants of the avoidance layer and of the team; the extent bounds every coordinate of the run."""
-    control, safe, robots = scenario["control"], scenario["safe_distance"], robots_of(scenario)
+    """Constants of the avoidance layer, and the pairs that it keeps apart."""
+    control = scenario["control"]
+    pairs = [
+        {"kind": kind.name.rstrip("0123456789").rstrip("_"), "safe_m": kind.safe_m, "closing_m_s": kind.closing_m_s}
+        for kind in kinds_of(scenario)
+    ]
     names = ("avoidance_gain_1_s", "period_s", "sensing_range_m")
-    gains = ("motion_gain_1_s", "formation_gain_1_s", "intervention_gain_1_s")
-    speeds = [float(robot["max_speed_m_s"]) for robot in robots.values()]
-    return {
-        **{name: control[name] for name in names + gains},
-        "altitude_m": scenario["uav"]["altitude_m"],
-        "duration_s": scenario["duration_s"],
-        "extent_m": extent_m(scenario),
-        "team": {
-            "ugvs": list(scenario["ugvs"]),
-            "uav": scenario["uav"]["name"],
-            "obstacles": [obstacle["position_m"] for obstacle in scenario["obstacles"].values()],
-            "obstacle_distance": safe["obstacle_m"],
-            "ugv_distance": safe["ugv_m"],
-            "air_ground_distance": safe["air_ground_m"],
-            "max_speed": speeds,
-            "radius": [float(robot["radius_m"]) for robot in robots.values()],
-            "obstacle_radius": [float(obstacle["radius_m"]) for obstacle in scenario["obstacles"].values()],
-        },
-    }
-
-
-def _built_from(scenario: Json) -> Json:
-    """What the diagram of method (d) that is compared is built from: the scenario, without what others may add.
-
-    Of names, texts, seed, verdicts, policies, runs and routes nothing comes into the controllers.
-    """
-    return {
-        **scenario,
-        **_WITHOUT_OTHERS,
-        "uav": {**scenario["uav"], "task": "formation"},
-        "intervention": {**_INTERVENTION, "period_s": scenario["intervention"]["period_s"]},
-        "gatekeeper": {**scenario["gatekeeper"], "route": "relaxed"},
-        "runs": {"d": {"method": "d", "composition": "augmented", "stalls_m": {}, "expected": {}}},
-    }
-
-
-_WITHOUT_OTHERS: Json = {
-    "name": "built", "seed": 0, "title": "", "description": "",
-    "claims": {}, "expected": {}, "reproduction": [], "choices": [],
-}  # fmt: skip
-"""What is of the scenario's own, and of no controller."""
-_INTERVENTION: Json = {"retry_s": 1.0, "ranking": "predicted", "budget_s": 2.0, "policies": []}
-"""An intervention where a scenario says nothing of it."""
-
-
-def _method_d(scenario: Json) -> Json:
-    """Method (d) never puts an intervention above the avoidance inequalities."""
-    found = {run["composition"] for run in scenario["runs"].values() if run["method"] == "d"}
-    return {"intervention_on_top": False, "compositions": sorted(found) or ["augmented"]}
+    return {**{name: control[name] for name in names}, "pairs": pairs}
 
 
 def _trigger(scenario: Json) -> Json:

@@ -11,7 +11,7 @@ from typing import Any
 
 from .command import LIMIT_S
 from .events import check_events
-from .files import Json, canonical, is_plain, names_in, read_folder, read_json
+from .files import Json, canonical, is_plain, names_in, read_json
 from .limits import at_most_s, is_of_a_size
 from .metrics import check_metrics
 from .overall import check_files, check_overall
@@ -55,7 +55,7 @@ def check_report(folder: Path, limit_s: float = LIMIT_S) -> list[Line]:
     """All checks of a report.
 
     Args:
-        folder: with report.json, trace/ and certificates/.
+        folder: with report.json and trace/.
         limit_s: CPU time for each check; one that takes longer is not established.
 
     Raises:
@@ -75,7 +75,7 @@ def _is_shaped_like_a_report(report: Any) -> None:
     for key in ("scenario", "provenance", "overall", "runs", "files"):
         if not isinstance(report.get(key), dict):
             raise NotEstablished("it is a report", f"its {key!r} is missing or is no object", "report.json")
-    for key in ("claims", "audit", "mutants", "choices"):
+    for key in ("claims", "audit", "choices"):
         listed = report.get(key)
         if not isinstance(listed, list) or not all(isinstance(entry, dict) for entry in listed):
             raise NotEstablished("it is a report", f"its {key!r} is missing or is no list of objects", "report.json")
@@ -121,7 +121,7 @@ def _lines(folder: Path, there: Sequence[str], report: Json, limit_s: float) -> 
         about = canonical({key: claim[key] for key in DECIDED_FROM if key in claim})
         if claim["run"]:
             return decide_of_run(loaded(claim["run"]), about)
-        return decide_of_model(about, read_folder(folder / "certificates" / claim["id"]), scenario_text)
+        return decide_of_model(about, scenario_text)
 
     for claim in report["claims"]:
         yield attempt(claim["id"], claim["run"], partial(judge, claim, scenario, decide))

@@ -164,6 +164,11 @@ class Kind(NamedTuple):
     share: float
 
 
+def rational(value: float) -> Fraction:
+    """The decimal that a number prints as."""
+    return Fraction(repr(float(value)))
+
+
 def kinds_of(scenario: Json) -> list[Kind]:
     """The kinds of pairs of a scenario, in the order of the report.
 

@@ -19,12 +19,12 @@ from .claims import (
     outcome_of,
 )
 from .evidence import check_entry, nothing_besides
-from .files import Files, Json, sha256
+from .files import Json
 from .inputs import inputs_of
 from .rules import Disagreement, Found, NotEstablished, agrees, holds, same
 from .run import Run
 
-DECIDED_FROM = ("id", "status", "where", "counterexample", "evidence", "inputs", "certificates")
+DECIDED_FROM = ("id", "status", "where", "counterexample", "margin", "exercised", "evidence", "inputs")
 """What of a recorded claim its formula looks at; the rest is compared with what the formula gives."""
 REFUTED_BY_RULES = ("THR-TRIG", "COMM", "GATE-OPT", "GATE-FEAS", "GATE-MODEL", "LIVE-PROG")
 """Claims that any broken rule of theirs refutes; the others are refuted by their margin."""
@@ -102,13 +102,12 @@ def decide_of_run(run: Run, claim_text: str) -> Found:
 
 
 @lru_cache(maxsize=64)
-def decide_of_model(claim_text: str, files: Files, scenario_text: str) -> Found:
-    """What a claim's formula gives; the same for the same certificates, scenario and recorded claim."""
+def decide_of_model(claim_text: str, scenario_text: str) -> Found:
+    """What a claim's formula gives; the same for the same scenario and recorded claim."""
     claim, scenario = json.loads(claim_text), json.loads(scenario_text)
     if claim["id"] not in OF_MODEL:
         raise NotEstablished("the claim is known", f"known: {', '.join(OF_MODEL)}", claim["id"])
-    same("SHA-256 of certificates", claim["certificates"], {name: sha256(content) for name, content in files})
     inputs = inputs_of(claim["id"], scenario)
     agrees("inputs", claim["inputs"], inputs, within=1e-12)
     nothing_besides("inputs", claim["inputs"], inputs)
-    return OF_MODEL[claim["id"]](claim, files, scenario)
+    return OF_MODEL[claim["id"]](claim, scenario)
