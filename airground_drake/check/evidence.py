@@ -55,6 +55,7 @@ AS_RECORDED: Mapping[str, tuple[str, ...]] = {
         "evidence.largest_regret_against_constant_plans", "evidence.largest_regret_against_blocks",
     ),
     "GATE-OPT": ("evidence.first_stage_certified",),
+    "SAFE-HYP": ("evidence.pairs_in_reach", "evidence.different_parameters"),
     "SAFE-LEMMA": ("evidence.gram_matrix",),
     "SAFE-INV": (
         *_CONFORMANCE,

@@ -71,7 +71,7 @@ FORMULAS = (
     StlFormula(
         "SAFE-HYP", "avoidance inequalities", "always (slack_m_s >= 0)",
         {"slack_m_s": "least slack of the avoidance inequalities of all pairs in range, at the control samples"},
-        "m/s", stl_signals.slack, tolerance=VELOCITY_TOLERANCE_M_S, relation="implied", compares=("avoidance",),
+        "m/s", stl_signals.slack, tolerance=VELOCITY_TOLERANCE_M_S, relation="implied",
     ),
     StlFormula(
         "SAFE-HYP", "velocities", "always ((spare_m_s >= 0) and (climb_m_s <= 0) and (drift_m_s <= 0))",
@@ -81,7 +81,6 @@ FORMULAS = (
             "drift_m_s": "largest departure of a velocity from the one chosen at the control sample",
         },
         "m/s", stl_signals.motion, tolerance=VELOCITY_TOLERANCE_M_S, relation="implied",
-        compares=("speed limit", "planar motion", "zero-order hold"),
     ),
     StlFormula(
         "ZENO-TRACE", "dwell", "always ((twice < 0) and ((trigger > 0) -> always[{past!r},{dwell!r}] (trigger < 0)))",
