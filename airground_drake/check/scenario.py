@@ -90,7 +90,7 @@ def pairs_of(scenario: Json) -> list[Pair]:
 @lru_cache(maxsize=10_000)
 def _sum(one: float, other: float) -> float:
     """Of two decimals as they are written: 1.1 and 2.2 make 3.3."""
-    return float(Fraction(repr(one)) + Fraction(repr(other)))
+    return float(written(one) + written(other))
 
 
 def apart_m(scenario: Json, kind: str, one: Json, other: Json) -> float:
@@ -132,3 +132,8 @@ def bayes_threshold_m(drift_m_s: float, noise_m_sqrt_s: float, ratio_s: float) -
         above = middle > 700.0 or math.sinh(middle) + middle > level
         low, high = (low, middle) if above else (middle, high)
     return high * noise_m_sqrt_s**2 / (2.0 * drift_m_s)
+
+
+def written(value: float) -> Fraction:
+    """A number as the decimal that it is written as: 0.1 is a tenth."""
+    return Fraction(repr(float(value)))
