@@ -1,7 +1,7 @@
 """A report built again from its own files: each claim judged anew by its own code, and compared value by value.
 
-`python -P -m airground_drake.report.rebuild DIR LIMIT_S` does this in a process that cannot import Drake, so that nothing is
-simulated and no code is run but that of the claims and of the report. It prints what it found as JSON lines, which
+`python -P -m airground_drake.report.rebuild DIR LIMIT_S` does this in a process that cannot import Drake: nothing is
+simulated, and only the code of the claims and of the report runs. It prints what it found as JSON lines, which
 `airground check` shows.
 """
 
@@ -91,7 +91,8 @@ def _compared(claim: str, run: str, recorded: Any, rebuilt: Any) -> dict[str, An
         broken = {"rule": "the files give what is recorded", "about": about, "recorded": theirs, "recomputed": ours}
         return {**line, "outcome": "DISAGREES", "text": text, **broken}
     status = rebuilt.get("status", "as recorded") if isinstance(rebuilt, dict) else "as recorded"
-    return {**line, "outcome": "agrees", "text": str(status)}
+    exactly = "exactly" if recorded == rebuilt else f"numbers to {WITHIN:g}"
+    return {**line, "outcome": "agrees", "text": f"{status}, {exactly}"}
 
 
 def differences(recorded: Any, rebuilt: Any, path: str = "") -> Iterator[tuple[str, Any, Any]]:
