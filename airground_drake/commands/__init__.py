@@ -31,7 +31,7 @@ COMMANDS: dict[str, Command] = {
     "check": Command("airground_drake.check.command", "go over a report with the independent checker"),
     "compare": Command("airground_drake.commands.compare", "say what has changed from one report to another"),
     "index": Command("airground_drake.commands.index", "list the reports in a folder on a page"),
-    "proofs": Command("airground_drake.verify.proof_files", "write the proofs of a report for others' checkers"),
+    "prove": Command("airground_drake.commands.prove", "have Coq check the theorems, or prove the runs of a report"),
     "campaign": Command("airground_drake.commands.campaign", "judge many draws of a scenario"),
     "falsify": Command("airground_drake.commands.falsify", "search for a scenario that violates a claim"),
     "replay": Command("airground_drake.commands.replay", "show the runs of a report: a page each, or a video"),

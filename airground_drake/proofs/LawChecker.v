@@ -259,3 +259,11 @@ Proof.
     replace (IZR num * IZR (unit r) * (/ IZR (unit r) * norm (real x))) with (IZR num * norm (real x)) by (field; lra).
     exact M.
 Qed.
+
+(** ** The law without error, in plain numbers *)
+Corollary obeys_exactly r i j num den a b g d : well_formed r = true -> obeys_law r i j num den a b 0 = true ->
+  g = IZR num / IZR den -> d = IZR a / IZR b -> obeys r g i j d 0.
+Proof.
+  intros W H -> ->; pose proof (sound r i j num den a b 0 W H) as S; unfold metres in S.
+  replace (0 / IZR (unit r)) with 0 in S by (unfold Rdiv; ring); exact S.
+Qed.

@@ -229,8 +229,8 @@ Lemma stride_at s k : (0 <= s)%Z -> forall ps, strides_within s ps = true -> (S 
   forall o, norm (sub (real (nth (S k) ps o)) (real (nth k ps o))) <= IZR s.
 Proof.
   intros Hs; induction k as [| k IH]; intros [| p [| p' ps]]; simpl length; intros H L o; try lia;
-    change ((if (product (minus p' p) (minus p' p) <=? s * s)%Z then strides_within s (p' :: ps) else false) = true) in H;
-    split_ifs.
+    change ((if (product (minus p' p) (minus p' p) <=? s * s)%Z
+      then strides_within s (p' :: ps) else false) = true) in H; split_ifs.
   - to_reals; rewrite real_minus in *; apply norm_at_most; [apply IZR_le; lia | assumption].
   - apply (IH (p' :: ps) H); simpl; lia.
 Qed.
@@ -299,7 +299,8 @@ Qed.
 Lemma covers_sound r a b c d t : well_formed r = true -> covers r a b c d = true ->
   IZR a / IZR b <= t <= IZR c / IZR d -> begins r <= t <= ends r.
 Proof.
-  unfold covers, begins, ends, metres; intros W H [A C]; apply well_formed_means in W; destruct W as [_ [U _]]; split_ifs; to_reals.
+  unfold covers, begins, ends, metres; intros W H [A C].
+  apply well_formed_means in W; destruct W as [_ [U _]]; split_ifs; to_reals.
   assert (F : forall x y u v, 0 < u -> 0 < v -> x * v <= y * u -> x / u <= y / v).
   { intros x y u v P Q L; apply Rmult_le_reg_r with (u * v); [nra |].
     replace (x / u * (u * v)) with (x * v) by (field; lra).
