@@ -40,6 +40,8 @@ COMMANDS: dict[str, Command] = {
     "init": Command("airground_drake.commands.init", "write a small scenario to start from"),
     "completion": Command("airground_drake.commands.completion", "print what completes this command line in a shell"),
 }
+GONE = {"proofs": "airground prove"}
+"""Commands that there were, and what does their work now."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -65,6 +67,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     name = "".join(unknown) or options.command
     if name is None:
         parser.error(f"a command is needed: {', '.join(COMMANDS)}")
+    if name in GONE:
+        return refuse(f"`airground {name}` is gone; use `{GONE[name]}`")
     if name not in COMMANDS:
         close = difflib.get_close_matches(name, COMMANDS, n=1)
         meant = f"did you mean {close[0]}? " if close else ""
