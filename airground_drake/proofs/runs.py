@@ -139,7 +139,8 @@ def _why(error: coq.CoqError, demand: Demand | None) -> str:
     """Why a theorem is not proved: Coq computes that a pair does not do it, or something keeps Coq from an answer."""
     if demand is None or COMPUTED not in str(error):
         return str(error)
-    return f"Coq computes that {demand.first} and {demand.second} do not ({float(demand.safe_m):g} m)"
+    pair = f"{demand.first} and {demand.second}, {float(demand.safe_m):g} m"
+    return f"Coq computes that it is false of {pair}; later pairs were not tried"
 
 
 def _about(run: Recorded, text: str, line: int) -> Demand | None:
@@ -170,12 +171,13 @@ def prove_report(report: Path, names: Sequence[str] = (), limit_s: float = coq.L
             raise UnknownNameError(f"run of {report}", name, there)
     if not there:
         raise TraceError(f"{report} has no trace/*/meta.json; wanted: the folder of a report")
+    runs = {name: trace.load(report / "trace" / name) for name in names or there}
+    for name, run in runs.items():
+        if run.run != name or not re.fullmatch(r"\w+", name, re.ASCII):
+            raise TraceError(one_line(f"{report / 'trace' / name}: the trace is of run {run.run!r}"))
     found: list[Proved] = []
     with workshop(limit_s) as place:
-        for name in names or there:
-            run = trace.load(report / "trace" / name)
-            if run.run != name or not re.fullmatch(r"\w+", name, re.ASCII):
-                raise TraceError(one_line(f"{report / 'trace' / name}: the trace is of run {run.run!r}"))
+        for name, run in runs.items():
             distances, law, rounded = prove(place, run, limit_s)
             for answer in (distances, law):
                 (report / PLACE / answer.file).unlink(missing_ok=True)
