@@ -34,6 +34,7 @@ COMMANDS: dict[str, Command] = {
     "check": Command("airground_drake.commands.check", "check a report from its files alone"),
     "compare": Command("airground_drake.commands.compare", "say what has changed from one report to another"),
     "index": Command("airground_drake.commands.index", "list the reports in a folder on a page"),
+    "prove": Command("airground_drake.commands.prove", "have Coq check the theorems, or prove the runs of a report"),
     "campaign": Command("airground_drake.commands.campaign", "judge many draws of a scenario"),
     "falsify": Command("airground_drake.commands.falsify", "search for a scenario that violates a claim"),
     "replay": Command("airground_drake.commands.replay", "show the runs of a report: a page each, or a video"),
