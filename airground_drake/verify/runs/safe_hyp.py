@@ -146,8 +146,8 @@ class SafeHyp(TraceClaim):
         kept = sorted(_guarantees(trace), key=lambda one: one.margin_m)
         others = [*_static(trace), *_sampled(trace)]
         different = list(differences(trace))
-        broken = [{"hypothesis": BUILT, "t_s": float(trace.t[0]), **each} for each in different[:1]]
-        broken += [h.at(int(k)) for h in [*others, *_avoidance(trace, kept)] for k in h.broken()[:1]]
+        broken = [h.at(int(k)) for h in [*others, *_avoidance(trace, kept)] for k in h.broken()[:1]]
+        broken += [{"hypothesis": BUILT, "t_s": float(trace.t[0]), **each} for each in different[:1]]
         first = min(broken, key=lambda entry: float(entry["t_s"]), default=None)
         worst: dict[tuple[str, str], dict[str, Any]] = {}
         for h in others:

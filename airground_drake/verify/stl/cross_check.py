@@ -69,11 +69,6 @@ FORMULAS = (
         "m", stl_signals.clearance, tolerance=DISTANCE_TOLERANCE_M, compares=("margin",),
     ),
     StlFormula(
-        "SAFE-HYP", "avoidance inequalities", "always (slack_m_s >= 0)",
-        {"slack_m_s": "least slack of the avoidance inequalities of all pairs in range, at the control samples"},
-        "m/s", stl_signals.slack, tolerance=VELOCITY_TOLERANCE_M_S, relation="implied",
-    ),
-    StlFormula(
         "SAFE-HYP", "velocities", "always ((spare_m_s >= 0) and (climb_m_s <= 0) and (drift_m_s <= 0))",
         {
             "spare_m_s": "least of maximum speed - speed over all robots, on each interval between rows",

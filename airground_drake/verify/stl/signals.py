@@ -102,27 +102,6 @@ def _intervals(trace: Trace) -> tuple[Rows, Rows]:
     return begins, np.maximum.accumulate(np.where(sampled, np.arange(len(begins)), 0))
 
 
-def slack(trace: Trace) -> Signals:
-    """Least slack of the avoidance inequalities of all ordered pairs at the control samples."""
-    control, ugvs = trace.scenario["control"], set(trace.ugvs)
-    begins, held = _intervals(trace)
-    rows = begins[np.unique(held)]
-    velocity = {robot: trace.command(robot)[rows + 1] for robot in trace.robots}
-    least = np.full(len(rows), NEVER)
-    for robot, other, offsets, safe, share in _pairs(trace):
-        offset = offsets[rows]
-        distance = np.linalg.norm(offset, axis=1)
-        spare = distance - safe
-        allowed = share * spare * np.where(spare > 0.0, 1.0 / control["period_s"], control["avoidance_gain_1_s"])
-        for name, sign in ((robot, 1.0), (other, -1.0)):
-            if name not in velocity:
-                continue
-            seen = velocity[name][:, :2] if name in ugvs else velocity[name]
-            rate = sign * (offset[:, : seen.shape[1]] * seen).sum(axis=1) / np.maximum(distance, 1e-300)
-            least = np.minimum(least, np.where(distance <= control["sensing_range_m"], rate + allowed, NEVER))
-    return Signals({}, [{"slack_m_s": (trace.t[rows], least)}])
-
-
 def motion(trace: Trace) -> Signals:
     """Speed to spare, climbing rate and departure from the held command, of the worst robot on each interval."""
     (begins, held), scenario = _intervals(trace), trace.scenario

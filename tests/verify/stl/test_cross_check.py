@@ -18,6 +18,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from builders.edits import with_events, with_scenario, with_signals
+from builders.layout import rebuilt
 from builders.runs import passing_by, run_of
 from builders.scenarios import STILL, case_a, lone
 from builders.simulation import simulate
@@ -155,7 +156,7 @@ def disturbed(trace: Trace, rng: np.random.Generator) -> Trace:
         away = rng.normal(size=3) * rng.choice([0.01, 0.01, 0.1])
         changes[f"{key}__target_m"] = (final[robot] + away).tolist()
         changes[f"{key}__max_speed_m_s"] = float(rng.choice([3.0, 20.0]))
-    trace = with_scenario(trace, **changes)
+    trace = rebuilt(with_scenario(trace, **changes))
     if rng.random() < 0.4:
         row = int(rng.integers(1, len(trace.t)))
         trace = with_signals(trace, lambda s: s.assign(**{"ugv1.noise_m": s["ugv1.noise_m"] + 0.3 * (s.index >= row)}))
@@ -258,9 +259,6 @@ WRONG: dict[str, tuple[StlFormula, Callable[[], Trace]]] = {
     "distance once, not always": (rewritten("SAFE-TRACE", "always", "eventually"), lambda: run_of("d")),
     "safe distance, <= for >=": (rewritten("SAFE-TRACE", ">=", "<="), lambda: passing_by(-0.1)),
     "distances at the rows only": (replace(formula_of("SAFE-TRACE"), evaluate_on=rows_only), lambda: passing_by(-1e-6)),
-    "slack, <= for >=": (rewritten("SAFE-HYP", ">=", "<=", "avoid"), lambda: run_of("d")),
-    "slack shifted": (rewritten("SAFE-HYP", ">= 0", ">= -0.1", "avoid"), lambda: passing_by(-0.3)),
-    "slack now, not always": (rewritten("SAFE-HYP", "always", "", "avoid"), lambda: passing_by(-0.3)),
     "climbing, >= for <=": (rewritten("SAFE-HYP", "climb_m_s <=", "climb_m_s > 0.001 +", "vel"), lambda: run_of("d")),
     "dwell halved": (tuned("ZENO-TRACE", dwell=lambda t: t / 2), lambda: out_and_back(2.0, "bare")),
     "dwell doubled": (tuned("ZENO-TRACE", dwell=lambda t: 2 * t), lambda: out_and_back(0.8)),
@@ -392,7 +390,3 @@ def test_a_formula_about_nothing_is_left_out_or_vacuous() -> None:
     assert {c["claim"] for c in cross_check(run_of("a"))} == CLAIMS - {"COMM"}
     timeless = with_scenario(run_of("d"), decision__min_inter_event_s=0.0)
     assert "ZENO-TRACE" not in {c["claim"] for c in cross_check(timeless)}
-    far = simulate(lone([0.0] * 3, [0.0] * 3, STILL, 1.0), drive=lambda t: [[0.0] * 3, [0.0] * 3])
-    (check,) = (c for c in cross_check(far) if c["part"] == "avoidance inequalities")
-    assert (check["verdict"], check["robustness"]) == ("satisfied", None)
-    assert_agreement(far)
