@@ -46,7 +46,7 @@ _WIRING = (
     "states", "inequalities", "commands", "executed", "proposals", "never_bound", "never_bound_count",
     "least_times_bound", "least_slack_m_s",
 )  # fmt: skip
-_EVERYWHERE = ("from_cache", "evidence.reason", *_SECOND_OPINION, *_ANSWERS)
+_EVERYWHERE = ("from_cache", "evidence.reason", "evidence.applies_to", "evidence.of", *_SECOND_OPINION, *_ANSWERS)
 
 AS_RECORDED: Mapping[str, tuple[str, ...]] = {
     "GATE-FEAS": ("evidence.comparisons",),
