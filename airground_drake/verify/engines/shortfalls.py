@@ -17,6 +17,7 @@ from fractions import Fraction
 from math import inf, isqrt, nextafter
 
 import numpy as np
+import numpy.typing as npt
 
 from airground_drake.arrays import Array
 
@@ -51,7 +52,7 @@ def shortage(one: Array, other: Array, d: float) -> Fraction:
     return max(Fraction(d) - _length(_minus(here, there), unit)[0], Fraction(0))
 
 
-def _doubtful(first: Array, other: Array, d: float, share: float, gain: float, last: float) -> Array:
+def _doubtful(first: Array, other: Array, d: float, share: float, gain: float, last: float) -> npt.NDArray[np.intp]:
     """Samples that floats find neither far nor met by more than `SCREEN_M`: their numbers."""
     apart = (first - other)[:-1]
     distance = np.linalg.norm(apart, axis=1)

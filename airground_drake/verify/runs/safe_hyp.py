@@ -143,11 +143,11 @@ class SafeHyp(TraceClaim):
 
     def check(self, trace: Trace) -> Finding:
         """Evaluate all hypotheses; the first violation in time is the counterexample."""
-        kept = sorted(_guarantees(trace), key=lambda one: one.margin_m)
+        kept = sorted(guarantees(trace), key=lambda one: one.margin_m)
         others = [*_static(trace), *_sampled(trace)]
         different = list(differences(trace))
-        broken = [{"hypothesis": BUILT, "t_s": float(trace.t[0]), **each} for each in different[:1]]
-        broken += [h.at(int(k)) for h in [*others, *_avoidance(trace, kept)] for k in h.broken()[:1]]
+        broken = [h.at(int(k)) for h in [*others, *_avoidance(trace, kept)] for k in h.broken()[:1]]
+        broken += [{"hypothesis": BUILT, "t_s": float(trace.t[0]), **each} for each in different[:1]]
         first = min(broken, key=lambda entry: float(entry["t_s"]), default=None)
         worst: dict[tuple[str, str], dict[str, Any]] = {}
         for h in others:
@@ -156,7 +156,7 @@ class SafeHyp(TraceClaim):
             if entry["margin"] <= worst.get(key, entry)["margin"]:
                 worst[key] = entry
         listed = [_listed(trace, one) for one in kept[:MOST_LISTED]]
-        least = {"margin": kept[0].margin_m if kept else 0.0, "unit": "m", "hypothesis": AVOIDANCE}
+        least: dict[str, Any] = {"margin": kept[0].margin_m if kept else 0.0, "unit": "m", "hypothesis": AVOIDANCE}
         least |= {key: listed[0][key] for key in ("first", "second")} if kept else {}
         name = first["hypothesis"] if first else AVOIDANCE
         leading = min((w for w in worst.values() if w["hypothesis"] == name), key=lambda w: w["margin"], default=least)
@@ -208,11 +208,15 @@ def _written(number: float) -> Fraction:
     return Fraction(repr(float(number)))
 
 
-def _guarantees(trace: Trace) -> list[Guarantee]:
+def guarantees(trace: Trace) -> list[Guarantee]:
     """What is promised for each pair that comes so near that its steps could break its distance.
 
     Pairs in bounds of whose distance there is room for both robots' longest steps are far at every sample.
     """
+    return trace.derived("guarantees", lambda: list(_guarantees(trace)))
+
+
+def _guarantees(trace: Trace) -> Iterator[Guarantee]:
     samples, period = np.append(_samples(trace), len(trace.t) - 1), trace.scenario["control"]["period_s"]
     lasting = float(trace.t[samples[-1]] - trace.t[samples[-2]])
     last = Fraction(1) if abs(lasting - period) <= TIME_TOLERANCE_S else Fraction(lasting) / Fraction(period)
@@ -220,7 +224,6 @@ def _guarantees(trace: Trace) -> list[Guarantee]:
     longest = {name: 0.0 if p.ndim == 1 else _longest(p, float(last)) for name, p in places.items()}
     pairs, gain = pairs_of(trace), _gain(trace)
     reach = np.array([pair.safe_m + longest[pair.first] + longest[pair.second] for pair in pairs])
-    found = []
     for k in np.flatnonzero(apart_of(trace) <= reach + SCREEN_M).tolist():
         pair = pairs[k]
         first, second = places[pair.first], places[pair.second]
@@ -228,8 +231,7 @@ def _guarantees(trace: Trace) -> list[Guarantee]:
         e = Fraction(float(missed.max()))
         short = shortage(first[0], second if second.ndim == 1 else second[0], pair.safe_m)
         lost = max(e / gain, short) if gain else len(missed) * e + short
-        found.append(Guarantee(pair, missed, rounded_up(short), -rounded_up(lost - Fraction(pair.safe_m))))
-    return found
+        yield Guarantee(pair, missed, rounded_up(short), -rounded_up(lost - Fraction(pair.safe_m)))
 
 
 def _longest(places: Array, last: float) -> float:
