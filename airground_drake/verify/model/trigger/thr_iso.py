@@ -48,7 +48,7 @@ class ThrIso(TheoremClaim):
     )
 
     theorems = ("Isolation.largest_at_an_end", "Isolation.nowhere_below", "Isolation.attained")
-    margin_of = "threshold"
+    margin_of = "threshold in force"
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
         """The trigger's levels, m, and dwell, s; the periods of noise and control, s."""
