@@ -60,13 +60,12 @@ def theorem(claim: Json, scenario: Json) -> Found:
 def _with_numbers(found: Found, claim: Json, scenario: Json) -> Found:
     """What follows from the theorems with the scenario's numbers."""
     match claim["id"]:
-        case "SAFE-DIST":
-            recorded = claim["evidence"].get("least_distances_m", {})
-            least = min((_left_m(scenario, kind.safe_m, kind.share) for kind in kinds_of(scenario)), default=0)
-            agrees(
-                "least distance that is left", min(recorded.values(), default=float(least)), float(least), within=SMALL
-            )
-            return found.having_judged("evidence.least_distances_m")
+        case "SAFE-DIST" if scenario["control"]["avoidance_gain_1_s"] > 0.0:
+            least: dict[str, float] = {}
+            for kind in kinds_of(scenario):
+                left = float(_left_m(scenario, kind.safe_m, kind.share))
+                least[_kind(kind.name)] = min(left, least.get(_kind(kind.name), left))
+            return found.also(least_distances_m=least)
         case "ZENO-PROOF":
             dwell = rational(levels_of(scenario).dwell_s)
             most = int(rational(scenario["duration_s"]) // dwell) + 1 if dwell > 0 else None
@@ -77,6 +76,11 @@ def _with_numbers(found: Found, claim: Json, scenario: Json) -> Found:
             bound = float(gate["tries"] * (rational(gate["longest_s"]) + rational(gate["period_s"])))
             return found.also(bound_s=bound, given_back_after_s=float(gate["behind_s"] + gate["period_s"]))
     return found
+
+
+def _kind(name: str) -> str:
+    """The name of a kind of pairs without its number."""
+    return name.rstrip("0123456789").rstrip("_")
 
 
 def _left_m(scenario: Json, safe_m: float, share: float) -> Fraction:
@@ -98,7 +102,7 @@ def _layer(claim: Json, scenario: Json) -> list[Margin]:
     """A h is at most 1, shares add up, the sensing range is long enough; method (d) has avoidance above all else."""
     period, reach = (rational(scenario["control"][name]) for name in ("period_s", "sensing_range_m"))
     kinds = kinds_of(scenario)
-    names = {kind.name.rstrip("0123456789").rstrip("_") for kind in kinds}
+    names = {_kind(kind.name) for kind in kinds}
     spare = [Margin(reach - rational(kind.safe_m) - rational(kind.closing_m_s) * period, own=True) for kind in kinds]
     order = [Margin(Fraction(0))] * (claim["id"] == "SAFE-GATE")
     return [*_stable(scenario), *[Margin(Fraction(0))] * len(names), *spare, *order]

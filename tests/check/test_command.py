@@ -111,9 +111,7 @@ def test_anything_else_is_no_report(content: str, tmp_path: Path, capsys: pytest
     assert "Traceback" not in said.err
 
 
-@pytest.mark.parametrize(
-    "key", ["scenario", "provenance", "overall", "runs", "claims", "audit", "mutants", "choices", "files"]
-)
+@pytest.mark.parametrize("key", ["scenario", "provenance", "overall", "runs", "claims", "audit", "choices", "files"])
 @pytest.mark.parametrize("value", [None, [], {}, "x", 3, [1], [None]])
 def test_a_report_with_a_part_of_another_kind_is_refused(report: Path, key: str, value: Any, tmp_path: Path) -> None:
     document = json.loads((report / "report.json").read_text())

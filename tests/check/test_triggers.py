@@ -10,8 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from airground_drake.check.rules import Disagreement
 from airground_drake.check.run import Run
-from airground_drake.check.triggers import Variable, decision_variable
+from airground_drake.check.scenario import Levels
+from airground_drake.check.triggers import Variable, decision_variable, refuted_zeno_proof
 
 SPEED_M_S = 2.0
 
@@ -50,3 +52,32 @@ def test_the_least_value_of_a_segment_is_a_knot(aside_m: float, slope_m_s: float
     sampled = np.hypot(aside_m, SPEED_M_S * (t - 5.0)) + slope_m_s * t
     assert x.x_m.min() <= sampled.min() + 1e-9
     assert x.x_m.min() >= sampled.min() - 0.01 * (SPEED_M_S + abs(slope_m_s))
+
+
+REST = {"t_s": 0.1, "x_m": 0.0, "mode": "SUPERVISING", "trigger": False}
+
+
+def refutation(first_s: float, rest_s: float, last_s: float, mode: str = "SUPERVISING") -> dict[str, Any]:
+    """ZENO-PROOF, refuted by two triggers of an automaton."""
+    risen = {"x_m": 3.0, "mode": "INTERVENING", "trigger": True}
+    run = [{"t_s": first_s, **risen}, {**REST, "t_s": rest_s, "mode": mode}, {"t_s": last_s, **risen}]
+    return {"counterexample": {"run": run, "gap_s": last_s - first_s, "bound_s": 0.5}}
+
+
+@pytest.mark.parametrize(
+    ("claim", "dwell_s", "rule"),
+    [
+        (refutation(0.0, 0.25, 0.5, "REFRACTORY"), 0.5, "two triggers are closer than the bound"),
+        (refutation(0.0, 0.1, 0.2), 0.5, "mode of the automaton"),
+        (refutation(10.0, 20.0, 9.9), 0.0, "time goes on in a run"),
+        (refutation(-2.0, -1.0, -1.9), 0.0, "a run begins at 0 or later"),
+    ],
+)
+def test_a_refutation_of_zeno_proof_is_a_run_of_the_automaton(claim: Any, dwell_s: float, rule: str) -> None:
+    with pytest.raises(Disagreement) as caught:
+        refuted_zeno_proof(claim, Levels(3.0, 1.5, dwell_s), 0.5, -0.5)
+    assert caught.value.rule == rule
+
+
+def test_a_refutation_by_a_bare_trigger_agrees() -> None:
+    assert refuted_zeno_proof(refutation(0.0, 0.1, 0.2), Levels(3.0, 3.0, 0.0), 0.5, -0.5).status == "refuted"

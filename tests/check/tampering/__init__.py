@@ -3,7 +3,7 @@
 `PYTHONPATH=tests python -m check.tampering DIR` tries them all on copies of a report of case B.
 """
 
-from check.tampering import bombs, certificates, counts, decisions, events, execution, files, outcomes, report, signals
+from check.tampering import bombs, counts, decisions, events, execution, files, outcomes, report, signals, theorems
 from check.tampering.base import IGNORED, NO_REPORT, TAMPERINGS, Outcome, Tampering, attempt
 
 __all__ = [
@@ -14,7 +14,6 @@ __all__ = [
     "Tampering",
     "attempt",
     "bombs",
-    "certificates",
     "counts",
     "decisions",
     "events",
@@ -23,4 +22,5 @@ __all__ = [
     "outcomes",
     "report",
     "signals",
+    "theorems",
 ]

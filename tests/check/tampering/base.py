@@ -184,31 +184,6 @@ def middle(frame: pd.DataFrame) -> int:
     return int(np.flatnonzero(frame[f"{UGV}.accepted"] == 1.0)[10])
 
 
-# ------------------------------------------------------------------------------------- certificates
-
-
-def seal_certificate(folder: Path, claim: str, name: str) -> None:
-    """Make the digest of a certificate right."""
-    digest = hashlib.sha256((folder / "certificates" / claim / name).read_bytes()).hexdigest()
-    with edited_claim(folder, claim, "") as entry:
-        entry["certificates"][name] = digest
-
-
-@contextlib.contextmanager
-def edited_certificate(folder: Path, claim: str, name: str = "obligations.json") -> Iterator[Any]:
-    """A certificate."""
-    with edited_json(folder / "certificates" / claim / name) as value:
-        yield value
-    seal_certificate(folder, claim, name)
-
-
-@contextlib.contextmanager
-def edited_obligation(folder: Path, claim: str, name: str) -> Iterator[Any]:
-    """One obligation of a certificate."""
-    with edited_certificate(folder, claim) as obligations:
-        yield next(entry for entry in obligations if entry["name"] == name)
-
-
 # ------------------------------------------------------------------------------------- trying
 
 

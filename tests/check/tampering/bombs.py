@@ -13,9 +13,7 @@ import pyarrow.parquet as pq
 from check.tampering.base import (
     NO_REPORT,
     claim_of,
-    edited_certificate,
     edited_claim,
-    edited_obligation,
     edited_report,
     edited_scenarios,
     read_table,
@@ -26,16 +24,10 @@ from check.tampering.base import (
 )
 
 
-@refused_by("THR-ROOT", "a number is an integer or a fraction", run="")
-def enclosure_of_a_billion_digits(folder: Path) -> None:
-    with edited_certificate(folder, "THR-ROOT", "statements.json") as saved:
-        saved["enclosures"]["u"] = ["1e1000000000", "1e1000000001"]
-
-
 @refused_by("THR-ROOT", "the files are well formed", run="")
 def threshold_of_a_billion_digits(folder: Path) -> None:
     with edited_claim(folder, "THR-ROOT", "") as claim:
-        claim["evidence"]["running_threshold_m"] = "1e1000000000"
+        claim["evidence"]["computed_threshold_m"] = "1e1000000000"
 
 
 @refused_by("trace", "the rows cover the run")
@@ -45,66 +37,9 @@ def duration_of_a_billion_digits(folder: Path) -> None:
             scenario["duration_s"] = "1e1000000000"
 
 
-@refused_by("SAFE-INV", "a number is short", run="")
-def three_thousand_factors_of_four_thousand_digits(folder: Path) -> None:
-    with edited_obligation(folder, "SAFE-INV", "outside") as one:
-        one["hypotheses"]["long"] = "9" * 4000
-        one["certificate"].append({"coefficient": "1", "factors": ["long"] * 3000, "square": "1"})
-
-
-@refused_by("SAFE-INV", "a number is short", run="")
-def three_thousand_factors_of_four_hundred_digits(folder: Path) -> None:
-    with edited_obligation(folder, "SAFE-INV", "outside") as one:
-        one["hypotheses"]["long"] = "9" * 400
-        one["certificate"].append({"coefficient": "1", "factors": ["long"] * 3000, "square": "1"})
-
-
-@refused_by("SAFE-INV", "a degree is low", run="")
-def a_thousand_squares(folder: Path) -> None:
-    with edited_obligation(folder, "SAFE-INV", "outside") as one:
-        one["hypotheses"]["long"] = "D*D"
-        one["certificate"].append({"coefficient": "1", "factors": ["long"] * 1000, "square": "1"})
-
-
-@refused_by("SAFE-INV", "a polynomial is", run="")
-def many_terms(folder: Path) -> None:
-    with edited_obligation(folder, "SAFE-INV", "outside") as one:
-        one["goal"] = " + ".join(f"a{i}" for i in range(30_000))
-
-
-@refused_by("SAFE-INV", "a polynomial is small enough", run="")
-def many_products(folder: Path) -> None:
-    with edited_obligation(folder, "SAFE-INV", "outside") as one:
-        one["certificate"][0]["square"] = " + ".join(f"a{i}" for i in range(1000))
-
-
-def _expression(text: str) -> Callable[[Path], None]:
-    def edit(folder: Path) -> None:
-        with edited_certificate(folder, "THR-OPT", "statements.json") as saved:
-            one = next(each for each in saved["statements"] if each["kind"] == "derivative")
-            one["function"] = text
-
-    return edit
-
-
-EXPRESSIONS = {
-    "towers_of_powers": "(((((((((q**12)**12)**12)**12)**12)**12)**12)**12)**12)",
-    "nested_brackets": "(" * 2000 + "q" + ")" * 2000,
-    "many_signs": "-" * 4999 + "q",
-    "constant_of_many_digits": f"q*{'9' * 4000}",
-    "long_expression": "q+" * 3000 + "q",
-    "imported_expression": "__import__('os')",
-}
-"""None is ever evaluated: an expression is the claim's, or the statement is refused."""
-for _name, _text in EXPRESSIONS.items():
-    _edit = _expression(_text)
-    _edit.__name__ = _name
-    refused_by("THR-OPT", "the statement is the claim's", run="")(_edit)
-
-
 @refused_by(NO_REPORT, "regular files")
 def fifo_added(folder: Path) -> None:
-    os.mkfifo(folder / "certificates" / "SAFE-INV" / "pipe")
+    os.mkfifo(folder / "trace" / "d" / "pipe")
 
 
 @refused_by(NO_REPORT, "regular files")
@@ -129,7 +64,7 @@ def meta_is_elsewhere(folder: Path) -> None:
 
 @refused_by(NO_REPORT, "regular files")
 def folder_leads_to_itself(folder: Path) -> None:
-    (folder / "certificates" / "more").symlink_to(folder)
+    (folder / "trace" / "more").symlink_to(folder)
 
 
 @refused_by(NO_REPORT, "the file can be read")

@@ -23,7 +23,6 @@ from check.tampering.base import (
     read_table,
     refused_by,
     seal,
-    seal_certificate,
     trace,
     write,
 )
@@ -173,12 +172,6 @@ def junit_changed(folder: Path) -> None:
 @refused_by("files", "SHA-256 of a file", run="")
 def diagram_changed(folder: Path) -> None:
     write(folder / "diagram.svg", b"<svg/>")
-
-
-@refused_by("files", "SHA-256 of a file", run="")
-def script_changed_with_its_claims_digest(folder: Path) -> None:
-    write(folder / "certificates" / "SAFE-INV" / "outside.smt2", b"(check-sat)")
-    seal_certificate(folder, "SAFE-INV", "outside.smt2")
 
 
 @refused_by("files", "SHA-256 of a file", run="")

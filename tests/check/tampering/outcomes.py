@@ -101,18 +101,6 @@ def patience_overstated(folder: Path) -> None:
         claim["margin"] = 3.0
 
 
-@refused_by("LIVE-WAIT", "answers that the tries left do not allow", run="")
-def an_attack_was_answered_wrongly(folder: Path) -> None:
-    with edited_claim(folder, "LIVE-WAIT", "") as claim:
-        claim["evidence"]["attacks"][0]["unexpected"] = 1
-
-
-@refused_by("LIVE-WAIT", "favours that no UGV is asked for", run="")
-def favours_to_nobody_done(folder: Path) -> None:
-    with edited_claim(folder, "LIVE-WAIT", "") as claim:
-        next(row for row in claim["evidence"]["attacks"] if row["attack"] == "favours to nobody")["tries"] = 1
-
-
 @refused_by("GATE-MODEL", "evidence")
 def outcomes_miscounted(folder: Path) -> None:
     with edited_claim(folder, "GATE-MODEL") as claim:

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 from pathlib import Path
-from typing import Any
 
 from check.tampering.base import (
     RUN,
@@ -19,8 +17,6 @@ from check.tampering.base import (
     refused_by,
     trace,
 )
-
-from airground_drake import check as checker
 
 GATED = ("GATE-FEAS", "GATE-MODEL", "LIVE-PROG")
 
@@ -277,38 +273,6 @@ def difference_invented(folder: Path) -> None:
         report["overall"]["differs"] = [{"id": "COMM", "run": "d", "status": "refuted", "expected": "holds"}]
 
 
-@refused_by("report", "broken variants of proofs", run="")
-def mutant_of_ones_own(folder: Path) -> None:
-    with edited_report(folder) as report:
-        report["mutants"].append({"claim": "SAFE-INV", "mutant": "no gain", "refuted": False})
-
-
-def all_mutants(refuted: bool) -> list[Any]:
-    listed = json.loads((Path(checker.__file__).parent / "mutants.json").read_text(encoding="utf-8"))
-    came_to = {"status": "refuted", "refuted": True, "counterexample": {}, "error": None, "from_cache": False}
-    entries: list[Any] = [{"claim": claim, "mutant": says, **came_to} for claim, says in listed]
-    entries[0] |= {"status": "holds", "refuted": refuted, "counterexample": None}
-    return entries
-
-
-@refused_by("report", "verdict over all", run="")
-def mutant_that_survived(folder: Path) -> None:
-    with edited_report(folder) as report:
-        report["mutants"], report["audit"] = all_mutants(refuted=False), []
-
-
-@refused_by("report", "whether a broken variant is refuted", run="")
-def mutant_that_survived_and_is_said_to_be_refuted(folder: Path) -> None:
-    with edited_report(folder) as report:
-        report["mutants"], report["audit"] = all_mutants(refuted=True), []
-
-
-@refused_by("report", "broken variants of proofs", run="")
-def audit_without_mutants(folder: Path) -> None:
-    with edited_report(folder) as report:
-        report["audit"] = [{"id": k, "demonstrated": True} for k in range(18)]
-
-
 @refused_by("report", "choice", run="")
 def calibrated_value_misquoted(folder: Path) -> None:
     with edited_report(folder) as report:
@@ -367,18 +331,15 @@ def gain_changed_everywhere(folder: Path) -> None:
             scenario["control"]["avoidance_gain_1_s"] = 5.0
 
 
-@refused_by("SAFE-INV", "the goal is the claim's", run="")
+@refused_by("SAFE-INV", "margin of a hypothesis", run="")
 def gain_changed_everywhere_and_in_the_inputs(folder: Path) -> None:
     gain_changed_everywhere(folder)
     with edited_report(folder) as report:
         for claim in ("SAFE-INV", "SAFE-GATE", "SAFE-DIST"):
-            inputs = claim_of(report, claim, "")["inputs"]
-            inputs["avoidance_gain_1_s"] = 5.0
-            if "scenario" in inputs:
-                inputs["scenario"]["control"]["avoidance_gain_1_s"] = 5.0
+            claim_of(report, claim, "")["inputs"]["avoidance_gain_1_s"] = 5.0
 
 
-@refused_by("THR-ROOT", "constants", run="")
+@refused_by("THR-ROOT", "(19) changes its sign in the enclosure", run="")
 def drift_changed_everywhere_and_in_the_inputs(folder: Path) -> None:
     with edited_scenarios(folder) as scenarios:
         for scenario in scenarios:
