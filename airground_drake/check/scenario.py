@@ -194,38 +194,6 @@ def kinds_of(scenario: Json) -> list[Kind]:
     return found
 
 
-def extent_m(scenario: Json) -> float:
-    """No coordinate of a run is larger: the largest of the scenario, and the way at the largest speed limit."""
-    points = [scenario["uav"]["start_m"], *(obstacle["position_m"] for obstacle in scenario["obstacles"].values())]
-    for ugv in scenario["ugvs"].values():
-        points += [ugv["start_m"], ugv["target_m"], *ugv["preset"]["waypoints_m"]]
-    farthest = max(abs(float(coordinate)) for point in points for coordinate in point)
-    speed = max(float(robot["max_speed_m_s"]) for robot in robots_of(scenario).values())
-    return farthest + speed * float(scenario["duration_s"])
-
-
-def rounding_m(scenario: Json, kind: Kind) -> float:
-    """What rounding may take from the safe distance of a kind of pairs while the gain restores it.
-
-    In a step: u (7 D + 9 c h) in the inequalities, at distances D up to the sensing range; u (extent + c h) for each
-    coordinate, robot and integration step, of which a period has 64 at most; u c T for each step and two more, as
-    multiples of the period are rounded; 1 % for products of these. A deficit shrinks by A h per step, so that alone it
-    never exceeds 1 / (A h) times that. Infinite where A = 0.
-    """
-    control = scenario["control"]
-    h, gain = float(control["period_s"]), float(control["avoidance_gain_1_s"])
-    way, reach = kind.closing_m_s * h, max(float(control["sensing_range_m"]), float(kind.safe_m))
-    inequalities = 7.0 * reach + 9.0 * way
-    positions = 2.0 * math.sqrt(3.0) * STEPS * (extent_m(scenario) + way)
-    clock = (STEPS + 2.0) * kind.closing_m_s * float(scenario["duration_s"])
-    step = 1.01 * 2.0**-53 * (inequalities + positions + clock)
-    return step / (gain * h) if gain > 0.0 else math.inf
-
-
-STEPS = 64
-"""Integration steps that a control period is cut into at most."""
-
-
 def disturbance_m_s(scenario: Json) -> float:
     """The disturbance that SAFE-DIST is about: 10 % of the largest speed limit, at most A/4 of the least distance."""
     tenth = 0.1 * max(float(robot["max_speed_m_s"]) for robot in robots_of(scenario).values())
