@@ -31,7 +31,6 @@ from airground_drake.registry import (
 )
 from airground_drake.scenarios import json_schema
 from airground_drake.verify.claim import Claim
-from airground_drake.verify.registry import mutants
 
 DOCS = Path(__file__).parent
 EXAMPLES = DOCS.parent / "examples"
@@ -96,14 +95,7 @@ def pages() -> dict[str, str]:
         "scenario.md": scenario(),
         "extending.md": extending(),
         "../airground_drake/scenarios/scenario.schema.json": json_schema.text(installed=False),
-        "../airground_drake/check/mutants.json": _broken_variants(),
     }
-
-
-def _broken_variants() -> str:
-    """Claim and words of every broken variant of a proof, for the checker, which cannot ask the package."""
-    lines = ",\n ".join(json.dumps([mutant.claim, mutant.says], ensure_ascii=False) for mutant in mutants())
-    return f"[{lines}]\n"
 
 
 def extending() -> str:
@@ -171,7 +163,6 @@ def claims() -> str:
     lines = []
     for name, claim in _claims():
         about = "the model" if name in MODEL_CLAIMS.own else "a run"
-        broken = [mutant.says for mutant in mutants() if mutant.claim == name]
         lines += [
             f"## {name}",
             "",
@@ -193,8 +184,6 @@ def claims() -> str:
             f"*Does not establish:* {claim.does_not_establish}",
             "",
         ]
-        if broken:
-            lines += ["*Broken variants that it refutes:* " + "; ".join(broken) + ".", ""]
     return _page("Claims", "What each claim says of itself, as in every report.", lines)
 
 

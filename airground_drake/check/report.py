@@ -22,6 +22,10 @@ from .verdict import DECIDED_FROM, Agreed, decide_of_model, decide_of_run, judge
 AGREES, DISAGREES, OPEN = "agrees", "DISAGREES", "cannot be re-established"
 
 
+EARLIER = ("airground_drake.report/1",)
+"""Schemas of reports by earlier versions."""
+
+
 @dataclass(frozen=True)
 class Line:
     """One check.
@@ -72,6 +76,9 @@ def _is_shaped_like_a_report(report: Any) -> None:
     """Objects are objects, lists are lists of objects."""
     if not isinstance(report, dict):
         raise NotEstablished("it is a report", f"it is a {type(report).__name__}", "report.json")
+    if isinstance(report, dict) and ("mutants" in report or report.get("schema") in EARLIER):
+        why = "it is by an earlier version: make the report again (docs/migration.md)"
+        raise NotEstablished("it is a report of this version", why, "report.json")
     for key in ("scenario", "provenance", "overall", "runs", "files"):
         if not isinstance(report.get(key), dict):
             raise NotEstablished("it is a report", f"its {key!r} is missing or is no object", "report.json")

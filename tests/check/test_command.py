@@ -111,6 +111,18 @@ def test_anything_else_is_no_report(content: str, tmp_path: Path, capsys: pytest
     assert "Traceback" not in said.err
 
 
+@pytest.mark.parametrize("change", [{"schema": "airground_drake.report/1"}, {"mutants": []}])
+def test_a_report_by_an_earlier_version_is_told_so(
+    change: dict[str, Any], report: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    document = json.loads((report / "report.json").read_text())
+    (tmp_path / "report.json").write_text(json.dumps(document | change))
+    assert check.main([str(tmp_path)]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert "by an earlier version: make the report again (docs/migration.md)" in said
+
+
 @pytest.mark.parametrize("key", ["scenario", "provenance", "overall", "runs", "claims", "audit", "choices", "files"])
 @pytest.mark.parametrize("value", [None, [], {}, "x", 3, [1], [None]])
 def test_a_report_with_a_part_of_another_kind_is_refused(report: Path, key: str, value: Any, tmp_path: Path) -> None:
