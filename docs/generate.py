@@ -32,7 +32,6 @@ from airground_drake.registry import (
 )
 from airground_drake.scenarios import json_schema
 from airground_drake.verify.claim import Claim
-from airground_drake.verify.registry import mutants
 
 DOCS = Path(__file__).parent
 EXAMPLES = DOCS.parent / "examples"
@@ -98,14 +97,7 @@ def pages() -> dict[str, str]:
         "extending.md": extending(),
         "proofs.md": proofs(),
         "../airground_drake/scenarios/scenario.schema.json": json_schema.text(installed=False),
-        "../airground_drake/check/mutants.json": _broken_variants(),
     }
-
-
-def _broken_variants() -> str:
-    """Claim and words of every broken variant of a proof, for the checker, which cannot ask the package."""
-    lines = ",\n ".join(json.dumps([mutant.claim, mutant.says], ensure_ascii=False) for mutant in mutants())
-    return f"[{lines}]\n"
 
 
 def extending() -> str:
@@ -188,7 +180,6 @@ def claims() -> str:
     lines = []
     for name, claim in _claims():
         about = "the model" if name in MODEL_CLAIMS.own else "a run"
-        broken = [mutant.says for mutant in mutants() if mutant.claim == name]
         lines += [
             f"## {name}",
             "",
@@ -210,8 +201,6 @@ def claims() -> str:
             f"*Does not establish:* {claim.does_not_establish}",
             "",
         ]
-        if broken:
-            lines += ["*Broken variants that it refutes:* " + "; ".join(broken) + ".", ""]
     return _page("Claims", "What each claim says of itself, as in every report.", lines)
 
 

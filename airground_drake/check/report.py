@@ -29,6 +29,10 @@ DECIDED: Mapping[str, Callable[[Run], Found]] = {
 """The claims that the checker decides by its own formulas; of the others it checks the expectation."""
 
 
+EARLIER = ("airground_drake.report/1",)
+"""Schemas of reports by earlier versions."""
+
+
 @dataclass(frozen=True)
 class Line:
     """One check.
@@ -79,6 +83,9 @@ def _is_shaped_like_a_report(report: Any) -> None:
     """Objects are objects, lists are lists of objects."""
     if not isinstance(report, dict):
         raise NotEstablished("it is a report", f"it is a {type(report).__name__}", "report.json")
+    if isinstance(report, dict) and ("mutants" in report or report.get("schema") in EARLIER):
+        why = "it is by an earlier version: make the report again (docs/migration.md)"
+        raise NotEstablished("it is a report of this version", why, "report.json")
     for key in ("scenario", "provenance", "overall", "runs", "files"):
         if not isinstance(report.get(key), dict):
             raise NotEstablished("it is a report", f"its {key!r} is missing or is no object", "report.json")

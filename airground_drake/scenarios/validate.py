@@ -373,7 +373,7 @@ def _sensing(scenario: Scenario) -> Problems:
 def _extent(scenario: Scenario) -> Problems:
     """Rounding must not take more from a safe distance than SAFE-TRACE tolerates; without a gain nothing is restored.
 
-    Then (A = 0) there is nothing that an extent could be accepted by, and SAFE-INV says so.
+    Then (A = 0) there is nothing that an extent could be accepted by; SAFE-HYP says what a run lost.
     """
     control, duration = scenario.control, scenario.duration_s
     if control.avoidance_gain_1_s == 0.0:

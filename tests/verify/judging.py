@@ -6,7 +6,7 @@ from typing import Any, Protocol
 
 from airground_drake.trace import Trace
 from airground_drake.verify import TRACE_CLAIMS, Finding, TraceClaim
-from airground_drake.verify.claim import ModelClaim, Mutant
+from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.runs import gate_feas, gate_opt
 from airground_drake.verify.runs.convex_bounds import enclose
 from airground_drake.verify.runs.gate_feas import GateFeas
@@ -18,7 +18,7 @@ from airground_drake.verify.runs.sum_up_rounding import compare_rounding, is_rou
 class Judged(Protocol):
     """The type of the fixture `judged` of conftest.py."""
 
-    def __call__(self, claim: ModelClaim | Mutant, inputs: dict[str, Any] | None = None) -> Finding:
+    def __call__(self, claim: ModelClaim, inputs: dict[str, Any] | None = None) -> Finding:
         """The finding for these inputs; default: those of case A."""
 
 

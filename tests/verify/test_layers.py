@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ast
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -69,3 +71,16 @@ def test_the_shelves_of_model_do_not_import_each_other() -> None:
         others = {f"verify.model.{other}" for other in SHELVES - {shelf}} | {"verify.runs"}
         for path in (PACKAGE / "verify" / "model" / shelf).glob("*.py"):
             assert not [name for name in imported(path) if within(name, others)], path
+
+
+def test_judging_loads_no_drake() -> None:
+    """Claims can be judged again where Drake is not installed."""
+    code = (
+        "import sys; from airground_drake.scenarios.load import load; from airground_drake.verify import verify_model; "
+        "from airground_drake.registry import MODEL_CLAIMS, RUN_CLAIMS; "
+        "from airground_drake.verify.registry import run_claims; run_claims(); "
+        "ids = [name for name in MODEL_CLAIMS if name not in ('LIVE-GATE', 'ZENO-REFINE')]; "
+        "verify_model(load('case_a')[0], claims=ids); print('pydrake' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"

@@ -13,19 +13,21 @@ import json
 import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
-from functools import cache, lru_cache
+from functools import cache, lru_cache, partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
+import pytest
 
 from airground_drake.check import command as checker
 from airground_drake.check.report import AGREES, Line
 from airground_drake.report import rebuild
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.trace import Trace
-from airground_drake.verify import Verdict, verify, verify_model
+from airground_drake.verify import Verdict, judge, verify_all
+from airground_drake.verify.claim import Claim
 
 RUN, UGV = "d", "ugv1"
 """The run and the UGV that are tampered with."""
@@ -255,30 +257,34 @@ def attempt(report: Path, edit: Edit, *, mended: bool = True) -> Outcome:
 
 
 def judged(scenario: Scenario, traces: Sequence[Trace]) -> list[Verdict]:
-    """As `verify_all`, but what was judged before is taken from there: most tamperings leave most runs as they are."""
-    found = [verdict for trace in traces for verdict in _of_run(_Content(trace, _key(trace)))]
-    return found + _of_model(_Content(scenario, json.dumps(asdict(scenario))))
+    """As `verify_all`, but what was judged before is not judged again: most tamperings leave most runs as they are."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(judge, "side_by_side", lambda pieces, **_: [_once(_Content(each, _key(each))) for each in pieces])
+        return verify_all(scenario, traces)
 
 
 @dataclass(frozen=True)
 class _Content:
-    """Something that is known by its content."""
+    """A piece of work that is known by what it depends on."""
 
-    value: Any = field(compare=False)
+    work: Any = field(compare=False)
     key: str
 
 
-def _key(trace: Trace) -> str:
-    tables = (trace.signals, trace.decisions, trace.problems, trace.proposals)
-    texts = [json.dumps(trace.meta), json.dumps(trace.timings), *(table.to_json() for table in tables)]
+def _key(piece: partial[Any]) -> str:
+    """Text of the traces, or of the claim and its inputs, that a piece of work of `verify_all` is about."""
+    texts = [piece.func.__name__]
+    for given in piece.args:
+        if isinstance(given, Trace):
+            tables = (given.signals, given.decisions, given.problems, given.proposals)
+            texts += [json.dumps(given.meta), json.dumps(given.timings), *(table.to_json() for table in tables)]
+        elif isinstance(given, Claim):
+            texts.append(given.id)
+        elif isinstance(given, dict):
+            texts.append(json.dumps(given))
     return hashlib.sha256("\0".join(texts).encode()).hexdigest()
 
 
 @lru_cache(maxsize=64)
-def _of_run(content: _Content) -> list[Verdict]:
-    return verify(content.value)
-
-
-@lru_cache(maxsize=8)
-def _of_model(content: _Content) -> list[Verdict]:
-    return verify_model(content.value)
+def _once(content: _Content) -> Any:
+    return content.work()

@@ -30,7 +30,7 @@ class SafeLemma(TheoremClaim):
     does_not_establish = "Anything about velocities that change within a period, or about rounding (see SAFE-HYP)."
 
     theorems = ("Safety.lemma", "Safety.lemma_in_the_plane")
-    margin_of = "safe distance"
+    margin_of = "least safe distance"
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
         """The safe distances of the scenario's pairs, m."""
@@ -39,6 +39,6 @@ class SafeLemma(TheoremClaim):
     def hypotheses(self, inputs: dict[str, Any]) -> list[Hypothesis]:
         """Safe distances are positive, so that no pair is at one point."""
         return [
-            Hypothesis("safe distance", f"{each.kind}: the safe distance is above 0", each.safe_m, "m", strict=True)
+            Hypothesis(self.margin_of, f"{each.kind}: the safe distance is above 0", each.safe_m, "m", strict=True)
             for each in kinds_of(inputs)
         ]

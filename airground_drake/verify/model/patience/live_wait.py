@@ -44,7 +44,7 @@ class LiveWait(TheoremClaim):
     )
 
     theorems = ("Patience.bounded", "Patience.given_back")
-    margin_of = "longest intervention"
+    margin_of = "longest intervention allowed"
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
         """The numbers of a UGV's patience, and the period of the gatekeeper, s."""

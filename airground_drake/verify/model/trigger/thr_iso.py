@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from airground_drake.scenarios.schema import Scenario
+from airground_drake.verify.model.levels import levels_of
 from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim, decimal
-from airground_drake.verify.model.trigger.levels import levels_of
 
 
 class ThrIso(TheoremClaim):
@@ -48,7 +48,7 @@ class ThrIso(TheoremClaim):
     )
 
     theorems = ("Isolation.largest_at_an_end", "Isolation.nowhere_below", "Isolation.attained")
-    margin_of = "threshold"
+    margin_of = "threshold in force"
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
         """The trigger's levels, m, and dwell, s; the periods of noise and control, s."""
