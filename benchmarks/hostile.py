@@ -24,6 +24,7 @@ from functools import partial
 from unittest import mock
 
 import numpy as np
+from airground_drake.verify.model.patience.attack import Believing
 from hostile_uav import CHOICES, LyingPlanner, Tactic, drawn, mutated
 
 from airground_drake import components
@@ -43,7 +44,6 @@ from airground_drake.scenarios.schema import Policy, Run, Scenario
 from airground_drake.simulation import Recorder
 from airground_drake.systems.controllers import UgvController
 from airground_drake.trace import Trace
-from airground_drake.verify.model.patience.attack import Believing
 from airground_drake.verify.runs.safe_trace import SafeTrace
 
 STEPS = 30

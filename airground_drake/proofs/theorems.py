@@ -130,6 +130,17 @@ _ALL = (
         ("LIVE-GATE",),
     ),
     Theorem(
+        "Gate.tracking_bounded",
+        "A tracking error stays within a bound b that contracts as the error does and grows by each disturbance.",
+        "(14)",
+        (
+            "g h is at most 1.",
+            "The error obeys e' = (1 - g h) e + h w.",
+            "The bound obeys b' >= (1 - g h) b + h |w|, and starts at |e| or more.",
+        ),
+        ("LIVE-GATE",),
+    ),
+    Theorem(
         "Gate.room",
         "With enough room no inequality restricts the command.",
         "ours",
