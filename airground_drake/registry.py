@@ -318,16 +318,20 @@ RUN_CLAIMS = Registry(
         "ZENO-TRACE": "airground_drake.verify.runs.zeno_trace:ZenoTrace",
         "THR-TRIG": "airground_drake.verify.runs.thr_trig:ThrTrig",
         "GATE-OPT": "airground_drake.verify.runs.gate_opt:GateOpt",
-        "GATE-SUR": "airground_drake.verify.runs.gate_sur:GateSur",
         "GATE-FEAS": "airground_drake.verify.runs.gate_feas:GateFeas",
         "GATE-MODEL": "airground_drake.verify.runs.gate_model:GateModel",
-        "GATE-TIME": "airground_drake.verify.runs.gate_time:GateTime",
         "LIVE-PROG": "airground_drake.verify.runs.live_prog:LiveProg",
         "LIVE-GOAL": "airground_drake.verify.runs.live_goal:LiveGoal",
         "COMM": "airground_drake.verify.runs.comm:Comm",
     },
 )
 """Claims that are decided from one trace, in the order of the report: subclasses of `verify.claim.TraceClaim`."""
+
+RETIRED_CLAIMS = {
+    "GATE-SUR": "it is part of GATE-FEAS",
+    "GATE-TIME": "decision times are measurements: runs.RUN.metrics.gatekeeper in report.json",
+}
+"""Claims of earlier versions, and what has become of them."""
 
 MODEL_CLAIMS = Registry(
     "claim",

@@ -118,8 +118,9 @@ class Trace:
     Attributes:
         meta: strict JSON: `schema`, `run` (identifier), `method`, `composition`, `seed`, `robots`, `ugvs`
             (names, array order; the UAV is the last robot), `zeta_m` (threshold in force), `scenario` (the
-            resolved scenario as nested dicts), `events` (list, by time), `faults` (list of what went wrong
-            in a policy or solver).
+            resolved scenario as nested dicts), `events` (list, by time), `controllers` (what the controllers were
+            built with, read back from the diagram: see `systems.controllers.read_back`), `faults` (list of what
+            went wrong in a policy or solver).
         signals: see the module's docstring.
         decisions: see DECISION_COLUMNS.
         problems: see PROBLEM_ARRAYS.

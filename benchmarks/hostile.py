@@ -38,12 +38,12 @@ from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.law import UgvLaw
 from airground_drake.nsbc.motion import Motion
 from airground_drake.registry import Method
+from airground_drake.report.audit.companions import Believing
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Policy, Run, Scenario
 from airground_drake.simulation import Recorder
 from airground_drake.systems.controllers import UgvController
 from airground_drake.trace import Trace
-from airground_drake.verify.model.patience.attack import Believing
 from airground_drake.verify.runs.safe_trace import SafeTrace
 
 STEPS = 30

@@ -44,8 +44,6 @@ MUTANTS: tuple[Mutant, ...] = (
 )  # fmt: skip
 LONGEST_S = 900
 """Time of a command, s: a mutant may run for ever."""
-NOT_COMPARED = ("GATE-TIME",)
-"""Claims that depend on what else the machine does."""
 RUNS_STAY = ("check", "report", "verify")
 """Folders of what judges: whatever is edited there, runs go the same way."""
 
@@ -237,7 +235,7 @@ class Bench:
         """What is not as on the package as it is; of one source, if it is named."""
         by = []
         for source, where, status, rule in found:
-            if source not in NOT_COMPARED and only in ("", source) and status != self.baseline.get((source, where)):
+            if only in ("", source) and status != self.baseline.get((source, where)):
                 by.append(f"{source} ({where}): {status}{f', {rule}' if rule else ''}")
         return by
 

@@ -18,6 +18,7 @@ from typing import Any
 import airground_drake
 from airground_drake import files
 from airground_drake.commands import COMMANDS
+from airground_drake.proofs import THEOREMS
 from airground_drake.registry import (
     METHODS,
     MODEL_CLAIMS,
@@ -31,7 +32,6 @@ from airground_drake.registry import (
 )
 from airground_drake.scenarios import json_schema
 from airground_drake.verify.claim import Claim
-from airground_drake.verify.registry import mutants
 
 DOCS = Path(__file__).parent
 EXAMPLES = DOCS.parent / "examples"
@@ -95,15 +95,9 @@ def pages() -> dict[str, str]:
         "commands.md": commands(),
         "scenario.md": scenario(),
         "extending.md": extending(),
+        "proofs.md": proofs(),
         "../airground_drake/scenarios/scenario.schema.json": json_schema.text(installed=False),
-        "../airground_drake/check/mutants.json": _broken_variants(),
     }
-
-
-def _broken_variants() -> str:
-    """Claim and words of every broken variant of a proof, for the checker, which cannot ask the package."""
-    lines = ",\n ".join(json.dumps([mutant.claim, mutant.says], ensure_ascii=False) for mutant in mutants())
-    return f"[{lines}]\n"
 
 
 def extending() -> str:
@@ -114,6 +108,21 @@ def extending() -> str:
         return f"```{block['language']}\n# file: {block['name']}\n{text}```"
 
     return _RECIPE.sub(as_it_is, (DOCS / "extending.md").read_text(encoding="utf-8"))
+
+
+def proofs() -> str:
+    """The page as it is up to its mark, and the theorems after it."""
+    mark = "<!-- theorems: made by python docs/generate.py -->\n"
+    lines, file = [], ""
+    for name, theorem in THEOREMS.items():
+        if file != (file := name.partition(".")[0]):
+            lines += ["", f"### {file}", ""]
+        takes = f" *Takes:* {' '.join(theorem.hypotheses)}" if theorem.hypotheses else ""
+        where = f" *Checked by:* {', '.join(theorem.checked_where)}." if theorem.checked_where else ""
+        about = "" if theorem.equation == "ours" else f", {theorem.equation}"
+        line = f"- **`{name}`**{about}: {theorem.statement}{takes}{where}"
+        lines += textwrap.wrap(line, WIDTH, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
+    return (DOCS / "proofs.md").read_text(encoding="utf-8").partition(mark)[0] + mark + "\n".join(lines) + "\n"
 
 
 def equations() -> str:
@@ -171,7 +180,6 @@ def claims() -> str:
     lines = []
     for name, claim in _claims():
         about = "the model" if name in MODEL_CLAIMS.own else "a run"
-        broken = [mutant.says for mutant in mutants() if mutant.claim == name]
         lines += [
             f"## {name}",
             "",
@@ -193,8 +201,6 @@ def claims() -> str:
             f"*Does not establish:* {claim.does_not_establish}",
             "",
         ]
-        if broken:
-            lines += ["*Broken variants that it refutes:* " + "; ".join(broken) + ".", ""]
     return _page("Claims", "What each claim says of itself, as in every report.", lines)
 
 

@@ -1,34 +1,18 @@
-"""An independent check of a report: `airground check DIR`.
+"""A small, separately written check of a report: `python -m airground_drake.check DIR`.
 
-Every verdict in DIR/report.json is established again from DIR/trace/ and DIR/certificates/, by formulas that are
-written here from the statements of the claims; proofs in exact rational arithmetic. Only the standard library, numpy,
-pandas and pyarrow are used: no Drake, no solver, nothing else of this package. docs/checker.md says what each rule
-establishes.
+It reads report.json and trace/, and establishes again what matters most by formulas of its own: distances, the
+hypotheses of the invariance theorem, triggers, events, and the verdict over all claims. It uses the standard library,
+numpy, pandas and pyarrow, and nothing else of this package. `airground check DIR` runs it first, then has every claim
+judged again by the claims' own code from the same files.
 
-    files, limits              strict reading; sizes and times beyond which nothing is looked at
-    rules, scenario            what a broken rule says; what a scenario declares
-    run, nearness              a trace that is of its run and obeys its law of motion; what comes near at all in it
-    events, metrics            what follows from a trace
-    safety                     SAFE-TRACE, SAFE-HYP
-    law, proposals, execution  EXEC: the control law, what was accepted when, commands
-    triggers                   ZENO-TRACE, THR-TRIG
-    outcome                    LIVE-GOAL, COMM, GATE-TIME
-    decisions                  a recorded decision, its problem (26), predictions (23) and costs (25)
-    feasibility                GATE-FEAS
-    rollouts, foresight        GATE-MODEL under method (d): what comes of accepting and refusing
-    prediction                 GATE-MODEL: mode velocities
-    progress                   LIVE-PROG
-    optimality                 GATE-SUR, GATE-OPT
-    polynomials, certificates  SAFE-LEMMA, SAFE-INV, SAFE-GATE, SAFE-DIST, ZENO-PROOF, LIVE-GATE, LIVE-WAIT, THR-ISO;
-                               obligations.json
-    conformance                what their records say besides: that running code conforms, and what rounding takes
-    statements, enclosures     THR-ROOT, THR-OPT: what they consist of, and whether it is true
-    statistics                 THR-DDM, ZENO-REFINE
-    inputs                     the constants that a claim about the model must be about
-    evidence                   what of a claim's entry is established, and what is taken as recorded
-    claims, verdict            what decides each claim, and what is expected of it; a recorded verdict against that
-    overall, report            the verdict over all of them, and the files; all checks, a line each; mutants.json
-    command                    the command line
+    files, limits         strict reading; sizes and times beyond which a report is refused
+    rules, scenario       how a broken rule is told; what a scenario declares
+    run                   a trace that belongs to its run and obeys its law of motion
+    safety                SAFE-TRACE: distances in continuous time; SAFE-HYP: the avoidance inequalities, exactly
+    triggers              ZENO-TRACE, THR-TRIG
+    events                triggers, messages, answers, arrivals, collisions
+    verdicts              expectations, and the verdict over all claims
+    report, command       all checks, one line each; the command line
 """
 
 from .command import main

@@ -17,12 +17,12 @@ from typing import TYPE_CHECKING, Any, NoReturn
 if TYPE_CHECKING:
     from .report import Line
 
-SCHEMA = "airground_drake.check/1"
+SCHEMA = "airground_drake.check/2"
 EPILOG = """\
 Each line says what was checked, on which run, and
-  agrees                     established again, with the recorded verdict, margin and evidence
-  DISAGREES                  files contradict the verdict or each other: the rule, the time, both values
-  cannot be re-established   a file cannot be read, or no way is known here to decide the claim
+  agrees              the files bear out what the report says
+  DISAGREES           the files contradict the report or each other: the rule, the time, both values
+  cannot be checked   a file cannot be read, or the report itself decides nothing
 Exit codes: 0 all agree; 1 not all; 2 usage, or no report; 4 a fault of the checker."""
 LIMIT_S = 300.0
 """CPU time that a check may take, s: those of a report of minutes take seconds."""
@@ -46,12 +46,12 @@ class _Parser(argparse.ArgumentParser):
 def parser() -> argparse.ArgumentParser:
     """What the command line takes; it raises `UsageError`."""
     parser = _Parser(
-        prog="airground check",
-        description="Establish every verdict of a report again, from its files alone.",
+        prog="python -m airground_drake.check",
+        description="Check a report from its files alone: distances, hypotheses, triggers, events, and its verdict.",
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("report", metavar="DIR", type=Path, help="folder with report.json, trace/ and certificates/")
+    parser.add_argument("report", metavar="DIR", type=Path, help="folder with report.json and trace/")
     parser.add_argument(
         "--limit-s",
         type=_limit_s,
@@ -88,23 +88,47 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _refuse(f"{error}; usage: airground check [--json] DIR")
     except SystemExit:  # --help has been printed
         return 0
+    try:
+        lines = checked(options.report, options.limit_s)
+    except UsageError as error:
+        return _refuse(str(error))
+    show(lines, options.report, as_json=options.json)
+    return verdict(lines)
+
+
+def checked(folder: Path, limit_s: float) -> list[Line]:
+    """All checks of a report, with warnings of numpy off.
+
+    Raises:
+        UsageError: if the folder is no report.
+    """
     import numpy as np
 
-    from .report import AGREES, check_report
+    from .report import check_report
     from .rules import Disagreement, NotEstablished
 
     try:
         with np.errstate(all="ignore"), warnings.catch_warnings():
             warnings.simplefilter("ignore")  # numbers out of all proportion are refused by the rules, not by numpy
-            lines = check_report(options.report, options.limit_s)
+            return check_report(folder, limit_s)
     except Disagreement as broken:
-        return _refuse(f"{options.report} is no report: {broken.rule}: {broken.about} is {broken.recorded}")
+        raise UsageError(f"{folder} is no report: {broken.rule}: {broken.about} is {broken.recorded}") from None
     except NotEstablished as error:
-        return _refuse(f"{options.report} is no report: {error.rule}: {error.about}: {error.why}")
-    if options.json:
-        print(json.dumps(_document(options.report, lines), indent=1, allow_nan=False))
+        raise UsageError(f"{folder} is no report: {error.rule}: {error.about}: {error.why}") from None
+
+
+def show(lines: Sequence[Line], folder: Path, *, as_json: bool) -> None:
+    """Print the checks, a line each, or as strict JSON."""
+    if as_json:
+        print(json.dumps(_document(folder, lines), indent=1, allow_nan=False))
     else:
         _print(lines)
+
+
+def verdict(lines: Sequence[Line]) -> int:
+    """The exit code: 0 if all agree, else 1."""
+    from .report import AGREES
+
     return int(any(line.outcome != AGREES for line in lines))
 
 
@@ -121,10 +145,7 @@ def _printable(text: str) -> str:
 
 def _print(lines: Sequence[Line]) -> None:
     for line in lines:
-        print(_printable(f"{line.claim:<12}{line.run or '-':<8} {line.outcome}: {line.text}"))
-    taken = _as_recorded(lines)
-    values, keys = sum(sum(each["keys"].values()) for each in taken), sum(len(each["keys"]) for each in taken)
-    print(f"{values} values under {keys} keys of claims are taken as recorded: --json lists them")
+        print(_printable(f"{line.claim:<12}{line.run or '-':<8} {line.outcome} ({line.by}): {line.text}"))
     counts = _counts(lines)
     print(f"{len(lines)} checks: {', '.join(f'{count} {outcome}' for outcome, count in counts.items())}")
 
@@ -137,19 +158,13 @@ def _counts(lines: Sequence[Line]) -> dict[str, int]:
 
 
 def _document(folder: Path, lines: Sequence[Line]) -> dict[str, Any]:
-    checks = [{key: _strict(value) for key, value in asdict(line).items() if key != "as_recorded"} for line in lines]
+    checks = [{key: _strict(value) for key, value in asdict(line).items()} for line in lines]
     return {
         "schema": SCHEMA,
         "report": str(folder),
         "checks": checks,
-        "as_recorded": _strict(_as_recorded(lines)),
         "summary": _counts(lines),
     }
-
-
-def _as_recorded(lines: Sequence[Line]) -> list[dict[str, Any]]:
-    """By claim and run, the keys that are taken as recorded, and how many values each has."""
-    return [{"claim": line.claim, "run": line.run, "keys": line.as_recorded} for line in lines if line.as_recorded]
 
 
 def _strict(value: Any) -> Any:

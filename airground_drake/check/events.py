@@ -10,10 +10,20 @@ from typing import NamedTuple
 import numpy as np
 
 from .files import Json
-from .proposals import proposals_of
 from .rules import SMALL, Array, Disagreement, close, holds, same
 from .run import Run
 from .scenario import apart_m
+
+NOTHING = -1.0
+"""Stands in a column of decisions that says nothing under the run's method."""
+OF_PROBLEMS = (
+    "relaxed_first_stage", "objective", "route_bound", "gap", "objective_accept", "objective_refuse",
+    "accept_throughout", "refuse_throughout", "rounding_deviation_s", "predicted_clearance_m",
+)  # fmt: skip
+OF_OUTCOMES = (
+    "refuse_outcome_m2_s", "accept_outcome_m2_s", "refuse_stalls", "accept_stalls", "refuse_left_m", "accept_left_m",
+    "lag_m", "predicted_lag_m", "tries",
+)  # fmt: skip
 
 
 class Event(NamedTuple):
@@ -57,7 +67,7 @@ def check_events(run: Run) -> str:
     _events_follow_from_signals_and_decisions(run)
     _events_are_where_their_robots_were(run)
     _nothing_is_executed_before_it_was_proposed(run)
-    _maps_are_the_scenarios(run)
+    _decisions_are_on_proposals(run)
     return f"{len(run.events)} events"
 
 
@@ -87,8 +97,8 @@ def _crossings(run: Run) -> Iterator[Event]:
 
 def _messages(run: Run) -> Iterator[Event]:
     """What the UAV has proposed."""
-    for proposal in proposals_of(run):
-        yield Event(proposal.issued_s, proposal.ugv, "proposal", proposal.policy)
+    for row in run.proposals.to_dict("records"):
+        yield Event(float(row["issued_s"]), row["robot"], "proposal", row["policy"])
 
 
 def _answers(run: Run) -> Iterator[Event]:
@@ -146,30 +156,6 @@ def _events_are_where_their_robots_were(run: Run) -> None:
         close("place of an event", event["position_m"], here, within=SMALL, about=about, t_s=event["t_s"])
 
 
-def _maps_are_the_scenarios(run: Run) -> None:
-    """The map in a message: the obstacles that the UAV knows, its phantoms, and then others that are there, each once.
-
-    Policies of others may send another one.
-    """
-    obstacles, phantoms = run.scenario["obstacles"].values(), run.scenario["uav"]["phantoms_m"]
-    known = [_disc(each) for each in obstacles if each["known_to_uav"]] + [[*map(float, p), 0.0] for p in phantoms]
-    learnt = [_disc(each) for each in obstacles if not each["known_to_uav"]]
-    for proposal in proposals_of(run):
-        about, when = f"proposal to {proposal.ugv}", proposal.issued_s
-        if ":" in proposal.policy:
-            continue
-        discs = np.column_stack([proposal.mapped_m, proposal.mapped_radius_m]).tolist()
-        same("obstacles on the map of a proposal", discs[: len(known)], known, about=about, t_s=when)
-        for disc in discs[len(known) :]:
-            once = disc in learnt and discs.count(disc) == 1 + known.count(disc)
-            holds("obstacles on the map of a proposal", once, disc, str(learnt), about=about, t_s=when)
-
-
-def _disc(obstacle: Json) -> list[float]:
-    """Place and radius, m."""
-    return [*map(float, obstacle["position_m"]), float(obstacle["radius_m"])]
-
-
 def _nothing_is_executed_before_it_was_proposed(run: Run) -> None:
     for ugv in run.ugvs:
         sent = run.times_s(ugv, "proposal")
@@ -177,3 +163,15 @@ def _nothing_is_executed_before_it_was_proposed(run: Run) -> None:
         executed = run.t_s[run.executed(ugv)]
         what = "an intervention is executed after it was proposed"
         holds(what, executed >= earliest, executed, f"not before {earliest} s", about=ugv, t_s=executed)
+
+
+def _decisions_are_on_proposals(run: Run) -> None:
+    """Each decision is on a proposal that was sent, and has nothing in the columns of the other method."""
+    key = ["robot", "issued_s", "policy"]
+    sent = set(run.proposals[key].itertuples(index=False, name=None))
+    unused = OF_OUTCOMES if run.method == "c" else OF_PROBLEMS
+    for row in run.decisions.to_dict("records"):
+        about, on = f"decision of {row['robot']}", tuple(row[name] for name in key)
+        holds("a decision is on a proposal", on in sent, str(on), "one that was sent", about=about, t_s=row["t_s"])
+        for name in unused:
+            same(f"nothing is said of {name}", row[name], NOTHING, about=about, t_s=row["t_s"])

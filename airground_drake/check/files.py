@@ -24,8 +24,6 @@ import pyarrow.parquet as pq
 from .rules import Disagreement, NotEstablished
 
 Json = dict[str, Any]
-Files = tuple[tuple[str, bytes], ...]
-"""Names and contents."""
 
 LARGEST_FILE = 256_000_000
 """Bytes of a file: a run of an hour with ten robots has less."""
@@ -91,23 +89,6 @@ def read_bytes(path: Path) -> bytes:
 def sha256(content: bytes) -> str:
     """SHA-256 of a content, hexadecimal."""
     return hashlib.sha256(content).hexdigest()
-
-
-def read_folder(folder: Path) -> Files:
-    """The content of every file in a folder, by name; nothing if there is no such folder."""
-    return tuple((path.name, read_bytes(path)) for path in sorted(folder.glob("*")))
-
-
-def content_of(files: Files, name: str) -> bytes:
-    """The content of one file.
-
-    Raises:
-        NotEstablished: if it is not there.
-    """
-    for known, content in files:
-        if known == name:
-            return content
-    raise NotEstablished("the file can be read", "it is not there", name)
 
 
 def canonical(value: Any) -> str:

@@ -6,8 +6,8 @@ what it should be third. So nothing is rejected without saying why.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -56,51 +56,19 @@ class NotEstablished(Exception):  # noqa: N818
 
 @dataclass(frozen=True)
 class Found:
-    """What a claim's own formula gives.
+    """What the checker's own formula gives for a claim.
 
     Attributes:
         status: the verdict.
-        least: least margin that is possible; None: no margin.
-        most: largest one; differs from `least` only where rounding or a solver decides.
-        facts: what the recorded evidence must contain.
-        within: by which a recorded margin may differ.
-        exercised: how often the claim was put to the test, at least and at most: they differ where rounding decides
-            whether something counts; None: not counted here.
-        judged: keys of `where`, `counterexample` and `evidence` that the claim's own rules have judged; what is in
-            `facts` need not be named. See `evidence.py`.
-        rules: to be applied to the entry once the verdict is known to be right: what breaks one of these breaks the
-            entry, and is no refutation of the claim.
+        margin: None if there is none.
+        exercised: how often the claim was put to the test, at least and at most; they differ where rounding decides.
+        because: the broken rule that refutes the claim; None if its margin decides.
     """
 
     status: str
-    least: float | None = None
-    most: float | None = None
-    facts: Mapping[str, Any] = field(default_factory=dict)
-    within: float = SMALL
+    margin: float | None = None
     exercised: tuple[int, int] | None = None
-    judged: tuple[str, ...] = ()
-    rules: tuple[Callable[[], object], ...] = ()
-
-    def having_judged(self, *keys: str) -> Found:
-        """The same, with further keys of the claim's entry that its rules have judged."""
-        return replace(self, judged=(*self.judged, *keys))
-
-    def judging(self, rule: Callable[[], object], *keys: str) -> Found:
-        """The same, with a further rule about the claim's entry, and the keys that it judges."""
-        return replace(self.having_judged(*keys), rules=(*self.rules, rule))
-
-    def also(self, **facts: Any) -> Found:
-        """The same, with further facts."""
-        return replace(self, facts={**self.facts, **facts})
-
-    def counted(self, least: int, most: int | None = None) -> Found:
-        """The same, with how often the claim was put to the test."""
-        return replace(self, exercised=(int(least), int(least if most is None else most)))
-
-    @classmethod
-    def with_margin(cls, status: str, margin: float, *, within: float = SMALL, **facts: Any) -> Found:
-        """With a margin that is known."""
-        return cls(status, float(margin), float(margin), facts, within)
+    because: Disagreement | None = None
 
 
 def same(rule: str, recorded: Any, recomputed: Any, *, about: str = "", t_s: float | None = None) -> None:

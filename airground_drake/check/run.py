@@ -15,7 +15,7 @@ import pandas as pd
 from .files import Json, canonical, parse_json, parse_table, read_bytes, sha256
 from .nearness import least_apart_m
 from .rules import SMALL, Array, Flags, NotEstablished, close, holds, same
-from .scenario import Levels, Pair, Preset, levels_of, pairs_of, preset_of, robots_of, views_of
+from .scenario import Levels, Pair, Preset, levels_of, pairs_of, preset_of, robots_of
 
 Rows = npt.NDArray[np.intp]
 SCHEMA = "airground_drake.trace/6"
@@ -85,20 +85,6 @@ class Run:
         return found | {(other, robot): apart for (robot, other), apart in found.items()}
 
     @cached_property
-    def views(self) -> dict[str, list[Pair]]:
-        """The pairs as each robot sees them."""
-        return views_of(self.scenario)
-
-    @cached_property
-    def near_views(self) -> dict[str, list[Pair]]:
-        """Those of them that may come within sensing range: no other has an inequality."""
-        reach = self.scenario["control"]["sensing_range_m"]
-        return {
-            robot: [pair for pair in views if self.apart_m[robot, pair.other] <= reach]
-            for robot, views in self.views.items()
-        }
-
-    @cached_property
     def presets(self) -> dict[str, Preset]:
         """Preset trajectory of each UGV."""
         return {ugv: preset_of(self.scenario, ugv) for ugv in self.ugvs}
@@ -137,11 +123,6 @@ class Run:
         """Row of each control sample, (S,); rows closer than 1e-9 s are one instant."""
         return np.searchsorted(self.t_s, self.sample_s - SMALL)
 
-    @cached_property
-    def chosen_row(self) -> Rows:
-        """Row that has the command chosen at each control sample, (S,): the next one."""
-        return np.searchsorted(self.t_s, self.sample_s + SMALL, side="right")
-
     def column(self, name: str) -> Array:
         """A column of the signals, (T,).
 
@@ -179,17 +160,6 @@ class Run:
         """Rows up to which an intervention was executed, (T,)."""
         return self.column(f"{ugv}.accepted") != 0.0
 
-    def interventions_s(self, ugv: str) -> Array:
-        """Begin and end of each stay in mode 'intervening', (K, 2); a row's mode is in force since the row before."""
-        inside = np.concatenate([[False], self.column(f"{ugv}.mode")[1:] == INTERVENING, [False]])
-        return self.t_s[np.flatnonzero(np.diff(inside))].reshape(-1, 2)
-
-    def talk_is_due(self, ugv: str) -> bool:
-        """Whether a UGV is intervened on for longer than a proposal and a decision on it take."""
-        periods_s = self.scenario["intervention"]["period_s"] + self.scenario["gatekeeper"]["period_s"]
-        stays = self.interventions_s(ugv)
-        return bool((stays[:, 1] - stays[:, 0] > periods_s).any())
-
 
 def read_run(folder: Path, name: str, report: Json) -> Run:
     """Read a trace and apply every rule that any claim about it rests on; equal files give the same Run.
@@ -219,6 +189,7 @@ def _run(name: str, scenario_text: str, entry_text: str, contents: tuple[bytes, 
         tables.append(parse_table(content, file))
     _is_of_the_run(meta, entry, scenario, name)
     run = Run(name, scenario, meta["events"], timings["decision_times_s"], timings["wall_s"], *tables)
+    same("a time for each decision", len(run.decision_times_s), len(run.decisions))
     _rows_cover_the_run(run)
     _decisions_come_by_time(run)
     _a_row_at_every_control_sample(run)

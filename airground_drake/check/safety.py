@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from functools import lru_cache, partial
-from itertools import chain
-from typing import NamedTuple
+from fractions import Fraction
+from functools import lru_cache
+from math import isqrt
 
 import numpy as np
 
-from .files import Json
-from .rules import SMALL, Array, Disagreement, Found, agrees, at_most, close, holds, same
+from .rules import SMALL, Disagreement, Found, at_most, close, holds
 from .run import Run
-from .scenario import Pair
+from .scenario import Pair, written
 
-MOST_LISTED = 300
-"""Pairs that the evidence lists at most: those of least margin."""
+FAR_M = 1e-6
+"""Distances of floating-point numbers are this wrong at most, m; farther pairs need no exact arithmetic."""
 
 
 @lru_cache(maxsize=4096)
@@ -31,275 +29,127 @@ def least_distance_m(run: Run, pair: Pair) -> float:
     return float(np.linalg.norm(r + s[:, None] * w, axis=1).min())
 
 
-def safe_trace(run: Run, claim: Json) -> Found:
-    """SAFE-TRACE: min over t of ||p_i(t) - q_j(t)|| >= d_ij for every pair."""
-    by_names = {(entry["first"], entry["second"]): entry for entry in claim["evidence"]["pairs"]}
-    known = {(pair.robot, pair.other) for pair in run.pairs}
-    same("pairs", claim["evidence"]["pairs_in_all"], len(known))
-    same("pairs", sorted({*by_names} - known), [])
-    same("pairs", [len(claim["evidence"]["pairs"]), len(by_names)], [min(len(known), MOST_LISTED)] * 2)
-    largest = max(float(entry["margin_m"]) for entry in by_names.values())
-    margins, close_by, doubtful = {}, 0, 0
+def safe_trace(run: Run) -> Found:
+    """SAFE-TRACE: ||p_i(t) - q_j(t)|| >= d_ij at every time, for every pair.
+
+    A pair puts the claim to the test if it comes so near that one period at the speed limits could break it.
+    """
+    margin, least, most = np.inf, 0, 0
     for pair in run.pairs:
-        names, closing = (pair.robot, pair.other), pair.closing_m_s * run.scenario["control"]["period_s"]
-        if names not in by_names and run.apart_m[names] - pair.safe_m > max(largest, closing + SMALL):
-            continue
-        least = least_distance_m(run, pair)
-        margins[names] = least - pair.safe_m
-        spare = margins[names] - closing
-        close_by += spare < -SMALL
-        doubtful += abs(spare) <= SMALL
-        about = ", ".join(names)
-        if names not in by_names:
-            farther = margins[names] >= largest - SMALL
-            holds("a pair that is not listed is farther apart", farther, margins[names], largest, about=about)
-            continue
-        _evidence_on_a_pair(run, pair, least, by_names[names])
-        if abs(spare) > SMALL:
-            same("a period at full speed breaks it", by_names[names]["exercised"], bool(spare < 0.0), about=about)
-    margin = min(margins.values())
-    worst = claim["where"]["first"], claim["where"]["second"]
-    close("pair of least margin", margins[worst], margin, within=SMALL, about=", ".join(worst))
-    status = "holds" if margin >= -SMALL else "refuted"
-    found = Found.with_margin(status, margin, tolerance_m=SMALL, pairs_in_all=len(known)).having_judged(*JUDGED)
-    found = found.judging(partial(_where_pairs_meet, run, claim, by_names[worst]), *JUDGED_OF_THE_WORST)
-    return found.counted(close_by, close_by + doubtful)
+        closing = pair.closing_m_s * run.scenario["control"]["period_s"]
+        if run.apart_m[pair.robot, pair.other] - pair.safe_m > max(margin, closing + SMALL):
+            continue  # neither the nearest pair nor near enough to count
+        of_pair = least_distance_m(run, pair) - pair.safe_m
+        margin = min(margin, of_pair)
+        least += of_pair - closing < -SMALL
+        most += of_pair - closing <= SMALL
+    return Found("holds" if margin >= -SMALL else "refuted", float(margin), (least, most))
 
 
-def _where_pairs_meet(run: Run, claim: Json, worst: Json) -> None:
-    """Time of least distance, and the counterexample, are those of the pair of least margin."""
-    about, shown = f"{worst['first']}, {worst['second']}", claim["counterexample"]
-    same("time of least distance", claim["where"]["t_s"], worst["t_s"], about=about)
-    if shown:
-        same("counterexample", {key: shown.get(key) for key in worst}, worst, about=about)
-        _snapshot(run, shown)
+def _root(square: Fraction) -> tuple[Fraction, Fraction]:
+    """Bounds of a square root, 2^-160 relative to the denominator apart."""
+    numerator = isqrt(square.numerator * square.denominator << 320)
+    denominator = square.denominator << 160
+    return Fraction(numerator, denominator), Fraction(numerator + 1, denominator)
 
 
-PAIR_KEYS = ("first", "second", "safe_distance_m", "min_distance_m", "margin_m", "t_s", "row", "exercised")
-"""What is recorded of a pair; that it is exercised is judged where rounding does not decide it."""
-JUDGED = ("where.first", "where.second", *(f"evidence.pairs.*.{key}" for key in PAIR_KEYS))
-SNAPSHOT = ("counterexample.positions_m.*", "counterexample.velocities_m_s.*")
-JUDGED_OF_THE_WORST = ("where.t_s", *(f"counterexample.{key}" for key in PAIR_KEYS), *SNAPSHOT)
-
-
-def _snapshot(run: Run, shown: Json) -> None:
-    """Places at the time of a counterexample, and velocities just after it, of the things that it names."""
-    when = shown["t_s"]
-    row = min(int(np.searchsorted(run.t_s, when + SMALL)), len(run.t_s) - 1)
-    named = {value for value in shown.values() if isinstance(value, str) and value in run.position_m}
-    same("things in the counterexample", sorted(shown["positions_m"]), sorted(named))
-    same("robots in the counterexample", sorted(shown["velocities_m_s"]), sorted(named & {*run.robots}))
-    for name, place in shown["positions_m"].items():
-        close("place in the counterexample", place, run.place_m(name, when), within=SMALL, about=name, t_s=when)
-    for name, velocity in shown["velocities_m_s"].items():
-        now = run.command_m_s[name][row]
-        close("velocity in the counterexample", velocity, now, within=SMALL, about=name, t_s=when)
-
-
-def _evidence_on_a_pair(run: Run, pair: Pair, least_m: float, recorded: Json) -> None:
-    about, when = f"{pair.robot}, {pair.other}", recorded["t_s"]
-    there = np.linalg.norm(run.place_m(pair.robot, when) - run.place_m(pair.other, when))
-    close("least distance", recorded["min_distance_m"], least_m, within=SMALL, about=about, t_s=when)
-    close("margin of a pair", recorded["margin_m"], least_m - pair.safe_m, within=SMALL, about=about, t_s=when)
-    close("distance at the recorded time", recorded["min_distance_m"], there, within=SMALL, about=about, t_s=when)
-    agrees("safe distance", recorded["safe_distance_m"], pair.safe_m, within=0.0, about=about)
-    row = recorded["row"]
-    holds("row of the least distance", type(row) is int and 0 < row < len(run.t_s), row, "a row", about=about)
-    within = run.t_s[row - 1] - SMALL <= when <= run.t_s[row] + SMALL
-    holds("row of the least distance", within, row, "the one at the end of the segment", about=about, t_s=when)
-
-
-class Hypothesis(NamedTuple):
-    """A hypothesis of SAFE-INV at some instants: it holds where its margin is not negative.
-
-    Of an avoidance inequality `kind` says who moves and what it avoids, such as `ugv beside obstacle`. `about` are the
-    robots that it is about, as recorded; where there is another one at each instant, `others` has their names.
-    """
-
-    name: str
-    unit: str
-    t_s: Array
-    margin: Array
-    about: Mapping[str, str] = {}
-    others: tuple[str, ...] = ()
-    kind: str = ""
-
-    @property
-    def who(self) -> tuple[str, str]:
-        """The hypothesis, and the robot: of these the evidence has the least margin."""
-        return self.name, next(iter(self.about.values()), "")
-
-    def margin_at(self, recorded: Json) -> float | None:
-        """The margin at an instant as recorded, that is of the other one there; None if there is none."""
-        there = np.abs(self.t_s - recorded["t_s"]) <= SMALL
-        if self.others:
-            there &= np.array([other == recorded.get("second") for other in self.others])
-        described = {"hypothesis": self.name, **self.about, "unit": self.unit}
-        if not there.any() or any(recorded.get(key) != value for key, value in described.items()):
-            return None
-        return float(self.margin[there].min())
-
-
-KINDS = ("ugv beside obstacle", "uav beside obstacle", "ugv beside ugv", "ugv beside uav", "uav beside ugv")
-DOUBT_M_S = 1e-11
-"""An inequality binds where a command has 1e-9 m/s to spare at most; of one this close to that, rounding decides."""
-
-
-def _binding(found: list[Hypothesis], recorded: Json) -> tuple[int, int]:
-    """How many avoidance inequalities bound a command, at least and at most; by kinds as recorded."""
-    least, most = dict.fromkeys(KINDS, 0), dict.fromkeys(KINDS, 0)
-    for each in found:
-        if each.name == "avoidance":
-            least[each.kind] += int((each.margin <= SMALL - DOUBT_M_S).sum())
-            most[each.kind] += int((each.margin <= SMALL + DOUBT_M_S).sum())
-    same("kinds of inequalities", sorted(recorded), sorted(KINDS))
-    for kind in KINDS:
-        possible = type(recorded[kind]) is int and least[kind] <= recorded[kind] <= most[kind]
-        between = f"{least[kind]}" if least[kind] == most[kind] else f"{least[kind]} to {most[kind]}"
-        holds("inequalities that bind", possible, recorded[kind], between, about=kind)
-    return sum(least.values()), sum(most.values())
-
-
-def safe_hyp(run: Run, claim: Json) -> Found:
-    """SAFE-HYP: at every control sample the hypotheses of the invariance proof held.
-
-    The margin is that of the avoidance inequalities, or of the hypothesis that was broken first.
-    """
-    found = [*_constants(run), *_velocities(run), *_inequalities(run)]
-    in_range = sum(len(each.margin) for each in found if each.name == "avoidance")
-    broken = [(each, k) for each in found for k in np.flatnonzero(~(each.margin >= -SMALL))[:1]]
-    leading, first_s = "avoidance", None
-    if broken:
-        first, k = min(broken, key=lambda one: float(one[0].t_s[one[1]]))
-        when = float(first.t_s[k])
-        if claim["status"] == "holds":
-            raise Disagreement("the hypotheses held", "held", float(first.margin[k]), first.name, when)
-        leading = claim["where"]["hypothesis"]
-        earliest = sorted({each.name for each, j in broken if each.t_s[j] <= when + SMALL})
-        holds("hypothesis broken first", leading in earliest, leading, " or ".join(earliest), t_s=when)
-        first_s = when
-    margins = [float(each.margin.min()) for each in found if each.name == leading and len(each.margin)]
-    status = "refuted" if broken else "holds"
-    margin = min(margins, default=None)
-    least, most = _binding(found, claim["evidence"]["inequalities_that_bind"])
-    facts = {"inequalities_in_range": in_range, "tolerance_m_s": SMALL}
-    result = Found(status, margin, margin, facts).counted(least, most)
-    result = result.having_judged("evidence.inequalities_that_bind.*")
-    shown = tuple(f"counterexample.{key}" for key in LISTED)
-    result = result.judging(partial(_first_broken, run, claim, found, first_s), *shown, *SNAPSHOT)
-    result = result.judging(partial(_worst, claim, found), "evidence.worst.*.*")
-    return result.judging(partial(_where, claim, leading, margin), *(f"where.{key}" for key in LISTED))
-
-
-def _first_broken(run: Run, claim: Json, found: list[Hypothesis], first_s: float | None) -> None:
-    """The counterexample is of the first instant at which a hypothesis is broken."""
-    shown = claim["counterexample"]
-    if shown and first_s is not None:
-        close("time of the counterexample", shown["t_s"], first_s, within=SMALL)
-        at_most("margin of the counterexample", shown["margin"], 0.0, t_s=first_s)
-        _is_attained(found, shown, "counterexample", (*LISTED, "positions_m", "velocities_m_s"))
-        _snapshot(run, shown)
-
-
-LISTED = ("hypothesis", "robot", "first", "second", "other", "t_s", "margin", "unit")
-"""What is recorded of a hypothesis at an instant."""
-
-
-def _is_attained(found: list[Hypothesis], recorded: Json, what: str, keys: tuple[str, ...] = LISTED) -> None:
-    """A margin is attained at the instant, and by those, that are recorded with it."""
-    strange = sorted({*recorded} - {*keys})
-    same(f"keys of {what}", strange, [])
-    there = [at for each in found if (at := each.margin_at(recorded)) is not None]
-    about = f"{recorded['hypothesis']}, {recorded.get('robot', recorded.get('first', ''))}"
-    when = recorded["t_s"]
-    holds(f"{what} is of an instant of the run", bool(there), str(recorded), "one that there is", about=about, t_s=when)
-    off = min(abs(at - recorded["margin"]) for at in there)
-    holds(f"margin of {what}", off <= SMALL, recorded["margin"], str(there), about=about, t_s=when)
-
-
-def _worst(claim: Json, found: list[Hypothesis]) -> None:
-    """The least margin of each hypothesis and robot, and where it is attained."""
-    recorded = claim["evidence"]["worst"]
-    least: dict[tuple[str, str], float] = {}
-    for each in found:
-        if len(each.margin):
-            least[each.who] = min(least.get(each.who, np.inf), float(each.margin.min()))
-    named = [(str(entry["hypothesis"]), str(entry.get("robot", entry.get("first", "")))) for entry in recorded]
-    same("hypotheses in the evidence", sorted(map(list, named)), sorted(map(list, least)))
-    for who, entry in zip(named, recorded, strict=True):
-        close("least margin", entry["margin"], least[who], within=SMALL, about=", ".join(who), t_s=entry["t_s"])
-        _is_attained(found, entry, "least margin")
-
-
-def _where(claim: Json, leading: str, margin: float | None) -> None:
-    """Where the margin is attained: one of the least ones of the leading hypothesis."""
-    listed = [entry for entry in claim["evidence"]["worst"] if entry["hypothesis"] == leading]
-    lowest = [entry for entry in listed if margin is not None and entry["margin"] <= margin + SMALL]
-    places = [{key: entry[key] for key in entry if key not in ("margin", "unit")} for entry in lowest]
-    there = claim["where"] in places or (margin is None and claim["where"] == {})
-    holds("where the margin is attained", there, str(claim["where"]), str(places))
-
-
-def _constants(run: Run) -> Iterator[Hypothesis]:
-    """A h <= 1; every pair starts at its safe distance; the sensing range covers d + (closing speed) h."""
-    control, start = run.scenario["control"], run.t_s[:1]
-    h = control["period_s"]
-    yield Hypothesis("gain: A h <= 1", "1", start, np.array([1.0 - control["avoidance_gain_1_s"] * h]))
-    first = {name: place[0] for name, place in run.position_m.items()}
-    for robot in dict.fromkeys(pair.robot for pair in run.pairs):
-        pairs = [pair for pair in run.pairs if pair.robot == robot]
-        others, about = tuple(pair.other for pair in pairs), {"first": robot}
-        offset = np.array([first[robot] - first[other] for other in others])
-        safe, closing = np.array([(pair.safe_m, pair.closing_m_s) for pair in pairs]).T
-        each = np.repeat(start, len(safe))
-        yield Hypothesis("safe start", "m", each, np.linalg.norm(offset, axis=1) - safe, about, others)
-        yield Hypothesis("sensing range", "m", each, control["sensing_range_m"] - safe - closing * h, about, others)
-
-
-def _velocities(run: Run) -> Iterator[Hypothesis]:
-    """||v|| <= v_max; v_z = 0 for a UGV; v is held from sample to sample. Rows within 1e-9 s are one instant."""
-    begins = run.t_s[:-1]
-    segment = np.flatnonzero(np.diff(run.t_s) >= SMALL)
-    sample = np.searchsorted(run.sample_s, begins[segment] + SMALL, side="right") - 1
-    samples = run.t_s[run.sample_row]
-    spacing = np.diff(np.append(samples, run.t_s[-1]))
-    yield Hypothesis("sampling", "s", samples, run.scenario["control"]["period_s"] - spacing)
-    for robot, spec in run.robots.items():
-        v = run.command_m_s[robot]
-        drift = np.linalg.norm(v[segment + 1] - v[run.chosen_row][sample], axis=1)
-        about = {"robot": robot}
-        yield Hypothesis("zero-order hold", "m/s", begins[segment], -drift, about)
-        spare = spec["max_speed_m_s"] - np.linalg.norm(v[1:], axis=1)
-        yield Hypothesis("speed limit", "m/s", begins, spare, about)
-        if robot != run.uav:
-            yield Hypothesis("planar motion", "m/s", begins, -np.abs(v[1:, 2]), about)
-
-
-def _inequalities(run: Run) -> Iterator[Hypothesis]:
-    """n.v >= share A (d - D) where D <= d, else n.v >= -share (D - d) / h, for what is within sensing range."""
-    sort = {robot: "uav" if robot == run.uav else "ugv" for robot in run.robots}
-    for pair in chain.from_iterable(run.near_views.values()):
-        kind = f"{sort[pair.robot]} beside {sort.get(pair.other, 'obstacle')}"
-        spare = avoidance_spare_m_s(run, pair, run.command_m_s[pair.robot][run.chosen_row])
-        seen = np.isfinite(spare)
-        about = {"robot": pair.robot, "other": pair.other}
-        yield Hypothesis("avoidance", "m/s", run.sample_s[seen], spare[seen], about, kind=kind)
-
-
-def avoidance_spare_m_s(run: Run, pair: Pair, v_m_s: Array) -> Array:
-    """n.v less its bound at every control sample, (S,); infinite beyond the sensing range.
+def _missed_m(x: list[Fraction], step: list[Fraction], safe: Fraction, share: Fraction, gain: Fraction) -> Fraction:
+    """By how much a step along x / |x| falls short of its share of the bound, at most; 0 if it meets it.
 
     Args:
-        run: the run.
-        pair: the robot that moves, and what it avoids.
-        v_m_s: velocity of the robot at the samples, (S, 3); a UGV cannot use the z component of n.
+        x: from what is avoided to the robot, m.
+        step: of the robot to the next sample, m.
+        safe: distance to be kept, m.
+        share: of the inequality.
+        gain: A h, at most 1.
     """
+    least, most = _root(sum((c * c for c in x), Fraction()))
+    if not least:  # no direction: any unit vector may be taken
+        return max(Fraction(), share * gain * safe)
+    along = sum((c * s for c, s in zip(x, step, strict=True)), Fraction())
+    bounds = [share * (gain * (safe - d) if d <= safe else safe - d) for d in (least, most)]
+    return max(Fraction(), max(bounds) - min(along / least, along / most))
+
+
+def gain_of(run: Run) -> Fraction:
+    """A h of the numbers as they are written, at most 1: the bound with 1 demands less."""
     control = run.scenario["control"]
-    offset = run.position_m[pair.robot][run.sample_row] - run.position_m[pair.other][run.sample_row]
-    distance = np.linalg.norm(offset, axis=1)
-    normal = offset / np.where(distance > 0.0, distance, 1.0)[:, None]
-    if pair.robot != run.uav:
-        normal = normal * [1.0, 1.0, 0.0]
-    steepness = np.where(distance <= pair.safe_m, control["avoidance_gain_1_s"], 1.0 / control["period_s"])
-    bound = pair.share * steepness * (pair.safe_m - distance)
-    return np.where(distance <= control["sensing_range_m"], (normal * v_m_s).sum(axis=1) - bound, np.inf)
+    return min(written(control["avoidance_gain_1_s"]) * written(control["period_s"]), Fraction(1))
+
+
+def shortfall_m(run: Run, pair: Pair) -> Fraction:
+    """The most that a pair's inequalities together miss their bound by at any control sample, m per period; exact.
+
+    Positions are taken as the rational numbers that they are. Samples at which the two cannot meet within a period,
+    whatever their direction, need no inequality. Of a last period that is cut short, the step is extended.
+    """
+    rows, gain = np.append(run.sample_row, len(run.t_s) - 1), gain_of(run)
+    own, other = run.position_m[pair.robot][rows], run.position_m[pair.other][rows]
+    reach = np.linalg.norm(np.diff(own, axis=0), axis=1) + np.linalg.norm(np.diff(other, axis=0), axis=1)
+    lasting, period = float(np.diff(run.t_s[rows])[-1]), run.scenario["control"]["period_s"]
+    extended = Fraction(1) if abs(lasting - period) <= SMALL else Fraction(period) / Fraction(lasting)
+    reach[-1] *= float(extended)
+    near = np.linalg.norm(own - other, axis=1)[:-1] < pair.safe_m + reach + FAR_M
+    safe, share, worst = Fraction(pair.safe_m), Fraction(pair.share), Fraction()
+    for k in np.flatnonzero(near):
+        here, there, after, beyond = (
+            [Fraction(c) for c in place] for place in (own[k], other[k], own[k + 1], other[k + 1])
+        )
+        scale = extended if k == len(near) - 1 else Fraction(1)
+        x = [a - b for a, b in zip(here, there, strict=True)]
+        missed = _missed_m(x, [scale * (a - b) for a, b in zip(after, here, strict=True)], safe, share, gain)
+        if pair.share < 1.0:
+            step = [scale * (a - b) for a, b in zip(beyond, there, strict=True)]
+            missed += _missed_m([-c for c in x], step, safe, share, gain)
+        worst = max(worst, missed)
+    return worst
+
+
+def safe_hyp(run: Run) -> Found:
+    """SAFE-HYP: the hypotheses of the safety theorem, up to e per pair; its margin is the least -e / (A h).
+
+    How often inequalities bound a command is not counted here.
+    """
+    try:
+        _constants(run)
+        _motion(run)
+    except Disagreement as broken:
+        return Found("refuted", because=broken)
+    gain, lost = gain_of(run), 0.0
+    for pair in run.pairs:
+        closing = pair.closing_m_s * run.scenario["control"]["period_s"]
+        if run.apart_m[pair.robot, pair.other] > pair.safe_m + closing + FAR_M:
+            continue
+        missed = shortfall_m(run, pair)
+        start = float(np.linalg.norm(run.position_m[pair.robot][0] - run.position_m[pair.other][0]))
+        of_gain = missed / gain if gain else missed * len(run.sample_row)
+        lost = max(lost, float(of_gain), pair.safe_m - start if start < pair.safe_m - FAR_M else 0.0)
+    return Found("holds" if lost <= SMALL else "refuted", -lost if lost <= SMALL else None)
+
+
+def _constants(run: Run) -> None:
+    """A h <= 1, each pair starts apart, and the sensing range covers d + (closing speed) h."""
+    control, limit = run.scenario["control"], {name: each["max_speed_m_s"] for name, each in run.robots.items()}
+    period, reach = written(control["period_s"]), written(control["sensing_range_m"])
+    gain = written(control["avoidance_gain_1_s"]) * period
+    holds("gain: A h <= 1", gain <= 1, float(gain), "1 at most")
+    for pair in run.pairs:
+        about, speed = f"{pair.robot}, {pair.other}", written(limit[pair.robot]) + written(limit.get(pair.other, 0.0))
+        least = written(pair.safe_m) + speed * period
+        holds("sensing range", reach >= least, float(reach), f"{float(least)} at least", about=about)
+        start = float(np.linalg.norm(run.position_m[pair.robot][0] - run.position_m[pair.other][0]))
+        holds("safe start", start >= pair.safe_m - SMALL, start, f"{pair.safe_m} at least", about=about)
+
+
+def _motion(run: Run) -> None:
+    """Robots move straight from sample to sample, at most at their speed limits, and UGVs stay at their height."""
+    rows = np.append(run.sample_row, len(run.t_s) - 1)
+    at_most("spacing of the samples", np.diff(run.t_s[rows]), run.scenario["control"]["period_s"], within=SMALL)
+    for robot, spec in run.robots.items():
+        place = run.position_m[robot]
+        on_chord = np.stack([np.interp(run.t_s, run.t_s[rows], axis[rows]) for axis in place.T], axis=1)
+        close("straight motion", place, on_chord, within=SMALL, about=robot, t_s=run.t_s)
+        speed = np.linalg.norm(run.command_m_s[robot][1:], axis=1)
+        at_most("speed limit", speed, spec["max_speed_m_s"], within=SMALL, about=robot, t_s=run.t_s[:-1])
+        if robot != run.uav:
+            close("planar motion", place[:, 2], np.full(len(place), place[0, 2]), within=0.0, about=robot, t_s=run.t_s)

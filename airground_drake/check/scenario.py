@@ -32,10 +32,6 @@ class Pair(NamedTuple):
     closing_m_s: float
     share: float
 
-    def turned(self) -> Pair:
-        """The same pair, seen from the other robot."""
-        return self._replace(robot=self.other, other=self.robot)
-
 
 class Levels(NamedTuple):
     """The trigger: it triggers at `zeta_m`, releases below `release_m`, and rests until `dwell_s` after a trigger."""
@@ -69,13 +65,6 @@ class Preset:
         travelled = self.speed_m_s * np.asarray(t_s)
         return np.stack([np.interp(travelled, self.length_m, axis) for axis in self.corners_m.T], axis=-1)
 
-    def rate_m_s(self, t_s: Array) -> Array:
-        """Velocity at times (K,), none at a corner: (K, 3)."""
-        legs, lengths = np.diff(self.corners_m, axis=0), np.diff(self.length_m)[:, None]
-        along = np.divide(self.speed_m_s * legs, lengths, out=np.zeros_like(legs), where=lengths > 0.0)
-        leg = np.searchsorted(self.corner_s, t_s) if len(self.corner_s) else np.full(len(t_s), len(legs))
-        return np.asarray(np.append(along, np.zeros((1, 3)), axis=0)[leg])
-
 
 def robots_of(scenario: Json) -> dict[str, Json]:
     """Each robot's part of the scenario by name, the UGVs first, the UAV last."""
@@ -101,22 +90,12 @@ def pairs_of(scenario: Json) -> list[Pair]:
 @lru_cache(maxsize=10_000)
 def _sum(one: float, other: float) -> float:
     """Of two decimals as they are written: 1.1 and 2.2 make 3.3."""
-    return float(Fraction(repr(one)) + Fraction(repr(other)))
+    return float(written(one) + written(other))
 
 
 def apart_m(scenario: Json, kind: str, one: Json, other: Json) -> float:
     """A distance of surfaces, of a kind of pair, as one of centres: with both radii."""
     return float(scenario["safe_distance"][kind]) + (float(one["radius_m"]) + float(other["radius_m"]))
-
-
-def views_of(scenario: Json) -> dict[str, list[Pair]]:
-    """The pairs as each robot sees them: obstacles, then the other robots, UGVs first, as recursion (5) lists them."""
-    found: dict[str, list[Pair]] = {robot: [] for robot in robots_of(scenario)}
-    for pair in pairs_of(scenario):
-        found[pair.robot].append(pair)
-        if pair.other in found:
-            found[pair.other].append(pair.turned())
-    return found
 
 
 def preset_of(scenario: Json, ugv: str) -> Preset:
@@ -155,74 +134,6 @@ def bayes_threshold_m(drift_m_s: float, noise_m_sqrt_s: float, ratio_s: float) -
     return high * noise_m_sqrt_s**2 / (2.0 * drift_m_s)
 
 
-class Kind(NamedTuple):
-    """A kind of pairs, of which the scenario has at least one, and the names of obligations."""
-
-    name: str
-    safe_m: float
-    closing_m_s: float
-    share: float
-
-
-def kinds_of(scenario: Json) -> list[Kind]:
-    """The kinds of pairs of a scenario, in the order of the report.
-
-    Of each those that no other pair has at as large a distance and as fast, from the largest distance on, and one at
-    the least distance; numbered if that makes several.
-    """
-    pairs, uav, found = pairs_of(scenario), scenario["uav"]["name"], []
-    for name in ("obstacle", "uav_ugv", "ugv_ugv"):
-        share = 1.0 if name == "obstacle" else 0.5
-        of_kind = {
-            (pair.safe_m, pair.closing_m_s)
-            for pair in pairs
-            if pair.share == share and (share == 1.0 or (pair.other == uav) == (name == "uav_ugv"))
-        }
-        kept: list[tuple[float, float]] = []
-        for safe, closing in sorted(of_kind, reverse=True):
-            if not kept or closing > max(fast for _, fast in kept):
-                kept.append((safe, closing))
-        if kept and (nearest := min(of_kind, key=lambda each: (each[0], -each[1]))) not in kept:
-            kept.append(nearest)
-        names = [name] if len(kept) == 1 else [f"{name}_{k}" for k in range(1, len(kept) + 1)]
-        found += [Kind(each, *values, share) for each, values in zip(names, kept, strict=True)]
-    return found
-
-
-def extent_m(scenario: Json) -> float:
-    """No coordinate of a run is larger: the largest of the scenario, and the way at the largest speed limit."""
-    points = [scenario["uav"]["start_m"], *(obstacle["position_m"] for obstacle in scenario["obstacles"].values())]
-    for ugv in scenario["ugvs"].values():
-        points += [ugv["start_m"], ugv["target_m"], *ugv["preset"]["waypoints_m"]]
-    farthest = max(abs(float(coordinate)) for point in points for coordinate in point)
-    speed = max(float(robot["max_speed_m_s"]) for robot in robots_of(scenario).values())
-    return farthest + speed * float(scenario["duration_s"])
-
-
-def rounding_m(scenario: Json, kind: Kind) -> float:
-    """What rounding may take from the safe distance of a kind of pairs while the gain restores it.
-
-    In a step: u (7 D + 9 c h) in the inequalities, at distances D up to the sensing range; u (extent + c h) for each
-    coordinate, robot and integration step, of which a period has 64 at most; u c T for each step and two more, as
-    multiples of the period are rounded; 1 % for products of these. A deficit shrinks by A h per step, so that alone it
-    never exceeds 1 / (A h) times that. Infinite where A = 0.
-    """
-    control = scenario["control"]
-    h, gain = float(control["period_s"]), float(control["avoidance_gain_1_s"])
-    way, reach = kind.closing_m_s * h, max(float(control["sensing_range_m"]), float(kind.safe_m))
-    inequalities = 7.0 * reach + 9.0 * way
-    positions = 2.0 * math.sqrt(3.0) * STEPS * (extent_m(scenario) + way)
-    clock = (STEPS + 2.0) * kind.closing_m_s * float(scenario["duration_s"])
-    step = 1.01 * 2.0**-53 * (inequalities + positions + clock)
-    return step / (gain * h) if gain > 0.0 else math.inf
-
-
-STEPS = 64
-"""Integration steps that a control period is cut into at most."""
-
-
-def disturbance_m_s(scenario: Json) -> float:
-    """The disturbance that SAFE-DIST is about: 10 % of the largest speed limit, at most A/4 of the least distance."""
-    tenth = 0.1 * max(float(robot["max_speed_m_s"]) for robot in robots_of(scenario).values())
-    least = min(kind.safe_m for kind in kinds_of(scenario))
-    return min(tenth, scenario["control"]["avoidance_gain_1_s"] * least / 4.0)
+def written(value: float) -> Fraction:
+    """A number as the decimal that it is written as: 0.1 is a tenth."""
+    return Fraction(repr(float(value)))

@@ -25,13 +25,16 @@ class Command(NamedTuple):
     says: str
 
 
+GONE = {"proofs": "airground prove"}
+"""Commands of earlier versions, and what does now what they did."""
+
 COMMANDS: dict[str, Command] = {
     "report": Command("airground_drake.report.__main__", "simulate a scenario, check its claims, write the report"),
     "verify": Command("airground_drake.verify.__main__", "judge claims anew, on a saved run or about a model"),
-    "check": Command("airground_drake.check.command", "go over a report with the independent checker"),
+    "check": Command("airground_drake.commands.check", "check a report from its files alone"),
     "compare": Command("airground_drake.commands.compare", "say what has changed from one report to another"),
     "index": Command("airground_drake.commands.index", "list the reports in a folder on a page"),
-    "proofs": Command("airground_drake.verify.proof_files", "write the proofs of a report for others' checkers"),
+    "prove": Command("airground_drake.commands.prove", "have Coq check the theorems, or prove the runs of a report"),
     "campaign": Command("airground_drake.commands.campaign", "judge many draws of a scenario"),
     "falsify": Command("airground_drake.commands.falsify", "search for a scenario that violates a claim"),
     "replay": Command("airground_drake.commands.replay", "show the runs of a report: a page each, or a video"),
@@ -65,6 +68,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     name = "".join(unknown) or options.command
     if name is None:
         parser.error(f"a command is needed: {', '.join(COMMANDS)}")
+    if name in GONE:
+        return refuse(f"`airground {name}` is gone: use `{GONE[name]}` (docs/migration.md)")
     if name not in COMMANDS:
         close = difflib.get_close_matches(name, COMMANDS, n=1)
         meant = f"did you mean {close[0]}? " if close else ""

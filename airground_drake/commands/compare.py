@@ -14,7 +14,7 @@ from airground_drake.report import compare
 from airground_drake.usage import Parser, refuse
 
 EXIT_WORSE = 1
-PARTS = ("overall", "verdicts", "margins", "exercised", "expectations", "reproduction", "audit", "mutants", "events")
+PARTS = ("overall", "verdicts", "margins", "exercised", "expectations", "reproduction", "audit", "events")
 MOST_LINES, MOST_ROWS = 20, 200
 """Changes of one part that are shown, in the terminal and on the page; --json has all."""
 _ABOUT = ("claim", "id", "run", "robot", "kind", "n")

@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 
 from airground_drake import files, graphviz, trace
 from airground_drake.diagram import build_diagram
-from airground_drake.errors import PluginError
 from airground_drake.progress import Watch
 from airground_drake.registry import METHODS
 from airground_drake.report import audit, document, folder, html, junit
@@ -27,8 +26,6 @@ from airground_drake.scenarios.schema import Scenario
 from airground_drake.side_by_side import begun
 from airground_drake.trace import Trace
 from airground_drake.verify import Verdict, verify_all
-from airground_drake.verify.finding import PLAIN_NAME
-from airground_drake.verify.mutants import refute_mutants
 from airground_drake.verify.registry import model_claims
 
 PACKAGES = ("airground_drake", "drake", "numpy", "scipy", "numba", "pandas", "matplotlib")
@@ -39,14 +36,13 @@ class Judged(NamedTuple):
 
     verdicts: Sequence[Verdict]
     findings: Sequence[dict[str, Any]]
-    mutants: Sequence[dict[str, Any]]
     figures: Sequence[Figure]
 
 
 def judge(
     scenario: Scenario, traces: Mapping[str, Trace], kept: Path | None, *, audited: bool, drawn: bool, watch: Watch
 ) -> Judged:
-    """Judge the runs and the model and, if asked for, the paper and broken variants; draw the runs at the same time.
+    """Judge the runs and the model and, if asked for, the paper; draw the runs at the same time.
 
     Raises:
         PluginError: if a claim of the scenario cannot be made.
@@ -57,8 +53,7 @@ def judge(
     if audited:
         watch.stage("auditing the paper")
     findings = audit.whole(scenario, verdicts) if audited else ()
-    mutants = refute_mutants(scenario, kept=kept, watch=watch) if audited else ()
-    return Judged(verdicts, findings, mutants, figures())
+    return Judged(verdicts, findings, figures())
 
 
 def write(
@@ -73,14 +68,13 @@ def write(
     """Write the folder, and return the document; arguments as of `make.write_report`.
 
     Raises:
-        PluginError: if a claim or a certificate has no plain name.
         OSError: if something cannot be written.
     """
     most_complete = max((run.method for run in scenario.runs.values()), key=list(METHODS).index)
     dot = graphviz.dot(build_diagram(plugins.without(scenario), most_complete))
     drawn = graphviz.svg(dot)
     folder.clear(output)
-    written = [f"certificates/{name}" for name in _save_certificates(output / "certificates", judged.verdicts)]
+    written = []
     for name, of_run in traces.items():
         written += [f"trace/{name}/{file}" for file in trace.save(of_run, output / "trace" / name)]
     files.write_text(output / "diagram.dot", dot)
@@ -88,9 +82,8 @@ def write(
     written += ["diagram.dot", "diagram.svg"]
     required = [claim.id for claim in model_claims(added=scenario.claims)]
     report = document.build(
-        scenario, digest, traces, judged.verdicts, provenance, audit=judged.findings, mutants=judged.mutants,
-        required=required,
-    )  # fmt: skip
+        scenario, digest, traces, judged.verdicts, provenance, audit=judged.findings, required=required
+    )
     if "junit" in formats:
         files.write_text(output / "junit.xml", junit.render(report))
         written.append("junit.xml")
@@ -109,22 +102,6 @@ def _refinement(verdicts: Sequence[Verdict], audited: bool) -> list[Figure]:
     """The figure of ZENO-REFINE, if there is such a verdict: beside finding 9, where that is in the report."""
     drawn = [zeno_refine.draw(verdict.finding.evidence) for verdict in verdicts if verdict.claim.id == "ZENO-REFINE"]
     return [replace(figure, beside="audit-9") if audited else figure for figure in drawn if figure is not None]
-
-
-def _save_certificates(folder: Path, verdicts: Sequence[Verdict]) -> list[str]:
-    """Write every certificate to <folder>/<claim>/ and return their paths in the folder.
-
-    Raises:
-        PluginError: if a claim or a certificate has no plain name.
-    """
-    written = []
-    for verdict in verdicts:
-        for name, text in verdict.finding.certificates.items():
-            if not (PLAIN_NAME.fullmatch(verdict.claim.id) and PLAIN_NAME.fullmatch(name)):
-                raise PluginError(f"claim {verdict.claim.id!r}: {name!r} is no name for a certificate")
-            files.write_text(folder / verdict.claim.id / name, text)
-            written.append(f"{verdict.claim.id}/{name}")
-    return written
 
 
 def provenance(scenario: Scenario, started: datetime, command: str) -> dict[str, Any]:

@@ -136,8 +136,6 @@ def _of_the_paper(document: Mapping[str, Any]) -> Iterator[Item]:
             )
     for number in document["overall"]["undemonstrated"]:
         yield Item("not_demonstrated", f"finding {number} about the paper", anchor="audit")
-    for mutant in document["overall"]["surviving_mutants"]:
-        yield Item("not_as_expected", f"a broken variant was not refuted: {mutant}", anchor="mutants")
 
 
 def beforehand(document: Mapping[str, Any]) -> Iterator[Item]:

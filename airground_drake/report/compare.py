@@ -1,9 +1,8 @@
 """What has changed from one report to another, read from their report.json alone.
 
 A verdict is worse than before if it stands further down in `ORDER`, if it was as the scenario expected and no longer
-is, or if it is gone; so is a row of the reproduction table, by `ROWS`, a finding about the paper that is no longer
-demonstrated, and a broken variant of a proof that is no longer refuted. Numbers are compared to the last digit, but for
-what is measured by the clock.
+is, or if it is gone; so is a row of the reproduction table, by `ROWS`, and a finding about the paper that is no longer
+demonstrated. Numbers are compared to the last digit.
 """
 
 from __future__ import annotations
@@ -22,6 +21,7 @@ from airground_drake.statuses import UNDECIDED, outcome
 
 SCHEMA = "airground_drake.comparison/1"
 REPORT = "airground_drake.report/2"
+EARLIER = ("airground_drake.report/1",)
 
 ORDER: tuple[tuple[str, ...], ...] = (
     ("proved",),
@@ -37,8 +37,6 @@ OVERALL: tuple[tuple[str, ...], ...] = (("as_expected",), ("inconclusive",), ("n
 """Over all claims, likewise."""
 LONGEST_INTEGER = 18
 """Digits of an integer that is read."""
-MEASURED = frozenset({"GATE-TIME"})
-"""Claims whose margin is measured by the clock, and never the same."""
 
 Document = Mapping[str, Any]
 Change = dict[str, Any]
@@ -55,6 +53,8 @@ def read(folder: Path) -> Document:
         text = files.read_text(path)
         document = json.loads(text, parse_constant=_finite, parse_float=_finite, parse_int=_short)
         json.dumps(document, ensure_ascii=False).encode()  # no halves of characters
+        if is_earlier(document):
+            raise ReportError(f"{path} is by an earlier version: make the report again (docs/migration.md)")
         if document["schema"] != REPORT:
             raise ValueError(f"its schema is not {REPORT}")
         _usable(document)
@@ -62,6 +62,11 @@ def read(folder: Path) -> Document:
         why = getattr(error, "strerror", None) or f"{type(error).__name__}: {error}"
         raise ReportError(one_line(f"{path} is no report that can be used: {why}"[:300])) from None
     return dict(document)
+
+
+def is_earlier(document: Document) -> bool:
+    """Whether a report is by an earlier version: of another schema, or with broken variants of proofs."""
+    return document["schema"] in EARLIER or (document["schema"] == REPORT and "mutants" in document)
 
 
 def _usable(document: Document) -> None:
@@ -96,7 +101,7 @@ def compared(before: Document, after: Document) -> dict[str, Any]:
 
     Returns:
         Strict JSON: `regressions`, a count; lists of changes `overall` (one at most), `verdicts`, `margins`,
-        `exercised`, `expectations`, `reproduction`, `audit`, `mutants`, `events`. Each change has `before` and `after`
+        `exercised`, `expectations`, `reproduction`, `audit`, `events`. Each change has `before` and `after`
         (None where there is none), what it is about (`claim` and `run`, `id`, or `run`, `robot`, `kind` and which of
         its kind, `n`, from 1), and whether it is `worse`; margins have their `relative` change.
     """
@@ -107,8 +112,7 @@ def compared(before: Document, after: Document) -> dict[str, Any]:
         "exercised": list(_of_claims(before, after, "exercised")),
         "expectations": list(_of_claims(before, after, "expected")),
         "reproduction": list(_rows(before, after)),
-        "audit": list(_findings(before, after, "audit", "demonstrated")),
-        "mutants": list(_findings(before, after, "mutants", "refuted")),
+        "audit": list(_findings(before, after)),
         "events": list(_events(before, after)),
     }
     for change in (changes := [change for part in found.values() for change in part]):
@@ -137,7 +141,7 @@ def _verdicts(before: Document, after: Document) -> Iterator[Change]:
 def _of_claims(before: Document, after: Document, field: str) -> Iterator[Change]:
     """Changes of a field of claims that are in both reports."""
     for (claim, run), old, new in _paired(before["claims"], after["claims"], "id", "run"):
-        if old and new and old[field] != new[field] and not (field == "margin" and claim in MEASURED):
+        if old and new and old[field] != new[field]:
             unit = {"unit": new["unit"]} if field == "margin" else {}
             yield {"claim": claim, "run": run, "before": old[field], "after": new[field], **unit}
 
@@ -150,15 +154,13 @@ def _rows(before: Document, after: Document) -> Iterator[Change]:
             yield {"id": row, "before": was, "after": now, "worse": worse}
 
 
-def _findings(before: Document, after: Document, part: str, good: str) -> Iterator[Change]:
-    """Findings about the paper, or broken variants of proofs."""
-    keys = ("id",) if part == "audit" else ("claim", "mutant")
-    kept = (good, "paper", "ours") if part == "audit" else (good, "status")
-    for key, old, new in _paired(before[part], after[part], *keys):
-        was, now = (each and {name: each[name] for name in kept} for each in (old, new))
+def _findings(before: Document, after: Document) -> Iterator[Change]:
+    """Findings about the paper."""
+    for (number,), old, new in _paired(before["audit"], after["audit"], "id"):
+        was, now = (each and {name: each[name] for name in ("demonstrated", "paper", "ours")} for each in (old, new))
         if was != now:
-            worse = bool(old and old[good] and not (new and new[good]))
-            yield {"id": ": ".join(key), "before": was, "after": now, "worse": worse}
+            worse = bool(old and old["demonstrated"] and not (new and new["demonstrated"]))
+            yield {"id": number, "before": was, "after": now, "worse": worse}
 
 
 def _events(before: Document, after: Document) -> Iterator[Change]:

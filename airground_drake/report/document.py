@@ -36,7 +36,6 @@ def build(
     provenance: Mapping[str, Any],
     *,
     audit: Sequence[Mapping[str, Any]] = (),
-    mutants: Sequence[Mapping[str, Any]] = (),
     required: Iterable[str] = (),
 ) -> dict[str, Any]:
     """The document.
@@ -49,7 +48,6 @@ def build(
         provenance: versions, seed, time, `command` and the like.
         audit: findings about the paper from elsewhere, added to those that the runs show; with any, all must be
             demonstrated.
-        mutants: what became of broken variants of the proofs; all must be refuted.
         required: claims about the model of which there must be a verdict.
 
     Returns:
@@ -76,13 +74,12 @@ def build(
             "resolved": resolved,
         },
         "provenance": dict(provenance),
-        "overall": overall(claims, missing(scenario, traces, claims, required), items if audit else (), mutants),
+        "overall": overall(claims, missing(scenario, traces, claims, required), items if audit else ()),
         "runs": {name: _run(scenario, trace) for name, trace in traces.items()},
         "claims": claims,
         "reproduction": reproduction.rows(scenario, traces),
         "choices": [{**asdict(choice), "ours": _lookup(resolved, choice.key)} for choice in scenario.choices],
         "audit": items,
-        "mutants": list(mutants),
         "files": {},
     }
     strict: dict[str, Any] = _strict(document)
@@ -107,17 +104,14 @@ def overall(
     claims: Sequence[Mapping[str, Any]],
     absent: Sequence[Mapping[str, Any]],
     items: Sequence[Mapping[str, Any]] = (),
-    mutants: Sequence[Mapping[str, Any]] = (),
 ) -> dict[str, Any]:
     """The verdict over all claims: `status`, `exit_code`, `why`, counts, and what differs, is open or missing.
 
     `counts` has a claim that was established because nothing put it to the test under `not_exercised`, never under
     its status; the list of that name says which they are.
 
-    Of `items`, the findings about the paper, one that was not demonstrated differs, too, and of `mutants` one that
-    was not refuted.
+    Of `items`, the findings about the paper, one that was not demonstrated differs, too.
     """
-    surviving = [f"{mutant['claim']}: {mutant['mutant']}" for mutant in mutants if not mutant["refuted"]]
     undemonstrated = [item["id"] for item in items if not item["demonstrated"]]
     keys = ("id", "run", "status", "expected", "exercised")
     unexpected = [{key: c[key] for key in keys} for c in claims if not c["as_expected"]]
@@ -132,9 +126,6 @@ def overall(
     elif undemonstrated:
         status = "not_as_expected"
         why = f"Findings about the paper that were not demonstrated: {', '.join(map(str, undemonstrated))}."
-    elif surviving:
-        status = "not_as_expected"
-        why = f"Broken variants that were not refuted: {', '.join(surviving)}."
     elif undecided or absent or not claims:
         status = "inconclusive"
         open_items = [*undecided, *absent]
@@ -144,7 +135,6 @@ def overall(
         why = f"All {_checks(len(claims))} gave the verdict that the scenario declares for them."
         why += f" {_nothing_to_check(idle)}" if idle else ""
         why += f" All {len(items)} findings about the paper were demonstrated." if items else ""
-        why += f" All {len(mutants)} broken variants of the proofs were refuted." if mutants else ""
     return {
         "status": status,
         "exit_code": EXIT_CODES[status],
@@ -157,7 +147,6 @@ def overall(
         "undecided": undecided,
         "missing": list(absent),
         "undemonstrated": undemonstrated,
-        "surviving_mutants": surviving,
     }
 
 

@@ -133,12 +133,11 @@ def _in_the_dark() -> str:
 
 
 def evidence_tables(claim: Mapping[str, Any]) -> list[Table]:
-    """Counterexample and evidence of a claim as tables; what has a table of its own on the page is left out."""
-    found = {key: item for key, item in claim["evidence"].items() if key != "stl"}
+    """Counterexample and evidence of a claim as tables."""
     on = f", run {claim['run']}" if claim["run"] else ""
     return [
         *evidence.tables(claim["counterexample"] or {}, f"{claim['id']}, counterexample{on}", number),
-        *evidence.tables(found, f"{claim['id']}, evidence{on}", number),
+        *evidence.tables(claim["evidence"], f"{claim['id']}, evidence{on}", number),
     ]
 
 

@@ -43,8 +43,8 @@ def write_report(
         output: folder, created if need be; nothing of an earlier report stays in it.
         formats: which of html, json and junit to write; traces and diagram are always written.
         command: how to make this report again.
-        kept: folder of kept findings about the model, see `verify_model`; None: every proof anew.
-        audited: add all findings about the paper, also those that take other runs, and the proofs' mutants.
+        kept: folder of kept findings about the model, see `verify_model`; None: everything anew.
+        audited: add all findings about the paper, also those that take other runs.
         limits: what the scenario may ask for.
         watch: is told what is done.
 

@@ -60,8 +60,9 @@ def gatekeeper(trace: Trace) -> dict[str, Any] | None:
     Returns:
         `calls`, `decisions` (decision -> count), `solver_failures` (decisions for which the solver failed, so
         that they rest on the best plan known), `refusals` (robot -> reason -> proposals refused at the first
-        answer), `max_gap` (largest optimality gap), `time_s` (p50, p99, max
-        of the CPU times) and `closest_call`: where the costs of accepting and refusing were closest,
+        answer), `max_gap` (largest optimality gap), `period_s` of the gatekeeper, `time_s` (p50, p99, max
+        of the CPU times, order statistics), `late` (decisions that took a period or longer; simulated time waits for
+        them) and `closest_call`: where the costs of accepting and refusing were closest,
         relative to the smaller one, so that nobody has to trust a knife edge. None where not recorded.
     """
     table = trace.decisions
@@ -69,14 +70,18 @@ def gatekeeper(trace: Trace) -> dict[str, Any] | None:
         return None
     gaps = table["gap"][table["gap"] >= 0.0]
     times = np.asarray(trace.timings.get("decision_times_s", []), dtype=np.float64)
-    time_s = {"p50": np.quantile(times, 0.5), "p99": np.quantile(times, 0.99), "max": times.max()} if times.size else {}
+    period = float(trace.scenario["gatekeeper"]["period_s"])
+    levels = {"p50": 0.5, "p99": 0.99, "max": 1.0}
+    time_s = {name: float(np.quantile(times, at, method="higher")) for name, at in levels.items() if times.size}
     return {
         "calls": len(table),
         "decisions": {str(name): int(count) for name, count in table["decision"].value_counts().sort_index().items()},
         "solver_failures": int((table["status"] == "solver_failed").sum()),
         "refusals": _refusals(trace),
         "max_gap": float(gaps.max()) if len(gaps) else None,
-        "time_s": {name: float(value) for name, value in time_s.items()} or None,
+        "period_s": period,
+        "time_s": time_s or None,
+        "late": int((times >= period).sum()) if times.size else None,
         "closest_call": _closest_call(trace),
     }
 

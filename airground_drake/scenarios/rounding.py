@@ -1,11 +1,10 @@
-"""What rounding may take from a safe distance in binary64: one formula, by which scenarios are accepted and judged.
+"""What rounding may take from a safe distance in binary64: one formula, by which scenarios are accepted.
 
-A scenario is accepted only where the loss stays below `TOLERANCE_M`; SAFE-INV says how much of it is left.
+A scenario is accepted only where the loss stays below `TOLERANCE_M`; SAFE-HYP measures what a run lost.
 """
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -56,11 +55,6 @@ class Rounding(NamedTuple):
         """Loss of one step, m, for coordinates up to `extent`, m, in a run of `duration`, s."""
         moves = _PER_METRE * (extent + self.closing * self.period)
         return SLACK * (self._kernel + moves + self._per_second * duration)
-
-    def restored(self, extent: float, duration: float) -> float:
-        """What a single deficit never exceeds, m; infinite with A = 0."""
-        kept = self.gain * self.period
-        return self.of_a_step(extent, duration) / kept if kept > 0.0 else math.inf
 
     def largest_extent(self, duration: float) -> float:
         """Coordinate up to which a deficit stays within the tolerance, m; may be negative: then none."""

@@ -30,6 +30,7 @@ from airground_drake.registry import (
     MODEL_CLAIMS,
     PLUGIN,
     POLICIES,
+    RETIRED_CLAIMS,
     ROUTES,
     RUN_CLAIMS,
     UAV_TASKS,
@@ -199,6 +200,9 @@ def _runs(scenario: Scenario) -> Problems:
             yield from _one_of(f"runs.{name}.stalls_m.{robot}", robot, scenario.ugvs, "one of the UGVs")
         for claim, status in run.expected.items():
             known = (*RUN_CLAIMS, *scenario.claims)
+            if claim in RETIRED_CLAIMS:
+                yield f"runs.{name}.expected.{claim}", claim, f"no longer a claim, {RETIRED_CLAIMS[claim]}: remove it"
+                continue
             yield from _one_of(f"runs.{name}.expected.{claim}", claim, known, "one of the claims")
             yield from _expectation(f"runs.{name}.expected.{claim}", status)
     for claim, status in scenario.expected.items():
@@ -396,7 +400,7 @@ def _sensing(scenario: Scenario) -> Problems:
 def _extent(scenario: Scenario) -> Problems:
     """Rounding must not take more from a safe distance than SAFE-TRACE tolerates; without a gain nothing is restored.
 
-    Then (A = 0) there is nothing that an extent could be accepted by, and SAFE-INV says so.
+    Then (A = 0) there is nothing that an extent could be accepted by; SAFE-HYP says what a run lost.
     """
     control, duration = scenario.control, scenario.duration_s
     if control.avoidance_gain_1_s == 0.0:

@@ -1,9 +1,9 @@
-"""Findings of model claims, kept by content: equal code and inputs, equal finding.
+"""Findings of experiments about the model, kept by content: equal code and inputs, equal finding.
 
-An entry is a file that says what it is about: claim, inputs, digest of the code, versions of the engines, and the
-finding. It is taken if all of that is what is asked for, the finding is well formed, and the claim takes it: one with
-certificates establishes them again (`ModelClaim.takes`). Anything else is decided anew, so that an entry that is
-damaged or under another's name costs time and no more. What is not done again is believed: see docs/verification.md.
+An entry is a file that says what it is about: claim, inputs, digest of the code, versions of the engines, the finding
+and its SHA-256. It is taken if all of that is what is asked for and the finding is well formed, passes and has that
+digest. Anything else is decided anew, so that a damaged entry costs time and no more. An entry that somebody forged
+with its digest is believed: see docs/verification.md.
 """
 
 from __future__ import annotations
@@ -25,13 +25,14 @@ from uuid import uuid4
 from airground_drake import files
 from airground_drake.progress import SILENT, Watch
 from airground_drake.side_by_side import side_by_side
+from airground_drake.statuses import PASSING
 from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.finding import Finding
 
-SCHEMA = "airground_drake.finding/1"
+SCHEMA = "airground_drake.finding/2"
 LARGEST_BYTES = 16_000_000
 """A larger entry is not read."""
-ENGINES = ("numpy", "scipy", "numba", "z3-solver", "cvc5", "python-flint", "sympy", "pyddm", "drake")
+ENGINES = ("numpy", "scipy", "numba", "pyddm")
 """Packages whose versions are part of a finding's key."""
 
 
@@ -114,11 +115,13 @@ def _engines() -> dict[str, str]:
 
 
 def _keep(folder: Path | None, claim: ModelClaim, inputs: Mapping[str, Any], finding: Finding) -> None:
-    """Write an entry, whole or not at all, of a finding that would be taken."""
-    if folder is None or not claim.kept or not _takes(claim, inputs, finding):
+    """Write an entry, whole or not at all, of a finding that passes."""
+    if folder is None or not claim.kept or finding.status not in PASSING:
         return
+    made = asdict(finding)
     with contextlib.suppress(OSError):  # a folder that cannot be written keeps nothing
-        files.write_json(_path(folder, claim, inputs), {**content(claim, inputs), "finding": asdict(finding)})
+        entry = {**content(claim, inputs), "finding": made, "sha256": _digest(made)}
+        files.write_json(_path(folder, claim, inputs), entry)
 
 
 def _read(folder: Path | None, claim: ModelClaim, inputs: Mapping[str, Any]) -> Finding | None:
@@ -130,18 +133,18 @@ def _read(folder: Path | None, claim: ModelClaim, inputs: Mapping[str, Any]) -> 
         if not path.is_file() or path.stat().st_size > LARGEST_BYTES:
             return None
         entry = json.loads(path.read_text(encoding="utf-8"), parse_constant=_refused, parse_float=_finite)
-        finding = Finding.from_json(entry.pop("finding"))
+        made, digest = entry.pop("finding"), entry.pop("sha256")
+        finding = Finding.from_json(made)
     except (OSError, ValueError, TypeError, AttributeError, KeyError, RecursionError):
         return None
     about = json.dumps(entry, sort_keys=True) == json.dumps(content(claim, inputs), sort_keys=True)
-    return replace(finding, from_cache=True) if about and _takes(claim, inputs, finding) else None
+    sound = about and digest == _digest(made) and finding.status in PASSING
+    return replace(finding, from_cache=True) if sound else None
 
 
-def _takes(claim: ModelClaim, inputs: Mapping[str, Any], finding: Finding) -> bool:
-    try:
-        return claim.takes(dict(inputs), finding)
-    except Exception:  # whatever is wrong with it, it is not taken
-        return False
+def _digest(finding: Mapping[str, Any]) -> str:
+    """SHA-256 of a finding: a bit that flips on a disk is noticed."""
+    return files.sha256(json.dumps(finding, sort_keys=True, allow_nan=False).encode())
 
 
 def _path(folder: Path, claim: ModelClaim, inputs: Mapping[str, Any]) -> Path:

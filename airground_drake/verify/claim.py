@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import abc
 import json
-from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
 
-from airground_drake import files
 from airground_drake.errors import TraceError, described
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.statuses import PASSING, STATUSES, Status, meets
@@ -21,7 +19,6 @@ __all__ = [
     "Claim",
     "Finding",
     "ModelClaim",
-    "Mutant",
     "TraceClaim",
     "Verdict",
     "require_motion",
@@ -74,8 +71,8 @@ class ModelClaim(Claim):
     """
 
     expected: Status = "proved"
-    kept: bool = True
-    """Whether findings may be kept: not where deciding the claim takes no longer than looking at a kept one."""
+    kept: bool = False
+    """Whether findings may be kept: for experiments that take long."""
 
     @abc.abstractmethod
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
@@ -83,17 +80,14 @@ class ModelClaim(Claim):
 
     @abc.abstractmethod
     def check(self, inputs: dict[str, Any]) -> Finding:
-        """Decide the claim for these constants; whatever a solver leaves open is `inconclusive`, never a pass.
+        """Decide the claim for these constants; what is left open is `inconclusive`, never a pass.
 
         Called through `judge`, which turns an exception into `error`.
         """
 
-    def takes(self, inputs: dict[str, Any], finding: Finding) -> bool:
-        """Whether a kept finding for these inputs may be taken for one made anew; whatever it raises means no.
-
-        By default any pass. A claim with certificates establishes them again.
-        """
-        return finding.status in PASSING
+    def applications(self, trace: Trace) -> tuple[int, int] | None:
+        """How often a run met the premise of the theorem, of how many times it could have; None: not counted."""
+        return None
 
     def judge_inputs(self, scenario: Scenario) -> dict[str, Any]:
         """`inputs` under guard: what keeps them from being found is told to `judge`."""
@@ -146,21 +140,6 @@ class TraceClaim(Claim):
 
 
 @dataclass(frozen=True)
-class Mutant:
-    """A broken variant of what a claim about the model is about: it must be refuted, or the claim proves nothing.
-
-    Attributes:
-        claim: identifier of the claim that must refute it.
-        says: what is broken.
-        check: decides the broken variant for the claim's inputs; 'refuted' with a counterexample is wanted.
-    """
-
-    claim: str
-    says: str
-    check: Callable[[dict[str, Any]], Finding]
-
-
-@dataclass(frozen=True)
 class Verdict:
     """A claim and what was found.
 
@@ -184,7 +163,7 @@ class Verdict:
         return meets(self.expected, self.finding.status, self.finding.exercised)
 
     def to_json(self) -> dict[str, Any]:
-        """The entry of `claims` in report.json; of certificates, their names and SHA-256."""
+        """The entry of `claims` in report.json."""
         described = (
             "id",
             "summary",
@@ -195,7 +174,6 @@ class Verdict:
             "does_not_establish",
             "exercised_by",
         )
-        digests = {name: files.sha256(text.encode()) for name, text in self.finding.certificates.items()}
         return {
             **{name: getattr(self.claim, name) for name in described},
             "assumptions": list(self.claim.assumptions),
@@ -205,7 +183,6 @@ class Verdict:
             "as_expected": self.as_expected,
             "inputs": self.inputs,
             **asdict(self.finding),
-            "certificates": digests,
         }
 
 

@@ -24,14 +24,10 @@ class Finding:
         where: where the margin is attained: robot, obstacle, time and the like.
         counterexample: for `refuted`: enough to reproduce it by hand.
         evidence: numbers behind the verdict, strict JSON.
-        certificates: texts that others can check, by file name.
         quantity: what the margin is of, in a few words.
         exercised: how often the claim was put to the test, in what its `exercised_by` counts; 0: nothing could have
             refuted it; None: not counted.
         from_cache: whether it was made by an earlier report, with the same inputs, code and engines, and kept.
-
-    Raises:
-        ValueError: if a certificate has no plain file name.
     """
 
     status: Status
@@ -40,15 +36,9 @@ class Finding:
     where: dict[str, Any] = field(default_factory=dict)
     counterexample: dict[str, Any] | None = None
     evidence: dict[str, Any] = field(default_factory=dict)
-    certificates: dict[str, str] = field(default_factory=dict)
     quantity: str = ""
     exercised: int | None = None
     from_cache: bool = False
-
-    def __post_init__(self) -> None:
-        for name in self.certificates:
-            if not PLAIN_NAME.fullmatch(name):
-                raise ValueError(f"{name!r} is no name for a certificate: {PLAIN_NAME.pattern} is allowed")
 
     @classmethod
     def from_json(cls, value: Any) -> Finding:
@@ -69,8 +59,6 @@ class Finding:
             raise ValueError("a margin is finite")
         if value["exercised"] is not None and value["exercised"] < 0:
             raise ValueError(f"a claim cannot be exercised {value['exercised']} times")
-        if not all(type(text) is str for text in value["certificates"].values()):
-            raise ValueError("a certificate is a text")
         return cls(**value)
 
 
@@ -81,7 +69,6 @@ _TYPES: dict[str, tuple[type, ...]] = {
     "where": (dict,),
     "counterexample": (dict, type(None)),
     "evidence": (dict,),
-    "certificates": (dict,),
     "quantity": (str,),
     "exercised": (int, type(None)),
     "from_cache": (bool,),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -16,7 +16,6 @@ from airground_drake.verify.cache import find, found
 from airground_drake.verify.claim import ModelClaim, TraceClaim, Verdict
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.registry import model_claims, run_claims
-from airground_drake.verify.stl.cross_check import cross_check, merge
 
 
 def verify(trace: Trace, claims: Collection[str] | None = None, watch: Watch = SILENT) -> list[Verdict]:
@@ -85,9 +84,9 @@ def verify_model(
 def verify_all(
     scenario: Scenario, traces: Iterable[Trace], *, kept: Path | None = None, watch: Watch = SILENT
 ) -> list[Verdict]:
-    """Judge every claim: on runs of a scenario, with the second opinion of `stl`, and then about its model.
+    """Judge every claim: on runs of a scenario, and then about its model.
 
-    What `verify`, `cross_check` and `verify_model` find, side by side in processes of their own.
+    What `verify` and `verify_model` find, side by side in processes of their own.
 
     Args:
         scenario: its constants.
@@ -102,23 +101,51 @@ def verify_all(
     chosen = model_claims(added=scenario.claims)
     inputs = [claim.judge_inputs(scenario) for claim in chosen]
     of_runs = [(replace(trace), _applicable(trace)) for trace in traces]  # as in `verify`
-    pieces = [partial(_found, claim, given, kept) for claim, given in zip(chosen, inputs, strict=True)]
-    pieces += [partial(_judged, trace, claims) for trace, claims in of_runs]
+    pieces: list[Callable[[], Any]] = [
+        partial(_found, claim, given, kept) for claim, given in zip(chosen, inputs, strict=True)
+    ]
+    pieces += [partial(_judged, trace, claims, chosen) for trace, claims in of_runs]
     names = [*(claim.id for claim in chosen), *(f"claims about run {trace.run}" for trace, _ in of_runs)]
     watch.stage("judging", len(pieces), "claims about the model or a run")
-    findings = side_by_side(pieces, names=names, watch=watch)
-    about_runs = zip(of_runs, findings[len(chosen) :], strict=True)
-    verdicts = [verdict for (trace, claims), of_run in about_runs for verdict in _verdicts(trace, claims, of_run)]
-    return verdicts + _model_verdicts(scenario, chosen, inputs, [finding for (finding,) in findings[: len(chosen)]])
+    done = side_by_side(pieces, names=names, watch=watch)
+    about_the_model, about_runs = done[: len(chosen)], done[len(chosen) :]
+    verdicts = [
+        verdict
+        for (trace, claims), (findings, _) in zip(of_runs, about_runs, strict=True)
+        for verdict in _verdicts(trace, claims, findings)
+    ]
+    theorems = [
+        with_applications(finding, [counts[k] for _, counts in about_runs]) for k, finding in enumerate(about_the_model)
+    ]
+    return verdicts + _model_verdicts(scenario, chosen, inputs, theorems)
 
 
-def _found(claim: ModelClaim, inputs: dict[str, Any], kept: Path | None) -> list[Finding]:
-    return [found(claim, inputs, kept)]
+def with_applications(finding: Finding, counts: Iterable[tuple[int, int] | None]) -> Finding:
+    """A finding about the model with how often the runs met its premise, `applies_to`, of how many times, `of`."""
+    counted = [count for count in counts if count is not None]
+    if not counted:
+        return finding
+    met, all_in_all = (sum(column) for column in zip(*counted, strict=True))
+    return replace(finding, evidence={**finding.evidence, "applies_to": met, "of": all_in_all})
 
 
-def _judged(trace: Trace, claims: Sequence[TraceClaim]) -> list[Finding]:
-    own = _verdicts(trace, claims, [claim.judge(trace) for claim in claims])
-    return [verdict.finding for verdict in merge(own, cross_check(trace))]
+def _found(claim: ModelClaim, inputs: dict[str, Any], kept: Path | None) -> Finding:
+    return found(claim, inputs, kept)
+
+
+def _judged(
+    trace: Trace, claims: Sequence[TraceClaim], theorems: Sequence[ModelClaim]
+) -> tuple[list[Finding], list[tuple[int, int] | None]]:
+    """What the claims found about a run, and how often it met the premise of each theorem."""
+    return [claim.judge(trace) for claim in claims], [_applications(claim, trace) for claim in theorems]
+
+
+def _applications(claim: ModelClaim, trace: Trace) -> tuple[int, int] | None:
+    """Not counted where a record is missing or wrong: the claims about runs say so."""
+    try:
+        return claim.applications(trace)
+    except (Exception, SystemExit):
+        return None
 
 
 def _model_verdicts(

@@ -1,4 +1,4 @@
-"""The claims and mutants that are registered, made on use.
+"""The claims that are registered, made on use.
 
 Which claims there are stands in `airground_drake.registry`, in the order of the report: a new claim is one file and one
 line there. A scenario adds its own under `claims`.
@@ -8,22 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from functools import cache
-from importlib import import_module
 from typing import TypeVar
 
 from airground_drake.errors import PluginError, UnknownNameError
 from airground_drake.registry import MODEL_CLAIMS, RUN_CLAIMS, Registry
-from airground_drake.verify.claim import Claim, ModelClaim, Mutant, TraceClaim
+from airground_drake.verify.claim import Claim, ModelClaim, TraceClaim
 
 C = TypeVar("C", bound=Claim)
-
-MUTANTS: tuple[str, ...] = (
-    "airground_drake.verify.model.avoidance.mutants",
-    "airground_drake.verify.model.trigger.mutants",
-    "airground_drake.verify.model.threshold.mutants",
-    "airground_drake.verify.model.patience.mutants",
-)
-"""Modules with a table MUTANTS of broken variants, each of which names the claim that must refute it."""
 
 
 def model_claims(ids: Collection[str] | None = None, added: Mapping[str, str] | None = None) -> list[ModelClaim]:
@@ -43,11 +34,6 @@ def model_claims(ids: Collection[str] | None = None, added: Mapping[str, str] | 
 def run_claims(ids: Collection[str] | None = None, added: Mapping[str, str] | None = None) -> list[TraceClaim]:
     """The claims that are decided from one trace, or those with these identifiers; as `model_claims` otherwise."""
     return _made(RUN_CLAIMS, TraceClaim, ids, added or {})
-
-
-def mutants() -> list[Mutant]:
-    """All broken variants."""
-    return [mutant for module in MUTANTS for mutant in import_module(module).MUTANTS]
 
 
 def _made(registry: Registry, kind: type[C], ids: Collection[str] | None, added: Mapping[str, str]) -> list[C]:

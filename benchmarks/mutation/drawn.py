@@ -23,16 +23,16 @@ RUNNING = (
 )  # fmt: skip
 """Files and folders of what produces a run."""
 PROBES = ("crowd d", "crowd c", "bodies d", "case_b d", "soft_gate c", "crowd b")
-PROOFS = {
-    "components.py": ("SAFE-INV", "THR-DDM"),
-    "diagram.py": ("SAFE-INV", "SAFE-GATE"),
-    "decision": ("ZENO-PROOF", "THR-ISO", "THR-ROOT"),
-    "nsbc": ("SAFE-INV", "SAFE-GATE"),
-    "systems/controllers.py": ("SAFE-INV", "SAFE-GATE"),
-    "systems/decision.py": ("THR-ISO", "ZENO-PROOF"),
-    "gatekeeper/patience.py": ("LIVE-WAIT", "LIVE-GATE"),
+HYPOTHESES = {
+    "components.py": ("test_wiring.py",),
+    "diagram.py": ("test_wiring.py",),
+    "decision": ("test_transitions.py", "test_isolation.py"),
+    "nsbc": ("test_wiring.py", "test_hostile_inputs.py", "test_disturbed_runs.py"),
+    "systems/controllers.py": ("test_wiring.py",),
+    "systems/decision.py": ("test_isolation.py",),
+    "gatekeeper/patience.py": ("test_transitions.py", "test_patience_attacks.py"),
 }
-"""By the beginning of the path: the proofs that are about the code there."""
+"""By the beginning of the path: the tests, in tests/hypotheses, that the code there meets a theorem's hypotheses."""
 FLIPPED: dict[type[ast.cmpop], tuple[str, tuple[str, ...]]] = {
     ast.Lt: ("<", ("<=", ">")), ast.LtE: ("<=", ("<", ">")), ast.Gt: (">", (">=", "<")), ast.GtE: (">=", (">", "<")),
     ast.Eq: ("==", ("!=",)), ast.NotEq: ("!=", ("==",)), ast.Is: ("is", ("is not",)), ast.IsNot: ("is not", ("is",)),
@@ -222,10 +222,11 @@ def mutant(root: Path, path: str, text: str, edit: Edit) -> Mutant:
         first = text.rfind("\n", 0, max(first - 1, 0)) + 1
     old, new = text[first:last], text[first : edit.start] + edit.new + text[edit.end : last]
     was = " ".join(text[edit.start : edit.end].split())
-    proofs = next((proofs for beginning, proofs in PROOFS.items() if path.startswith(beginning)), ())
+    ours = next((names for beginning, names in HYPOTHESES.items() if path.startswith(beginning)), ())
     folder, name = Path("tests", path).parent, Path(path).name
     tests = [str(folder / f"test_{name}")] if (root / folder / f"test_{name}").exists() else [str(folder)]
     if folder == Path("tests"):
         tests = ["tests/test_simulation.py", "tests/test_diagram.py"]
+    tests = [*(f"tests/hypotheses/{name}" for name in ours), *tests]
     what = f"{path}:{edit.line}:{edit.start - first}: {edit.kind}: {was[:60]!r} becomes {edit.new[:60]!r}"
-    return Mutant(what, path, old, new, PROBES, proofs, tests=tuple(tests))
+    return Mutant(what, path, old, new, PROBES, tests=tuple(tests))

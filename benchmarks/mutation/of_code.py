@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from mutation.mutant import Mutant
 
-WIRING = ("SAFE-INV",)
-"""The proof that compares the built diagram with the scenario."""
+WIRING = ("tests/hypotheses/test_wiring.py",)
+TRANSITIONS = ("tests/hypotheses/test_transitions.py",)
+ISOLATION = ("tests/hypotheses/test_isolation.py",)
+ATTACKS = ("tests/hypotheses/test_patience_attacks.py",)
+ROOT = ("tests/verify/model/threshold/test_thr_root.py",)
+"""Tests that the running code meets the hypotheses of theorems."""
 
 AMONG_BODIES = ("bodies d", "bodies c")
 
@@ -43,7 +47,7 @@ TEAM = (
     ),
     Mutant("the UAV cannot climb", "nsbc/team.py", "mobility[:-1, 2] = 0.0", "mobility[:, 2] = 0.0"),
     Mutant(
-        "UGVs may leave the ground", "nsbc/team.py", "mobility[:-1, 2] = 0.0", "mobility[:0, 2] = 0.0", proofs=WIRING
+        "UGVs may leave the ground", "nsbc/team.py", "mobility[:-1, 2] = 0.0", "mobility[:0, 2] = 0.0", tests=WIRING
     ),
     Mutant(
         "robots avoid only what the UAV knows",
@@ -80,7 +84,7 @@ TEAM = (
         "components.py",
         "return Avoidance(control.avoidance_gain_1_s,",
         "return Avoidance(0.0 * control.avoidance_gain_1_s,",
-        proofs=WIRING,
+        tests=WIRING,
     ),
     Mutant(
         "twice the control period in the inequalities",
@@ -93,8 +97,7 @@ TEAM = (
         "systems/plant.py",
         "velocity[3 * i : 3 * i + 3] += port.Eval(context)",
         "velocity[3 * i : 3 * i + 3] -= port.Eval(context)",
-        proofs=WIRING,
-        tests=("tests/test_simulation.py", "tests/test_python_api.py"),
+        tests=(*WIRING, "tests/test_simulation.py", "tests/test_python_api.py"),
     ),
 )
 
@@ -183,7 +186,7 @@ KERNELS = (
         "nsbc/kernels.py",
         "bound[k] = -share[k] * gain * excess",
         "bound[k] = -gain * excess",
-        proofs=WIRING,
+        tests=WIRING,
     ),
     Mutant(
         "no scaling back",
@@ -191,7 +194,7 @@ KERNELS = (
         "return _scale_back(_closest_feasible(lower, normal, bound), normal, bound)",
         "return _closest_feasible(lower, normal, bound)",
         runs=("crowd d",),
-        proofs=WIRING,
+        tests=WIRING,
     ),
     Mutant(
         "speeds up to twice the limit", "nsbc/kernels.py", "if speed > max_speed[i]:", "if speed > 2.0 * max_speed[i]:"
@@ -208,8 +211,10 @@ KERNELS = (
         "for m in range(j, j + 1 if planar or j == i else count):",
         "for m in range(j, j + 1):",
         runs=("crowd d",),
-        proofs=WIRING,
-        tests=("tests/nsbc/test_avoidance.py",),
+        tests=(
+            *WIRING,
+            "tests/nsbc/test_avoidance.py",
+        ),
     ),
     Mutant(
         "contradictions are not looked for",
@@ -217,8 +222,10 @@ KERNELS = (
         "return velocity if shortfall <= CONTRADICTION_M_S else _least_violation(normal, bound)",
         "return velocity",
         runs=("crowd b", "crowd d"),
-        proofs=WIRING,
-        tests=("tests/nsbc/test_avoidance.py",),
+        tests=(
+            *WIRING,
+            "tests/nsbc/test_avoidance.py",
+        ),
     ),
     Mutant(
         "the recursion starts with the highest priority",
@@ -375,47 +382,42 @@ LAW = (
     ),
 )
 
-TRIGGER = ("tests/decision", "tests/systems/test_decision.py", "tests/verify/model/trigger/test_relation.py")
+TRIGGER = ("tests/decision", "tests/systems/test_decision.py")
 DECISION = (
     Mutant(
         "the dwell is 10 % short",
         "decision/trigger.py",
         "state.triggered_at + self.dwell if",
         "state.triggered_at + 0.9 * self.dwell if",
-        proofs=("ZENO-PROOF",),
-        tests=TRIGGER,
+        tests=(*TRANSITIONS, *TRIGGER),
     ),
     Mutant(
         "no dwell after a release",
         "decision/trigger.py",
         "over = t >= self.dwell_end(state)",
         "over = True",
-        proofs=("ZENO-PROOF",),
-        tests=TRIGGER,
+        tests=(*TRANSITIONS, *TRIGGER),
     ),
     Mutant(
         "the dwell counts from the release",
         "decision/trigger.py",
         "Mode.REFRACTORY, released_at=t)",
         "Mode.REFRACTORY, released_at=t, triggered_at=t)",
-        proofs=("ZENO-PROOF",),
-        tests=TRIGGER,
+        tests=(*TRANSITIONS, *TRIGGER),
     ),
     Mutant(
         "releases at the threshold",
         "decision/trigger.py",
         "x <= self.release and x < self.zeta:",
         "x <= self.zeta and x < self.zeta:",
-        proofs=("ZENO-PROOF",),
-        tests=TRIGGER,
+        tests=(*TRANSITIONS, *TRIGGER),
     ),
     Mutant(
         "nothing triggers at the initial time",
         "decision/trigger.py",
         "return self.rise(TriggerState(), t) if x >= self.zeta else TriggerState()",
         "return TriggerState()",
-        proofs=("ZENO-PROOF",),
-        tests=TRIGGER,
+        tests=(*TRANSITIONS, *TRIGGER),
     ),
     Mutant(
         "what is above the threshold at the start triggers after the first tick",
@@ -429,24 +431,21 @@ DECISION = (
         "decision/trigger.py",
         "return self.rise(state, t) if x >= self.zeta else replace(state, mode=Mode.SUPERVISING)",
         "return replace(state, mode=Mode.SUPERVISING)",
-        proofs=("ZENO-PROOF",),
-        tests=TRIGGER,
+        tests=(*TRANSITIONS, *TRIGGER),
     ),
     Mutant(
         "triggers are not counted",
         "decision/trigger.py",
         "triggers=state.triggers + 1",
         "triggers=state.triggers",
-        proofs=("ZENO-PROOF",),
-        tests=TRIGGER,
+        tests=(*TRANSITIONS, *TRIGGER),
     ),
     Mutant(
         "events come at the ends of steps",
         "systems/decision.py",
         "return -1.0 if self._anything_due(",
         "return 1.0 if self._anything_due(",
-        proofs=("THR-ISO",),
-        tests=TRIGGER,
+        tests=(*ISOLATION, *TRIGGER),
     ),
     Mutant(
         "extremes at the ends of steps only",
@@ -455,24 +454,21 @@ DECISION = (
         "    first, last = task_errors(begun), task_errors(now)\n"
         "    first, last = extremes(first, first)[0], extremes(last, last)[0]\n"
         "    return np.minimum(first, last), np.maximum(first, last)",
-        proofs=("THR-ISO",),
-        tests=TRIGGER,
+        tests=(*ISOLATION, *TRIGGER),
     ),
     Mutant(
         "corners of presets are not looked at",
         "systems/decision.py",
         "self._presets = tuple(presets)",
         "self._presets = ()",
-        proofs=("THR-ISO",),
-        tests=TRIGGER,
+        tests=(*ISOLATION, *TRIGGER),
     ),
     Mutant(
         "the noise's slope does not move the minimum",
         "decision/excursion.py",
         "slope = dn / length",
         "slope = 0.0",
-        proofs=("THR-ISO",),
-        tests=TRIGGER,
+        tests=(*ISOLATION, *TRIGGER),
     ),
     Mutant(
         "noise is no part of the decision variable",
@@ -486,7 +482,7 @@ DECISION = (
         "decision/bayes.py",
         "level = c2 / c1 * drift**2 / noise**2",
         "level = c1 / c2 * drift**2 / noise**2",
-        proofs=("THR-ROOT",),
+        tests=ROOT,
     ),
     Mutant(
         "the noise is 5 % too strong",
@@ -534,7 +530,7 @@ INTERVENTION = (
         "intervention/messages.py",
         "if proposal is None or answers[2 * robot + 1] != proposal.number:",
         "if proposal is None:",
-        proofs=("SAFE-GATE",),
+        tests=WIRING,
     ),
     Mutant("silence counts as acceptance", "intervention/messages.py", "== ACCEPT else None", "!= REFUSE else None"),
     Mutant(
@@ -929,7 +925,7 @@ MIX_UPS = (
         "favour = proposal.cause in self._team.ugvs and proposal.cause != self._team.ugvs[i]",
         "favour = proposal.cause != self._team.ugvs[i]",
         runs=("crowd d",),
-        proofs=("LIVE-WAIT",),
+        tests=ATTACKS,
     ),
     Mutant(
         "a withdrawal is not noticed before the next proposal",
@@ -937,7 +933,7 @@ MIX_UPS = (
         "return not any(proposals) and not any(memory.answers[::2])",
         "return not any(proposals)",
         runs=("crowd d",),
-        proofs=("LIVE-WAIT",),
+        tests=ATTACKS,
     ),
     Mutant(
         "a replaced proposal does not end its try",
@@ -945,7 +941,7 @@ MIX_UPS = (
         "if turns[i].executing and standing != ACCEPT:  # withdrawn",
         "if turns[i].executing and proposal is None:  # withdrawn",
         runs=("crowd d",),
-        proofs=("LIVE-WAIT",),
+        tests=ATTACKS,
     ),
     Mutant(
         "a UGV rests only where nothing is proposed",
@@ -953,6 +949,6 @@ MIX_UPS = (
         "            turns[i] = self._patience.rested(turns[i], t)\n            if proposal is None:\n",
         "            if proposal is None:\n                turns[i] = self._patience.rested(turns[i], t)\n",
         runs=("crowd d",),
-        proofs=("LIVE-WAIT",),
+        tests=ATTACKS,
     ),
 )

@@ -19,17 +19,16 @@ STAGES = {
 HEAD = """\
 Made by `python benchmarks/mutants.py --json mutants.json --page docs/mutants.md`: each mutant is one edit of the
 package in a temporary copy. Short runs (scenarios `crowd`, `bodies`, `case_a`, `case_b`, `soft_gate`) are judged by
-their claims and by the independent checker; where they say nothing else than on the package as it is, the proofs that
-are about the edited code, tampered reports (mutants of the checker), and at last the tests of the file. A mutant counts
-for the first of these that catches it. What demands less (mutants of claims and of the checker) says the same on
+their claims and by the independent checker; where they say nothing else than on the package as it is, the experiments
+that are about the edited code, tampered reports (mutants of the checker), and at last the tests of the file. A mutant
+counts for the first of these that catches it. What demands less (mutants of claims and of the checker) says the same on
 honest runs: it takes a run, or a report, that must be refused.
 """
 ELSEWHERE = """\
-Mutants that the tests make in place, each refuted by the claim named: `tests/verify/model/avoidance/test_wiring.py`
-(SAFE-INV, SAFE-GATE), `tests/verify/runs/test_exec.py` (EXEC), `tests/verify/runs/test_gate_model.py` (GATE-MODEL),
-and broken traces in the other files of `tests/verify/runs`. Broken variants of proofs: [claims](claims.md) lists them
-under each claim, and `python -m airground_drake.report audit` shows the counterexamples. Tampered reports:
-`tests/check/tampering`, see [the checker](checker.md).
+Mutants that the tests make in place: wiring, layers, automata and gatekeepers in `tests/hypotheses`; mutants that a
+claim must refute in `tests/verify/runs/test_exec.py` (EXEC) and `tests/verify/runs/test_gate_model.py` (GATE-MODEL),
+and broken traces in the other files of `tests/verify/runs`. Tampered reports: `tests/check/tampering`, see
+[the checker](checker.md).
 """
 
 

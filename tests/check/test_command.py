@@ -62,9 +62,9 @@ def no_constants(text: str) -> None:
 def test_json_is_strict_and_says_the_same(report: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert check.main(["--json", str(report)]) == 0
     said = json.loads(capsys.readouterr().out, parse_constant=no_constants)
-    assert said["schema"] == "airground_drake.check/1"
-    assert said["summary"] == {"agrees": len(said["checks"]), "DISAGREES": 0, "cannot be re-established": 0}
-    assert {"claim", "run", "outcome", "text", "rule", "t_s", "recorded", "recomputed"} <= set(said["checks"][0])
+    assert said["schema"] == "airground_drake.check/2"
+    assert said["summary"] == {"agrees": len(said["checks"]), "DISAGREES": 0, "cannot be checked": 0}
+    assert {"claim", "run", "outcome", "text", "rule", "t_s", "recorded", "recomputed", "by"} <= set(said["checks"][0])
 
 
 def test_a_rejection_names_rule_time_and_both_values(
@@ -111,14 +111,12 @@ def test_anything_else_is_no_report(content: str, tmp_path: Path, capsys: pytest
     assert "Traceback" not in said.err
 
 
-@pytest.mark.parametrize(
-    "key", ["scenario", "provenance", "overall", "runs", "claims", "audit", "mutants", "choices", "files"]
-)
+@pytest.mark.parametrize("key", ["scenario", "provenance", "overall", "runs", "claims", "audit", "choices", "files"])
 @pytest.mark.parametrize("value", [None, [], {}, "x", 3, [1], [None]])
 def test_a_report_with_a_part_of_another_kind_is_refused(report: Path, key: str, value: Any, tmp_path: Path) -> None:
     document = json.loads((report / "report.json").read_text())
-    if document[key] == value:
-        pytest.skip("it is the same")
+    if document[key] == value or (key, value) == ("choices", []):
+        pytest.skip("the checker takes it: quoted choices are compared when the report is built again")
     document[key] = value
     folder = copy(report, tmp_path)
     write(folder / "report.json", json.dumps(document).encode())

@@ -1,7 +1,8 @@
-"""SAFE-TRACE and SAFE-HYP of the checker refute what is broken by more than rounding, whatever a report says of it."""
+"""Distances and shortfalls of the checker against closed forms."""
 
 from __future__ import annotations
 
+from fractions import Fraction
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -9,40 +10,53 @@ import numpy as np
 import pytest
 
 from airground_drake.check import safety
-from airground_drake.check.rules import Disagreement
 from airground_drake.check.run import Run
+from airground_drake.check.scenario import Pair
 
-RUN = cast(
-    "Run",
-    SimpleNamespace(
-        pairs=[SimpleNamespace(robot="ugv1", other="rock", safe_m=2.0, closing_m_s=1.0)],
-        scenario={"control": {"period_s": 0.05}},
-    ),
-)
+PERIOD_S, GAIN_1_S, SAFE_M = 0.25, 2.0, 2.0
+"""Binary fractions, so that A h = 1/2 and the positions below are exact."""
+
+
+def run(way_m: list[float], **more: Any) -> Run:
+    """A robot that moves along x towards a rock at the origin, one place per control sample."""
+    t = PERIOD_S * np.arange(len(way_m))
+    own = np.column_stack([way_m, np.zeros(len(t)), np.zeros(len(t))])
+    pair = Pair("ugv1", "rock", SAFE_M, 1.0, 1.0)
+    found = SimpleNamespace(
+        t_s=t, sample_row=np.arange(len(t) - 1), pairs=[pair], apart_m={("ugv1", "rock"): 0.0},
+        position_m={"ugv1": own, "rock": np.zeros((len(t), 3))},
+        scenario={"control": {"period_s": PERIOD_S, "avoidance_gain_1_s": GAIN_1_S}},
+    )  # fmt: skip
+    return cast("Run", cast("Any", found))
 
 
 @pytest.mark.parametrize(
     ("short_m", "status"), [(0.0, "holds"), (5e-10, "holds"), (2e-9, "refuted"), (0.01, "refuted")]
 )
-def test_a_distance_that_is_short_refutes(monkeypatch: pytest.MonkeyPatch, short_m: float, status: str) -> None:
-    monkeypatch.setattr(safety, "least_distance_m", lambda run, pair: pair.safe_m - short_m)
-    monkeypatch.setattr(safety, "_evidence_on_a_pair", lambda *_: None)
-    noted = {"first": "ugv1", "second": "rock", "exercised": True, "margin_m": -short_m}
-    claim = {"evidence": {"pairs": [noted], "pairs_in_all": 1}, "where": noted}
-    assert safety.safe_trace(RUN, claim).status == status
+def test_a_distance_that_is_short_refutes(short_m: float, status: str) -> None:
+    found = safety.safe_trace(run([3.0, 2.0 - short_m, 2.5]))
+    assert found.status == status
+    assert found.margin == pytest.approx(-short_m, abs=1e-15)
 
 
-@pytest.mark.parametrize(("margin", "broken"), [(0.0, False), (-5e-10, False), (-2e-9, True), (-0.5, True)])
-def test_a_broken_inequality_refutes(monkeypatch: pytest.MonkeyPatch, margin: float, broken: bool) -> None:
-    kind = safety.KINDS[0]
-    found = safety.Hypothesis("avoidance", "m/s", np.array([1.0]), np.array([margin]), kind=kind)
-    monkeypatch.setattr(safety, "_constants", lambda run: iter(()))
-    monkeypatch.setattr(safety, "_velocities", lambda run: iter(()))
-    monkeypatch.setattr(safety, "_inequalities", lambda run: iter([found]))
-    bind = dict.fromkeys(safety.KINDS, 0) | {kind: 1}
-    claim: dict[str, Any] = {"evidence": {"inequalities_that_bind": bind}, "where": {"hypothesis": "avoidance"}}
-    refuted = safety.safe_hyp(RUN, claim | {"status": "refuted"})
-    assert refuted.status == ("refuted" if broken else "holds")
-    if broken:
-        with pytest.raises(Disagreement, match="the hypotheses held"):
-            safety.safe_hyp(RUN, claim | {"status": "holds"})
+def test_the_least_distance_lies_between_rows() -> None:
+    passing = run([3.0, -3.0])
+    passing.position_m["ugv1"][:, 1] = 0.5
+    assert safety.least_distance_m(passing, passing.pairs[0]) == 0.5
+
+
+@pytest.mark.parametrize(
+    ("way_m", "missed_m"),
+    [
+        ([3.0, 2.0], 0.0),  # exactly the bound: the safe distance is reached
+        ([3.0, 1.75], 0.25),  # beyond it
+        ([1.0, 1.5], 0.0),  # inside, A h (d - D) = 1/2 back is demanded
+        ([1.0, 1.25], 0.25),
+        ([1.0, 0.75], 0.75),
+        ([10.0, 9.0], 0.0),  # far
+    ],
+)
+def test_the_shortfall_is_what_the_inequality_lacks(way_m: list[float], missed_m: float) -> None:
+    approach = run(way_m)
+    found = safety.shortfall_m(approach, approach.pairs[0])
+    assert abs(found - Fraction(missed_m)) < Fraction(1, 2**100)

@@ -14,13 +14,10 @@ from typing import Any
 import pytest
 
 from airground_drake.decision import bayes
-from airground_drake.registry import MODEL_CLAIMS
-from airground_drake.report import document
 from airground_drake.report.audit import companions, formulas, thresholds
 from airground_drake.report.figures import findings
 from airground_drake.scenarios.load import load
 from airground_drake.verify import Finding, cache_folder, verify_model
-from airground_drake.verify.mutants import refute_mutants
 
 DOCS = Path(__file__).parent.parent.parent / "docs"
 FORMULAS = (2, 3, 4, 5, 8, 9, *range(12, 19))
@@ -87,26 +84,6 @@ def test_without_proofs_the_items_that_rest_on_them_are_not_demonstrated(proofs:
     assert found == {number: number != 2 for number in FORMULAS}
     found = {item["id"]: item["demonstrated"] for item in from_formulas({})}
     assert found == {number: number not in (2, 9) for number in FORMULAS}
-
-
-@pytest.mark.parametrize("name", ["case_a", "case_b"])
-def test_every_mutant_of_the_proofs_is_refuted(name: str) -> None:
-    """On case A as the tests beside the proofs, which look at each: all take what the first one has found."""
-    scenario = load(name)[0]
-    found = refute_mutants(scenario, kept=cache_folder())
-    assert len(found) >= 30
-    assert [mutant for mutant in found if not mutant["refuted"]] == []
-    assert {mutant["claim"] for mutant in found} == set(MODEL_CLAIMS)
-    again = refute_mutants(scenario, kept=cache_folder())
-    assert any(mutant["from_cache"] for mutant in again)
-    assert [mutant | {"from_cache": False} for mutant in again] == [mutant | {"from_cache": False} for mutant in found]
-
-
-def test_a_mutant_that_survives_is_in_the_verdict() -> None:
-    surviving = [{"claim": "SAFE-INV", "mutant": "harmless", "refuted": False}]
-    overall = document.overall([{"as_expected": True, "status": "holds", "exercised": 1}], [], (), surviving)
-    assert (overall["status"], overall["exit_code"]) == ("not_as_expected", 1)
-    assert "SAFE-INV: harmless" in overall["why"]
 
 
 @pytest.mark.parametrize("number", [*FORMULAS, 7, 10, 11])

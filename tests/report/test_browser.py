@@ -47,7 +47,7 @@ def page_file(scenario: Scenario, traces: dict[str, Trace], tmp_path_factory: py
     faulty = {**traces, "c": replace(traces["c"], meta={**traces["c"].meta, "faults": [FAULT]})}
     items = [{**item, "id": 90 + k} for k, item in enumerate(audit.of_runs(scenario, traces))]
     report = document.build(
-        scenario, "ab" * 32, faulty, [idle, failed, FINE[2]], {"package": "0.1.0"}, audit=items, mutants=[MUTANT],
+        scenario, "ab" * 32, faulty, [idle, failed, FINE[2]], {"package": "0.1.0"}, audit=items,
         required=["SAFE-INV"],
     )  # fmt: skip
     path = tmp_path_factory.mktemp("page") / "report.html"
@@ -63,10 +63,6 @@ def short(figure: Figure) -> Figure:
 
 
 FAULT = {"t_s": 1.0, "robot": "ugv1", "policy": "detour", "what": "ValueError: no"}
-MUTANT: dict[str, Any] = {
-    "claim": "SAFE-INV", "mutant": "half the bound", "status": "refuted", "refuted": True, "counterexample": {"x": 1.0},
-    "error": None, "from_cache": False,
-}  # fmt: skip
 
 
 @pytest.fixture(scope="module")

@@ -22,7 +22,7 @@ Report = Callable[[str], Path]
 def test_everything_is_written(report: Report) -> None:
     folder = report("case_a")
     names = {path.name for path in folder.iterdir()}
-    assert names == {"report.html", "report.json", "junit.xml", "diagram.dot", "diagram.svg", "trace", "certificates"}
+    assert names == {"report.html", "report.json", "junit.xml", "diagram.dot", "diagram.svg", "trace"}
     assert (folder / "diagram.dot").read_text() == (DIAGRAMS / "case_a.dot").read_text()
     scenario = load("case_a")[0]
     for name in scenario.runs:

@@ -132,6 +132,13 @@ BAD: list[tuple[str, object, list[str]]] = [
     ("ugvs.one.target_m", [5, -4, 0], ["ugvs.one.target_m", "one would end 1 m from rock"]),
     ("uav.target_m", [5, -4, 0], ["uav.target_m", "uav would end 1 m from rock"]),
     ("ugvs.two.target_m", [9, 1, 0], ["ugvs.two.target_m", "two would end 1 m from one"]),
+    # claims that have moved
+    ("runs.d.expected", {"GATE-SUR": "holds"}, ["expected.GATE-SUR", "no longer a claim, it is part of GATE-FEAS"]),
+    (
+        "runs.d.expected",
+        {"GATE-TIME": "exercised"},
+        ["no longer a claim, decision times are measurements", "remove it"],
+    ),
     # radii
     ("obstacles.rock.radius_m", -1, ["obstacles.rock.radius_m: -1.0", "a number in m, not below 0"]),
     ("ugvs.one.radius_m", "wide", ["ugvs.one.radius_m"]),

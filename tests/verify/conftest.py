@@ -10,26 +10,24 @@ from verify.judging import Judged
 
 from airground_drake.scenarios.load import load
 from airground_drake.verify.cache import cache_folder, find
-from airground_drake.verify.claim import ModelClaim, Mutant
+from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.finding import Finding
-from airground_drake.verify.mutants import MutantClaim
 
 
 @pytest.fixture(scope="session")
 def judged() -> Judged:
-    """`judged(claim, inputs)`: the finding on a claim or a mutant, on case A by default, which its report has, too.
+    """`judged(claim, inputs)`: the finding on a claim, on case A by default, which its report has, too.
 
     Tests that patch something must judge themselves.
     """
     case_a = load("case_a")[0]
     made: dict[tuple[str, str], Finding] = {}
 
-    def get(claim: ModelClaim | Mutant, inputs: dict[str, Any] | None = None) -> Finding:
-        asked = MutantClaim(claim) if isinstance(claim, Mutant) else claim
-        given = asked.inputs(case_a) if inputs is None else inputs
-        key = asked.id, json.dumps(given, sort_keys=True)
+    def get(claim: ModelClaim, inputs: dict[str, Any] | None = None) -> Finding:
+        given = claim.inputs(case_a) if inputs is None else inputs
+        key = claim.id, json.dumps(given, sort_keys=True)
         if key not in made:
-            (made[key],) = find([asked], [given], folder=cache_folder())
+            (made[key],) = find([claim], [given], folder=cache_folder())
         return made[key]
 
     return get

@@ -6,25 +6,25 @@ from typing import Any, Protocol
 
 from airground_drake.trace import Trace
 from airground_drake.verify import TRACE_CLAIMS, Finding, TraceClaim
-from airground_drake.verify.claim import ModelClaim, Mutant
-from airground_drake.verify.runs import gate_feas, gate_opt, gate_sur
+from airground_drake.verify.claim import ModelClaim
+from airground_drake.verify.runs import gate_feas, gate_opt
 from airground_drake.verify.runs.convex_bounds import enclose
 from airground_drake.verify.runs.gate_feas import GateFeas
 from airground_drake.verify.runs.gate_opt import GateOpt
 from airground_drake.verify.runs.gate_record import Off, rows_of
-from airground_drake.verify.runs.gate_sur import GateSur
+from airground_drake.verify.runs.sum_up_rounding import compare_rounding, is_rounded
 
 
 class Judged(Protocol):
     """The type of the fixture `judged` of conftest.py."""
 
-    def __call__(self, claim: ModelClaim | Mutant, inputs: dict[str, Any] | None = None) -> Finding:
+    def __call__(self, claim: ModelClaim, inputs: dict[str, Any] | None = None) -> Finding:
         """The finding for these inputs; default: those of case A."""
 
 
 CLAIMS = {claim.id: claim for claim in TRACE_CLAIMS}
 
-GATE = {"GATE-OPT", "GATE-SUR", "GATE-FEAS", "GATE-MODEL"}
+GATE = {"GATE-OPT", "GATE-FEAS", "GATE-MODEL"}
 """Claims about recorded problems, which the synthetic runs do not have: see runs/test_gate_claims.py."""
 
 UNRECORDED = {
@@ -51,13 +51,11 @@ def counterexample(claim: str, trace: Trace) -> dict[str, Any]:
     return finding.counterexample
 
 
-FEAS, SUR, OPT = GateFeas(), GateSur(), GateOpt()
+FEAS, OPT = GateFeas(), GateOpt()
 
 
 def comparisons(claim: TraceClaim, trace: Trace) -> list[Off]:
     rows = rows_of(trace)
-    if claim is SUR:
-        return [one for row in rows for one in gate_sur.compare_rounding(row)]
     if claim is OPT:
         pairs = zip(rows, enclose(rows), strict=True)
         return [one for row in rows for one in gate_opt.compare_with_constant_plans(row)] + [
@@ -66,7 +64,8 @@ def comparisons(claim: TraceClaim, trace: Trace) -> list[Off]:
     described = [
         one for row in rows for one in (*gate_feas.compare_situation(trace, row), *gate_feas.compare_plan(trace, row))
     ]
-    return [*described, *gate_feas.compare_answers(trace, rows)]
+    rounded = [one for row in rows if is_rounded(row) for one in compare_rounding(row)]
+    return [*described, *rounded, *gate_feas.compare_answers(trace, rows)]
 
 
 def assert_decision_refuted(claim: TraceClaim, trace: Trace, what: str) -> None:

@@ -14,14 +14,12 @@ from typing import Any
 import pytest
 
 import airground_drake
-from airground_drake.errors import PluginError
-from airground_drake.report.after_runs import _save_certificates
+from airground_drake import files
+from airground_drake.registry import MODEL_CLAIMS
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify import cache
-from airground_drake.verify.claim import ModelClaim, Verdict
-from airground_drake.verify.engines.prover import certificates, proved_again
+from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.finding import Finding
-from airground_drake.verify.model.avoidance.obligations import gate
 from airground_drake.verify.model.avoidance.safe_gate import SafeGate
 
 
@@ -30,6 +28,7 @@ class Counting(ModelClaim):
 
     id, statement, formula, method, equations = "COUNTING", "s", "f", "m", "e"
     assumptions, does_not_establish = (), "n"
+    kept = True
 
     def __init__(self, found: Finding | Exception) -> None:
         self.found, self.calls = found, 0
@@ -45,7 +44,7 @@ class Counting(ModelClaim):
 
 
 def test_findings_are_kept_by_their_inputs(tmp_path: Path) -> None:
-    claim = Counting(Finding("proved", certificates={"a": "b"}))
+    claim = Counting(Finding("proved", evidence={"a": "b"}))
     (first,) = cache.find([claim], [{"x": 1.0}], folder=tmp_path)
     assert not first.from_cache
     assert cache.find([claim], [{"x": 1.0}], folder=tmp_path) == [replace(first, from_cache=True)]
@@ -76,7 +75,8 @@ def entry(**changes: Any) -> bytes:
     """One of COUNTING for {}, with changes to its finding."""
     finding = asdict(Finding("proved", margin=1.0, exercised=1)) | changes
     about = cache.content(Counting(Finding("proved")), {})
-    return json.dumps({**about, "finding": finding}).encode()
+    text = json.dumps(finding, sort_keys=True, allow_nan=True)
+    return json.dumps({**about, "finding": finding, "sha256": files.sha256(text.encode())}).encode()
 
 
 UNUSABLE: dict[str, bytes] = {
@@ -95,14 +95,14 @@ UNUSABLE: dict[str, bytes] = {
     "a field too many": entry(more=1),
     "evidence that is a list": entry(evidence=[]),
     "a count below 0": entry(exercised=-1),
-    "a certificate outside": entry(certificates={"../../..": "x"}),
-    "a certificate of no text": entry(certificates={"a": 1}),
+    "a flipped bit": entry().replace(b'"margin": 1.0', b'"margin": 3.0'),
+    "no digest": entry().replace(b'"sha256"', b'"sha265"'),
     "nothing that passes": entry(status="inconclusive"),
     "a refutation": entry(status="refuted", counterexample={"x": 1}),
     "another claim": entry().replace(b"COUNTING", b"ANOTHER"),
     "another code": entry().replace(cache._code().encode(), b"0" * 64),
-    "another engine": entry().replace(b'"z3-solver"', b'"z4-solver"'),
-    "another schema": entry().replace(b"finding/1", b"finding/2"),
+    "another engine": entry().replace(b'"numba"', b'"numbb"'),
+    "another schema": entry().replace(b"finding/2", b"finding/1"),
     "large": entry() + b" " * cache.LARGEST_BYTES,
 }
 
@@ -139,47 +139,10 @@ def test_an_entry_under_another_key_is_made_anew(tmp_path: Path) -> None:
     assert claim.calls == 2
 
 
-def proof() -> Finding:
-    """Of SAFE-GATE's obligations, as `discharge` records one; solvers are not asked."""
-    obligations = gate()
-    evidence = {"obligations": [{"name": each.name, "status": "proved"} for each in obligations]}
-    return Finding("proved", evidence=evidence, certificates=certificates(obligations), exercised=len(obligations))
-
-
-def test_certificates_are_established_again() -> None:
-    known = proof()
-    assert proved_again(known, gate())
-    assert SafeGate().takes({}, known)
-    scripts = {name: text for name, text in known.certificates.items() if name != "obligations.json"}
-    wrong = known.certificates["obligations.json"].replace('"coefficient": "1"', '"coefficient": "2"')
-    open_ = [each | {"status": "inconclusive"} for each in known.evidence["obligations"]]
-    for changed in (
-        replace(known, certificates=scripts),
-        replace(known, certificates=scripts | {"obligations.json": wrong}),
-        replace(known, certificates=known.certificates | {"zero_outside.smt2": "(check-sat)"}),
-        replace(known, evidence={"obligations": open_}),
-        replace(known, evidence={"obligations": open_[1:]}),
-        replace(known, exercised=1),
-        replace(known, status="supported"),
-    ):
-        assert not proved_again(changed, gate())
-    broken = [replace(gate()[0], certificate=()), *gate()[1:]]
-    assert not proved_again(replace(known, certificates=certificates(broken)), broken)
-
-
-def test_an_entry_with_malformed_evidence_is_made_anew() -> None:
-    assert not cache._takes(SafeGate(), {}, replace(proof(), evidence={"obligations": [1]}))
-
-
-@pytest.mark.parametrize("name", ["../../..", "..", ".", "", "a/b", "/etc/passwd", "a\\b", "a\0", "x" * 101, "ü"])
-def test_certificates_have_plain_names(name: str, tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match="no name for a certificate"):
-        Finding("proved", certificates={name: "x"})
-    claim = Counting(Finding("proved"))
-    claim.id = name
-    with pytest.raises(PluginError):
-        _save_certificates(tmp_path / "c", [Verdict(claim, "", Finding("proved", certificates={"a": "b"}), "proved")])
-    assert not list(tmp_path.iterdir())
+def test_only_experiments_are_kept() -> None:
+    """A theorem's hypotheses take no longer to check than an entry takes to read."""
+    kept = {name for name in MODEL_CLAIMS if MODEL_CLAIMS.make(name, of=ModelClaim).kept}
+    assert kept == {"ZENO-REFINE", "THR-DDM"}
 
 
 def test_the_key_covers_every_file_of_the_package_where_it_is(tmp_path: Path) -> None:

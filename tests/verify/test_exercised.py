@@ -58,7 +58,7 @@ def test_a_run_without_anything_to_check_exercises_no_claim(claim: str, idle: di
 
 @pytest.mark.parametrize("claim", CLAIMS)
 def test_a_run_with_several_triggers_and_proposals_exercises_every_claim(claim: str, run: Runs) -> None:
-    of = {"GATE-OPT": ("case_b", "c"), "GATE-SUR": ("case_b", "c"), "LIVE-PROG": ("contact", "d")}
+    of = {"GATE-OPT": ("case_b", "c"), "LIVE-PROG": ("contact", "d")}
     (verdict,) = verify(run(*of.get(claim, ("dwell", "d"))), [claim])
     count = verdict.finding.exercised
     assert count

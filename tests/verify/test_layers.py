@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ast
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -14,7 +16,6 @@ PACKAGE = Path(airground_drake.__file__).parent
 ALLOWED: dict[str, set[str]] = {
     "engines": {"arrays", "interruption", "statuses", "verify.engines", "verify.finding"},
     "runs": {"arrays", "errors", "trace", "verify.engines", "verify.runs", "verify.claim", "verify.finding"},
-    "stl": {"arrays", "trace", "verify.runs", "verify.stl", "verify.claim", "verify.finding"},
 }
 """By folder of verify/, beginnings of what its modules may import of this package."""
 JUDGED = {"nsbc", "gatekeeper", "systems", "decision", "diagram", "simulation", "intervention"}
@@ -67,6 +68,19 @@ def test_what_runs_may_import_loads_nothing_that_is_judged() -> None:
 def test_the_shelves_of_model_do_not_import_each_other() -> None:
     assert len(SHELVES) > 3
     for shelf in SHELVES:
-        others = {f"verify.model.{other}" for other in SHELVES - {shelf}} | {"verify.runs", "verify.stl"}
+        others = {f"verify.model.{other}" for other in SHELVES - {shelf}} | {"verify.runs"}
         for path in (PACKAGE / "verify" / "model" / shelf).glob("*.py"):
             assert not [name for name in imported(path) if within(name, others)], path
+
+
+def test_judging_loads_no_drake() -> None:
+    """Claims can be judged again where Drake is not installed."""
+    code = (
+        "import sys; from airground_drake.scenarios.load import load; from airground_drake.verify import verify_model; "
+        "from airground_drake.registry import MODEL_CLAIMS, RUN_CLAIMS; "
+        "from airground_drake.verify.registry import run_claims; run_claims(); "
+        "ids = [name for name in MODEL_CLAIMS if name not in ('LIVE-GATE', 'ZENO-REFINE')]; "
+        "verify_model(load('case_a')[0], claims=ids); print('pydrake' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"

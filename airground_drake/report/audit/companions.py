@@ -11,6 +11,9 @@ from pydrake.solvers import ClarabelSolver, MathematicalProgram
 
 from airground_drake.arrays import Array
 from airground_drake.gatekeeper.certified import CertifiedGatekeepers
+from airground_drake.gatekeeper.outcome import Outcome
+from airground_drake.gatekeeper.sample import Situation
+from airground_drake.intervention.policy import Proposal
 from airground_drake.report.audit.item import Item
 from airground_drake.report.figures.canvas import thin
 from airground_drake.report.figures.timelines import nearest_distance
@@ -19,11 +22,20 @@ from airground_drake.report.reproduction import MEASURES
 from airground_drake.scenarios.load import load
 from airground_drake.simulation import simulate
 from airground_drake.trace import Trace
-from airground_drake.verify.model.patience.attack import Believing
 
 WAY_POINTS = 120
 """Points of a line that a finding keeps for its picture."""
 EVERYTHING = "d, all accepted"
+
+
+class Believing(CertifiedGatekeepers):
+    """Takes every proposal for useful, followed without any lag."""
+
+    def foresee(self, seen: Situation, i: int, proposal: Proposal) -> tuple[Outcome, Outcome]:
+        """Refusing stalls, accepting does not."""
+        steps = np.arange(0.0, 2.0, self._law.avoidance.period)
+        follows = proposal.motion.sample(seen.t + steps)
+        return Outcome(follows, True, 1.0, 1.0), Outcome(follows, False, 0.0, 0.0)
 
 
 def companion_findings() -> list[Item]:

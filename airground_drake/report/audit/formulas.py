@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
-import sympy
 
 from airground_drake.arrays import Array
 from airground_drake.nsbc.tasks import DistanceTask
@@ -60,38 +60,40 @@ def _avoidance_jacobian() -> Array:
 
 def _feed_forward(scenario: Scenario) -> Item:
     """Item 12: (6) feeds the task's own rate forward, not the desired one."""
-    v, gain, error = sympy.symbols("v B sigma_error", real=True)
-    printed = sympy.Eq(v, v + gain * error)  # J = I: the task's rate is v itself
-    solutions = sympy.solve(printed, error)
-    example = {gain: scenario.control.motion_gain_1_s, error: 1.0}
+    gain, error = scenario.control.motion_gain_1_s, 1.0
     rate = scenario.ugvs["ugv1"].preset.speed_m_s
-    velocities = {
-        "as_printed": [float(x) for x in sympy.solve(printed.subs(example), v)],
-        "corrected": [float(x) for x in sympy.solve(sympy.Eq(v, rate + (gain * error).subs(example)), v)],
-    }
+    # J = I: the task's rate is v itself. As printed v = v + B error, or 0 v = B error; corrected v = rate + B error
+    velocities = {"as_printed": _solutions(0.0, gain * error), "corrected": _solutions(1.0, rate + gain * error)}
+    solutions = _solutions(gain, 0.0)
     return item(
         12, "(6)",
         "(6) feeds forward the rate of the task itself, sigma_m, instead of the desired sigma_md. With J = I it reads "
         "v = v + B error, which no velocity satisfies unless the error is 0.",
         "v = J^+ (d(sigma_m)/dt + B error)", "v = J^+ (d(sigma_md)/dt + B error)",
-        solutions == [0] and [len(found) for found in velocities.values()] == [0, 1],
+        solutions == [0.0] and [len(found) for found in velocities.values()] == [0, 1],
         {
-            "solutions_for_the_error": [str(solution) for solution in solutions], "error_m": example[error],
-            "gain_1_s": example[gain], "desired_rate_m_s": rate, "velocities_m_s": velocities,
+            "solutions_for_the_error": [f"{solution:g}" for solution in solutions], "error_m": error,
+            "gain_1_s": gain, "desired_rate_m_s": rate, "velocities_m_s": velocities,
         },
     )  # fmt: skip
 
 
+def _solutions(slope: float, right: float) -> list[float]:
+    """All x with slope * x = right, where the slope is not 0; nothing where it is."""
+    return [right / slope] if slope else []
+
+
 def _centroid(scenario: Scenario) -> Item:
     """Item 13: the task value (9) does not depend on the UAV."""
-    uav, one, two = sympy.symbols("uav_x ugv1_x ugv2_x", real=True)
-    tasks = {"as_printed_m": (one + two) / 2, "corrected_m": uav - (one + two) / 2}
-    printed, ours = (sympy.diff(task, uav) for task in tasks.values())
     targets = {robot: scenario.ugvs[robot].target_m[0] for robot in ("ugv1", "ugv2")}
-    at = {"uav_x_m": [-2.0, 0.0, 2.0, 4.0]} | {
-        name: [float(task.subs({one: targets["ugv1"], two: targets["ugv2"], uav: x})) for x in (-2.0, 0.0, 2.0, 4.0)]
-        for name, task in tasks.items()
+    centroid = sum(targets.values()) / 2.0
+    tasks: dict[str, Callable[[float], float]] = {
+        "as_printed_m": lambda uav_x: centroid,
+        "corrected_m": lambda uav_x: uav_x - centroid,
     }
+    places = [-2.0, 0.0, 2.0, 4.0]
+    at = {"uav_x_m": places} | {name: [task(x) for x in places] for name, task in tasks.items()}
+    printed, ours = (task(1.0) - task(0.0) for task in tasks.values())  # linear: the difference is the slope
     return item(
         13, "(9)-(10)",
         "The task value (9) is the centroid of the UGVs, which does not depend on the UAV's position: its Jacobian is "

@@ -1,4 +1,4 @@
-"""GATE-FEAS: every gatekeeper decision of a run, its plan and the answer given, from the data that it recorded."""
+"""GATE-FEAS: every gatekeeper decision of a run, its plan, its rounding and the answer given, as recorded."""
 
 from __future__ import annotations
 
@@ -26,6 +26,7 @@ from airground_drake.verify.runs.gate_record import (
 from airground_drake.verify.runs.interventions import intervening
 from airground_drake.verify.runs.pairs import around
 from airground_drake.verify.runs.proposals import proposals_of
+from airground_drake.verify.runs.sum_up_rounding import compare_rounding, integrated_error_s, is_rounded
 
 SPEED_TOLERANCE = 1e-4
 """A step may be longer than the speed limit allows by this, relative."""
@@ -44,13 +45,16 @@ class GateFeas(GateClaim):
     statement = (
         "Every gatekeeper decision was about the UGV's situation at that time, its plan satisfies (26b)-(26e) at the "
         "recorded cost, and the answer given is the one that follows from the costs; every proposal that stood for "
-        "long enough was decided on."
+        "long enough was decided on. Relaxed plans were rounded by sum-up rounding, with an integrated error of at "
+        "most half a stage."
     )
     formula = (
         "rho(0) = p(t); omega in {0, 1}; rho_k = rho_(k-1) + dt (omega_k a_k + (1 - omega_k) b_k); u_k = max(0, max_j "
         "d_j - ||rho_k - o_jk||); objective = dt sum_k a ||rho_rd - rho_k||^2 + b u_k^2, and the terminal "
         "cost w a ||rho_rd - rho_N||^2 (w = 0 unless the scenario says so); reference, centres, distances and weights "
-        "as the scenario and the signals at t have them; answer = rules(costs, standing answer)"
+        "as the scenario and the signals at t have them; answer = rules(costs, standing answer); rounded_k = 1 if "
+        "D_k >= 1 - D_k else 0, D_k = sum_{r <= k} relaxed_r - sum_{r < k} rounded_r; "
+        "max_k |dt sum_{r <= k} (relaxed_r - rounded_r)| <= dt / 2"
     )
     latex = (
         r"\rho_k = \rho_{k-1} + \Delta t (\omega_k a_k + (1 - \omega_k) b_k), \quad \rho_0 = p(t), \quad "
@@ -59,6 +63,9 @@ class GateFeas(GateClaim):
         r"J = \Delta t \sum_k (a \lVert \rho_{rd} - \rho_k \rVert^2 + b u_k^2) + w a \lVert \rho_{rd} - "
         r"\rho_N \rVert^2",
         r"\text{answer} = \text{rules}(\text{costs}, \text{standing answer})",
+        r"\bar\omega_k = \begin{cases} 1 & D_k \ge 1 - D_k \\ 0 & \text{otherwise} \end{cases}, \quad "
+        r"D_k = \sum_{r \le k} \tilde\omega_r - \sum_{r < k} \bar\omega_r",
+        r"\max_k \left| \Delta t \sum_{r \le k} (\tilde\omega_r - \bar\omega_r) \right| \le \frac{\Delta t}{2}",
     )
     method = (
         "All recomputed in numpy from the scenario, the signals and the recorded mode velocities. A sensed obstacle or "
@@ -69,18 +76,22 @@ class GateFeas(GateClaim):
         "loop: there (23) is checked up to the first change of mode, after it that no step is longer than the speed "
         "limit allows. Constant plans keep to it, except where they begin more than 1e-6 m inside a safe distance: "
         "avoidance may then demand more; so do other plans where the constant plan of their stage's choice does. "
+        "Rounding is judged stage by stage, by running sums of the recorded relaxed and rounded plans; deficits within "
+        "1e-9 of 1/2 are a tie, where either mode may follow. "
         "Under method (d), which solves no problem (26), it is about the times of the decisions; what its answers rest "
         "on is GATE-MODEL, how they follow LIVE-PROG. That answers are obeyed is EXEC."
     )
-    equations = "(22)-(26)"
+    equations = "(22)-(26), (28)-(29)"
     assumptions = (
         "The mode velocities of (23) are the recorded ones, in stages of the recorded length.",
         "Other robots keep the velocity that they have at the time of the decision.",
         "The cost of the choice that lost is the recorded one.",
+        "The relaxed plan recorded is the one that was rounded.",
     )
     does_not_establish = (
         "That the mode velocities are those of the closed loop, or that the run went as predicted. (26d) is soft: a "
-        "feasible plan may lead inside a safe distance, at the cost of its slack; safety is SAFE-TRACE."
+        "feasible plan may lead inside a safe distance, at the cost of its slack; safety is SAFE-TRACE. That the "
+        "relaxed plan is optimal is GATE-OPT. The cheapest plan known is taken, which need not be the rounded one."
     )
 
     exercised_by = "decisions"
@@ -91,12 +102,16 @@ class GateFeas(GateClaim):
             return judge_compared(trace, rows, [*compare_times(trace, rows)])
         compared = [one for row in rows for one in (*compare_situation(trace, row), *compare_plan(trace, row))]
         compared += compare_answers(trace, rows)
+        rounded = [row for row in rows if is_rounded(row)]
+        compared += [one for row in rounded for one in compare_rounding(row)]
         slack = [float(np.maximum(0.0, -row.clearance(row["positions_m"])).max()) for row in rows if row.planned]
         return judge_compared(
             trace, rows, compared,
             without_a_plan=[row.label for row in rows if not row.planned],
             largest_slack_m=max(slack, default=0.0),
             plans_with_slack=sum(value > 0.0 for value in slack),
+            rounded_plans=len(rounded),
+            largest_rounding_error_s=max(map(integrated_error_s, rounded), default=0.0),
         )  # fmt: skip
 
 

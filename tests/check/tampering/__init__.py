@@ -3,19 +3,15 @@
 `PYTHONPATH=tests python -m check.tampering DIR` tries them all on copies of a report of case B.
 """
 
-from check.tampering import bombs, certificates, counts, decisions, events, execution, files, outcomes, report, signals
-from check.tampering.base import IGNORED, NO_REPORT, TAMPERINGS, Outcome, Tampering, attempt
+from check.tampering import bombs, decisions, events, execution, files, outcomes, report, signals
+from check.tampering.base import TAMPERINGS, Outcome, Tampering, attempt
 
 __all__ = [
-    "IGNORED",
-    "NO_REPORT",
     "TAMPERINGS",
     "Outcome",
     "Tampering",
     "attempt",
     "bombs",
-    "certificates",
-    "counts",
     "decisions",
     "events",
     "execution",

@@ -11,21 +11,26 @@ import hashlib
 import io
 import json
 import os
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from functools import cache
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, field
+from functools import cache, lru_cache, partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
+import pytest
 
-from airground_drake import check
+from airground_drake.check import command as checker
+from airground_drake.check.report import AGREES, Line
+from airground_drake.report import rebuild
+from airground_drake.scenarios.schema import Scenario
+from airground_drake.trace import Trace
+from airground_drake.verify import Verdict, judge, verify_all
+from airground_drake.verify.claim import Claim
 
 RUN, UGV = "d", "ugv1"
 """The run and the UGV that are tampered with."""
-NO_REPORT = "no report"
-"""In place of a claim: the folder is refused as a whole, exit code 2."""
 
 
 @dataclass(frozen=True)
@@ -34,49 +39,33 @@ class Tampering:
 
     Attributes:
         edit: edits a copy of a report's folder in place.
-        claim: identifier in the line that must refuse it.
-        rule: name of the rule that must be broken, or its beginning.
-        run: on which run.
+        mended: whether the list of files is made right afterwards.
+        no_report: what standard error says if the folder is refused as a whole, with exit code 2.
     """
 
     edit: Callable[[Path], None]
-    claim: str
-    rule: str
-    run: str
-
-    @property
-    def mended(self) -> bool:
-        """Whether the list of files is made right afterwards: unless it is what is tampered with."""
-        return self.claim not in ("files", NO_REPORT)
+    mended: bool = True
+    no_report: str = ""
 
 
 TAMPERINGS: dict[str, Tampering] = {}
-IGNORED: dict[str, tuple[Callable[[Path], None], str]] = {}
-"""Edits that the checker does not notice, each with the reason."""
-
 Edit = Callable[[Path], None]
 
 
-def refused_by(claim: str, rule: str, run: str = RUN) -> Callable[[Edit], Edit]:
-    """Register a tampering with the claim, the run and the rule that must refuse it."""
+def tampering(*, mended: bool = True, no_report: str = "") -> Callable[[Edit], Edit]:
+    """Register a tampering that must be refused."""
 
     def register(edit: Edit) -> Edit:
         assert edit.__name__ not in TAMPERINGS
-        TAMPERINGS[edit.__name__] = Tampering(edit, claim, rule, run)
+        TAMPERINGS[edit.__name__] = Tampering(edit, mended and not no_report, no_report)
         return edit
 
     return register
 
 
-def ignored(why: str) -> Callable[[Edit], Edit]:
-    """Register an edit that the checker does not notice."""
-
-    def register(edit: Edit) -> Edit:
-        assert edit.__name__ not in IGNORED
-        IGNORED[edit.__name__] = (edit, why)
-        return edit
-
-    return register
+def refused_as_a_whole(why: str) -> Callable[[Edit], Edit]:
+    """Register a tampering after which the folder is no report."""
+    return tampering(no_report=why)
 
 
 # ------------------------------------------------------------------------------------- files
@@ -184,31 +173,6 @@ def middle(frame: pd.DataFrame) -> int:
     return int(np.flatnonzero(frame[f"{UGV}.accepted"] == 1.0)[10])
 
 
-# ------------------------------------------------------------------------------------- certificates
-
-
-def seal_certificate(folder: Path, claim: str, name: str) -> None:
-    """Make the digest of a certificate right."""
-    digest = hashlib.sha256((folder / "certificates" / claim / name).read_bytes()).hexdigest()
-    with edited_claim(folder, claim, "") as entry:
-        entry["certificates"][name] = digest
-
-
-@contextlib.contextmanager
-def edited_certificate(folder: Path, claim: str, name: str = "obligations.json") -> Iterator[Any]:
-    """A certificate."""
-    with edited_json(folder / "certificates" / claim / name) as value:
-        yield value
-    seal_certificate(folder, claim, name)
-
-
-@contextlib.contextmanager
-def edited_obligation(folder: Path, claim: str, name: str) -> Iterator[Any]:
-    """One obligation of a certificate."""
-    with edited_certificate(folder, claim) as obligations:
-        yield next(entry for entry in obligations if entry["name"] == name)
-
-
 # ------------------------------------------------------------------------------------- trying
 
 
@@ -220,15 +184,9 @@ class Outcome:
     refused: list[dict[str, Any]]
     error: str
 
-    def is_by(self, tampering: Tampering) -> bool:
-        """Whether the refusal is the one that is expected."""
-        if tampering.claim == NO_REPORT:
-            return self.code == 2 and tampering.rule in self.error
-        return self.code == 1 and any(
-            (entry["claim"], entry["run"]) == (tampering.claim, tampering.run)
-            and entry["rule"].startswith(tampering.rule)
-            for entry in self.refused
-        )
+    def is_of(self, tampering: Tampering) -> bool:
+        """Whether the tampering is refused as it must be."""
+        return self.code == 2 and tampering.no_report in self.error if tampering.no_report else self.code == 1
 
 
 @cache
@@ -288,8 +246,45 @@ def attempt(report: Path, edit: Edit, *, mended: bool = True) -> Outcome:
     edit(folder)
     if mended:
         mend(folder)
-    said, complained = io.StringIO(), io.StringIO()
-    with contextlib.redirect_stdout(said), contextlib.redirect_stderr(complained):
-        code = check.main(["--json", str(folder)])
-    checks = json.loads(said.getvalue())["checks"] if said.getvalue() else []
-    return Outcome(code, [entry for entry in checks if entry["outcome"] != "agrees"], complained.getvalue())
+    try:
+        found = checker.checked(folder, checker.LIMIT_S)
+    except checker.UsageError as error:
+        return Outcome(2, [], str(error))
+    if all(line.outcome == AGREES for line in found):
+        found = [Line(**line, by="judged again") for line in rebuild.lines(folder, judge=judged)]
+    refused = [asdict(line) for line in found if line.outcome != AGREES]
+    return Outcome(int(bool(refused)), refused, "")
+
+
+def judged(scenario: Scenario, traces: Sequence[Trace]) -> list[Verdict]:
+    """As `verify_all`, but what was judged before is not judged again: most tamperings leave most runs as they are."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(judge, "side_by_side", lambda pieces, **_: [_once(_Content(each, _key(each))) for each in pieces])
+        return verify_all(scenario, traces)
+
+
+@dataclass(frozen=True)
+class _Content:
+    """A piece of work that is known by what it depends on."""
+
+    work: Any = field(compare=False)
+    key: str
+
+
+def _key(piece: partial[Any]) -> str:
+    """Text of the traces, or of the claim and its inputs, that a piece of work of `verify_all` is about."""
+    texts = [piece.func.__name__]
+    for given in piece.args:
+        if isinstance(given, Trace):
+            tables = (given.signals, given.decisions, given.problems, given.proposals)
+            texts += [json.dumps(given.meta), json.dumps(given.timings), *(table.to_json() for table in tables)]
+        elif isinstance(given, Claim):
+            texts.append(given.id)
+        elif isinstance(given, dict):
+            texts.append(json.dumps(given))
+    return hashlib.sha256("\0".join(texts).encode()).hexdigest()
+
+
+@lru_cache(maxsize=64)
+def _once(content: _Content) -> Any:
+    return content.work()

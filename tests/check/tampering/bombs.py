@@ -11,115 +11,50 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 from check.tampering.base import (
-    NO_REPORT,
     claim_of,
-    edited_certificate,
     edited_claim,
-    edited_obligation,
     edited_report,
     edited_scenarios,
     read_table,
-    refused_by,
+    refused_as_a_whole,
     seal,
+    tampering,
     trace,
     write,
 )
 
 
-@refused_by("THR-ROOT", "a number is an integer or a fraction", run="")
-def enclosure_of_a_billion_digits(folder: Path) -> None:
-    with edited_certificate(folder, "THR-ROOT", "statements.json") as saved:
-        saved["enclosures"]["u"] = ["1e1000000000", "1e1000000001"]
-
-
-@refused_by("THR-ROOT", "the files are well formed", run="")
+@tampering()
 def threshold_of_a_billion_digits(folder: Path) -> None:
     with edited_claim(folder, "THR-ROOT", "") as claim:
         claim["evidence"]["running_threshold_m"] = "1e1000000000"
 
 
-@refused_by("trace", "the rows cover the run")
+@tampering()
 def duration_of_a_billion_digits(folder: Path) -> None:
     with edited_scenarios(folder) as scenarios:
         for scenario in scenarios:
             scenario["duration_s"] = "1e1000000000"
 
 
-@refused_by("SAFE-INV", "a number is short", run="")
-def three_thousand_factors_of_four_thousand_digits(folder: Path) -> None:
-    with edited_obligation(folder, "SAFE-INV", "outside") as one:
-        one["hypotheses"]["long"] = "9" * 4000
-        one["certificate"].append({"coefficient": "1", "factors": ["long"] * 3000, "square": "1"})
-
-
-@refused_by("SAFE-INV", "a number is short", run="")
-def three_thousand_factors_of_four_hundred_digits(folder: Path) -> None:
-    with edited_obligation(folder, "SAFE-INV", "outside") as one:
-        one["hypotheses"]["long"] = "9" * 400
-        one["certificate"].append({"coefficient": "1", "factors": ["long"] * 3000, "square": "1"})
-
-
-@refused_by("SAFE-INV", "a degree is low", run="")
-def a_thousand_squares(folder: Path) -> None:
-    with edited_obligation(folder, "SAFE-INV", "outside") as one:
-        one["hypotheses"]["long"] = "D*D"
-        one["certificate"].append({"coefficient": "1", "factors": ["long"] * 1000, "square": "1"})
-
-
-@refused_by("SAFE-INV", "a polynomial is", run="")
-def many_terms(folder: Path) -> None:
-    with edited_obligation(folder, "SAFE-INV", "outside") as one:
-        one["goal"] = " + ".join(f"a{i}" for i in range(30_000))
-
-
-@refused_by("SAFE-INV", "a polynomial is small enough", run="")
-def many_products(folder: Path) -> None:
-    with edited_obligation(folder, "SAFE-INV", "outside") as one:
-        one["certificate"][0]["square"] = " + ".join(f"a{i}" for i in range(1000))
-
-
-def _expression(text: str) -> Callable[[Path], None]:
-    def edit(folder: Path) -> None:
-        with edited_certificate(folder, "THR-OPT", "statements.json") as saved:
-            one = next(each for each in saved["statements"] if each["kind"] == "derivative")
-            one["function"] = text
-
-    return edit
-
-
-EXPRESSIONS = {
-    "towers_of_powers": "(((((((((q**12)**12)**12)**12)**12)**12)**12)**12)**12)",
-    "nested_brackets": "(" * 2000 + "q" + ")" * 2000,
-    "many_signs": "-" * 4999 + "q",
-    "constant_of_many_digits": f"q*{'9' * 4000}",
-    "long_expression": "q+" * 3000 + "q",
-    "imported_expression": "__import__('os')",
-}
-"""None is ever evaluated: an expression is the claim's, or the statement is refused."""
-for _name, _text in EXPRESSIONS.items():
-    _edit = _expression(_text)
-    _edit.__name__ = _name
-    refused_by("THR-OPT", "the statement is the claim's", run="")(_edit)
-
-
-@refused_by(NO_REPORT, "regular files")
+@refused_as_a_whole("regular files")
 def fifo_added(folder: Path) -> None:
-    os.mkfifo(folder / "certificates" / "SAFE-INV" / "pipe")
+    os.mkfifo(folder / "trace" / "pipe")
 
 
-@refused_by(NO_REPORT, "regular files")
+@refused_as_a_whole("regular files")
 def signals_are_a_fifo(folder: Path) -> None:
     (trace(folder) / "signals.parquet").unlink()
     os.mkfifo(trace(folder) / "signals.parquet")
 
 
-@refused_by(NO_REPORT, "regular files")
+@refused_as_a_whole("regular files")
 def page_is_a_device(folder: Path) -> None:
     (folder / "report.html").unlink()
     (folder / "report.html").symlink_to("/dev/zero")
 
 
-@refused_by(NO_REPORT, "regular files")
+@refused_as_a_whole("regular files")
 def meta_is_elsewhere(folder: Path) -> None:
     elsewhere = folder.with_name(f"{folder.name}.meta")
     elsewhere.write_bytes((trace(folder) / "meta.json").read_bytes())
@@ -127,49 +62,49 @@ def meta_is_elsewhere(folder: Path) -> None:
     (trace(folder) / "meta.json").symlink_to(elsewhere)
 
 
-@refused_by(NO_REPORT, "regular files")
+@refused_as_a_whole("regular files")
 def folder_leads_to_itself(folder: Path) -> None:
-    (folder / "certificates" / "more").symlink_to(folder)
+    (folder / "trace" / "more").symlink_to(folder)
 
 
-@refused_by(NO_REPORT, "the file can be read")
+@refused_as_a_whole("the file can be read")
 def report_is_a_fifo(folder: Path) -> None:
     (folder / "report.json").unlink()
     os.mkfifo(folder / "report.json")
 
 
-@refused_by(NO_REPORT, "the file can be read")
+@refused_as_a_whole("the file can be read")
 def report_is_a_device(folder: Path) -> None:
     (folder / "report.json").unlink()
     (folder / "report.json").symlink_to("/dev/zero")
 
 
-@refused_by(NO_REPORT, "the file can be read")
+@refused_as_a_whole("the file can be read")
 def report_is_a_folder(folder: Path) -> None:
     (folder / "report.json").unlink()
     (folder / "report.json").mkdir()
 
 
-@refused_by(NO_REPORT, "no name of a run")
+@refused_as_a_whole("no name of a run")
 def run_is_outside(folder: Path) -> None:
     with edited_scenarios(folder) as scenarios:
         for scenario in scenarios:
             scenario["runs"]["../../d"] = scenario["runs"]["d"]
 
 
-@refused_by(NO_REPORT, "no name of a run")
+@refused_as_a_whole("no name of a run")
 def claim_is_outside(folder: Path) -> None:
     with edited_claim(folder, "SAFE-INV", "") as claim:
         claim["id"] = "../SAFE-INV"
 
 
-@refused_by(NO_REPORT, "no name of a run")
+@refused_as_a_whole("no name of a run")
 def claim_of_two_lines(folder: Path) -> None:
     with edited_claim(folder, "SAFE-INV", "") as claim:
         claim["id"] = "SAFE-INV\nSAFE-GATE    -        agrees: proved\n"
 
 
-@refused_by(NO_REPORT, "no name of a run")
+@refused_as_a_whole("no name of a run")
 def claim_of_half_a_character(folder: Path) -> None:
     path = folder / "report.json"
     write(path, path.read_bytes().replace(b'"id": "SAFE-INV"', b'"id": "\\ud800"', 1))
@@ -197,7 +132,7 @@ MARGINS = {
 for _name, (_rule, _content) in MARGINS.items():
     _edit = _margin(_content)
     _edit.__name__ = _name
-    refused_by(NO_REPORT, _rule)(_edit)
+    refused_as_a_whole(_rule)(_edit)
 
 
 def _sized(value: Any, *path: str) -> Callable[[Path], None]:
@@ -224,10 +159,10 @@ SIZES = {
 for _name, (_value, *_path) in SIZES.items():
     _edit = _sized(_value, *_path)
     _edit.__name__ = _name
-    refused_by(NO_REPORT, "the scenario is of a size")(_edit)
+    refused_as_a_whole("the scenario is of a size")(_edit)
 
 
-@refused_by(NO_REPORT, "the scenario is of a size")
+@refused_as_a_whole("the scenario is of a size")
 def obstacles_without_end(folder: Path) -> None:
     with edited_scenarios(folder) as scenarios:
         for scenario in scenarios:
@@ -269,4 +204,4 @@ TABLES = {
 for _name, (_rule, _change) in TABLES.items():
     _edit = _signals(_change)
     _edit.__name__ = _name
-    refused_by("trace", _rule)(_edit)
+    tampering()(_edit)

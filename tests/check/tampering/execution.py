@@ -15,7 +15,7 @@ from check.tampering.base import (
     edited_table,
     middle,
     read_table,
-    refused_by,
+    tampering,
     trace,
     write_table,
 )
@@ -35,129 +35,105 @@ def moved(frame: pd.DataFrame, robot: str, row: int, by_m: float) -> None:
     frame.loc[row + 1, f"{robot}.vx_m_s"] -= by_m / dt[row]
 
 
-@refused_by("EXEC", "the command is the law's")
+@tampering()
 def uav_flies_otherwise(folder: Path) -> None:
     with edited_table(folder) as frame:
         moved(frame, "uav", 100, 1e-4)
 
 
-@refused_by("EXEC", "the command is the law's")
+@tampering()
 def executed_motion_moved(folder: Path) -> None:
     edit_proposals(folder, "positions_m", lambda value: value + 1e-4)
 
 
-@refused_by("EXEC", "the command is the law's")
+@tampering()
 def executed_motion_delayed(folder: Path) -> None:
     edit_proposals(folder, "times_s", lambda value: value + 1e-3)
 
 
-@refused_by("EXEC", "the command is the law's")
+@tampering()
 def executed_directions_fewer(folder: Path) -> None:
     edit_proposals(folder, "selection", lambda value: value[:3])
 
 
-@refused_by("EXEC", "numbers of a proposal are finite")
+@tampering()
 def executed_motion_is_nan(folder: Path) -> None:
     edit_proposals(folder, "positions_m", lambda value: value * np.nan)
 
 
-@refused_by("EXEC", "a proposal is a motion")
+@tampering()
 def executed_motion_cut(folder: Path) -> None:
     edit_proposals(folder, "positions_m", lambda value: value[:-1])
 
 
-@refused_by("EXEC", "times of a motion increase")
+@tampering()
 def executed_motion_backwards(folder: Path) -> None:
     edit_proposals(folder, "times_s", lambda value: value[::-1])
 
 
-@refused_by("EXEC", "a proposal is to a UGV")
+@tampering()
 def proposal_to_nobody(folder: Path) -> None:
     with edited_table(folder, "proposals") as frame:
         frame["robot"] = "ugv9"
 
 
-@refused_by("EXEC", "a proposal is for a UGV's trigger")
+@tampering()
 def proposal_for_nobody(folder: Path) -> None:
     with edited_table(folder, "proposals") as frame:
         frame["cause"] = "ugv9"
 
 
-@refused_by("EXEC", "a proposal is for a trigger")
+@tampering()
 def proposal_for_another_ugv(folder: Path) -> None:
     with edited_table(folder, "proposals") as frame:
         frame["cause"] = [next(ugv for ugv in ("ugv1", "ugv2") if ugv != robot) for robot in frame["robot"]]
 
 
-@refused_by("EXEC", "what is executed is what was accepted")
+@tampering()
 def proposals_table_emptied(folder: Path) -> None:
     write_table(folder, read_table(folder, "proposals").iloc[:0], "proposals")
 
 
-@refused_by("events", "events follow from signals and decisions")
+@tampering()
 def proposal_missing_from_the_table(folder: Path) -> None:
     write_table(folder, read_table(folder, "proposals").iloc[1:], "proposals")
 
 
-@refused_by("EXEC", "what is executed is what was accepted")
+@tampering()
 def intervention_said_to_be_over_early(folder: Path) -> None:
     with edited_table(folder) as frame:
         frame.loc[middle(frame) :, f"{UGV}.accepted"] = 0.0
 
 
-@refused_by("EXEC", "margin")
-def execution_margin_raised(folder: Path) -> None:
-    with edited_claim(folder, "EXEC") as claim:
-        claim["margin"] = 1e-3
-
-
-@refused_by("EXEC", "verdict")
+@tampering()
 def execution_said_to_be_refuted(folder: Path) -> None:
     with edited_claim(folder, "EXEC") as claim:
         claim.update(status="refuted", as_expected=False, counterexample={"robot": UGV}, margin=-1.0)
 
 
-@refused_by("EXEC", "evidence")
-def executions_miscounted(folder: Path) -> None:
-    with edited_claim(folder, "EXEC") as claim:
-        claim["evidence"]["robots"][UGV]["executing"] += 1
-
-
-@refused_by("GATE-MODEL", "velocity of mode accept", run="c")
+@tampering()
 def last_predicted_velocity_changed(folder: Path) -> None:
     with edited_table(folder, "problems", "c") as frame:
         frame["accept_m_s"] = [np.append(np.array(v)[:-3], np.array(v)[-3:] + 1e-5) for v in frame["accept_m_s"]]
 
 
-@refused_by("GATE-MODEL", "velocity of mode refuse", run="c")
+@tampering()
 def own_way_predicted_slower(folder: Path) -> None:
     with edited_table(folder, "problems", "c") as frame:
         frame["refuse_m_s"] = [0.99 * np.array(value) for value in frame["refuse_m_s"]]
 
 
-@refused_by("GATE-MODEL", "a decision is on a proposal that was sent", run="c")
+@tampering()
 def decisions_on_a_proposal_that_is_not_in_the_table(folder: Path) -> None:
     write_table(folder, read_table(folder, "proposals", "c").iloc[1:], "proposals", "c")
 
 
-@refused_by("GATE-MODEL", "margin", run="c")
-def prediction_margin_raised(folder: Path) -> None:
-    with edited_claim(folder, "GATE-MODEL", "c") as claim:
-        claim["margin"] = 1.0
-
-
-@refused_by("GATE-MODEL", "evidence", run="c")
-def predictions_miscounted(folder: Path) -> None:
-    with edited_claim(folder, "GATE-MODEL", "c") as claim:
-        claim["evidence"]["decisions"] += 1
-
-
-@refused_by("trace", "the file can be read")
+@tampering()
 def proposals_missing(folder: Path) -> None:
     (trace(folder) / "proposals.parquet").unlink()
 
 
-@refused_by("trace", "files of the trace")
+@tampering()
 def digest_of_the_proposals_removed(folder: Path) -> None:
     with edited_json(trace(folder) / "meta.json") as meta:
         del meta["files"]["proposals.parquet"]

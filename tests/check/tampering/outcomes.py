@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from check.tampering import base
-from check.tampering.base import edited_claim, edited_entries, edited_table, refused_by
+from check.tampering.base import edited_entries, edited_table, tampering
 
 
 def change(folder: Path, where: Callable[[pd.DataFrame], Any], **values: Any) -> None:
@@ -32,22 +32,22 @@ def under_way(frame: pd.DataFrame) -> Any:
     return (frame["decision"] == "accept") & (frame["lag_m"] > 0.0)
 
 
-@refused_by("GATE-MODEL", "accept: outcome")
+@tampering()
 def outcome_made_better(folder: Path) -> None:
     change(folder, first_accepted, accept_outcome_m2_s=lambda value: 0.99 * value)
 
 
-@refused_by("GATE-MODEL", "accept: stalls")
+@tampering()
 def stall_denied(folder: Path) -> None:
     change(folder, first_refused, accept_stalls=0.0)
 
 
-@refused_by("GATE-MODEL", "refuse: way left")
+@tampering()
 def way_left_made_long(folder: Path) -> None:
     change(folder, first_refused, refuse_left_m=lambda value: 3.0 * value)
 
 
-@refused_by("GATE-MODEL", "accept: ")
+@tampering()
 def map_in_a_message_exchanged(folder: Path) -> None:
     with edited_table(folder, "proposals") as frame:
         walls = [3.3, 9.5, 0.0, 5.0, 9.0, 0.0, 6.5, 7.5, 0.0]
@@ -55,7 +55,7 @@ def map_in_a_message_exchanged(folder: Path) -> None:
         frame["mapped_radius_m"] = [np.zeros(3) for _ in range(len(frame))]
 
 
-@refused_by("GATE-MODEL", "accept: ")
+@tampering()
 def large_obstacle_added_to_a_message(folder: Path) -> None:
     """Where a point would be out of the way."""
     with edited_table(folder, "proposals") as frame:
@@ -63,107 +63,83 @@ def large_obstacle_added_to_a_message(folder: Path) -> None:
         frame["mapped_radius_m"] = [np.append(radii, 5.0) for radii in frame["mapped_radius_m"]]
 
 
-@refused_by("GATE-MODEL", "a proposal is a motion")
+@tampering()
 def radius_left_out_of_a_message(folder: Path) -> None:
     with edited_table(folder, "proposals") as frame:
         frame["mapped_radius_m"] = [radii[:-1] for radii in frame["mapped_radius_m"]]
 
 
-@refused_by("LIVE-PROG", "answer and its reason")
+@tampering()
 def reason_of_a_refusal_changed(folder: Path) -> None:
     change(folder, first_refused, reason="not_cheaper")
 
 
-@refused_by("LIVE-PROG", "answer and its reason")
+@tampering()
 def favour_to_itself(folder: Path) -> None:
     """Accepted although of no use, to make way for the very UGV that is asked."""
     change(folder, first_refused, decision="accept", reason="makes_way", accept_stalls=0.0)
 
 
-@refused_by("LIVE-PROG", "tries")
+@tampering()
 def tries_understated(folder: Path) -> None:
     change(folder, under_way, tries=0.0)
 
 
-@refused_by("LIVE-PROG", "lag")
+@tampering()
 def lag_understated(folder: Path) -> None:
     change(folder, under_way, lag_m=lambda value: 0.5 * value)
 
 
-@refused_by("LIVE-PROG", "predicted lag")
+@tampering()
 def lag_predicted_afterwards(folder: Path) -> None:
     change(folder, under_way, predicted_lag_m=lambda value: value + 0.1)
 
 
-@refused_by("LIVE-PROG", "margin")
-def patience_overstated(folder: Path) -> None:
-    with edited_claim(folder, "LIVE-PROG") as claim:
-        claim["margin"] = 3.0
-
-
-@refused_by("LIVE-WAIT", "answers that the tries left do not allow", run="")
-def an_attack_was_answered_wrongly(folder: Path) -> None:
-    with edited_claim(folder, "LIVE-WAIT", "") as claim:
-        claim["evidence"]["attacks"][0]["unexpected"] = 1
-
-
-@refused_by("LIVE-WAIT", "favours that no UGV is asked for", run="")
-def favours_to_nobody_done(folder: Path) -> None:
-    with edited_claim(folder, "LIVE-WAIT", "") as claim:
-        next(row for row in claim["evidence"]["attacks"] if row["attack"] == "favours to nobody")["tries"] = 1
-
-
-@refused_by("GATE-MODEL", "evidence")
-def outcomes_miscounted(folder: Path) -> None:
-    with edited_claim(folder, "GATE-MODEL") as claim:
-        claim["evidence"]["outcomes"] += 2
-
-
-@refused_by("GATE-MODEL", "nothing is said of gap")
+@tampering()
 def filler_changed(folder: Path) -> None:
     with edited_table(folder, "decisions") as frame:
         frame.loc[1, "gap"] = -1.002
 
 
-@refused_by("GATE-MODEL", "nothing is said of tries", run="c")
+@tampering()
 def filler_changed_where_problems_are_solved(folder: Path) -> None:
     with base.edited_table(folder, "decisions", "c") as frame:
         frame.loc[1, "tries"] = -1.002
 
 
-@refused_by("events", "obstacles on the map of a proposal")
+@tampering()
 def obstacle_on_the_map_moved(folder: Path) -> None:
     with edited_table(folder, "proposals") as frame:
         frame["mapped_m"] = [points + np.append(0.001, np.zeros(len(points) - 1)) for points in frame["mapped_m"]]
 
 
-@refused_by("events", "obstacles on the map of a proposal")
+@tampering()
 def radius_on_the_map_changed(folder: Path) -> None:
     with edited_table(folder, "proposals") as frame:
         frame["mapped_radius_m"] = [radii + 0.001 for radii in frame["mapped_radius_m"]]
 
 
-@refused_by("COMM", "obstacles that the UAV knows of")
+@tampering()
 def obstacle_known_before_it_was_told(folder: Path) -> None:
     with edited_table(folder, "proposals") as frame:
         for name in ("mapped_m", "mapped_radius_m"):
             frame[name] = [frame[name].iloc[-1]] * len(frame)
 
 
-@refused_by("COMM", "obstacles that the UAV knows of")
+@tampering()
 def obstacle_forgotten(folder: Path) -> None:
     with edited_table(folder, "proposals") as frame:
         for name in ("mapped_m", "mapped_radius_m"):
             frame[name] = [frame[name].iloc[0]] * len(frame)
 
 
-@refused_by("COMM", "a decision before the proposal is taken back")
+@tampering()
 def decision_on_what_was_taken_back(folder: Path) -> None:
     change(folder, first_refused, t_s=lambda value: value + 1.0)
     base.write_table(folder, base.read_table(folder, "decisions").sort_values("t_s", kind="stable"), "decisions")
 
 
-@refused_by("COMM", "a proposal stands until it is over")
+@tampering()
 def proposal_replaced_while_in_force(folder: Path) -> None:
     with edited_table(folder, "proposals") as proposals, edited_table(folder, "decisions") as decisions:
         issued_s, replaced_s = decisions.loc[first_accepted(decisions), ["issued_s", "t_s"]].iloc[0]

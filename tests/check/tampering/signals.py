@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from check.tampering.base import UGV, edited_entries, edited_table, middle, read_table, refused_by, write_table
+from check.tampering.base import UGV, edited_entries, edited_table, middle, read_table, tampering, write_table
 
 
 def shift(frame: pd.DataFrame, row: int, offset_m: float) -> None:
@@ -17,19 +17,19 @@ def shift(frame: pd.DataFrame, row: int, offset_m: float) -> None:
     frame.loc[row + 1, f"{UGV}.vx_m_s"] -= offset_m / dt[row]
 
 
-@refused_by("trace", "law of motion")
+@tampering()
 def position_changed(folder: Path) -> None:
     with edited_table(folder) as frame:
         frame.loc[middle(frame), f"{UGV}.x_m"] += 1e-6
 
 
-@refused_by("THR-TRIG", "decision variable")
+@tampering()
 def position_and_commands_changed(folder: Path) -> None:
     with edited_table(folder) as frame:
         shift(frame, middle(frame), 1e-4)
 
 
-@refused_by("LIVE-PROG", "lag")
+@tampering()
 def position_commands_and_decision_variable_changed(folder: Path) -> None:
     with edited_table(folder) as frame:
         shift(frame, middle(frame), 1e-3)
@@ -37,26 +37,26 @@ def position_commands_and_decision_variable_changed(folder: Path) -> None:
         frame[f"{UGV}.decision_variable_m"] = np.linalg.norm(error, axis=0) + frame[f"{UGV}.noise_m"]
 
 
-@refused_by("trace", "start of a robot")
+@tampering()
 def whole_team_moved(folder: Path) -> None:
     with edited_table(folder) as frame:
         for robot in ("ugv1", "ugv2", "uav"):
             frame[f"{robot}.x_m"] += 0.5
 
 
-@refused_by("trace", "start of a robot", run="b")
+@tampering()
 def crash_hidden(folder: Path) -> None:
     with edited_table(folder, run="b") as frame:
         frame[f"{UGV}.x_m"] += 5.0
 
 
-@refused_by("trace", "law of motion")
+@tampering()
 def command_changed(folder: Path) -> None:
     with edited_table(folder) as frame:
         frame.loc[middle(frame), f"{UGV}.vy_m_s"] += 1e-3
 
 
-@refused_by("SAFE-HYP", "the hypotheses held")
+@tampering()
 def faster_than_the_limit(folder: Path) -> None:
     """The UAV jumps by 1 m and back, by commands that lead there."""
     with edited_table(folder) as frame:
@@ -67,64 +67,64 @@ def faster_than_the_limit(folder: Path) -> None:
         frame.loc[row + 1, "uav.vz_m_s"] -= 1.0 / dt[row]
 
 
-@refused_by("trace", "the rows cover the run")
+@tampering()
 def times_stretched(folder: Path) -> None:
     with edited_table(folder) as frame:
         frame["t_s"] *= 1.0 + 1e-6
 
 
-@refused_by("trace", "a row at every control sample")
+@tampering()
 def one_time_changed(folder: Path) -> None:
     with edited_table(folder) as frame:
         frame.loc[middle(frame), "t_s"] += 1e-4
 
 
-@refused_by("trace", "the rows cover the run")
+@tampering()
 def last_rows_dropped(folder: Path) -> None:
     write_table(folder, read_table(folder).iloc[:-20])
 
 
-@refused_by("trace", "the rows cover the run")
+@tampering()
 def first_rows_dropped(folder: Path) -> None:
     write_table(folder, read_table(folder).iloc[5:])
 
 
-@refused_by("trace", "a row at every control sample")
+@tampering()
 def middle_row_dropped(folder: Path) -> None:
     frame = read_table(folder)
     write_table(folder, frame.drop(index=middle(frame)))
 
 
-@refused_by("trace", "a row at every control sample")
+@tampering()
 def standing_row_dropped(folder: Path) -> None:
     frame = read_table(folder)
     write_table(folder, frame.drop(index=len(frame) - 3))
 
 
-@refused_by("trace", "time increases from row to row")
+@tampering()
 def row_duplicated(folder: Path) -> None:
     frame = read_table(folder)
     write_table(folder, pd.concat([frame.iloc[:50], frame.iloc[49:]]))
 
 
-@refused_by("trace", "time increases from row to row")
+@tampering()
 def rows_in_another_order(folder: Path) -> None:
     frame = read_table(folder)
     write_table(folder, frame.iloc[[*range(50), 51, 50, *range(52, len(frame))]])
 
 
-@refused_by("trace", "the rows cover the run")
+@tampering()
 def signals_empty(folder: Path) -> None:
     write_table(folder, read_table(folder).iloc[:0])
 
 
-@refused_by("trace", "numbers are finite")
+@tampering()
 def position_is_nan(folder: Path) -> None:
     with edited_table(folder) as frame:
         frame.loc[100, "uav.z_m"] = np.nan
 
 
-@refused_by("trace", "start of a robot")
+@tampering()
 def robots_exchanged(folder: Path) -> None:
     other = {"ugv1": "ugv2", "ugv2": "ugv1"}
     frame = read_table(folder)
@@ -132,71 +132,71 @@ def robots_exchanged(folder: Path) -> None:
     write_table(folder, frame.rename(columns=names))
 
 
-@refused_by("THR-TRIG", "decision variable")
+@tampering()
 def decision_variable_changed(folder: Path) -> None:
     with edited_table(folder) as frame:
         frame[f"{UGV}.decision_variable_m"] -= 1e-4
 
 
-@refused_by("THR-TRIG", "triggers and releases")
+@tampering()
 def noise_and_decision_variable_changed(folder: Path) -> None:
     with edited_table(folder) as frame:
         frame[f"{UGV}.decision_variable_m"] += 0.01
         frame[f"{UGV}.noise_m"] += 0.01
 
 
-@refused_by("THR-TRIG", "noise at the start")
+@tampering()
 def noise_from_elsewhere(folder: Path) -> None:
     with edited_table(folder) as frame:
         for column in ("decision_variable_m", "noise_m"):
             frame[f"{UGV}.{column}"] += 1e-7
 
 
-@refused_by("trace", "preset trajectory")
+@tampering()
 def preset_changed(folder: Path) -> None:
     with edited_table(folder) as frame:
         frame[f"{UGV}.ref_x_m"] += 0.01
 
 
-@refused_by("THR-TRIG", "mode")
+@tampering()
 def mode_changed(folder: Path) -> None:
     with edited_table(folder) as frame:
         frame.loc[middle(frame), f"{UGV}.mode"] = 0.0
 
 
-@refused_by("ZENO-TRACE", "column triggers")
+@tampering()
 def trigger_count_changed(folder: Path) -> None:
     with edited_table(folder) as frame:
         frame.loc[len(frame) - 1, f"{UGV}.triggers"] += 1.0
 
 
-@refused_by("ZENO-TRACE", "column released_at_s")
+@tampering()
 def release_forgotten(folder: Path) -> None:
     """At one row the last release is none yet; no event is added or lost by that."""
     with edited_table(folder) as frame:
         frame.loc[len(frame) - 1, f"{UGV}.released_at_s"] = -1.0
 
 
-@refused_by("EXEC", "what is executed is what was accepted")
+@tampering()
 def executed_without_acceptance(folder: Path) -> None:
     with edited_table(folder) as frame:
         frame.loc[50, f"{UGV}.accepted"] = 1.0
 
 
-@refused_by("events", "an intervention is executed after it was proposed", run="b")
+@tampering()
 def executed_without_a_proposal(folder: Path) -> None:
     with edited_table(folder, run="b") as frame:
         frame.loc[50, f"{UGV}.accepted"] = 1.0
 
 
-@refused_by("EXEC", "what is executed is what was accepted")
+@tampering()
 def acceptance_hidden(folder: Path) -> None:
     """What was executed by an acceptance looks as if the UGV had done it of its own accord."""
     with edited_table(folder) as frame:
         frame[f"{UGV}.accepted"] = 0.0
 
 
-@refused_by("THR-TRIG", "triggers and releases")
+@tampering()
 def trigger_late(folder: Path) -> None:
     """The row of the trigger is left out, and the event put to the next one."""
     frame = read_table(folder)
@@ -211,13 +211,13 @@ def trigger_late(folder: Path) -> None:
             trigger["t_s"] = late
 
 
-@refused_by("trace", "flag whether an intervention is executed")
+@tampering()
 def flag_between_yes_and_no(folder: Path) -> None:
     with edited_table(folder) as frame:
         frame.loc[middle(frame), f"{UGV}.accepted"] = 0.5
 
 
-@refused_by("trace", "command before the start")
+@tampering()
 def command_before_the_start(folder: Path) -> None:
     with edited_table(folder) as frame:
         frame.loc[0, f"{UGV}.vx_m_s"] = 0.001

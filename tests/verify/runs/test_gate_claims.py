@@ -1,4 +1,4 @@
-"""GATE-FEAS, GATE-SUR and GATE-OPT together: on good, malformed and missing records."""
+"""GATE-FEAS and GATE-OPT together: on good, malformed and missing records."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 from builders.decisions import decided_run
 from builders.edits import with_decision, with_meta, with_signals
-from verify.judging import FEAS, OPT, SUR
+from verify.judging import FEAS, OPT
 from verify.runs.cases import refused_for_want_of_a_plan
 
 from airground_drake.trace import Trace
@@ -19,20 +19,18 @@ from airground_drake.trace import Trace
 @pytest.mark.parametrize(
     ("route", "expected"),
     [
-        ("relaxed", ("holds", "holds", "holds")),
-        ("nonlinear", ("holds", "holds", "inconclusive")),
-        ("enumeration", ("holds", None, "holds")),
-        ("branch_and_bound", ("holds", None, "holds")),
-        ("rollout", ("holds", None, "inconclusive")),
+        ("relaxed", ("holds", "holds")),
+        ("nonlinear", ("holds", "inconclusive")),
+        ("enumeration", ("holds", "holds")),
+        ("branch_and_bound", ("holds", "holds")),
+        ("rollout", ("holds", "inconclusive")),
     ],
 )
-def test_good_decisions_pass_where_there_is_something_to_check(route: str, expected: tuple[str | None, ...]) -> None:
+def test_good_decisions_pass_where_there_is_something_to_check(route: str, expected: tuple[str, ...]) -> None:
     trace = decided_run(route)
-    for claim, status in zip((FEAS, SUR, OPT), expected, strict=True):
-        assert claim.applies(trace) == (status is not None)
+    for claim, status in zip((FEAS, OPT), expected, strict=True):
         finding = claim.judge(trace)
-        if status is not None:
-            assert finding.status == status, finding
+        assert finding.status == status, finding
         if status == "holds":
             assert finding.margin is not None
             assert finding.margin >= 0.0
@@ -54,7 +52,7 @@ def test_malformed_records_are_errors(relaxed: Trace) -> None:
     def other_route(row: dict[str, Any], problem: dict[str, Any]) -> None:
         row["route"] = "enumeration"
 
-    for claim in (FEAS, SUR, OPT):
+    for claim in (FEAS, OPT):
         for edit in (nan, nan_cost, cut, planless, other_route):
             assert claim.judge(with_decision(relaxed, edit)).status == "error"
         assert claim.judge(replace(relaxed, problems=relaxed.problems.iloc[1:])).status == "error"
@@ -64,7 +62,7 @@ def test_malformed_records_are_errors(relaxed: Trace) -> None:
 def test_a_refusal_without_a_plan_is_in_order_but_an_acceptance_is_not(relaxed: Trace) -> None:
     last = len(relaxed.decisions) - 1
     trace = with_decision(relaxed, refused_for_want_of_a_plan, row=last)
-    for claim in (FEAS, SUR, OPT):
+    for claim in (FEAS, OPT):
         assert claim.judge(trace).status == "holds"
     assert len(FEAS.judge(trace).evidence["without_a_plan"]) == 1
 
@@ -79,7 +77,6 @@ def test_without_a_single_plan_nothing_is_established(relaxed: Trace) -> None:
     trace = relaxed
     for row in range(len(relaxed.decisions)):
         trace = with_decision(trace, refused_for_want_of_a_plan, row=row)
-    assert SUR.judge(trace).status == "not_run"
     assert OPT.judge(trace).status == "inconclusive"
 
 
@@ -90,7 +87,7 @@ def test_no_decision_at_all() -> None:
     def intervening(signals: pd.DataFrame) -> None:
         signals.loc[signals["t_s"] > 0.2, "ugv2.mode"] = 1.0
 
-    for claim in (FEAS, SUR, OPT):
+    for claim in (FEAS, OPT):
         assert claim.judge(none).status == "holds"
         assert claim.judge(with_signals(none, intervening)).status == "not_run"
         others = claim.judge(with_signals(trace, intervening))  # those of ugv1 are judged all the same

@@ -1,4 +1,4 @@
-"""GATE-FEAS, GATE-SUR and GATE-OPT on runs of the simulator."""
+"""GATE-FEAS and GATE-OPT on runs of the simulator."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from builders.edits import with_decision
-from verify.judging import FEAS, OPT, SUR
+from verify.judging import FEAS, OPT
 from verify.runs.cases import (
     contrary_answer,
     flip_plan,
@@ -53,7 +53,7 @@ def record_of(run: Callable[[str, str], Trace]) -> Simulated:
 def test_real_runs_pass(record_of: Simulated, name: str, run_name: str) -> None:
     trace = record_of(name, run_name, "relaxed")
     assert len(trace.decisions) > 5
-    for claim in (FEAS, SUR, OPT):
+    for claim in (FEAS, OPT):
         finding = claim.judge(trace)
         assert finding.status == "holds", finding
 
@@ -64,18 +64,19 @@ def test_real_runs_of_other_routes(record_of: Simulated, route: str) -> None:
     assert FEAS.judge(trace).status == "holds"
     bounded = route in ("enumeration", "branch_and_bound")
     assert OPT.judge(trace).status == ("holds" if bounded else "inconclusive")
-    assert not SUR.applies(trace) or SUR.judge(trace).status == "holds"
+    rounded = FEAS.judge(trace).evidence["rounded_plans"]
+    assert bool(rounded) == (route == "nonlinear")
 
 
 def test_a_real_run_saved_and_broken(record_of: Simulated, tmp_path: Any) -> None:
     trace = record_of("case_b", "c", "relaxed")
     save(trace, tmp_path)
-    for claim in (FEAS, SUR, OPT):
+    for claim in (FEAS, OPT):
         assert claim.judge(load_trace(tmp_path)) == claim.judge(trace)
     for claim, edit in (
         (FEAS, flip_plan), (FEAS, shift_position), (FEAS, shift_initial), (FEAS, shift_reference), (FEAS, too_fast),
         (FEAS, understate_cost), (FEAS, smaller_distance), (FEAS, overstate_clearance), (FEAS, contrary_answer),
-        (SUR, round_otherwise), (SUR, understate_rounding), (OPT, overstate_bound), (OPT, understate_bound),
+        (FEAS, round_otherwise), (FEAS, understate_rounding), (OPT, overstate_bound), (OPT, understate_bound),
         (OPT, understate_gap), (OPT, long_normals), (OPT, inflate_loser),
     ):  # fmt: skip
         assert claim.judge(with_decision(trace, edit)).status == "refuted", edit

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from airground_drake.verify.runs.gate_sur import TIE
 from builders.edits import bumped, moved, with_decision, with_events, with_scenario, with_signals
 from builders.runs import refractory
 
@@ -21,7 +22,6 @@ from airground_drake.verify.runs.decision_noise import NOISE_TOLERANCE_M
 from airground_drake.verify.runs.exec import COMMAND_TOLERANCE_M_S
 from airground_drake.verify.runs.gate_feas import SPEED_TOLERANCE
 from airground_drake.verify.runs.gate_record import POSITION_TOLERANCE_M, Row, cost_tolerance, rows_of
-from airground_drake.verify.runs.gate_sur import TIE
 from airground_drake.verify.runs.live_goal import AT_REST_M
 from airground_drake.verify.runs.live_prog import LAG_TOLERANCE_M
 from airground_drake.verify.runs.outcome_rolls import foreseen

@@ -1,23 +1,15 @@
-"""SAFE-LEMMA: the distance on a straight line is at least its linear part.
-
-The obligations and the Gram matrix are in `lemma.py`. Certificate files: `obligations.json` and `<obligation>.smt2` as
-`engines/obligation.py` describes them, and `gram.json`, see `lemma.py`.
-"""
+"""SAFE-LEMMA: the distance on a straight line is at least its linear part (proofs/Safety.v)."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from typing import Any
 
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.verify.claim import ModelClaim
-from airground_drake.verify.engines.prover import discharge, finding, proved_again
-from airground_drake.verify.finding import Finding
-from airground_drake.verify.model.avoidance.constants import Inputs
-from airground_drake.verify.model.avoidance.lemma import gram_certificate, lemma
-from airground_drake.verify.model.avoidance.obligations import LIMIT_S
+from airground_drake.verify.model.avoidance.kinds import constants, kinds_of
+from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim
 
 
-class SafeLemma(ModelClaim):
+class SafeLemma(TheoremClaim):
     """SAFE-LEMMA."""
 
     id = "SAFE-LEMMA"
@@ -32,27 +24,21 @@ class SafeLemma(ModelClaim):
         r"\lVert x + s v \rVert \ge \lVert x \rVert + s \frac{x^\top v}{\lVert x \rVert}, \quad x \ne 0, "
         r"\quad s \ge 0",
     )
-    method = (
-        "Lagrange's identity ||x||^2 ||v||^2 - (x.v)^2 = sum over i < j of (x_i v_j - x_j v_i)^2, expanded exactly, "
-        "and as a rational Gram matrix with exact LDL; the step from squares to norms by polynomial certificates for "
-        "both signs of the right-hand side. z3 and cvc5 on the negations."
-    )
+    method = "A theorem in Coq. That x is not 0 follows from safe distances above 0."
     equations = "none of the paper's; it turns (7)-(8), (11) into statements about one number, the distance"
-    assumptions = ("Real arithmetic; x is not 0 (a robot is not at the point that it avoids).",)
-    does_not_establish = "Anything about velocities that change within the period, or about rounding (see SAFE-INV)."
+    assumptions = ("Real arithmetic. A robot is not at the point that it avoids.",)
+    does_not_establish = "Anything about velocities that change within a period, or about rounding (see SAFE-HYP)."
 
-    exercised_by = "obligations of the proof"
+    theorems = ("Safety.lemma", "Safety.lemma_in_the_plane")
+    margin_of = "least safe distance"
 
-    def inputs(self, scenario: Scenario) -> Inputs:
-        """None: it is about no constants."""
-        return {}
+    def inputs(self, scenario: Scenario) -> dict[str, Any]:
+        """The safe distances of the scenario's pairs, m."""
+        return {"pairs": constants(scenario)["pairs"]}
 
-    def check(self, inputs: Inputs) -> Finding:
-        """Discharge the obligations and build the Gram matrix."""
-        gram = gram_certificate()
-        found = finding(discharge(lemma(), LIMIT_S), gram_matrix="expands exactly, positive semidefinite by exact LDL")
-        return replace(found, certificates=found.certificates | {"gram.json": gram})
-
-    def takes(self, inputs: Inputs, finding: Finding) -> bool:
-        """The obligations once more, by expansion, and the Gram matrix."""
-        return proved_again(finding, lemma()) and finding.certificates["gram.json"] == gram_certificate()
+    def hypotheses(self, inputs: dict[str, Any]) -> list[Hypothesis]:
+        """Safe distances are positive, so that no pair is at one point."""
+        return [
+            Hypothesis(self.margin_of, f"{each.kind}: the safe distance is above 0", each.safe_m, "m", strict=True)
+            for each in kinds_of(inputs)
+        ]

@@ -1,125 +1,93 @@
-"""LIVE-GATE: an intervention that is accepted where there is room is never given back, and ends in time.
-
-The tracking error between prediction and run is a contraction with an input; obligations in `tracking_obligations`,
-the running gatekeeper and the running control law in `tracking_runs`. Certificates: `obligations.json` and an SMT-LIB
-script for each obligation.
-"""
+"""LIVE-GATE: an accepted intervention that goes as predicted is never given back, and ends in time."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
-from airground_drake.components import make_law, make_patience
-from airground_drake.gatekeeper.patience import Patience
-from airground_drake.registry import METHODS
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.verify.claim import ModelClaim
-from airground_drake.verify.engines.prover import LIMIT_S, discharge, finding, proved_again
-from airground_drake.verify.finding import Finding
-from airground_drake.verify.model.patience.tracking_obligations import Tracking, obligations
-from airground_drake.verify.model.patience.tracking_runs import runs
+from airground_drake.trace import Trace
+from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim, decimal
+from airground_drake.verify.runs.followed import followed
 
 
-class LiveGate(ModelClaim):
+class LiveGate(TheoremClaim):
     """LIVE-GATE."""
 
     id = "LIVE-GATE"
-    summary = (
-        "With room around it, an accepted intervention in all directions of the plane is carried through to its end."
-    )
+    summary = "An accepted intervention that goes as predicted is carried through to its end."
     statement = (
         "Under method (d) an accepted intervention that leaves no direction of the plane to the UGV's own task is "
-        "never given back before its time, and is over when its motion is, as long as there is room along the "
-        "predicted way, disturbances are bounded and the speed limit is not reached."
+        "never given back before its time, and is over when its motion is, as long as no obstacle is sensed that was "
+        "not known at its acceptance, and whatever else moves the UGV differs little from the prediction: other "
+        "robots, contact, corners of the motion, disturbances."
     )
     formula = (
-        "J^+ J = I in the plane, predicted distances >= d + v h + lag_m (robots: d + 2 v h + lag_m), |disturbance| <= "
-        "Lambda lag_m: |p - predicted| <= lag_m at every sample, so lag <= predicted lag + lag_m: never late; over by "
-        "t0 + length / speed + h for a motion of that length at that speed, if that is no more than longest_s"
+        "J^+ J = I in the plane; e = p - predicted, e' = (1 - Lambda h) e + h w; b' = (1 - Lambda h) b + h ||w||, b = "
+        "||e|| at the acceptance; if b <= lag_m at every sample: |p - predicted| <= lag_m, so lag <= predicted lag + "
+        "lag_m: never late; over by t0 + length / speed + h for a motion of that length at that speed, if that is no "
+        "more than longest_s. b <= lag_m where ||w|| <= Lambda lag_m, as where predicted distances are >= d + v h + "
+        "lag_m (robots: d + 2 v h + lag_m) and |disturbance| <= Lambda lag_m; w = 0 where all is as predicted"
     )
     latex = (
-        r"J^+ J = I \text{ in the plane}",
-        r"D_{\text{predicted}} \ge d + v h + \ell \text{ (robots: } d + 2 v h + \ell \text{)}, \quad \lVert e "
-        r"\rVert \le \Lambda \ell",
+        r"J^+ J = I \text{ in the plane}, \quad e = p - p_{\text{predicted}}, \quad e_{k+1} = (1 - \Lambda h) e_k + h "
+        r"w_k",
+        r"b_{k+1} = (1 - \Lambda h) b_k + h \lVert w_k \rVert, \quad b_0 = \lVert e_0 \rVert, \quad b_k \le \ell "
+        r"\text{ for all } k",
         r"\Rightarrow \; \lVert p - p_{\text{predicted}} \rVert \le \ell \text{ at every sample}, \quad "
         r"\text{lag} \le \text{lag}_{\text{predicted}} + \ell",
         r"t_{\text{over}} \le t_0 + \frac{\text{length}}{\text{speed}} + h \quad \text{if that is no more "
         r"than } t_0 + \tau_{\text{longest}}",
     )
     method = (
-        "Where the intervention has every direction of the plane, the difference e between run and prediction obeys "
-        "e' = (1 - Lambda h) e + h w, w the disturbance: it never leaves the ball of radius lag_m; within it, with "
-        "that room, no avoidance inequality can bind, so that both are the same law. Polynomial implications with "
-        "exact certificates, z3 and cvc5; what is late and what is over is read off the running `Patience`. The "
-        "running gatekeeper and the running control law are run on random ways with room, disturbed by the most that "
-        "is allowed: nothing may be given back."
+        "Theorems: where the intervention has every direction of the plane, the difference e between run and "
+        "prediction obeys e' = (1 - Lambda h) e + h w, w what else moves the UGV in the run, less what does in the "
+        "prediction, so that e is bounded by b. With room, no avoidance inequality binds, and both are the same law. "
+        "The report counts how many accepted interventions of its runs under (d) met the premise, from acceptance "
+        "until they were given back or withdrawn."
     )
     equations = "(14), (20)"
     assumptions = (
         "J^+ J is the identity in the plane, as in every proposal of a `BehaviourDatabase`. Along a direction that is "
         "left to the own task that one's gain acts, not Lambda, and the UGV may be pushed out of the room. LIVE-PROG "
         "counts the accepted proposals of a run that leave one (`leave_a_direction`).",
-        "The obstacles near the way are known and stand still, and no other robot comes nearer to it than stated.",
-        "Neither run nor prediction reaches the speed limit: speed of the motion + Lambda lag < v.",
-        "The disturbance includes what the rate of the motion differs by from that of the motion sampled every "
-        "period (0 but at its corners), besides what moves the robot otherwise.",
+        "No obstacle is sensed that the UGV did not know at its acceptance.",
+        "b <= lag_m: what avoidance and the speed limit change of the command in the run (other robots where they are) "
+        "differs little from what they change in the prediction (other robots where they are predicted). So does the "
+        "rate of the motion from that of the motion sampled every period (the same but at its corners).",
         "The UAV does not withdraw the proposal. Rounding is not counted.",
     )
     does_not_establish = (
-        "That a proposal with room is accepted: that depends on its outcome; that it has room: where it has less, "
+        "That a proposal is accepted, or goes as predicted: that depends on the others. Where the premise was not met, "
         "LIVE-PROG says what came of it, and LIVE-WAIT bounds the time."
     )
 
-    exercised_by = "obligations of the proof"
+    theorems = ("Gate.tracking_bounded", "Gate.tracking_contracts", "Gate.room")
+    margin_of = "1 - Lambda h"
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
-        """Gains, period, speed limits and the running patience's numbers."""
-        law, patience = make_law(scenario, METHODS["d"]), make_patience(scenario)
+        """The gain of the intervention, 1/s, the control period, s, and the lag that is tolerated, m."""
+        control = scenario.control
         return {
-            "intervention_gain_1_s": float(law.intervention_gain),
-            "motion_gain_1_s": float(law.motion_gain),
-            "avoidance_gain_1_s": float(law.avoidance.gain),
-            "control_period_s": float(law.avoidance.period),
-            "sensing_range_m": float(law.avoidance.sensing_range),
-            "period_s": float(scenario.gatekeeper.period_s),
-            "max_speed_m_s": max(float(ugv.max_speed_m_s) for ugv in scenario.ugvs.values()),
-            "obstacle_m": _widest_m(scenario),
-            "tries": int(patience.most),
-            "rest_s": float(patience.rest),
-            "longest_s": float(patience.longest),
-            "lag_m": float(patience.lag),
-            "behind_s": float(patience.behind),
+            "intervention_gain_1_s": float(control.intervention_gain_1_s),
+            "control_period_s": float(control.period_s),
+            "lag_m": float(scenario.gatekeeper.lag_m),
         }
 
-    def check(self, inputs: dict[str, Any]) -> Finding:
-        """Prove, and run."""
-        return judge(Tracking(), Patience, inputs)
+    def hypotheses(self, inputs: dict[str, Any]) -> list[Hypothesis]:
+        """The tracking error contracts."""
+        gain, h = decimal(inputs["intervention_gain_1_s"]), decimal(inputs["control_period_s"])
+        return [
+            Hypothesis(self.margin_of, f"Lambda h = {float(gain * h):g} is at most 1", 1 - gain * h),
+            Hypothesis("Lambda", "the gain Lambda is not negative", gain, "1/s"),
+            Hypothesis("h", "the control period h is above 0", h, "s", strict=True),
+        ]
 
-    def takes(self, inputs: dict[str, Any], finding: Finding) -> bool:
-        """The obligations once more, by expansion."""
-        return proved_again(finding, obligations(Tracking(), Patience))
+    def numbers(self, inputs: dict[str, Any]) -> dict[str, Any]:
+        """The disturbance that may last, m/s."""
+        gain, lag = decimal(inputs["intervention_gain_1_s"]), decimal(inputs["lag_m"])
+        return {"disturbance_m_s": float(gain * lag)}
 
-
-def _widest_m(scenario: Scenario) -> float:
-    """The largest distance that the centre of a UGV has to keep from that of an obstacle, m."""
-    of_ugvs = max(ugv.radius_m for ugv in scenario.ugvs.values())
-    of_obstacles = max((obstacle.radius_m for obstacle in scenario.obstacles.values()), default=0.0)
-    return float(scenario.safe_distance.obstacle_m + (of_ugvs + of_obstacles))
-
-
-def judge(tracking: Tracking, kind: type[Patience], inputs: dict[str, Any]) -> Finding:
-    """The finding for a kind of tracking and of patience."""
-    patience = kind(*(inputs[name] for name in ("tries", "rest_s", "longest_s", "lag_m", "behind_s")))
-    found = finding(discharge(obligations(tracking, kind), LIMIT_S))
-    ran = runs(patience, inputs)
-    evidence = {**found.evidence, "disturbance_m_s": inputs["intervention_gain_1_s"] * inputs["lag_m"], "runs": ran}
-    given_back = [row for row in ran if row["given_back"]]
-    if found.status != "proved":
-        return replace(found, evidence=evidence)
-    if given_back or inputs["intervention_gain_1_s"] * inputs["control_period_s"] > 1.0:
-        return replace(found, status="error", evidence=evidence)  # the running code is not what was proved
-    return replace(
-        found, evidence=evidence, margin=inputs["lag_m"] - max(row["largest_excess_m"] for row in ran), unit="m",
-        quantity="lag allowed above the predicted one, less the largest that a disturbed run had",
-    )  # fmt: skip
+    def applications(self, trace: Trace) -> tuple[int, int]:
+        """Accepted interventions under method (d) that met the premise."""
+        found = followed(trace)
+        return sum(one.met for one in found), len(found)

@@ -1,10 +1,8 @@
 """Simulated drift-diffusion paths of the decision variable between two thresholds.
 
-Paths come from the systems of the diagram that runs: RandomSource -> integrated noise (`make_noise`) ->
-DecisionVariable, whose UGVs stand still while their references leave at the drift, so that x = drift t + n. Increments
-of x over the noise period are independent, so one long record is cut into paths, one beginning where the one before
-has ended, until a fixed number is complete; a fixed number, because the paths that happen to fit into a fixed time are
-too short.
+Paths are those of the diagram's systems with a task error that grows at the drift, x = drift t + n: over each noise
+period x changes by drift * period + noise * sqrt(period) * (a normal number). Tests compare these increments with those
+of the running systems.
 
 A path is decided at the first sample at or beyond a barrier, which is later, and less often wrong, than for the
 continuous process. The barrier is therefore moved inwards by 0.5826 noise sqrt(period) (Chernoff 1965, Siegmund
@@ -14,25 +12,17 @@ continuous process. The barrier is therefore moved inwards by 0.5826 noise sqrt(
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from pydrake.common import RandomGenerator
-from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
-from pydrake.systems.framework import DiagramBuilder
-from pydrake.systems.primitives import ConstantVectorSource, LogVectorOutput, TrajectorySource
 
-from airground_drake.components import make_noise, stack_presets
 from airground_drake.decision.bayes import decision_time, error_rate, optimal_threshold
-from airground_drake.nsbc.motion import Motion
-from airground_drake.scenarios.schema import Decision
-from airground_drake.systems.decision import DecisionVariable
 
 SEED = 20061
-CHANNELS = 32
+MOST_PERIODS = 1_000_000
+"""Noise periods of a path: with the drifts in use some hundred are needed."""
 OVERSHOOT = 0.5825971579390107
 """-zeta(1/2)/sqrt(2 pi): mean overshoot of a sampled Wiener path beyond a far barrier, in steps of one deviation."""
 STEP = 0.2
@@ -105,55 +95,23 @@ def running(experiment: PassageExperiment) -> tuple[float, float]:
 
 @lru_cache(maxsize=16)
 def simulate(experiment: PassageExperiment) -> Sample:
-    """Decide `experiment.paths` paths, simulated by Drake.
+    """Decide `experiment.paths` paths, side by side.
 
     Raises:
-        ArithmeticError: if the record is too short for them, which the margin makes all but impossible.
+        ArithmeticError: if a path is not decided within MOST_PERIODS.
     """
-    expected = (running(experiment)[0] / experiment.period + 1.0) * experiment.paths
-    steps = iter(increments(experiment, math.ceil((1.1 * expected + 1000.0) / CHANNELS)))
-    start, barrier = experiment.deviation, experiment.barrier
-    wrong = 0
-    total = 0
-    squares = 0
-    for _ in range(experiment.paths):
-        periods, x = passage(steps, start, barrier)
-        wrong += x < 0.0
-        total += periods
-        squares += periods**2
-    return Sample(experiment, wrong, total, squares)
-
-
-def passage(steps: Iterator[float], x: float, barrier: float) -> tuple[int, float]:
-    """Noise periods until x, m, reaches +-barrier, and where it is then."""
-    for periods, step in enumerate(steps, start=1):
-        x += step
-        if not -barrier < x < barrier:
-            return periods, x
-    raise ArithmeticError("the record ended within a path")
-
-
-def increments(experiment: PassageExperiment, rows: int) -> list[float]:
-    """Increments of the decision variable over the noise period, m, (rows * CHANNELS), from a Drake simulation."""
-    period, duration = experiment.period, rows * experiment.period
-    ends = np.array([[0.0, 0.0, 0.0], [1.01 * experiment.drift * duration, 0.0, 0.0]])
-    away = Motion.at_speed(ends, experiment.drift)
-    builder = DiagramBuilder()
-    given = Decision(noise_m_sqrt_s=experiment.noise, leak_1_s=0.0, noise_period_s=period)
-    source, noise = map(builder.AddSystem, make_noise(CHANNELS, given))
-    reference = builder.AddNamedSystem("reference", TrajectorySource(stack_presets([away] * CHANNELS), 1))
-    standing = builder.AddNamedSystem("team_position", ConstantVectorSource(np.zeros(3 * (CHANNELS + 1))))
-    variable = builder.AddNamedSystem("decision_variable", DecisionVariable(CHANNELS))
-    builder.Connect(source.get_output_port(), noise.get_input_port())
-    builder.Connect(noise.get_output_port(), variable.GetInputPort("noise"))
-    builder.Connect(reference.get_output_port(), variable.GetInputPort("reference"))
-    builder.Connect(standing.get_output_port(), variable.GetInputPort("team_position"))
-    log = LogVectorOutput(variable.GetOutputPort("decision_variable"), builder, period)
-    diagram = builder.Build()
-    simulator = Simulator(diagram)
-    context = simulator.get_mutable_context()
-    diagram.SetRandomContext(context, RandomGenerator(experiment.seed))
-    ResetIntegratorFromFlags(simulator, "explicit_euler", period)  # exact, the noise being held over each period
-    simulator.Initialize()
-    simulator.AdvanceTo(duration)
-    return np.diff(log.FindLog(context).data(), axis=1).ravel().tolist()
+    rng = np.random.default_rng(experiment.seed)
+    mean, deviation = experiment.drift * experiment.period, experiment.noise * math.sqrt(experiment.period)
+    x = np.full(experiment.paths, experiment.deviation)
+    wrong, total, squares = 0, 0, 0
+    for periods in range(1, MOST_PERIODS + 1):
+        x = x + rng.normal(mean, deviation, len(x))
+        inside = np.abs(x) < experiment.barrier
+        decided = len(x) - int(np.count_nonzero(inside))
+        wrong += int(np.count_nonzero(x <= -experiment.barrier))
+        total += periods * decided
+        squares += periods**2 * decided
+        x = x[inside]
+        if not len(x):
+            return Sample(experiment, wrong, total, squares)
+    raise ArithmeticError(f"{experiment.name}: {len(x)} paths are undecided after {MOST_PERIODS} noise periods")

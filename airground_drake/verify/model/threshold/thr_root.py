@@ -1,40 +1,22 @@
-"""THR-ROOT: the Bayes threshold as the one root of (19), by ball arithmetic."""
+"""THR-ROOT: the Bayes threshold as the one root of (19) (proofs/Threshold.v), enclosed by two signs."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
-from airground_drake.components import threshold
 from airground_drake.decision.bayes import optimal_threshold
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.verify.claim import ModelClaim
-from airground_drake.verify.engines.ball_arithmetic import (
-    bracket,
-    conclude,
-    enclose,
-    evaluate,
-)
-from airground_drake.verify.engines.smt import solve
-from airground_drake.verify.finding import Finding
-from airground_drake.verify.model.threshold.constants import FLOAT_TOLERANCE, Rule, ThresholdRule, running_threshold
-from airground_drake.verify.model.threshold.expressions import INCREASING, ONE_ROOT, RESIDUAL
+from airground_drake.verify.engines.signs import Ends, Rule, enclose, value
+from airground_drake.verify.model.levels import threshold_m
+from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim, decimal
 
-CVC5_LIMIT_S = 5.0
-
-UNIQUE_SMT2 = f"""; two roots of (19) for any drift, noise, c1, c2: must be unsatisfiable
-(set-logic QF_NRAT)
-{"".join(f"(declare-const {v} Real){chr(10)}" for v in ("drift", "noise", "c1", "c2", "u", "v"))}\
-{"".join(f"(assert (> {v} 0.0)){chr(10)}" for v in ("drift", "noise", "c1", "c2", "u"))}\
-(assert (< u v))
-(assert (= (* c1 noise noise (+ (/ (- (exp u) (exp (- u))) 2.0) u)) (* c2 drift drift)))
-(assert (= (* c1 noise noise (+ (/ (- (exp v) (exp (- v))) 2.0) v)) (* c2 drift drift)))
-(check-sat)
-"""
+FLOAT_TOLERANCE = Fraction(1, 10**12)
+"""The program's threshold may be this far outside its enclosure, relative to it: rounding errs by some 1e-15."""
+NUMBERS = ("drift_m_s", "noise_m_sqrt_s", "c1_1_s", "c2")
 
 
-class ThrRoot(ModelClaim):
+class ThrRoot(TheoremClaim):
     """THR-ROOT."""
 
     id = "THR-ROOT"
@@ -46,10 +28,9 @@ class ThrRoot(ModelClaim):
         r"\zeta = \frac{u \sigma^2}{2 \mu}",
     )
     method = (
-        "Ball arithmetic (256 bits) decides the signs of f(u) = k (sinh u + u) - r at two rational points at most "
-        "1e-12 apart (relative); f' = k (cosh u + 1) > 0 leaves no second root. The value of `optimal_threshold` "
-        "must lie between the points to within 1e-12 (relative). cvc5 is asked besides whether any drift, noise, c1 "
-        "and c2 have two roots; its answer is reported, and only a contradiction counts."
+        "Theorems in Coq: the left side increases strictly, so there is one root, and two points with different signs "
+        "enclose it. Ball arithmetic (256 bits) decides both signs, at rational points at most 1e-12 apart (relative). "
+        "The value of `optimal_threshold` must lie between the points to within 1e-12 (relative)."
     )
     equations = "(19) with c2/c1 for the printed c1/c2"
     assumptions = (
@@ -61,58 +42,71 @@ class ThrRoot(ModelClaim):
         "decision variable follows (15) at all."
     )
 
-    exercised_by = "statements of the proof"
-    kept = False
+    theorems = ("Threshold.increasing", "Threshold.exactly_one", "Threshold.enclosed")
+    margin_of = "threshold against its enclosure"
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
         """The numbers of the threshold rule and the threshold in force."""
         rule = scenario.decision.threshold
-        return {
-            "rule": rule.rule,
-            "drift_m_s": rule.drift_m_s,
-            "noise_m_sqrt_s": rule.noise_m_sqrt_s,
-            "c1_1_s": rule.c1_1_s,
-            "c2": rule.c2,
-            "zeta_m": threshold(scenario),
-        }
+        numbers = {name: getattr(rule, name) for name in NUMBERS}
+        return {"rule": rule.rule, **numbers, "zeta_m": threshold_m(scenario)}
 
-    def check(self, inputs: dict[str, Any]) -> Finding:
-        """Enclose the root and look for the code's in it."""
-        return judge_root(inputs, optimal_threshold)
+    def hypotheses(self, inputs: dict[str, Any]) -> list[Hypothesis]:
+        """The constants are positive, two signs enclose the root, and the program's threshold is between them."""
+        rule = rule_of(inputs)
+        root = enclose(rule.residual(rule.c2 / rule.c1), Fraction(0))
+        names = ("drift", "noise", "c1", "c2")
+        judged = [Fraction(self.computed(inputs))]
+        if inputs["rule"] == "bayes":
+            judged.append(Fraction(inputs["zeta_m"]))
+        low, high = rule.zeta(root.low), rule.zeta(root.high)
+        outside = max(max(low - zeta, zeta - high) for zeta in judged)
+        return [
+            *(Hypothesis(name, f"{name} is above 0", number, strict=True)
+              for name, number in zip(names, rule, strict=True)),
+            *two_signs("(19)", root, (-1, 1)),
+            Hypothesis(self.margin_of, "the program's threshold is between the points, to within 1e-12",
+                       FLOAT_TOLERANCE * high - outside, "m"),
+        ]  # fmt: skip
+
+    def numbers(self, inputs: dict[str, Any]) -> dict[str, Any]:
+        """The enclosure of u and of the threshold, m, and what the program computes, m."""
+        rule = rule_of(inputs)
+        root = enclose(rule.residual(rule.c2 / rule.c1), Fraction(0))
+        return {"enclosures": as_floats(rule, root), "computed_threshold_m": self.computed(inputs)}
+
+    def counterexample(self, inputs: dict[str, Any], broken: Hypothesis) -> dict[str, Any] | None:
+        """The program's threshold does not solve the equation."""
+        if broken.name != self.margin_of:
+            return None
+        rule, zeta = rule_of(inputs), self.computed(inputs)
+        residual = value(rule.residual(rule.c2 / rule.c1), rule.u(Fraction(zeta)))
+        return {"computed_threshold_m": zeta, "residual_of_the_equation_s": float(residual.mid())}
+
+    def computed(self, inputs: dict[str, Any]) -> float:
+        """The threshold that the program computes for these numbers, m."""
+        return float(optimal_threshold(*(inputs[name] for name in NUMBERS)))
 
 
-def judge_root(inputs: dict[str, Any], rule: Rule, shift: int = 0) -> Finding:
-    """THR-ROOT for the threshold that `rule` computes; `shift` moves the enclosure by multiples of its width."""
-    constants = ThresholdRule.of(inputs)
-    low, high = enclose(RESIDUAL, constants.values, Fraction(0))
-    low, high = low + shift * (high - low), high + shift * (high - low)
-    zeta = constants.zeta(low), constants.zeta(high)
-    statements = [INCREASING, *bracket("root", "f changes its sign here.", RESIDUAL, constants.values, (low, high))]
-    running = running_threshold(inputs, rule)
-    in_force = Fraction(inputs["zeta_m"]) if inputs["rule"] == "bayes" else running
-    outside = max(max(zeta[0] - value, value - zeta[1]) for value in (running, in_force))
-    [cvc5] = solve([UNIQUE_SMT2], "cvc5", CVC5_LIMIT_S)
-    evidence = {
-        "running_threshold_m": float(running),
-        "cvc5_on_two_roots": cvc5.answer,
-        "cvc5_says": {"unsat": "no constants have two roots", "sat": "contradicts"}.get(cvc5.answer, "undecided"),
+def rule_of(inputs: dict[str, Any]) -> Rule:
+    """The threshold rule of a claim's inputs, exactly."""
+    return Rule(*(decimal(inputs[name]) for name in NUMBERS))
+
+
+def two_signs(what: str, ends: Ends, wanted: tuple[int, int]) -> list[Hypothesis]:
+    """That a function has these signs at the ends of an enclosure."""
+    words = {-1: "below 0", 1: "above 0"}
+    return [
+        Hypothesis(
+            f"sign of {what}", f"{what} is {words[want]} at u = {float(u)!r}", Fraction(have * want), strict=True
+        )
+        for u, have, want in zip(ends[:2], ends.signs, wanted, strict=True)
+    ]
+
+
+def as_floats(rule: Rule, root: Ends, prefix: str = "") -> dict[str, list[float]]:
+    """The enclosures of u and of the threshold, m."""
+    return {
+        f"{prefix}u": [float(u) for u in root[:2]],
+        f"{prefix}zeta_m": [float(rule.zeta(u)) for u in root[:2]],
     }
-    finding = conclude(
-        statements,
-        constants.values,
-        {"u": (low, high), "zeta_m": zeta},
-        ONE_ROOT,
-        margin=float(FLOAT_TOLERANCE * zeta[1] - outside),
-        unit="m",
-        evidence=evidence,
-        scripts={"two_roots.smt2": UNIQUE_SMT2},
-    )
-    quantity = "what the running threshold leaves of the distance by which it may be outside of the enclosure"
-    finding = replace(finding, quantity=quantity)
-    if cvc5.answer == "sat":
-        return replace(finding, status="error")
-    if finding.status == "proved" and outside > FLOAT_TOLERANCE * zeta[1]:
-        found = {"running_threshold_m": float(running), "enclosure_m": [float(end) for end in zeta]}
-        residual = float(evaluate(RESIDUAL, constants.at(u=constants.u(running))).mid())
-        return replace(finding, status="refuted", counterexample={**found, "residual_of_the_equation_s": residual})
-    return finding

@@ -1,72 +1,40 @@
-"""ZENO-PROOF: two triggers are never closer than the minimum inter-event time, whatever the decision variable does.
-
-The transition relation is not written down a second time: `read_off` (`relation.py`) runs the methods of the running
-`Trigger` on symbols, once for every way in which their comparisons can come out. The induction on it is in
-`induction.py`, broken triggers are in `mutants.py`. An observer that sees nothing but entries into INTERVENING is
-added to it: k triggers so far, the last of them at l; what the automaton itself remembers, n triggers and the last at
-a, is not trusted. t is the time of the last event or wait, s >= t now, x any number. The invariant:
-
-    n = k; SUPERVISING: k = 0 or t >= l + dwell; INTERVENING and REFRACTORY: k >= 1 and a = l
-
-Certificates: `relation.json` (transitions with the scenario's numbers: guards `form` >= 0 or > 0, values after it;
-source 'START' has no state before), `obligations.json` (for all zeta > 0, release <= zeta, dwell >= 0: of every
-transition that it keeps n = k and a = l, `*_memory`, and the rest of the invariant, `*_phase`, and at every trigger
-that s - l >= dwell, `*_claim`; "k = 0 or" is a factor k there, k >= 0 because it counts), `zeno_horn.smt2`
-(the numbers again, for Spacer: satisfiable if some invariant P exists), `inv_initiation.smt2`, `inv_consecution.smt2`
-and `inv_safety.smt2` (the invariant above, for any solver: each must be unsatisfiable).
-"""
+"""ZENO-PROOF: two triggers are never closer than the minimum inter-event time (proofs/Trigger.v)."""
 
 from __future__ import annotations
 
-import json
-from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
-from airground_drake.components import make_trigger, threshold
-from airground_drake.decision.trigger import Trigger
+from airground_drake.decision.trigger import Mode, Trigger, TriggerState
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.statuses import Status
-from airground_drake.verify.claim import TIME_TOLERANCE_S, ModelClaim
-from airground_drake.verify.engines.obligation import Obligation, rational
-from airground_drake.verify.engines.prover import LIMIT_S, discharge, finding, proved_again
-from airground_drake.verify.engines.smt import solve
-from airground_drake.verify.finding import Finding
-from airground_drake.verify.model.trigger.induction import counterexample, horn, invariant, obligations, remarks
-from airground_drake.verify.model.trigger.relation import Transition, conformance, dwell_rounding, read_off
+from airground_drake.verify.model.levels import levels_of, trigger_of
+from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim, decimal
 
 SHORTEST_S = 1e-3
 """Bound that is tried where the scenario has none (0 s), s: any number would do, the counterexample scales with it."""
 
 
-class ZenoProof(ModelClaim):
+class ZenoProof(TheoremClaim):
     """ZENO-PROOF."""
 
     id = "ZENO-PROOF"
     summary = "Triggers never pile up: two are at least the minimum inter-event time apart, whatever the noise."
     statement = (
-        "Two triggers of a UGV are never closer than the minimum inter-event time, whatever the decision variable "
-        "does, so that no run is Zeno."
+        "Triggers i < j of a UGV are at least (j - i) times the minimum inter-event time apart, whatever the decision "
+        "variable does, so that there are at most floor(T/dwell) + 1 in a time T and no run is Zeno."
     )
-    formula = (
-        "for every x: [0, inf) -> R, consecutive triggers satisfy t_(k+1) - t_k >= min_inter_event_s - e, where e, "
-        "about 1e-15 s, is the rounding error of triggered_at + dwell"
-    )
+    formula = "for every x: [0, inf) -> R: t_j - t_i >= (j - i) min_inter_event_s, number in T <= floor(T/dwell) + 1"
     latex = (
-        r"x : [0, \infty) \to \mathbb{R} \text{ arbitrary} \; \Rightarrow \; t_{k+1} - t_k \ge \tau_{\min} - "
-        r"e, \quad e \approx 10^{-15} \text{ s}",
+        r"x : [0, \infty) \to \mathbb{R} \text{ arbitrary} \; \Rightarrow \; t_j - t_i \ge (j - i) \tau_{\min}",
+        r"N(T) \le \lfloor T / \tau_{\min} \rfloor + 1",
     )
     method = (
-        "The transition relation is read off the running `Trigger` by running its methods on symbols. Its invariant "
-        "is proved for symbolic parameters, transition by transition, by polynomial implications with exact "
-        "certificates, z3 and cvc5 besides; with the scenario's numbers Spacer finds an invariant of its own "
-        "(constrained Horn clauses), and z3 and cvc5 check ours. The relation is compared with the running "
-        "`EventTrigger` on random states. The margin is what rounding leaves of ZENO-TRACE's tolerance, 1e-9 s. A "
-        "refuted claim comes with a run of the automaton, replayed on the running code."
+        "Theorems in Coq about the automaton, by induction over any events at any times. Checked here: the dwell in "
+        "force is the minimum inter-event time, and above 0. Tests read the transitions off the running `Trigger` and "
+        "compare them with the theorem's. A bare threshold is refuted by a run of the automaton."
     )
     equations = "(20)"
     assumptions = (
-        "Time never runs backwards, and the trigger's methods are called only under the guards of `EventTrigger`.",
+        "Time never runs backwards.",
         "x is any number at any time: no bound on the noise or its rate is used.",
         "Triggers are the times at which the automaton enters INTERVENING. The simulator's event isolation, 1e-6 s, "
         "delays them against the crossings of x; it brings no two of them closer than the dwell, because guards and "
@@ -74,85 +42,58 @@ class ZenoProof(ModelClaim):
     )
     does_not_establish = (
         "That a trigger comes when it should (THR-TRIG), or that the bare threshold is Zeno (ZENO-REFINE shows how its "
-        "events multiply; here it is refuted by a run with two triggers closer than the bound). With a rate bound "
-        "|dx/dt| <= R (not Wiener noise) 2 (zeta - release)/R would bound the inter-event time as well: `rate_bound`."
+        "events multiply). The end of a dwell is rounded, by about 1e-15 s: ZENO-TRACE measures gaps to 1e-9 s."
     )
 
-    exercised_by = "obligations of the proof"
+    theorems = ("Trigger.dwell_apart", "Trigger.at_most")
+    margin_of = "dwell in force"
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
-        """The running trigger's levels, m, and dwell, s; the bound claimed, s; the time within which to be exact, s."""
-        trigger = make_trigger(scenario, threshold(scenario))
+        """The trigger's levels, m, and dwell, s; the bound claimed, s; the duration, s."""
         return {
-            "zeta_m": float(trigger.zeta),
-            "released_below_m": float(trigger.release),
-            "dwell_s": float(trigger.dwell),
+            **levels_of(scenario),
             "min_inter_event_s": float(scenario.decision.min_inter_event_s),
             "duration_s": float(scenario.duration_s),
         }
 
-    def check(self, inputs: dict[str, Any]) -> Finding:
-        """Prove it for these constants, or find a run that breaks it."""
-        return prove(_trigger(inputs), inputs)
+    def hypotheses(self, inputs: dict[str, Any]) -> list[Hypothesis]:
+        """The dwell is in force and positive; the release level is not above the threshold."""
+        dwell, zeta, release = (decimal(inputs[name]) for name in ("dwell_s", "zeta_m", "released_below_m"))
+        bound = decimal(inputs["min_inter_event_s"])
+        return [
+            Hypothesis(
+                "dwell less the bound", "the dwell is the minimum inter-event time at least", dwell - bound, "s"
+            ),
+            Hypothesis(self.margin_of, "the dwell in force is above 0", dwell, "s", strict=True),
+            Hypothesis("threshold less release", "the release level is at most the threshold", zeta - release, "m"),
+        ]
 
-    def takes(self, inputs: dict[str, Any], finding: Finding) -> bool:
-        """The obligations once more, by expansion; relation, invariant and clauses as this code writes them."""
-        trigger, bound = _trigger(inputs), _bound(inputs)
-        written = scripts(read_off(lambda _: trigger), trigger, bound).items() <= finding.certificates.items()
-        return written and proved_again(finding, to_prove(trigger, bound))
+    def numbers(self, inputs: dict[str, Any]) -> dict[str, Any]:
+        """The bound, s, and how many triggers the run can have at most."""
+        dwell = decimal(inputs["dwell_s"])
+        most = int(decimal(inputs["duration_s"]) // dwell) + 1 if dwell > 0 else None
+        return {"bound_s": inputs["min_inter_event_s"] or SHORTEST_S, "most_triggers": most}
 
-
-def prove(trigger: Trigger, inputs: dict[str, Any]) -> Finding:
-    """The finding for a trigger, the scenario's or a mutant of it."""
-    bound, duration = _bound(inputs), inputs["duration_s"]
-    numeric = read_off(lambda _: trigger)
-    saved = scripts(numeric, trigger, bound)
-    files = {name: text for name, text in saved.items() if name.endswith(".smt2")}
-    answers = solve(list(files.values()), "z3", LIMIT_S)
-    spacer = answers[0]  # on the clauses; the others on our invariant
-    z3 = answers[1:]
-    evidence: dict[str, Any] = {
-        "bound_s": bound,
-        "spacer": {"sat": "an invariant exists", "unsat": "violated"}.get(spacer.answer, spacer.answer),
-        "conformance": conformance(trigger, numeric, duration),
-        "rounding_s": dwell_rounding(trigger, duration),
-    }
-    if spacer.answer == "unsat":
-        broken = counterexample(numeric, trigger, bound)
-        status: Status = "refuted" if broken else "error"
-        margin = broken["gap_s"] - bound if broken else None
-        return Finding(status, margin, "s", {}, broken, evidence, saved, "a gap between triggers less the bound")
-    cvc5 = solve(list(files.values())[1:], "cvc5", LIMIT_S)
-    found = finding(discharge(to_prove(trigger, bound)))
-    ours = {name: [a.answer, b.answer] for name, a, b in zip(list(files)[1:], z3, cvc5, strict=True)}
-    status = found.status
-    if any("sat" in pair for pair in ours.values()) or evidence["conformance"]["disagreements"]:
-        status = "error"  # the invariant or the relation is not the running code's
-    elif status == "proved" and (spacer.answer != "sat" or any(pair != ["unsat", "unsat"] for pair in ours.values())):
-        status = "inconclusive"
-    return replace(
-        found, status=status, margin=TIME_TOLERANCE_S - evidence["rounding_s"], unit="s", where={"bound_s": bound},
-        quantity="what rounding leaves of the 1e-9 s by which a gap between triggers may fall short of the bound",
-        evidence={**evidence, "invariant": ours, **found.evidence}, certificates={**saved, **found.certificates},
-    )  # fmt: skip
+    def counterexample(self, inputs: dict[str, Any], broken: Hypothesis) -> dict[str, Any] | None:
+        """Two triggers closer than the bound, on a run of the automaton: up, down and up again."""
+        trigger, bound = trigger_of(inputs), float(self.numbers(inputs)["bound_s"])
+        gap = max(trigger.dwell, bound / 2.0)
+        if not gap < bound:
+            return None
+        low = trigger.release - trigger.zeta
+        run = replay(trigger, [(0.0, trigger.zeta), (gap / 2.0, low), (gap, trigger.zeta)])
+        times = [row["t_s"] for row in run if row["trigger"]]
+        if len(times) < 2:
+            return None
+        return {"run": run, "gap_s": times[1] - times[0], "bound_s": bound}
 
 
-def scripts(numeric: Sequence[Transition], trigger: Trigger, bound: float) -> dict[str, str]:
-    """The certificates with the scenario's numbers."""
-    described = json.dumps({"bound_s": rational(bound), "transitions": [each.to_json() for each in numeric]}, indent=1)
-    clauses = {"zeno_horn.smt2": horn(numeric, trigger, bound), **invariant(numeric, trigger, bound)}
-    return {"relation.json": described + "\n", **clauses}
-
-
-def to_prove(trigger: Trigger, bound: float) -> list[Obligation]:
-    """The obligations for all parameters, and what follows with the scenario's numbers."""
-    general = read_off(lambda path: type(trigger)(*map(path.symbol, ("zeta", "release", "dwell"))))
-    return [*obligations(general), *remarks(trigger, bound)]
-
-
-def _trigger(inputs: dict[str, Any]) -> Trigger:
-    return Trigger(inputs["zeta_m"], inputs["released_below_m"], inputs["dwell_s"])
-
-
-def _bound(inputs: dict[str, Any]) -> float:
-    return float(inputs["min_inter_event_s"] or SHORTEST_S)
+def replay(trigger: Trigger, events: list[tuple[float, float]]) -> list[dict[str, Any]]:
+    """Run the automaton through events (t in s, x in m): the state after each."""
+    state, rows = TriggerState(), list[dict[str, Any]]()
+    for i, (t, x) in enumerate(events):
+        before = state.mode
+        state = trigger.start(t, x) if i == 0 else trigger.step(state, t, x)
+        fired = state.mode is Mode.INTERVENING and before is not Mode.INTERVENING
+        rows.append({"t_s": t, "x_m": x, "mode": state.mode.name, "trigger": fired})
+    return rows

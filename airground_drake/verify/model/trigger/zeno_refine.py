@@ -13,7 +13,7 @@ Verdict, fixed beforehand: 'supported' as the claim's `method` says (the bias is
 counts); 'inconclusive' if an interval is wider than 1/5, or all holds but the bare counts are too far from their
 expectation at some dt; else 'refuted'. Margin: the smallest distance of an interval's end from breaking the rule.
 
-Certificate `counts.csv`: trigger counts by path and dt, from which means, standard errors and fits can be redone; the
+The evidence has the trigger counts by path and dt, from which means, standard errors and fits can be redone; the
 theoretical counts follow from the formula in `refined_paths.py`.
 """
 
@@ -25,16 +25,15 @@ from typing import Any
 import numpy as np
 
 from airground_drake.arrays import Array
-from airground_drake.components import make_trigger, threshold
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.statuses import Status
 from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.finding import Finding
+from airground_drake.verify.model.levels import levels_of
 from airground_drake.verify.model.trigger.refined_paths import (
     HALVINGS,
     PATHS,
     SEED,
-    SERIES,
     Refinement,
     counts,
     expected_bare,
@@ -60,6 +59,7 @@ class ZenoRefine(ModelClaim):
 
     id = "ZENO-REFINE"
     expected = "supported"
+    kept = True
     summary = "With ever finer noise a bare threshold triggers ever more often; the trigger in use does not."
     statement = (
         "As the step of the decision noise is refined, the number of events of the bare threshold grows without bound, "
@@ -98,12 +98,9 @@ class ZenoRefine(ModelClaim):
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
         """The running trigger, the noise of (15) and its step, the duration."""
-        trigger = make_trigger(scenario, threshold(scenario))
         decision = scenario.decision
         return {
-            "zeta_m": float(trigger.zeta),
-            "released_below_m": float(trigger.release),
-            "dwell_s": float(trigger.dwell),
+            **levels_of(scenario),
             "noise_m_sqrt_s": float(decision.noise_m_sqrt_s),
             "leak_1_s": float(decision.leak_1_s),
             "noise_period_s": float(decision.noise_period_s),
@@ -121,9 +118,10 @@ def series(setting: Refinement, found: dict[str, Array]) -> dict[str, Any]:
     Returns:
         `dt_s`: noise steps, s. Under `bare`, `automaton` and `automaton_at_scenario_noise`, one number per dt:
         `mean` and `largest` number of triggers in a path, `standard_error` of the mean. `expected_bare`: theory of
-        the bare mean, per dt. `fit`: for `bare` and `automaton`, `exponent`, its `interval`, `intercept` and
-        `correction` (the curve exp(intercept + correction sqrt(dt)) dt^exponent), `at_dt`: that curve per dt.
-        `bias`: of the bare exponent. `most_triggers`: duration/dwell + 1, None without a dwell. `duration_s`,
+        the bare mean, per dt. `counts`: triggers at each dt, by path, a text for each path. `fit`: for `bare` and
+        `automaton`, `exponent`, its `interval`, `intercept` and `correction` (the curve
+        exp(intercept + correction sqrt(dt)) dt^exponent), `at_dt`: that curve per dt. `bias`: of the bare exponent.
+        `most_triggers`: duration/dwell + 1, None without a dwell. `duration_s`,
         `noise_m_sqrt_s`, `own_noise_m_sqrt_s`, `leak_1_s`, `paths`, `seed`, `level` of the intervals.
     """
     dt, dwell = np.array(setting.dt_s), setting.trigger.dwell
@@ -152,6 +150,7 @@ def series(setting: Refinement, found: dict[str, Array]) -> dict[str, Any]:
             for name, values in found.items()
         },
         "expected_bare": expected.tolist(),
+        "counts": {name: [" ".join(f"{n:.0f}" for n in row) for row in values] for name, values in found.items()},
         "fit": fits,
         "bias": float(_fit(dt, expected)[1]) + 0.5,
         "most_triggers": int(setting.duration_s / dwell + 1e-9) + 1 if dwell > 0.0 else None,
@@ -202,13 +201,7 @@ def judge_experiment(setting: Refinement) -> Finding:
         broken = {"what": f"not so: {condition}", **fit, "dt_s": evidence["dt_s"], "mean": evidence[which]["mean"]}
     elif (off > STANDARD_ERRORS * spread).any():
         status = "inconclusive"
-    rows = [
-        f"{i},{dt!r}," + ",".join(str(int(found[name][i, j])) for name in SERIES)
-        for i in range(PATHS)
-        for j, dt in enumerate(setting.dt_s)
-    ]
-    table = "\n".join([f"path,dt_s,{','.join(SERIES)}", *rows]) + "\n"
     quantity = "what the confidence interval of an exponent, or a count, leaves of the condition"
     return Finding(
-        status, slack[condition], "", {"condition": condition}, broken, evidence, {"counts.csv": table}, quantity, PATHS
+        status, slack[condition], "", {"condition": condition}, broken, evidence, quantity=quantity, exercised=PATHS
     )

@@ -14,8 +14,8 @@ from airground_drake.verify.model.threshold.thr_root import ThrRoot
 
 
 @pytest.fixture(scope="session")
-def found(judged: Judged) -> dict[str, tuple[Finding, Finding]]:
-    return {name: (judged(ThrRoot(), inputs), judged(ThrOpt(), inputs)) for name, inputs in INPUTS.items()}
+def found() -> dict[str, tuple[Finding, Finding]]:
+    return {name: (ThrRoot().judge(inputs), ThrOpt().judge(inputs)) for name, inputs in INPUTS.items()}
 
 
 @pytest.fixture(scope="session")

@@ -7,22 +7,11 @@ from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorC
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
 from pydrake.systems.primitives import ConstantVectorSource, Integrator, LogVectorOutput, ZeroOrderHold
 
-from airground_drake.decision.trigger import Trigger
 from airground_drake.systems.decision import FIELDS, EventTrigger
-from airground_drake.verify.model.trigger import mutants
-
-ZENO = {"zeta_m": 3.0, "released_below_m": 2.0, "dwell_s": 0.3, "min_inter_event_s": 0.3, "duration_s": 30.0}
 
 NOISE = {"noise_m_sqrt_s": 0.004, "leak_1_s": 0.0, "noise_period_s": 0.05, "duration_s": 30.0}
 
 REFINE = {"zeta_m": 3.0, "released_below_m": 2.0, "dwell_s": 0.5, **NOISE}
-
-KINDS: dict[str, type[Trigger]] = {
-    "no dwell": mutants.NoDwell,
-    "no refractory mode": mutants.NoRefractory,
-    "recovers at once": mutants.RecoversAtOnce,
-    "forgets a trigger after the dwell": mutants.Forgets,
-}
 
 
 def simulate(system: EventTrigger, noise: LeafSystem, until: float, step: float, error_m: float = 0.0) -> np.ndarray:

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from itertools import pairwise
 
 import pytest
 from verify.judging import Judged
 from verify.model.trigger.cases import REFINE
 
+from airground_drake.decision.trigger import Trigger, TriggerState
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.verify.model.trigger import mutants, refined_paths, zeno_refine
+from airground_drake.verify.model.trigger import refined_paths, zeno_refine
 from airground_drake.verify.model.trigger.refined_paths import experiment
 from airground_drake.verify.model.trigger.zeno_refine import ZenoRefine
 
@@ -30,14 +30,21 @@ def test_the_shipped_trigger_is_supported(judged: Judged, case_a: Scenario) -> N
     assert low < -0.49 < high < -0.4
     assert max(evidence["automaton"]["largest"]) <= evidence["most_triggers"] == 61
     assert evidence["bare"]["mean"][-1] > 10.0 * evidence["bare"]["mean"][0]
-    rows = finding.certificates["counts.csv"].splitlines()
-    assert len(rows) == 1 + refined_paths.PATHS * len(dt)
-    last = [float(row.split(",")[2]) for row in rows[1:] if float(row.split(",")[1]) == dt[-1]]
-    assert math.fsum(last) / len(last) == pytest.approx(evidence["bare"]["mean"][-1])
+    rows = evidence["counts"]["bare"]
+    assert len(rows) == refined_paths.PATHS
+    last = [float(row.split()[-1]) for row in rows]
+    assert sum(last) / len(last) == pytest.approx(evidence["bare"]["mean"][-1])
+
+
+class NoDwell(Trigger):
+    """May trigger again at once."""
+
+    def dwell_end(self, state: TriggerState) -> float:
+        return state.triggered_at
 
 
 def test_more_triggers_than_the_dwell_admits_are_noticed() -> None:
-    kind = mutants.NoDwell(3.0, 3.0, 0.5)
+    kind = NoDwell(3.0, 3.0, 0.5)
     setting = dataclasses.replace(experiment(REFINE), trigger=kind)
     finding = zeno_refine.judge_experiment(setting)
     assert finding.status == "refuted"
@@ -47,3 +54,11 @@ def test_more_triggers_than_the_dwell_admits_are_noticed() -> None:
     times = refined_paths.triggers(kind, 3.0 + setting.noise_m_sqrt_s * unit, dt)
     assert len(times) == finding.counterexample["triggers"] > 61
     assert min(b - a for a, b in pairwise(times)) < 0.5
+
+
+def test_a_bare_threshold_without_noise_does_not_diverge() -> None:
+    """On a sine about the threshold the bare count is the same at every step: the experiment can fail."""
+    finding = zeno_refine.judge_experiment(dataclasses.replace(experiment(REFINE), smooth=True))
+    assert finding.status == "refuted"
+    assert finding.counterexample is not None
+    assert "bare" in finding.counterexample["what"]

@@ -1,0 +1,89 @@
+"""`airground check DIR`: the checker, then every claim judged again by its own code, from the files alone.
+
+Two processes go over the files. The checker (`airground_drake.check`) is separate code for what matters most. Then
+`airground_drake.report.rebuild` builds the report again without Drake, and each value of it is compared. With `--coq`
+the safety of the runs is proved again, too. Each line says which of the three it comes from.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from airground_drake.check import command as checker
+from airground_drake.usage import refuse
+
+if TYPE_CHECKING:
+    import argparse
+
+    from airground_drake.check.report import Line
+
+NEEDED = ("report", "files", "trace")
+"""Checks that must agree before claims are judged again: else the files are not those of the report."""
+
+
+def parser() -> argparse.ArgumentParser:
+    """What the command line takes."""
+    found = checker.parser()
+    found.prog = "airground check"
+    found.description = "Check a report from its files alone, then have its claims judged again by their own code."
+    found.add_argument("--coq", action="store_true", help="prove the safety of the runs again with Coq")
+    return found
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line.
+
+    Returns:
+        Exit code: 0 all agree, 1 not all, 2 usage or no report, 4 a fault of the checker.
+    """
+    try:
+        options = parser().parse_args(arguments)
+        lines = checker.checked(options.report, options.limit_s)
+    except checker.UsageError as error:
+        return refuse(error)
+    except SystemExit:  # --help has been printed
+        return 0
+    lines += judged_again(options.report, lines, options.limit_s)
+    if options.coq:
+        lines.append(_proved_again(options.report))
+    checker.show(lines, options.report, as_json=options.json)
+    return checker.verdict(lines)
+
+
+def judged_again(folder: Path, lines: Sequence[Line], limit_s: float) -> Iterator[Line]:
+    """Each claim and each other part of a report, judged by its own code in a process without Drake.
+
+    Args:
+        folder: of the report.
+        lines: what the checker says of it.
+        limit_s: CPU time for each process that judges.
+    """
+    from airground_drake.check.report import AGREES, OPEN, Line
+
+    line = partial(Line, by="judged again")
+    if any(each.outcome != AGREES for each in lines if each.claim in NEEDED):
+        yield line("report", "", OPEN, "not judged again, since a check above failed", "the files are the report's")
+        return
+    command = [sys.executable, "-P", "-m", "airground_drake.report.rebuild", str(folder), str(limit_s)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    for text in done.stdout.splitlines():
+        yield line(**json.loads(text))
+    if done.returncode:
+        why = done.stderr.strip().splitlines()[-1:] or [f"its process ended with {done.returncode}"]
+        yield line("report", "", OPEN, f"not all was judged again: {why[0]}", "the files can be judged")
+
+
+def _proved_again(folder: Path) -> Line:
+    from airground_drake.check.report import AGREES, DISAGREES, Line
+
+    command = [sys.executable, "-P", "-m", "airground_drake", "prove", str(folder)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    said = (done.stdout or done.stderr).strip().splitlines()
+    outcome = DISAGREES if done.returncode else AGREES
+    return Line("proofs", "", outcome, said[-1] if said else "nothing was said", "", by="Coq")

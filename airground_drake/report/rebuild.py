@@ -1,0 +1,155 @@
+"""A report built again from its own files: each claim judged anew by its own code, and compared value by value.
+
+`python -P -m airground_drake.report.rebuild DIR LIMIT_S` does this in a process that cannot import Drake: nothing is
+simulated, and only the code of the claims and of the report runs. It prints what it found as JSON lines, which
+`airground check` shows.
+"""
+
+from __future__ import annotations
+
+import json
+import resource
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+WITHIN = 1e-8
+"""Numbers agree to this, relative to 1 plus their size: versions of numpy, scipy and solvers round differently."""
+OTHERWISE_CHECKED = ("provenance", "files")
+"""Parts of report.json that do not follow from its traces: the clock, versions, and the digests of files."""
+
+Judge = Callable[[Any, Sequence[Any]], Sequence[Any]]
+"""From a scenario and its traces to verdicts, as `verify_all`."""
+
+
+def lines(folder: Path, judge: Judge | None = None) -> Iterator[dict[str, Any]]:
+    """Everything that report.json says, built again and compared: a line for each claim and each other part.
+
+    Args:
+        folder: of a report whose files are those that it names.
+        judge: judges the claims; default: `verify_all`, without its cache.
+
+    Yields:
+        `claim` (or the name of the part), `run`, `outcome`, `text`, and of a difference `rule`, `about`, `recorded`
+        and `recomputed`.
+
+    Raises:
+        ScenarioError, TraceError, OSError: if a file cannot be used.
+    """
+    from airground_drake import trace
+    from airground_drake.report import document
+    from airground_drake.scenarios.load import from_data
+    from airground_drake.verify import verify_all
+
+    report = json.loads((folder / "report.json").read_text(encoding="utf-8"))
+    scenario = from_data(report["scenario"]["resolved"], str(folder / "report.json"))
+    third_party, own = scenario.claims, replace(scenario, claims={})
+    traces = {name: trace.load(folder / "trace" / name) for name in scenario.runs}
+    judged = [
+        replace(each, meta={**each.meta, "scenario": {**each.scenario, "claims": {}}}) for each in traces.values()
+    ]
+    again = document.build(
+        scenario,
+        report["scenario"]["sha256"],
+        traces,
+        (judge or verify_all)(own, judged),
+        report["provenance"],
+        audit=_from_other_runs(report, scenario, traces),
+    )
+    recorded = {(entry["id"], entry["run"]): entry for entry in report["claims"]}
+    rebuilt = {(entry["id"], entry["run"]): entry for entry in again["claims"]}
+    for claim, run in recorded:
+        if claim in third_party:
+            text = "a third-party claim: `airground verify --allow-plugins` judges it"
+            yield {"claim": claim, "run": run, "outcome": "cannot be checked", "text": text, "rule": "own claims"}
+        else:
+            entry = recorded[claim, run] | {"from_cache": False}
+            yield _compared(claim, run, entry, rebuilt.get((claim, run)))
+    for claim, run in [key for key in rebuilt if key not in recorded]:
+        yield _compared(claim, run, None, rebuilt[claim, run])
+    parts = [part for part in again if part not in ("claims", *OTHERWISE_CHECKED)]
+    for part in [*parts, *(key for key in report if key not in again)]:
+        if part == "overall" and third_party:
+            continue  # it counts verdicts that are not judged here; the checker derives it from all entries
+        yield _compared(part, "", report.get(part), again.get(part))
+
+
+def _from_other_runs(report: Mapping[str, Any], scenario: Any, traces: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Findings about the paper that rest on runs and computations beyond those of the report: as recorded."""
+    from airground_drake.report.audit import of_runs
+
+    here = {item["id"] for item in of_runs(scenario, traces)}
+    return [item for item in report["audit"] if item.get("id") not in here]
+
+
+def _compared(claim: str, run: str, recorded: Any, rebuilt: Any) -> dict[str, Any]:
+    line: dict[str, Any] = {"claim": claim, "run": run}
+    for about, theirs, ours in differences(recorded, rebuilt):
+        text = f"judged again, {about or 'it'} is {_short(ours)}; recorded {_short(theirs)}"
+        broken = {"rule": "the files give what is recorded", "about": about, "recorded": theirs, "recomputed": ours}
+        return {**line, "outcome": "DISAGREES", "text": text, **broken}
+    status = rebuilt.get("status", "as recorded") if isinstance(rebuilt, dict) else "as recorded"
+    exactly = "exactly" if recorded == rebuilt else f"numbers to {WITHIN:g}"
+    return {**line, "outcome": "agrees", "text": f"{status}, {exactly}"}
+
+
+def differences(recorded: Any, rebuilt: Any, path: str = "") -> Iterator[tuple[str, Any, Any]]:
+    """Each value that differs, with its dotted path: numbers by more than `WITHIN`, anything else at all."""
+    if isinstance(recorded, dict) and isinstance(rebuilt, dict):
+        for key in {**rebuilt, **recorded}:
+            both = recorded.get(key, "nothing"), rebuilt.get(key, "nothing")
+            yield from differences(*both, f"{path}.{key}".strip("."))
+    elif isinstance(recorded, list) and isinstance(rebuilt, list) and len(recorded) == len(rebuilt):
+        for k, (theirs, ours) in enumerate(zip(recorded, rebuilt, strict=True)):
+            yield from differences(theirs, ours, f"{path}.{k}".strip("."))
+    elif _is_number(recorded) and _is_number(rebuilt):
+        if not abs(recorded - rebuilt) <= WITHIN * (1.0 + abs(rebuilt)):
+            yield path, recorded, rebuilt
+    elif type(recorded) is not type(rebuilt) or recorded != rebuilt:
+        yield path, recorded, rebuilt
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+def _short(value: Any, most: int = 120) -> str:
+    text = repr(value)
+    return text if len(text) <= most else f"{text[:most]}..."
+
+
+class _WithoutDrake:
+    """Refuses to import Drake."""
+
+    def find_spec(self, name: str, path: object = None, target: object = None) -> None:
+        if name.partition(".")[0] == "pydrake":
+            raise ImportError("claims are judged again without Drake")
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Print the lines of a report, one JSON object each.
+
+    Args:
+        arguments: the folder of the report, and the CPU time that each process may take, s.
+
+    Returns:
+        Exit code: 0, or 2 if a file cannot be used.
+    """
+    from airground_drake.errors import AirgroundError
+
+    folder, limit_s = Path(arguments[0]), int(float(arguments[1])) + 1
+    resource.setrlimit(resource.RLIMIT_CPU, (limit_s, limit_s))
+    try:
+        for line in lines(folder):
+            print(json.dumps(line, allow_nan=False), flush=True)
+    except (AirgroundError, OSError) as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.meta_path.insert(0, _WithoutDrake())
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,107 @@
+"""Signs of (16)-(19) in ball arithmetic: rational arguments, values enclosed in 256 bits.
+
+With u = 2 zeta drift / noise^2, k = noise^2 / drift^2 (s) and r = c2 / c1 (s), the threshold equation (19) with c2/c1
+on the right is f(u) = k (sinh u + u) - r = 0.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from fractions import Fraction
+from typing import Any, NamedTuple
+
+import flint
+
+PRECISION_BITS = 256
+NARROW = Fraction(1, 10**12)
+"""Enclosures are at most this wide, relative to their lower end."""
+LARGEST_U = 10**6
+_flint = threading.Lock()  # flint's precision is one for all threads
+
+Function = Callable[[Any], Any]
+"""From a ball u to a ball that contains the value there."""
+
+
+class Ends(NamedTuple):
+    """Two rational numbers with a root between them, and the signs there: -1 or 1."""
+
+    low: Fraction
+    high: Fraction
+    signs: tuple[int, int]
+
+
+class Rule(NamedTuple):
+    """The numbers of the threshold rule, as the decimals that they print as."""
+
+    drift: Fraction
+    noise: Fraction
+    c1: Fraction
+    c2: Fraction
+
+    def zeta(self, u: Fraction) -> Fraction:
+        """Threshold, m, at u."""
+        return u * self.noise**2 / (2 * self.drift)
+
+    def u(self, zeta: Fraction) -> Fraction:
+        """2 zeta drift / noise^2 of a length, m."""
+        return zeta * 2 * self.drift / self.noise**2
+
+    def residual(self, ratio: Fraction) -> Function:
+        """f for r = ratio, s."""
+        k = self.noise**2 / self.drift**2
+        return lambda u: ball(k) * (u.sinh() + u) - ball(ratio)
+
+    def risk(self, u: Any) -> Any:
+        """The Bayes risk (16) without initial deviation, at a ball u."""
+        k = self.noise**2 / self.drift**2
+        q = u.exp()
+        return (ball(self.c1 * k / 2) * u * (q - 1) + ball(self.c2)) / (q + 1)
+
+
+def ball(value: Fraction) -> Any:
+    """A ball that contains a rational number."""
+    return flint.arb(flint.fmpq(*value.as_integer_ratio()))
+
+
+def value(function: Function, u: Fraction) -> Any:
+    """A ball that contains the function's value at u."""
+    with _flint, flint.ctx.workprec(PRECISION_BITS):
+        return function(ball(u))
+
+
+def sign(function: Function, u: Fraction) -> int:
+    """The sign of the function at u: -1 or 1; 0 if the ball contains 0, so that it is open."""
+    found = value(function, u)
+    return int(bool(found > 0)) - int(bool(found < 0))
+
+
+def enclose(function: Function, low: Fraction, high: Fraction | None = None) -> Ends:
+    """Rational ends, NARROW apart or less, around a sign change of the function, by bisection.
+
+    Args:
+        function: monotone between `low` and `high`.
+        low: below the sign change; may be 0.
+        high: above it; None: found by doubling.
+
+    Raises:
+        ArithmeticError: if a sign cannot be decided, or none changes below LARGEST_U.
+    """
+
+    def sure(u: Fraction) -> int:
+        found = sign(function, u)
+        if not found:
+            raise ArithmeticError(f"the sign at u = {float(u):g} is open")
+        return found
+
+    if high is None:
+        low, high = max(low, Fraction(1, 2**200)), max(2 * low, Fraction(1))
+        while sure(high) == sure(low):
+            low, high = high, 2 * high
+            if high > LARGEST_U:
+                raise ArithmeticError(f"no sign changes below u = {LARGEST_U}")
+    before = sure(low)
+    while high - low > NARROW * low:
+        middle = (low + high) / 2
+        low, high = (middle, high) if sure(middle) == before else (low, middle)
+    return Ends(low, high, (before, sure(high)))

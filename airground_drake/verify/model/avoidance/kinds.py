@@ -1,0 +1,70 @@
+"""Who must keep which distance from whom, read from the scenario alone.
+
+Nothing here is taken from the controllers. SAFE-HYP compares the built ones with the scenario.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from fractions import Fraction
+from itertools import combinations, product
+from typing import Any, NamedTuple
+
+from airground_drake.scenarios.schema import Scenario
+from airground_drake.verify.model.theorem import decimal
+
+SHARES = {"obstacle": (Fraction(1), Fraction(0)), "uav_ugv": (Fraction(1, 2),) * 2, "ugv_ugv": (Fraction(1, 2),) * 2}
+"""By kind of pair, the parts of an inequality that its two bodies take; an obstacle stands still and takes none."""
+
+
+class Kind(NamedTuple):
+    """Pairs of one kind with the same safe distance of centres, m, and closing speed, m/s."""
+
+    kind: str
+    safe_m: Fraction
+    closing_m_s: Fraction
+
+
+def constants(scenario: Scenario) -> dict[str, Any]:
+    """Constants of a scenario that the claims about avoidance are about, strict JSON."""
+    control = scenario.control
+    return {
+        "avoidance_gain_1_s": control.avoidance_gain_1_s,
+        "period_s": control.period_s,
+        "sensing_range_m": control.sensing_range_m,
+        "pairs": [
+            {"kind": each.kind, "safe_m": float(each.safe_m), "closing_m_s": float(each.closing_m_s)}
+            for each in _kinds(scenario)
+        ],
+    }
+
+
+def kinds_of(inputs: dict[str, Any]) -> list[Kind]:
+    """The pairs among a claim's inputs, as the decimals that their numbers print as."""
+    return [Kind(each["kind"], decimal(each["safe_m"]), decimal(each["closing_m_s"])) for each in inputs["pairs"]]
+
+
+def _kinds(scenario: Scenario) -> Iterator[Kind]:
+    """Of each kind the pairs than which no other is as far apart and as fast, and the nearest ones.
+
+    With radii there are many distances of a kind; what holds for these pairs holds for all.
+    """
+    safe = scenario.safe_distance
+    ugvs = [(decimal(ugv.radius_m), decimal(ugv.max_speed_m_s)) for ugv in scenario.ugvs.values()]
+    uav = (decimal(scenario.uav.radius_m), decimal(scenario.uav.max_speed_m_s))
+    obstacles = {(decimal(obstacle.radius_m), Fraction(0)) for obstacle in scenario.obstacles.values()}
+    pairs: dict[str, tuple[float, Iterable[Any]]] = {
+        "obstacle": (safe.obstacle_m, product({*ugvs, uav}, obstacles)),
+        "uav_ugv": (safe.air_ground_m, product([uav], ugvs)),
+        "ugv_ugv": (safe.ugv_m, combinations(ugvs, 2)),
+    }
+    for kind, (surface_m, both) in pairs.items():
+        found = sorted({(decimal(surface_m) + r + s, v + w) for (r, v), (s, w) in both}, reverse=True)
+        kept: list[tuple[Fraction, Fraction]] = []
+        for each in found:
+            if not kept or each[1] > kept[-1][1]:
+                kept.append(each)
+        if found:
+            nearest = min(found, key=lambda each: (each[0], -each[1]))
+            kept += [nearest] if nearest not in kept else []
+        yield from (Kind(kind, *each) for each in kept)

@@ -1,0 +1,35 @@
+"""The trigger of a scenario, read from the scenario."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from airground_drake.decision.bayes import optimal_threshold
+from airground_drake.decision.trigger import Trigger
+from airground_drake.scenarios.schema import Scenario
+
+
+def levels_of(scenario: Scenario) -> dict[str, float]:
+    """Threshold and release level, m, and the dwell in force, s; the paper's bare trigger has neither of the latter."""
+    decision = scenario.decision
+    zeta = float(threshold_m(scenario))
+    if decision.trigger == "bare":
+        return {"zeta_m": zeta, "released_below_m": zeta, "dwell_s": 0.0}
+    return {
+        "zeta_m": zeta,
+        "released_below_m": float(decision.release_m),
+        "dwell_s": float(decision.min_inter_event_s),
+    }
+
+
+def threshold_m(scenario: Scenario) -> float:
+    """The decision threshold in force, m: the fixed one, or the minimiser of the Bayes risk (16)."""
+    rule = scenario.decision.threshold
+    if rule.rule == "bayes":
+        return optimal_threshold(rule.drift_m_s, rule.noise_m_sqrt_s, rule.c1_1_s, rule.c2)
+    return rule.zeta_m
+
+
+def trigger_of(inputs: dict[str, Any]) -> Trigger:
+    """The automaton with these levels."""
+    return Trigger(inputs["zeta_m"], inputs["released_below_m"], inputs["dwell_s"])

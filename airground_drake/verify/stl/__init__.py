@@ -1,1 +1,0 @@
-"""Claims about a run again, in Signal Temporal Logic."""

@@ -1,0 +1,184 @@
+"""UAVs that waste a UGV's time, against the running `CertifiedGatekeepers`: they keep the bound of LIVE-WAIT.
+
+The gatekeeper believes whatever is predicted: its roll-outs are replaced by ones in which refusing stalls and accepting
+does not, as a lying map could make it; or ones in which accepting is worse, for proposals that ask it to make way. The
+UAV proposes and withdraws at will, motions long and short; the UGV follows well, badly or not at all. The gatekeepers
+are called as their system calls them, not where they say that a sample changes nothing, and a count of tries is kept
+beside theirs: each new proposal is to be accepted as long as it leaves any, so also after every rest, and else refused.
+"""
+
+from __future__ import annotations
+
+import inspect
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from airground_drake.arrays import Array
+from airground_drake.gatekeeper import certified
+from airground_drake.gatekeeper.certified import CertifiedGatekeepers
+from airground_drake.gatekeeper.outcome import Outcome, Outlook
+from airground_drake.gatekeeper.patience import Patience
+from airground_drake.gatekeeper.sample import Gatekeepers, Memory, Situation
+from airground_drake.intervention.messages import ACCEPT, answer_to
+from airground_drake.intervention.policy import Proposal
+from airground_drake.nsbc.avoidance import Avoidance
+from airground_drake.nsbc.law import UgvLaw
+from airground_drake.nsbc.motion import Motion
+from airground_drake.nsbc.team import Team
+from airground_drake.report.audit.companions import Believing
+from airground_drake.scenarios.load import load
+from airground_drake.verify.model.patience.live_wait import LiveWait
+
+MOST_SAMPLES = 20_000
+"""Of each attack: else as many as all tries with a rest after each take, and a fifth more."""
+BRIEF_S = 1.0
+"""Time after which the attack of that name withdraws."""
+UGV, OTHER = "ugv", "other"
+FAVOURS = {"favours": OTHER, "favours to nobody": "nobody", "favours to itself": UGV}
+"""Attacks by proposals that are of no use to the UGV, and the cause that they name."""
+FORGED = ("favours to nobody", "favours to itself")
+"""Those that no UGV goes along with: there is nobody to make way for."""
+
+
+class Unmoved(Believing):
+    """Sees no use in any proposal, and nothing that speaks against a favour."""
+
+    def foresee(self, seen: Situation, i: int, proposal: Proposal) -> tuple[Outcome, Outcome]:
+        """Neither stalls, and accepting costs more."""
+        refuse, accept = super().foresee(seen, i, proposal)
+        return Outcome(refuse.positions, False, 0.0, 1.0), Outcome(accept.positions, False, 0.0, 2.0)
+
+
+def attacks(patience: Patience, period: float) -> list[dict[str, Any]]:
+    """What each attack came to: `attack`, `tries`, times in s, `reasons`, and `unexpected`: answers that are wrong."""
+    return [_attack(name, patience, period) for name in ("endless", "greedy", "random", "brief", "stuck", *FAVOURS)]
+
+
+def _attack(name: str, patience: Patience, period: float) -> dict[str, Any]:
+    rng = np.random.default_rng(len(name))
+    team = Team((UGV, OTHER), "uav", np.empty((0, 3)), 1.0, 1.0, 1.0, np.ones(3))
+    preset = Motion(np.zeros(1), np.zeros((1, 3)))
+    law = UgvLaw(Avoidance(1.0, period), 1.0, 1.0, intervention_on_top=False)
+    kind = Unmoved if name in FAVOURS else Believing
+    gatekeepers = kind(team, law, [preset] * 2, Outlook(patience.longest), patience)
+    memory, proposal, place = Memory.empty(2), None, np.zeros(3)
+    accepted, executed, worst, began, longest, tries, unexpected = False, 0.0, 0.0, 0.0, 0.0, 0, 0
+    left, alone = patience.most, 0.0
+    for k in range(min(MOST_SAMPLES, int(1.2 * patience.most * (patience.longest + patience.rest) / period))):
+        t, before, asked = k * period, accepted, proposal
+        proposal = _next(name, proposal, memory, t, rng, patience)
+        if proposal is not None and proposal is not asked:
+            proposal = replace(proposal, number=k)
+        if proposal is not None and name != "stuck":
+            place = proposal.motion.at(t)[0]
+        if before:
+            executed += period
+            worst = max(worst, executed)
+        positions = np.stack([place] * 3)
+        if not gatekeepers.idle((proposal, None), positions, memory):
+            memory = gatekeepers.sample(t, (proposal, None), positions, np.zeros((3, 3)), memory)
+        accepted = answer_to(proposal, memory.answers, 0) == ACCEPT
+        if before and not (accepted and proposal is asked):
+            alone, longest = t, max(longest, t - began)
+        if proposal is None or proposal is asked:
+            continue
+        if t >= alone + patience.rest:
+            left, executed = patience.most, 0.0
+        unexpected += accepted != (left > 0 and name not in FORGED)
+        if accepted:
+            began, tries, left = t, tries + 1, left - 1
+    reasons = sorted({decision.reason for decision in memory.decisions})
+    return {
+        "attack": name, "tries": tries, "longest_between_rests_s": worst, "longest_try_s": longest, "reasons": reasons,
+        "unexpected": unexpected,
+    }  # fmt: skip
+
+
+def _next(
+    name: str, proposal: Proposal | None, memory: Memory, t: float, rng: np.random.Generator, patience: Patience
+) -> Proposal | None:
+    """What the UAV proposes now: a new one when the last is refused, withdrawn or replaced."""
+    refused = memory.answers[0] < 0.0
+    if name == "brief":
+        begun = t % (BRIEF_S + 1.1 * patience.rest)
+        if begun >= BRIEF_S:
+            return None
+        return proposal if proposal is not None else _proposal(name, t, 2.0 * patience.longest, rng)
+    if proposal is not None and not refused:
+        if name == "greedy" and t >= proposal.issued + 0.9 * patience.longest:
+            return _proposal(name, t, 2.0 * patience.longest, rng)
+        return proposal if name != "random" or rng.random() > 0.01 else None
+    if name == "random" and rng.random() < 0.7:
+        return None
+    if name == "stuck":
+        return _proposal(name, t, 2.0 * patience.longest, rng, away=10.0 * patience.lag)
+    return _proposal(name, t, float(rng.choice([0.1, 1.0, 100.0])) * patience.longest, rng)
+
+
+def _proposal(name: str, t: float, lasts: float, rng: np.random.Generator, away: float = 0.0) -> Proposal:
+    way: Array = rng.normal(size=(3, 3)) * [5.0, 5.0, 0.0] + [away, 0.0, 0.0]
+    motion = Motion(t + lasts * np.array([0.0, 0.5, 1.0]), way)
+    return Proposal("waste", t, motion, cause=FAVOURS.get(name, ""))
+
+
+PATIENCE, PERIOD = Patience(most=2, rest=1.0, longest=2.0, lag=0.5, behind=0.5), 0.1
+BOUND_S = PATIENCE.most * (PATIENCE.longest + PERIOD)
+
+
+def gets_through() -> bool:
+    """Whether an attack keeps the UGV for longer than the bound, or is answered otherwise than it must be."""
+    rows = attacks(PATIENCE, PERIOD)
+    return any(row["longest_between_rests_s"] > BOUND_S + 1e-9 or row["unexpected"] for row in rows)
+
+
+def test_no_attack_gets_through_with_the_numbers_of_case_b() -> None:
+    inputs = LiveWait().inputs(load("case_b")[0])
+    numbers = [inputs[name] for name in ("tries", "rest_s", "longest_s", "lag_m", "behind_s")]
+    bound = LiveWait().numbers(inputs)["bound_s"]
+    for row in attacks(Patience(*numbers), inputs["period_s"]):
+        assert row["longest_between_rests_s"] <= bound + 1e-9, row
+        assert not row["unexpected"], row
+
+
+def test_attacks_use_all_tries_and_no_more() -> None:
+    rows = attacks(PATIENCE, PERIOD)
+    assert not gets_through()
+    assert {reason for row in rows for reason in row["reasons"]} >= {"over", "exhausted", "no_progress"}
+    assert max(row["longest_between_rests_s"] for row in rows) == pytest.approx(4.0, abs=0.3)
+
+
+TURNED = [
+    ("standing != ACCEPT:  # withdrawn", "proposal is None:"),
+    (
+        "            turns[i] = self._patience.rested(turns[i], t)\n            if proposal is None:\n",
+        "            if proposal is None:\n                turns[i] = self._patience.rested(turns[i], t)\n",
+    ),
+    ("proposal.cause in self._team.ugvs and proposal", "proposal"),
+]
+"""Ways to call `Patience` wrongly: text of the gatekeeper's module, and what takes its place."""
+
+
+@pytest.mark.parametrize(("old", "new"), TURNED, ids=["replaced", "rests in silence only", "forged favours"])
+def test_a_gatekeeper_that_miscounts_is_noticed(monkeypatch: pytest.MonkeyPatch, old: str, new: str) -> None:
+    source = inspect.getsource(certified)
+    assert source.count(old) == 1
+    broken: dict[str, Any] = {"__name__": certified.__name__}
+    exec(compile(source.replace(old, new), certified.__file__, "exec"), broken)
+    for method in ("sample", "_judge"):
+        monkeypatch.setattr(CertifiedGatekeepers, method, getattr(broken["CertifiedGatekeepers"], method))
+    assert gets_through()
+
+
+def test_a_gatekeeper_that_does_not_notice_withdrawals_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Gatekeepers, "idle", lambda _, proposals, *__: not any(proposals))
+    assert gets_through()
+
+
+def test_only_another_ugv_of_the_team_is_made_way_for_and_not_for_longer() -> None:
+    rows = {row["attack"]: row for row in attacks(PATIENCE, PERIOD)}
+    assert rows["favours"]["reasons"] == ["exhausted", "kept", "makes_way", "over"]
+    assert rows["favours"]["longest_between_rests_s"] <= BOUND_S
+    assert [rows[name]["reasons"] for name in FORGED] == [["not_cheaper"]] * 2

@@ -1,0 +1,165 @@
+"""The running automata make the transitions of the theorems' models (proofs/Trigger.v, Patience.v).
+
+Both compare times and levels only. So every order of the values, ties and next floats included, is every case.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from fractions import Fraction
+from typing import Any
+
+import pytest
+
+from airground_drake.decision.trigger import Mode, Trigger, TriggerState
+from airground_drake.gatekeeper.patience import Patience, Turn
+
+SUPERVISING, INTERVENING, REFRACTORY = Mode.SUPERVISING, Mode.INTERVENING, Mode.REFRACTORY
+LEVELS = [(3.0, 1.5, 0.5), (3.0, 3.0, 0.0), (3.0, 3.0, 0.5), (1.5, -0.5, 2.0)]
+"""Threshold, release level and dwell."""
+
+
+def around(*values: float) -> list[float]:
+    """The values, the next floats on both sides, and numbers far from all."""
+    found = {value for each in values for value in (each, math.nextafter(each, -9e9), math.nextafter(each, 9e9))}
+    return sorted(found | {min(values) - 1.0, max(values) + 1.0})
+
+
+def model_step(
+    levels: tuple[float, float, float], state: tuple[Mode, int, float], t: float, x: float
+) -> tuple[Mode, int, float]:
+    """`step` of Trigger.v: mode, number of triggers, time of the last one."""
+    zeta, release, dwell = levels
+    now, triggers, at = state
+    end = Fraction(at) + Fraction(dwell) if triggers else Fraction(0)
+    risen = (INTERVENING, triggers + 1, t)
+    if now is SUPERVISING:
+        return risen if zeta <= x else state
+    if now is INTERVENING:
+        if x <= release and x < zeta:
+            return (SUPERVISING if end <= t else REFRACTORY), triggers, at
+        return state
+    if end <= t:
+        return risen if zeta <= x else (SUPERVISING, triggers, at)
+    return state
+
+
+def seen(state: TriggerState) -> tuple[Mode, int, float]:
+    return state.mode, state.triggers, state.triggered_at
+
+
+def differing(kind: type[Trigger]) -> list[Any]:
+    """States and events at which a trigger does not do what the model does."""
+    found: list[Any] = []
+    for levels in LEVELS:
+        trigger, (zeta, release, dwell) = kind(*levels), levels
+        for x in around(zeta, release):
+            start = (INTERVENING, 1, 0.0) if zeta <= x else (SUPERVISING, 0, -1.0)
+            if seen(trigger.start(0.0, x)) != start:
+                found.append((levels, x))
+        for mode, count, x in itertools.product(Mode, (0, 1, 7), around(zeta, release)):
+            last = 4.0 if count else -1.0
+            for t in around(4.0 + dwell):
+                state = TriggerState(mode, count, last, -1.0)
+                if seen(trigger.step(state, t, x)) != model_step(levels, (mode, count, last), t, x):
+                    found.append((levels, state, t, x))
+    return found
+
+
+def test_the_trigger_makes_the_transitions_of_the_theorem() -> None:
+    assert differing(Trigger) == []
+
+
+class Above(Trigger):
+    def rise(self, state: TriggerState, t: float) -> TriggerState:
+        return super().rise(state, t + 1e-9)
+
+
+class NoDwell(Trigger):
+    def dwell_end(self, state: TriggerState) -> float:
+        return state.triggered_at
+
+
+class Forgets(Trigger):
+    def fall(self, state: TriggerState, t: float) -> TriggerState:
+        found = super().fall(state, t)
+        return TriggerState(found.mode, 0, -1.0, found.released_at)
+
+
+class AlwaysOver(Trigger):
+    def fall(self, state: TriggerState, t: float) -> TriggerState:
+        return TriggerState(SUPERVISING, state.triggers, state.triggered_at, t)
+
+
+@pytest.mark.parametrize("kind", [Above, NoDwell, Forgets, AlwaysOver])
+def test_a_trigger_that_differs_is_noticed(kind: type[Trigger]) -> None:
+    assert differing(kind)
+
+
+TIMES = (2, 5.0, 3.0, 0.5, 1.0)
+"""Tries, rest, longest try, lag and time behind."""
+
+
+def impatient(kind: type[Patience]) -> list[str]:
+    """What of a patience differs from Patience.v."""
+    most, rest, longest, _, behind = TIMES
+    patience, found = kind(*TIMES), set[str]()
+    for executing, tries, t in itertools.product((False, True), (0, 1, 2, 3), around(10.0, 10.0 + rest)):
+        turn = Turn(executing, tries, 10.0, 12.0)
+        over = not executing and 10.0 + rest <= t
+        if patience.rested(turn, t) != (Turn(executing, 0, 10.0, 12.0) if over else turn):
+            found.add("rested")
+        if patience.exhausted(turn) != (not tries < most):
+            found.add("exhausted")
+        for end in around(t, t + longest):
+            until = end if end <= t + longest else t + longest
+            if patience.accept(turn, t, end) != Turn(True, tries + 1, t, until):
+                found.add("accept")
+        if patience.stop(turn, t) != Turn(False, tries, t, 12.0):
+            found.add("stop")
+    for t in around(12.0):
+        if patience.over(Turn(True, 1, 10.0, 12.0), t) != (t >= 12.0):
+            found.add("over")
+    for t in around(10.0 + behind):
+        if patience.late(10.0, t) != (t - 10.0 > behind):
+            found.add("late")
+    return sorted(found)
+
+
+def test_patience_makes_the_transitions_of_the_theorem() -> None:
+    assert impatient(Patience) == []
+
+
+class NeverExhausted(Patience):
+    def exhausted(self, turn: Turn) -> bool:
+        return False
+
+
+class RestsAtOnce(Patience):
+    def rested(self, turn: Turn, t: float) -> Turn:
+        return Turn(turn.executing, 0, turn.since, turn.until)
+
+
+class Endless(Patience):
+    def accept(self, turn: Turn, t: float, end: float) -> Turn:
+        return Turn(True, turn.tries + 1, t, end)
+
+
+class DoesNotCount(Patience):
+    def accept(self, turn: Turn, t: float, end: float) -> Turn:
+        return Turn(True, turn.tries, t, min(end, t + self.longest))
+
+
+class NeverLate(Patience):
+    def late(self, on_time: float, t: float) -> bool:
+        return False
+
+
+@pytest.mark.parametrize(
+    ("kind", "what"),
+    [(NeverExhausted, "exhausted"), (RestsAtOnce, "rested"), (Endless, "accept"), (DoesNotCount, "accept"),
+     (NeverLate, "late")],
+)  # fmt: skip
+def test_a_patience_that_differs_is_noticed(kind: type[Patience], what: str) -> None:
+    assert impatient(kind) == [what]
