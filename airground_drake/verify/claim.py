@@ -88,10 +88,6 @@ class ModelClaim(Claim):
         Called through `judge`, which turns an exception into `error`.
         """
 
-    def applications(self, trace: Trace) -> tuple[int, int] | None:
-        """How often a run met the premise of the theorem, of how many times it could have; None: not counted."""
-        return None
-
     def takes(self, inputs: dict[str, Any], finding: Finding) -> bool:
         """Whether a kept finding for these inputs may be taken for one made anew; whatever it raises means no.
 

@@ -11,7 +11,6 @@ from dataclasses import replace
 from airground_drake.diagram import build_model
 from airground_drake.scenarios.load import from_data
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.trace import Trace
 from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.engines.prover import discharge, finding, proved_again
 from airground_drake.verify.finding import Finding
@@ -19,7 +18,6 @@ from airground_drake.verify.model.avoidance.constants import Inputs, built_from,
 from airground_drake.verify.model.avoidance.hostile_inputs import hostile_team, non_finite, postcondition
 from airground_drake.verify.model.avoidance.obligations import LIMIT_S, gate
 from airground_drake.verify.model.avoidance.wiring import compare, difference
-from airground_drake.verify.runs.proposals import executed_under
 
 QUANTITY = "least slack n.v - b of an avoidance inequality over all hostile inputs to the layer"
 
@@ -73,10 +71,6 @@ class SafeGate(ModelClaim):
             "compositions": compositions_of(scenario),
         }
         return constants(scenario) | {"method_d": built, "scenario": given}
-
-    def applications(self, trace: Trace) -> tuple[int, int]:
-        """Interventions that were executed under method (d), of all."""
-        return executed_under(trace, "d")
 
     def check(self, inputs: Inputs) -> Finding:
         """Discharge the obligations and attack the running code; margin: the worst slack of the sample, m/s."""

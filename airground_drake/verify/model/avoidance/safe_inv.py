@@ -21,7 +21,6 @@ from dataclasses import replace
 
 from airground_drake.scenarios.rounding import TOLERANCE_M
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.trace import Trace
 from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.engines.obligation import Obligation
 from airground_drake.verify.engines.prover import discharge, finding, proved_again
@@ -31,7 +30,6 @@ from airground_drake.verify.model.avoidance.constants import Inputs, built_from,
 from airground_drake.verify.model.avoidance.hostile_inputs import postcondition
 from airground_drake.verify.model.avoidance.obligations import LIMIT_S, rest, scaling, step, with_scenario
 from airground_drake.verify.model.avoidance.wiring import compare, difference
-from airground_drake.verify.runs.safe_hyp import guarantees
 
 QUANTITY = "what rounding leaves of the 1e-9 m by which a distance may fall short of d"
 
@@ -92,11 +90,6 @@ class SafeInv(ModelClaim):
     def inputs(self, scenario: Scenario) -> Inputs:
         """Gain, period, sensing range and the team; and what the diagram is built from."""
         return constants(scenario) | {"scenario": built_from(scenario)}
-
-    def applications(self, trace: Trace) -> tuple[int, int]:
-        """Pairs that came within reach of each other and met every inequality, of those within reach."""
-        kept = guarantees(trace)
-        return sum(one.margin_m == 0.0 for one in kept), len(kept)
 
     def check(self, inputs: Inputs) -> Finding:
         """Discharge the obligations, compare with the running code; margin: what rounding leaves of 1e-9 m."""

@@ -14,13 +14,11 @@ from airground_drake.components import make_law, make_patience
 from airground_drake.gatekeeper.patience import Patience
 from airground_drake.registry import METHODS
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.trace import Trace
 from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.engines.prover import LIMIT_S, discharge, finding, proved_again
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.model.patience.tracking_obligations import Tracking, obligations
 from airground_drake.verify.model.patience.tracking_runs import runs
-from airground_drake.verify.runs.followed import followed
 
 
 class LiveGate(ModelClaim):
@@ -101,11 +99,6 @@ class LiveGate(ModelClaim):
     def check(self, inputs: dict[str, Any]) -> Finding:
         """Prove, and run."""
         return judge(Tracking(), Patience, inputs)
-
-    def applications(self, trace: Trace) -> tuple[int, int]:
-        """Accepted interventions under method (d) that met the premise."""
-        found = followed(trace)
-        return sum(one.met for one in found), len(found)
 
     def takes(self, inputs: dict[str, Any], finding: Finding) -> bool:
         """The obligations once more, by expansion."""

@@ -12,13 +12,11 @@ from typing import Any
 from airground_drake.components import make_patience
 from airground_drake.gatekeeper.patience import Patience
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S, ModelClaim
 from airground_drake.verify.engines.prover import LIMIT_S, discharge, finding, proved_again
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.model.patience.attack import attacks
 from airground_drake.verify.model.patience.relation import obligations, symbolic
-from airground_drake.verify.runs.proposals import executed_under
 
 
 class LiveWait(ModelClaim):
@@ -74,10 +72,6 @@ class LiveWait(ModelClaim):
             "behind_s": float(patience.behind),
             "period_s": float(scenario.gatekeeper.period_s),
         }
-
-    def applications(self, trace: Trace) -> tuple[int, int]:
-        """Interventions that were executed under method (d), of all."""
-        return executed_under(trace, "d")
 
     def check(self, inputs: dict[str, Any]) -> Finding:
         """Read off, prove, attack."""
