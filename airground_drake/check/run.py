@@ -14,7 +14,7 @@ import pandas as pd
 
 from .files import Json, canonical, parse_json, parse_table, read_bytes, sha256
 from .nearness import least_apart_m
-from .rules import SMALL, Array, Flags, NotEstablished, close, holds, same
+from .rules import SMALL, Array, Flags, NotEstablished, at_most, close, holds, same
 from .scenario import Levels, Pair, Preset, levels_of, pairs_of, preset_of, robots_of
 
 Rows = npt.NDArray[np.intp]
@@ -190,6 +190,7 @@ def _run(name: str, scenario_text: str, entry_text: str, contents: tuple[bytes, 
     _is_of_the_run(meta, entry, scenario, name)
     run = Run(name, scenario, meta["events"], timings["decision_times_s"], timings["wall_s"], *tables)
     same("a time for each decision", len(run.decision_times_s), len(run.decisions))
+    at_most("times of decisions are not negative", -np.array([*run.decision_times_s, run.wall_s]), 0.0)
     _rows_cover_the_run(run)
     _decisions_come_by_time(run)
     _a_row_at_every_control_sample(run)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from fractions import Fraction
-from functools import lru_cache
 from math import isqrt
 
 import numpy as np
@@ -16,7 +15,6 @@ FAR_M = 1e-6
 """Distances of floating-point numbers are this wrong at most, m; farther pairs need no exact arithmetic."""
 
 
-@lru_cache(maxsize=4096)
 def least_distance_m(run: Run, pair: Pair) -> float:
     """Least distance of a pair over continuous time.
 

@@ -85,10 +85,6 @@ class ModelClaim(Claim):
         Called through `judge`, which turns an exception into `error`.
         """
 
-    def applications(self, trace: Trace) -> tuple[int, int] | None:
-        """How often a run met the premise of the theorem, of how many times it could have; None: not counted."""
-        return None
-
     def judge_inputs(self, scenario: Scenario) -> dict[str, Any]:
         """`inputs` under guard: what keeps them from being found is told to `judge`."""
         try:

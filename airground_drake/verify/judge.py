@@ -12,6 +12,7 @@ from airground_drake.progress import SILENT, Watch
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.side_by_side import side_by_side
 from airground_drake.trace import Trace
+from airground_drake.verify.applications import Count, counts, with_counts
 from airground_drake.verify.cache import find, found
 from airground_drake.verify.claim import ModelClaim, TraceClaim, Verdict
 from airground_drake.verify.finding import Finding
@@ -104,7 +105,7 @@ def verify_all(
     pieces: list[Callable[[], Any]] = [
         partial(_found, claim, given, kept) for claim, given in zip(chosen, inputs, strict=True)
     ]
-    pieces += [partial(_judged, trace, claims, chosen) for trace, claims in of_runs]
+    pieces += [partial(_judged, trace, claims) for trace, claims in of_runs]
     names = [*(claim.id for claim in chosen), *(f"claims about run {trace.run}" for trace, _ in of_runs)]
     watch.stage("judging", len(pieces), "claims about the model or a run")
     done = side_by_side(pieces, names=names, watch=watch)
@@ -114,38 +115,18 @@ def verify_all(
         for (trace, claims), (findings, _) in zip(of_runs, about_runs, strict=True)
         for verdict in _verdicts(trace, claims, findings)
     ]
-    theorems = [
-        with_applications(finding, [counts[k] for _, counts in about_runs]) for k, finding in enumerate(about_the_model)
-    ]
+    counted = [of_run for _, of_run in about_runs]
+    theorems = [with_counts(claim.id, each, counted) for claim, each in zip(chosen, about_the_model, strict=True)]
     return verdicts + _model_verdicts(scenario, chosen, inputs, theorems)
-
-
-def with_applications(finding: Finding, counts: Iterable[tuple[int, int] | None]) -> Finding:
-    """A finding about the model with how often the runs met its premise, `applies_to`, of how many times, `of`."""
-    counted = [count for count in counts if count is not None]
-    if not counted:
-        return finding
-    met, all_in_all = (sum(column) for column in zip(*counted, strict=True))
-    return replace(finding, evidence={**finding.evidence, "applies_to": met, "of": all_in_all})
 
 
 def _found(claim: ModelClaim, inputs: dict[str, Any], kept: Path | None) -> Finding:
     return found(claim, inputs, kept)
 
 
-def _judged(
-    trace: Trace, claims: Sequence[TraceClaim], theorems: Sequence[ModelClaim]
-) -> tuple[list[Finding], list[tuple[int, int] | None]]:
-    """What the claims found about a run, and how often it met the premise of each theorem."""
-    return [claim.judge(trace) for claim in claims], [_applications(claim, trace) for claim in theorems]
-
-
-def _applications(claim: ModelClaim, trace: Trace) -> tuple[int, int] | None:
-    """Not counted where a record is missing or wrong: the claims about runs say so."""
-    try:
-        return claim.applications(trace)
-    except (Exception, SystemExit):
-        return None
+def _judged(trace: Trace, claims: Sequence[TraceClaim]) -> tuple[list[Finding], dict[str, Count]]:
+    """What the claims found about a run, and how often it met the premises of the theorems."""
+    return [claim.judge(trace) for claim in claims], counts(trace)
 
 
 def _model_verdicts(

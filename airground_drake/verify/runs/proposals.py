@@ -161,12 +161,6 @@ def _accepted_at(trace: Trace, ugv: str) -> list[Sent | None]:
     return found
 
 
-def executed_under(trace: Trace, method: str) -> tuple[int, int]:
-    """How many proposals of a run were accepted and executed under a method, of all those that were."""
-    count = sum(len({id(one) for one in accepted_at(trace, ugv) if one is not None}) for ugv in trace.ugvs)
-    return (count if trace.meta["method"] == method else 0), count
-
-
 def answers_of(trace: Trace, ugv: str) -> list[Answer]:
     """Every decision of a UGV, by time."""
     table = trace.decisions[trace.decisions["robot"] == ugv]

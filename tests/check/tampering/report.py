@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 from pathlib import Path
-from typing import Any
 
 from check.tampering.base import (
     RUN,
@@ -18,8 +16,6 @@ from check.tampering.base import (
     tampering,
     trace,
 )
-
-from airground_drake import check as checker
 
 GATED = ("GATE-FEAS", "GATE-MODEL", "LIVE-PROG")
 
@@ -118,20 +114,6 @@ def run_removed(folder: Path) -> None:
 def run_removed_everywhere_but_in_the_scenario(folder: Path) -> None:
     run_removed(folder)
     shutil.rmtree(trace(folder, "b"))
-
-
-@tampering()
-def mutant_of_ones_own(folder: Path) -> None:
-    with edited_report(folder) as report:
-        report["mutants"].append({"claim": "SAFE-INV", "mutant": "no gain", "refuted": False})
-
-
-def all_mutants(refuted: bool) -> list[Any]:
-    listed = json.loads((Path(checker.__file__).parent / "mutants.json").read_text(encoding="utf-8"))
-    came_to = {"status": "refuted", "refuted": True, "counterexample": {}, "error": None, "from_cache": False}
-    entries: list[Any] = [{"claim": claim, "mutant": says, **came_to} for claim, says in listed]
-    entries[0] |= {"status": "holds", "refuted": refuted, "counterexample": None}
-    return entries
 
 
 @tampering()

@@ -14,8 +14,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from airground_drake.trace import Trace
+from airground_drake.verify.applications import counts, with_counts
 from airground_drake.verify.finding import Finding
-from airground_drake.verify.judge import with_applications
 from airground_drake.verify.runs.followed import Followed, bounds, followed
 
 Run = Callable[[str, str], Trace]
@@ -92,10 +92,15 @@ def test_the_bound_is_one(seed: int, contraction: float) -> None:
 
 
 def test_counts_of_several_runs_are_added() -> None:
-    finding = with_applications(Finding("proved", evidence={"x": 1}), [(1, 2), None, (0, 3)])
-    assert finding.evidence == {"x": 1, "applies_to": 1, "of": 5}
-    assert with_applications(Finding("proved"), [None, None]).evidence == {}
-    assert with_applications(Finding("proved"), []).evidence == {}
+    runs: list[dict[str, tuple[int, int]]] = [{"A": (1, 2)}, {}, {"A": (0, 3), "B": (1, 1)}]
+    assert with_counts("A", Finding("proved", evidence={"x": 1}), runs).evidence == {"x": 1, "applies_to": 1, "of": 5}
+    assert with_counts("C", Finding("proved"), runs).evidence == {}
+
+
+def test_a_run_whose_records_are_wrong_is_not_counted(run: Run) -> None:
+    trace = run("case_a", "d")
+    assert set(counts(trace)) == {"SAFE-INV", "SAFE-GATE", "LIVE-GATE", "LIVE-WAIT"}
+    assert set(counts(Trace(trace.meta, trace.signals, trace.decisions))) == {"SAFE-INV"}  # no proposals
 
 
 def test_theorems_say_how_often_their_premise_was_met(report: Callable[[str], Path]) -> None:

@@ -7,11 +7,9 @@ from typing import Any
 
 from airground_drake.registry import METHODS
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.trace import Trace
 from airground_drake.verify.model.avoidance.kinds import constants
 from airground_drake.verify.model.avoidance.safe_inv import SafeInv
 from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim
-from airground_drake.verify.runs.proposals import executed_under
 
 
 class SafeGate(TheoremClaim):
@@ -53,10 +51,6 @@ class SafeGate(TheoremClaim):
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
         """Those of SAFE-INV, and whether method (d) puts an intervention above avoidance."""
         return {**constants(scenario), "intervention_on_top": METHODS["d"].intervention_on_top}
-
-    def applications(self, trace: Trace) -> tuple[int, int]:
-        """Interventions that were executed under method (d), of all."""
-        return executed_under(trace, "d")
 
     def hypotheses(self, inputs: dict[str, Any]) -> list[Hypothesis]:
         """Those of SAFE-INV, and the order of priorities."""

@@ -10,10 +10,8 @@ from fractions import Fraction
 from typing import Any
 
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.trace import Trace
 from airground_drake.verify.model.avoidance.kinds import SHARES, constants, kinds_of
 from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim, decimal
-from airground_drake.verify.runs.safe_hyp import guarantees
 
 
 class SafeInv(TheoremClaim):
@@ -65,11 +63,6 @@ class SafeInv(TheoremClaim):
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
         """Gain, period, sensing range; safe distances and closing speeds of the pairs."""
         return constants(scenario)
-
-    def applications(self, trace: Trace) -> tuple[int, int]:
-        """Pairs that came within reach of each other and met every inequality, of those within reach."""
-        kept = guarantees(trace)
-        return sum(one.margin_m == 0.0 for one in kept), len(kept)
 
     def hypotheses(self, inputs: dict[str, Any]) -> list[Hypothesis]:
         """A h is at most 1, shares add up to 1, the sensing range covers d + c h."""

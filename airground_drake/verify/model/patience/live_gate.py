@@ -5,9 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.trace import Trace
 from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim, decimal
-from airground_drake.verify.runs.followed import followed
 
 
 class LiveGate(TheoremClaim):
@@ -86,8 +84,3 @@ class LiveGate(TheoremClaim):
         """The disturbance that may last, m/s."""
         gain, lag = decimal(inputs["intervention_gain_1_s"]), decimal(inputs["lag_m"])
         return {"disturbance_m_s": float(gain * lag)}
-
-    def applications(self, trace: Trace) -> tuple[int, int]:
-        """Accepted interventions under method (d) that met the premise."""
-        found = followed(trace)
-        return sum(one.met for one in found), len(found)

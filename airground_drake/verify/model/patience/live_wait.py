@@ -6,9 +6,7 @@ from fractions import Fraction
 from typing import Any
 
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.trace import Trace
 from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim, decimal
-from airground_drake.verify.runs.proposals import executed_under
 
 
 class LiveWait(TheoremClaim):
@@ -57,10 +55,6 @@ class LiveWait(TheoremClaim):
             "behind_s": float(gate.behind_s),
             "period_s": float(gate.period_s),
         }
-
-    def applications(self, trace: Trace) -> tuple[int, int]:
-        """Interventions that were executed under method (d), of all."""
-        return executed_under(trace, "d")
 
     def hypotheses(self, inputs: dict[str, Any]) -> list[Hypothesis]:
         """Times are positive."""
