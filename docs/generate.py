@@ -18,6 +18,7 @@ from typing import Any
 import airground_drake
 from airground_drake import files
 from airground_drake.commands import COMMANDS
+from airground_drake.proofs import THEOREMS
 from airground_drake.registry import (
     METHODS,
     MODEL_CLAIMS,
@@ -94,6 +95,7 @@ def pages() -> dict[str, str]:
         "commands.md": commands(),
         "scenario.md": scenario(),
         "extending.md": extending(),
+        "proofs.md": proofs(),
         "../airground_drake/scenarios/scenario.schema.json": json_schema.text(installed=False),
     }
 
@@ -106,6 +108,21 @@ def extending() -> str:
         return f"```{block['language']}\n# file: {block['name']}\n{text}```"
 
     return _RECIPE.sub(as_it_is, (DOCS / "extending.md").read_text(encoding="utf-8"))
+
+
+def proofs() -> str:
+    """The page as it is up to its mark, and the theorems after it."""
+    mark = "<!-- theorems: made by python docs/generate.py -->\n"
+    lines, file = [], ""
+    for name, theorem in THEOREMS.items():
+        if file != (file := name.partition(".")[0]):
+            lines += ["", f"### {file}", ""]
+        takes = f" *Takes:* {' '.join(theorem.hypotheses)}" if theorem.hypotheses else ""
+        where = f" *Checked by:* {', '.join(theorem.checked_where)}." if theorem.checked_where else ""
+        about = "" if theorem.equation == "ours" else f", {theorem.equation}"
+        line = f"- **`{name}`**{about}: {theorem.statement}{takes}{where}"
+        lines += textwrap.wrap(line, WIDTH, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
+    return (DOCS / "proofs.md").read_text(encoding="utf-8").partition(mark)[0] + mark + "\n".join(lines) + "\n"
 
 
 def equations() -> str:

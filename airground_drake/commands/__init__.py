@@ -25,15 +25,13 @@ class Command(NamedTuple):
     says: str
 
 
-GONE = {"proofs": "airground prove"}
-"""Commands of earlier versions, and what does now what they did."""
-
 COMMANDS: dict[str, Command] = {
     "report": Command("airground_drake.report.__main__", "simulate a scenario, check its claims, write the report"),
     "verify": Command("airground_drake.verify.__main__", "judge claims anew, on a saved run or about a model"),
     "check": Command("airground_drake.check.command", "go over a report with the independent checker"),
     "compare": Command("airground_drake.commands.compare", "say what has changed from one report to another"),
     "index": Command("airground_drake.commands.index", "list the reports in a folder on a page"),
+    "prove": Command("airground_drake.commands.prove", "have Coq check the theorems, or prove the runs of a report"),
     "campaign": Command("airground_drake.commands.campaign", "judge many draws of a scenario"),
     "falsify": Command("airground_drake.commands.falsify", "search for a scenario that violates a claim"),
     "replay": Command("airground_drake.commands.replay", "show the runs of a report: a page each, or a video"),
@@ -42,6 +40,8 @@ COMMANDS: dict[str, Command] = {
     "init": Command("airground_drake.commands.init", "write a small scenario to start from"),
     "completion": Command("airground_drake.commands.completion", "print what completes this command line in a shell"),
 }
+GONE = {"proofs": "airground prove"}
+"""Commands that there were, and what does their work now."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

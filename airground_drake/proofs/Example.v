@@ -2,7 +2,8 @@
 Require Import Reals Lra Psatz Safety.
 Local Open Scope R_scope.
 
-(* Robot [true], obstacle [false] at 0, d = 1, h = 1, A = 1; the robot is at 1 + (1/2)^k at sample k. *)
+(** The robot is [true]; the obstacle, [false], is at 0. With d = 1, h = 1, A = 1 the robot is at 1 + (1/2)^k at sample
+    [k]. *)
 Definition excess (k : nat) : R := (1 / 2) ^ k.
 Definition v (i : bool) (k : nat) := if i then V (- excess k / 2) 0 0 else V 0 0 0.
 Definition floor (t : R) := Z.to_nat (Int_part t).
@@ -27,7 +28,8 @@ Theorem can_be_met : forall t, 0 <= t -> 1 <= norm (sub (p true t) (p false t)).
 Proof.
   assert (P : forall k, 0 < excess k) by (intros k; apply pow_lt; lra).
   pose proof (safe_always 1 1 ltac:(lra) ltac:(lra) ltac:(lra) bool p v (fun _ => V 1 1 1) (fun _ => 0)
-    (fun i j => i = true /\ j = false) (fun _ _ => 1) (fun i _ => if i then 1 else 0) (fun _ _ => 0) (fun _ => True)) as S.
+    (fun i j => i = true /\ j = false) (fun _ _ => 1) (fun i _ => if i then 1 else 0) (fun _ _ => 0)
+    (fun _ => True)) as S.
   unfold sample, distance, moved, missed in S; apply S; auto; clear S.
   - intros i k s _ H; unfold moved, sample; destruct i; [rewrite place by exact H |].
     + replace (INR k * 1) with (INR k * 1 + 0) at 1 by ring; rewrite place by lra; right.

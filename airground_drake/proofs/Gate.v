@@ -1,9 +1,12 @@
-(** SAFE-GATE and LIVE-GATE: shortening a velocity mends it, the nearest feasible one is no faster, tracking contracts. *)
+(** What the layer of avoidance may do to a command, and what that does to an intervention: SAFE-GATE, LIVE-GATE,
+    SAFE-DIST. Velocities are vectors; the inequality [i] of a body is [b i <= dot (n i) v]. *)
 Require Import Reals Lra Psatz Safety.
 Local Open Scope R_scope.
 
-(** ** From a safe state (all bounds <= 0) a velocity scaled_back by [c <= b / r] over what it misses meets everything. *)
-Theorem scaled_back (k : Type) (n : k -> vec) (b : k -> R) v c : (forall i, b i <= 0) -> 0 <= c <= 1 ->
+(** ** From a safe state any command that is scaled back far enough meets all inequalities.
+    In a safe state all bounds are at most 0; far enough is [c <= b i / r] wherever the rate [r] misses its bound. *)
+Theorem scaled_back (k : Type) (n : k -> vec) (b : k -> R) v c :
+  (forall i, b i <= 0) -> 0 <= c <= 1 ->
   (forall i, dot (n i) v < b i -> c <= b i / dot (n i) v) -> forall i, b i <= dot (n i) (scale c v).
 Proof.
   intros B C M i; specialize (B i); specialize (M i).
@@ -12,7 +15,8 @@ Proof.
   apply M in L as Q; assert (E : b i / r * r = b i) by (field; lra); nra.
 Qed.
 
-(** ** Where standing still is feasible, the nearest feasible velocity is no faster than the one wanted. *)
+(** ** The allowed velocity nearest to a command is no faster than it, where standing still is allowed.
+    [q] is the projection of [u] onto a convex set with 0 in it: that is all that the premise says. *)
 Theorem no_faster u q : dot (sub u q) (sub (V 0 0 0) q) <= 0 -> norm q <= norm u.
 Proof.
   intros H; apply sqrt_le_1_alt; pose proof (Rle_0_sqr (norm (sub u q))) as S; unfold Rsqr in S.
@@ -32,7 +36,7 @@ Proof.
   rewrite sqrt_mult_alt by apply Rle_0_sqr; rewrite sqrt_Rsqr by exact H; reflexivity.
 Qed.
 
-(** ** A tracking error that contracts never leaves the ball: any number of samples. *)
+(** ** A tracking error that contracts stays within [r], if its disturbance is at most [g r]: any number of samples. *)
 Theorem tracking_contracts (g h r : R) (e w : nat -> vec) : 0 <= g -> 0 <= h -> g * h <= 1 ->
   (forall k, e (S k) = add (scale (1 - g * h) (e k)) (scale h (w k))) -> (forall k, norm (w k) <= g * r) ->
   norm (e 0%nat) <= r -> forall k, norm (e k) <= r.
@@ -41,21 +45,28 @@ Proof.
   eapply Rle_trans; [apply triangle |]; rewrite !norm_scale by lra; specialize (W k); nra.
 Qed.
 
-(** ** With room no inequality binds: at [D >= d + q' v h], [q' = 1] (obstacle), [2] (robot), whatever the command. *)
-Theorem room h d D q n v : 0 < h -> norm n = 1 -> 0 < q -> d + norm v * h / q <= D -> - q * (D - d) / h <= dot n v.
+(** ** With enough room no inequality restricts the command [v]: [D >= d + v h] beside an obstacle (share [q] = 1),
+    [D >= d + 2 v h] beside a robot ([q] = 1/2). *)
+Theorem room h d D q n v : 0 < h -> norm n = 1 -> 0 < q -> d + norm v * h / q <= D ->
+  - q * (D - d) / h <= dot n v.
 Proof.
   intros H N Q R; pose proof (dot_le n v) as C; rewrite N in C.
   apply Rmult_le_reg_r with h; [exact H |]; replace (- q * (D - d) / h * h) with (- (q * (D - d))) by (field; lra).
   assert (q * (norm v * h / q) <= q * (D - d)) by (apply Rmult_le_compat_l; lra).
   replace (q * (norm v * h / q)) with (norm v * h) in * by (field; lra); nra.
 Qed.
-(** ** SAFE-DIST, what is missing after [k] periods inside, and that all inequalities can be met at once. *)
+
+(** * SAFE-DIST *)
+
+(** ** What is missing of a safe distance after [k] disturbed periods, where [f] was missing at the start. *)
 Theorem deficit_closed_form h A e f k : 0 < A -> deficit h A e f k = e / A + (1 - A * h) ^ k * (f - e / A).
 Proof. intros P; induction k as [| k IH]; simpl; [ring |]; rewrite IH; unfold missing; field; lra. Qed.
 
+(** ** All inequalities can be met at once, where one direction [g] leads away from every near point. *)
 Theorem common_direction (k : Type) (n : k -> vec) (d D : k -> R) h A e m g : 0 < h -> 0 < A -> 0 <= e -> 0 < m ->
   norm g = 1 -> (forall i, norm (n i) = 1) -> (forall i, d i - e / A <= D i) ->
-  (forall i, D i < d i + h * (e / m) -> m <= dot (n i) g) -> forall i, bound h A (d i) (D i) <= dot (n i) (scale (e / m) g).
+  (forall i, D i < d i + h * (e / m) -> m <= dot (n i) g) ->
+  forall i, bound h A (d i) (D i) <= dot (n i) (scale (e / m) g).
 Proof.
   intros H P E M G N F C i; specialize (N i); specialize (F i); specialize (C i); pose proof (dot_le (n i) g) as B.
   rewrite N, G in B; replace (dot (n i) (scale (e / m) g)) with (e / m * dot (n i) g) by (vectors; ring).
@@ -66,6 +77,18 @@ Proof.
     + assert (m <= dot (n i) g) by (apply C; nra); nra.
     + rewrite <- L in *; lra.
   - apply Rmult_le_reg_r with h; [lra |]; replace (- (D i - d i) / h * h) with (- (D i - d i)) by (field; lra).
-    set (q := e / m) in *; assert (Qh : 0 <= q * h) by nra; replace (q * dot (n i) g * h) with (q * h * dot (n i) g) by ring.
+    set (q := e / m) in *; assert (Qh : 0 <= q * h) by nra.
+    replace (q * dot (n i) g * h) with (q * h * dot (n i) g) by ring.
     destruct (Rlt_dec (D i) (d i + h * q)) as [L | L]; [apply C in L; nra | nra].
+Qed.
+
+(** ** Straight over a UGV, which cannot move along [n], the UAV's half of the inequality keeps [d - W / A] alone.
+    [r] is the radial speed, [W / 2] the disturbance of the UAV. *)
+Theorem overhead h A d D r W s : 0 <= s <= h -> 0 < A -> A * h <= 1 -> 0 <= W -> d - W / A <= D <= d ->
+  A * (d - D) / 2 <= r -> d - W / A <= D + s * (r - W / 2).
+Proof.
+  intros Hs P S HW [HD _] L; set (f := W / A) in *; assert (E : W = A * f) by (unfold f; field; lra).
+  assert (T : A * s <= 1) by nra; assert (0 <= (D - d + f) * (1 - A * s / 2)) by (apply Rmult_le_pos; lra).
+  assert (s * (A * (d - D) / 2 - W / 2) <= s * (r - W / 2)) by (apply Rmult_le_compat_l; lra).
+  rewrite E in *; lra.
 Qed.

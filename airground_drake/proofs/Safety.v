@@ -1,4 +1,12 @@
-(** Set-based avoidance keeps the safe distance: any bodies, any number of samples, all real times. *)
+(** Set-based avoidance keeps the safe distance: any bodies, any number of samples, all real times.
+
+    The law, (7)-(8) and (11) as inequalities: at every sample each body of a pair at distance [D] with safe distance
+    [d] moves away from the other at least at its share of
+        [A (d - D)]     inside the safe distance,
+        [- (D - d) / h] outside of it, which cannot use up the distance left within a period [h].
+    The theorems: [lemma] (motion on a straight line), [safe_always], [recovers] (a deficit shrinks by [1 - A h] per
+    period), [disturbed] (velocities that miss the law by [e] cost [e / A]).
+    SAFE-HYP and SAFE-INV check the hypotheses, the ones about a scenario and the ones about a run. *)
 Require Import Reals Lra Psatz.
 Local Open Scope R_scope.
 
@@ -13,6 +21,7 @@ Definition norm a := sqrt (dot a a).
 (** [n] is a unit vector along [x] (any, where [x] is 0). *)
 Definition along n x := norm n = 1 /\ x = scale (norm x) n.
 
+(** Turns a statement about vectors into one about their coordinates. *)
 Ltac vectors := unfold add, sub, scale, mask, dot in *; simpl in *.
 
 Lemma norm_nonneg a : 0 <= norm a.
@@ -48,7 +57,7 @@ Proof.
   rewrite <- nn; lra.
 Qed.
 
-(** ** The lemma *)
+(** ** The lemma: after [s] on a straight line the distance is at least what it was plus [s] times its rate of change *)
 Theorem lemma x v s : 0 < norm x -> norm x + s * (dot x v / norm x) <= norm (add x (scale s v)).
 Proof.
   intros pos; eapply Rle_trans; [| exact (grows _ x _ (along_unit x pos))].
@@ -65,18 +74,21 @@ Qed.
 (** * One period *)
 Section Law.
 
-Variables h A : R. (** control period, s; gain, 1/s *)
+(** The control period, s, and the gain, 1/s. That [A h <= 1] is no restriction: see [capped] at the end. *)
+Variables h A : R.
 Hypotheses (h_positive : 0 < h) (A_nonneg : 0 <= A) (no_overshoot : A * h <= 1).
 
-(** The bound on the radial speed of a pair at distance [D] with safe distance [d]. *)
+(** The law: the least radial speed of a pair at distance [D] with safe distance [d]. *)
 Definition bound d D := if Rle_dec D d then A * (d - D) else - (D - d) / h.
 
-(** What can be missing of the safe distance [s] after [f] was, where the radial speed falls short by [e] at most. *)
+(** Where [f] is missing of the safe distance now, and the radial speed falls short of the law by [e] at most, this is
+    what can be missing after the time [s]. *)
 Definition missing e f s := (1 - A * s) * f + e * s.
 
 Lemma missing_nonneg e f s : 0 <= s <= h -> 0 <= e -> 0 <= f -> 0 <= missing e f s.
 Proof. intros Hs He Hf; unfold missing; assert (A * s <= 1) by nra; nra. Qed.
 
+(** After [s], within the period, no more than that is missing. *)
 Lemma period d D e f s :
   0 <= s <= h -> 0 <= f -> d - f <= D -> d - missing e f s <= D + s * (bound d D - e).
 Proof.
@@ -90,9 +102,16 @@ Proof.
 Qed.
 
 (** * Any bodies, all times *)
+
+(** Bodies are robots and obstacles. Body [i] is at [p i t] at time [t]; its velocity from sample [k] on is [v i k]. *)
 Variables (body : Type) (p : body -> R -> vec) (v : body -> nat -> vec).
-Variable can_move : body -> vec. (** 1 where the body can move, else 0: (1, 1, 0) for a UGV *)
-Variable wander : body -> R. (** how much faster or slower than [v] it is at most, m/s *)
+(** 1 for each axis along which the body can move, else 0: (1, 1, 0) for a UGV. *)
+Variable can_move : body -> vec.
+(** By how much its motion may differ from [v], m/s: 0 where velocities are held, the top speed of an obstacle that
+    moves as it likes. *)
+Variable wander : body -> R.
+(** Which pairs are to be kept apart, by which distance; the part of the law that the first one of a pair takes; and by
+    how much it may miss that part, m/s. *)
 Variables (apart : body -> body -> Prop) (d share slack : body -> body -> R).
 (** The samples of the run, from the first one on: all, or those below some [N]. *)
 Variable sampled : nat -> Prop.
@@ -101,18 +120,22 @@ Hypothesis from_the_first : forall k, sampled (S k) -> sampled k.
 Definition sample k := INR k * h.
 Definition distance i j t := norm (sub (p i t) (p j t)).
 Definition moved i k s := sub (p i (sample k + s)) (p i (sample k)).
-(** The inequality of [i] against [j] at sample [k], up to [slack]; [n] points from [j] to [i]. *)
+(** Body [i] meets its inequality against [j] at sample [k], up to [slack]; [n] points from [j] to [i]. *)
 Definition meets i j k n :=
   share i j * bound (d i j) (distance i j (sample k)) - slack i j <= dot (mask (can_move i) n) (v i k).
 (** Even at their speeds the two cannot come within the safe distance before the next sample. *)
 Definition far i j k := d i j + (norm (v i k) + wander i + norm (v j k) + wander j) * h <= distance i j (sample k).
-(** By how much the radial speed of the pair can fall short of the bound. *)
+(** By how much the radial speed of the pair can fall short of the law. *)
 Definition missed i j := slack i j + slack j i + wander i + wander j.
 
+(** Velocities are held from sample to sample, up to [wander]. *)
 Hypothesis held : forall i k s, sampled k -> 0 <= s <= h -> norm (sub (moved i k s) (scale s (v i k))) <= wander i * s.
+(** No body moves along an axis along which it cannot. *)
 Hypothesis moves_as_it_can : forall i k, mask (can_move i) (v i k) = v i k.
 Hypothesis symmetric : forall i j, apart i j -> d j i = d i j.
+(** The two shares of a pair add up to 1. *)
 Hypothesis shared : forall i j, apart i j -> share i j + share j i = 1.
+(** At every sample both bodies of a pair meet their inequalities, or they are too far apart to matter. *)
 Hypothesis law : forall i j k, sampled k -> apart i j ->
   (exists n, along n (sub (p i (sample k)) (p j (sample k))) /\ meets i j k n /\ meets j i k (scale (-1) n))
   \/ far i j k.
@@ -123,7 +146,7 @@ Proof. intros E; rewrite <- E at 2; vectors; ring. Qed.
 Lemma distance_sym i j t : distance i j t = distance j i t.
 Proof. unfold distance, norm; f_equal; vectors; ring. Qed.
 
-(** What a body moves along [a] is what [v] says, up to [wander]. *)
+(** How far a body moves along [a] is what [v] says, up to [wander]. *)
 Lemma moved_along a i k s : sampled k -> 0 <= s <= h ->
   - (norm a * (wander i * s)) <= dot a (moved i k s) - s * dot a (v i k) <= norm a * (wander i * s).
 Proof.
@@ -133,6 +156,7 @@ Proof.
     by (vectors; ring); nra.
 Qed.
 
+(** One period of a pair. *)
 Lemma between i j k s e f : sampled k -> apart i j -> 0 <= s <= h -> missed i j <= e -> 0 <= e -> 0 <= f ->
   d i j - f <= distance i j (sample k) -> d i j - missing e f s <= distance i j (sample k + s).
 Proof.
@@ -156,7 +180,8 @@ Proof.
     { intros b; pose proof (held b k h Hk ltac:(lra)); pose proof (norm_nonneg (sub (moved b k h) (scale h (v b k)))).
       nra. }
     set (c := norm (v i k) + wander i + norm (v j k) + wander j) in *; assert (0 <= c).
-    { unfold c; pose proof (W i); pose proof (W j); pose proof (norm_nonneg (v i k)); pose proof (norm_nonneg (v j k)); lra. }
+    { unfold c; pose proof (W i); pose proof (W j); pose proof (norm_nonneg (v i k)).
+      pose proof (norm_nonneg (v j k)); lra. }
     assert (0 <= D) by apply norm_nonneg; pose proof (norm_nonneg y); assert (0 <= s * c <= c * h) by nra.
     assert (T : D * D <= D * (norm y + s * c)).
     { pose proof (moved_along x i k s Hk Hs) as Vi; pose proof (moved_along x j k s Hk Hs) as Vj.
@@ -167,7 +192,7 @@ Proof.
     destruct (Req_dec D 0) as [Z | Z]; [lra | apply Rmult_le_reg_l in T; lra].
 Qed.
 
-(** What may be missing at sample [k] where [f] was at the start. *)
+(** What may be missing at sample [k], where [f] was missing at the start. *)
 Fixpoint deficit e f k := match k with O => f | S k => missing e (deficit e f k) h end.
 
 Lemma deficit_nonneg e f k : 0 <= e -> 0 <= f -> 0 <= deficit e f k.
@@ -196,7 +221,7 @@ Proof.
   rewrite <- E; unfold missing in B; assert (0 <= A * s) by nra; nra.
 Qed.
 
-(** ** Safety *)
+(** ** Safety at all times of the samples that there are *)
 Theorem safe i j : apart i j -> missed i j <= 0 -> d i j <= distance i j 0 ->
   forall k s, sampled k -> 0 <= s <= h -> d i j <= distance i j (sample k + s).
 Proof.
@@ -204,7 +229,7 @@ Proof.
   pose proof (recovers i j 0 Hij He (Rle_refl 0) ltac:(lra) k s Hk Hs) as P; rewrite Rmult_0_r in P; lra.
 Qed.
 
-(** ** Safety of a pair whose radial speed falls short by [e]: no more than [e / A] is lost, ever. *)
+(** ** Under disturbance: a pair whose radial speed falls short of the law by [e] never loses more than [e / A]. *)
 Theorem disturbed i j e : apart i j -> 0 < A -> missed i j <= e -> 0 <= e -> d i j - e / A <= distance i j 0 ->
   forall k s, sampled k -> 0 <= s <= h -> d i j - e / A <= distance i j (sample k + s).
 Proof.
@@ -228,18 +253,19 @@ Proof.
   destruct (Rlt_dec t (sample k)) as [L | L]; [apply IH, L | exists k, (t - sample k); lra].
 Qed.
 
+(** ** Safety for ever *)
 Corollary safe_always i j : (forall k, sampled k) -> apart i j -> missed i j <= 0 -> d i j <= distance i j 0 ->
   forall t, 0 <= t -> d i j <= distance i j t.
 Proof. intros Hk Hij He H0 t Ht; destruct (periods t Ht) as [k [s [Hs ->]]]; apply safe; auto. Qed.
 
 (** * What meets the hypotheses *)
 
-(** An obstacle is a body without a share, that wanders at its top speed and is held at 0: its inequality holds where
-    its slack is 0. Against one that moves ([wander j] > 0), the robot's slack is [- wander j], so that [missed] is 0. *)
+(** An obstacle has velocity 0 and takes no share: it meets its inequality without slack. One that moves wanders at its
+    top speed; the robot then takes the slack [- wander j], so that [missed] is 0. *)
 Lemma obstacle i j k n : v j k = V 0 0 0 -> share j i = 0 -> slack j i = 0 -> meets j i k n.
 Proof. intros E Q P; unfold meets; rewrite E, Q, P; vectors; lra. Qed.
 
-(** What a sensing range [r >= d + c h] does not show is far, [c] being the sum of the speed limits. *)
+(** What is beyond the sensing range [r >= d + c h] is far, [c] being the sum of the speed limits. *)
 Lemma unseen i j k r c : norm (v i k) + wander i + norm (v j k) + wander j <= c -> d i j + c * h <= r ->
   r <= distance i j (sample k) -> far i j k.
 Proof. intros C Hr Hd; unfold far; nra. Qed.
@@ -257,3 +283,13 @@ Qed.
 
 End Law.
 
+(** ** A gain with [A h > 1] asks for more than [1 / h] does, so that the theorems cover it with [min (A, 1 / h)]: then
+    [A h] becomes [min (A h, 1)]. The program multiplies in floating point, where [A h] may come out above 1 by
+    rounding. *)
+Theorem capped h A d D : 0 < h ->
+  Rmin A (/ h) * h <= 1 /\ bound h (Rmin A (/ h)) d D <= bound h A d D.
+Proof.
+  intros H; split.
+  - apply Rle_trans with (/ h * h); [apply Rmult_le_compat_r; [lra | apply Rmin_r] | right; field; lra].
+  - unfold bound; destruct (Rle_dec D d); [apply Rmult_le_compat_r; [lra | apply Rmin_l] | lra].
+Qed.

@@ -1,4 +1,7 @@
-(** The threshold equation (19) with c2/c1 on the right has one root, and it alone minimises the Bayes risk (16). *)
+(** The threshold equation (19), with c2/c1 on the right, has one root, and the Bayes risk (16) is least there alone.
+
+    That (17) and (18) are the mean decision time and the error rate of the process (15) is not proved here: THR-DDM
+    compares them with simulated first passages. THR-ROOT checks the signs by which [enclosed] encloses the root. *)
 Require Import Reals Lra Psatz.
 Local Open Scope R_scope.
 
@@ -107,10 +110,13 @@ Proof.
 Qed.
 
 (** ** The printed equation, with c1/c2, has its root elsewhere, at a higher risk. *)
-Corollary printed_is_worse zeta printed : solves zeta -> left_side printed = c1 / c2 -> c1 <> c2 -> risk zeta < risk printed.
+Corollary printed_is_worse zeta printed : solves zeta -> left_side printed = c1 / c2 -> c1 <> c2 ->
+  risk zeta < risk printed.
 Proof.
   intros S P N; apply least; [exact S |]; intros ->; unfold solves in S; rewrite S in P; apply N.
-  assert (Q : c2 * c2 = c1 * c1) by (apply (f_equal (fun q => q * c1 * c2)) in P; field_simplify in P; lra || nra); nra.
+  assert (Q : c2 * c2 = c1 * c1).
+  { apply (f_equal (fun q => q * c1 * c2)) in P; field_simplify in P; lra || nra. }
+  nra.
 Qed.
 
 (** ** With an initial deviation, (17)-(18), it is not the minimum: a threshold nearby is better. *)
@@ -141,7 +147,8 @@ Proof.
   assert (C2 : c2 = k * (twice_sinh (u zeta) + 2 * u zeta)).
   { unfold k, twice_sinh; rewrite Rmult_assoc, S; field; lra. }
   assert (E : forall z, 0 < z -> risk_from y z = risk z + b * (2 * k * u z - c2) / twice_sinh (u z) - c1 * y / drift).
-  { intros z Hz; specialize (U z Hz); unfold risk_from, decision_time_from, error_rate_from, risk, bias, sinh, twice_sinh in *.
+  { intros z Hz; specialize (U z Hz).
+    unfold risk_from, decision_time_from, error_rate_from, risk, bias, sinh, twice_sinh in *.
     replace (2 * z / drift) with (2 * scale * u z) by (unfold scale, u; field; lra).
     unfold b, k; field; lra. }
   rewrite !E by assumption; rewrite C2; pose proof (U zeta Z); pose proof (U other O); unfold t; field; lra.
@@ -213,3 +220,58 @@ Proof.
 Qed.
 
 End Threshold.
+
+(** * One threshold is the optimum for two drifts at most: [sinh u + u] and [K u^2] meet twice at most *)
+Lemma sinh_increasing a b : a < b -> sinh a < sinh b.
+Proof.
+  intros H; unfold sinh; pose proof (exp_increasing _ _ H).
+  assert (exp (- b) < exp (- a)) by (apply exp_increasing; lra); lra.
+Qed.
+
+Lemma at_most_two K a b c : 0 < a -> a < b -> b < c ->
+  sinh a + a = K * Rsqr a -> sinh b + b = K * Rsqr b -> sinh c + c = K * Rsqr c -> False.
+Proof.
+  intros A B C Ea Eb Ec.
+  set (f := fun u => sinh u + u - K * Rsqr u); set (f' := fun u => cosh u + 1 - K * (2 * u)).
+  set (f'' := fun u => sinh u + 0 - K * 2).
+  assert (D : forall u, derivable_pt_lim f u (f' u)).
+  { intros u; apply (derivable_pt_lim_minus (fun u => sinh u + u) (fun u => K * Rsqr u)).
+    - apply (derivable_pt_lim_plus sinh id); [apply derivable_pt_lim_sinh | apply derivable_pt_lim_id].
+    - apply (derivable_pt_lim_scal Rsqr), derivable_pt_lim_Rsqr. }
+  assert (D' : forall u, derivable_pt_lim f' u (f'' u)).
+  { intros u; apply (derivable_pt_lim_minus (fun u => cosh u + 1) (fun u => K * (2 * u))).
+    - apply (derivable_pt_lim_plus cosh (fct_cte 1)); [apply derivable_pt_lim_cosh | apply derivable_pt_lim_const].
+    - replace (K * 2) with (K * (2 * 1)) by ring.
+      apply (derivable_pt_lim_scal (fun u => 2 * u)), (derivable_pt_lim_scal id), derivable_pt_lim_id. }
+  assert (Rolle : forall g g' x y, (forall u, derivable_pt_lim g u (g' u)) -> x < y -> g x = g y ->
+    exists u, g' u = 0 /\ x < u < y).
+  { intros g g' x y L H E; destruct (MVT_cor2 g g' x y H (fun u _ => L u)) as [u [M I]]; exists u; split; [| exact I].
+    apply Rmult_eq_reg_r with (y - x); lra. }
+  assert (Z : f 0 = 0) by (unfold f; rewrite sinh_0, Rsqr_0; ring).
+  assert (Fa : f a = 0) by (unfold f; lra); assert (Fb : f b = 0) by (unfold f; lra).
+  assert (Fc : f c = 0) by (unfold f; lra).
+  destruct (Rolle f f' 0 a D A ltac:(lra)) as [u [U Iu]], (Rolle f f' a b D B ltac:(lra)) as [v [V Iv]].
+  destruct (Rolle f f' b c D C ltac:(lra)) as [w [W Iw]].
+  destruct (Rolle f' f'' u v D' ltac:(lra) ltac:(lra)) as [x [X Ix]].
+  destruct (Rolle f' f'' v w D' ltac:(lra) ltac:(lra)) as [y [Y Iy]].
+  pose proof (sinh_increasing x y ltac:(lra)); unfold f'' in X, Y; lra.
+Qed.
+
+Theorem at_most_two_drifts noise c1 c2 zeta m1 m2 m3 : 0 < noise -> 0 < zeta -> 0 < m1 -> m1 < m2 -> m2 < m3 ->
+  solves m1 noise c1 c2 zeta -> solves m2 noise c1 c2 zeta -> solves m3 noise c1 c2 zeta -> False.
+Proof.
+  intros N Z A B C S1 S2 S3; pose proof (pow_lt noise 2 N) as N2; set (n := noise ^ 2) in *.
+  set (k := 2 * zeta / n); set (K := c2 / c1 / (n * Rsqr k)).
+  assert (k_positive : 0 < k) by (apply Rdiv_lt_0_compat; lra).
+  assert (E : forall m, 0 < m -> solves m noise c1 c2 zeta -> sinh (k * m) + k * m = K * Rsqr (k * m)).
+  { intros m M S; unfold solves, left_side in S; fold n in S; unfold K; rewrite <- S, Rsqr_mult.
+    replace (2 * m * zeta / n) with (k * m) by (unfold k; field; lra).
+    generalize (sinh (k * m)); intros y; unfold k, Rsqr; field; repeat split; lra. }
+  apply (at_most_two K (k * m1) (k * m2) (k * m3)).
+  - apply Rmult_lt_0_compat; lra.
+  - apply Rmult_lt_compat_l; lra.
+  - apply Rmult_lt_compat_l; lra.
+  - apply E; [lra | exact S1].
+  - apply E; [lra | exact S2].
+  - apply E; [lra | exact S3].
+Qed.

@@ -1,4 +1,7 @@
-(** The event trigger: two triggers are never closer than the dwell, whatever the signal; no run is Zeno. *)
+(** The event trigger: two triggers are never closer than the dwell, whatever the signal; no run is Zeno.
+
+    ZENO-PROOF checks the constants, ZENO-TRACE the triggers of a run; that the program makes these transitions is for
+    the tests. *)
 Require Import Reals Lra Lia List.
 Import ListNotations.
 Local Open Scope R_scope.
@@ -8,6 +11,7 @@ Record state := State { now : mode; triggers : nat; triggered_at : R }.
 
 Section Automaton.
 
+(** The threshold, m; below [release] a trigger can end; the least time from one trigger to the next, s. *)
 Variables zeta release dwell : R.
 Hypothesis dwell_nonneg : 0 <= dwell.
 
@@ -78,7 +82,7 @@ Proof.
   rewrite Nat.sub_0_r in *; rewrite (S_INR (S j)); lra.
 Qed.
 
-(** ** In a time [T] there are at most [floor (T / dwell) + 1] triggers: [(m - 1) dwell <= T] for [m] of them. *)
+(** [m] triggers take a time of [(m - 1) dwell] at least. *)
 Theorem span s t l : run s t l -> forall i j T, (i <= j < length l)%nat ->
   nth i l 0 - nth j l 0 <= T -> INR (j - i) * dwell <= T.
 Proof.
@@ -87,6 +91,7 @@ Proof.
   - pose proof (dwell_apart s t l R i j ltac:(lia)); lra.
 Qed.
 
+(** ** In a time [T] there are at most [floor (T / dwell) + 1] triggers. *)
 Corollary at_most s t l T : 0 < dwell -> run s t l -> forall i m, (i + m < length l)%nat ->
   nth i l 0 - nth (i + m) l 0 <= T -> (Z.of_nat (S m) <= Int_part (T / dwell) + 1)%Z.
 Proof.

@@ -58,15 +58,22 @@ def standing(*names: str, folder: Path = FOLDER) -> Standing:
         theory = {file: digest(folder / file) for file in closure([file_of(name) for name in chosen], folder)}
     except OSError as error:
         return Standing(False, f"not checked: {Path(error.filename).name} cannot be read", {})
+    record = read_record(folder)
+    if record is None:
+        return Standing(False, f"not checked: {RECORD} cannot be read: run `airground prove --record`", theory)
+    if why := _doubt(record, chosen, theory):
+        return Standing(False, f"not checked: {why}", theory)
+    return Standing(True, f"checked by Coq {record['coq']} for this release; hypotheses checked now", theory)
+
+
+def read_record(folder: Path = FOLDER) -> dict[str, Any] | None:
+    """The record of the last check: `coq`, `sha256` by file, `axioms` by theorem; None if it cannot be read."""
     try:
         record = json.loads((folder / RECORD).read_text(encoding="utf-8"))
-        why = _doubt(record, chosen, theory)
-        version = record["coq"]
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
-        return Standing(False, f"not checked: {RECORD} cannot be read: run `airground prove --record`", theory)
-    if why:
-        return Standing(False, f"not checked: {why}", theory)
-    return Standing(True, f"checked by Coq {version} for this release; hypotheses checked now", theory)
+        whole = isinstance(record["coq"], str) and all(isinstance(record[part], dict) for part in ("sha256", "axioms"))
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+    return record if whole else None
 
 
 def _doubt(record: Mapping[str, Any], names: tuple[str, ...], theory: Mapping[str, str]) -> str:

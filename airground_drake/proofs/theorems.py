@@ -29,7 +29,7 @@ class Theorem:
     checked_where: tuple[str, ...]
 
 
-_STABLE = "The product of gain and control period, A h, is at most 1; the program uses min(A h, 1)."
+_STABLE = "The product of gain and control period, A h, is at most 1: min(A h, 1) stands for it (Safety.capped)."
 _SHARES = "The shares that the two robots of a pair take add up to 1."
 _HELD = "Between two samples every body moves on a straight line at its velocity, up to `wander`."
 _PLANAR = "A body that cannot leave the plane has no velocity out of it."
@@ -99,6 +99,13 @@ _ALL = (
         _RUN_AND_SCENARIO,
     ),
     Theorem(
+        "Safety.capped",
+        "A gain with A h > 1 asks for more than min(A, 1/h), so that the theorems cover it with min(A h, 1).",
+        "ours",
+        ("h is positive.",),
+        _RUN_AND_SCENARIO,
+    ),
+    Theorem(
         "Gate.scaled_back",
         "From a safe state any command that is scaled back far enough meets all inequalities.",
         "(20)",
@@ -141,6 +148,13 @@ _ALL = (
         "If one direction leads away from every near point, one velocity meets all inequalities at once.",
         "ours",
         ("Every distance is at least d - e/A.", "There is a unit vector g with n.g >= m > 0 for every near point."),
+        ("SAFE-DIST",),
+    ),
+    Theorem(
+        "Gate.overhead",
+        "Straight over a UGV, which cannot move along n, the UAV's half of the inequality keeps d - W/A alone.",
+        "ours",
+        ("A is positive, and A h is at most 1.", "The UAV is disturbed by at most W/2."),
         ("SAFE-DIST",),
     ),
     Theorem(
@@ -233,6 +247,44 @@ _ALL = (
         "(17)-(19)",
         (*_COSTS, "The deviation is not 0 and smaller than the root."),
         ("THR-OPT",),
+    ),
+    Theorem(
+        "Threshold.at_most_two_drifts",
+        "One threshold is the root of the equation for at most two drifts.",
+        "(19)",
+        ("noise and threshold are positive.",),
+        ("THR-OPT",),
+    ),
+    Theorem(
+        "Run.nearby",
+        "Positions within r and q of those of the run lose at most r + q of a distance.",
+        "ours",
+        ("Recorded positions differ from the exported ones by their rounding.",),
+        ("airground prove DIR",),
+    ),
+    Theorem(
+        "DistanceChecker.sound",
+        "Two bodies of a recorded run that the checker accepts keep their distance at all times of the run.",
+        "(7)-(8), (11)",
+        (
+            "The integers in the file are the recorded positions, rounded to 2^-60 m.",
+            "Between two rows bodies move on straight lines.",
+        ),
+        ("airground prove DIR", "SAFE-TRACE"),
+    ),
+    Theorem(
+        "LawChecker.sound",
+        "Two bodies of a recorded run that the checker accepts obey the avoidance law at all rows, up to e per step.",
+        "(7)-(8), (11)",
+        ("The hypotheses of DistanceChecker.sound.",),
+        ("airground prove DIR", "SAFE-HYP"),
+    ),
+    Theorem(
+        "LawChecker.law_keeps",
+        "Two bodies that obey the law up to e per step keep d - e/(A h) at all times of the run.",
+        "(7)-(8), (11)",
+        ("The hypotheses of LawChecker.sound.", "The pair starts at d - e/(A h) or farther."),
+        ("airground prove DIR", "SAFE-HYP"),
     ),
     Theorem(
         "Example.can_be_met",

@@ -24,7 +24,7 @@ _CLAIM = r"[A-Z][A-Z0-9-]*"
 _FILES = re.compile(
     r"report\.html|report\.json|junit\.xml|diagram\.dot|diagram\.svg"
     r"|trace/\w+/(\w+\.parquet|timings\.json|meta\.json)"
-    rf"|certificates/{_CLAIM}/\w[\w.-]*|proofs/(index\.json|{_CLAIM}/\w[\w.-]*)"
+    rf"|certificates/{_CLAIM}/\w[\w.-]*|proofs/(proofs\.json|run_\w+\.v|index\.json|{_CLAIM}/\w[\w.-]*)"
 )
 _FOLDERS = re.compile(rf"trace(/\w+)?|(certificates|proofs)(/{_CLAIM})?")
 _OURS = re.compile(rb'\s*\{\s*"schema":\s*"airground_drake\.report/')

@@ -1,0 +1,111 @@
+"""`airground prove`: have Coq check the theorems of the package, or prove the runs of a report."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from airground_drake.errors import AirgroundError
+from airground_drake.usage import Parser, positive, refuse
+
+if TYPE_CHECKING:
+    from airground_drake.proofs.runs import Proved
+
+EXIT_UNPROVED = 1
+
+
+def parser() -> argparse.ArgumentParser:
+    """What the command line takes."""
+    parser = Parser(
+        prog="airground prove",
+        description="Have the proof checker Coq check the package's theorems (without DIR), or prove for the runs of a "
+        "report that they keep their distances (with DIR).",
+        epilog="Exit codes: 0 proved (with DIR: each run that is named, or whose distances the scenario expects to be "
+        "kept); 1 something is not proved, or differs from its record; 2 usage, Coq is not installed, or a file cannot "
+        "be read.",
+    )
+    parser.add_argument("report", type=Path, metavar="DIR", nargs="?", help="folder of a report")
+    parser.add_argument(
+        "--run",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="prove this run of DIR, whatever the scenario expects of it, and no other; may be repeated",
+    )
+    parser.add_argument(
+        "--limit", type=positive, default=600.0, metavar="S", help="seconds for one call of Coq (default: %(default)g)"
+    )
+    parser.add_argument("--record", action="store_true", help="without DIR: write the record of this check")
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Check or prove, and say what was found.
+
+    Returns:
+        Exit code: 0, 1 if something is not proved, 2 if that cannot be told.
+    """
+    from airground_drake.proofs.coq import CoqError
+
+    options = parser().parse_args(arguments)
+    if options.report and options.record:
+        return refuse("--record is about the package's theorems; allowed: without DIR")
+    if options.run and not options.report:
+        return refuse("--run is about the runs of a report; allowed: with DIR")
+    try:
+        return _runs(options) if options.report else _theorems(record=options.record, limit_s=options.limit)
+    except CoqError as error:
+        return refuse(error, EXIT_UNPROVED)
+    except (AirgroundError, OSError) as error:
+        return refuse(error)
+
+
+def _theorems(*, record: bool, limit_s: float) -> int:
+    """Check the package's theorems."""
+    from airground_drake.proofs import theories
+    from airground_drake.proofs.theorems import THEOREMS
+
+    found = theories.check(limit_s=limit_s)
+    for name, theorem in THEOREMS.items():
+        print(f"{name}: {theorem.statement}")
+        print(f"    axioms: {', '.join(found.axioms[name]) or 'none'}")
+    print(
+        f"Coq {found.coq}: {len(found.axioms)} theorems in {len(found.sha256)} files, compiled in "
+        f"{found.compile_s:.0f} s, checked again by coqchk in {found.again_s:.0f} s"
+    )
+    if record:
+        print(theories.write_record(found))
+    differing = theories.differences(found)
+    for line in differing:
+        print(line)
+    return EXIT_UNPROVED if differing else 0
+
+
+def _runs(options: argparse.Namespace) -> int:
+    """Prove the runs of a report."""
+    from airground_drake.proofs.runs import prove_report
+
+    code = 0
+    for found in prove_report(options.report, options.run, options.limit):
+        print("\n".join(_lines(found)), flush=True)
+        if (found.expected or options.run) and not found.distances.proved:
+            code = EXIT_UNPROVED
+    return code
+
+
+def _lines(found: Proved) -> list[str]:
+    """What came of a run."""
+    lines = []
+    for what, answer in (
+        (f"all {found.pairs} distances kept at all times", found.distances),
+        ("avoidance law obeyed without error", found.law),
+    ):
+        if answer.proved:
+            lines.append(f"run {found.run}: {what}: proved in {answer.seconds:.1f} s ({answer.file})")
+        else:
+            lines.append(f"run {found.run}: {what}: not proved: {answer.why}")
+    if not found.expected:
+        lines.append(f"run {found.run}: the scenario does not ask for it: SAFE-TRACE may be refuted")
+    return lines

@@ -1,0 +1,250 @@
+"""A recorded run as Coq files: its positions as integers, and theorems about them that Coq decides by computing."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cache
+from itertools import combinations, pairwise
+from math import isqrt, lcm
+from typing import Any
+
+from airground_drake.proofs.record import FOLDER
+from airground_drake.trace import Trace
+
+PARTS = 2**60
+"""Positions are rounded to 1/PARTS m: some coordinates are as small as 1e-100 m. At a metre binary64 is coarser."""
+
+Place = tuple[Fraction, Fraction, Fraction]
+
+
+@dataclass(frozen=True)
+class Demand:
+    """Two bodies, by name, and the distance of their centres that they are to keep, m."""
+
+    first: str
+    second: str
+    safe_m: Fraction
+
+    @property
+    def lemma(self) -> str:
+        """Name of the lemma about it."""
+        return f"{self.first}_and_{self.second}"
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """A run in exact numbers.
+
+    Attributes:
+        name: of the run in Coq.
+        times: of the rows, s.
+        places: of each body, m: one per row, or a single one of a body at rest. In the order of their numbers.
+        demands: pairs and distances.
+        gain: A h, the product of gain and control period, at most 1 (see `capped` in Safety.v).
+    """
+
+    name: str
+    times: tuple[Fraction, ...]
+    places: Mapping[str, tuple[Place, ...]]
+    demands: tuple[Demand, ...]
+    gain: Fraction
+
+    @property
+    def unit(self) -> int:
+        """Parts of a metre and of a second of which every number is a multiple."""
+        numbers: Iterable[Fraction] = (
+            *self.times,
+            *(demand.safe_m for demand in self.demands),
+            *(axis for places in self.places.values() for place in places for axis in place),
+        )
+        return lcm(*(number.denominator for number in numbers))
+
+
+def recorded(trace: Trace) -> Recorded:
+    """A run as recorded, positions rounded to 1/PARTS m; nothing else is rounded.
+
+    Raises:
+        TraceError: if a column is missing or not finite.
+    """
+    control = trace.scenario["control"]
+    places: dict[str, tuple[Place, ...]] = {
+        name: (_rounded(obstacle["position_m"]),) for name, obstacle in trace.scenario["obstacles"].items()
+    }
+    places |= {robot: tuple(map(_rounded, trace.position(robot).tolist())) for robot in trace.robots}
+    spelled = _spelled(list(places))
+    return Recorded(
+        name=f"run_{trace.run}",
+        times=tuple(map(Fraction, trace.t.tolist())),
+        places={spelled[name]: place for name, place in places.items()},
+        demands=tuple(
+            Demand(spelled[first], spelled[second], safe_m) for first, second, safe_m in demands(trace.scenario)
+        ),
+        gain=min(decimal(control["avoidance_gain_1_s"]) * decimal(control["period_s"]), Fraction(1)),
+    )
+
+
+def demands(scenario: Mapping[str, Any]) -> list[tuple[str, str, Fraction]]:
+    """Who is to keep which distance from whom, m: each robot from each obstacle, and each two robots."""
+    robots = {**scenario["ugvs"], scenario["uav"]["name"]: scenario["uav"]}
+    safe = {kind: decimal(value) for kind, value in scenario["safe_distance"].items()}
+    radius = {name: decimal(body["radius_m"]) for name, body in {**robots, **scenario["obstacles"]}.items()}
+    found = [(robot, obstacle, "obstacle_m") for robot in robots for obstacle in scenario["obstacles"]]
+    for one, other in combinations(robots, 2):
+        found.append((one, other, "air_ground_m" if scenario["uav"]["name"] in (one, other) else "ugv_m"))
+    return [(one, other, safe[kind] + radius[one] + radius[other]) for one, other, kind in found]
+
+
+def decimal(number: float) -> Fraction:
+    """The decimal number that a scenario's number prints as."""
+    return Fraction(repr(number))
+
+
+def _rounded(place: Sequence[float]) -> Place:
+    x, y, z = (Fraction(round(Fraction(axis) * PARTS), PARTS) for axis in place)
+    return x, y, z
+
+
+def _spelled(names: list[str]) -> dict[str, str]:
+    """Names for Coq: as they are, where that is an identifier that nothing else can have; else by number."""
+    plain = re.compile(r"(?!run_|body_number_)(?!\w*(_and_|_places\b))[A-Za-z]\w*", re.ASCII)
+    return {
+        name: name if plain.fullmatch(name) and name not in _taken() else f"body_number_{k}"
+        for k, name in enumerate(names)
+    }
+
+
+@cache
+def _taken() -> frozenset[str]:
+    """Words that mean something in the theories or in an exported file."""
+    words = re.findall(r"\w+", "".join(file.read_text(encoding="utf-8") for file in FOLDER.glob("*.v")))
+    return frozenset({*words, *re.findall(r"\w+", _DISTANCES + _LAW), "exists", "fun", "let", "Set", "Prop", "Type"})
+
+
+_DISTANCES = """\
+Lemma is_well_formed : well_formed {run} = true.
+Proof. vm_cast_no_check (eq_refl true). Qed.
+
+Local Open Scope R_scope.
+
+Lemma during t : {interval} -> begins {run} <= t <= ends {run}.
+Proof.
+  intros H; apply (covers_sound {run} {start} {end}).
+  - exact is_well_formed.
+  - vm_cast_no_check (eq_refl true).
+  - lra.
+Qed.
+
+(** Coq computes [keeps], and [sound] turns the answer into a statement about all times. *)
+Ltac decide_distance a b :=
+  intros t T; apply (Rle_trans _ (IZR a / IZR b)); [lra |];
+  apply sound; [exact is_well_formed | vm_cast_no_check (eq_refl true) | exact (during t T)].
+
+"""
+_LAW = """\
+(** Coq computes [obeys_law], and [obeys_exactly] turns the answer into a statement about all rows. *)
+Ltac decide_law num den a b :=
+  apply (obeys_exactly _ _ _ num den a b); [exact is_well_formed | vm_cast_no_check (eq_refl true) | lra | lra].
+
+"""
+
+
+def distances_file(run: Recorded) -> str:
+    """The run, and the theorem that every pair keeps its distance at all times."""
+    interval = f"{real(run.times[0])} <= t <= {real(run.times[-1])}"
+    claims = [
+        f"{real(demand.safe_m)} <= norm (sub (position {run.name} {demand.first} t) "
+        f"(position {run.name} {demand.second} t))"
+        for demand in run.demands
+    ]
+    lemmas = [
+        f"Lemma {demand.lemma} : forall t, {interval} ->\n  {claim}.\n"
+        f"Proof. decide_distance {ratio(demand.safe_m)}. Qed.\n\n"
+        for demand, claim in zip(run.demands, claims, strict=True)
+    ]
+    checks = _DISTANCES.format(
+        run=run.name, interval=interval, start=ratio(run.times[0]), end=ratio(run.times[-1])
+    )  # fmt: skip
+    together = _theorem(f"{run.name}_keeps_its_distances", f"forall t, {interval} ->\n  ", claims)
+    proof = _all_of([f"({demand.lemma} t T)" for demand in run.demands])
+    return (
+        f"(** That {run.name} keeps its distances. Written by `airground prove`, from the positions in trace/. *)\n"
+        "Require Import Reals Lra ZArith List.\nRequire Import Safety Run DistanceChecker.\nImport ListNotations.\n"
+        f"Local Open Scope Z_scope.\n\n{_data(run)}{checks}{''.join(lemmas)}"
+        f"(** All pairs, m and s. *)\n{together}Proof. intros t T; exact {proof}. Qed.\n\n"
+        f"Print Assumptions {run.name}_keeps_its_distances.\n"
+    )
+
+
+def law_file(run: Recorded) -> str:
+    """The theorem that every pair of the run obeys the avoidance law, without error."""
+    g = real(run.gain)
+    claims = [f"obeys {run.name} {g} {demand.first} {demand.second} {real(demand.safe_m)} 0" for demand in run.demands]
+    lemmas = [
+        f"Lemma {demand.lemma}_obey : {claim}.\nProof. decide_law {ratio(run.gain)} {ratio(demand.safe_m)}. Qed.\n\n"
+        for demand, claim in zip(run.demands, claims, strict=True)
+    ]
+    proof = _all_of([f"{demand.lemma}_obey" for demand in run.demands])
+    return (
+        f"(** That {run.name} obeys the avoidance law. Written by `airground prove`, from the positions in trace/. *)\n"
+        f"Require Import Reals Lra ZArith.\nRequire Import Safety Run LawChecker {run.name}.\n"
+        f"Local Open Scope R_scope.\n\n{_LAW}{''.join(lemmas)}"
+        f"(** All pairs: A h, bodies, safe distance in m, error in m per step. *)\n"
+        f"{_theorem(f'{run.name}_obeys_the_law', '', claims)}Proof. exact {proof}. Qed.\n\n"
+        f"Print Assumptions {run.name}_obeys_the_law.\n"
+    )
+
+
+def _theorem(name: str, quantifier: str, claims: list[str]) -> str:
+    return f"Theorem {name} : {quantifier}" + " /\\\n  ".join(claims) + ".\n"
+
+
+def _all_of(proofs: list[str]) -> str:
+    """A proof of a conjunction from proofs of its parts."""
+    return "".join(f"(conj {proof}\n  " for proof in proofs[:-1]) + proofs[-1] + ")" * (len(proofs) - 1)
+
+
+def _data(run: Recorded) -> str:
+    """The integers: bodies, their numbers, times."""
+    unit = run.unit
+
+    def whole(number: Fraction) -> str:
+        parts = int(number * unit)
+        return f"-{-parts:#x}" if parts < 0 else f"{parts:#x}"
+
+    def point(place: Place) -> str:
+        return "P " + " ".join(f"({text})" if text.startswith("-") else text for text in map(whole, place))
+
+    out = [f"(** Positions at the rows, in parts: {unit} parts are 1 m. *)\n"]
+    for name, places in run.places.items():
+        if len(places) == 1:
+            out.append(f"Definition {name}_places := at_rest {len(run.times)} ({point(places[0])}).\n")
+        else:
+            rows = ";\n".join(map(point, places))
+            out.append(f"Definition {name}_places := Body {_stride(places, unit):#x} [\n{rows}].\n")
+    out += [f"Definition {name} := {k}%nat.\n" for k, name in enumerate(run.places)]
+    times = ";\n".join(map(whole, run.times))
+    bodies = "; ".join(f"{name}_places" for name in run.places)
+    out.append(f"Definition {run.name} := Run {unit:#x} [\n{times}] [\n{bodies}].\n\n")
+    return "".join(out)
+
+
+def _stride(places: Sequence[Place], unit: int) -> int:
+    """The longest step, parts, rounded up."""
+    square = max(
+        sum((int(b * unit) - int(a * unit)) ** 2 for a, b in zip(p, q, strict=True)) for p, q in pairwise(places)
+    )
+    root = isqrt(square)
+    return root + (root * root < square)
+
+
+def real(number: Fraction) -> str:
+    """A real number in Coq."""
+    return str(number.numerator) if number.denominator == 1 else f"({number.numerator} / {number.denominator})"
+
+
+def ratio(number: Fraction) -> str:
+    """Two arguments, numerator and denominator."""
+    return f"{number.numerator}%Z {number.denominator}%Z"

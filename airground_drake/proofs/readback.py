@@ -1,0 +1,99 @@
+"""Reads an exported Coq file back and compares it with the run: that its numbers are the recorded ones, Coq cannot see.
+
+The file is taken apart by patterns of its own; nothing of the exporter is used but its account of who is to keep which
+distance from whom.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import NamedTuple
+
+from airground_drake.errors import AirgroundError
+from airground_drake.proofs.export import PARTS, demands
+from airground_drake.trace import Trace
+
+
+class ReadbackError(AirgroundError):
+    """An exported file does not say what the trace says."""
+
+
+class Rounding(NamedTuple):
+    """How many coordinates differ from the recorded ones, and by how much at most, m."""
+
+    coordinates: int
+    most_m: float
+
+
+def compare(text: str, trace: Trace) -> Rounding:
+    """Compare an exported file with the run that it should be about.
+
+    Raises:
+        ReadbackError: at the first difference.
+        TraceError: if a column of the trace is missing or not finite.
+    """
+    run = f"run_{trace.run}"
+    unit, times, listed = _parts(rf"^Definition {run} := Run (\w+) \[\n(.*?)\] \[\n(.*?)\]\.$", text)
+    parts_in_a_metre = int(unit, 0)
+    if [Fraction(int(t, 0), parts_in_a_metre) for t in times.split(";\n")] != [Fraction(t) for t in trace.t.tolist()]:
+        raise ReadbackError(f"{run}: the times are not those of the trace")
+    obstacles = trace.scenario["obstacles"]
+    recorded = {name: [obstacle["position_m"]] for name, obstacle in obstacles.items()}
+    recorded |= {robot: trace.position(robot).tolist() for robot in trace.robots}
+    numbers = dict(re.findall(r"^Definition (\w+) := (\d+)%nat\.$", text, re.MULTILINE))
+    bodies = [name.removesuffix("_places") for name in listed.split("; ")]
+    if list(numbers.items()) != [(name, str(k)) for k, name in enumerate(bodies)] or len(bodies) != len(recorded):
+        raise ReadbackError(f"{run}: the bodies are not numbered in their order")
+    off = [
+        abs(said - Fraction(was))
+        for body, places in zip(bodies, recorded.values(), strict=True)
+        for said, was in zip(
+            _coordinates(body, text, len(trace.t), parts_in_a_metre, len(places)),
+            (axis for place in places for axis in place),
+            strict=True,
+        )
+    ]
+    if max(off) > Fraction(1, 2 * PARTS):
+        raise ReadbackError(f"{run}: a position differs from the trace by {float(max(off)):.3g} m")
+    spelled = dict(zip(recorded, bodies, strict=True))
+    _compare_statement(
+        run, text, trace, [(spelled[one], spelled[two], safe) for one, two, safe in demands(trace.scenario)]
+    )
+    return Rounding(sum(each > 0 for each in off), float(max(off)))
+
+
+def _coordinates(body: str, text: str, rows: int, unit: int, places: int) -> list[Fraction]:
+    """All coordinates of a body in the file, m."""
+    [what] = _parts(rf"^Definition {body}_places := (.*?)\.$", text)
+    points = re.findall(r"\bP (\(?-?\w+\)?) (\(?-?\w+\)?) (\(?-?\w+\)?)", what)
+    if len(points) != places or not what.startswith("Body " if places > 1 else f"at_rest {rows} "):
+        raise ReadbackError(f"{body}: {len(points)} places in the file, {places} in the trace")
+    return [Fraction(int(axis.strip("()"), 0), unit) for point in points for axis in point]
+
+
+def _compare_statement(run: str, text: str, trace: Trace, wanted: Sequence[tuple[str, str, Fraction]]) -> None:
+    """The theorem at the end is about all of the run's time and every pair, with its full distance."""
+    number = r"(\d+|\(\d+ / \d+\))"
+    start, end, body = _parts(
+        rf"^Theorem {run}_keeps_its_distances : forall t, {number} <= t <= {number} ->\n(.*?)\.\nProof\.", text
+    )
+    if [_value(start), _value(end)] != [Fraction(trace.t[0]), Fraction(trace.t[-1])]:
+        raise ReadbackError(f"{run}: the theorem is not about all of the run's time")
+    claim = rf"  {number} <= norm \(sub \(position {run} (\w+) t\) \(position {run} (\w+) t\)\)"
+    claims = [re.fullmatch(claim, line) for line in body.split(" /\\\n")]
+    if [(said[2], said[3], _value(said[1])) for said in claims if said] != list(wanted) or not all(claims):
+        raise ReadbackError(f"{run}: the theorem does not claim the scenario's distance of every pair")
+
+
+def _value(text: str) -> Fraction:
+    return Fraction(text.strip("()").replace(" ", ""))
+
+
+def _parts(pattern: str, text: str) -> tuple[str, ...]:
+    """The groups of the one place that a pattern matches."""
+    found = list(re.finditer(pattern, text, re.MULTILINE | re.DOTALL))
+    if len(found) != 1:
+        raise ReadbackError(f"{pattern.split(' :')[0].lstrip('^')} is in the file {len(found)} times; wanted: once")
+    return found[0].groups()

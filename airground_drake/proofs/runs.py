@@ -1,0 +1,226 @@
+"""The runs of a report as theorems: one Coq file each, which Coq decides."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from airground_drake import files, trace
+from airground_drake.errors import TraceError, UnknownNameError, one_line
+from airground_drake.proofs import coq, readback
+from airground_drake.proofs.export import Demand, Recorded, distances_file, law_file, recorded
+from airground_drake.proofs.record import FOLDER, digest
+from airground_drake.trace import Trace
+
+SCHEMA = "airground_drake.proofs/1"
+PLACE = "proofs"
+"""Folder of a report for what is proved about it."""
+FOUND = "proofs.json"
+"""File in that folder that says what came of it."""
+COMPUTED = "is expected to have type"
+"""In Coq's complaint where a checker has computed `false`, and the proof says `true`."""
+CHECKERS = ("DistanceChecker.v", "LawChecker.v")
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What Coq says to one theorem.
+
+    Attributes:
+        proved: whether it accepts it.
+        theorem: its name.
+        file: it is in.
+        why: if it is not proved, in words.
+        axioms: that it rests on.
+        seconds: how long Coq took, s.
+    """
+
+    proved: bool
+    theorem: str
+    file: str
+    why: str = ""
+    axioms: Sequence[str] = ()
+    seconds: float = 0.0
+
+
+@dataclass(frozen=True)
+class Proved:
+    """What came of one run.
+
+    Attributes:
+        run: its identifier.
+        expected: whether the scenario expects its distances to be kept.
+        pairs: number of pairs.
+        rows: of the trace.
+        distances: every pair keeps its full distance at all times.
+        law: every pair obeys the avoidance law, without error.
+        rounded: coordinates that were rounded, and by how much at most, m.
+        meta_sha256: of the run's trace/<run>/meta.json.
+    """
+
+    run: str
+    expected: bool
+    pairs: int
+    rows: int
+    distances: Answer
+    law: Answer
+    rounded: readback.Rounding
+    meta_sha256: str
+
+
+@dataclass(frozen=True)
+class Workshop:
+    """A folder in which the checkers are compiled.
+
+    Attributes:
+        folder: temporary.
+        coq: version of Coq.
+        theory: SHA-256 of each theory used.
+    """
+
+    folder: Path
+    coq: str
+    theory: Mapping[str, str] = field(default_factory=dict)
+
+
+@contextmanager
+def workshop(limit_s: float = coq.LIMIT_S) -> Iterator[Workshop]:
+    """Compile what the files of runs require, in a folder that is removed in the end.
+
+    Raises:
+        CoqError: if a theory is not accepted.
+        NoCoqError: if Coq is not installed.
+    """
+    version = coq.version()
+    with files.temporary_folder() as folder:
+        used = coq.install(CHECKERS, folder, limit_s=limit_s)
+        yield Workshop(folder, version, {name: digest(FOLDER / name) for name in used})
+
+
+def prove(place: Workshop, run: Trace, limit_s: float = coq.LIMIT_S) -> tuple[Answer, Answer, readback.Rounding]:
+    """Have Coq decide whether a run keeps its distances, and if so, whether it obeys the law.
+
+    The files are left in the workshop.
+
+    Raises:
+        ReadbackError: if the exported file differs from the trace.
+        TraceError: if the trace lacks something.
+    """
+    try:
+        exact = recorded(run)
+        text = distances_file(exact)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise TraceError(one_line(f"run {run.run}: the scenario in meta.json cannot be used: {error!r}")) from None
+    rounded = readback.compare(text, run)
+    distances = decide(place, exact, f"{exact.name}.v", text, f"{exact.name}_keeps_its_distances", limit_s)
+    law = Answer(False, f"{exact.name}_obeys_the_law", f"{exact.name}_law.v", "not tried: a distance is not kept")
+    if distances.proved:
+        law = decide(place, exact, law.file, law_file(exact), law.theorem, limit_s)
+    return distances, law, rounded
+
+
+def decide(place: Workshop, run: Recorded, name: str, text: str, theorem: str, limit_s: float) -> Answer:
+    """Have Coq decide one exported file."""
+    files.write_text(place.folder / name, text)
+    started = time.perf_counter()
+    try:
+        axioms = coq.listed(theorem, coq.compile_file(place.folder / name, limit_s))
+    except coq.CoqError as error:
+        return Answer(False, theorem, name, _why(error, _about(run, text, error.line)))
+    return Answer(True, theorem, name, "", axioms, time.perf_counter() - started)
+
+
+def _why(error: coq.CoqError, demand: Demand | None) -> str:
+    """Why a theorem is not proved: Coq computes that a pair does not do it, or something keeps Coq from an answer."""
+    if demand is None or COMPUTED not in str(error):
+        return str(error)
+    pair = f"{demand.first} and {demand.second}, {float(demand.safe_m):g} m"
+    return f"Coq computes that it is false of {pair}; later pairs were not tried"
+
+
+def _about(run: Recorded, text: str, line: int) -> Demand | None:
+    """The pair whose lemma has a line of an exported file."""
+    before = "\n".join(text.splitlines()[:line])
+    lemma = before.rpartition("\nLemma ")[2].partition(" ")[0].removesuffix("_obey")
+    return next((demand for demand in run.demands if demand.lemma == lemma), None)
+
+
+def prove_report(report: Path, names: Sequence[str] = (), limit_s: float = coq.LIMIT_S) -> Iterator[Proved]:
+    """Prove the runs of a report, one after the other; what was found is written into its folder `proofs` in the end.
+
+    Args:
+        report: its folder.
+        names: of the runs; all, if none is named.
+        limit_s: wall-clock time for one call of Coq, s.
+
+    Raises:
+        UnknownNameError: if there is no run of a name.
+        TraceError: if a trace cannot be read.
+        CoqError: if a theory is not accepted.
+        NoCoqError: if Coq is not installed.
+        OSError: if the folder cannot be written.
+    """
+    there = sorted(path.parent.name for path in report.glob("trace/*/meta.json"))
+    for name in names:
+        if name not in there:
+            raise UnknownNameError(f"run of {report}", name, there)
+    if not there:
+        raise TraceError(f"{report} has no trace/*/meta.json; wanted: the folder of a report")
+    runs = {name: trace.load(report / "trace" / name) for name in names or there}
+    for name, run in runs.items():
+        if run.run != name or not re.fullmatch(r"\w+", name, re.ASCII):
+            raise TraceError(one_line(f"{report / 'trace' / name}: the trace is of run {run.run!r}"))
+    found: list[Proved] = []
+    with workshop(limit_s) as place:
+        for name, run in runs.items():
+            distances, law, rounded = prove(place, run, limit_s)
+            for answer in (distances, law):
+                (report / PLACE / answer.file).unlink(missing_ok=True)
+                if (place.folder / answer.file).exists():
+                    files.write_bytes(report / PLACE / answer.file, (place.folder / answer.file).read_bytes())
+            meta = digest(report / "trace" / name / "meta.json")
+            found.append(
+                Proved(name, expects_kept(run), len(recorded(run).demands), len(run.t), distances, law, rounded, meta)
+            )
+            yield found[-1]
+        files.write_json(report / PLACE / FOUND, document(place, found))
+
+
+def expects_kept(run: Trace) -> bool:
+    """Whether the scenario expects that the run keeps its distances: SAFE-TRACE may not be refuted."""
+    expected: str = run.scenario["runs"][run.run]["expected"].get("SAFE-TRACE", "holds")
+    return "refuted" not in expected
+
+
+def document(place: Workshop, found: Sequence[Proved]) -> dict[str, Any]:
+    """What was found, as strict JSON."""
+    return {
+        "schema": SCHEMA,
+        "coq": place.coq,
+        "theory": dict(place.theory),
+        "runs": {
+            proved.run: {
+                "expected": proved.expected,
+                "meta_sha256": proved.meta_sha256,
+                "rows": proved.rows,
+                "pairs": proved.pairs,
+                "rounded_coordinates": proved.rounded.coordinates,
+                "rounded_by_m": proved.rounded.most_m,
+                "distances": _entry(proved.distances),
+                "law": _entry(proved.law),
+            }
+            for proved in found
+        },
+    }
+
+
+def _entry(answer: Answer) -> dict[str, Any]:
+    entry: dict[str, Any] = {"proved": answer.proved, "theorem": answer.theorem, "file": answer.file}
+    if answer.proved:
+        return entry | {"axioms": list(answer.axioms), "seconds": round(answer.seconds, 3)}
+    return entry | {"why": answer.why}

@@ -1,0 +1,232 @@
+"""Runs as theorems: Coq proves those that keep their distances and refuses the others; files say what traces say."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from airground_drake import trace
+from airground_drake.arrays import Array
+from airground_drake.commands import main
+from airground_drake.proofs import coq
+from airground_drake.proofs.export import demands, distances_file, recorded
+from airground_drake.proofs.readback import ReadbackError, compare
+from airground_drake.proofs.record import closure
+from airground_drake.proofs.runs import Workshop, expects_kept, prove
+from airground_drake.testing.plugin import Simulations
+from airground_drake.trace import Trace
+
+UGV, ROCK = "ugv1", "obstacle_1"
+REFUSED = f"Coq computes that it is false of {UGV} and {ROCK}, 2 m; later pairs were not tried"
+
+
+@pytest.mark.parametrize("name", ["c", "d"])
+def test_case_a_keeps_its_distances_and_obeys_the_law(name: str, run: Simulations, workshop: Workshop) -> None:
+    distances, law, rounded = prove(workshop, run("case_a", name))
+    assert (distances.proved, distances.why) == (True, "")
+    assert (law.proved, law.why) == (True, "")
+    assert distances.axioms
+    assert rounded.most_m <= 2.0**-61
+    said = (workshop.folder / f"run_{name}.v").read_text(encoding="utf-8")
+    assert f"2 <= norm (sub (position run_{name} ugv1 t) (position run_{name} obstacle_1 t)) /\\" in said
+
+
+def test_the_run_of_case_b_that_hits_the_obstacle_is_refused(run: Simulations, workshop: Workshop) -> None:
+    distances, law, _ = prove(workshop, run("case_b", "b"))
+    assert not distances.proved
+    assert distances.why == "Coq computes that it is false of ugv1 and obstacle_2, 2 m; later pairs were not tried"
+    assert (law.proved, law.why) == (False, "not tried: a distance is not kept")
+
+
+def moved(of: Trace, row: int, place: Array) -> Trace:
+    """The run with UGV1 at another place in one row."""
+    signals = of.signals.copy()
+    for axis, value in zip("xyz", place, strict=True):
+        signals.loc[row, f"{UGV}.{axis}_m"] = value
+    return replace(of, signals=signals)
+
+
+def near_the_rock(of: Trace) -> tuple[int, Array, Array]:
+    """The row in which UGV1 is nearest to an obstacle, and the vectors from there to it and back, m."""
+    rock = np.array(of.scenario["obstacles"][ROCK]["position_m"])
+    offsets = of.position(UGV) - rock
+    row = int(np.argmin(np.linalg.norm(offsets, axis=1)))
+    return row, rock, offsets[row]
+
+
+def test_a_step_through_an_obstacle_is_refused_though_both_of_its_ends_keep_the_distance(
+    run: Simulations, workshop: Workshop
+) -> None:
+    whole = run("case_a", "d")
+    row, rock, offset = near_the_rock(whole)
+    through = moved(whole, row, rock - 1.1 * offset)
+    assert np.linalg.norm(through.position(UGV) - rock, axis=1).min() >= 2.0
+    distances, _, _ = prove(workshop, through)
+    assert distances.why == REFUSED
+
+
+@pytest.mark.parametrize(("short_m", "kept"), [(6e-14, False), (-6e-14, True)])
+def test_some_rounding_errors_short_is_too_short(
+    short_m: float, kept: bool, run: Simulations, workshop: Workshop
+) -> None:
+    whole = run("case_a", "d")
+    row, rock, offset = near_the_rock(whole)
+    place = rock + offset * ((2.0 - short_m) / np.linalg.norm(offset))
+    distances, law, _ = prove(workshop, moved(whole, row, place))
+    assert distances.proved is kept
+    assert distances.why == ("" if kept else REFUSED)
+    if kept:  # it was farther out before, by less
+        assert law.proved or law.why == REFUSED
+
+
+def short(of: Trace, rows: int = 5) -> Trace:
+    """Its first rows."""
+    return replace(of, signals=of.signals.iloc[:rows].reset_index(drop=True))
+
+
+def test_tiny_coordinates_are_rounded_and_it_is_said_by_how_much(run: Simulations, workshop: Workshop) -> None:
+    few = short(run("case_a", "d"))
+    tiny = moved(few, 2, few.position(UGV)[2] + np.array([0.0, 0.0, 1e-100]))
+    distances, _, rounded = prove(workshop, tiny)
+    assert distances.proved
+    assert (rounded.coordinates, rounded.most_m) == (1, 1e-100)
+
+
+def test_names_that_mean_something_in_coq_are_replaced(run: Simulations, workshop: Workshop) -> None:
+    few = short(run("case_a", "d"))
+    names = {"ugv1": "norm", "ugv2": "ugv1_and_uav", "obstacle_2": "forall", "obstacle_3": "Größe"}
+    meta = json.dumps(few.meta, ensure_ascii=False)
+    signals = few.signals
+    for old, new in names.items():
+        meta = meta.replace(f'"{old}"', f'"{new}"')
+        signals = signals.rename(columns=lambda name, old=old, new=new: name.replace(f"{old}.", f"{new}."))
+    distances, law, _ = prove(workshop, replace(few, meta=json.loads(meta), signals=signals))
+    assert distances.proved, distances.why
+    assert law.proved, law.why
+
+
+def test_every_pair_is_to_keep_its_kind_of_distance_and_both_radii() -> None:
+    body = {"radius_m": 0.1}
+    scenario = {
+        "ugvs": {"one": body, "two": {"radius_m": 0.2}}, "uav": {"name": "above", "radius_m": 0.4},
+        "obstacles": {"rock": {"radius_m": 0.8}},
+        "safe_distance": {"obstacle_m": 2.0, "ugv_m": 3.0, "air_ground_m": 1.0},
+    }  # fmt: skip
+    assert [(one, other, float(safe)) for one, other, safe in demands(scenario)] == [
+        ("one", "rock", 2.9), ("two", "rock", 3.0), ("above", "rock", 3.2),
+        ("one", "two", 3.3), ("one", "above", 1.5), ("two", "above", 1.6),
+    ]  # fmt: skip
+
+
+EDITS: list[tuple[Callable[[str], str], str]] = [
+    (lambda text: text.replace(";\nP 0x", ";\nP 0x1", 1), "a position differs from the trace"),
+    (lambda text: text.replace("Run 0x1", "Run 0x2", 1), "the times are not those of the trace"),
+    (lambda text: text.replace("nat.\nDefinition", "nat.\n\nDefinition").replace("ugv1 := 3", "ugv1 := 4"), "numbered"),
+    (lambda text: text.replace("->\n  2 <=", "->\n  1 <="), "does not claim the scenario's distance of every pair"),
+    (
+        lambda text: text.replace("/\\\n  1 <= norm (sub (position run_d ugv1 t) (position run_d uav t)) /", "/"),
+        "every",
+    ),
+    (lambda text: text.replace("forall t, 0 <= t", "forall t, 1 <= t"), "not about all of the run's time"),
+    (lambda text: text.replace("Definition run_d := Run", "Definition run_e := Run"), "0 times; wanted: once"),
+    (lambda text: text.replace(f"{ROCK}_places := at_rest 5", f"{ROCK}_places := at_rest 4"), "1 places in the file"),
+]
+
+
+@pytest.mark.parametrize(("edit", "why"), EDITS)
+def test_a_file_that_says_something_else_than_the_trace_is_refused(
+    edit: Callable[[str], str], why: str, run: Simulations
+) -> None:
+    few = short(run("case_a", "d"))
+    text = distances_file(recorded(few))
+    compare(text, few)
+    assert edit(text) != text
+    with pytest.raises(ReadbackError, match=why):
+        compare(edit(text), few)
+
+
+@pytest.mark.parametrize(
+    ("expected", "kept"),
+    [({}, True), ({"SAFE-TRACE": "exercised"}, True), ({"SAFE-TRACE": "holds or refuted"}, False)],
+)
+def test_a_scenario_says_which_runs_are_to_keep_their_distances(
+    expected: dict[str, str], kept: bool, run: Simulations
+) -> None:
+    of = run("case_a", "d")
+    scenario: dict[str, Any] = {**of.scenario, "runs": {"d": {"expected": expected}}}
+    assert expects_kept(replace(of, meta={**of.meta, "scenario": scenario})) is kept
+
+
+@pytest.fixture
+def compiled_before(compiled: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The command takes the theories that the session has compiled."""
+
+    def install(names: Iterable[str], folder: Path, limit_s: float) -> list[str]:
+        shutil.copytree(compiled, folder, dirs_exist_ok=True)
+        return closure(names)
+
+    monkeypatch.setattr(coq, "install", install)
+
+
+@pytest.fixture
+def report(tmp_path: Path, run: Simulations) -> Path:
+    """What there is to prove of a report: case A (d), its first rows."""
+    trace.save(short(run("case_a", "d")), tmp_path / "report" / "trace" / "d")
+    return tmp_path / "report"
+
+
+@pytest.mark.usefixtures("compiled_before")
+def test_the_command_proves_a_report_and_writes_down_what_it_found(
+    report: Path, coq_version: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["prove", str(report)]) == 0
+    assert "run d: all 12 distances kept at all times: proved in " in capsys.readouterr().out
+    found = json.loads((report / "proofs" / "proofs.json").read_text(encoding="utf-8"))
+    assert found["coq"] == coq_version
+    assert found["runs"]["d"]["distances"]["proved"] is found["runs"]["d"]["law"]["proved"] is True
+    assert sorted(path.name for path in (report / "proofs").iterdir()) == ["proofs.json", "run_d.v", "run_d_law.v"]
+
+    of = trace.load(report / "trace" / "d")
+    rock = np.array(of.scenario["obstacles"][ROCK]["position_m"])
+    trace.save(moved(of, 3, rock), report / "trace" / "d")
+    assert main(["prove", str(report), "--run", "d"]) == 1
+    said = capsys.readouterr().out
+    assert f"run d: all 12 distances kept at all times: not proved: {REFUSED}" in said
+    assert sorted(path.name for path in (report / "proofs").iterdir()) == ["proofs.json", "run_d.v"]
+
+
+def test_what_cannot_be_proved_for_want_of_coq_or_of_files_is_said(
+    report: Path, coq_version: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for arguments, why in (
+        ([str(tmp_path)], "wanted: the folder of a report"),
+        ([str(report), "--run", "e"], "unknown run of .* 'e'; allowed: d"),
+        (["--run", "d"], "allowed: with DIR"),
+        ([str(report), "--record"], "allowed: without DIR"),
+    ):
+        assert main(["prove", *arguments]) == 2
+        said = capsys.readouterr().err
+        assert said.count("\n") == 1
+        assert re.search(why, said), said
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert main(["prove"]) == 2
+    assert "coqc is not on the PATH: install Coq" in capsys.readouterr().err
+
+
+def test_a_damaged_trace_is_said(report: Path, coq_version: str, capsys: pytest.CaptureFixture[str]) -> None:
+    (report / "trace" / "d" / "signals.parquet").write_bytes(b"")
+    assert main(["prove", str(report)]) == 2
+    assert "SHA-256" in capsys.readouterr().err
+
+
+def test_the_command_of_before_names_its_successor(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["proofs", "reports/case_a"]) == 2
+    assert capsys.readouterr().err == "error: `airground proofs` is gone; use `airground prove`\n"
