@@ -140,6 +140,7 @@ class Recorder:
             "zeta_m": model.zeta,
             "scenario": resolved(self._scenario),
             "events": [],
+            "controllers": _controllers(model),
             "faults": [{"t_s": f.t, "robot": f.robot, "policy": f.policy, "what": f.what} for f in memory.faults],
         }
         times = list(gatekeeper.decision_times_s) if gatekeeper is not None else []
@@ -148,6 +149,13 @@ class Recorder:
         trace = Trace(meta, signals, decisions, timings, _problems(decided), proposals)
         meta["events"] = extract(trace, sent)
         return trace
+
+
+def _controllers(model: Model) -> dict[str, Any]:
+    """What the controllers in the diagram were built with, by name: see `controllers.read_back`."""
+    ugvs, uav = (model.diagram.GetSubsystemByName(name) for name in ("ugvs", "uav"))
+    systems = (ugvs.GetSubsystemByName("ugv_controller"), uav.GetSubsystemByName("uav_controller"))
+    return {system.get_name(): system.parameters() for system in systems}
 
 
 def _decision(decision: Decision, robot: str, route: str) -> dict[str, Any]:

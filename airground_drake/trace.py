@@ -39,7 +39,7 @@ from airground_drake.errors import TraceError
 
 T = TypeVar("T")
 
-SCHEMA = "airground_drake.trace/5"
+SCHEMA = "airground_drake.trace/6"
 
 DECISION_COLUMNS = {
     "t_s": "float64",
@@ -110,8 +110,9 @@ class Trace:
     Attributes:
         meta: strict JSON: `schema`, `run` (identifier), `method`, `composition`, `seed`, `robots`, `ugvs`
             (names, array order; the UAV is the last robot), `zeta_m` (threshold in force), `scenario` (the
-            resolved scenario as nested dicts), `events` (list, by time), `faults` (list of what went wrong
-            in a policy or solver).
+            resolved scenario as nested dicts), `events` (list, by time), `controllers` (what the controllers were
+            built with, read back from the diagram: see `systems.controllers.read_back`), `faults` (list of what
+            went wrong in a policy or solver).
         signals: see the module's docstring.
         decisions: see DECISION_COLUMNS.
         problems: see PROBLEM_ARRAYS.

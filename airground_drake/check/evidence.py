@@ -27,7 +27,7 @@ KEYS = frozenset(
     )
 )  # fmt: skip
 """What a claim's entry consists of."""
-_EVERYWHERE = ("from_cache", "evidence.reason")
+_EVERYWHERE = ("from_cache", "evidence.reason", "evidence.applies_to", "evidence.of")
 _OF_A_THEOREM = ("evidence.proof", "evidence.theorems")
 
 AS_RECORDED: Mapping[str, tuple[str, ...]] = {
@@ -37,6 +37,7 @@ AS_RECORDED: Mapping[str, tuple[str, ...]] = {
         "evidence.largest_regret_against_constant_plans", "evidence.largest_regret_against_blocks",
     ),
     "GATE-OPT": ("evidence.first_stage_certified",),
+    "SAFE-HYP": ("evidence.pairs_in_reach", "evidence.different_parameters"),
     **dict.fromkeys(
         ("SAFE-LEMMA", "SAFE-INV", "SAFE-GATE", "SAFE-DIST", "ZENO-PROOF", "LIVE-WAIT", "THR-ISO"),
         _OF_A_THEOREM,

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .files import Json
-from .rules import SMALL, Array, Disagreement, Found, agrees, at_most, close, holds, same
+from .rules import SMALL, Array, Disagreement, Found, NotEstablished, agrees, at_most, close, holds, same
 from .run import Run
 from .scenario import Pair
 
@@ -123,6 +123,7 @@ class Hypothesis(NamedTuple):
     about: Mapping[str, str] = {}
     others: tuple[str, ...] = ()
     kind: str = ""
+    slop: float = SMALL
 
     @property
     def who(self) -> tuple[str, str]:
@@ -160,35 +161,74 @@ def _binding(found: list[Hypothesis], recorded: Json) -> tuple[int, int]:
     return sum(least.values()), sum(most.values())
 
 
-def safe_hyp(run: Run, claim: Json) -> Found:
-    """SAFE-HYP: at every control sample the hypotheses of the invariance proof held.
+AVOIDANCE, BUILT = "avoidance", "controller parameters"
+MOST_MISSED = ("first", "second", "safe_distance_m", "guarantee_m", "e_m", "t_s")
+"""What is recorded of a pair and what it is promised."""
 
-    The margin is that of the avoidance inequalities, or of the hypothesis that was broken first.
+
+def safe_hyp(run: Run, claim: Json) -> Found:
+    """SAFE-HYP: the hypotheses of the safety theorem held at every control sample, up to e for each pair of bodies.
+
+    In floats, so that what is missed is known to 1e-9 m. What the controllers were built with is not judged here.
+
+    Raises:
+        NotEstablished: if the controllers are said to differ from the scenario.
     """
-    found = [*_constants(run), *_velocities(run), *_inequalities(run)]
-    in_range = sum(len(each.margin) for each in found if each.name == "avoidance")
-    broken = [(each, k) for each in found for k in np.flatnonzero(~(each.margin >= -SMALL))[:1]]
-    leading, first_s = "avoidance", None
+    evidence, leading = claim["evidence"], AVOIDANCE
+    if evidence["different_parameters"]:
+        raise NotEstablished("the controllers are the scenario's", "the trace says otherwise", BUILT)
+    others, lost, spares = [*_constants(run), *_velocities(run)], [*_lost(run)], [*_inequalities(run)]
+    found = [*others, *lost]
+    broken = [(each, k) for each in found for k in np.flatnonzero(~(each.margin >= -each.slop))[:1]]
+    first_s = None
     if broken:
         first, k = min(broken, key=lambda one: float(one[0].t_s[one[1]]))
-        when = float(first.t_s[k])
+        first_s = float(first.t_s[k])
         if claim["status"] == "holds":
-            raise Disagreement("the hypotheses held", "held", float(first.margin[k]), first.name, when)
+            raise Disagreement("the hypotheses held", "held", float(first.margin[k]), first.name, first_s)
         leading = claim["where"]["hypothesis"]
-        earliest = sorted({each.name for each, j in broken if each.t_s[j] <= when + SMALL})
-        holds("hypothesis broken first", leading in earliest, leading, " or ".join(earliest), t_s=when)
-        first_s = when
+        earliest = sorted({each.name for each, j in broken if each.t_s[j] <= first_s + SMALL})
+        holds("hypothesis broken first", leading in earliest, leading, " or ".join(earliest), t_s=first_s)
     margins = [float(each.margin.min()) for each in found if each.name == leading and len(each.margin)]
     status = "refuted" if broken else "holds"
-    margin = min(margins, default=None)
-    least, most = _binding(found, claim["evidence"]["inequalities_that_bind"])
-    facts = {"inequalities_in_range": in_range, "tolerance_m_s": SMALL}
+    margin = min(margins, default=0.0)
+    least, most = _binding(spares, evidence["inequalities_that_bind"])
+    facts = {"inequalities_in_range": sum(len(each.margin) for each in spares), "tolerance_m": SMALL}
     result = Found(status, margin, margin, facts).counted(least, most)
     result = result.having_judged("evidence.inequalities_that_bind.*")
     shown = tuple(f"counterexample.{key}" for key in LISTED)
     result = result.judging(partial(_first_broken, run, claim, found, first_s), *shown, *SNAPSHOT)
-    result = result.judging(partial(_worst, claim, found), "evidence.worst.*.*")
+    result = result.judging(partial(_worst, claim, others), "evidence.worst.*.*")
+    promised = (*(f"evidence.pairs.*.{key}" for key in MOST_MISSED), "evidence.e_m", "evidence.guarantee_m")
+    result = result.judging(partial(_promised, run, claim, lost), *promised)
     return result.judging(partial(_where, claim, leading, margin), *(f"where.{key}" for key in LISTED))
+
+
+def _promised(run: Run, claim: Json, lost: list[Hypothesis]) -> None:
+    """What each listed pair missed, and what it is promised; no other one is promised less."""
+    evidence, gain, periods = claim["evidence"], _gain(run), len(run.sample_s)
+    safe = {(pair.robot, pair.other): pair.safe_m for pair in run.pairs}
+    least = {(each.about["first"], each.about["second"]): each.margin for each in lost}
+    for entry in evidence["pairs"]:
+        names = entry["first"], entry["second"]
+        about, margin = ", ".join(names), least.get(names, np.zeros(1))
+        holds("a pair of the run", names in safe, about, "one of its pairs")
+        same("safe distance", entry["safe_distance_m"], safe[names], about=about)
+        close("promised distance", entry["guarantee_m"], safe[names] + margin.min(), within=SMALL, about=about)
+        e = -margin.min() * (gain if gain else 1.0 / periods)
+        close("what is missed", entry["e_m"], e, within=SMALL, about=about)
+        if entry["t_s"] is not None:
+            there = margin[np.abs(run.sample_s[: len(margin)] - entry["t_s"]) <= SMALL]
+            close("when the most is missed", there, margin.min(keepdims=True), within=SMALL, about=about)
+    listed = {(entry["first"], entry["second"]) for entry in evidence["pairs"]}
+    for each in lost:
+        names = each.about["first"], each.about["second"]
+        holds("a pair that misses something is listed", names in listed or len(listed) == MOST_LISTED
+              or each.margin.min() >= -SMALL, ", ".join(names), "listed")  # fmt: skip
+    largest = max((entry["e_m"] for entry in evidence["pairs"]), default=0.0)
+    same("the most that is missed", evidence["e_m"], largest)
+    first = evidence["pairs"][0]["guarantee_m"] if evidence["pairs"] else None
+    same("the least promise", evidence["guarantee_m"], first)
 
 
 def _first_broken(run: Run, claim: Json, found: list[Hypothesis], first_s: float | None) -> None:
@@ -233,6 +273,11 @@ def _worst(claim: Json, found: list[Hypothesis]) -> None:
 
 def _where(claim: Json, leading: str, margin: float | None) -> None:
     """Where the margin is attained: one of the least ones of the leading hypothesis."""
+    if leading == AVOIDANCE:
+        worst = claim["evidence"]["pairs"][:1]
+        due = {"hypothesis": AVOIDANCE, **{key: pair[key] for pair in worst for key in ("first", "second")}}
+        same("where the margin is attained", claim["where"], due)
+        return
     listed = [entry for entry in claim["evidence"]["worst"] if entry["hypothesis"] == leading]
     lowest = [entry for entry in listed if margin is not None and entry["margin"] <= margin + SMALL]
     places = [{key: entry[key] for key in entry if key not in ("margin", "unit")} for entry in lowest]
@@ -257,22 +302,51 @@ def _constants(run: Run) -> Iterator[Hypothesis]:
 
 
 def _velocities(run: Run) -> Iterator[Hypothesis]:
-    """||v|| <= v_max; v_z = 0 for a UGV; v is held from sample to sample. Rows within 1e-9 s are one instant."""
-    begins = run.t_s[:-1]
-    segment = np.flatnonzero(np.diff(run.t_s) >= SMALL)
-    sample = np.searchsorted(run.sample_s, begins[segment] + SMALL, side="right") - 1
-    samples = run.t_s[run.sample_row]
-    spacing = np.diff(np.append(samples, run.t_s[-1]))
+    """||v|| <= v_max; z constant for a UGV; straight from sample to sample. Rows within 1e-9 s are one instant."""
+    t, begins, samples = run.t_s, run.t_s[:-1], run.t_s[run.sample_row]
+    spacing = np.diff(np.append(samples, t[-1]))
     yield Hypothesis("sampling", "s", samples, run.scenario["control"]["period_s"] - spacing)
+    rows = np.append(run.sample_row, len(t) - 1)
     for robot, spec in run.robots.items():
-        v = run.command_m_s[robot]
-        drift = np.linalg.norm(v[segment + 1] - v[run.chosen_row][sample], axis=1)
-        about = {"robot": robot}
-        yield Hypothesis("zero-order hold", "m/s", begins[segment], -drift, about)
+        v, place, about = run.command_m_s[robot], run.position_m[robot], {"robot": robot}
+        straight = np.stack([np.interp(t, t[rows], axis[rows]) for axis in place.T], axis=1)
+        yield Hypothesis("straight motion", "m", t, -np.linalg.norm(place - straight, axis=1), about)
         spare = spec["max_speed_m_s"] - np.linalg.norm(v[1:], axis=1)
         yield Hypothesis("speed limit", "m/s", begins, spare, about)
         if robot != run.uav:
-            yield Hypothesis("planar motion", "m/s", begins, -np.abs(v[1:, 2]), about)
+            yield Hypothesis("planar motion", "m", t, -np.abs(place[:, 2] - place[0, 2]), about, slop=0.0)
+
+
+def _gain(run: Run) -> float:
+    """What of a deficit is restored in a control period, A h, at most 1."""
+    control = run.scenario["control"]
+    return min(float(control["avoidance_gain_1_s"] * control["period_s"]), 1.0)
+
+
+def _lost(run: Run) -> Iterator[Hypothesis]:
+    """What each pair's steps miss of its inequalities at each sample, as what this costs of the safe distance.
+
+    Where the two are farther apart than d and both steps, nothing is asked of them. Without a gain nothing is restored.
+    """
+    rows = np.append(run.sample_row, len(run.t_s) - 1)
+    periods = (np.diff(run.t_s[rows]) / run.scenario["control"]["period_s"])[:, None]
+    periods = np.where(np.abs(periods - 1.0) <= 1e-6, 1.0, periods)
+    gain, place = _gain(run), {name: each[rows] for name, each in run.position_m.items()}
+    step = {name: np.diff(each, axis=0) / periods for name, each in place.items()}
+    longest = {name: float(np.linalg.norm(each, axis=1).max()) for name, each in step.items()}
+    for pair in run.pairs:
+        robot, other = pair.robot, pair.other
+        if run.apart_m[robot, other] > pair.safe_m + longest[robot] + longest[other] + SMALL:
+            continue
+        offset = (place[robot] - place[other])[:-1]
+        distance = np.linalg.norm(offset, axis=1)
+        normal = offset / np.where(distance > 0.0, distance, 1.0)[:, None]
+        bound = np.where(distance <= pair.safe_m, gain, 1.0) * (pair.safe_m - distance)
+        missed = [np.maximum(share * bound - sign * (normal * step[name]).sum(axis=1), 0.0)
+                  for name, sign, share in ((robot, 1.0, pair.share), (other, -1.0, 1.0 - pair.share))]  # fmt: skip
+        far = distance >= pair.safe_m + sum(np.linalg.norm(step[name], axis=1) for name in (robot, other))
+        loss = np.where(far, 0.0, missed[0] + missed[1]) * (1.0 / gain if gain else len(distance))
+        yield Hypothesis(AVOIDANCE, "m", run.sample_s, -loss, {"first": robot, "second": other})
 
 
 def _inequalities(run: Run) -> Iterator[Hypothesis]:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import groupby
+from typing import Any
 
 import numpy as np
 from pydrake.common.value import Value
@@ -16,7 +18,7 @@ from airground_drake.nsbc.avoidance import Avoidance, limit_speed
 from airground_drake.nsbc.law import Intervention, UgvLaw
 from airground_drake.nsbc.task import Task
 from airground_drake.nsbc.tasks import FormationTask, PositionTask
-from airground_drake.nsbc.team import Team
+from airground_drake.nsbc.team import Neighbourhood, Team
 from airground_drake.systems.lifetime import weakly
 
 
@@ -52,6 +54,11 @@ class UgvController(LeafSystem):
         self.DeclareStateOutputPort("command", command)
         self.DeclareStateOutputPort("accepted", accepted)
         self.DeclarePeriodicDiscreteUpdateEvent(law.avoidance.period, 0.0, weakly(self._update))
+
+    def parameters(self) -> dict[str, Any]:
+        """What it was built with, see `read_back`, and whether it puts interventions on top of avoidance."""
+        found = read_back(self, self.avoidance, self._neighbourhood, self._mobility, self._max_speed)
+        return {**found, "composition": self.avoidance.composition, "intervention_on_top": self.law.intervention_on_top}
 
     def _update(self, context: Context, discrete: DiscreteValues) -> None:
         positions = _finite(self._position.Eval(context)).reshape(-1, 3)
@@ -130,6 +137,10 @@ class UavController(LeafSystem):
         self.DeclareStateOutputPort("command", command)
         self.DeclarePeriodicDiscreteUpdateEvent(avoidance.period, 0.0, weakly(self._update))
 
+    def parameters(self) -> dict[str, Any]:
+        """What it was built with, see `read_back`."""
+        return read_back(self, self.avoidance, self._neighbourhood, self._mobility, self._max_speed)
+
     def _update(self, context: Context, discrete: DiscreteValues) -> None:
         positions = _finite(self._position.Eval(context)).reshape(-1, 3)
         commands = self._ugv_command.Eval(context).reshape(-1, 3)
@@ -150,6 +161,38 @@ class UavController(LeafSystem):
         spaces = self.avoidance.half_spaces(positions[-1:], self._mobility, self._neighbourhood.around(positions))
         velocity: Array = self.avoidance.apply(lower, spaces)[0]
         return velocity
+
+
+def read_back(
+    system: LeafSystem, avoidance: Avoidance, neighbourhood: Neighbourhood, mobility: Array, max_speed: Array
+) -> dict[str, Any]:
+    """The parameters of a controller's avoidance as it runs, in strict JSON, for the trace.
+
+    Returns:
+        Of its k robots: `members`, their indices in team order; `obstacles_m`, centres (m, 3); `others`, indices of the
+        n robots that each avoids, (k, n); `safe_m` and `share` beside the obstacles, then beside the robots,
+        (k, m + n); `mobility` (k, 3); `max_speed_m_s` (k,). Of all: `sampling_s`, period and offset; `gain_1_s`,
+        `period_s`, `sensing_range_m`. Arrays in C order, `safe_m` and `share` as [value, how many] in a row.
+    """
+    timing = system.GetUniquePeriodicDiscreteUpdateAttribute()
+    return {
+        "members": neighbourhood.members.tolist(),
+        "obstacles_m": neighbourhood.obstacles.ravel().tolist(),
+        "others": neighbourhood.others.ravel().tolist(),
+        "safe_m": _in_runs(neighbourhood.distance),
+        "share": _in_runs(neighbourhood.share),
+        "mobility": mobility.ravel().tolist(),
+        "max_speed_m_s": max_speed.tolist(),
+        "sampling_s": [timing.period_sec(), timing.offset_sec()],
+        "gain_1_s": avoidance.gain,
+        "period_s": avoidance.period,
+        "sensing_range_m": avoidance.sensing_range,
+    }
+
+
+def _in_runs(array: Array) -> list[list[float]]:
+    """Equal neighbours as [value, how many]: 100 robots among 1,000 obstacles have 110,000 distances, mostly alike."""
+    return [[value, len(list(alike))] for value, alike in groupby(array.ravel().tolist())]
 
 
 def _finite(positions: Array) -> Array:

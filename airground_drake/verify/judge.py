@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -12,6 +12,7 @@ from airground_drake.progress import SILENT, Watch
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.side_by_side import side_by_side
 from airground_drake.trace import Trace
+from airground_drake.verify.applications import Count, counts, with_counts
 from airground_drake.verify.cache import find, found
 from airground_drake.verify.claim import ModelClaim, TraceClaim, Verdict
 from airground_drake.verify.finding import Finding
@@ -101,22 +102,31 @@ def verify_all(
     chosen = model_claims(added=scenario.claims)
     inputs = [claim.judge_inputs(scenario) for claim in chosen]
     of_runs = [(replace(trace), _applicable(trace)) for trace in traces]  # as in `verify`
-    pieces = [partial(_found, claim, given, kept) for claim, given in zip(chosen, inputs, strict=True)]
+    pieces: list[Callable[[], Any]] = [
+        partial(_found, claim, given, kept) for claim, given in zip(chosen, inputs, strict=True)
+    ]
     pieces += [partial(_judged, trace, claims) for trace, claims in of_runs]
     names = [*(claim.id for claim in chosen), *(f"claims about run {trace.run}" for trace, _ in of_runs)]
     watch.stage("judging", len(pieces), "claims about the model or a run")
-    findings = side_by_side(pieces, names=names, watch=watch)
-    about_runs = zip(of_runs, findings[len(chosen) :], strict=True)
-    verdicts = [verdict for (trace, claims), of_run in about_runs for verdict in _verdicts(trace, claims, of_run)]
-    return verdicts + _model_verdicts(scenario, chosen, inputs, [finding for (finding,) in findings[: len(chosen)]])
+    done = side_by_side(pieces, names=names, watch=watch)
+    about_the_model, about_runs = done[: len(chosen)], done[len(chosen) :]
+    verdicts = [
+        verdict
+        for (trace, claims), (findings, _) in zip(of_runs, about_runs, strict=True)
+        for verdict in _verdicts(trace, claims, findings)
+    ]
+    counted = [of_run for _, of_run in about_runs]
+    theorems = [with_counts(claim.id, each, counted) for claim, each in zip(chosen, about_the_model, strict=True)]
+    return verdicts + _model_verdicts(scenario, chosen, inputs, theorems)
 
 
-def _found(claim: ModelClaim, inputs: dict[str, Any], kept: Path | None) -> list[Finding]:
-    return [found(claim, inputs, kept)]
+def _found(claim: ModelClaim, inputs: dict[str, Any], kept: Path | None) -> Finding:
+    return found(claim, inputs, kept)
 
 
-def _judged(trace: Trace, claims: Sequence[TraceClaim]) -> list[Finding]:
-    return [claim.judge(trace) for claim in claims]
+def _judged(trace: Trace, claims: Sequence[TraceClaim]) -> tuple[list[Finding], dict[str, Count]]:
+    """What the claims found about a run, and how often it met the premises of the theorems."""
+    return [claim.judge(trace) for claim in claims], counts(trace)
 
 
 def _model_verdicts(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -12,6 +13,7 @@ import pandas as pd
 
 from airground_drake.arrays import Array
 from airground_drake.trace import DECISION_COLUMNS, SCHEMA, Trace
+from airground_drake.verify.runs.demands import demanded
 
 HELD = ("noise_m", "decision_variable_m", "mode", "triggers", "triggered_at_s", "released_at_s", "accepted")
 """Columns of a UGV after its reference."""
@@ -56,7 +58,19 @@ def laid_out(
     meta = {"schema": SCHEMA, "run": run, "method": of_run["method"], "composition": of_run["composition"], "seed": 0}
     meta |= {"robots": robots, "ugvs": ugvs, "zeta_m": scenario["decision"]["threshold"]["zeta_m"], "faults": []}
     meta |= {"scenario": scenario, "events": sorted(events, key=lambda event: float(event["t_s"]))}
-    return Trace(meta, pd.DataFrame(columns), decision_table(decisions), timings or {})
+    return rebuilt(Trace(meta, pd.DataFrame(columns), decision_table(decisions), timings or {}))
+
+
+def rebuilt(trace: Trace) -> Trace:
+    """A copy whose controllers were built with what its scenario demands."""
+    built = {name: as_read_back(parameters) for name, parameters in demanded(trace).items()}
+    return replace(trace, meta=trace.meta | {"controllers": built})
+
+
+def as_read_back(parameters: dict[str, Any]) -> dict[str, Any]:
+    """Parameters of a controller as `systems.controllers.read_back` writes them."""
+    found = {key: value.tolist() if isinstance(value, np.ndarray) else value for key, value in parameters.items()}
+    return found | {key: [[value, 1] for value in found[key]] for key in ("safe_m", "share")}
 
 
 def decision_table(decisions: Sequence[dict[str, Any]]) -> pd.DataFrame:

@@ -34,13 +34,13 @@ def test_a_distance_that_is_short_refutes(monkeypatch: pytest.MonkeyPatch, short
 
 @pytest.mark.parametrize(("margin", "broken"), [(0.0, False), (-5e-10, False), (-2e-9, True), (-0.5, True)])
 def test_a_broken_inequality_refutes(monkeypatch: pytest.MonkeyPatch, margin: float, broken: bool) -> None:
-    kind = safety.KINDS[0]
-    found = safety.Hypothesis("avoidance", "m/s", np.array([1.0]), np.array([margin]), kind=kind)
-    monkeypatch.setattr(safety, "_constants", lambda run: iter(()))
-    monkeypatch.setattr(safety, "_velocities", lambda run: iter(()))
-    monkeypatch.setattr(safety, "_inequalities", lambda run: iter([found]))
-    bind = dict.fromkeys(safety.KINDS, 0) | {kind: 1}
-    claim: dict[str, Any] = {"evidence": {"inequalities_that_bind": bind}, "where": {"hypothesis": "avoidance"}}
+    pair = {"first": "ugv1", "second": "rock"}
+    found = safety.Hypothesis("avoidance", "m", np.array([1.0]), np.array([margin]), pair)
+    for name in ("_constants", "_velocities", "_inequalities"):
+        monkeypatch.setattr(safety, name, lambda run: iter(()))
+    monkeypatch.setattr(safety, "_lost", lambda run: iter([found]))
+    evidence = {"inequalities_that_bind": dict.fromkeys(safety.KINDS, 0), "different_parameters": []}
+    claim: dict[str, Any] = {"evidence": evidence, "where": {"hypothesis": "avoidance", **pair}}
     refuted = safety.safe_hyp(RUN, claim | {"status": "refuted"})
     assert refuted.status == ("refuted" if broken else "holds")
     if broken:

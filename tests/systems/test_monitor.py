@@ -67,8 +67,10 @@ def test_it_finds_what_safe_hyp_finds(run: Callable[[str, str], Trace], name: st
     assert found is not None
     assert found.rule == Rule.AVOIDANCE
     assert found.t_s == pytest.approx(finding.counterexample["t_s"], abs=1e-9)
-    assert run(name, method).robots[found.robot] == finding.counterexample["robot"]
-    assert -found.amount_m_s == pytest.approx(finding.counterexample["margin"], abs=1e-9)
+    assert run(name, method).robots[found.robot] == finding.counterexample["first"]
+    period, gain = load(name)[0].control.period_s, load(name)[0].control.avoidance_gain_1_s
+    lost = found.amount_m_s * period / (gain * period)  # e / (A h) of an obstacle
+    assert -lost == pytest.approx(finding.counterexample["margin"], abs=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -1,11 +1,17 @@
-"""SAFE-HYP: the hypotheses of the invariance proof along a run, recomputed from its positions."""
+"""SAFE-HYP: the hypotheses of the safety theorems along a run, recomputed from its positions.
+
+What is missed of the avoidance inequalities is found in exact arithmetic (`engines.shortfalls`), and so is the distance
+that follows. What the controllers were built with is compared with the scenario (`demands`).
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
+from functools import cache
 from itertools import groupby
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -13,11 +19,15 @@ import numpy.typing as npt
 from airground_drake.arrays import Array
 from airground_drake.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S, TraceClaim
-from airground_drake.verify.engines.segments import MERGE_S
+from airground_drake.verify.engines.segments import MERGE_S, interpolate
+from airground_drake.verify.engines.shortfalls import SCREEN_M, rounded_up, shortage, shortfalls
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.control_samples import control_samples
+from airground_drake.verify.runs.demands import differences
 from airground_drake.verify.runs.pairs import (
     DISTANCE_TOLERANCE_M,
+    Pair,
+    apart_of,
     near_pairs,
     pairs_of,
     places_of,
@@ -27,10 +37,16 @@ from airground_drake.verify.runs.pairs import (
 )
 
 VELOCITY_TOLERANCE_M_S = 1e-9
-"""A velocity may miss an inequality, a limit or the held command by this much, m/s: distances are divided by the
-control period, so rounding errs by 1e-13 m/s; in one period of 25 ms it moves a robot 2.5e-11 m."""
+"""A speed may be above its limit by this much, m/s: a command that is shortened to its limit errs by 1e-15 m/s, and in
+one period of 25 ms this moves a robot by 2.5e-11 m."""
 BINDING_M_S = 1e-9
 """An avoidance inequality binds where a command has no more than this to spare, m/s."""
+MOST_LISTED = 300
+"""Pairs that the evidence lists at most: those with the least guarantee."""
+AVOIDANCE = "avoidance"
+"""The hypothesis that the steps met the inequalities."""
+BUILT = "controller parameters"
+"""The hypothesis that the controllers were built with what the scenario demands."""
 
 
 @dataclass(frozen=True)
@@ -59,132 +75,239 @@ class _Hypothesis:
         return {**described, "margin": float(self.margin[k]), "unit": self.unit}
 
 
+class Guarantee(NamedTuple):
+    """What follows for a pair of bodies: D >= `distance_m` at all times of the run.
+
+    Attributes:
+        pair: which.
+        missed_m: what each sample misses, e_i + e_j, (K,), m per control period; 0: both inequalities are met.
+        short_m: by how much the pair started too close, m.
+        distance_m: d - max(e / a, short_m), e the most that is missed and a = min(A h, 1). Without a gain nothing is
+            restored: d - K e - short_m.
+    """
+
+    pair: Pair
+    missed_m: Array
+    short_m: float
+    distance_m: float
+
+    @property
+    def margin_m(self) -> float:
+        """The distance promised less the safe one; not positive."""
+        return self.distance_m - self.pair.safe_m
+
+
 class SafeHyp(TraceClaim):
     """SAFE-HYP."""
 
     id = "SAFE-HYP"
-    summary = "Every command of the run met the conditions under which the safety proof (SAFE-INV) holds."
-    statement = "At every control sample of the run the hypotheses of the invariance proof (SAFE-INV) held."
+    summary = "Every step of the run met the conditions under which the safety theorem (SAFE-INV) holds."
+    statement = (
+        "At every control sample of the run the hypotheses of the safety theorem held, up to e per pair of bodies: so "
+        "each pair kept d - e / (A h) at all times of the run. The controllers were built with what the scenario says."
+    )
     formula = (
-        "n.v >= share A (d - D) where D <= d, else n.v >= -share (D - d) / h, for every pair with D <= sensing range "
-        "(share 1 obstacle, 1/2 robot; z of n dropped for a UGV), tolerance 1e-9 m/s; D(0) >= d; A h <= 1; "
-        "||v|| <= v_max; v_z = 0 for a UGV; range >= d + (closing speed) h; v constant over at most h"
+        "step_i = p_i[k+1] - p_i[k]; n.step_i >= q b - e_i where b = A h (d - D) if D <= d, else d - D, or D >= d + "
+        "||step_i|| + ||step_j|| (q = 1 obstacle, 1/2 robot; e = max over k of e_i + e_j); D(0) >= d; p straight "
+        "between samples; z constant for a UGV; ||v|| <= v_max; A h <= 1; range >= d + (closing speed) h; then D >= d "
+        "- e / (A h), and d - e / (A h) >= d - 1e-9 m"
     )
     latex = (
-        r"n^\top v \ge \begin{cases} q A (d - D) & D \le d \\ -q (D - d) / h & D > d \end{cases} \quad "
-        r"\text{for every pair with } D \le R",
-        r"q = 1 \text{ (obstacle)}, \quad q = 1/2 \text{ (robot)}; \quad \text{tolerance } 10^{-9} \text{ m/s}",
+        r"n^\top (p_i^{k+1} - p_i^k) \ge q\, b - e_i, \quad b = \begin{cases} A h (d - D) & D \le d \\ d - D & D > d "
+        r"\end{cases}",
+        r"\text{or} \quad D \ge d + \lVert p_i^{k+1} - p_i^k \rVert + \lVert p_j^{k+1} - p_j^k \rVert; \quad q = 1 "
+        r"\text{ (obstacle)}, \; q = 1/2 \text{ (robot)}",
+        r"e = \max_k (e_i + e_j) \quad \Rightarrow \quad D \ge d - \frac{e}{A h}, \quad \frac{e}{A h} \le 10^{-9} "
+        r"\text{ m}",
         r"D(0) \ge d, \quad A h \le 1, \quad \lVert v \rVert \le v_{\max}, \quad v_z = 0 \text{ (UGV)}, \quad "
         r"R \ge d + c h",
     )
     method = (
-        "Runtime monitor: positions at each multiple of the control period and the command of the row after it are put "
-        "into the inequalities, written again here in plain numpy. Rows less than 1e-9 s apart count as one instant."
+        "From the recorded positions at the control samples, which are rational numbers, in exact arithmetic; square "
+        "roots are enclosed. Only pairs and samples that floats do not find far, or met by more than 1e-9 m, are "
+        "computed so. What the controllers were built with was read back from the diagram, and is compared with the "
+        "scenario. Rows less than 1e-9 s apart count as one instant."
     )
     equations = "(7)-(8), (11) in the inequality form of the package (set-based avoidance)"
     assumptions = (
         "The command of a row is the velocity applied since the row before (the trace's convention).",
-        "Obstacles and robots beyond the sensing range need no inequality: the range covers d + closing speed * h.",
+        "Robots move straight from row to row.",
     )
     does_not_establish = (
-        "Safety by itself: it supplies the hypotheses, SAFE-INV the implication and SAFE-TRACE the outcome. Broken "
-        "hypotheses do not mean that the distance was violated, only that the proof does not cover this run. Nothing "
-        "is said about samples that the run did not visit."
+        "The theorem (SAFE-INV) and the outcome (SAFE-TRACE). Broken hypotheses do not mean that the distance was "
+        "violated, only that no more than d - e / (A h) is promised: inside several safe distances at once the "
+        "inequalities can contradict each other. Nothing is said about other runs."
     )
 
     exercised_by = "avoidance inequalities that bound a command at a control sample"
 
     def check(self, trace: Trace) -> Finding:
         """Evaluate all hypotheses; the first violation in time is the counterexample."""
-        monitored = [*_static(trace), *_sampled(trace)]
-        broken = [h.at(int(k)) for h in monitored for k in h.broken()[:1]]
+        kept = sorted(guarantees(trace), key=lambda one: one.margin_m)
+        others = [*_static(trace), *_sampled(trace)]
+        different = list(differences(trace))
+        broken = [h.at(int(k)) for h in [*others, *_avoidance(trace, kept)] for k in h.broken()[:1]]
+        broken += [{"hypothesis": BUILT, "t_s": float(trace.t[0]), **each} for each in different[:1]]
         first = min(broken, key=lambda entry: float(entry["t_s"]), default=None)
         worst: dict[tuple[str, str], dict[str, Any]] = {}
-        for h in monitored:
+        for h in others:
             entry = h.at(int(np.argmin(h.margin)))
             key = h.name, str(next(iter(h.about.values()), ""))
-            if np.isfinite(entry["margin"]) and entry["margin"] <= worst.get(key, entry)["margin"]:
+            if entry["margin"] <= worst.get(key, entry)["margin"]:
                 worst[key] = entry
-        name = first["hypothesis"] if first else "avoidance"
-        leading = min((w for w in worst.values() if w["hypothesis"] == name), key=lambda w: w["margin"], default={})
-        binding = _binding(trace, monitored)
-        in_range = sum(int(np.isfinite(h.margin).sum()) for h in monitored if h.name == "avoidance")
+        listed = [_listed(trace, one) for one in kept[:MOST_LISTED]]
+        least: dict[str, Any] = {"margin": kept[0].margin_m if kept else 0.0, "unit": "m", "hypothesis": AVOIDANCE}
+        least |= {key: listed[0][key] for key in ("first", "second")} if kept else {}
+        name = first["hypothesis"] if first else AVOIDANCE
+        leading = min((w for w in worst.values() if w["hypothesis"] == name), key=lambda w: w["margin"], default=least)
+        leading = first if first and name == BUILT else leading
+        in_range, binding = _binding(trace)
         return Finding(
             "refuted" if first else "holds",
             margin=leading.get("margin"),
             unit=leading.get("unit", ""),
-            quantity=f"least slack of the hypothesis {name!r}",
+            quantity="distance promised less the safe one" if name == AVOIDANCE else f"least slack of {name!r}",
             where={key: leading[key] for key in leading if key not in ("margin", "unit")},
-            counterexample=first | snapshot(trace, first.values(), first["t_s"]) if first else None,
+            counterexample=first | snapshot(trace, map(str, first.values()), first["t_s"]) if first else None,
             evidence={
+                "e_m": float(max((one.missed_m.max() for one in kept), default=0.0)),
+                "guarantee_m": kept[0].distance_m if kept else None,
+                "pairs": listed,
+                "pairs_in_reach": len(kept),
+                "different_parameters": different,
                 "worst": list(worst.values()),
                 "inequalities_in_range": in_range,
                 "inequalities_that_bind": binding,
-                "tolerance_m_s": VELOCITY_TOLERANCE_M_S,
+                "tolerance_m": DISTANCE_TOLERANCE_M,
             },
             exercised=sum(binding.values()),
         )
 
 
-def _binding(trace: Trace, monitored: list[_Hypothesis]) -> dict[str, int]:
-    """How many avoidance inequalities bound a command, by who moved and what it had to avoid."""
+def _listed(trace: Trace, one: Guarantee) -> dict[str, Any]:
+    """A row of the evidence, with the sample at which the most was missed, if anything was."""
+    e, k = float(one.missed_m.max()), int(np.argmax(one.missed_m))
+    described = {"first": one.pair.first, "second": one.pair.second, "safe_distance_m": one.pair.safe_m}
+    t = float(trace.t[_samples(trace)[k]]) if e > 0.0 else None
+    return {**described, "guarantee_m": one.distance_m, "e_m": e, "t_s": t}
+
+
+def _samples(trace: Trace) -> npt.NDArray[np.intp]:
+    """Rows of the control samples."""
+    return control_samples(trace.t, trace.scenario["control"]["period_s"])
+
+
+def _gain(trace: Trace) -> Fraction:
+    """a = min(A h, 1), of the numbers as they are written."""
+    control = trace.scenario["control"]
+    return min(_written(control["avoidance_gain_1_s"]) * _written(control["period_s"]), Fraction(1))
+
+
+def _written(number: float) -> Fraction:
+    """A number of the scenario as it is written: 0.1 is a tenth."""
+    return Fraction(repr(float(number)))
+
+
+def guarantees(trace: Trace) -> list[Guarantee]:
+    """What is promised for each pair that comes so near that its steps could break its distance.
+
+    Pairs in bounds of whose distance there is room for both robots' longest steps are far at every sample.
+    """
+    return trace.derived("guarantees", lambda: list(_guarantees(trace)))
+
+
+def _guarantees(trace: Trace) -> Iterator[Guarantee]:
+    samples, period = np.append(_samples(trace), len(trace.t) - 1), trace.scenario["control"]["period_s"]
+    lasting = float(trace.t[samples[-1]] - trace.t[samples[-2]])
+    last = Fraction(1) if abs(lasting - period) <= TIME_TOLERANCE_S else Fraction(lasting) / Fraction(period)
+    places = {name: p if p.ndim == 1 else p[samples] for name, p in places_of(trace).items()}
+    longest = {name: 0.0 if p.ndim == 1 else _longest(p, float(last)) for name, p in places.items()}
+    pairs, gain = pairs_of(trace), _gain(trace)
+    reach = np.array([pair.safe_m + longest[pair.first] + longest[pair.second] for pair in pairs])
+    for k in np.flatnonzero(apart_of(trace) <= reach + SCREEN_M).tolist():
+        pair = pairs[k]
+        first, second = places[pair.first], places[pair.second]
+        missed = shortfalls(first, second, pair.safe_m, Fraction(pair.share), gain, last)
+        e = Fraction(float(missed.max()))
+        short = shortage(first[0], second if second.ndim == 1 else second[0], pair.safe_m)
+        lost = max(e / gain, short) if gain else len(missed) * e + short
+        yield Guarantee(pair, missed, rounded_up(short), -rounded_up(lost - Fraction(pair.safe_m)))
+
+
+def _longest(places: Array, last: float) -> float:
+    """The longest step between samples, m."""
+    steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
+    steps[-1] /= last
+    return float(steps.max())
+
+
+def _avoidance(trace: Trace, kept: Sequence[Guarantee]) -> Iterator[_Hypothesis]:
+    """What is missed of the inequalities at each sample, as what it costs of the distance."""
+    t, gain = trace.t[_samples(trace)], float(_gain(trace))
+    for one in kept:
+        lost = one.missed_m / gain if gain else one.missed_m * len(t)
+        about = {"first": one.pair.first, "second": one.pair.second}
+        yield _Hypothesis(AVOIDANCE, "m", t, 0.0 - lost, DISTANCE_TOLERANCE_M, about)
+
+
+def _binding(trace: Trace) -> tuple[int, dict[str, int]]:
+    """How many avoidance inequalities were in range of a robot, and how many bound a command, by who avoided whom."""
     count = {"ugv beside obstacle": 0, "uav beside obstacle": 0}
     count |= {"ugv beside ugv": 0, "ugv beside uav": 0, "uav beside ugv": 0}
     kind = dict.fromkeys(trace.ugvs, "ugv") | {trace.robots[-1]: "uav"}
-    for h in monitored:
-        if h.name == "avoidance":
-            sides = kind[h.about["robot"]], kind.get(h.about["other"], "obstacle")
-            count[" beside ".join(sides)] += int((h.margin <= BINDING_M_S).sum())
-    return count
+    control, samples, in_range = trace.scenario["control"], _samples(trace), 0
+    chosen = _chosen(trace, samples)
+    places = {name: p if p.ndim == 1 else p[samples] for name, p in places_of(trace).items()}
+    velocities = {robot: trace.command(robot)[chosen] for robot in trace.robots}
+    for pair in near_pairs(trace):
+        for robot, other in ((pair.first, pair.second), (pair.second, pair.first)):
+            if robot in velocities:
+                away, planar = places[robot] - places[other], robot in trace.ugvs
+                slack = slack_of(away, velocities[robot], pair, control, planar=planar)
+                in_range += int(np.isfinite(slack).sum())
+                count[f"{kind[robot]} beside {kind.get(other, 'obstacle')}"] += int((slack <= BINDING_M_S).sum())
+    return in_range, count
+
+
+def _chosen(trace: Trace, samples: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
+    """Rows with the velocities that were chosen at the samples: a command is that of the next row."""
+    return np.searchsorted(trace.t, trace.t[samples] + MERGE_S)
 
 
 def _static(trace: Trace) -> Iterator[_Hypothesis]:
     """Hypotheses on the scenario and the start: gain, sensing range, distances at t = 0."""
-    control, places = trace.scenario["control"], places_of(trace)
-    stable = np.array([1.0 - control["avoidance_gain_1_s"] * control["period_s"]])
-    yield _Hypothesis("gain: A h <= 1", "1", trace.t[:1], stable, 1e-12, {})
+    control, places, limit = trace.scenario["control"], places_of(trace), speed_limits(trace)
+    period, reach = _written(control["period_s"]), _written(control["sensing_range_m"])
+    stable = np.array([float(1 - _written(control["avoidance_gain_1_s"]) * period)])
+    yield _Hypothesis("gain: A h <= 1", "1", trace.t[:1], stable, 0.0, {})
+
+    @cache
+    def spare(safe: float, *speeds: float) -> float:
+        return float(reach - _written(safe) - sum(map(_written, speeds)) * period)
+
     pairs = sorted(pairs_of(trace), key=lambda pair: trace.robots.index(pair.first))
     for robot, own in groupby(pairs, key=lambda pair: pair.first):
         beside = list(own)
         others = [pair.second for pair in beside]
-        safe, reach = (np.array([getattr(pair, name) for pair in beside]) for name in ("safe_m", "reach_m"))
         away = places[robot][0] - np.array([np.atleast_2d(places[other])[0] for other in others])
         start, about = np.full(len(beside), trace.t[0]), {"first": robot}
-        excess = np.linalg.norm(away, axis=1) - safe
+        excess = np.linalg.norm(away, axis=1) - np.array([pair.safe_m for pair in beside])
         yield _Hypothesis("safe start", "m", start, excess, DISTANCE_TOLERANCE_M, about, others)
-        spare = control["sensing_range_m"] - safe - reach
-        yield _Hypothesis("sensing range", "m", start, spare, DISTANCE_TOLERANCE_M, about, others)
+        left = [spare(pair.safe_m, limit[robot], limit.get(pair.second, 0.0)) for pair in beside]
+        yield _Hypothesis("sensing range", "m", start, np.array(left), 0.0, about, others)
 
 
 def _sampled(trace: Trace) -> Iterator[_Hypothesis]:
-    """Hypotheses at the control samples: their spacing, the hold between them, limits and inequalities."""
-    control = trace.scenario["control"]
-    limits = speed_limits(trace)
-    t = trace.t
-    samples = control_samples(t, control["period_s"])
-    chosen = np.searchsorted(t, t[samples] + MERGE_S)  # the velocity chosen at a sample is the next row's command
+    """Hypotheses at the control samples: their spacing, straight motion between them, speed limits, planar motion."""
+    period, limits, t, samples = trace.scenario["control"]["period_s"], speed_limits(trace), trace.t, _samples(trace)
     spacing = np.diff(np.append(t[samples], t[-1]))
-    yield _Hypothesis("sampling", "s", t[samples], control["period_s"] - spacing, TIME_TOLERANCE_S, {})
-    begins = np.flatnonzero(np.diff(t) >= MERGE_S)  # rows at which an interval begins
-    sample_of = np.searchsorted(t[samples], t[begins] + MERGE_S) - 1
+    yield _Hypothesis("sampling", "s", t[samples], period - spacing, TIME_TOLERANCE_S, {})
+    ends = np.append(samples, len(t) - 1)
     for robot in trace.robots:
-        command, about = trace.command(robot), {"robot": robot}
-        drift = np.linalg.norm(command[begins + 1] - command[chosen][sample_of], axis=1)
-        yield _Hypothesis("zero-order hold", "m/s", t[begins], 0.0 - drift, VELOCITY_TOLERANCE_M_S, about)
-        spare = limits[robot] - np.linalg.norm(command[1:], axis=1)
+        place, about = trace.position(robot), {"robot": robot}
+        off = np.linalg.norm(place - interpolate(t[ends], place[ends], t), axis=1)
+        yield _Hypothesis("straight motion", "m", t, 0.0 - off, DISTANCE_TOLERANCE_M, about)
+        spare = limits[robot] - np.linalg.norm(trace.command(robot)[1:], axis=1)
         yield _Hypothesis("speed limit", "m/s", t[:-1], spare, VELOCITY_TOLERANCE_M_S, about)
         if robot in trace.ugvs:
-            climb = 0.0 - np.abs(command[1:, 2])
-            yield _Hypothesis("planar motion", "m/s", t[:-1], climb, VELOCITY_TOLERANCE_M_S, about)
-    velocities = {robot: trace.command(robot)[chosen] for robot in trace.robots}
-    places = places_of(trace)
-    sampled = {name: places[name] if places[name].ndim == 1 else places[name][samples] for name in places}
-    for pair in near_pairs(trace):
-        for robot, other in ((pair.first, pair.second), (pair.second, pair.first)):
-            if robot not in velocities:
-                continue
-            slack = slack_of(
-                sampled[robot] - sampled[other], velocities[robot], pair, control, planar=robot in trace.ugvs
-            )
-            about = {"robot": robot, "other": other}
-            yield _Hypothesis("avoidance", "m/s", t[samples], slack, VELOCITY_TOLERANCE_M_S, about)
+            yield _Hypothesis("planar motion", "m", t, 0.0 - np.abs(place[:, 2] - place[0, 2]), 0.0, about)

@@ -145,6 +145,24 @@ def inequalities_invented(folder: Path) -> None:
         claim["evidence"]["inequalities_in_range"] += 1000
 
 
+@refused_by("SAFE-HYP", "promised distance", run="b")
+def more_distance_promised(folder: Path) -> None:
+    with edited_claim(folder, "SAFE-HYP", "b") as claim:
+        claim["evidence"]["pairs"][0]["guarantee_m"] = claim["evidence"]["guarantee_m"] = 2.0
+
+
+@refused_by("SAFE-HYP", "what is missed", run="b")
+def shortfall_hidden(folder: Path) -> None:
+    with edited_claim(folder, "SAFE-HYP", "b") as claim:
+        claim["evidence"]["pairs"][0]["e_m"] = claim["evidence"]["e_m"] = 0.0
+
+
+@refused_by("SAFE-HYP", "a pair that misses something is listed", run="b")
+def pair_that_misses_something_left_out(folder: Path) -> None:
+    with edited_claim(folder, "SAFE-HYP", "b") as claim:
+        del claim["evidence"]["pairs"][0]
+
+
 @refused_by("COMM", "evidence")
 def messages_in_the_evidence_changed(folder: Path) -> None:
     with edited_claim(folder, "COMM") as claim:

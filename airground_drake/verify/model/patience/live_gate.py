@@ -1,4 +1,4 @@
-"""LIVE-GATE: an intervention that is accepted where there is room is never given back, and ends in time.
+"""LIVE-GATE: an accepted intervention that goes as predicted is never given back, and ends in time.
 
 The tracking error between prediction and run is a contraction with an input; obligations in `tracking_obligations`,
 the running gatekeeper and the running control law in `tracking_runs`. Certificates: `obligations.json` and an SMT-LIB
@@ -25,23 +25,25 @@ class LiveGate(ModelClaim):
     """LIVE-GATE."""
 
     id = "LIVE-GATE"
-    summary = (
-        "With room around it, an accepted intervention in all directions of the plane is carried through to its end."
-    )
+    summary = "An accepted intervention that goes as predicted is carried through to its end."
     statement = (
         "Under method (d) an accepted intervention that leaves no direction of the plane to the UGV's own task is "
-        "never given back before its time, and is over when its motion is, as long as there is room along the "
-        "predicted way, disturbances are bounded and the speed limit is not reached."
+        "never given back before its time, and is over when its motion is, as long as no obstacle is sensed that was "
+        "not known at its acceptance, and whatever else moves the UGV differs little from the prediction: other "
+        "robots, contact, corners of the motion, disturbances."
     )
     formula = (
-        "J^+ J = I in the plane, predicted distances >= d + v h + lag_m (robots: d + 2 v h + lag_m), |disturbance| <= "
-        "Lambda lag_m: |p - predicted| <= lag_m at every sample, so lag <= predicted lag + lag_m: never late; over by "
-        "t0 + length / speed + h for a motion of that length at that speed, if that is no more than longest_s"
+        "J^+ J = I in the plane; e = p - predicted, e' = (1 - Lambda h) e + h w; b' = (1 - Lambda h) b + h ||w||, b = "
+        "||e|| at the acceptance; if b <= lag_m at every sample: |p - predicted| <= lag_m, so lag <= predicted lag + "
+        "lag_m: never late; over by t0 + length / speed + h for a motion of that length at that speed, if that is no "
+        "more than longest_s. b <= lag_m where ||w|| <= Lambda lag_m, as where predicted distances are >= d + v h + "
+        "lag_m (robots: d + 2 v h + lag_m) and |disturbance| <= Lambda lag_m; w = 0 where all is as predicted"
     )
     latex = (
-        r"J^+ J = I \text{ in the plane}",
-        r"D_{\text{predicted}} \ge d + v h + \ell \text{ (robots: } d + 2 v h + \ell \text{)}, \quad \lVert e "
-        r"\rVert \le \Lambda \ell",
+        r"J^+ J = I \text{ in the plane}, \quad e = p - p_{\text{predicted}}, \quad e_{k+1} = (1 - \Lambda h) e_k + h "
+        r"w_k",
+        r"b_{k+1} = (1 - \Lambda h) b_k + h \lVert w_k \rVert, \quad b_0 = \lVert e_0 \rVert, \quad b_k \le \ell "
+        r"\text{ for all } k",
         r"\Rightarrow \; \lVert p - p_{\text{predicted}} \rVert \le \ell \text{ at every sample}, \quad "
         r"\text{lag} \le \text{lag}_{\text{predicted}} + \ell",
         r"t_{\text{over}} \le t_0 + \frac{\text{length}}{\text{speed}} + h \quad \text{if that is no more "
@@ -49,25 +51,27 @@ class LiveGate(ModelClaim):
     )
     method = (
         "Where the intervention has every direction of the plane, the difference e between run and prediction obeys "
-        "e' = (1 - Lambda h) e + h w, w the disturbance: it never leaves the ball of radius lag_m; within it, with "
-        "that room, no avoidance inequality can bind, so that both are the same law. Polynomial implications with "
-        "exact certificates, z3 and cvc5; what is late and what is over is read off the running `Patience`. The "
-        "running gatekeeper and the running control law are run on random ways with room, disturbed by the most that "
-        "is allowed: nothing may be given back."
+        "e' = (1 - Lambda h) e + h w, w what else moves the UGV in the run, less what does in the prediction: e is "
+        "bounded by b. Within a ball of radius lag_m, with room, no avoidance inequality can bind, so that both are "
+        "the same law. Polynomial implications with exact certificates, z3 and cvc5; what is late and what is over is "
+        "read off the running `Patience`. The running gatekeeper and the running control law are run on random ways "
+        "with room, disturbed by the most that is allowed: nothing may be given back. The report counts how many "
+        "accepted interventions of its runs under (d) met the premise, from acceptance until they were given back or "
+        "withdrawn."
     )
     equations = "(14), (20)"
     assumptions = (
         "J^+ J is the identity in the plane, as in every proposal of a `BehaviourDatabase`. Along a direction that is "
         "left to the own task that one's gain acts, not Lambda, and the UGV may be pushed out of the room. LIVE-PROG "
         "counts the accepted proposals of a run that leave one (`leave_a_direction`).",
-        "The obstacles near the way are known and stand still, and no other robot comes nearer to it than stated.",
-        "Neither run nor prediction reaches the speed limit: speed of the motion + Lambda lag < v.",
-        "The disturbance includes what the rate of the motion differs by from that of the motion sampled every "
-        "period (0 but at its corners), besides what moves the robot otherwise.",
+        "No obstacle is sensed that the UGV did not know at its acceptance.",
+        "b <= lag_m: what avoidance and the speed limit change of the command in the run (other robots where they are) "
+        "differs little from what they change in the prediction (other robots where they are predicted). So does the "
+        "rate of the motion from that of the motion sampled every period (the same but at its corners).",
         "The UAV does not withdraw the proposal. Rounding is not counted.",
     )
     does_not_establish = (
-        "That a proposal with room is accepted: that depends on its outcome; that it has room: where it has less, "
+        "That a proposal is accepted, or goes as predicted: that depends on the others. Where the premise was not met, "
         "LIVE-PROG says what came of it, and LIVE-WAIT bounds the time."
     )
 

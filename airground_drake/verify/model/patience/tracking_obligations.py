@@ -1,10 +1,10 @@
 """What LIVE-GATE proves.
 
-Symbols: E, F length of the difference between run and prediction at a sample and at the next one; w length of the
-disturbance, q their inner product; r the lag allowed, g the gain Lambda, h the period; D, P distances to a point in
-the run and in the prediction, d the safe one, v the speed limit, x the rate at which the point is left; l, p lag and
-predicted lag; t, s samples, o last on time, W time behind; u, m end of the try and of the motion, a its begin, y its
-length, z its speed, H the period of the gatekeeper.
+Symbols: E, F length of the difference between run and prediction at a sample and at the next one, B a bound of E; w
+length of the disturbance, q their inner product; r the lag allowed, g the gain Lambda, h the period; D, P distances to
+a point in the run and in the prediction, d the safe one, v the speed limit, x the rate at which the point is left; l, p
+lag and predicted lag; t, s samples, o last on time, W time behind; u, m end of the try and of the motion, a its begin,
+y its length, z its speed, H the period of the gatekeeper.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from airground_drake.verify.model.patience.relation import SYMBOLS as PATIENCE_S
 from airground_drake.verify.model.patience.relation import symbolic
 
 SYMBOLS = ("E", "F", "w", "q", "r", "g", "h", "D", "P", "d", "v", "x", "l", "p", "t", "s", "o", "W", "u", "m", "a", "y",
-           "z", "H")  # fmt: skip
+           "z", "H", "B")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Tracking:
 
 def obligations(tracking: Tracking, kind: type[Patience]) -> list[Obligation]:
     """That the run stays near the prediction, has room, is never late and ends."""
-    return [*_stays_near(tracking), *_has_room(tracking), *_is_on_time(kind)]
+    return [*_stays_near(tracking), *_stays_below(tracking), *_has_room(tracking), *_is_on_time(kind)]
 
 
 def _obligation(
@@ -68,6 +68,24 @@ def _stays_near(tracking: Tracking) -> Iterator[Obligation]:
             "contracts inside radius", "contracts contracts inside length", "contracts inside period disturbed",
             "period bounded radius", "period bounded contracts length", "period period bounded disturbed",
             "2 contracts period cauchy",
+        ),
+        {"period": "h", "gain": "g"},
+        {"step": f"F**2 - ({k})**2*E**2 - 2*({k})*h*q - h**2*w**2"},
+        {"step": "-1"},
+    )  # fmt: skip
+
+
+def _stays_below(tracking: Tracking) -> Iterator[Obligation]:
+    """Whatever the disturbance is: where E <= B, F <= k B + h w, k = 1 - g h. A run is judged by this bound."""
+    k = tracking.contraction
+    yield _obligation(
+        "stays_below",
+        "run and prediction differ by k B + h w at most at the next sample, if by B at most at this one",
+        f"(({k})*B + h*w)**2 - F**2",
+        {"length": "E", "disturbed": "w", "bound": "B", "contracts": k, "below": "B - E", "cauchy": "E*w - q"},
+        terms(
+            "contracts contracts below bound", "contracts contracts below length",
+            "2 contracts period below disturbed", "2 contracts period cauchy",
         ),
         {"period": "h", "gain": "g"},
         {"step": f"F**2 - ({k})**2*E**2 - 2*({k})*h*q - h**2*w**2"},

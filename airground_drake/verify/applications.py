@@ -1,0 +1,62 @@
+"""How often the runs of a report met the premises of its theorems: one that never applies protects nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+
+from airground_drake.trace import Trace
+from airground_drake.verify.finding import Finding
+from airground_drake.verify.runs.followed import followed
+from airground_drake.verify.runs.proposals import accepted_at
+from airground_drake.verify.runs.safe_hyp import guarantees
+
+Count = tuple[int, int]
+"""How often a premise was met, and how many times it could have been."""
+
+
+def safe_pairs(trace: Trace) -> Count:
+    """Pairs that came within reach of each other and met every inequality, of all pairs within reach."""
+    kept = guarantees(trace)
+    return sum(one.margin_m == 0.0 for one in kept), len(kept)
+
+
+def below_avoidance(trace: Trace) -> Count:
+    """Interventions that were executed under method (d), of all that were executed."""
+    count = sum(len({id(one) for one in accepted_at(trace, ugv) if one is not None}) for ugv in trace.ugvs)
+    return (count if trace.meta["method"] == "d" else 0), count
+
+
+def as_predicted(trace: Trace) -> Count:
+    """Interventions accepted under method (d) that went as predicted, of all of these."""
+    found = followed(trace)
+    return sum(one.met for one in found), len(found)
+
+
+COUNTED: dict[str, Callable[[Trace], Count]] = {
+    "SAFE-INV": safe_pairs,
+    "SAFE-GATE": below_avoidance,
+    "LIVE-GATE": as_predicted,
+    "LIVE-WAIT": below_avoidance,
+}
+"""By claim about the model: what counts as a case of its theorem in a run."""
+
+
+def counts(trace: Trace) -> dict[str, Count]:
+    """The counts of a run, by claim. Where records are missing or wrong there is none: claims about runs say so."""
+    found = {}
+    for claim, count in COUNTED.items():
+        try:
+            found[claim] = count(trace)
+        except (Exception, SystemExit):  # as in `judge`: whatever went wrong, nothing was counted
+            continue
+    return found
+
+
+def with_counts(claim: str, finding: Finding, of_runs: Iterable[dict[str, Count]]) -> Finding:
+    """A finding about the model with how often the runs met its premise, `applies_to`, of how many times, `of`."""
+    counted = [found[claim] for found in of_runs if claim in found]
+    if not counted:
+        return finding
+    met, cases = (sum(column) for column in zip(*counted, strict=True))
+    return replace(finding, evidence={**finding.evidence, "applies_to": met, "of": cases})

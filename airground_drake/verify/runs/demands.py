@@ -1,0 +1,100 @@
+"""What the controllers of a run have to be built with: who keeps what distance from whom, and with which share.
+
+It is read off the scenario and compared with what was read back from the controllers in the diagram. Nothing is taken
+from the code that builds them, so that a wrong distance there is a difference here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from airground_drake.trace import Trace
+from airground_drake.verify.runs.control_law import ON_TOP
+from airground_drake.verify.runs.pairs import radii_of, speed_limits
+
+CONTROLLERS = ("ugv_controller", "uav_controller")
+NO_INTERVENTION = "a"
+"""Method without interventions."""
+OBSTACLE_SHARE, ROBOT_SHARE = 1.0, 0.5
+"""Parts of an avoidance inequality: an obstacle takes none of it, two robots take half each."""
+PLANAR, SPATIAL = (1.0, 1.0, 0.0), (1.0, 1.0, 1.0)
+"""Directions in which UGVs and UAVs move."""
+
+
+def demanded(trace: Trace) -> dict[str, dict[str, Any]]:
+    """The parameters of both controllers by the scenario, as `systems.controllers.read_back` names them; flat arrays.
+
+    Every robot avoids all obstacles, then all other robots in team order. Safe distances are those of the kind of pair
+    and both radii.
+    """
+    scenario, robots = trace.scenario, trace.robots
+    control, safe, uav = scenario["control"], scenario["safe_distance"], scenario["uav"]["name"]
+    obstacles, radius, limit = scenario["obstacles"], radii_of(trace), speed_limits(trace)
+    everybody, bodies = np.arange(len(robots)), np.array([radius[name] for name in robots])
+    with_uav = np.array([name == uav for name in robots])
+    beside_robots = np.where(with_uav[:, None] | with_uav, safe["air_ground_m"], safe["ugv_m"])
+    beside_robots = beside_robots + (bodies[:, None] + bodies)
+    beside_obstacles = safe["obstacle_m"] + (bodies[:, None] + np.array([radius[name] for name in obstacles]))
+    found = {}
+    for name, team in zip(CONTROLLERS, (everybody[~with_uav], everybody[with_uav]), strict=True):
+        others = np.array([np.delete(everybody, i) for i in team])
+        apart = np.hstack([beside_obstacles[team], np.take_along_axis(beside_robots[team], others, axis=1)])
+        share = np.where(np.arange(apart.shape[1]) < len(obstacles), OBSTACLE_SHARE, ROBOT_SHARE)
+        found[name] = {
+            "members": team,
+            "obstacles_m": np.array([each["position_m"] for each in obstacles.values()]).ravel(),
+            "others": others.ravel(),
+            "safe_m": apart.ravel(),
+            "share": np.tile(share, len(team)),
+            "mobility": np.array([SPATIAL if with_uav[i] else PLANAR for i in team]).ravel(),
+            "max_speed_m_s": np.array([limit[robots[i]] for i in team]),
+            "sampling_s": np.array([control["period_s"], 0.0]),
+            "gain_1_s": control["avoidance_gain_1_s"],
+            "period_s": control["period_s"],
+            "sensing_range_m": control["sensing_range_m"],
+        }
+    of_run = scenario["runs"][trace.run]
+    found["ugv_controller"]["composition"] = of_run["composition"]
+    if of_run["method"] != NO_INTERVENTION:  # where none is accepted, their order says nothing
+        found["ugv_controller"]["intervention_on_top"] = of_run["method"] in ON_TOP
+    return found
+
+
+def differences(trace: Trace) -> Iterator[dict[str, Any]]:
+    """Parameters of the controllers that are not what the scenario demands, each with the first place that differs."""
+    built = trace.meta["controllers"]
+    for controller, wanted in demanded(trace).items():
+        for parameter, due in wanted.items():
+            given = built.get(controller, {}).get(parameter)
+            about = {"controller": controller, "parameter": parameter}
+            if not isinstance(due, np.ndarray):
+                if given != due:
+                    yield {**about, "built": given, "scenario": due}
+                continue
+            if parameter in ("safe_m", "share"):
+                value, times = np.array(given, dtype=np.float64).reshape(-1, 2).T
+                given = np.repeat(value, times.astype(np.intp))
+            given = np.asarray(given, dtype=np.float64)
+            if given.shape != due.shape:
+                yield {**about, "built": f"{given.size} numbers", "scenario": f"{due.size} numbers"}
+            elif (given != due).any():
+                k = int(np.argmax(given != due))
+                place = _place(trace, wanted, parameter, k)
+                yield {**about, **place, "built": float(given[k]), "scenario": float(due[k])}
+
+
+def _place(trace: Trace, wanted: dict[str, Any], parameter: str, k: int) -> dict[str, Any]:
+    """Which robot, and beside what, the k-th number of a parameter is about."""
+    members, obstacles = wanted["members"], list(trace.scenario["obstacles"])
+    each = len(wanted[parameter]) // len(members)
+    if parameter in ("safe_m", "share"):
+        robot, column = divmod(k, each)
+        others = wanted["others"].reshape(len(members), -1)[robot]
+        beside = obstacles[column] if column < len(obstacles) else trace.robots[others[column - len(obstacles)]]
+        return {"robot": trace.robots[members[robot]], "other": beside}
+    if parameter in ("mobility", "max_speed_m_s"):
+        return {"robot": trace.robots[members[k // each]]}
+    return {"index": k}

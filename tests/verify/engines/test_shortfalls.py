@@ -1,0 +1,114 @@
+"""By how much positions miss the inequalities of set-based avoidance, exactly."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from airground_drake.arrays import Array
+from airground_drake.nsbc.avoidance import Avoidance, limit_speed
+from airground_drake.nsbc.team import Team
+from airground_drake.verify.engines import shortfalls as module
+from airground_drake.verify.engines.shortfalls import shortage, shortfalls
+
+ONE, HALF, GAIN = Fraction(1), Fraction(1, 2), Fraction(3, 40)
+D = 2.0
+
+
+def along_x(*places: float) -> Array:
+    return np.array([[x, 0.0, 0.0] for x in places])
+
+
+ROCK = np.zeros(3)
+
+
+@pytest.mark.parametrize(
+    ("places", "missed"),
+    [
+        ((2.0, 1.75), 0.25),  # a step of 0.25 m into the safe distance
+        ((2.0, 2.0), 0.0),
+        ((2.5, 2.0), 0.0),  # onto it
+        ((2.5, 1.9375), 0.0625),
+        ((1.0, 1.0), 0.075),  # no step back where A h times the deficit is due
+        ((1.0, 1.0625), 0.0125),
+        ((-1.0, -1.0625), 0.0125),
+        ((0.0, 1.0), 0.075 * 2.0 + 1.0),  # on the obstacle no direction leads away: more is not known
+        ((9.0, 8.0), 0.0),  # far
+    ],
+)
+def test_what_a_step_beside_an_obstacle_misses(places: tuple[float, float], missed: float) -> None:
+    (found,) = shortfalls(along_x(*places), ROCK, D, ONE, GAIN, ONE)
+    assert found == pytest.approx(missed, abs=1e-15)
+    assert (found == 0.0) == (missed == 0.0)
+
+
+def test_each_of_two_robots_is_asked_for_its_share() -> None:
+    still, near = along_x(2.5, 2.5), along_x(0.0, 0.75)  # together they may come 0.5 m nearer
+    assert shortfalls(still, near, D, HALF, GAIN, ONE).tolist() == [0.5]
+    assert shortfalls(still, near, D, Fraction(1, 4), GAIN, ONE).tolist() == [0.375]
+    assert shortfalls(along_x(2.5, 3.5), near, D, HALF, GAIN, ONE).tolist() == [0.5]  # the other's step is no help
+    assert shortfalls(along_x(2.5, 3.5), along_x(0.0, -1.0), D, HALF, GAIN, ONE).tolist() == [0.0]
+
+
+def test_robots_that_cannot_reach_each_other_are_asked_for_nothing() -> None:
+    fast, slow = along_x(3.0, 2.25), along_x(0.0, 0.0)
+    assert shortfalls(fast, slow, D, HALF, GAIN, ONE).tolist() == [0.0]
+    assert shortfalls(fast, along_x(0.0, 0.5), D, HALF, GAIN, ONE).tolist() == [0.25]
+
+
+def test_the_last_period_may_be_cut_short() -> None:
+    assert shortfalls(along_x(2.0, 2.0, 1.75), ROCK, D, ONE, GAIN, HALF).tolist() == [0.0, 0.5]
+    assert shortfalls(along_x(3.0, 2.5), ROCK, D, ONE, GAIN, HALF).tolist() == [0.0]
+    assert shortfalls(along_x(3.0, 2.375), ROCK, D, ONE, GAIN, HALF).tolist() == [0.25]
+
+
+def test_nothing_is_below_the_resolution() -> None:
+    tiny = 2.0 - 2.0**-52
+    assert shortfalls(along_x(2.0, tiny), ROCK, D, ONE, GAIN, ONE).tolist() == [2.0**-52]
+    assert shortage(np.array([tiny, 0.0, 0.0]), ROCK, D) == Fraction(2) ** -52
+    assert shortage(np.array([2.0, 0.0, 0.0]), ROCK, D) == 0
+    assert shortfalls(along_x(2.0, 2.0) + np.array([0.0, 1e-100, 0.0]), ROCK, D, ONE, GAIN, ONE).tolist() == [0.0]
+
+
+@given(seed=st.integers(0, 2**32 - 1), share=st.sampled_from([ONE, HALF]))
+def test_the_screen_hides_nothing(seed: int, share: Fraction) -> None:
+    rng = np.random.default_rng(seed)
+    size = 10.0 ** rng.uniform(-13.0, 0.5, (40, 1))
+    first = np.cumsum(rng.normal(0.0, 1.0, (40, 3)) * size, axis=0) + np.array([D, 0.0, 0.0])
+    second = np.zeros((40, 3)) if share == 1 else np.cumsum(rng.normal(0.0, 1.0, (40, 3)) * size, axis=0)
+    screened = shortfalls(first, second, D, share, GAIN, ONE)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "_doubtful", lambda first, *_: np.arange(len(first) - 1))
+        assert shortfalls(first, second, D, share, GAIN, ONE).tolist() == screened.tolist()
+
+
+ROUNDING_M = 2e-14
+"""Some roundings of coordinates of 10 m, each by 9e-16 m."""
+
+
+@given(seed=st.integers(0, 2**32 - 1), ugvs=st.integers(1, 4), rocks=st.integers(0, 4))
+def test_teams_under_the_running_law_miss_no_more_than_rounding(seed: int, ugvs: int, rocks: int) -> None:
+    """Whatever is asked of them: each sample of a team that starts safe meets its inequalities."""
+    rng, h = np.random.default_rng(seed), 0.05
+    grid = rng.permutation([[2.5 * x, 2.5 * y, 0.0] for x in range(4) for y in range(4)])
+    starts = np.concatenate([grid[:ugvs], grid[ugvs : ugvs + 1] + np.array([0.0, 0.0, 1.0])])
+    obstacles = grid[ugvs + 1 : ugvs + 1 + rocks]
+    team = Team(tuple(f"u{i}" for i in range(ugvs)), "uav", obstacles, 2.0, 1.5, 1.0, rng.uniform(0.5, 5.0, ugvs + 1))
+    avoidance = Avoidance(gain=float(rng.uniform(1.0, 20.0)), period=h, sensing_range=4.0)
+    around, rows = team.neighbourhood(slice(0, ugvs + 1)), [starts]
+    for _ in range(30):
+        spaces = avoidance.half_spaces(rows[-1], team.mobility, around.around(rows[-1]))
+        wish = limit_speed(rng.normal(0.0, 5.0, starts.shape) * team.mobility, team.max_speed)
+        rows.append(rows[-1] + h * avoidance.apply(wish, spaces))
+    paths = np.stack(rows, axis=1)
+    gain = Fraction(avoidance.gain) * Fraction(h)
+    for i, path in enumerate(paths):
+        for rock in obstacles:
+            assert shortfalls(path, rock, 2.0, ONE, gain, ONE).max() <= ROUNDING_M
+        for j in range(i):
+            d = 1.0 if i == ugvs else 1.5
+            assert shortfalls(path, paths[j], d, HALF, gain, ONE).max() <= ROUNDING_M

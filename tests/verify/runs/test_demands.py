@@ -1,0 +1,158 @@
+"""Controllers that were not built with what the scenario says: SAFE-HYP refutes the run, and says what differs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from airground_drake import components, simulation
+from airground_drake.arrays import Array
+from airground_drake.diagram import Model
+from airground_drake.nsbc.avoidance import Avoidance
+from airground_drake.nsbc.law import UgvLaw
+from airground_drake.nsbc.team import Neighbourhood, Team
+from airground_drake.scenarios.load import load
+from airground_drake.systems import controllers
+from airground_drake.trace import Trace
+from airground_drake.verify import verify
+
+Patch = Callable[[pytest.MonkeyPatch], None]
+
+
+def with_layer(**changed: Any) -> Patch:
+    right = components.make_avoidance
+    return lambda patch: patch.setattr(components, "make_avoidance", lambda *args: replace(right(*args), **changed))
+
+
+def with_law(**changed: Any) -> Patch:
+    right = components.make_law
+    return lambda patch: patch.setattr(components, "make_law", lambda *args: replace(right(*args), **changed))
+
+
+def with_neighbours(change: Callable[[Neighbourhood], Neighbourhood]) -> Patch:
+    right = Team.neighbourhood
+    return lambda patch: patch.setattr(Team, "neighbourhood", lambda self, rows: change(right(self, rows)))
+
+
+def with_team(change: Callable[[Team], Team]) -> Patch:
+    right = components.make_team
+    return lambda patch: patch.setattr(components, "make_team", lambda scenario: change(right(scenario)))
+
+
+def as_space(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(Team, "mobility", property(lambda self: np.ones((len(self.robots), 3))))
+
+
+def at_half_the_rate(patch: pytest.MonkeyPatch) -> None:
+    class Slow(controllers.UgvController):
+        def __init__(self, team: Team, law: UgvLaw) -> None:
+            slow = replace(law.avoidance, period=2.0 * law.avoidance.period)
+            super().__init__(team, replace(law, avoidance=slow))
+            self.law, self.avoidance = law, law.avoidance
+
+    patch.setattr("airground_drake.diagram.UgvController", Slow)
+
+
+def without_a_layer(patch: pytest.MonkeyPatch) -> None:
+    class Blind(controllers.UavController):
+        def __init__(self, team: Team, avoidance: Avoidance, **given: Any) -> None:
+            super().__init__(team, replace(avoidance, sensing_range=0.0), **given)
+
+    patch.setattr("airground_drake.diagram.UavController", Blind)
+
+
+def times(factor: float, which: Callable[[Array], Array]) -> Callable[[Neighbourhood], Neighbourhood]:
+    """Some of the safe distances, by their shares, times a factor."""
+    return lambda given: replace(given, distance=np.where(which(given.share), factor, 1.0) * given.distance)
+
+
+MUTANTS: dict[str, tuple[Patch, str]] = {
+    "all safe distances x 0.9": (with_neighbours(times(0.9, lambda share: share > 0.0)), "safe_m"),
+    "distances to obstacles x 0.9": (with_neighbours(times(0.9, lambda share: share == 1.0)), "safe_m"),
+    "distances of robots x 1.000001": (with_neighbours(times(1.000001, lambda share: share < 1.0)), "safe_m"),
+    "share 0.4": (with_neighbours(lambda g: replace(g, share=np.where(g.share < 1.0, 0.4, g.share))), "share"),
+    "obstacles that are not there": (with_neighbours(lambda g: replace(g, obstacles=g.obstacles + 0.1)), "obstacles_m"),
+    "others in another order": (with_neighbours(lambda g: replace(g, others=g.others[:, ::-1])), "others"),
+    "gain": (with_layer(gain=2.9), "gain_1_s"),
+    "period": (with_layer(period=0.1), "sampling_s"),
+    "range": (with_layer(sensing_range=3.9), "sensing_range_m"),
+    "composition": (with_law(avoidance=Avoidance(3.0, 0.05, 4.0, "recursion_nearest")), "composition"),
+    "mobility": (as_space, "mobility"),
+    "speed limit": (with_team(lambda team: replace(team, max_speed=1.1 * team.max_speed)), "max_speed_m_s"),
+    "intervention on top": (with_law(intervention_on_top=True), "intervention_on_top"),
+    "sampling": (at_half_the_rate, "sampling_s"),
+    "UAV that senses nothing": (without_a_layer, "sensing_range_m"),
+}
+
+
+def judged(patch: pytest.MonkeyPatch, mutate: Patch, scenario: str) -> dict[str, Any]:
+    """What SAFE-HYP finds different in a run of the scenario."""
+    mutate(patch)
+    trace = simulation.simulate(load(scenario, ["duration_s=1.0"])[0], "d")
+    (verdict,) = verify(trace, ["SAFE-HYP"])
+    assert verdict.finding.status == "refuted", verdict.finding
+    assert verdict.finding.counterexample is not None
+    return {each["parameter"]: each for each in verdict.finding.evidence["different_parameters"]}
+
+
+@pytest.mark.parametrize("name", MUTANTS)
+def test_a_controller_that_was_built_otherwise_is_refuted(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    mutate, parameter = MUTANTS[name]
+    found = judged(monkeypatch, mutate, "case_a")
+    assert parameter in found
+    assert found[parameter]["built"] != found[parameter]["scenario"]
+
+
+def test_the_robot_and_what_it_avoids_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    right = Team.pair_distance
+
+    def wrong(self: Team) -> Array:
+        found = right(self)
+        found[0, 1] *= 0.9
+        return found
+
+    found = judged(monkeypatch, lambda patch: patch.setattr(Team, "pair_distance", wrong), "case_b")
+    assert found == {
+        "safe_m": {
+            "controller": "ugv_controller", "parameter": "safe_m", "robot": "ugv1", "other": "ugv2", "built": 1.8,
+            "scenario": 2.0,
+        }
+    }  # fmt: skip
+
+
+def test_shorter_distances_between_robots_are_refuted_in_every_run_of_case_b(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In these runs no robots come near each other, so that no distance betrays it."""
+    right = Team.pair_distance
+    monkeypatch.setattr(Team, "pair_distance", lambda self: 0.9 * right(self))
+    scenario = load("case_b")[0]
+    for run in scenario.runs:
+        verdict = {
+            each.claim.id: each for each in verify(simulation.simulate(scenario, run), ["SAFE-TRACE", "SAFE-HYP"])
+        }
+        assert verdict["SAFE-HYP"].finding.status == "refuted"
+        assert verdict["SAFE-HYP"].finding.evidence["different_parameters"]
+        assert verdict["SAFE-TRACE"].as_expected
+
+
+def test_a_trace_without_the_parameters_is_no_pass() -> None:
+    trace = simulation.simulate(load("case_a", ["duration_s=1.0"])[0], "d")
+    without = Trace({k: v for k, v in trace.meta.items() if k != "controllers"}, trace.signals, trace.decisions)
+    assert verify(without, ["SAFE-HYP"])[0].finding.status == "error"
+
+
+def test_they_are_read_from_the_controllers_in_the_diagram(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whoever changes the system after it was built is found out, too."""
+    right = simulation.build_model
+
+    def wrong(*args: Any) -> Model:
+        model = right(*args)
+        controller = model.diagram.GetSubsystemByName("ugvs").GetSubsystemByName("ugv_controller")
+        controller._max_speed = 2.0 * controller._max_speed
+        return model
+
+    monkeypatch.setattr(simulation, "build_model", wrong)
+    assert list(judged(monkeypatch, lambda _: None, "case_a")) == ["max_speed_m_s"]
