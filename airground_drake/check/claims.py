@@ -42,13 +42,10 @@ WITH_OUTCOMES: Mapping[str, OfRun] = {
 }
 OF_MODEL: Mapping[str, OfModel] = {
     **dict.fromkeys(HYPOTHESES, theorem),
-    "LIVE-GATE": lambda claim, scenario: Found(claim["status"], claim["margin"], claim["margin"]).counted(
-        claim["exercised"]
-    ),
     "THR-DDM": ddm,
     "ZENO-REFINE": refine,
 }
-"""LIVE-GATE is taken as recorded: `airground verify` judges it."""
+"""The claims about the model."""
 STATISTICAL = ("THR-DDM", "ZENO-REFINE")
 """Claims that are supported; the others about the model are proved."""
 KNOWN = {*EVERY_RUN, *WITH_MESSAGES, *WITH_GATEKEEPER, *WITH_OUTCOMES, *OF_MODEL}

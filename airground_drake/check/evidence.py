@@ -39,10 +39,9 @@ AS_RECORDED: Mapping[str, tuple[str, ...]] = {
     "GATE-OPT": ("evidence.first_stage_certified",),
     "SAFE-HYP": ("evidence.pairs_in_reach", "evidence.different_parameters"),
     **dict.fromkeys(
-        ("SAFE-LEMMA", "SAFE-INV", "SAFE-GATE", "SAFE-DIST", "ZENO-PROOF", "LIVE-WAIT", "THR-ISO"),
+        ("SAFE-LEMMA", "SAFE-INV", "SAFE-GATE", "SAFE-DIST", "ZENO-PROOF", "LIVE-GATE", "LIVE-WAIT", "THR-ISO"),
         _OF_A_THEOREM,
     ),
-    "LIVE-GATE": ("evidence", "where"),
     "THR-ROOT": (*_OF_A_THEOREM, "evidence.enclosures", "evidence.computed_threshold_m"),
     "THR-OPT": (
         *_OF_A_THEOREM, "evidence.enclosures", "evidence.optimal_for_drifts_m_s", "evidence.threshold_in_force_m",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from .files import Json
-from .scenario import apart_m, disturbance_m_s, kinds_of, levels_of, threshold_m
+from .scenario import disturbance_m_s, kinds_of, levels_of, threshold_m
 
 
 def inputs_of(claim: str, scenario: Json) -> Json:
@@ -45,20 +45,7 @@ def _patience(scenario: Json) -> Json:
 
 def _tracking(scenario: Json) -> Json:
     control = scenario["control"]
-    names = ("intervention_gain_1_s", "motion_gain_1_s", "avoidance_gain_1_s", "sensing_range_m")
-    return {
-        **{name: control[name] for name in names},
-        "control_period_s": control["period_s"],
-        "max_speed_m_s": max(float(ugv["max_speed_m_s"]) for ugv in scenario["ugvs"].values()),
-        "obstacle_m": _widest_m(scenario),
-    }
-
-
-def _widest_m(scenario: Json) -> float:
-    """The largest distance that a UGV has to keep from an obstacle."""
-    of_ugvs = max(float(ugv["radius_m"]) for ugv in scenario["ugvs"].values())
-    of_obstacles = max((float(obstacle["radius_m"]) for obstacle in scenario["obstacles"].values()), default=0.0)
-    return apart_m(scenario, "obstacle_m", {"radius_m": of_ugvs}, {"radius_m": of_obstacles})
+    return {"intervention_gain_1_s": control["intervention_gain_1_s"], "control_period_s": control["period_s"]}
 
 
 def _avoidance(scenario: Json) -> Json:

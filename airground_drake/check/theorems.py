@@ -71,6 +71,9 @@ def _with_numbers(found: Found, claim: Json, scenario: Json) -> Found:
             most = int(rational(scenario["duration_s"]) // dwell) + 1 if dwell > 0 else None
             bound = float(scenario["decision"]["min_inter_event_s"] or SHORTEST_S)
             return found.also(bound_s=bound, most_triggers=most)
+        case "LIVE-GATE":
+            gain, lag = scenario["control"]["intervention_gain_1_s"], scenario["gatekeeper"]["lag_m"]
+            return found.also(disturbance_m_s=float(rational(gain) * rational(lag)))
         case "LIVE-WAIT":
             gate = scenario["gatekeeper"]
             bound = float(gate["tries"] * (rational(gate["longest_s"]) + rational(gate["period_s"])))
@@ -133,6 +136,13 @@ def _patient(claim: Json, scenario: Json) -> list[Margin]:
     return [Margin(longest, strict=True, own=True), Margin(period, strict=True), Margin(behind)]
 
 
+def _followed(claim: Json, scenario: Json) -> list[Margin]:
+    gain, period = (rational(scenario["control"][name]) for name in ("intervention_gain_1_s", "period_s"))
+    lag, behind = (rational(scenario["gatekeeper"][name]) for name in ("lag_m", "behind_s"))
+    positive = [Margin(value, strict=True) for value in (period, lag, behind)]
+    return [Margin(1 - gain * period, own=True), Margin(gain), *positive]
+
+
 def _root(claim: Json, scenario: Json) -> list[Margin]:
     """The constants are positive; the recorded enclosures have the root of (19) between them, and the threshold."""
     rule = scenario["decision"]["threshold"]
@@ -186,6 +196,7 @@ HYPOTHESES: Mapping[str, Callable[[Json, Json], list[Margin]]] = {
     "ZENO-PROOF": _zeno,
     "THR-ISO": _isolated,
     "LIVE-WAIT": _patient,
+    "LIVE-GATE": _followed,
     "THR-ROOT": _root,
     "THR-OPT": _root,
 }

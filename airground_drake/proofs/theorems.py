@@ -130,6 +130,13 @@ _ALL = (
         ("LIVE-GATE",),
     ),
     Theorem(
+        "Gate.tracking_bounded",
+        "A tracking error stays within b, where b' = (1 - g h) b + h |w| adds up what is left of the disturbances.",
+        "(14)",
+        ("g h is at most 1.", "The error obeys e' = (1 - g h) e + h w."),
+        ("LIVE-GATE",),
+    ),
+    Theorem(
         "Gate.room",
         "With enough room no inequality restricts the command.",
         "ours",

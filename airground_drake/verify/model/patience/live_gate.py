@@ -1,27 +1,20 @@
-"""LIVE-GATE: an accepted intervention that goes as predicted is never given back, and ends in time.
+"""LIVE-GATE: an accepted intervention that goes as predicted is never given back, and ends in time (proofs/Gate.v).
 
-The tracking error between prediction and run is a contraction with an input; obligations in `tracking_obligations`,
-the running gatekeeper and the running control law in `tracking_runs`. Certificates: `obligations.json` and an SMT-LIB
-script for each obligation.
+The difference e between run and prediction obeys e' = (1 - Lambda h) e + h w: w is what else moves the UGV in the run,
+less what does in the prediction.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from fractions import Fraction
 from typing import Any
 
-from airground_drake.components import make_law, make_patience
-from airground_drake.gatekeeper.patience import Patience
-from airground_drake.registry import METHODS
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.verify.claim import ModelClaim
-from airground_drake.verify.engines.prover import LIMIT_S, discharge, finding, proved_again
-from airground_drake.verify.finding import Finding
-from airground_drake.verify.model.patience.tracking_obligations import Tracking, obligations
-from airground_drake.verify.model.patience.tracking_runs import runs
+from airground_drake.verify.model.patience.live_wait import LiveWait
+from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim, decimal
 
 
-class LiveGate(ModelClaim):
+class LiveGate(TheoremClaim):
     """LIVE-GATE."""
 
     id = "LIVE-GATE"
@@ -50,14 +43,11 @@ class LiveGate(ModelClaim):
         r"than } t_0 + \tau_{\text{longest}}",
     )
     method = (
-        "Where the intervention has every direction of the plane, the difference e between run and prediction obeys "
-        "e' = (1 - Lambda h) e + h w, w what else moves the UGV in the run, less what does in the prediction: e is "
-        "bounded by b. Within a ball of radius lag_m, with room, no avoidance inequality can bind, so that both are "
-        "the same law. Polynomial implications with exact certificates, z3 and cvc5; what is late and what is over is "
-        "read off the running `Patience`. The running gatekeeper and the running control law are run on random ways "
-        "with room, disturbed by the most that is allowed: nothing may be given back. The report counts how many "
-        "accepted interventions of its runs under (d) met the premise, from acceptance until they were given back or "
-        "withdrawn."
+        "Theorems in Coq: the difference stays within b; where w is at most Lambda lag_m, b stays within lag_m; with "
+        "room no inequality binds, so that run and prediction follow the same law. Checked here: the gain times the "
+        "control period is at most 1, and the lag allowed is above 0. The report counts how many accepted "
+        "interventions of its runs under (d) met the premise, from acceptance until they were given back or withdrawn. "
+        "Tests disturb the running gatekeeper and control law by the most that is allowed."
     )
     equations = "(14), (20)"
     assumptions = (
@@ -68,6 +58,8 @@ class LiveGate(ModelClaim):
         "b <= lag_m: what avoidance and the speed limit change of the command in the run (other robots where they are) "
         "differs little from what they change in the prediction (other robots where they are predicted). So does the "
         "rate of the motion from that of the motion sampled every period (the same but at its corners).",
+        "A UGV that is on time at every sample is never late: `Patience` gives back only what has been behind for "
+        "longer than behind_s.",
         "The UAV does not withdraw the proposal. Rounding is not counted.",
     )
     does_not_establish = (
@@ -75,55 +67,27 @@ class LiveGate(ModelClaim):
         "LIVE-PROG says what came of it, and LIVE-WAIT bounds the time."
     )
 
-    exercised_by = "obligations of the proof"
+    theorems = ("Gate.tracking_bounded", "Gate.tracking_contracts", "Gate.room")
+    margin_of = "1 less gain times period"
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
-        """Gains, period, speed limits and the running patience's numbers."""
-        law, patience = make_law(scenario, METHODS["d"]), make_patience(scenario)
-        return {
-            "intervention_gain_1_s": float(law.intervention_gain),
-            "motion_gain_1_s": float(law.motion_gain),
-            "avoidance_gain_1_s": float(law.avoidance.gain),
-            "control_period_s": float(law.avoidance.period),
-            "sensing_range_m": float(law.avoidance.sensing_range),
-            "period_s": float(scenario.gatekeeper.period_s),
-            "max_speed_m_s": max(float(ugv.max_speed_m_s) for ugv in scenario.ugvs.values()),
-            "obstacle_m": _widest_m(scenario),
-            "tries": int(patience.most),
-            "rest_s": float(patience.rest),
-            "longest_s": float(patience.longest),
-            "lag_m": float(patience.lag),
-            "behind_s": float(patience.behind),
-        }
+        """The gain of an intervention, the control period, and the numbers of a UGV's patience."""
+        control = scenario.control
+        gains = {"intervention_gain_1_s": control.intervention_gain_1_s, "control_period_s": control.period_s}
+        return {**{name: float(value) for name, value in gains.items()}, **LiveWait().inputs(scenario)}
 
-    def check(self, inputs: dict[str, Any]) -> Finding:
-        """Prove, and run."""
-        return judge(Tracking(), Patience, inputs)
+    def hypotheses(self, inputs: dict[str, Any]) -> list[Hypothesis]:
+        """Lambda h is at most 1; lag and time behind are above 0."""
+        gain, h = decimal(inputs["intervention_gain_1_s"]), decimal(inputs["control_period_s"])
+        lag, behind = decimal(inputs["lag_m"]), decimal(inputs["behind_s"])
+        return [
+            Hypothesis(self.margin_of, f"Lambda h = {float(gain * h):g} is at most 1", Fraction(1) - gain * h),
+            Hypothesis("gain", "the gain Lambda is not negative", gain, "1/s"),
+            Hypothesis("period", "the control period is above 0", h, "s", strict=True),
+            Hypothesis("lag allowed", "the lag allowed is above 0", lag, "m", strict=True),
+            Hypothesis("time behind", "the time for which a UGV may be behind is above 0", behind, "s", strict=True),
+        ]
 
-    def takes(self, inputs: dict[str, Any], finding: Finding) -> bool:
-        """The obligations once more, by expansion."""
-        return proved_again(finding, obligations(Tracking(), Patience))
-
-
-def _widest_m(scenario: Scenario) -> float:
-    """The largest distance that the centre of a UGV has to keep from that of an obstacle, m."""
-    of_ugvs = max(ugv.radius_m for ugv in scenario.ugvs.values())
-    of_obstacles = max((obstacle.radius_m for obstacle in scenario.obstacles.values()), default=0.0)
-    return float(scenario.safe_distance.obstacle_m + (of_ugvs + of_obstacles))
-
-
-def judge(tracking: Tracking, kind: type[Patience], inputs: dict[str, Any]) -> Finding:
-    """The finding for a kind of tracking and of patience."""
-    patience = kind(*(inputs[name] for name in ("tries", "rest_s", "longest_s", "lag_m", "behind_s")))
-    found = finding(discharge(obligations(tracking, kind), LIMIT_S))
-    ran = runs(patience, inputs)
-    evidence = {**found.evidence, "disturbance_m_s": inputs["intervention_gain_1_s"] * inputs["lag_m"], "runs": ran}
-    given_back = [row for row in ran if row["given_back"]]
-    if found.status != "proved":
-        return replace(found, evidence=evidence)
-    if given_back or inputs["intervention_gain_1_s"] * inputs["control_period_s"] > 1.0:
-        return replace(found, status="error", evidence=evidence)  # the running code is not what was proved
-    return replace(
-        found, evidence=evidence, margin=inputs["lag_m"] - max(row["largest_excess_m"] for row in ran), unit="m",
-        quantity="lag allowed above the predicted one, less the largest that a disturbed run had",
-    )  # fmt: skip
+    def numbers(self, inputs: dict[str, Any]) -> dict[str, Any]:
+        """The disturbance, m/s, under which b stays within the lag allowed."""
+        return {"disturbance_m_s": float(decimal(inputs["intervention_gain_1_s"]) * decimal(inputs["lag_m"]))}

@@ -1,10 +1,11 @@
-"""The running gatekeeper and control law on random ways with room, disturbed by the most that is allowed."""
+"""The running gatekeeper and control law on ways with room, disturbed by the most that LIVE-GATE allows."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
+import pytest
 
 from airground_drake.gatekeeper.answer import Foreseen
 from airground_drake.gatekeeper.certified import CertifiedGatekeepers
@@ -17,7 +18,9 @@ from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.law import UgvLaw
 from airground_drake.nsbc.motion import Motion
 from airground_drake.nsbc.team import Team
+from airground_drake.scenarios.load import load
 from airground_drake.systems.controllers import UgvController
+from airground_drake.verify.model.patience.live_gate import LiveGate
 
 RUNS = 4
 LEGS = 3
@@ -81,3 +84,72 @@ def _run(rng: np.random.Generator, patience: Patience, inputs: dict[str, Any]) -
         place = place + h * (velocity + push)
     ended = over >= motion.end - 1e-9 and memory.decisions[-1].reason == "over"
     return {"samples": samples, "given_back": not ended, "largest_excess_m": excess, "over_after_s": over}
+
+
+def of_case_b() -> dict[str, Any]:
+    scenario = load("case_b")[0]
+    control = scenario.control
+    return {
+        **LiveGate().inputs(scenario),
+        "motion_gain_1_s": control.motion_gain_1_s,
+        "avoidance_gain_1_s": control.avoidance_gain_1_s,
+        "sensing_range_m": control.sensing_range_m,
+        "max_speed_m_s": max(ugv.max_speed_m_s for ugv in scenario.ugvs.values()),
+        "obstacle_m": scenario.safe_distance.obstacle_m,
+    }
+
+
+def patience_of(kind: type[Patience], inputs: dict[str, Any]) -> Patience:
+    return kind(*(inputs[name] for name in ("tries", "rest_s", "longest_s", "lag_m", "behind_s")))
+
+
+def test_nothing_is_given_back_and_the_lag_stays_within_the_one_allowed() -> None:
+    inputs = of_case_b()
+    for row in runs(patience_of(Patience, inputs), inputs):
+        assert not row["given_back"]
+        assert 0.0 < row["largest_excess_m"] <= inputs["lag_m"]
+
+
+class LateAtOnce(Patience):
+    """Late whenever it is asked."""
+
+    def late(self, on_time: float, t: float) -> bool:
+        return t - on_time > -self.behind
+
+
+def test_a_run_that_is_given_back_early_is_noticed() -> None:
+    inputs = of_case_b()
+    assert all(row["given_back"] for row in runs(patience_of(LateAtOnce, inputs), inputs))
+
+
+@pytest.mark.parametrize(
+    ("selection", "kept"), [([[1.0, 1.0, 0.0], [1.0, -1.0, 0.0]], True), ([[1.0, 0.0, 0.0]], False)]
+)
+def test_a_direction_that_is_left_to_the_own_task_may_cost_the_room(selection: list[list[float]], kept: bool) -> None:
+    """Past the end of a wall with room, pushed to where the wall is: only Lambda is strong enough to hold the UGV."""
+    patience, h, limit, d = Patience(5, 5.0, 30.0, 0.5, 2.0), 0.025, 5.0, 1.0
+    room = limit * h + patience.lag + 0.1
+    stands = np.column_stack([np.full(8, 8.0), d + room + 0.8 * np.arange(8.0), np.zeros(8)])
+    team = Team(("ugv",), "uav", stands, d, 1.0, 1.0, np.array([limit, 1.0]))
+    law = UgvLaw(Avoidance(1.0, h, 20.0), motion_gain=0.1, intervention_gain=1.0, intervention_on_top=False)
+    preset = Motion(np.zeros(1), np.zeros((1, 3)))
+    gatekeepers = Stalled(team, law, [preset], Outlook(patience.longest), patience)
+    controller, at = UgvController(team, law), np.zeros((1, 3))
+    motion = Motion(np.array([0.0, 20.0]), np.array([[0.0, 0.0, 0.0], [10.0, 0.0, 0.0]]))
+    proposal = Proposal("way", 0.0, motion, selection=np.array(selection))
+    memory, place, push = Memory.empty(1), np.zeros(3), np.array([0.0, 0.99 * patience.lag, 0.0])
+    for k in range(round(motion.end / h) + 1):
+        positions = np.stack([place, FAR])
+        if k % 2 == 0:
+            memory = gatekeepers.sample(k * h, (proposal,), positions, np.zeros((2, 3)), memory)
+        accepted = [proposal if memory.answers[0] == ACCEPT else None]
+        velocity = controller.velocity(k * h, positions, at, at, accepted)[0]
+        place = place + h * (velocity + push)
+    first = memory.decisions[0].grounds
+    assert isinstance(first, Foreseen)
+    assert first.accept is not None
+    along = first.accept.positions[: round(motion.end / h)]
+    assert np.linalg.norm(along[:, None] - stands, axis=2).min() >= d + limit * h + patience.lag
+    reasons = [decision.reason for decision in memory.decisions]
+    assert ("no_progress" in reasons) != kept
+    assert ("over" in reasons) == kept
