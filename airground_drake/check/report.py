@@ -83,7 +83,7 @@ def _is_shaped_like_a_report(report: Any) -> None:
     """Objects are objects, lists are lists of objects."""
     if not isinstance(report, dict):
         raise NotEstablished("it is a report", f"it is a {type(report).__name__}", "report.json")
-    if isinstance(report, dict) and ("mutants" in report or report.get("schema") in EARLIER):
+    if "mutants" in report or report.get("schema") in EARLIER:
         why = "it is by an earlier version: make the report again (docs/migration.md)"
         raise NotEstablished("it is a report of this version", why, "report.json")
     for key in ("scenario", "provenance", "overall", "runs", "files"):

@@ -45,14 +45,14 @@ Proof.
   eapply Rle_trans; [apply triangle |]; rewrite !norm_scale by lra; specialize (W k); nra.
 Qed.
 
-(** ** What moves a body apart from its prediction is bounded by a sum in which older disturbances [w] count less. *)
+(** ** Whatever the disturbance is, the error stays within the bound [b] that adds up what is left of it. *)
 Theorem tracking_bounded (g h : R) (e w : nat -> vec) (b : nat -> R) : 0 <= h -> g * h <= 1 ->
   (forall k, e (S k) = add (scale (1 - g * h) (e k)) (scale h (w k))) ->
-  (forall k, (1 - g * h) * b k + h * norm (w k) <= b (S k)) -> norm (e 0%nat) <= b 0%nat ->
+  (forall k, b (S k) = (1 - g * h) * b k + h * norm (w k)) -> norm (e 0%nat) <= b 0%nat ->
   forall k, norm (e k) <= b k.
 Proof.
-  intros H C S B E0 k; induction k as [| k IH]; [exact E0 |]; rewrite S.
-  eapply Rle_trans; [apply triangle |]; rewrite !norm_scale by lra; specialize (B k); nra.
+  intros H C S B E0 k; induction k as [| k IH]; [exact E0 |]; rewrite S, B.
+  eapply Rle_trans; [apply triangle |]; rewrite !norm_scale by lra; nra.
 Qed.
 
 (** ** With enough room no inequality restricts the command [v]: [D >= d + v h] beside an obstacle (share [q] = 1),

@@ -6,7 +6,7 @@ optimiser whose work they judge; proofs take their constants from the scenario a
 them, or read a relation off the running code.
 
 `claim.py` says what a claim is, `registry.py` which there are; `runs/` has those about a trace and `model/` those about
-the model, one claim in one file, named by its identifier; `engines/` proves and knows no claim.
+the model, one claim in one file, named by its identifier; `engines/` computes and knows no claim.
 """
 
 from __future__ import annotations

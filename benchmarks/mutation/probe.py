@@ -129,7 +129,7 @@ def report(names: list[str]) -> Findings:
 
 OTHERS = (
     "cvxpy", "flint", "jinja2", "matplotlib", "numba", "pandas", "pyarrow.parquet", "pydrake.all", "scipy.optimize",
-    "sympy", "yaml", "z3",
+    "yaml",
 )  # fmt: skip
 """Packages that every child needs."""
 LONGEST_CPU_S, MOST_BYTES = 300, 12 << 30

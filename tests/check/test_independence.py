@@ -17,8 +17,8 @@ import runpy, sys
 
 ALLOWED = "airground_drake.check"
 REFUSED = {
-    "pydrake", "scipy", "sympy", "flint", "z3", "cvc5", "cvxpy", "clarabel", "osqp", "numba", "matplotlib", "jinja2",
-    "pygraphviz", "rtamt", "pyddm", "yaml",
+    "pydrake", "scipy", "flint", "cvxpy", "clarabel", "osqp", "numba", "matplotlib", "jinja2",
+    "pygraphviz", "pyddm", "yaml",
 }
 
 class Refuses:

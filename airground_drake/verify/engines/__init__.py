@@ -1,7 +1,5 @@
-"""What proves and computes, and knows no claim.
+"""What computes for claims, and knows none.
 
-`obligation.py` implications between polynomial inequalities with certificates, `rewriting.py` made from others,
-`prover.py` proved in three ways, `smt.py` solvers in processes of their own; `ball_arithmetic.py` signs of elementary
-functions; `symbolic_execution.py` code run on symbols; `rounding.py` vectors in binary64; `segments.py` exact geometry
-of straight motion.
+`segments.py` exact geometry of straight motion, `boxes.py` what comes near at all, `shortfalls.py` what pairs miss of
+their inequalities, exactly; `signs.py` signs of (16)-(19) in ball arithmetic.
 """

@@ -42,8 +42,8 @@ class SafeDist(TheoremClaim):
         "The disturbance may change at any time, but is bounded by w in every direction (for a UGV: in its plane).",
         "Inside a safe distance v = 0 is not feasible, and the inequalities of several points can contradict each "
         "other; the layer then takes the least violation. So: one violated inequality at a time, or a common direction "
-        "g as in the statement. A UGV straight under the UAV has no such direction; that the UAV's half suffices there "
-        "rests on disturbed runs in tests, not on a theorem.",
+        "g as in the statement. A UGV straight under the UAV has no such direction; there its disturbance does not "
+        "count either, and the UAV's half suffices (`Gate.overhead`).",
         "w is 10 % of the largest speed limit, but at most A/4 times the smallest safe distance, so that at least half "
         "of it is left. It is a choice, not a property of a robot.",
         "Positions are measured exactly and without delay.",
@@ -57,7 +57,7 @@ class SafeDist(TheoremClaim):
         "layer's velocities there are not limited."
     )
 
-    theorems = ("Safety.disturbed", "Gate.deficit_closed_form", "Gate.common_direction")
+    theorems = ("Safety.disturbed", "Gate.deficit_closed_form", "Gate.common_direction", "Gate.overhead")
     margin_of = "distance that is left, d - W/A"
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:

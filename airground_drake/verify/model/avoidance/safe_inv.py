@@ -57,7 +57,14 @@ class SafeInv(TheoremClaim):
         "inequalities. That the program computes these inequalities is for tests and SAFE-HYP to show."
     )
 
-    theorems = ("Safety.safe_always", "Safety.recovers", "Safety.obstacle", "Safety.unseen", "Safety.standing")
+    theorems = (
+        "Safety.safe_always",
+        "Safety.recovers",
+        "Safety.obstacle",
+        "Safety.unseen",
+        "Safety.standing",
+        "Safety.capped",
+    )
     margin_of = "sensing range less d + c h"
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
@@ -71,7 +78,7 @@ class SafeInv(TheoremClaim):
         found = stable(gain, h)
         found += [
             Hypothesis(
-                "share that is missing",
+                "share that is missing to 1",
                 f"{kind}: the shares of both bodies add up to 1",
                 -abs(sum(SHARES[kind], Fraction(-1))),
             )

@@ -1,10 +1,16 @@
-"""LIVE-GATE: an accepted intervention that goes as predicted is never given back, and ends in time."""
+"""LIVE-GATE: an accepted intervention that goes as predicted is never given back, and ends in time (proofs/Gate.v).
+
+The difference e between run and prediction obeys e' = (1 - Lambda h) e + h w: w is what else moves the UGV in the run,
+less what does in the prediction.
+"""
 
 from __future__ import annotations
 
+from fractions import Fraction
 from typing import Any
 
 from airground_drake.scenarios.schema import Scenario
+from airground_drake.verify.model.patience.live_wait import LiveWait
 from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim, decimal
 
 
@@ -37,11 +43,11 @@ class LiveGate(TheoremClaim):
         r"than } t_0 + \tau_{\text{longest}}",
     )
     method = (
-        "Theorems: where the intervention has every direction of the plane, the difference e between run and "
-        "prediction obeys e' = (1 - Lambda h) e + h w, w what else moves the UGV in the run, less what does in the "
-        "prediction, so that e is bounded by b. With room, no avoidance inequality binds, and both are the same law. "
-        "The report counts how many accepted interventions of its runs under (d) met the premise, from acceptance "
-        "until they were given back or withdrawn."
+        "Theorems in Coq: the difference stays within b; where w is at most Lambda lag_m, b stays within lag_m; with "
+        "room no inequality binds, so that run and prediction follow the same law. Checked here: the gain times the "
+        "control period is at most 1, and the lag allowed is above 0. The report counts how many accepted "
+        "interventions of its runs under (d) met the premise, from acceptance until they were given back or withdrawn. "
+        "Tests disturb the running gatekeeper and control law by the most that is allowed."
     )
     equations = "(14), (20)"
     assumptions = (
@@ -52,6 +58,8 @@ class LiveGate(TheoremClaim):
         "b <= lag_m: what avoidance and the speed limit change of the command in the run (other robots where they are) "
         "differs little from what they change in the prediction (other robots where they are predicted). So does the "
         "rate of the motion from that of the motion sampled every period (the same but at its corners).",
+        "A UGV that is on time at every sample is never late: `Patience` gives back only what has been behind for "
+        "longer than behind_s.",
         "The UAV does not withdraw the proposal. Rounding is not counted.",
     )
     does_not_establish = (
@@ -60,27 +68,26 @@ class LiveGate(TheoremClaim):
     )
 
     theorems = ("Gate.tracking_bounded", "Gate.tracking_contracts", "Gate.room")
-    margin_of = "1 - Lambda h"
+    margin_of = "1 less gain times period"
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
-        """The gain of the intervention, 1/s, the control period, s, and the lag that is tolerated, m."""
+        """The gain of an intervention, the control period, and the numbers of a UGV's patience."""
         control = scenario.control
-        return {
-            "intervention_gain_1_s": float(control.intervention_gain_1_s),
-            "control_period_s": float(control.period_s),
-            "lag_m": float(scenario.gatekeeper.lag_m),
-        }
+        gains = {"intervention_gain_1_s": control.intervention_gain_1_s, "control_period_s": control.period_s}
+        return {**{name: float(value) for name, value in gains.items()}, **LiveWait().inputs(scenario)}
 
     def hypotheses(self, inputs: dict[str, Any]) -> list[Hypothesis]:
-        """The tracking error contracts."""
+        """Lambda h is at most 1; lag and time behind are above 0."""
         gain, h = decimal(inputs["intervention_gain_1_s"]), decimal(inputs["control_period_s"])
+        lag, behind = decimal(inputs["lag_m"]), decimal(inputs["behind_s"])
         return [
-            Hypothesis(self.margin_of, f"Lambda h = {float(gain * h):g} is at most 1", 1 - gain * h),
-            Hypothesis("Lambda", "the gain Lambda is not negative", gain, "1/s"),
-            Hypothesis("h", "the control period h is above 0", h, "s", strict=True),
+            Hypothesis(self.margin_of, f"Lambda h = {float(gain * h):g} is at most 1", Fraction(1) - gain * h),
+            Hypothesis("gain", "the gain Lambda is not negative", gain, "1/s"),
+            Hypothesis("period", "the control period is above 0", h, "s", strict=True),
+            Hypothesis("lag allowed", "the lag allowed is above 0", lag, "m", strict=True),
+            Hypothesis("time behind", "the time for which a UGV may be behind is above 0", behind, "s", strict=True),
         ]
 
     def numbers(self, inputs: dict[str, Any]) -> dict[str, Any]:
-        """The disturbance that may last, m/s."""
-        gain, lag = decimal(inputs["intervention_gain_1_s"]), decimal(inputs["lag_m"])
-        return {"disturbance_m_s": float(gain * lag)}
+        """The disturbance, m/s, under which b stays within the lag allowed."""
+        return {"disturbance_m_s": float(decimal(inputs["intervention_gain_1_s"]) * decimal(inputs["lag_m"]))}

@@ -34,8 +34,8 @@ class ThrOpt(TheoremClaim):
     )
     method = (
         "Theorems in Coq. Checked here, by signs in ball arithmetic: where both roots are, and by how much the risk at "
-        "the printed root is higher at least. The drifts for which the threshold in force solves the equation are "
-        "enclosed, too; that there are no others rests on the shape of (sinh u + u)/u^2, not on a theorem."
+        "the printed root is higher at least. The drifts for which the threshold in force solves the equation, at most "
+        "two, are enclosed, too."
     )
     equations = "(16)-(19)"
     assumptions = (
@@ -47,7 +47,12 @@ class ThrOpt(TheoremClaim):
         "minimises the risk with an initial deviation. For c1 = c2 the printed equation has the same root."
     )
 
-    theorems = ("Threshold.least", "Threshold.printed_is_worse", "Threshold.not_least_with_deviation")
+    theorems = (
+        "Threshold.least",
+        "Threshold.printed_is_worse",
+        "Threshold.not_least_with_deviation",
+        "Threshold.at_most_two_drifts",
+    )
     margin_of = "risk at the printed form's root above that at the minimiser"
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
@@ -95,7 +100,7 @@ def _drifts(rule: Rule, zeta: Fraction) -> list[list[float]]:
     """Enclosures of the drifts, m/s, for which zeta, m, solves the equation: two, or none.
 
     The equation is (sinh u + u)/u^2 = m at the drift u noise^2 / (2 zeta), m = c2/c1 noise^2/(4 zeta^2). The left side
-    falls to its least value, near u = 2.4, and rises again.
+    falls to its least value, near u = 2.4, and rises again: there are at most two (`Threshold.at_most_two_drifts`).
     """
     m = rule.c2 / rule.c1 * rule.noise**2 / (4 * zeta**2)
 
