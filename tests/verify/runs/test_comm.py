@@ -14,6 +14,7 @@ from builders.runs import run_of
 from verify.judging import counterexample, judge
 
 from airground_drake.trace import Trace
+from airground_drake.verify.runs.standing import standing_conflicts
 
 
 def more_decisions(trace: Trace, **columns: Any) -> Trace:
@@ -114,6 +115,10 @@ def test_a_proposal_stands_until_it_is_over_and_no_longer(told: Trace) -> None:
     )
     twice = with_meta(twice, events=[*told.events, *({**event, "t_s": when} for event in events)])
     assert counterexample("COMM", twice)["kind"] in ("replaced while in force", "decision on what was withdrawn")
+    # the policies may have been asked about another UGV, and have helped this one only
+    asked = with_signals(twice, lambda signals: signals.assign(**{"ugv2.mode": 1.0}))
+    kinds = [{str(each["kind"]) for each in standing_conflicts(trace)} for trace in (twice, asked)]
+    assert kinds[0] - kinds[1] == {"replaced while in force"}
 
 
 def test_a_ugv_that_no_policy_helps_does_not_keep_the_others_from_being_judged() -> None:
