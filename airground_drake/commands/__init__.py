@@ -25,6 +25,9 @@ class Command(NamedTuple):
     says: str
 
 
+GONE = {"proofs": "airground prove"}
+"""Commands of earlier versions, and the commands that replace them."""
+
 COMMANDS: dict[str, Command] = {
     "report": Command("airground_drake.report.__main__", "simulate a scenario, check its claims, write the report"),
     "verify": Command("airground_drake.verify.__main__", "judge claims anew, on a saved run or about a model"),
