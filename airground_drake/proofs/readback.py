@@ -81,9 +81,10 @@ def _compare_statement(run: str, text: str, trace: Trace, wanted: Sequence[tuple
     )
     if [_value(start), _value(end)] != [Fraction(trace.t[0]), Fraction(trace.t[-1])]:
         raise ReadbackError(f"{run}: the theorem is not about all of the run's time")
-    claim = rf"  {number} <= norm \(sub \(position {run} (\w+) t\) \(position {run} (\w+) t\)\)"
-    claims = [re.fullmatch(claim, line) for line in body.split(" /\\\n")]
-    if [(said[2], said[3], _value(said[1])) for said in claims if said] != list(wanted) or not all(claims):
+    claim = re.compile(rf"{number} <= norm \(sub \(position {run} (\w+) t\) \(position {run} (\w+) t\)\)")
+    claims = [(first, second, _value(safe)) for safe, first, second in claim.findall(body)]
+    between = claim.sub("", body)  # nothing but conjunctions, in groups
+    if claims != list(wanted) or re.sub(r"[\s()]", "", between) != "/\\" * (len(claims) - 1):
         raise ReadbackError(f"{run}: the theorem does not claim the scenario's distance of every pair")
 
 
