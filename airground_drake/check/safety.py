@@ -199,7 +199,8 @@ def safe_hyp(run: Run, claim: Json) -> Found:
     shown = tuple(f"counterexample.{key}" for key in LISTED)
     result = result.judging(partial(_first_broken, run, claim, found, first_s), *shown, *SNAPSHOT)
     result = result.judging(partial(_worst, claim, others), "evidence.worst.*.*")
-    promised = (*(f"evidence.pairs.*.{key}" for key in MOST_MISSED), "evidence.e_m", "evidence.guarantee_m")
+    of_pairs = [f"evidence.pairs.*.{key}" for key in MOST_MISSED] if evidence["pairs"] else ["evidence.pairs"]
+    promised = (*of_pairs, "evidence.e_m", "evidence.guarantee_m")
     result = result.judging(partial(_promised, run, claim, lost), *promised)
     return result.judging(partial(_where, claim, leading, margin), *(f"where.{key}" for key in LISTED))
 

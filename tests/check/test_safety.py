@@ -39,7 +39,7 @@ def test_a_broken_inequality_refutes(monkeypatch: pytest.MonkeyPatch, margin: fl
     for name in ("_constants", "_velocities", "_inequalities"):
         monkeypatch.setattr(safety, name, lambda run: iter(()))
     monkeypatch.setattr(safety, "_lost", lambda run: iter([found]))
-    evidence = {"inequalities_that_bind": dict.fromkeys(safety.KINDS, 0), "different_parameters": []}
+    evidence = {"inequalities_that_bind": dict.fromkeys(safety.KINDS, 0), "different_parameters": [], "pairs": []}
     claim: dict[str, Any] = {"evidence": evidence, "where": {"hypothesis": "avoidance", **pair}}
     refuted = safety.safe_hyp(RUN, claim | {"status": "refuted"})
     assert refuted.status == ("refuted" if broken else "holds")

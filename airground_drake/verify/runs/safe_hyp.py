@@ -285,11 +285,13 @@ def _static(trace: Trace) -> Iterator[_Hypothesis]:
     def spare(safe: float, *speeds: float) -> float:
         return float(reach - _written(safe) - sum(map(_written, speeds)) * period)
 
-    pairs = sorted(pairs_of(trace), key=lambda pair: trace.robots.index(pair.first))
+    order = {robot: k for k, robot in enumerate(trace.robots)}
+    starts = {name: place if place.ndim == 1 else place[0] for name, place in places.items()}
+    pairs = sorted(pairs_of(trace), key=lambda pair: order[pair.first])
     for robot, own in groupby(pairs, key=lambda pair: pair.first):
         beside = list(own)
         others = [pair.second for pair in beside]
-        away = places[robot][0] - np.array([np.atleast_2d(places[other])[0] for other in others])
+        away = starts[robot] - np.array([starts[other] for other in others])
         start, about = np.full(len(beside), trace.t[0]), {"first": robot}
         excess = np.linalg.norm(away, axis=1) - np.array([pair.safe_m for pair in beside])
         yield _Hypothesis("safe start", "m", start, excess, DISTANCE_TOLERANCE_M, about, others)

@@ -1,0 +1,50 @@
+"""What the steps of every shipped run miss of the avoidance inequalities, and what distance follows: a table.
+
+    python benchmarks/guarantees.py [scenario ...]
+
+Of each run the pair that is promised the least, see SAFE-HYP: e, in metres per control period; what this costs of its
+safe distance, e / (A h); the distance that it is promised. Under method (d) also how many accepted interventions met
+the premise of LIVE-GATE.
+"""
+
+from __future__ import annotations
+
+import argparse
+
+from airground_drake.scenarios.load import load
+from airground_drake.scenarios.shipped import shipped
+from airground_drake.simulation import simulate
+from airground_drake.verify import verify
+from airground_drake.verify.runs.followed import followed
+
+
+def main() -> None:
+    """Simulate, judge and print."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("scenarios", nargs="*", default=shipped(), help="names or files; default: all that are shipped")
+    applies_to = accepted = 0
+    print("| scenario | run | SAFE-HYP | pair | d, m | e, m/period | e/(A h), m | guarantee, m | LIVE-GATE |")
+    print("| --- | --- | --- | --- | --- | --- | --- | --- | --- |")
+    for name in parser.parse_args().scenarios:
+        scenario, _ = load(name)
+        for run in scenario.runs:
+            trace = simulate(scenario, run)
+            (verdict,) = verify(trace, ["SAFE-HYP"])
+            evidence, found = verdict.finding.evidence, followed(trace)
+            met = sum(one.met for one in found)
+            applies_to, accepted = applies_to + met, accepted + len(found)
+            count = f"{met} of {len(found)}" if found else ""
+            row = "all pairs | their own | 0 | 0 | their own"
+            if evidence["e_m"] > 0.0:
+                worst = evidence["pairs"][0]
+                safe, promised = worst["safe_distance_m"], worst["guarantee_m"]
+                row = (
+                    f"{worst['first']}, {worst['second']} | {safe:.6g} | {worst['e_m']:.6g} | {safe - promised:.6g} | "
+                )
+                row += f"{promised:.6g}"
+            print(f"| {scenario.name} | {run} | {verdict.finding.status} | {row} | {count} |", flush=True)
+    print(f"\nThe premise of LIVE-GATE was met by {applies_to} of {accepted} accepted interventions.")
+
+
+if __name__ == "__main__":
+    main()
