@@ -19,7 +19,18 @@ from airground_drake.scenarios.load import load
 
 PACKAGE = Path(airground_drake.__file__).parent
 LAYERS = (
-    ("arrays", "confinement", "errors", "files", "interruption", "progress", "side_by_side", "usage", "check"),
+    (
+        "arrays",
+        "confinement",
+        "errors",
+        "files",
+        "interruption",
+        "progress",
+        "side_by_side",
+        "usage",
+        "check",
+        "proofs",
+    ),
     ("registry", "statuses"),
     ("nsbc",),
     ("decision", "intervention"),

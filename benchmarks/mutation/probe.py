@@ -108,15 +108,14 @@ def proofs(names: list[str]) -> Findings:
 
 
 def tamperings(names: list[str]) -> Findings:
-    """Tamperings that are about these claims and are not refused by the rule that must; the first name is a report."""
+    """Tamperings that are not refused; the first name is the folder of a report."""
     from check.tampering import TAMPERINGS, attempt
 
     found: Findings = []
     for name, tampering in TAMPERINGS.items():
-        if tampering.claim in names[1:]:
-            outcome = attempt(Path(names[0]), tampering.edit, mended=tampering.mended)
-            if not outcome.is_by(tampering):
-                found.append([f"tampering {name}", "case_b", "accepted" if outcome.code == 0 else "other rule", ""])
+        outcome = attempt(Path(names[0]), tampering.edit, mended=tampering.mended)
+        if not outcome.is_of(tampering):
+            found.append([f"tampering {name}", "case_b", "accepted" if outcome.code == 0 else "otherwise", ""])
     return found
 
 

@@ -43,7 +43,7 @@ def test_a_claim_that_the_checker_does_not_decide_is_refused_when_it_is_judged_a
     (folder / "report.json").unlink()
     (folder / "report.json").write_text(json.dumps(document))
     assert check.main([str(folder)]) == 1
-    refused = [line for line in capsys.readouterr().out.splitlines() if "DISAGREES" in line]
+    refused = [line for line in capsys.readouterr().out.splitlines() if " DISAGREES (" in line]
     assert len(refused) == 1
     assert refused[0].startswith("EXEC        d        DISAGREES (judged again): ")
 

@@ -91,7 +91,7 @@ def test_only_another_ugv_is_made_way_for(cause: str, answer: float) -> None:
 
 def making_way(issued: float, cause: str = "other") -> Proposal:
     """One that "ugv" accepts as a favour to the other; with its own name for the cause it refuses."""
-    return Proposal("way", issued, STAYS, cause=cause)
+    return Proposal("way", issued, STAYS, cause=cause, number=round(issued / 0.05))
 
 
 class Pair:

@@ -200,7 +200,7 @@ def test_a_page_that_cannot_be_written_is_named(
     folder = str(save(tmp_path / "before", before))
     assert main([folder, folder, "--html", str(tmp_path)]) == 2
     said = capsys.readouterr().err
-    assert said == f"error: {tmp_path} cannot be written: Is a directory; wanted: a file for the page\n"
+    assert said == f"error: {tmp_path} cannot be written: not a regular file; wanted: a file for the page\n"
 
 
 def test_the_page_has_both_runs_drawn_and_nothing_foreign(before: Json, tmp_path: Path) -> None:
