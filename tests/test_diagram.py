@@ -19,18 +19,7 @@ from airground_drake.scenarios.load import load
 
 PACKAGE = Path(airground_drake.__file__).parent
 LAYERS = (
-    (
-        "arrays",
-        "confinement",
-        "errors",
-        "files",
-        "interruption",
-        "progress",
-        "side_by_side",
-        "usage",
-        "check",
-        "proofs",
-    ),
+    ("arrays", "confinement", "errors", "files", "interruption", "progress", "side_by_side", "usage", "check"),
     ("registry", "statuses"),
     ("nsbc",),
     ("decision", "intervention"),
@@ -38,7 +27,7 @@ LAYERS = (
     ("scenarios",),
     ("systems",),
     ("components", "trace"),
-    ("diagram", "events"),
+    ("diagram", "events", "proofs"),
     ("simulation", "blocks", "graphviz", "verify"),
     ("runs", "testing"),
     ("report", "replay"),
