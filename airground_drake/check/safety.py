@@ -7,7 +7,8 @@ from math import isqrt
 
 import numpy as np
 
-from .rules import SMALL, Disagreement, Found, at_most, close, holds
+from .files import Json
+from .rules import SMALL, Array, Disagreement, Found, at_most, close, holds
 from .run import Run
 from .scenario import Pair, written
 
@@ -15,12 +16,12 @@ FAR_M = 1e-6
 """Distances of floating-point numbers are this wrong at most, m; farther pairs need no exact arithmetic."""
 
 
-def least_distance_m(run: Run, pair: Pair) -> float:
-    """Least distance of a pair over continuous time.
+def least_distance_m(own_m: Array, other_m: Array) -> float:
+    """Least distance of two bodies that move straight between samples, at places (K, 3) each.
 
     On a segment the relative position is r + s w, 0 <= s <= 1; |r + s w|^2 is least at s = -r.w / w.w.
     """
-    relative = run.position_m[pair.robot] - run.position_m[pair.other]
+    relative = own_m - other_m
     r, w = relative[:-1], np.diff(relative, axis=0)
     ww = (w * w).sum(axis=1)
     s = np.clip(-(r * w).sum(axis=1) / np.where(ww > 0.0, ww, 1.0), 0.0, 1.0)
@@ -37,7 +38,7 @@ def safe_trace(run: Run) -> Found:
         closing = pair.closing_m_s * run.scenario["control"]["period_s"]
         if run.apart_m[pair.robot, pair.other] - pair.safe_m > max(margin, closing + SMALL):
             continue  # neither the nearest pair nor near enough to count
-        of_pair = least_distance_m(run, pair) - pair.safe_m
+        of_pair = least_distance_m(run.position_m[pair.robot], run.position_m[pair.other]) - pair.safe_m
         margin = min(margin, of_pair)
         least += of_pair - closing < -SMALL
         most += of_pair - closing <= SMALL
@@ -69,38 +70,45 @@ def _missed_m(x: list[Fraction], step: list[Fraction], safe: Fraction, share: Fr
     return max(Fraction(), max(bounds) - min(along / least, along / most))
 
 
-def gain_of(run: Run) -> Fraction:
+def gain_of(scenario: Json, period_s: float) -> Fraction:
     """A h of the numbers as they are written, at most 1: the bound with 1 demands less."""
-    control = run.scenario["control"]
-    return min(written(control["avoidance_gain_1_s"]) * written(control["period_s"]), Fraction(1))
+    return min(written(scenario["control"]["avoidance_gain_1_s"]) * written(period_s), Fraction(1))
 
 
-def shortfall_m(run: Run, pair: Pair) -> Fraction:
-    """The most that a pair's inequalities together miss their bound by at any control sample, m per period; exact.
+def shortfall_m(own_m: Array, other_m: Array, pair: Pair, gain: Fraction, last: Fraction = Fraction(1)) -> Fraction:
+    """The most that a pair's inequalities together miss their bound by at any sample, m per period; exact.
 
     Positions are taken as the rational numbers that they are. Samples at which the two cannot meet within a period,
-    whatever their direction, need no inequality. Of a last period that is cut short, the step is extended.
+    whatever their direction, need no inequality.
+
+    Args:
+        own_m: places of the robot at the control samples and at the end, (K + 1, 3).
+        other_m: places of what it avoids, (K + 1, 3).
+        pair: safe distance and share.
+        gain: A h.
+        last: length of the last period, in periods; its step is extended to a whole one.
     """
-    rows, gain = np.append(run.sample_row, len(run.t_s) - 1), gain_of(run)
-    own, other = run.position_m[pair.robot][rows], run.position_m[pair.other][rows]
-    reach = np.linalg.norm(np.diff(own, axis=0), axis=1) + np.linalg.norm(np.diff(other, axis=0), axis=1)
-    lasting, period = float(np.diff(run.t_s[rows])[-1]), run.scenario["control"]["period_s"]
-    extended = Fraction(1) if abs(lasting - period) <= SMALL else Fraction(period) / Fraction(lasting)
-    reach[-1] *= float(extended)
-    near = np.linalg.norm(own - other, axis=1)[:-1] < pair.safe_m + reach + FAR_M
+    reach = np.linalg.norm(np.diff(own_m, axis=0), axis=1) + np.linalg.norm(np.diff(other_m, axis=0), axis=1)
+    reach[-1] /= float(last)
+    near = np.linalg.norm(own_m - other_m, axis=1)[:-1] < pair.safe_m + reach + FAR_M
     safe, share, worst = Fraction(pair.safe_m), Fraction(pair.share), Fraction()
     for k in np.flatnonzero(near):
         here, there, after, beyond = (
-            [Fraction(c) for c in place] for place in (own[k], other[k], own[k + 1], other[k + 1])
+            [Fraction(c) for c in place] for place in (own_m[k], other_m[k], own_m[k + 1], other_m[k + 1])
         )
-        scale = extended if k == len(near) - 1 else Fraction(1)
+        lasts = last if k == len(near) - 1 else Fraction(1)
         x = [a - b for a, b in zip(here, there, strict=True)]
-        missed = _missed_m(x, [scale * (a - b) for a, b in zip(after, here, strict=True)], safe, share, gain)
+        missed = _missed_m(x, [(a - b) / lasts for a, b in zip(after, here, strict=True)], safe, share, gain)
         if pair.share < 1.0:
-            step = [scale * (a - b) for a, b in zip(beyond, there, strict=True)]
+            step = [(a - b) / lasts for a, b in zip(beyond, there, strict=True)]
             missed += _missed_m([-c for c in x], step, safe, share, gain)
         worst = max(worst, missed)
     return worst
+
+
+def lost_m(missed: Fraction, gain: Fraction, samples: int) -> float:
+    """What a shortfall costs of the safe distance at most: e / (A h), or without a gain all that is missed."""
+    return float(missed / gain if gain else missed * samples)
 
 
 def safe_hyp(run: Run) -> Found:
@@ -113,15 +121,18 @@ def safe_hyp(run: Run) -> Found:
         _motion(run)
     except Disagreement as broken:
         return Found("refuted", because=broken)
-    gain, lost = gain_of(run), 0.0
+    period = run.scenario["control"]["period_s"]
+    rows, gain, lost = np.append(run.sample_row, len(run.t_s) - 1), gain_of(run.scenario, period), 0.0
+    lasting = float(np.diff(run.t_s[rows])[-1])
+    last = Fraction(1) if abs(lasting - period) <= SMALL else Fraction(lasting) / Fraction(period)
     for pair in run.pairs:
-        closing = pair.closing_m_s * run.scenario["control"]["period_s"]
-        if run.apart_m[pair.robot, pair.other] > pair.safe_m + closing + FAR_M:
+        if run.apart_m[pair.robot, pair.other] > pair.safe_m + pair.closing_m_s * period + FAR_M:
             continue
-        missed = shortfall_m(run, pair)
-        start = float(np.linalg.norm(run.position_m[pair.robot][0] - run.position_m[pair.other][0]))
-        of_gain = missed / gain if gain else missed * len(run.sample_row)
-        lost = max(lost, float(of_gain), pair.safe_m - start if start < pair.safe_m - FAR_M else 0.0)
+        own, other = run.position_m[pair.robot][rows], run.position_m[pair.other][rows]
+        missed, start = shortfall_m(own, other, pair, gain, last), float(np.linalg.norm(own[0] - other[0]))
+        lost = max(
+            lost, lost_m(missed, gain, len(run.sample_row)), pair.safe_m - start if start < pair.safe_m - FAR_M else 0.0
+        )
     return Found("holds" if lost <= SMALL else "refuted", -lost if lost <= SMALL else None)
 
 

@@ -42,7 +42,7 @@ def test_a_distance_that_is_short_refutes(short_m: float, status: str) -> None:
 def test_the_least_distance_lies_between_rows() -> None:
     passing = run([3.0, -3.0])
     passing.position_m["ugv1"][:, 1] = 0.5
-    assert safety.least_distance_m(passing, passing.pairs[0]) == 0.5
+    assert safety.least_distance_m(*passing.position_m.values()) == 0.5
 
 
 @pytest.mark.parametrize(
@@ -58,5 +58,5 @@ def test_the_least_distance_lies_between_rows() -> None:
 )
 def test_the_shortfall_is_what_the_inequality_lacks(way_m: list[float], missed_m: float) -> None:
     approach = run(way_m)
-    found = safety.shortfall_m(approach, approach.pairs[0])
+    found = safety.shortfall_m(*approach.position_m.values(), approach.pairs[0], Fraction(1, 2))
     assert abs(found - Fraction(missed_m)) < Fraction(1, 2**100)

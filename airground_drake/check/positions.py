@@ -1,0 +1,128 @@
+"""Positions from elsewhere, judged by the checker: the distances that were kept, and what is missed of the law.
+
+A table of sampled positions and a scenario are all that this needs: nothing has to come from this package's simulator.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from .files import Json
+from .rules import SMALL, Array
+from .safety import gain_of, least_distance_m, lost_m, shortfall_m
+from .scenario import pairs_of, robots_of
+
+COLUMNS = ("t_s", "body", "x_m", "y_m", "z_m")
+MOST_ROWS = 10_000_000
+NOT_JUDGED = (
+    "how bodies moved between samples: motion is taken as straight",
+    "where obstacles were: they are taken as where the scenario has them",
+    "triggers, proposals, decisions, commands and arrivals",
+)
+
+
+class UnusableError(Exception):
+    """The table cannot be judged for this scenario; says why, and what was wanted."""
+
+
+class Judged(NamedTuple):
+    """What was found about a pair of bodies.
+
+    Attributes:
+        first: a robot.
+        second: an obstacle, or another robot.
+        safe_m: distance of the centres to be kept.
+        least_m: distance that was kept at all times, with straight motion between samples.
+        missed_m: e, by how much the samples miss the avoidance inequalities, m per sampling period; None if the law
+            says nothing, since samples are not equally spaced.
+        guarantee_m: distance that follows from the law with that e; None as above.
+    """
+
+    first: str
+    second: str
+    safe_m: float
+    least_m: float
+    missed_m: float | None
+    guarantee_m: float | None
+
+    @property
+    def kept(self) -> bool:
+        """Whether the distance was kept, to 1e-9 m."""
+        return self.least_m >= self.safe_m - SMALL
+
+
+def judge(table: pd.DataFrame, scenario: Json) -> list[Judged]:
+    """Judge the positions of a table.
+
+    Args:
+        table: columns `COLUMNS`; a row is where a body is at a time, s and m, world frame. All robots of the scenario
+            at the same times.
+        scenario: as resolved; says which distances are to be kept, and the gain of the law.
+
+    Returns:
+        One entry per pair, the least margin first.
+
+    Raises:
+        UnusableError: if the table lacks something.
+    """
+    t_s, places = _sampled(table, scenario)
+    spacing, control_s = np.diff(t_s), float(scenario["control"]["period_s"])
+    period: float | None = None
+    if np.ptp(spacing) <= SMALL:
+        period = control_s if abs(spacing[0] - control_s) <= SMALL else float(spacing.mean())
+    found = []
+    for pair in pairs_of(scenario):
+        own, other = places[pair.robot], places[pair.other]
+        missed = guarantee = None
+        if period is not None:
+            gain = gain_of(scenario, period)
+            e = shortfall_m(own, other, pair, gain)
+            short = max(0.0, pair.safe_m - float(np.linalg.norm(own[0] - other[0])))
+            missed, guarantee = float(e), pair.safe_m - max(lost_m(e, gain, len(spacing)), short)
+        found.append(Judged(pair.robot, pair.other, pair.safe_m, least_distance_m(own, other), missed, guarantee))
+    return sorted(found, key=lambda one: one.least_m - one.safe_m)
+
+
+def _sampled(table: pd.DataFrame, scenario: Json) -> tuple[Array, Mapping[str, Array]]:
+    """Times (K,), and the places of all bodies at them, (K, 3) each."""
+    if sorted(table.columns) != sorted(COLUMNS):
+        raise UnusableError(f"its columns are {', '.join(map(str, table.columns))}; wanted: {', '.join(COLUMNS)}")
+    if len(table) > MOST_ROWS:
+        raise UnusableError(f"it has {len(table)} rows; allowed: {MOST_ROWS}")
+    robots, obstacles = robots_of(scenario), scenario["obstacles"]
+    names = table["body"].astype(str)
+    if strange := sorted({*names} - {*robots}):
+        raise UnusableError(f"body {strange[0]!r} is no robot of the scenario; its robots are {', '.join(robots)}")
+    found: dict[str, Array] = {}
+    times: dict[str, Array] = {}
+    for robot in robots:
+        rows = table[names == robot]
+        if len(rows) < 2:
+            raise UnusableError(f"{robot} has {len(rows)} rows; wanted: 2 at least")
+        numbers = _numbers(rows, robot)
+        times[robot], found[robot] = numbers[:, 0], numbers[:, 1:]
+        if (np.diff(times[robot]) <= 0.0).any():
+            k = int(np.argmax(np.diff(times[robot]) <= 0.0)) + 1
+            raise UnusableError(f"{robot}: t_s = {times[robot][k]:g} does not come after the row before")
+    first = next(iter(robots))
+    for robot, own in times.items():
+        if len(own) != len(times[first]) or not np.allclose(own, times[first], rtol=0.0, atol=SMALL):
+            raise UnusableError(f"{robot} and {first} are not sampled at the same times; wanted: equal t_s")
+    for name, body in obstacles.items():
+        found[name] = np.tile(np.array(body["position_m"], dtype=np.float64), (len(times[first]), 1))
+    return times[first], found
+
+
+def _numbers(rows: pd.DataFrame, robot: str) -> Any:
+    values = [
+        pd.to_numeric(rows[name], errors="coerce").to_numpy(dtype=np.float64) for name in COLUMNS if name != "body"
+    ]
+    numbers = np.column_stack(values)
+    if not np.isfinite(numbers).all():
+        k = int(np.argmax(~np.isfinite(numbers).all(axis=1)))
+        raise UnusableError(f"{robot}: row {rows.index[k]} has a value that is no finite number")
+    return numbers

@@ -1,0 +1,85 @@
+"""`airground judge POSITIONS --scenario NAME`: judge positions that come from elsewhere, such as a laboratory."""
+
+from __future__ import annotations
+
+import argparse
+import io
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from airground_drake import files
+from airground_drake.errors import AirgroundError, one_line
+from airground_drake.usage import Parser, overridable, refuse
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+MOST_LISTED = 20
+"""Pairs that are printed: those of least margin."""
+
+
+def parser() -> argparse.ArgumentParser:
+    """What the command line takes."""
+    parser = Parser(
+        prog="airground judge",
+        description="Judge sampled positions of robots, wherever they come from: the distances that were kept, and by "
+        "how much the samples miss the avoidance law.",
+        epilog="exit codes: 0 every distance is kept, 1 one is not, 2 usage, or a file that cannot be used",
+    )
+    parser.add_argument(
+        "positions", type=Path, metavar="FILE", help="CSV or Parquet with the columns t_s, body, x_m, y_m, z_m"
+    )
+    parser.add_argument(
+        "--scenario", required=True, metavar="NAME", help="name of a shipped scenario, or path to a YAML file"
+    )
+    overridable(parser)
+    parser.add_argument("--json", action="store_true", help="print every pair as JSON")
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line.
+
+    Returns:
+        Exit code: 0 every distance is kept, 1 one is not, 2 usage, or a table or scenario that cannot be used.
+    """
+    options = parser().parse_args(arguments)
+    from airground_drake.check import positions
+    from airground_drake.scenarios.load import load, resolved
+
+    try:
+        scenario = resolved(load(options.scenario, options.set)[0])
+        found = positions.judge(_table(options.positions), scenario)
+    except (AirgroundError, OSError) as error:
+        return refuse(error)
+    except (positions.UnusableError, ValueError) as error:
+        return refuse(f"{options.positions}: {error}")
+    broken = [one for one in found if not one.kept]
+    if options.json:
+        pairs = [{**one._asdict(), "kept": one.kept} for one in found]
+        print(json.dumps({"kept": not broken, "pairs": pairs, "not_judged": positions.NOT_JUDGED}, indent=1))
+        return int(bool(broken))
+    print(f"{len(found) - len(broken)} of {len(found)} distances were kept. Least margins first:")
+    for one in found[:MOST_LISTED]:
+        law = "the law is not judged: samples are not equally spaced"
+        if one.missed_m is not None:
+            law = f"misses the law by e = {one.missed_m:.6g} m per period, which promises {one.guarantee_m:.6g} m"
+        verdict = "kept" if one.kept else "NOT KEPT"
+        print(one_line(f"{one.first}, {one.second}: {verdict}, {one.least_m:.6g} of {one.safe_m:.6g} m; {law}"))
+    print("".join(f"Not judged: {each}.\n" for each in positions.NOT_JUDGED), end="")
+    return int(bool(broken))
+
+
+def _table(path: Path) -> pd.DataFrame:
+    """The table in a file.
+
+    Raises:
+        OSError: if it cannot be read.
+        ValueError: if it is no table.
+    """
+    import pandas as pd
+
+    content = files.read_bytes(path)
+    return files.read_table(content) if content[:4] == b"PAR1" else pd.read_csv(io.BytesIO(content))
