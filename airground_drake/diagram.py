@@ -16,7 +16,7 @@ from airground_drake.nsbc.avoidance import COMPOSITIONS, Composition
 from airground_drake.nsbc.motion import Motion
 from airground_drake.nsbc.task import Task
 from airground_drake.nsbc.team import Team
-from airground_drake.registry import UAV_TASKS, Method, method_of
+from airground_drake.registry import METHODS, UAV_TASKS, Method, method_of
 from airground_drake.scenarios.load import validated
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.systems import (
@@ -134,6 +134,11 @@ def build_model(
     exported = [*RECORDED, *(["violation"] if monitor is not None else [])]
     diagram = _assembled(f"{scenario.name}_method_{chosen.id}", parts, named, exported)
     return Model(diagram, chosen, team, zeta, planner, gatekeeper)
+
+
+def most_complete(scenario: Scenario) -> str:
+    """The method of the scenario's runs that has the most parts, by its identifier: the one that pictures show."""
+    return max((run.method for run in scenario.runs.values()), key=list(METHODS).index)
 
 
 def _chosen(scenario: Scenario, method: str | None, composition: str | None) -> tuple[Method, Composition]:

@@ -23,20 +23,19 @@ SUPERVISING, INTERVENING = 0, 1
 
 
 @njit(cache=True)
-def extremes(before: Array, after: Array, start: Array, end: Array) -> Array:
+def extremes(before: Array, after: Array, ends: Array) -> Array:
     """Least and largest x over a step, (2, n), m.
 
     Args:
         before: task error, m, and noise, m, of n UGVs at the beginning of the step, (n, 4).
         after: the same at its end, (n, 4); both are linear in between.
-        start: x at the beginning, (n,), m.
-        end: x at the end, (n,), m.
+        ends: x at the beginning and at the end, (2, n), m.
     """
     found = np.empty((2, len(before)))
     for j in range(len(before)):
         x, y, z, n = before[j]
         dx, dy, dz, dn = after[j, 0] - x, after[j, 1] - y, after[j, 2] - z, after[j, 3] - n
-        found[0, j], found[1, j] = min(start[j], end[j]), max(start[j], end[j])
+        found[0, j], found[1, j] = min(ends[0, j], ends[1, j]), max(ends[0, j], ends[1, j])
         length = np.sqrt(dx * dx + dy * dy + dz * dz)
         if abs(dn) >= length:  # monotone, or at rest
             continue

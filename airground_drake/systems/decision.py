@@ -107,8 +107,9 @@ class DecisionBlock(LeafSystem):
             begun = now
         begin, end, before, after = begun[0], now[0], begun[1:].reshape(-1, 4), now[1:].reshape(-1, 4)
         found = self.extremes(begin, before, end, after)
-        first, last = bisect_right(self._corner_times, begin), bisect_left(self._corner_times, end)
-        if first < last:
+        first = bisect_right(self._corner_times, begin)
+        if first < len(self._corners) and self._corner_times[first] < end:
+            last = bisect_left(self._corner_times, end)
             times = np.array([begin, *self._corner_times[first:last], end])
             self._look_into_corners(found, times, {j for _, j in self._corners[first:last]}, before, after)
         output.SetFromVector(found.ravel())
@@ -150,7 +151,7 @@ class DecisionVariable(DecisionBlock):
 
     def extremes(self, begin: float, before: Array, end: float, after: Array) -> Array:
         """Exact: see `decision.excursion`."""
-        return extremes(before, after, np.array(self.value(begin, before)), np.array(self.value(end, after)))
+        return extremes(before, after, np.array([self.value(begin, before), self.value(end, after)]))
 
 
 class EventTrigger(LeafSystem):

@@ -450,15 +450,15 @@ DECISION = (
     Mutant(
         "extremes at the ends of steps only",
         "systems/decision.py",
-        "return extremes(before, after, np.array(self.value(begin, before)), np.array(self.value(end, after)))",
+        "return extremes(before, after, np.array([self.value(begin, before), self.value(end, after)]))",
         "return super().extremes(begin, before, end, after)",
         tests=(*ISOLATION, *TRIGGER),
     ),
     Mutant(
         "corners of presets are not looked at",
         "systems/decision.py",
-        "if first < last:",
-        "if False:",
+        "self._corner_times[first] < end:",
+        "self._corner_times[first] < begin:",
         tests=(*ISOLATION, *TRIGGER),
     ),
     Mutant(

@@ -21,7 +21,7 @@ def x_at(before: Array, after: Array, share: Array) -> Array:
 
 def ranges(before: Array, after: Array) -> Array:
     x = [np.linalg.norm(parts[:, :3], axis=1) + parts[:, 3] for parts in (before, after)]
-    return extremes(before, after, *x)
+    return extremes(before, after, np.array(x))
 
 
 @examples(200)

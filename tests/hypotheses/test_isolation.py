@@ -74,7 +74,7 @@ def _random_steps(rng: np.random.Generator, levels: Array) -> tuple[Array, Array
 
 def _ranges(before: Array, after: Array) -> Array:
     x = [np.linalg.norm(parts[:, :3], axis=1) + parts[:, 3] for parts in (before, after)]
-    return extremes(before, after, *x)
+    return extremes(before, after, np.array(x))
 
 
 def _running(
