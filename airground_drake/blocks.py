@@ -20,6 +20,7 @@ UNITS = {
     "reference": "m, m/s",
     "noise": "m",
     "decision_variable": "m",
+    "decision_range": "m",
 }
 """Of ports by name, or by its part before a robot's; what is not here is of several units or has none."""
 

@@ -16,7 +16,7 @@ from airground_drake.nsbc.avoidance import COMPOSITIONS, Composition
 from airground_drake.nsbc.motion import Motion
 from airground_drake.nsbc.task import Task
 from airground_drake.nsbc.team import Team
-from airground_drake.registry import UAV_TASKS, Method, method_of
+from airground_drake.registry import METHODS, UAV_TASKS, Method, method_of
 from airground_drake.scenarios.load import validated
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.systems import (
@@ -40,6 +40,11 @@ RECORDED = (
 PlantFactory = Callable[[str, Array], System]
 """Makes the plant of a robot from its name and its start (3,), m: a System with one input, the velocity (3,), m/s, and
 one output, the position (3,), m, both in the world frame, whose default state has the robot at its start."""
+
+DecisionFactory = Callable[[int, Sequence[Motion]], System]
+"""Makes the block that computes the decision variables, from the number of UGVs n and their presets: a System with the
+output ports `decision_variable` (n), m, and `decision_range` (2n), m, the least and the largest since the simulator's
+step began. Its input ports are fed by name. `systems.DecisionBlock` is a base for such blocks."""
 
 
 @dataclass(frozen=True)
@@ -69,6 +74,7 @@ def build_diagram(
     composition: Composition | None = None,
     plants: PlantFactory = components.first_order_plant,
     monitor: Monitor | None = None,
+    decision_block: DecisionFactory = DecisionVariable,
 ) -> Diagram:
     """The diagram of a scenario, for inspection, simulation or embedding.
 
@@ -78,6 +84,7 @@ def build_diagram(
         composition: of the UGVs' avoidance tasks; default: 'augmented', or without `method` that of the last run.
         plants: makes the plant of each robot. The claims are about the default, `first_order_plant`.
         monitor: watches the diagram while it runs; see `make_monitor`.
+        decision_block: makes the block that drives the trigger. The default, `systems.DecisionVariable`, is (15).
 
     Returns:
         A Diagram whose default context has every robot at its start; to be simulated, a context needs an accuracy:
@@ -88,9 +95,10 @@ def build_diagram(
     Raises:
         ScenarioError: if the scenario is not valid.
         UnknownNameError: if there is no such method or composition.
-        PluginError: if it names a policy, route or task that cannot be made, or a plant has other ports.
+        PluginError: if it names a policy, route or task that cannot be made, or a plant or the decision block has other
+            ports.
     """
-    return build_model(validated(scenario), method, composition, plants, monitor).diagram
+    return build_model(validated(scenario), method, composition, plants, monitor, decision_block).diagram
 
 
 def build_model(
@@ -99,6 +107,7 @@ def build_model(
     composition: Composition | None = None,
     plants: PlantFactory = components.first_order_plant,
     monitor: Monitor | None = None,
+    decision_block: DecisionFactory = DecisionVariable,
 ) -> Model:
     """Build and wire all components of one method of a valid scenario; else as `build_diagram`."""
     chosen, composition = _chosen(scenario, method, composition)
@@ -107,7 +116,8 @@ def build_model(
     zeta = components.threshold(scenario)
     law = components.make_law(scenario, chosen, composition)
     # first, so that the seed of its noise does not depend on what a plant may draw
-    decision = _decision(scenario, n, components.make_trigger(scenario, zeta), presets)
+    block = _checked_block(n, decision_block(n, presets))
+    decision = _decision(scenario, n, block, components.make_trigger(scenario, zeta))
     starts = dict(zip(team.robots, components.make_starts(scenario), strict=True))
     world = _world(team, {robot: _checked(robot, plants(robot, start)) for robot, start in starts.items()})
     planner = InterventionPlanner(components.make_planner(scenario, chosen), scenario.control.period_s)
@@ -126,6 +136,11 @@ def build_model(
     return Model(diagram, chosen, team, zeta, planner, gatekeeper)
 
 
+def most_complete(scenario: Scenario) -> str:
+    """The method of the scenario's runs that has the most parts, by its identifier: the one that pictures show."""
+    return max((run.method for run in scenario.runs.values()), key=list(METHODS).index)
+
+
 def _chosen(scenario: Scenario, method: str | None, composition: str | None) -> tuple[Method, Composition]:
     """The method and the composition that are asked for; without a method, those of the scenario's last run.
 
@@ -142,19 +157,21 @@ def _chosen(scenario: Scenario, method: str | None, composition: str | None) -> 
     return method_of(method), composition
 
 
-def _decision(scenario: Scenario, n: int, trigger: Trigger, presets: Sequence[Motion]) -> Diagram:
-    """The decision layer of n UGVs: noise, decision variables, triggers."""
+def _decision(scenario: Scenario, n: int, variable: System, trigger: Trigger) -> Diagram:
+    """The decision layer of n UGVs: noise, the block of the decision variables, triggers."""
     source, noise = components.make_noise(n, scenario.decision)
-    variable, events = DecisionVariable(n), EventTrigger(n, trigger, presets)
+    events = EventTrigger(n, trigger)
     systems = {
         "noise_source": source, "decision_noise": noise, "decision_variable": variable, "event_trigger": events,
     }  # fmt: skip
     named = {
         "noise": noise.get_output_port(),
         "decision_variable": variable.GetOutputPort("decision_variable"),
+        "decision_range": variable.GetOutputPort("decision_range"),
         "status": events.GetOutputPort("status"),
     }
-    return _assembled("decision", systems, named, wires=[(source.get_output_port(), noise.get_input_port())])
+    exported = [name for name in named if name != "decision_range"]
+    return _assembled("decision", systems, named, exported, [(source.get_output_port(), noise.get_input_port())])
 
 
 def _ugvs(presets: Sequence[Motion], controller: UgvController, gatekeeper: Gatekeeper | DirectAcceptance) -> Diagram:
@@ -293,3 +310,16 @@ def _checked(robot: str, plant: System) -> System:
         wanted = "allowed: velocity (3) first among its inputs, position (3) first among its outputs"
         raise PluginError(f"the plant of {robot} has inputs of sizes {ports}, outputs of sizes {outputs}; {wanted}")
     return plant
+
+
+def _checked_block(n: int, block: System) -> System:
+    """The block of the decision variables of n UGVs, if it has the output ports of one.
+
+    Raises:
+        PluginError: if not.
+    """
+    sizes = {port.get_name(): port.size() for port in _outputs(block)}
+    wanted = {"decision_variable": n, "decision_range": 2 * n}
+    if any(sizes.get(name) != size for name, size in wanted.items()):
+        raise PluginError(f"the decision block has output ports of sizes {sizes}; they must include {wanted}")
+    return block

@@ -16,7 +16,7 @@ from pydrake.systems.framework import Context, DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput, Multiplexer
 
 from airground_drake.arrays import Array
-from airground_drake.diagram import RECORDED, Model, build_model
+from airground_drake.diagram import RECORDED, DecisionFactory, Model, build_model
 from airground_drake.errors import SimulationError, UnknownNameError, described
 from airground_drake.events import extract
 from airground_drake.gatekeeper.answer import Decision, Foreseen, Planned
@@ -31,7 +31,7 @@ from airground_drake.nsbc.motion import Motion
 from airground_drake.nsbc.team import Team
 from airground_drake.scenarios.load import resolved, validated
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.systems.decision import FIELDS
+from airground_drake.systems.decision import FIELDS, DecisionVariable
 from airground_drake.systems.lifetime import untie
 from airground_drake.trace import (
     DECISION_COLUMNS,
@@ -52,20 +52,21 @@ MERGE_S = 1e-9
 class Recorder:
     """A model inside a diagram that logs its exported outputs at every step; may be used for several seeds."""
 
-    def __init__(self, scenario: Scenario, name: str) -> None:
-        """Build the model of a run of the scenario and its loggers.
+    def __init__(self, scenario: Scenario, name: str, decision_block: DecisionFactory = DecisionVariable) -> None:
+        """Build the model of a run of the scenario and its loggers; `decision_block` as in `build_diagram`.
 
         Raises:
             ScenarioError: if the scenario is not valid.
             UnknownNameError: if it has no such run.
-            PluginError: if it names a policy, route or task that cannot be made.
+            PluginError: if it names a policy, route or task that cannot be made, or the decision block has other
+                ports.
         """
         self._scenario, self._name = validated(scenario), name
         if name not in self._scenario.runs:
             raise UnknownNameError("run", name, self._scenario.runs)
         self._run = self._scenario.runs[name]
         composition: Composition = self._run.composition  # type: ignore[assignment]
-        self._model: Model = build_model(self._scenario, self._run.method, composition)
+        self._model: Model = build_model(self._scenario, self._run.method, composition, decision_block=decision_block)
         builder = DiagramBuilder()
         builder.AddSystem(self._model.diagram)
         ports = [self._model.diagram.GetOutputPort(name) for name in RECORDED]
@@ -141,6 +142,7 @@ class Recorder:
             "scenario": resolved(self._scenario),
             "events": [],
             "controllers": _controllers(model),
+            "decision_block": _decision_block(model),
             "faults": [{"t_s": f.t, "robot": f.robot, "policy": f.policy, "what": f.what} for f in memory.faults],
         }
         times = list(gatekeeper.decision_times_s) if gatekeeper is not None else []
@@ -156,6 +158,12 @@ def _controllers(model: Model) -> dict[str, Any]:
     ugvs, uav = (model.diagram.GetSubsystemByName(name) for name in ("ugvs", "uav"))
     systems = (ugvs.GetSubsystemByName("ugv_controller"), uav.GetSubsystemByName("uav_controller"))
     return {system.get_name(): system.parameters() for system in systems}
+
+
+def _decision_block(model: Model) -> str:
+    """Name of the class that computes the decision variables in the diagram; "" for that of (15)."""
+    block = model.diagram.GetSubsystemByName("decision").GetSubsystemByName("decision_variable")
+    return "" if type(block) is DecisionVariable else type(block).__qualname__
 
 
 def _decision(decision: Decision, robot: str, route: str) -> dict[str, Any]:
@@ -258,7 +266,11 @@ def warm_up() -> None:
 
 
 def simulate(
-    scenario: Scenario, run: str, seed: int | None = None, watch: Callable[[float], None] | None = None
+    scenario: Scenario,
+    run: str,
+    seed: int | None = None,
+    watch: Callable[[float], None] | None = None,
+    decision_block: DecisionFactory = DecisionVariable,
 ) -> Trace:
     """Simulate one run of a scenario.
 
@@ -267,16 +279,17 @@ def simulate(
         run: name of one of its runs.
         seed: of the decision noise, in place of the scenario's.
         watch: is told the time, s, at every step.
+        decision_block: makes the block that drives the trigger; see `build_diagram`.
 
     Raises:
         ScenarioError: if the scenario, or the seed, is not valid.
         UnknownNameError: if it has no such run.
-        PluginError: if it names a policy, route or task that cannot be made.
+        PluginError: if it names a policy, route or task that cannot be made, or the decision block has other ports.
         SimulationError: if Drake or a system stops; names the run and the time.
     """
     if seed is not None:
         scenario = validated(scenario, {"seed": seed})
-    return Recorder(scenario, run).simulate(watch=watch)
+    return Recorder(scenario, run, decision_block).simulate(watch=watch)
 
 
 def _distinct(t: Array, command: Array) -> npt.NDArray[np.intp]:

@@ -19,7 +19,7 @@ def parser() -> argparse.ArgumentParser:
     """What the command line takes."""
     parser = Parser(prog="airground diagram", description="Draw the diagram of a scenario.")
     parser.add_argument("scenario", help="name of a shipped scenario, or path to a YAML file")
-    parser.add_argument("--method", choices=tuple(METHODS), help="default: that of the scenario's last run")
+    parser.add_argument("--method", choices=tuple(METHODS), help="default: the most complete of its runs")
     parser.add_argument("--part", metavar="NAME", help="only the diagram inside it of that name")
     parser.add_argument("--depth", type=whole(1), default=1, metavar="N", help="levels of the first graph (default: 1)")
     parser.add_argument("--format", action="append", choices=FORMATS, help="may be repeated (default: dot and svg)")
@@ -37,13 +37,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     options = parser().parse_args(arguments)
     from airground_drake import graphviz
-    from airground_drake.diagram import build_diagram
+    from airground_drake.diagram import build_diagram, most_complete
     from airground_drake.scenarios.load import load
 
     try:
         scenario, _ = load(options.scenario, options.set)
         with plugins.admitted(scenario, options.scenario, allow=options.allow_plugins):
-            diagram, name = build_diagram(scenario, method=options.method), scenario.name
+            method = most_complete(scenario) if options.method is None else options.method
+            diagram, name = build_diagram(scenario, method=method), scenario.name
         if options.part is not None:
             parts = [system.get_name() for system in diagram.GetSystems()]
             if options.part not in parts:

@@ -23,20 +23,19 @@ SUPERVISING, INTERVENING = 0, 1
 
 
 @njit(cache=True)
-def extremes(before: Array, after: Array) -> tuple[Array, Array]:
-    """Least and largest x over a step, (n,) and (n,), m.
+def extremes(before: Array, after: Array, ends: Array) -> Array:
+    """Least and largest x over a step, (2, n), m.
 
     Args:
         before: task error, m, and noise, m, of n UGVs at the beginning of the step, (n, 4).
         after: the same at its end, (n, 4); both are linear in between.
+        ends: x at the beginning and at the end, (2, n), m.
     """
-    least, most = np.empty(len(before)), np.empty(len(before))
+    found = np.empty((2, len(before)))
     for j in range(len(before)):
         x, y, z, n = before[j]
         dx, dy, dz, dn = after[j, 0] - x, after[j, 1] - y, after[j, 2] - z, after[j, 3] - n
-        start = np.sqrt(x * x + y * y + z * z) + n
-        end = np.sqrt(after[j, 0] ** 2 + after[j, 1] ** 2 + after[j, 2] ** 2) + after[j, 3]
-        least[j], most[j] = min(start, end), max(start, end)
+        found[0, j], found[1, j] = min(ends[0, j], ends[1, j]), max(ends[0, j], ends[1, j])
         length = np.sqrt(dx * dx + dy * dy + dz * dz)
         if abs(dn) >= length:  # monotone, or at rest
             continue
@@ -47,42 +46,27 @@ def extremes(before: Array, after: Array) -> tuple[Array, Array]:
         aside = np.sqrt(cx * cx + cy * cy + cz * cz)
         travelled = -slope * aside / level - along
         if 0.0 < travelled < length:
-            least[j] = min(least[j], aside * level - slope * along + n)
-    return least, most
+            found[0, j] = min(found[0, j], aside * level - slope * along + n)
+    return found
 
 
 @njit(cache=True)
 def gathered(t: float, position: Array, reference: Array, noise: Array) -> Array:
-    """Signals of n UGVs as `task_errors` takes them, from positions and references of which theirs are the first, m."""
-    n = len(noise)
-    signals = np.empty(1 + 7 * n)
-    signals[0] = t
-    signals[1 : 1 + 3 * n] = position[: 3 * n]
-    signals[1 + 3 * n : 1 + 6 * n] = reference[: 3 * n]
-    signals[1 + 6 * n :] = noise
-    return signals
-
-
-@njit(cache=True)
-def task_errors(signals: Array) -> Array:
-    """Task error, m, and noise, m, of every UGV, (n, 4).
+    """Time, s, then task error, m, and noise, m, of each of n UGVs: (1 + 4n,).
 
     Args:
-        signals: time, s, positions and references (3n each), m, and noise (n), m: (1 + 7n,).
+        t: time, s.
+        position: theirs first, (3n + ...,), m.
+        reference: the same of their preset trajectories.
+        noise: (n,), m.
     """
-    n = len(signals) // 7
-    parts = np.empty((n, 4))
-    for j in range(n):
+    signals = np.empty(1 + 4 * len(noise))
+    signals[0] = t
+    for j in range(len(noise)):
         for a in range(3):
-            parts[j, a] = signals[1 + 3 * (n + j) + a] - signals[1 + 3 * j + a]
-        parts[j, 3] = signals[1 + 6 * n + j]
-    return parts
-
-
-@njit(cache=True)
-def excursions(begun: Array, now: Array) -> tuple[Array, Array]:
-    """Least and largest x between two instants whose signals are these, see `task_errors`; (n,) and (n,), m."""
-    return extremes(task_errors(begun), task_errors(now))
+            signals[1 + 4 * j + a] = reference[3 * j + a] - position[3 * j + a]
+        signals[4 + 4 * j] = noise[j]
+    return signals
 
 
 @njit(cache=True)
@@ -112,7 +96,7 @@ def transitions_due(
 
 
 @njit(cache=True)
-def anything_due(status: Array, begun: Array, now: Array, levels: tuple[float, float, float]) -> bool:
-    """Whether a transition is due for any UGV in a step without corners, see `transitions_due`."""
-    least, most = excursions(begun, now)
-    return bool(transitions_due(status, now[0], least, most, levels).any())
+def anything_due(status: Array, t: float, spans: Array, levels: tuple[float, float, float]) -> bool:
+    """Whether a transition is due for any UGV, see `transitions_due`; `spans`: least x, then largest x, (2n,), m."""
+    n = len(spans) // 2
+    return bool(transitions_due(status, t, spans[:n], spans[n:], levels).any())

@@ -13,9 +13,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from airground_drake import files, graphviz, trace
-from airground_drake.diagram import build_diagram
+from airground_drake.diagram import build_diagram, most_complete
 from airground_drake.progress import Watch
-from airground_drake.registry import METHODS
 from airground_drake.report import audit, document, folder, html, junit
 from airground_drake.report.figures import moments, zeno_refine
 from airground_drake.report.figures.draw import draw
@@ -70,8 +69,7 @@ def write(
     Raises:
         OSError: if something cannot be written.
     """
-    most_complete = max((run.method for run in scenario.runs.values()), key=list(METHODS).index)
-    dot = graphviz.dot(build_diagram(plugins.without(scenario), most_complete))
+    dot = graphviz.dot(build_diagram(plugins.without(scenario), most_complete(scenario)))
     drawn = graphviz.svg(dot)
     folder.clear(output)
     written = []

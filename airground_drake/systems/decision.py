@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 from pydrake.systems.framework import (
@@ -19,14 +20,7 @@ from pydrake.systems.framework import (
 )
 
 from airground_drake.arrays import Array
-from airground_drake.decision.excursion import (
-    anything_due,
-    excursions,
-    extremes,
-    gathered,
-    task_errors,
-    transitions_due,
-)
+from airground_drake.decision.excursion import anything_due, extremes, gathered, transitions_due
 from airground_drake.decision.trigger import Mode, Trigger, TriggerState
 from airground_drake.nsbc.motion import Motion
 from airground_drake.systems.lifetime import weakly
@@ -42,74 +36,157 @@ SHORTEST_S = 1e-9
 be one unit in the last place apart, and Drake cannot isolate anything in such a step: it stops instead."""
 
 
-class DecisionVariable(LeafSystem):
-    """x_j = ||rho_rd,j - rho_j|| + n_j, the solution of (15) with integrated noise n_j.
+class DecisionBlock(LeafSystem):
+    """Ports, state and rate of a block that computes the decision variables of n UGVs; a subclass says which.
+
+    Between the simulator's steps positions, references and noise are linear in time, but for corners of the presets.
+    So the block keeps what they were when the step began, and tells how far x has gone since: what the trigger needs
+    to miss nothing between two updates. A subclass defines `value`, and `extremes` if the variable can be smaller or
+    larger within a straight stretch than at its ends.
 
     Ports (n UGVs):
         in  `team_position` (3(n+1)) m; `reference` (6n), positions first; `noise` (n) m.
-        out `decision_variable` (n) m, continuous in time.
+        out `decision_variable` (n) m, x now; `decision_range` (2n) m, the least x since the step began, then the
+            largest one. Both are continuous in time.
+    State (1 + 4n): of the beginning of the step, time, s, and task error and noise of every UGV, m.
+    Rate: one update per step of the simulator.
     """
 
-    def __init__(self, count: int) -> None:
-        """Declare ports for `count` UGVs."""
+    def __init__(self, count: int, presets: Sequence[Motion] = ()) -> None:
+        """Declare ports, state and events for `count` UGVs; the presets (default: none) tell where references bend."""
         super().__init__()
-        self._count = count
+        self._presets = tuple(presets)
+        self._corners = sorted((t, j) for j, preset in enumerate(self._presets) for t in preset.times.tolist())
+        self._corner_times = [t for t, _ in self._corners]
         self._position = self.DeclareVectorInputPort("team_position", 3 * (count + 1))
         self._reference = self.DeclareVectorInputPort("reference", 6 * count)
         self._noise = self.DeclareVectorInputPort("noise", count)
+        self.DeclareDiscreteState(np.array([NOT_BEGUN, *([0.0] * 4 * count)]))
+        given = {self._position.ticket(), self._reference.ticket(), self._noise.ticket(), self.time_ticket()}
         self.DeclareVectorOutputPort(
-            "decision_variable",
-            count,
-            weakly(self._calc),
-            prerequisites_of_calc={self._position.ticket(), self._reference.ticket(), self._noise.ticket()},
+            "decision_variable", count, weakly(self._calc_variable), prerequisites_of_calc=given
         )
+        self.DeclareVectorOutputPort(
+            "decision_range", 2 * count, weakly(self._calc_range), prerequisites_of_calc={*given, self.xd_ticket()}
+        )
+        self.DeclareInitializationDiscreteUpdateEvent(weakly(self._begin_step))
+        self.DeclarePerStepDiscreteUpdateEvent(weakly(self._begin_step))
 
-    def _calc(self, context: Context, output: BasicVector) -> None:
-        # Evaluated several times a step, for few UGVs: plain floats are twice as fast as arrays here.
-        wanted, there = iter(self._reference.Eval(context).tolist()), iter(self._position.Eval(context).tolist())
-        noise = self._noise.Eval(context).tolist()
-        away = map(math.dist, zip(wanted, wanted, wanted, strict=False), zip(there, there, there, strict=False))
-        output.SetFromVector(list(map(float.__add__, noise, away)))
+    def value(self, t: float, parts: Array) -> Array | Sequence[float]:
+        """x of every UGV, (n,), m; it must depend on the arguments alone.
+
+        Args:
+            t: time, s.
+            parts: task error rho_rd - rho, m, and noise, m, of every UGV, (n, 4).
+        """
+        raise NotImplementedError(f"{type(self).__name__} does not define `value`")
+
+    def extremes(self, begin: float, before: Array, end: float, after: Array) -> Array:
+        """Least and largest x, (2, n), m, while task errors and noise are linear in time: here those at the ends.
+
+        Args:
+            begin: time, s.
+            before: task error and noise at that time, (n, 4), m.
+            end: time, s.
+            after: task error and noise at that time.
+        """
+        return np.sort([self.value(begin, before), self.value(end, after)], axis=0)
+
+    def _signals(self, context: Context) -> Array:
+        """Time, s, and task error and noise of every UGV now, m, (1 + 4n,)."""
+        position, reference = self._position.Eval(context), self._reference.Eval(context)
+        return gathered(context.get_time(), position, reference, self._noise.Eval(context))
+
+    def _calc_variable(self, context: Context, output: BasicVector) -> None:
+        now = self._signals(context)
+        output.SetFromVector(self.value(now[0], now[1:].reshape(-1, 4)))
+
+    def _calc_range(self, context: Context, output: BasicVector) -> None:
+        begun, now = context.get_discrete_state(0).value(), self._signals(context)
+        if begun[0] == NOT_BEGUN:
+            begun = now
+        begin, end, before, after = begun[0], now[0], begun[1:].reshape(-1, 4), now[1:].reshape(-1, 4)
+        found = self.extremes(begin, before, end, after)
+        first = bisect_right(self._corner_times, begin)
+        if first < len(self._corners) and self._corner_times[first] < end:
+            last = bisect_left(self._corner_times, end)
+            times = np.array([begin, *self._corner_times[first:last], end])
+            self._look_into_corners(found, times, {j for _, j in self._corners[first:last]}, before, after)
+        output.SetFromVector(found.ravel())
+
+    def _look_into_corners(self, found: Array, times: Array, bent: set[int], before: Array, after: Array) -> None:
+        """Replace least and largest x of the UGVs whose references bend within a step.
+
+        Args:
+            found: what is replaced, (2, n), m.
+            times: beginning of the step, corners within, end of the step, s.
+            bent: indices of these UGVs.
+            before: task error and noise at the beginning, (n, 4), m.
+            after: the same at the end.
+        """
+        shares = (times - times[0]) / (times[-1] - times[0])
+        parts = before + shares[:, None, None] * (after - before)
+        for j in bent:
+            reference = self._presets[j].sample(times)
+            parts[:, j, :3] += reference - reference[0] - shares[:, None] * (reference[-1] - reference[0])
+        ranges = np.array([self.extremes(*one, *other) for one, other in pairwise(zip(times, parts, strict=True))])
+        for j in bent:
+            found[:, j] = ranges[:, 0, j].min(), ranges[:, 1, j].max()
+
+    def _begin_step(self, context: Context, discrete: DiscreteValues) -> EventStatus:
+        """Keep the signals of this instant: a step ends here, or a simulator begins."""
+        discrete.set_value(0, self._signals(context))
+        return EventStatus.Succeeded()
+
+
+class DecisionVariable(DecisionBlock):
+    """x_j = ||rho_rd,j - rho_j|| + n_j, the solution of (15) with integrated noise n_j; its range is exact.
+
+    Ports, state and rate: see `DecisionBlock`.
+    """
+
+    def value(self, t: float, parts: Array) -> list[float]:
+        """The norms of the task errors plus the noise, (n,), m."""
+        return [math.hypot(x, y, z) + n for x, y, z, n in parts.tolist()]
+
+    def extremes(self, begin: float, before: Array, end: float, after: Array) -> Array:
+        """Exact: see `decision.excursion`."""
+        return extremes(before, after, np.array([self.value(begin, before), self.value(end, after)]))
 
 
 class EventTrigger(LeafSystem):
     """The automaton of `decision.trigger` for every UGV, its events isolated by a witness function.
 
-    The witness looks at the whole step so far, not at its end: between the simulator's steps positions, references
-    and noise are linear in time (but for corners of a preset), so that the least and the largest x since the step
-    began are known exactly (`decision.excursion`). It changes its sign once a transition has become due anywhere in
-    the step, and cannot change it back before the step ends: a dip below the release level and back within a step is
-    isolated like any other crossing, and nothing is missed. At the isolated time the step ends, and the per-step
-    update makes the transition; what is due at the beginning of a run, at once. The Context needs an accuracy
+    It knows the decision variables alone, whatever block computes them. The witness looks at the whole step so far,
+    not at its end: the least and the largest x since the step began are an input. It changes its sign once a
+    transition has become due anywhere in the step, and cannot change it back before the step ends: a dip below the
+    release level and back within a step is isolated like any other crossing, and nothing is missed. At the isolated
+    time the step ends, and the per-step update makes the transition; what is due at the beginning of a run, at once.
+    The per-step updates of a diagram all see the signals before any of them: the trigger sees the range of the step
+    that ends, while the block that computes it begins another. The Context needs an accuracy
     (`Context.SetAccuracy`): without it Drake stops at the first event, or with fixed steps it comes at the end of one.
     A Simulator that is initialised in the middle of a run, such as one for a clone of its Context, goes on with it; one
     that is initialised again before its first step, or for an earlier time, begins anew.
 
     Ports (n UGVs):
-        in  `team_position` (3(n+1)) m; `reference` (6n), positions first; `noise` (n) m.
+        in  `decision_variable` (n) m; `decision_range` (2n) m, the least since the step began, then the largest.
         out `status` (4n): per UGV mode (see Mode), number of triggers, time of the last trigger, s, and of
             the last release, s (-1 before the first).
-    State: the status; the beginning of the step: time, s, positions and references (3n each), m, and noise (n), m;
-        the beginning of the run, s.
+    State: the status; the beginning of the step and of the run, s.
     Rate: one update per step of the simulator.
     """
 
-    def __init__(self, count: int, trigger: Trigger, presets: Sequence[Motion] = ()) -> None:
-        """Declare ports, state and events for `count` UGVs; the presets (default: none) tell where references bend."""
+    def __init__(self, count: int, trigger: Trigger) -> None:
+        """Declare ports, state and events for `count` UGVs."""
         super().__init__()
         self._trigger = trigger
         self._levels = (float(trigger.zeta), float(trigger.release), float(trigger.dwell))
         self._count = count
-        self._presets = tuple(presets)
-        corners = [(t, j) for j, preset in enumerate(self._presets) for t in preset.times.tolist()]
-        self._corners = sorted(corners)
-        self._corner_times = [t for t, _ in self._corners]
-        self._position = self.DeclareVectorInputPort("team_position", 3 * (count + 1))
-        self._reference = self.DeclareVectorInputPort("reference", 6 * count)
-        self._noise = self.DeclareVectorInputPort("noise", count)
+        self._variable = self.DeclareVectorInputPort("decision_variable", count)
+        self._range = self.DeclareVectorInputPort("decision_range", 2 * count)
         status = self.DeclareDiscreteState(_pack([TriggerState()] * count))
-        self.DeclareDiscreteState(np.array([NOT_BEGUN, *([0.0] * 7 * count)]))
-        self.DeclareDiscreteState(np.array([NOT_BEGUN]))
+        self.DeclareDiscreteState([NOT_BEGUN])
+        self.DeclareDiscreteState([NOT_BEGUN])
         self.DeclareStateOutputPort("status", status)
         self.DeclareInitializationUnrestrictedUpdateEvent(weakly(self._start))
         self.DeclarePerStepDiscreteUpdateEvent(weakly(self.update))
@@ -120,83 +197,47 @@ class EventTrigger(LeafSystem):
         """The one witness."""
         return [self._witness]
 
-    def _signals(self, context: Context) -> Array:
-        """Time, s, positions and references, m, and noise, m, of the UGVs now, (1 + 7n,)."""
-        position, reference = self._position.Eval(context), self._reference.Eval(context)
-        return gathered(context.get_time(), position, reference, self._noise.Eval(context))
-
     def _start(self, context: Context, state: State) -> EventStatus:
-        now, discrete = self._signals(context), state.get_mutable_discrete_state()
+        discrete, t, x = state.get_mutable_discrete_state(), context.get_time(), self._variable.Eval(context)
         before, begun, run_begun = (discrete.value(k) for k in range(3))
-        if run_begun[0] < begun[0] <= now[0]:  # another simulator goes on with a run
-            discrete.set_value(0, self._after(before, now, now))
+        if run_begun[0] < begun[0] <= t:  # another simulator goes on with a run
+            discrete.set_value(0, self._after(before, t, x, x, x))
         else:
-            t, x = float(now[0]), _norms(now)
-            discrete.set_value(0, _pack([self._trigger.start(t, float(x[j])) for j in range(self._count)]))
-            discrete.set_value(2, now[:1])
-        discrete.set_value(1, now)
+            discrete.set_value(0, _pack([self._trigger.start(t, each) for each in x.tolist()]))
+            discrete.set_value(2, [t])
+        discrete.set_value(1, [t])
         return EventStatus.Succeeded()
 
     def nothing_due(self, context: Context) -> float:
         """The witness: 1 at the beginning of a step and until a transition is due in it, then -1."""
-        begun = context.get_discrete_state(1).value()
-        if context.get_time() - begun[0] < SHORTEST_S:
+        t = context.get_time()
+        if t - context.get_discrete_state(1)[0] < SHORTEST_S:
             return 1.0
-        return -1.0 if self._anything_due(context.get_discrete_state(0).value(), begun, self._signals(context)) else 1.0
+        status = context.get_discrete_state(0).value()
+        return -1.0 if anything_due(status, t, self._range.Eval(context), self._levels) else 1.0
 
     def update(self, context: Context, discrete: DiscreteValues) -> EventStatus:
         """Make the transitions that have become due in the step that ends, and begin another: the per-step update."""
-        now, begun, before = self._signals(context), *(context.get_discrete_state(k).value() for k in (1, 0))
-        if self._anything_due(before, begun, now):
-            discrete.set_value(0, self._after(before, begun, now))
-        discrete.set_value(1, now)
+        t, spans = context.get_time(), self._range.Eval(context)
+        before = context.get_discrete_state(0).value()
+        if anything_due(before, t, spans, self._levels):
+            least, most = spans[: self._count], spans[self._count :]
+            discrete.set_value(0, self._after(before, t, self._variable.Eval(context), least, most))
+        discrete.set_value(1, [t])
         return EventStatus.Succeeded()
 
-    def _after(self, before: Array, begun: Array, now: Array) -> Array:
+    def _after(self, before: Array, t: float, x: Array, least: Array, most: Array) -> Array:
         """Status once the transitions that became due in a step are made."""
-        least, most = self._excursions(begun, now)
         status = before.reshape(-1, FIELDS).copy()
-        t, x = float(now[0]), _norms(now)
         for j in np.flatnonzero(transitions_due(before, t, least, most, self._levels)):
             status[j] = _pack([self._moved(_unpack(status[j]), t, float(x[j]), float(least[j]), float(most[j]))])
         return status.ravel()
-
-    def _anything_due(self, status: Array, begun: Array, now: Array) -> bool:
-        if self._bends(begun, now):
-            return bool(transitions_due(status, now[0], *self._excursions(begun, now), self._levels).any())
-        return anything_due(status, begun, now, self._levels)
 
     def _moved(self, before: TriggerState, t: float, x: float, least: float, most: float) -> TriggerState:
         """State at the end of a step in which a transition became due: x now, and how far it went, m."""
         seen = {Mode.SUPERVISING: most, Mode.INTERVENING: least, Mode.REFRACTORY: x}[before.mode]
         after = self._trigger.step(before, t, seen)
         return after if after.mode is before.mode else self._trigger.step(after, t, x)  # x may have come back already
-
-    def _bends(self, begun: Array, now: Array) -> list[tuple[float, int]]:
-        """When references bend in a step, s, and whose."""
-        return self._corners[bisect_right(self._corner_times, begun[0]) : bisect_right(self._corner_times, now[0])]
-
-    def _excursions(self, begun: Array, now: Array) -> tuple[Array, Array]:
-        """Least and largest x since the step began, (n,) each, m."""
-        least, most = excursions(begun, now)
-        corners = self._bends(begun, now)
-        before, after = task_errors(begun), task_errors(now)
-        for j in {robot for _, robot in corners}:
-            times = [t for t, robot in corners if robot == j and t < now[0]]
-            share = (np.array(times) - begun[0]) / (now[0] - begun[0])
-            own = slice(1 + 3 * j, 4 + 3 * j)
-            position = begun[own] + share[:, None] * (now[own] - begun[own])
-            noise = before[j, 3] + share * (after[j, 3] - before[j, 3])
-            bends = np.column_stack([self._presets[j].sample(np.array(times)) - position, noise])
-            way = np.vstack([before[j], bends, after[j]])
-            low, high = extremes(way[:-1], way[1:])
-            least[j], most[j] = low.min(), high.max()
-        return least, most
-
-
-def _norms(signals: Array) -> Array:
-    """x of every UGV, (n,), m."""
-    return excursions(signals, signals)[0]
 
 
 def _pack(states: Sequence[TriggerState]) -> Array:

@@ -72,8 +72,8 @@ CLAIMS = (
     Mutant(
         "THR-TRIG ignores the mode",
         "verify/runs/thr_trig.py",
-        "((mode != sides[0]) & (mode != sides[1]))",
-        "((mode != sides[0]) & (mode != sides[1]) & False)",
+        "wrong = (mode != sides[0]) & (mode != sides[1])",
+        "wrong = (mode != sides[0]) & (mode != sides[1]) & False",
         runs=BOTH,
         tests=(f"{RUNS}/test_thr_trig.py",),
     ),

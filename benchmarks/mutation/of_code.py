@@ -422,7 +422,7 @@ DECISION = (
     Mutant(
         "what is above the threshold at the start triggers after the first tick",
         "systems/decision.py",
-        "discrete.set_value(0, _pack([self._trigger.start(t, float(x[j])) for j in range(self._count)]))",
+        "discrete.set_value(0, _pack([self._trigger.start(t, each) for each in x.tolist()]))",
         "pass",
         tests=TRIGGER,
     ),
@@ -443,24 +443,22 @@ DECISION = (
     Mutant(
         "events come at the ends of steps",
         "systems/decision.py",
-        "return -1.0 if self._anything_due(",
-        "return 1.0 if self._anything_due(",
+        "return -1.0 if anything_due(",
+        "return 1.0 if anything_due(",
         tests=(*ISOLATION, *TRIGGER),
     ),
     Mutant(
         "extremes at the ends of steps only",
-        "decision/excursion.py",
-        "    return extremes(task_errors(begun), task_errors(now))",
-        "    first, last = task_errors(begun), task_errors(now)\n"
-        "    first, last = extremes(first, first)[0], extremes(last, last)[0]\n"
-        "    return np.minimum(first, last), np.maximum(first, last)",
+        "systems/decision.py",
+        "return extremes(before, after, np.array([self.value(begin, before), self.value(end, after)]))",
+        "return super().extremes(begin, before, end, after)",
         tests=(*ISOLATION, *TRIGGER),
     ),
     Mutant(
         "corners of presets are not looked at",
         "systems/decision.py",
-        "self._presets = tuple(presets)",
-        "self._presets = ()",
+        "self._corner_times[first] < end:",
+        "self._corner_times[first] < begin:",
         tests=(*ISOLATION, *TRIGGER),
     ),
     Mutant(
@@ -473,8 +471,8 @@ DECISION = (
     Mutant(
         "noise is no part of the decision variable",
         "systems/decision.py",
-        "map(float.__add__, noise, away)",
-        "map(float, away)",
+        "math.hypot(x, y, z) + n for",
+        "math.hypot(x, y, z) for",
         tests=TRIGGER,
     ),
     Mutant(

@@ -175,6 +175,13 @@ def test_diagram_writes_what_was_asked_for(tmp_path: Path, capsys: pytest.Captur
     assert "no such scenario" in capsys.readouterr().err
 
 
+def test_diagram_shows_the_method_that_a_report_shows(tmp_path: Path) -> None:
+    """The last run of case_a has method (a)."""
+    assert main(["diagram", "case_a", "--format", "dot", "-o", str(tmp_path)]) == 0
+    shipped = Path(__file__).parents[2] / "diagrams" / "case_a.dot"  # of method (d), held by tests/test_diagram.py
+    assert (tmp_path / "case_a.dot").read_text(encoding="utf-8") == shipped.read_text(encoding="utf-8")
+
+
 MISTAKEN = """
 --versoin
 -x

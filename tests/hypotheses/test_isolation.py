@@ -10,10 +10,9 @@ import numpy.typing as npt
 import pytest
 
 from airground_drake.arrays import Array
-from airground_drake.decision.excursion import extremes, task_errors
+from airground_drake.decision.excursion import extremes
 from airground_drake.decision.trigger import Mode, Trigger
-from airground_drake.systems import decision
-from airground_drake.systems.decision import FIELDS, EventTrigger
+from airground_drake.systems.decision import FIELDS, DecisionBlock, DecisionVariable, EventTrigger
 
 UGVS = 400
 """Steps compared at a time."""
@@ -24,8 +23,8 @@ ROUNDING = 1e-13
 and the subtraction of two errors that are nearly the same."""
 
 
-def disagreements(trigger: Trigger) -> int:
-    """How often the running EventTrigger misses at the end of a step what was due in it, or invents something.
+def disagreements(trigger: Trigger, block: type[DecisionVariable] = DecisionVariable) -> int:
+    """How often the running block and EventTrigger miss at the end of a step what was due in it, or invent something.
 
     Errors pass the origin closely or not, stand still, or are tiny; noise changes slowly or fast; x is near the levels.
     """
@@ -34,7 +33,7 @@ def disagreements(trigger: Trigger) -> int:
         modes = rng.integers(0, 2, UGVS)
         levels = np.where(modes == Mode.SUPERVISING, trigger.zeta, trigger.release)
         before, after = _random_steps(rng, levels)
-        due = _running(EventTrigger(UGVS, trigger), modes, before, after)
+        due = _running(block(UGVS), EventTrigger(UGVS, trigger), modes, before, after)
         for j in range(UGVS):
             size = float(np.abs(np.concatenate([before[j], after[j]])).max()) + abs(float(levels[j]))
             low, high = _range(before[j], after[j])
@@ -48,13 +47,12 @@ def test_no_crossing_is_missed_and_none_is_invented(trigger: Trigger) -> None:
     assert disagreements(trigger) == 0
 
 
-def test_a_trigger_that_looks_at_the_ends_of_steps_only_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    def ends(begun: Array, now: Array) -> tuple[Array, Array]:
-        x = [np.linalg.norm(parts[:, :3], axis=1) + parts[:, 3] for parts in map(task_errors, (begun, now))]
-        return np.minimum(*x), np.maximum(*x)
+class EndsOnly(DecisionVariable):
+    extremes = DecisionBlock.extremes
 
-    monkeypatch.setattr(decision, "excursions", ends)
-    assert disagreements(Trigger(3.0, 2.0, 0.5)) > 0
+
+def test_a_block_that_looks_at_the_ends_of_steps_only_is_noticed() -> None:
+    assert disagreements(Trigger(3.0, 2.0, 0.5), EndsOnly) > 0
 
 
 def _random_steps(rng: np.random.Generator, levels: Array) -> tuple[Array, Array]:
@@ -67,28 +65,36 @@ def _random_steps(rng: np.random.Generator, levels: Array) -> tuple[Array, Array
     after = np.select([kind == 0, kind == 1], [passing, away], before[:, :3])
     noise = before[:, 3:] + size * rng.normal(size=(UGVS, 1)) * 10.0 ** rng.uniform(-6.0, 0.5, (UGVS, 1))
     after = np.hstack([after, noise])
-    near = np.where(rng.random(UGVS) < 0.5, *extremes(before, after))  # move x so that this is near the level
+    near = np.where(rng.random(UGVS) < 0.5, *_ranges(before, after))  # move x so that this is near the level
     shift = levels - near + size[:, 0] * rng.choice([-1.0, 1.0], UGVS) * 10.0 ** rng.uniform(-9.0, 0.0, UGVS)
     before[:, 3] += shift
     after[:, 3] += shift
     return before, after
 
 
-def _running(system: EventTrigger, modes: npt.NDArray[np.int64], before: Array, after: Array) -> list[bool]:
-    """For which UGVs the running system makes a transition at the end of its step."""
-    context, count, step = system.CreateDefaultContext(), len(modes), 0.1
+def _ranges(before: Array, after: Array) -> Array:
+    x = [np.linalg.norm(parts[:, :3], axis=1) + parts[:, 3] for parts in (before, after)]
+    return extremes(before, after, np.array(x))
+
+
+def _running(
+    variable: DecisionVariable, system: EventTrigger, modes: npt.NDArray[np.int64], before: Array, after: Array
+) -> list[bool]:
+    """For which UGVs the running systems make a transition at the end of their step."""
+    count, step = len(modes), 0.1
+    source = variable.CreateDefaultContext()
+    source.SetTime(1.0 + step)
+    source.SetDiscreteState(0, np.concatenate([[1.0], before.ravel()]))
+    variable.GetInputPort("team_position").FixValue(source, np.zeros(3 * count + 3))
+    variable.GetInputPort("reference").FixValue(source, np.concatenate([after[:, :3].ravel(), np.zeros(3 * count)]))
+    variable.GetInputPort("noise").FixValue(source, after[:, 3])
+    context = system.CreateDefaultContext()
     context.SetTime(1.0 + step)
-
-    def signals(parts: Array) -> list[Array]:
-        return [np.zeros(3 * count), parts[:, :3].ravel(), parts[:, 3]]
-
     status = np.column_stack([modes, modes, np.where(modes > 0, 0.0, -1.0), np.full(count, -1.0)])
     context.SetDiscreteState(0, status.ravel())
-    context.SetDiscreteState(1, np.concatenate([[1.0], *signals(before)]))
-    position, reference, noise = signals(after)
-    system.GetInputPort("team_position").FixValue(context, np.concatenate([position, np.zeros(3)]))
-    system.GetInputPort("reference").FixValue(context, np.concatenate([reference, np.zeros(3 * count)]))
-    system.GetInputPort("noise").FixValue(context, noise)
+    context.SetDiscreteState(1, [1.0])
+    for port in ("decision_variable", "decision_range"):
+        system.GetInputPort(port).FixValue(context, variable.GetOutputPort(port).Eval(source))
     updated = system.AllocateDiscreteVariables()
     updated.SetFrom(context.get_discrete_state())
     system.update(context, updated)

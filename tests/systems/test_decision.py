@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pathlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -13,16 +13,20 @@ from hypothesis import strategies as st
 from properties import examples
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 from pydrake.systems.framework import DiagramBuilder
-from pydrake.systems.primitives import Integrator, LogVectorOutput, TrajectorySource, ZeroOrderHold
+from pydrake.systems.primitives import Integrator, LogVectorOutput, PassThrough, TrajectorySource, ZeroOrderHold
 from pydrake.trajectories import PiecewisePolynomial
+from verify.judging import judge
 
 from airground_drake.arrays import Array
 from airground_drake.components import integrated_noise
 from airground_drake.decision.trigger import Trigger
+from airground_drake.diagram import build_diagram
+from airground_drake.errors import PluginError
 from airground_drake.nsbc.motion import Motion
 from airground_drake.scenarios.load import load
 from airground_drake.simulation import simulate
-from airground_drake.systems.decision import FIELDS, EventTrigger
+from airground_drake.systems.decision import FIELDS, DecisionBlock, DecisionVariable, EventTrigger
+from airground_drake.trace import Trace
 from airground_drake.verify.engines.segments import NormSignal
 from airground_drake.verify.runs.trigger_replay import transitions
 
@@ -40,7 +44,10 @@ def run(trigger: Trigger, path: Path, step: float, presets: Sequence[Motion] = (
     """Rows (4n, T) of the running trigger's status; references move by the presets, or stand still."""
     builder = DiagramBuilder()
     n = path.noise.shape[1]
-    system = builder.AddNamedSystem("event_trigger", EventTrigger(n, trigger, presets))
+    variable = builder.AddNamedSystem("decision_variable", DecisionVariable(n, presets))
+    system = builder.AddNamedSystem("event_trigger", EventTrigger(n, trigger))
+    for port in ("decision_variable", "decision_range"):
+        builder.Connect(variable.GetOutputPort(port), system.GetInputPort(port))
     reference = np.zeros((len(path.t), n, 3))
     t = path.t
     if presets:
@@ -54,7 +61,7 @@ def run(trigger: Trigger, path: Path, step: float, presets: Sequence[Motion] = (
     for name, (times, samples) in signals.items():
         source = TrajectorySource(PiecewisePolynomial.FirstOrderHold(times, samples))
         builder.AddNamedSystem(name, source)
-        builder.Connect(source.get_output_port(), system.GetInputPort(name))
+        builder.Connect(source.get_output_port(), variable.GetInputPort(name))
     # steps end at the multiples of `step`; they need a continuous state
     clock, hold = builder.AddNamedSystem("clock", Integrator(1)), builder.AddNamedSystem("hold", ZeroOrderHold(step, 1))
     builder.Connect(hold.get_output_port(), clock.get_input_port())
@@ -171,3 +178,78 @@ def test_a_sample_of_the_noise_moves_the_variable_by_what_its_period_is_worth(pe
     noise = integrated_noise(2, 0.4, 0.0, period)
     np.testing.assert_allclose(period * noise.B(), 0.4 * np.sqrt(period) * np.eye(2), rtol=1e-12)
     np.testing.assert_array_equal(integrated_noise(2, 0.4, 0.3, period).A(), -0.3 * np.eye(2))
+
+
+class Silent(DecisionBlock):
+    """Never has a reason to intervene."""
+
+    def value(self, t: float, parts: Array) -> Array:
+        return np.zeros(len(parts))
+
+
+class MaxNorm(DecisionBlock):
+    """The largest coordinate of the task error, plus the noise."""
+
+    def value(self, t: float, parts: Array) -> Array:
+        found: Array = np.abs(parts[:, :3]).max(axis=1) + parts[:, 3]
+        return found
+
+
+class Played(DecisionBlock):
+    """A recorded signal: rises to 4 m in 2 s and falls to 0 m in 2 s, for every UGV."""
+
+    def value(self, t: float, parts: Array) -> Array:
+        return np.full(len(parts), np.interp(t, [0.0, 2.0, 4.0], [0.0, 4.0, 0.0]))
+
+
+def of_kind(trace: Trace, kind: str) -> list[float]:
+    return [float(event["t_s"]) for event in trace.events if event["kind"] == kind]
+
+
+def test_a_decision_block_that_returns_0_triggers_nothing() -> None:
+    scenario = load("case_a")[0]
+    assert of_kind(simulate(scenario, "b"), "trigger")
+    trace = simulate(scenario, "b", decision_block=Silent)
+    assert of_kind(trace, "trigger") == []
+    assert trace.meta["decision_block"] == "Silent"
+    finding = judge("THR-TRIG", trace)
+    assert finding.status == "holds"
+    assert finding.exercised == 0
+    assert finding.evidence["ugvs"][0]["port_against_15"]["status"] == "not_run"
+
+
+def test_another_norm_triggers_when_it_reaches_the_threshold() -> None:
+    scenario = load("case_a")[0]
+    trace = simulate(scenario, "b", decision_block=MaxNorm)
+    first = of_kind(trace, "trigger")[0]
+    assert first > of_kind(simulate(scenario, "b"), "trigger")[0]  # the largest coordinate is less than the norm
+    row = int(np.searchsorted(trace.t, first))
+    error = np.array([trace.column(f"ugv1.ref_{a}_m") - trace.column(f"ugv1.{a}_m") for a in "xyz"])
+    largest = np.abs(error).max(axis=0) + trace.column("ugv1.noise_m")
+    assert largest[row] == pytest.approx(scenario.decision.threshold.zeta_m, abs=1e-5)
+    assert largest[:row].max() < scenario.decision.threshold.zeta_m
+    assert judge("THR-TRIG", trace).status == "holds"
+
+
+def test_a_recorded_signal_drives_the_trigger_and_its_crossings_are_isolated() -> None:
+    scenario = load("case_a", {"duration_s": 5.0, "decision.release_m": 1.0})[0]
+    trace = simulate(scenario, "b", decision_block=Played)
+    ugvs = len(trace.ugvs)
+    assert of_kind(trace, "trigger") == pytest.approx([scenario.decision.threshold.zeta_m / 2.0] * ugvs, abs=2e-6)
+    assert of_kind(trace, "release") == pytest.approx([3.5] * ugvs, abs=2e-6)
+    assert judge("THR-TRIG", trace).status == "holds"
+    late = [{**e, "t_s": e["t_s"] + 0.001 * (e["kind"] == "release")} for e in trace.events]
+    assert judge("THR-TRIG", replace(trace, meta={**trace.meta, "events": late})).status == "refuted"
+
+
+def test_a_run_of_another_block_does_not_pass_for_one_of_15() -> None:
+    trace = simulate(load("case_a", {"duration_s": 2.0})[0], "b", decision_block=Silent)
+    passed_off = replace(trace, meta={**trace.meta, "decision_block": ""})
+    finding = judge("THR-TRIG", passed_off)
+    assert finding.status == "refuted"
+    assert finding.evidence["ugvs"][0]["port_against_15"]["status"] == "refuted"
+
+
+def test_a_decision_block_without_a_range_is_refused() -> None:
+    with pytest.raises(PluginError, match=r"the decision block has output ports of sizes .*'decision_range': 4"):
+        build_diagram(load("case_a")[0], decision_block=lambda count, presets: PassThrough(count))

@@ -17,7 +17,7 @@ from airground_drake.verify.engines.segments import NormSignal
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.decision_noise import noise_conflict
 from airground_drake.verify.runs.trigger_record import Conflict, Transition, column_conflict, recorded_events
-from airground_drake.verify.runs.trigger_replay import decision_variable, transitions
+from airground_drake.verify.runs.trigger_replay import decision_variable, recorded_variable, transitions
 
 EVENT_TOLERANCE_S = 1e-5
 """Recorded and recomputed events may differ by this, s: ten times the accuracy of the simulator's event isolation."""
@@ -50,8 +50,8 @@ class ThrTrig(TraceClaim):
         "in the variable moves as (15) has it, by one sample for each of its periods."
     )
     formula = (
-        "recorded triggers and releases = those of the automaton run on x(t) = ||rho_rd(t) - rho(t)|| + n(t), "
-        "times equal within 1e-5 s; recorded x equal within 1e-6 m at every row; n(0) = 0, and between rows "
+        "recorded triggers and releases = those of the automaton run on the recorded x, times equal within 1e-5 s; "
+        "recorded x(t) = ||rho_rd(t) - rho(t)|| + n(t) within 1e-6 m at every row; n(0) = 0, and between rows "
         "n' = s w_k / sqrt(h) - leak n with one w_k, |w_k| <= 9, for each period h of the noise"
     )
     latex = (
@@ -61,9 +61,12 @@ class ThrTrig(TraceClaim):
         r"n(0) = 0, \quad \dot n = \sigma w_k / \sqrt{h} - \lambda n, \quad |w_k| \le 9",
     )
     method = (
-        "x is rebuilt from positions, noise and the scenario's preset, cut at the preset's corners and at its turning "
-        "points (closed form) into monotone pieces; crossings are then sign changes, located by Brent's method to "
-        "1e-12 s. The automaton is run again on it and its events, and the mode column, are compared one by one. Where "
+        "(15) is rebuilt from positions, noise and the scenario's preset, and the recorded x, the signal that the "
+        "trigger has, is compared with it at every row: `port_against_15` in the evidence. Where they agree, the "
+        "rebuilt x also tells what x is between rows; where they do not, or the block that computes x is another than "
+        "that of (15), x is linear between rows. It is cut at the preset's corners and at its turning points (closed "
+        "form) into monotone pieces; crossings are then sign changes, located by Brent's method to 1e-12 s. The "
+        "automaton is run again on it and its events, and the mode column, are compared one by one. Where "
         "a period of the noise has several rows, all must have the same sample, given the leak."
     )
     equations = "(15), (20)"
@@ -71,6 +74,7 @@ class ThrTrig(TraceClaim):
         "Positions and integrated noise are linear in time between rows.",
         "The threshold in force is the one recorded in the trace: the scenario's, or the root of (19) with c2/c1.",
         "Events in the last 1e-5 s of the run may be on either side of its end.",
+        "Where another block computes x (`decision_block` in the trace), x is linear in time between rows.",
     )
     does_not_establish = (
         "That the threshold is a good one (THR-ROOT, THR-OPT); that the noise has the stated distribution (THR-DDM), "
@@ -88,6 +92,7 @@ class ThrTrig(TraceClaim):
             raise TraceError(f"the threshold in force, {zeta} m, is not the scenario's")
         if decision["threshold"]["rule"] == "bayes" and not _is_bayes(decision["threshold"], zeta):
             raise TraceError(f"the threshold in force, {zeta} m, is not the Bayes-optimal one of the scenario")
+        block = str(trace.meta.get("decision_block", ""))
         bare = decision["trigger"] == "bare"
         release, dwell = (zeta, 0.0) if bare else (decision["release_m"], decision["min_inter_event_s"])
         wrong: list[Conflict] = [
@@ -99,14 +104,14 @@ class ThrTrig(TraceClaim):
         lags: list[tuple[float, str]] = []
         due: Counter[str] = Counter()
         for ugv in trace.ugvs:
-            x = decision_variable(trace, ugv)
+            x, against_15, off = _judged(trace, ugv, replaced=bool(block))
             predicted = list(transitions(x, zeta, release, dwell))
             due.update(_as_transitions(predicted))
             recorded = recorded_events(trace, ugv)
             expected = [(time, EVENT_KINDS[kind]) for time, kind in predicted if kind in EVENT_KINDS]
             lag, mismatch = _compare(expected, recorded, x)
             found = (
-                mismatch, column_conflict(trace, ugv, recorded), _signal_conflict(trace, ugv, x, predicted),
+                off, mismatch, column_conflict(trace, ugv, recorded), _mode_conflict(trace, ugv, predicted),
                 noise_conflict(trace, ugv),
             )  # fmt: skip
             wrong += [{"robot": ugv, **conflict} for conflict in found if conflict is not None]
@@ -117,6 +122,7 @@ class ThrTrig(TraceClaim):
                     "events": [{"t_s": time, "kind": kind} for time, kind in expected],
                     "worst_time_difference_s": lag,
                     "largest_decision_variable_m": float(x.x.max()),
+                    "port_against_15": against_15,
                 }
             )
         worst = max(lags) if lags and not wrong else None
@@ -129,6 +135,7 @@ class ThrTrig(TraceClaim):
             counterexample=min(wrong, key=lambda conflict: float(conflict["t_s"])) if wrong else None,
             evidence={
                 "ugvs": evidence,
+                "decision_block": block or "that of (15)",
                 "zeta_m": zeta,
                 "release_m": release,
                 "dwell_s": dwell,
@@ -163,19 +170,42 @@ def _compare(expected: list[Transition], recorded: list[Transition], x: NormSign
     return lag, None
 
 
-def _signal_conflict(trace: Trace, ugv: str, x: NormSignal, predicted: list[Transition]) -> Conflict | None:
-    """First row at which the recorded decision variable or mode is not the recomputed one."""
-    t = trace.t
-    mode = trace.column(f"{ugv}.mode")
-    value = x.at(trace.t)
+def _judged(trace: Trace, ugv: str, *, replaced: bool) -> tuple[NormSignal, dict[str, Any], Conflict | None]:
+    """The decision variable that the trigger had, how it compares with (15), and the first row at which it differs.
+
+    Args:
+        trace: the run.
+        ugv: whose.
+        replaced: whether another block than that of (15) computes it.
+    """
+    recorded = recorded_variable(trace, ugv)
+    if replaced:
+        return recorded, {"status": "not_run", "reason": "another block computes the decision variable"}, None
+    rebuilt = decision_variable(trace, ugv)
+    value, port = rebuilt.at(trace.t), trace.column(f"{ugv}.decision_variable_m")
+    off = np.abs(port - value)
+    found = {"status": "holds", "largest_difference_m": float(off.max())}
+    if not (off > VARIABLE_TOLERANCE_M).any():
+        return rebuilt, found, None
+    k = int(np.argmax(off > VARIABLE_TOLERANCE_M))
+    conflict = {
+        "t_s": float(trace.t[k]),
+        "what": "recorded decision variable is not that of (15)",
+        "decision_variable_m": float(value[k]),
+        "recorded_m": float(port[k]),
+        "difference_m": float(off[k]),
+    }
+    return recorded, {**found, "status": "refuted"}, conflict
+
+
+def _mode_conflict(trace: Trace, ugv: str, predicted: list[Transition]) -> Conflict | None:
+    """First row at which the recorded mode is not the recomputed one."""
+    t, mode = trace.t, trace.column(f"{ugv}.mode")
     times = np.array([time for time, _ in predicted])
     modes = np.array([0, *(MODES[kind] for _, kind in predicted)])
     sides = [modes[np.searchsorted(times, t + shift)] for shift in (-EVENT_TOLERANCE_S, EVENT_TOLERANCE_S)]
-    off = np.abs(trace.column(f"{ugv}.decision_variable_m") - value)
-    wrong = (off > VARIABLE_TOLERANCE_M) | ((mode != sides[0]) & (mode != sides[1]))
+    wrong = (mode != sides[0]) & (mode != sides[1])
     if not wrong.any():
         return None
     k = int(np.argmax(wrong))
-    recomputed = {"decision_variable_m": float(value[k]), "mode": int(sides[1][k])}
-    difference = {"difference_m": float(off[k]), "recorded_mode": float(mode[k])}
-    return {"t_s": float(t[k]), "what": "recorded decision variable or mode", **recomputed, **difference}
+    return {"t_s": float(t[k]), "what": "recorded mode", "mode": int(sides[1][k]), "recorded_mode": float(mode[k])}

@@ -27,6 +27,12 @@ def decision_variable(trace: Trace, ugv: str) -> NormSignal:
     return NormSignal.of(t, parts)
 
 
+def recorded_variable(trace: Trace, ugv: str) -> NormSignal:
+    """The recorded x(t), the signal that the trigger had, taken to be linear in time between rows."""
+    x = trace.column(f"{ugv}.decision_variable_m")
+    return NormSignal.of(trace.t, np.column_stack([np.zeros((len(x), 3)), x]))
+
+
 def transitions(x: NormSignal, zeta: float, release: float, dwell: float) -> Iterator[Transition]:
     """Run the trigger automaton on x: levels zeta >= release, m, and dwell, s (release = zeta, dwell = 0: bare)."""
     released, resume = -np.inf, float(x.t[0])
