@@ -122,7 +122,10 @@ class Control:
 
 @dataclass(slots=True)
 class Threshold:
-    """Decision threshold zeta: rule 'fixed' takes zeta_m; 'bayes' minimises the Bayes risk (16)-(19)."""
+    """Decision threshold zeta: rule 'fixed' takes zeta_m; 'bayes' minimises the Bayes risk (16)-(18).
+
+    'printed' takes the root of (19) as the paper prints it, for comparison: it does not minimise the risk.
+    """
 
     rule: str = "fixed"
     """Where the threshold comes from."""

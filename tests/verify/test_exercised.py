@@ -131,8 +131,11 @@ def test_the_command_line_says_when_there_was_nothing_to_check(
 def test_a_report_counts_what_was_not_exercised_apart(report: Callable[[str], Path]) -> None:
     document = json.loads((report("case_b") / "report.json").read_text(encoding="utf-8"))
     overall = document["overall"]
-    assert overall["not_exercised"] == [{"id": "ZENO-TRACE", "run": run} for run in "bcd"]
-    assert overall["counts"]["not_exercised"] == 3
-    assert overall["counts"]["holds"] == sum(c["status"] == "holds" for c in document["claims"]) - 3
-    assert overall["why"].endswith("3 of them had nothing to check: ZENO-TRACE on run b, c, d.")
+    assert overall["not_exercised"] == [
+        *({"id": "ZENO-TRACE", "run": run} for run in "bcd"),
+        {"id": "THR-CHOICE", "run": ""},  # its threshold is declared
+    ]
+    assert overall["counts"]["not_exercised"] == 4
+    assert overall["counts"]["holds"] == sum(c["status"] == "holds" for c in document["claims"]) - 4
+    assert overall["why"].endswith("4 of them had nothing to check: ZENO-TRACE on run b, c, d; THR-CHOICE.")
     assert all(claim["exercised"] is not None and claim["exercised_by"] for claim in document["claims"])
