@@ -66,6 +66,12 @@ def meets(expected: str, claim: Json) -> bool:
     return status in admitted or (EXERCISED in admitted and status in PASSING and count is not None and count > 0)
 
 
+def admits_either(expected: str) -> bool:
+    """Whether an expectation admits a claim that was established and one that was refuted."""
+    admitted = expected.split(" or ")
+    return "refuted" in admitted and not {*PASSING, EXERCISED}.isdisjoint(admitted)
+
+
 def outcome_of(claim: Json) -> str:
     """How a verdict counts: by its status, unless nothing put the claim to the test."""
     idle = claim["status"] in PASSING and claim["exercised"] == 0
@@ -166,6 +172,7 @@ def _overall(report: Json) -> Json:
         "as_expected": len(claims) - len(unexpected),
         "counts": dict(Counter(map(outcome_of, claims))),
         "not_exercised": [{"id": c["id"], "run": c["run"]} for c in claims if outcome_of(c) == NOT_EXERCISED],
+        "either": [{"id": c["id"], "run": c["run"]} for c in claims if admits_either(c["expected"])],
         "differs": differs,
         "undecided": undecided,
         "missing": [],

@@ -55,6 +55,7 @@ CHIPS = {
     "not_run": ("○", "not run", "open"),
     "reproduced": ("✓", "reproduced", "good"),
     "calibrated": ("≈", "calibrated", "tuned"),
+    "by_construction": ("=", "by construction", "tuned"),
     "ambiguous": ("?", "ambiguous", "open"),
     "not_reproduced": ("✗", "not reproduced", "bad"),
     "demonstrated": ("✓", "demonstrated", "good"),

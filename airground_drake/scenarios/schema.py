@@ -271,8 +271,9 @@ class Run:
 class Reproduction:
     """One row of the reproduction table: a measure of a run against the paper's value.
 
-    `calibrated`: something that the paper leaves open was chosen so that the value comes out. `ambiguous` is another
-    way to read the paper: the row is then neither reproduced nor not.
+    `calibrated`: something that the paper leaves open was chosen so that the value comes out. `by_construction`: the
+    scenario itself says the value, so that nothing is reproduced. `ambiguous` is another way to read the paper: the row
+    is then neither reproduced nor not.
     """
 
     id: str = field(default_factory=str, metadata=REQUIRED)
@@ -297,6 +298,8 @@ class Reproduction:
     """Why the row is as it is."""
     ambiguous: str = ""
     """Another way to read the paper, in words."""
+    by_construction: bool = False
+    """Whether the scenario itself says the value."""
 
 
 @dataclass(slots=True)

@@ -12,10 +12,11 @@ import pytest
 from builders.runs import run_of
 from verify.judging import CLAIMS
 
+from airground_drake.check import verdicts
 from airground_drake.registry import MODEL_CLAIMS, RUN_CLAIMS
 from airground_drake.scenarios.load import load
 from airground_drake.simulation import simulate
-from airground_drake.statuses import meets, outcome
+from airground_drake.statuses import admits_either, meets, outcome
 from airground_drake.trace import Trace
 from airground_drake.verify import Finding, verify
 from airground_drake.verify.__main__ import main
@@ -115,6 +116,13 @@ def test_a_claim_that_says_what_exercises_it_must_count_it(finding: Finding, cou
 def test_exercised_is_established_on_something(expected: str, status: Any, count: int | None, met: bool) -> None:
     assert meets(expected, status, count) is met
     assert Verdict(CLAIMS["COMM"], "d", Finding(status, exercised=count), expected).as_expected is met
+
+
+def test_an_expectation_that_admits_either_verdict_is_known() -> None:
+    either = ("holds or refuted", "exercised or refuted", "refuted or supported or error")
+    assert all(map(admits_either, either))
+    assert not any(map(admits_either, ("holds", "refuted", "holds or supported", "refuted or error")))
+    assert all(verdicts.admits_either(expected) is admits_either(expected) for expected in (*either, "holds"))
 
 
 def test_the_command_line_says_when_there_was_nothing_to_check(

@@ -37,7 +37,22 @@ def draw(inputs: Mapping[str, Any], evidence: Mapping[str, Any]) -> Figure | Non
         f"For the assumed drift of {constants[0]:g} m/s and noise of {constants[1]:g} m/√s, c1 = {constants[2]:g} 1/s, "
         f"c2 = {constants[3]:g}. The threshold in force is {evidence['kind']}: {places['in force']:.4g} m; optimal is "
         f"{places['optimal']:.4g} m, (19) as printed gives {places['(19) as printed']:.4g} m. Extra risk of the "
-        f"threshold in force: {evidence['extra_risk']:.3g}."
+        f"threshold in force: {evidence['extra_risk']:.3g}.{_as_it_was(evidence.get('runs', {}))}"
     )
     with canvas.style():
         return shown.plate("threshold-choice", "Risk for the scenario's own numbers", caption, beside="THR-CHOICE")
+
+
+def _as_it_was(runs: Mapping[str, Mapping[str, Any]]) -> str:
+    """The drift and noise of the first UGV that triggered, and what would be optimal for them."""
+    for name, row in runs.items():
+        optima = {
+            "the assumed noise": row["optimum_for_this_drift_m"],
+            "the run's own": row["optimum_for_this_drift_and_noise_m"],
+        }
+        best = [f"{zeta:.3g} m with {noise}" for noise, zeta in optima.items() if zeta is not None]
+        return (
+            f" In run {name.replace(' ', ', ')}, the drift really was {row['drift_m_s']:.4g} m/s and the noise "
+            f"{row['noise_m_sqrt_s']:g} m/√s: optimal for this drift would be {' and '.join(best) or 'no threshold'}."
+        )
+    return " No run triggered, so that none shows a drift."

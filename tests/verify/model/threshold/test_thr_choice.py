@@ -11,6 +11,8 @@ from builders.runs import run_of
 from verify.model.threshold.cases import INPUTS, TABLE_1
 
 from airground_drake.decision.bayes import optimal_threshold
+from airground_drake.report import html
+from airground_drake.report.figures import threshold
 from airground_drake.scenarios.load import load
 from airground_drake.trace import Trace
 from airground_drake.verify import verify_all, verify_model
@@ -102,3 +104,26 @@ def test_a_report_has_the_runs_beside_the_numbers_of_the_rule(run: Callable[[str
     for row in found.evidence["runs"].values():
         assert row["drift_m_s"] == pytest.approx(1.0, abs=1e-6)
         assert row["optimum_for_this_drift_and_noise_m"] == pytest.approx(found.evidence["threshold_in_force_m"])
+
+
+def test_the_figure_marks_three_thresholds_and_says_what_the_runs_had() -> None:
+    finding, drift = judged(TABLE_1), {"drift_m_s": 0.5606, "noise_m_sqrt_s": 0.004}
+    optima = {"optimum_for_this_drift_m": 0.2803, "optimum_for_this_drift_and_noise_m": None}
+    figure = threshold.draw(TABLE_1, {**finding.evidence, "runs": {"b ugv1": {**drift, **optima}}})
+    assert figure is not None
+    assert figure.beside == "THR-CHOICE"
+    rows = {row[0]: row[1:] for row in figure.panels[0].table.rows[-3:]}
+    assert rows == {"in force": ("3", "0.4547"), "optimal": ("2.992", "0.4547"), "(19) as printed": ("0.7557", "0.48")}
+    assert "In run b, ugv1, the drift really was 0.5606 m/s" in figure.caption
+    assert "optimal for this drift would be 0.28 m with the assumed noise." in figure.caption
+    none = threshold.draw(TABLE_1, finding.evidence)
+    assert none is not None
+    assert none.caption.endswith("No run triggered, so that none shows a drift.")
+    assert threshold.draw(TABLE_1, {"error": "failed"}) is None
+
+
+@pytest.mark.parametrize(("kind", "shown"), [("declared", "declared"), ("optimal", "holds")])
+def test_a_declared_threshold_never_looks_proved(kind: str, shown: str) -> None:
+    claim = {"status": "holds", "exercised": 1, "evidence": {"kind": kind}}
+    assert html._shown(claim) == shown
+    assert html._shown({**claim, "status": "refuted"}) == "refuted"
