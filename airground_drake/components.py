@@ -10,7 +10,7 @@ from pydrake.systems.primitives import AffineSystem, LinearSystem, RandomSource
 from pydrake.trajectories import PiecewisePolynomial
 
 from airground_drake.arrays import Array
-from airground_drake.decision.bayes import optimal_threshold
+from airground_drake.decision.bayes import COMPUTED
 from airground_drake.decision.trigger import Trigger
 from airground_drake.gatekeeper.answer import Rules
 from airground_drake.gatekeeper.budget import Budget
@@ -190,10 +190,10 @@ def make_trigger(scenario: Scenario, zeta: float) -> Trigger:
 
 
 def threshold(scenario: Scenario) -> float:
-    """Decision threshold zeta, m: the fixed one, or the minimiser of the Bayes risk (16)."""
+    """Decision threshold zeta, m: the fixed one, the minimiser of the Bayes risk, or the root of (19) as printed."""
     rule = scenario.decision.threshold
-    if rule.rule == "bayes":
-        return optimal_threshold(rule.drift_m_s, rule.noise_m_sqrt_s, rule.c1_1_s, rule.c2)
+    if rule.rule in COMPUTED:
+        return COMPUTED[rule.rule](rule.drift_m_s, rule.noise_m_sqrt_s, rule.c1_1_s, rule.c2)
     return rule.zeta_m
 
 

@@ -348,6 +348,7 @@ MODEL_CLAIMS = Registry(
         "THR-ISO": "airground_drake.verify.model.trigger.thr_iso:ThrIso",
         "THR-ROOT": "airground_drake.verify.model.threshold.thr_root:ThrRoot",
         "THR-OPT": "airground_drake.verify.model.threshold.thr_opt:ThrOpt",
+        "THR-CHOICE": "airground_drake.verify.model.threshold.thr_choice:ThrChoice",
         "THR-DDM": "airground_drake.verify.model.threshold.thr_ddm:ThrDdm",
     },
 )

@@ -25,6 +25,12 @@ def alternatives(expected: str) -> tuple[str, ...]:
     return tuple(expected.split(" or "))
 
 
+def admits_either(expected: str) -> bool:
+    """Whether an expectation admits a claim that was established and one that was refuted: nothing decided differs."""
+    admitted = alternatives(expected)
+    return "refuted" in admitted and any(each in (*PASSING, EXERCISED) for each in admitted)
+
+
 def outcome(status: str, exercised: float | None) -> str:
     """How a verdict counts: by its status, or as `NOT_EXERCISED` if nothing was there to refute it.
 

@@ -116,15 +116,16 @@ def levels_of(scenario: Json) -> Levels:
 
 
 def threshold_m(scenario: Json) -> float:
-    """The threshold in force: the fixed one, or the Bayes-optimal one."""
+    """The threshold in force: the fixed one, the Bayes-optimal one, or the root of (19) as printed."""
     rule = scenario["decision"]["threshold"]
     if rule["rule"] == "fixed":
         return float(rule["zeta_m"])
-    return bayes_threshold_m(rule["drift_m_s"], rule["noise_m_sqrt_s"], rule["c2"] / rule["c1_1_s"])
+    ratio_s = rule["c1_1_s"] / rule["c2"] if rule["rule"] == "printed" else rule["c2"] / rule["c1_1_s"]
+    return root_m(rule["drift_m_s"], rule["noise_m_sqrt_s"], ratio_s)
 
 
-def bayes_threshold_m(drift_m_s: float, noise_m_sqrt_s: float, ratio_s: float) -> float:
-    """Root of noise^2/drift^2 (sinh u + u) = ratio, with u = 2 zeta drift / noise^2, by bisection: (19) with c2/c1."""
+def root_m(drift_m_s: float, noise_m_sqrt_s: float, ratio_s: float) -> float:
+    """Root of noise^2/drift^2 (sinh u + u) = ratio, with u = 2 zeta drift / noise^2, by bisection: (19)."""
     level = ratio_s * (drift_m_s / noise_m_sqrt_s) ** 2
     low, high = 0.0, 1.0 + level
     for _ in range(200):

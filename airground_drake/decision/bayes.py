@@ -63,6 +63,15 @@ def optimal_threshold(drift: float, noise: float, c1: float, c2: float) -> float
     return float(brentq(residual, low, high, xtol=4e-16 * low, rtol=8.9e-16)) / scale
 
 
+def printed_threshold(drift: float, noise: float, c1: float, c2: float) -> float:
+    """Root of (19) as printed, with c1/c2 on the right, m: it minimises nothing unless c1 = c2. Raises as above."""
+    return optimal_threshold(drift, noise, c2, c1)
+
+
+COMPUTED = {"bayes": optimal_threshold, "printed": printed_threshold}
+"""Rules that compute the threshold from drift, noise, c1 and c2."""
+
+
 def _bias(zeta: float, drift: float, noise: float, deviation: float) -> float:
     """(1 - exp(-2 y0 a / s^2)) / (2 sinh(2 zeta a / s^2)), so that nothing overflows, and small y0 do not cancel."""
     u = 2.0 * zeta * drift / noise**2

@@ -16,7 +16,7 @@ from airground_drake import files, graphviz, trace
 from airground_drake.diagram import build_diagram, most_complete
 from airground_drake.progress import Watch
 from airground_drake.report import audit, document, folder, html, junit
-from airground_drake.report.figures import moments, zeno_refine
+from airground_drake.report.figures import moments, threshold, zeno_refine
 from airground_drake.report.figures.draw import draw
 from airground_drake.report.figures.findings import draw as draw_findings
 from airground_drake.report.figures.panels import Figure
@@ -86,7 +86,8 @@ def write(
         files.write_text(output / "junit.xml", junit.render(report))
         written.append("junit.xml")
     if "html" in formats:
-        plates = [*judged.figures, *_refinement(judged.verdicts, bool(judged.findings)), *moments.draw(report, traces)]
+        plates = [*judged.figures, *_refinement(judged.verdicts, bool(judged.findings)), *_threshold(judged.verdicts)]
+        plates += moments.draw(report, traces)
         plates += draw_findings(report["audit"])
         files.write_text(output / "report.html", html.render(report, plates, drawn))
         written.append("report.html")
@@ -100,6 +101,13 @@ def _refinement(verdicts: Sequence[Verdict], audited: bool) -> list[Figure]:
     """The figure of ZENO-REFINE, if there is such a verdict: beside finding 9, where that is in the report."""
     drawn = [zeno_refine.draw(verdict.finding.evidence) for verdict in verdicts if verdict.claim.id == "ZENO-REFINE"]
     return [replace(figure, beside="audit-9") if audited else figure for figure in drawn if figure is not None]
+
+
+def _threshold(verdicts: Sequence[Verdict]) -> list[Figure]:
+    """The figure of THR-CHOICE, if there is such a verdict."""
+    chosen = [verdict for verdict in verdicts if verdict.claim.id == "THR-CHOICE"]
+    drawn = [threshold.draw(verdict.inputs, verdict.finding.evidence) for verdict in chosen]
+    return [figure for figure in drawn if figure is not None]
 
 
 def provenance(scenario: Scenario, started: datetime, command: str) -> dict[str, Any]:

@@ -31,7 +31,13 @@ ORDER: tuple[tuple[str, ...], ...] = (
     ("refuted",),
 )
 """Verdicts from the best to the worst, as `statuses.outcome` names them; `gone`: there is none any more."""
-ROWS: tuple[tuple[str, ...], ...] = (("reproduced",), ("calibrated",), ("ambiguous",), ("not_reproduced", "gone"))
+ROWS: tuple[tuple[str, ...], ...] = (
+    ("reproduced",),
+    ("calibrated",),
+    ("by_construction",),
+    ("ambiguous",),
+    ("not_reproduced", "gone"),
+)
 """Rows of the reproduction table, likewise."""
 OVERALL: tuple[tuple[str, ...], ...] = (("as_expected",), ("inconclusive",), ("not_as_expected",))
 """Over all claims, likewise."""

@@ -17,7 +17,7 @@ from airground_drake.report import metrics, reproduction
 from airground_drake.report.audit import of_runs
 from airground_drake.scenarios.plugins import OPTION
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.statuses import NOT_EXERCISED, STATUSES, UNDECIDED, outcome
+from airground_drake.statuses import NOT_EXERCISED, STATUSES, UNDECIDED, admits_either, outcome
 from airground_drake.trace import Trace
 from airground_drake.verify.claim import Verdict
 
@@ -108,7 +108,8 @@ def overall(
     """The verdict over all claims: `status`, `exit_code`, `why`, counts, and what differs, is open or missing.
 
     `counts` has a claim that was established because nothing put it to the test under `not_exercised`, never under
-    its status; the list of that name says which they are.
+    its status; the list of that name says which they are. `either` lists claims that the scenario admits refuted as
+    well as established: that they came out as expected says nothing.
 
     Of `items`, the findings about the paper, one that was not demonstrated differs, too.
     """
@@ -119,6 +120,7 @@ def overall(
     undecided = [c for c in unexpected if c["status"] in UNDECIDED]
     counts = Counter(outcome(c["status"], c["exercised"]) for c in claims)
     idle = [{"id": c["id"], "run": c["run"]} for c in claims if outcome(c["status"], c["exercised"]) == NOT_EXERCISED]
+    either = [{"id": c["id"], "run": c["run"]} for c in claims if admits_either(c["expected"])]
     if differs:
         status = "not_as_expected"
         differ = "differs" if len(differs) == 1 else "differ"
@@ -133,7 +135,8 @@ def overall(
     else:
         status = "as_expected"
         why = f"All {_checks(len(claims))} gave the verdict that the scenario declares for them."
-        why += f" {_nothing_to_check(idle)}" if idle else ""
+        why += f" {len(either)} of them may come out either way: {_together(either)}." if either else ""
+        why += f" {len(idle)} of them had nothing to check: {_together(idle)}." if idle else ""
         why += f" All {len(items)} findings about the paper were demonstrated." if items else ""
     return {
         "status": status,
@@ -143,6 +146,7 @@ def overall(
         "as_expected": len(claims) - len(unexpected),
         "counts": {name: counts[name] for name in (*STATUSES, NOT_EXERCISED) if counts[name]},
         "not_exercised": idle,
+        "either": either,
         "differs": differs,
         "undecided": undecided,
         "missing": list(absent),
@@ -200,16 +204,15 @@ def _checks(count: int) -> str:
     return f"{count} check" if count == 1 else f"{count} checks"
 
 
-def _nothing_to_check(idle: Sequence[Mapping[str, Any]]) -> str:
-    """Which claims were established for lack of anything that could have refuted them; those of equal runs together."""
+def _together(items: Sequence[Mapping[str, Any]]) -> str:
+    """Claims and their runs in words; those of equal runs together."""
     runs: dict[str, list[str]] = {}
-    for item in idle:
+    for item in items:
         runs.setdefault(item["id"], []).append(item["run"])
     together: dict[str, list[str]] = {}
     for name, where in runs.items():
         together.setdefault(", ".join(filter(None, where)), []).append(name)
-    listed = "; ".join(f"{', '.join(names)}{_on(where)}" for where, names in together.items())
-    return f"{len(idle)} of them had nothing to check: {listed}."
+    return "; ".join(f"{', '.join(names)}{_on(where)}" for where, names in together.items())
 
 
 def _list(items: Sequence[Mapping[str, Any]]) -> str:

@@ -25,7 +25,7 @@ from airground_drake.report.figures.panels import Figure, Table
 from airground_drake.report.mathml import mathml
 from airground_drake.report.reproduction import YES_NO
 from airground_drake.report.templating import environment_of
-from airground_drake.statuses import NOT_EXERCISED, outcome
+from airground_drake.statuses import NOT_EXERCISED, PASSING, outcome
 
 STYLE, SCRIPTS = "report.css", ("report.js", "scrubber.js")
 """The style sheet and the scripts of the page, among the templates."""
@@ -34,6 +34,8 @@ NOTHING = "'none'"
 MAX_DIAGRAM_CHARS = 500_000
 MAX_JSON_CHARS = 4_000
 LINE_CHARS = 110
+KINDS = ("declared", "stuck")
+"""Evidence of these kinds is shown instead of the verdict where that passes: it must not look like more than it is."""
 MAX_DISTANCE_ROWS = 120
 MAX_FAULTS = 40
 """Different ones of a run that are listed."""
@@ -45,12 +47,15 @@ CHIPS = {
     "holds": ("✓", "holds", "good"),
     "supported": ("✓", "supported", "good"),
     "not_exercised": ("∅", "holds, nothing to check", "idle"),
+    "declared": ("≈", "declared", "tuned"),
+    "stuck": ("■", "stuck, as declared", "tuned"),
     "refuted": ("✗", "refuted", "bad"),
     "inconclusive": ("?", "inconclusive", "open"),
     "error": ("!", "error", "open"),
     "not_run": ("○", "not run", "open"),
     "reproduced": ("✓", "reproduced", "good"),
     "calibrated": ("≈", "calibrated", "tuned"),
+    "by_construction": ("=", "by construction", "tuned"),
     "ambiguous": ("?", "ambiguous", "open"),
     "not_reproduced": ("✗", "not reproduced", "bad"),
     "demonstrated": ("✓", "demonstrated", "good"),
@@ -75,7 +80,7 @@ def render(document: Mapping[str, Any], figures: Sequence[Figure], diagram_svg: 
         beside=_beside(figures),
         diagram=_diagram(diagram_svg, str(document["scenario"]["name"])),
         groups=_by_claim(claims),
-        outcomes=list(dict.fromkeys(outcome(claim["status"], claim["exercised"]) for claim in claims)),
+        outcomes=list(dict.fromkeys(map(_shown, claims))),
         attention=attention.items(document),
         assumptions=_assumptions(claims),
         tightest=_tightest(distances),
@@ -94,10 +99,16 @@ def _environment() -> Environment:
         evidence=evidence_tables, records=partial(evidence.tables, number=number), brief=brief,
     )  # fmt: skip
     environment.globals.update(
-        chips=CHIPS, refused=attention.REFUSED, outcome=outcome, max_faults=MAX_FAULTS,
+        chips=CHIPS, shown=_shown, refused=attention.REFUSED, max_faults=MAX_FAULTS,
         policy=Markup(security_policy(style, scripts)), style=Markup(style), scripts=list(map(Markup, scripts)),
     )  # fmt: skip
     return environment
+
+
+def _shown(claim: Mapping[str, Any]) -> str:
+    """What is shown of a claim, a key of `CHIPS`: its outcome, or the kind of its evidence."""
+    kind = claim["evidence"].get("kind")
+    return kind if kind in KINDS and claim["status"] in PASSING else outcome(claim["status"], claim["exercised"])
 
 
 def stylesheet() -> str:

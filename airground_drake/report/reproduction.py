@@ -146,6 +146,14 @@ def execution_time(trace: Trace, robot: str) -> list[float]:
 
 
 @measure
+def final_position(trace: Trace, robot: str) -> list[float]:
+    """Position [x, y] in m at the end of the run."""
+    if robot not in trace.robots:
+        raise TraceError(f"run {trace.run}: there is no robot {robot!r}; there are {', '.join(trace.robots)}")
+    return _planar(trace.position(robot)[-1])
+
+
+@measure
 def collision_position(trace: Trace, robot: str) -> list[float]:
     """Position [x, y] in m of the robot's first collision."""
     hits = events_of(trace, robot, "collision")
@@ -162,7 +170,8 @@ def rows(scenario: Scenario, traces: Mapping[str, Trace]) -> list[dict[str, Any]
     Returns:
         For each row `id`, `quantity`, `measure`, `run`, `robot`, `paper`, `ours` (scalars if of one component,
         `ours` is None without a value), `difference` (largest over the components), `unit`, `tolerance`,
-        `status` (reproduced, calibrated, ambiguous or not_reproduced) and `why`.
+        `status` (reproduced, calibrated, by_construction, ambiguous or not_reproduced) and `why`, which says so where
+        ours is within the tolerance but does not round to the paper's digits.
     """
     return [_row(row, traces) for row in scenario.reproduction]
 
@@ -176,6 +185,8 @@ def _row(row: Reproduction, traces: Mapping[str, Trace]) -> dict[str, Any]:
         reason = f"differs by {difference:.4g} {row.unit}, {tolerance:.4g} {row.unit} are allowed"
     elif difference is not None and not within:
         reason = "the answer differs"
+    elif within and row.unit != YES_NO:
+        reason = _off_the_digits(ours, row.paper, row.unit)
     return {
         "id": row.id,
         "quantity": row.quantity,
@@ -188,14 +199,27 @@ def _row(row: Reproduction, traces: Mapping[str, Trace]) -> dict[str, Any]:
         "unit": row.unit,
         "tolerance": tolerance,
         "status": _status(row, within),
-        "why": row.why if within else "; ".join(filter(None, (reason, row.ambiguous, row.why))),
+        "why": "; ".join(filter(None, (reason, "" if within else row.ambiguous, row.why))),
     }
 
 
 def _status(row: Reproduction, within: bool) -> str:
+    if within and row.by_construction:
+        return "by_construction"
     if within:
         return "calibrated" if row.calibrated else "reproduced"
     return "ambiguous" if row.ambiguous else "not_reproduced"
+
+
+def _off_the_digits(ours: list[float], paper: list[float], unit: str) -> str:
+    """What to say where ours, rounded to the paper's digits, is another number: only the tolerance lets it pass."""
+    off = [
+        f"ours rounds to {round(mine, decimals):g} {unit}, the paper prints {printed:g} {unit}"
+        for mine, printed in zip(ours, paper, strict=True)
+        for decimals in [len(repr(float(printed)).partition(".")[2])]
+        if round(mine, decimals) != printed
+    ]
+    return f"within the tolerance only: {', '.join(off)}" if off else ""
 
 
 def _evaluate(row: Reproduction, traces: Mapping[str, Trace]) -> tuple[list[float], str]:

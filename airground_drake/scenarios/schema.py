@@ -122,7 +122,10 @@ class Control:
 
 @dataclass(slots=True)
 class Threshold:
-    """Decision threshold zeta: rule 'fixed' takes zeta_m; 'bayes' minimises the Bayes risk (16)-(19)."""
+    """Decision threshold zeta: rule 'fixed' takes zeta_m; 'bayes' minimises the Bayes risk (16)-(18).
+
+    'printed' takes the root of (19) as the paper prints it, for comparison: it does not minimise the risk.
+    """
 
     rule: str = "fixed"
     """Where the threshold comes from."""
@@ -268,8 +271,9 @@ class Run:
 class Reproduction:
     """One row of the reproduction table: a measure of a run against the paper's value.
 
-    `calibrated`: something that the paper leaves open was chosen so that the value comes out. `ambiguous` is another
-    way to read the paper: the row is then neither reproduced nor not.
+    `calibrated`: something that the paper leaves open was chosen so that the value comes out. `by_construction`: the
+    scenario itself says the value, so that nothing is reproduced. `ambiguous` is another way to read the paper: the row
+    is then neither reproduced nor not.
     """
 
     id: str = field(default_factory=str, metadata=REQUIRED)
@@ -294,6 +298,8 @@ class Reproduction:
     """Why the row is as it is."""
     ambiguous: str = ""
     """Another way to read the paper, in words."""
+    by_construction: bool = False
+    """Whether the scenario itself says the value."""
 
 
 @dataclass(slots=True)

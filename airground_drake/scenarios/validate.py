@@ -21,7 +21,7 @@ import numpy as np
 from scipy.spatial.distance import cdist
 
 from airground_drake.arrays import LARGEST
-from airground_drake.decision.bayes import optimal_threshold
+from airground_drake.decision.bayes import COMPUTED
 from airground_drake.errors import Fault, ScenarioError
 from airground_drake.intervention.database import RANKINGS
 from airground_drake.nsbc.avoidance import COMPOSITIONS
@@ -42,7 +42,7 @@ from airground_drake.scenarios.schema import MAX_NAME, MAX_SEED, MAX_UGVS, Scena
 from airground_drake.statuses import EXPECTATIONS, alternatives
 
 TRIGGERS: tuple[str, ...] = ("automaton", "bare")
-THRESHOLD_RULES: tuple[str, ...] = ("fixed", "bayes")
+THRESHOLD_RULES: tuple[str, ...] = ("fixed", *COMPUTED)
 SOURCES: tuple[str, ...] = ("calibrated", "ours")
 BUDGETS: tuple[str, ...] = ("counted", "wall_clock")
 
@@ -317,11 +317,12 @@ def _multiple(of: float, unit: float) -> bool:
 def _release(scenario: Scenario) -> Problems:
     decision, rule = scenario.decision, scenario.decision.threshold
     zeta = rule.zeta_m
-    if rule.rule == "bayes":
+    if rule.rule in COMPUTED:
         try:
-            zeta = optimal_threshold(rule.drift_m_s, rule.noise_m_sqrt_s, rule.c1_1_s, rule.c2)
+            zeta = COMPUTED[rule.rule](rule.drift_m_s, rule.noise_m_sqrt_s, rule.c1_1_s, rule.c2)
         except ValueError:
-            yield "decision.threshold", Fault("no Bayes threshold found"), "numbers of comparable size are allowed"
+            none = Fault(f"no {rule.rule} threshold found")
+            yield "decision.threshold", none, "numbers of comparable size are allowed"
     if decision.trigger == "automaton" and not decision.release_m < zeta:
         yield "decision.release_m", decision.release_m, f"less than the {rule.rule} threshold, {zeta:.9g} m"
 

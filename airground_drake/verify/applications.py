@@ -1,12 +1,18 @@
-"""How often the runs of a report met the premises of its theorems: one that never applies protects nothing."""
+"""What the runs of a report add to claims about the model.
+
+They count how often they met the premises of theorems: one that never applies protects nothing. For THR-CHOICE they
+measure the drift and the noise that there really were.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
+from typing import Any
 
 from airground_drake.trace import Trace
 from airground_drake.verify.finding import Finding
+from airground_drake.verify.model.threshold import thr_choice
 from airground_drake.verify.runs.followed import followed
 from airground_drake.verify.runs.proposals import accepted_at
 from airground_drake.verify.runs.safe_hyp import guarantees
@@ -60,3 +66,19 @@ def with_counts(claim: str, finding: Finding, of_runs: Iterable[dict[str, Count]
         return finding
     met, cases = (sum(column) for column in zip(*counted, strict=True))
     return replace(finding, evidence={**finding.evidence, "applies_to": met, "of": cases})
+
+
+def measured(trace: Trace) -> dict[str, Any]:
+    """What THR-CHOICE shows of a run: `thr_choice.of_run`; {} where records are missing or wrong, as in `counts`."""
+    try:
+        return thr_choice.of_run(trace)
+    except (Exception, SystemExit):
+        return {}
+
+
+def with_runs(claim: str, finding: Finding, of_runs: Iterable[dict[str, Any]]) -> Finding:
+    """THR-CHOICE with what was measured in the runs under `runs`; other findings as they are."""
+    if claim != "THR-CHOICE" or finding.status == "error":
+        return finding
+    runs = {name: row for each in of_runs for name, row in each.items()}
+    return replace(finding, evidence={**finding.evidence, "runs": runs})

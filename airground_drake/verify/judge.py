@@ -12,7 +12,7 @@ from airground_drake.progress import SILENT, Watch
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.side_by_side import side_by_side
 from airground_drake.trace import Trace
-from airground_drake.verify.applications import Count, counts, with_counts
+from airground_drake.verify.applications import Count, counts, measured, with_counts, with_runs
 from airground_drake.verify.cache import find, found
 from airground_drake.verify.claim import ModelClaim, TraceClaim, Verdict
 from airground_drake.verify.finding import Finding
@@ -112,21 +112,24 @@ def verify_all(
     about_the_model, about_runs = done[: len(chosen)], done[len(chosen) :]
     verdicts = [
         verdict
-        for (trace, claims), (findings, _) in zip(of_runs, about_runs, strict=True)
+        for (trace, claims), (findings, *_) in zip(of_runs, about_runs, strict=True)
         for verdict in _verdicts(trace, claims, findings)
     ]
-    counted = [of_run for _, of_run in about_runs]
-    theorems = [with_counts(claim.id, each, counted) for claim, each in zip(chosen, about_the_model, strict=True)]
-    return verdicts + _model_verdicts(scenario, chosen, inputs, theorems)
+    counted, shown = [each for _, each, _ in about_runs], [each for _, _, each in about_runs]
+    findings = [
+        with_runs(claim.id, with_counts(claim.id, each, counted), shown)
+        for claim, each in zip(chosen, about_the_model, strict=True)
+    ]
+    return verdicts + _model_verdicts(scenario, chosen, inputs, findings)
 
 
 def _found(claim: ModelClaim, inputs: dict[str, Any], kept: Path | None) -> Finding:
     return found(claim, inputs, kept)
 
 
-def _judged(trace: Trace, claims: Sequence[TraceClaim]) -> tuple[list[Finding], dict[str, Count]]:
-    """What the claims found about a run, and how often it met the premises of the theorems."""
-    return [claim.judge(trace) for claim in claims], counts(trace)
+def _judged(trace: Trace, claims: Sequence[TraceClaim]) -> tuple[list[Finding], dict[str, Count], dict[str, Any]]:
+    """What the claims found about a run, how often it met the premises of the theorems, and what it shows of itself."""
+    return [claim.judge(trace) for claim in claims], counts(trace), measured(trace)
 
 
 def _model_verdicts(

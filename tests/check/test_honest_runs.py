@@ -22,6 +22,12 @@ KINDS: dict[str, dict[str, dict[str, Any]]] = {
             "release_m": 0.01,
         }
     },
+    "printed": {
+        "decision": {
+            "threshold": {"rule": "printed", "c1_1_s": 0.5, "c2": 1.0, "drift_m_s": 6.05, "noise_m_sqrt_s": 1.0},
+            "release_m": 0.01,
+        }
+    },
     "reversals": {
         "decision": {"threshold": {"rule": "fixed", "zeta_m": 0.01}, "release_m": 0.0105},
         "gatekeeper": {"switching_margin": 0.0, "min_dwell_s": 0.3},
@@ -31,7 +37,7 @@ KINDS: dict[str, dict[str, dict[str, Any]]] = {
         "gatekeeper": {"budget_iterations": 1, "budget_nodes": 1},
     },
 }
-METHODS = dict(zip(KINDS, "bddbccc", strict=True))
+METHODS = dict(zip(KINDS, "bddbcdcc", strict=True))
 """Under which method each kind is tried here."""
 
 

@@ -84,6 +84,14 @@ def test_what_had_nothing_to_check_is_counted_apart(scenario: Scenario, traces: 
     assert "SAFE-TRACE on run a (holds, nothing to check, expected exercised)" in missed["why"]
 
 
+def test_what_may_come_out_either_way_is_counted_apart(scenario: Scenario, traces: dict[str, Trace]) -> None:
+    either = [verdict("a", "refuted", "holds or refuted"), verdict("c", "holds", "exercised or refuted", exercised=1)]
+    overall = built(scenario, traces, [*FINE, *either])["overall"]
+    assert overall["either"] == [{"id": "SAFE-TRACE", "run": run} for run in "ac"]
+    assert "2 of them may come out either way: SAFE-TRACE on run a, c." in overall["why"]
+    assert built(scenario, traces, FINE)["overall"]["either"] == []
+
+
 def test_nothing_at_all_is_no_pass(scenario: Scenario) -> None:
     empty = replace(scenario, runs={}, reproduction=[])
     assert built(empty, {}, [])["overall"]["exit_code"] == 3

@@ -61,7 +61,7 @@ def test_what_comes_of_runs_is_drawn_from_what_is_kept_of_them() -> None:
     )
     assert "end, x = -1.3 m: (13, -1.3)" in sides.caption
     assert "closest, c: (1, 0.8)" in intrusion.caption
-    assert {row[0] for row in intrusion.panels[0].table.rows} == {"c", "d", "safe distance"}
+    assert {row[0] for row in intrusion.panels[0].table.rows} == {"c", "d", "safe distance", "closest, c", "closest, d"}
     assert {row[0] for row in error.panels[0].table.rows} == {
         "as printed, either",
         "with (23), accept",

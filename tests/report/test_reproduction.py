@@ -124,7 +124,29 @@ def test_statuses_and_scalars(scenario: Scenario, traces: dict[str, Trace]) -> N
     assert (stall["status"], trigger["status"], success["status"]) == ("reproduced", "calibrated", "reproduced")
     assert stall["ours"] == pytest.approx(list(STALL))
     assert stall["difference"] == pytest.approx(0.069)
-    assert (trigger["paper"], trigger["ours"], trigger["why"]) == (14.45, 14.5, "speed set")
+    assert (trigger["paper"], trigger["ours"]) == (14.45, 14.5)
+
+
+def test_a_value_that_only_the_tolerance_lets_pass_says_so(scenario: Scenario, traces: dict[str, Trace]) -> None:
+    stall, trigger, success = reproduction.rows(scenario, traces)
+    assert stall["why"] == "within the tolerance only: ours rounds to 3.4 m, the paper prints 3.3 m; as it is"
+    assert trigger["why"] == "within the tolerance only: ours rounds to 14.5 s, the paper prints 14.45 s; speed set"
+    assert success["why"] == "all of it"
+    exact = replace(scenario.reproduction[1], paper=[14.5])
+    assert reproduction.rows(replace(scenario, reproduction=[exact]), traces)[0]["why"] == "speed set"
+
+
+def test_what_the_scenario_itself_says_is_not_reproduced(scenario: Scenario, traces: dict[str, Trace]) -> None:
+    own = replace(scenario.reproduction[1], by_construction=True)
+    missed = replace(own, paper=[10.6])
+    found = reproduction.rows(replace(scenario, reproduction=[own, missed]), traces)
+    assert [row["status"] for row in found] == ["by_construction", "not_reproduced"]
+
+
+def test_final_position() -> None:
+    assert measured("final_position", GOING_ROUND) == [3.3, 13.0]
+    with pytest.raises(TraceError, match="no robot 'ugv9'; there are ugv1, ugv2, uav"):
+        MEASURES["final_position"](make_trace(make_scenario(), "a"), "ugv9")
 
 
 @pytest.mark.parametrize(

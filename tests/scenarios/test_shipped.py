@@ -5,15 +5,19 @@ from __future__ import annotations
 import json
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from airground_drake.registry import MODEL_CLAIMS, RUN_CLAIMS
+from airground_drake.report.reproduction import MEASURES
 from airground_drake.scenarios.load import load, shipped
+from airground_drake.simulation import Recorder
 from airground_drake.trace import Trace
-from airground_drake.verify import verify
+from airground_drake.verify import verify, verify_model
 from airground_drake.verify.claim import Verdict
 
 SHORT = (("dwell", "a"), ("dwell", "d"), ("contact", "d"))
@@ -40,6 +44,8 @@ def test_every_claim_is_exercised_in_at_least_one_shipped_scenario(
         often.update({name: verdict.finding.exercised or 0 for name, verdict in found.items()})
     for claim in json.loads((report("case_b") / "report.json").read_text(encoding="utf-8"))["claims"]:
         often[claim["id"]] += claim["exercised"] or 0
+    (choice,) = verify_model(load("bayes_threshold")[0], claims=["THR-CHOICE"])  # the others declare their threshold
+    often["THR-CHOICE"] += choice.finding.exercised or 0
     assert [name for name in (*RUN_CLAIMS.own, *MODEL_CLAIMS.own) if not often[name]] == []
 
 
@@ -48,6 +54,17 @@ def test_every_kind_of_pair_has_an_inequality_that_binds(verdicts: dict[str, dic
     kinds = {"ugv beside obstacle", "uav beside obstacle", "ugv beside ugv", "ugv beside uav", "uav beside ugv"}
     assert set(binding) == kinds
     assert all(binding[kind] >= 5 for kind in kinds), binding
+
+
+def test_the_spread_of_the_trigger_over_seeds_is_what_case_a_says() -> None:
+    """As `python benchmarks/seeds.py case_a -n 12` prints it; the intervention comes after the trigger."""
+    scenario = load("case_a")[0]
+    (row,) = [row for row in scenario.reproduction if row.id == "A5"]
+    recorder = Recorder(replace(scenario, duration_s=15.0), "a")
+    times = [MEASURES["trigger_time"](recorder.simulate(seed), "ugv1")[0] for seed in range(1, 13)]
+    median, low, high = (f"{value:.3f}" for value in np.quantile(times, [0.5, 0.05, 0.95]))
+    within = sum(abs(time - row.paper[0]) <= row.tolerance for time in times)
+    assert f"the median is {median} s, 5 % to 95 % are {low} to {high} s, and {within} of 12 are" in row.why
 
 
 @pytest.mark.parametrize("of", ["dwell a", "dwell d"])

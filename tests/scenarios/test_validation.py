@@ -215,8 +215,8 @@ def test_a_bayes_threshold_that_cannot_be_found(monkeypatch: pytest.MonkeyPatch)
     def fail(*_: float) -> float:
         raise ValueError
 
-    monkeypatch.setattr(validate, "optimal_threshold", fail)
-    assert "decision.threshold: no Bayes threshold" in message("case_a", ["decision.threshold.rule=bayes"])
+    monkeypatch.setitem(validate.COMPUTED, "bayes", fail)
+    assert "decision.threshold: no bayes threshold" in message("case_a", ["decision.threshold.rule=bayes"])
 
 
 def test_every_number_of_the_schema_has_a_lower_bound() -> None:

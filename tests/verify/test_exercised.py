@@ -12,10 +12,11 @@ import pytest
 from builders.runs import run_of
 from verify.judging import CLAIMS
 
+from airground_drake.check import verdicts
 from airground_drake.registry import MODEL_CLAIMS, RUN_CLAIMS
 from airground_drake.scenarios.load import load
 from airground_drake.simulation import simulate
-from airground_drake.statuses import meets, outcome
+from airground_drake.statuses import admits_either, meets, outcome
 from airground_drake.trace import Trace
 from airground_drake.verify import Finding, verify
 from airground_drake.verify.__main__ import main
@@ -117,6 +118,13 @@ def test_exercised_is_established_on_something(expected: str, status: Any, count
     assert Verdict(CLAIMS["COMM"], "d", Finding(status, exercised=count), expected).as_expected is met
 
 
+def test_an_expectation_that_admits_either_verdict_is_known() -> None:
+    either = ("holds or refuted", "exercised or refuted", "refuted or supported or error")
+    assert all(map(admits_either, either))
+    assert not any(map(admits_either, ("holds", "refuted", "holds or supported", "refuted or error")))
+    assert all(verdicts.admits_either(expected) is admits_either(expected) for expected in (*either, "holds"))
+
+
 def test_the_command_line_says_when_there_was_nothing_to_check(
     report: Callable[[str], Path], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -131,8 +139,11 @@ def test_the_command_line_says_when_there_was_nothing_to_check(
 def test_a_report_counts_what_was_not_exercised_apart(report: Callable[[str], Path]) -> None:
     document = json.loads((report("case_b") / "report.json").read_text(encoding="utf-8"))
     overall = document["overall"]
-    assert overall["not_exercised"] == [{"id": "ZENO-TRACE", "run": run} for run in "bcd"]
-    assert overall["counts"]["not_exercised"] == 3
-    assert overall["counts"]["holds"] == sum(c["status"] == "holds" for c in document["claims"]) - 3
-    assert overall["why"].endswith("3 of them had nothing to check: ZENO-TRACE on run b, c, d.")
+    assert overall["not_exercised"] == [
+        *({"id": "ZENO-TRACE", "run": run} for run in "bcd"),
+        {"id": "THR-CHOICE", "run": ""},  # its threshold is declared
+    ]
+    assert overall["counts"]["not_exercised"] == 4
+    assert overall["counts"]["holds"] == sum(c["status"] == "holds" for c in document["claims"]) - 4
+    assert overall["why"].endswith("4 of them had nothing to check: ZENO-TRACE on run b, c, d; THR-CHOICE.")
     assert all(claim["exercised"] is not None and claim["exercised_by"] for claim in document["claims"])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from airground_drake.decision.bayes import optimal_threshold
+from airground_drake.decision.bayes import COMPUTED
 from airground_drake.decision.trigger import Trigger
 from airground_drake.scenarios.schema import Scenario
 
@@ -23,10 +23,10 @@ def levels_of(scenario: Scenario) -> dict[str, float]:
 
 
 def threshold_m(scenario: Scenario) -> float:
-    """The decision threshold in force, m: the fixed one, or the minimiser of the Bayes risk (16)."""
+    """The decision threshold in force, m: the fixed one, or what its rule computes."""
     rule = scenario.decision.threshold
-    if rule.rule == "bayes":
-        return optimal_threshold(rule.drift_m_s, rule.noise_m_sqrt_s, rule.c1_1_s, rule.c2)
+    if rule.rule in COMPUTED:
+        return COMPUTED[rule.rule](rule.drift_m_s, rule.noise_m_sqrt_s, rule.c1_1_s, rule.c2)
     return rule.zeta_m
 
 

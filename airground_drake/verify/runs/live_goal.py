@@ -91,7 +91,8 @@ class LiveGoal(TraceClaim):
             quantity="tolerance left about where a robot must end",
             where={"robot": worst["robot"], "condition": worst["condition"]},
             counterexample=None if live else worst,
-            evidence={"conditions": conditions, "had_a_way_to_go": away_from_there},
+            evidence={"conditions": conditions, "had_a_way_to_go": away_from_there}
+            | ({"kind": "stuck"} if stalls else {}),
             exercised=len(away_from_there),
         )
 

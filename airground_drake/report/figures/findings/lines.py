@@ -39,18 +39,25 @@ class Lines(NamedTuple):
     def figure(self, number: int) -> Figure:
         """The figure beside finding `number`; call it inside `canvas.style`."""
         name = f"audit-{number}"
-        says = "; ".join(f"{mark}: ({x:.3g}, {y:.3g})" for mark, (x, y) in self.marks.items())
-        text = f"Up: {self.y}. Across: {self.x}. {says}".rstrip()
+        return self.plate(name, f"Finding {number}", self._marked() and f"{self._marked()}.", beside=name)
+
+    def plate(self, name: str, heading: str, caption: str, beside: str) -> Figure:
+        """The figure with this identifier, heading and caption, beside a claim or finding; inside `canvas.style`."""
+        text = f"Up: {self.y}. Across: {self.x}. {self._marked()}".rstrip()
         rows = []
         for line, (x, y) in self.lines.items():
             chosen = np.unique(np.linspace(0, len(x) - 1, MAX_TABLE_ROWS // len(self.lines)).round().astype(int))
             rows += [(line, f"{x[k]:.4g}", f"{y[k]:.4g}") for k in chosen]
+        rows += [(mark, f"{x:.4g}", f"{y:.4g}") for mark, (x, y) in self.marks.items()]
         panel = Panel(
-            f"Finding {number}",
+            heading,
             svg.inline(canvas.svg(_drawing(self)), name, self.title, text),
             Table(f"{self.title}, some of its points", ("line", self.x, self.y), tuple(rows)),
         )
-        return Figure(name, self.title, says and f"{says}.", (panel,), beside=name)
+        return Figure(name, self.title, caption, (panel,), beside=beside)
+
+    def _marked(self) -> str:
+        return "; ".join(f"{mark}: ({x:.3g}, {y:.3g})" for mark, (x, y) in self.marks.items())
 
 
 def _drawing(shown: Lines) -> Drawing:

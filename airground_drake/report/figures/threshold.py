@@ -1,0 +1,58 @@
+"""The figure of THR-CHOICE: the Bayes risk over the threshold; in force, optimal, and as (19) is printed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from airground_drake.decision.bayes import bayes_risk
+from airground_drake.report.figures import canvas
+from airground_drake.report.figures.findings.lines import Lines
+from airground_drake.report.figures.panels import Figure
+
+POINTS = 200
+BEYOND = 1.6
+"""The axis goes so far beyond the largest mark."""
+
+
+def draw(inputs: Mapping[str, Any], evidence: Mapping[str, Any]) -> Figure | None:
+    """The figure, from what the claim is about and its evidence; None without them."""
+    if "optimal_threshold_m" not in evidence:
+        return None
+    constants = inputs["drift_m_s"], inputs["noise_m_sqrt_s"], inputs["c1_1_s"], inputs["c2"]
+    places = {
+        "in force": evidence["threshold_in_force_m"],
+        "optimal": evidence["optimal_threshold_m"],
+        "(19) as printed": evidence["threshold_as_printed_in_19_m"],
+    }
+    zeta = np.linspace(0.0, BEYOND * max(places.values()), POINTS + 1)[1:]
+    risk = np.array([bayes_risk(each, *constants) for each in zeta])
+    shown = Lines(
+        "Bayes risk (16) over the threshold", "threshold, m", "Bayes risk", {"risk (16)": (zeta, risk)},
+        {name: (each, bayes_risk(each, *constants)) for name, each in places.items()},
+    )  # fmt: skip
+    caption = (
+        f"For the assumed drift of {constants[0]:g} m/s and noise of {constants[1]:g} m/√s, c1 = {constants[2]:g} 1/s, "
+        f"c2 = {constants[3]:g}. The threshold in force is {evidence['kind']}: {places['in force']:.4g} m; optimal is "
+        f"{places['optimal']:.4g} m, (19) as printed gives {places['(19) as printed']:.4g} m. Extra risk of the "
+        f"threshold in force: {evidence['extra_risk']:.3g}.{_as_it_was(evidence.get('runs', {}))}"
+    )
+    with canvas.style():
+        return shown.plate("threshold-choice", "Risk for the scenario's own numbers", caption, beside="THR-CHOICE")
+
+
+def _as_it_was(runs: Mapping[str, Mapping[str, Any]]) -> str:
+    """The drift and noise of the first UGV that triggered, and what would be optimal for them."""
+    for name, row in runs.items():
+        optima = {
+            "the assumed noise": row["optimum_for_this_drift_m"],
+            "the run's own": row["optimum_for_this_drift_and_noise_m"],
+        }
+        best = [f"{zeta:.3g} m with {noise}" for noise, zeta in optima.items() if zeta is not None]
+        return (
+            f" In run {name.replace(' ', ', ')}, the drift really was {row['drift_m_s']:.4g} m/s and the noise "
+            f"{row['noise_m_sqrt_s']:g} m/√s: optimal for this drift would be {' and '.join(best) or 'no threshold'}."
+        )
+    return " No run triggered, so that none shows a drift."

@@ -1,0 +1,129 @@
+"""THR-CHOICE."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from copy import deepcopy
+from typing import Any
+
+import pytest
+from builders.runs import run_of
+from verify.model.threshold.cases import INPUTS, TABLE_1
+
+from airground_drake.decision.bayes import optimal_threshold
+from airground_drake.report import html
+from airground_drake.report.figures import threshold
+from airground_drake.scenarios.load import load
+from airground_drake.trace import Trace
+from airground_drake.verify import verify_all, verify_model
+from airground_drake.verify.applications import with_runs
+from airground_drake.verify.finding import Finding
+from airground_drake.verify.model.threshold.thr_choice import ThrChoice, of_run
+
+
+def judged(inputs: dict[str, Any], **changes: Any) -> Finding:
+    return ThrChoice().judge(inputs | changes)
+
+
+def test_a_threshold_that_is_not_optimal_is_declared_and_nothing_could_refute_it() -> None:
+    finding = judged(TABLE_1)
+    assert (finding.status, finding.exercised, finding.evidence["kind"]) == ("holds", 0, "declared")
+    assert finding.evidence["threshold_in_force_m"] == 3.0
+    assert finding.evidence["optimal_threshold_m"] == pytest.approx(2.9921, abs=1e-4)
+    assert finding.evidence["extra_risk"] == pytest.approx(3.118e-7, rel=1e-3)
+
+
+def test_the_optimum_is_optimal_whoever_wrote_it_down() -> None:
+    zeta = optimal_threshold(6.05, 10.0, 0.5, 1.0)
+    for rule in ("fixed", "bayes"):
+        finding = judged(TABLE_1, rule=rule, zeta_m=zeta)
+        assert (finding.status, finding.exercised, finding.evidence["kind"]) == ("holds", 1, "optimal")
+        assert finding.evidence["extra_risk"] == pytest.approx(0.0, abs=1e-15)
+
+
+@pytest.mark.parametrize("factor", [1.0 - 2e-6, 1.0 + 2e-6, 2.0])
+def test_a_bayes_threshold_that_is_not_the_optimum_is_refuted(factor: float) -> None:
+    good = INPUTS["audit"]
+    finding = judged(good, zeta_m=factor * good["zeta_m"])
+    assert finding.status == "refuted"
+    assert finding.margin is not None
+    assert finding.margin < 0.0
+    assert judged(good, zeta_m=(1.0 + 0.5e-6) * good["zeta_m"]).status == "holds"
+
+
+@pytest.mark.parametrize(
+    ("scenario", "rule", "in_force", "extra"),
+    [
+        ("case_a", "fixed", 3.0, 3.118e-7),
+        ("warehouse", "fixed", 1.5, 0.011223),
+        ("bayes_threshold", "bayes", 0.50310, 0.0),
+        ("bayes_threshold_printed", "printed", 0.03109, 1.44155),
+    ],
+)
+def test_shipped_scenarios(scenario: str, rule: str, in_force: float, extra: float) -> None:
+    (verdict,) = verify_model(load(scenario)[0], claims=["THR-CHOICE"])
+    found = verdict.finding.evidence
+    assert verdict.as_expected
+    assert verdict.expected == "holds"
+    assert (found["rule"], found["kind"]) == (rule, "optimal" if rule == "bayes" else "declared")
+    assert found["threshold_in_force_m"] == pytest.approx(in_force, rel=1e-4)
+    assert found["extra_risk"] == pytest.approx(extra, rel=1e-3, abs=1e-12)
+    if rule == "printed":
+        assert found["threshold_in_force_m"] == found["threshold_as_printed_in_19_m"]
+
+
+def test_the_drift_and_the_noise_that_a_run_of_case_a_had(run: Callable[[str, str], Trace]) -> None:
+    found = of_run(run("case_a", "b"))["b ugv1"]
+    assert found["drift_m_s"] == pytest.approx(0.5606, abs=5e-4)
+    assert found["noise_m_sqrt_s"] == 0.004
+    assert found["optimum_for_this_drift_m"] == pytest.approx(0.2802, abs=5e-4)
+    assert found["optimum_for_this_drift_and_noise_m"] == pytest.approx(0.00016, abs=5e-6)
+    assert found["extra_risk"] == pytest.approx(0.5 * 3.0 / 0.5606, rel=1e-2)  # c1 times the time to reach 3 m
+
+
+def test_where_there_is_no_drift_or_noise_there_is_no_optimum() -> None:
+    trace = deepcopy(run_of("d"))
+    assert of_run(trace)["d ugv1"]["optimum_for_this_drift_and_noise_m"] > 0.0
+    trace.meta["scenario"]["decision"]["noise_m_sqrt_s"] = 0.0
+    row = of_run(trace)["d ugv1"]
+    assert row["optimum_for_this_drift_m"] > 0.0
+    assert row["optimum_for_this_drift_and_noise_m"] is None
+    assert row["extra_risk"] is None
+
+
+def test_only_this_claim_shows_the_runs() -> None:
+    rows = [{"a ugv1": {"drift_m_s": 1.0}}, {}]
+    assert with_runs("THR-CHOICE", Finding("holds"), rows).evidence == {"runs": {"a ugv1": {"drift_m_s": 1.0}}}
+    assert with_runs("THR-OPT", Finding("proved"), rows).evidence == {}
+
+
+def test_a_report_has_the_runs_beside_the_numbers_of_the_rule(run: Callable[[str, str], Trace]) -> None:
+    scenario = load("bayes_threshold")[0]
+    verdicts = verify_all(scenario, [run("bayes_threshold", name) for name in scenario.runs])
+    (found,) = [verdict.finding for verdict in verdicts if verdict.claim.id == "THR-CHOICE"]
+    for row in found.evidence["runs"].values():
+        assert row["drift_m_s"] == pytest.approx(1.0, abs=1e-6)
+        assert row["optimum_for_this_drift_and_noise_m"] == pytest.approx(found.evidence["threshold_in_force_m"])
+
+
+def test_the_figure_marks_three_thresholds_and_says_what_the_runs_had() -> None:
+    finding, drift = judged(TABLE_1), {"drift_m_s": 0.5606, "noise_m_sqrt_s": 0.004}
+    optima = {"optimum_for_this_drift_m": 0.2803, "optimum_for_this_drift_and_noise_m": None}
+    figure = threshold.draw(TABLE_1, {**finding.evidence, "runs": {"b ugv1": {**drift, **optima}}})
+    assert figure is not None
+    assert figure.beside == "THR-CHOICE"
+    rows = {row[0]: row[1:] for row in figure.panels[0].table.rows[-3:]}
+    assert rows == {"in force": ("3", "0.4547"), "optimal": ("2.992", "0.4547"), "(19) as printed": ("0.7557", "0.48")}
+    assert "In run b, ugv1, the drift really was 0.5606 m/s" in figure.caption
+    assert "optimal for this drift would be 0.28 m with the assumed noise." in figure.caption
+    none = threshold.draw(TABLE_1, finding.evidence)
+    assert none is not None
+    assert none.caption.endswith("No run triggered, so that none shows a drift.")
+    assert threshold.draw(TABLE_1, {"error": "failed"}) is None
+
+
+@pytest.mark.parametrize(("kind", "shown"), [("declared", "declared"), ("optimal", "holds")])
+def test_a_declared_threshold_never_looks_proved(kind: str, shown: str) -> None:
+    claim = {"status": "holds", "exercised": 1, "evidence": {"kind": kind}}
+    assert html._shown(claim) == shown
+    assert html._shown({**claim, "status": "refuted"}) == "refuted"
