@@ -100,7 +100,8 @@ def make_route(scenario: Scenario) -> Route:
     Raises:
         UnknownNameError, PluginError: if the scenario names a route that cannot be made.
     """
-    return ROUTES.make(scenario.gatekeeper.route, of=Route)
+    blocks = scenario.gatekeeper.blocks
+    return ROUTES.make(scenario.gatekeeper.route, of=Route, **({"blocks": blocks} if blocks else {}))
 
 
 def first_order_plant(robot: str, start: Array) -> LinearSystem:

@@ -285,6 +285,7 @@ ROUTES = Registry(
     "route",
     "routes",
     {
+        "mixed_integer": "airground_drake.gatekeeper.routes.mixed_integer:MixedIntegerRoute",
         "relaxed": "airground_drake.gatekeeper.routes.relaxed:RelaxedRoute",
         "enumeration": "airground_drake.gatekeeper.routes.enumeration:EnumerationRoute",
         "nonlinear": "airground_drake.gatekeeper.routes.nonlinear:NonlinearRoute",

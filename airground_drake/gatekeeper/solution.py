@@ -174,18 +174,17 @@ def cut_short(
     )
 
 
-def after_failure(problem: Problem, solution: Solution, previous: Array | None) -> Solution:
+def after_failure(problem: Problem, solution: Solution) -> Solution:
     """The solution after a solver failure: the cheapest of its own plan, the constant plans and the previous one.
 
     Args:
         problem: what they are plans of.
         solution: the route's, with or without a plan.
-        previous: what is left of the plan decided on at the sample before, (N,); None if there is none.
     """
     constants = ConstantPlans.of(problem)
     if not (problem.is_finite() and constants.are_finite()):
         return Solution(False, "refused_not_finite")
-    known = [problem.evaluate(plan) for plan in (solution.plan, previous) if plan is not None]
+    known = [problem.evaluate(plan) for plan in (solution.plan, problem.previous) if plan is not None]
     bound = max(0.0, solution.route_bound)
     found = cut_short(
         problem, (*constants.both, *known), bound, status="solver_failed",

@@ -213,6 +213,8 @@ class Gatekeeper:
     """How far (26) looks ahead, and how long other robots are predicted to go on."""
     stages: int = 60
     """Stages of (26): horizon_s / stages is a multiple of the control period."""
+    blocks: int = 0
+    """Accept variables of (26), each for a block of stages, for route mixed_integer; 0: one per stage."""
     error_weight_1_m2_s: float = 1.0
     """a of (25): weight of the distance to the preset trajectory."""
     slack_weight_1_m2_s: float = field(default=1000.0, metadata=FROM_ZERO)

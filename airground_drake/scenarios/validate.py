@@ -170,6 +170,11 @@ def _counts(scenario: Scenario) -> Problems:
         yield "seed", scenario.seed, f"a whole number from 0 to {MAX_SEED}"
     if not 1 <= scenario.gatekeeper.stages <= MAX_STAGES:
         yield "gatekeeper.stages", scenario.gatekeeper.stages, f"a whole number from 1 to {MAX_STAGES}"
+    if not 0 <= scenario.gatekeeper.blocks <= scenario.gatekeeper.stages:
+        allowed = "a whole number from 1 to gatekeeper.stages, or 0: one accept variable per stage"
+        yield "gatekeeper.blocks", scenario.gatekeeper.blocks, allowed
+    if scenario.gatekeeper.blocks and scenario.gatekeeper.route in (set(ROUTES.own) - {"mixed_integer"}):
+        yield "gatekeeper.blocks", scenario.gatekeeper.blocks, "0: only the route mixed_integer has blocks"
     for name in ("budget_iterations", "budget_nodes", "tries"):
         if not 1 <= getattr(scenario.gatekeeper, name) <= MAX_SEED:
             yield f"gatekeeper.{name}", getattr(scenario.gatekeeper, name), f"a whole number from 1 to {MAX_SEED}"

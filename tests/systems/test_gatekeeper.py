@@ -92,9 +92,9 @@ def test_after_a_failure_the_rest_of_the_plan_before_counts(case_a: Scenario, mo
                 solutions[-1] = replace(solutions[-1], plan=plan.omega, positions=plan.positions)
             return solutions[-1]
 
-    def listening(problem: Problem, solution: Solution, previous: np.ndarray | None) -> Solution:
-        before.append(previous)
-        return after_failure(problem, solution, previous)
+    def listening(problem: Problem, solution: Solution) -> Solution:
+        before.append(problem.previous)
+        return after_failure(problem, solution)
 
     monkeypatch.setattr(sample, "after_failure", listening)
     case_a.gatekeeper.route = "failing"
@@ -113,13 +113,13 @@ def test_the_best_of_what_is_known_after_a_failure() -> None:
     best = EnumerationRoute().solve(problem)
     assert best.plan is not None
     assert best.objective < constants.better.objective
-    assert after_failure(problem, failed, best.plan).objective == best.objective
+    assert after_failure(replace(problem, previous=best.plan), failed).objective == best.objective
     for own, previous in ((failed, None), (failed, constants.better.omega)):
-        assert after_failure(problem, own, previous).objective == constants.better.objective
+        assert after_failure(replace(problem, previous=previous), own).objective == constants.better.objective
     own = replace(best, status="solver_failed")
-    assert after_failure(problem, own, np.ones(problem.stages)).objective == best.objective
+    assert after_failure(replace(problem, previous=np.ones(problem.stages)), own).objective == best.objective
     broken = replace(problem, initial=np.full(3, np.nan))
-    assert after_failure(broken, failed, best.plan).status == "refused_not_finite"
+    assert after_failure(replace(broken, previous=best.plan), failed).status == "refused_not_finite"
 
 
 def test_a_proposal_that_leads_nowhere_is_refused_under_d_and_the_uav_is_told_where() -> None:

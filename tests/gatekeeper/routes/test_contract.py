@@ -93,7 +93,7 @@ def test_tiny_counts_leave_the_best_plan_so_far(name: str, instance: str, iterat
     problem, budget = INSTANCES[instance], Budget(iterations, nodes)
     solution = check_contract(used(name), problem, instance in BROKEN, budget)
     assert same(solution, used(name).solve(problem, budget))
-    if (iterations, nodes) == (1, 1) and instance == "rolled out 1":
+    if (iterations, nodes) == (1, 1) and instance == "rolled out 1" and name != "mixed_integer":
         assert solution.status == "budget_spent"
 
 
