@@ -205,7 +205,7 @@ class Gatekeeper:
     on its own for `rest_s`.
     """
 
-    route: str = "relaxed"
+    route: str = "mixed_integer"
     """How (26) is solved under method (c)."""
     period_s: float = 0.05
     """How often it decides; a multiple of the control period."""

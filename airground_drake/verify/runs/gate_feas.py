@@ -26,7 +26,12 @@ from airground_drake.verify.runs.gate_record import (
 from airground_drake.verify.runs.interventions import intervening
 from airground_drake.verify.runs.pairs import around
 from airground_drake.verify.runs.proposals import proposals_of
-from airground_drake.verify.runs.sum_up_rounding import compare_rounding, integrated_error_s, is_rounded
+from airground_drake.verify.runs.sum_up_rounding import (
+    compare_rounding,
+    compare_without_rounding,
+    integrated_error_s,
+    is_rounded,
+)
 
 SPEED_TOLERANCE = 1e-4
 """A step may be longer than the speed limit allows by this, relative."""
@@ -104,6 +109,7 @@ class GateFeas(GateClaim):
         compared += compare_answers(trace, rows)
         rounded = [row for row in rows if is_rounded(row)]
         compared += [one for row in rounded for one in compare_rounding(row)]
+        compared += [one for row in rows if row.planned for one in compare_without_rounding(row)]
         slack = [float(np.maximum(0.0, -row.clearance(row["positions_m"])).max()) for row in rows if row.planned]
         return judge_compared(
             trace, rows, compared,

@@ -179,7 +179,6 @@ def test_runs_of_c_solve_a_program_with_binaries(name: str, monkeypatch: pytest.
 
     monkeypatch.setattr("airground_drake.gatekeeper.binary_program.MathematicalProgram", Counting)
     scenario = load(name)[0]
-    scenario.gatekeeper.route = "mixed_integer"
     decisions = simulate(scenario, "c").decisions
     assert calls == [scenario.gatekeeper.stages]
     assert len(decisions) > 20
