@@ -153,7 +153,7 @@ def make_rules(scenario: Scenario) -> Rules:
     return Rules(
         switching_margin=gate.switching_margin,
         min_dwell=gate.min_dwell_s,
-        budget=Budget(gate.budget_iterations, gate.budget_nodes),
+        budget=Budget(gate.budget_iterations),
         budget_share=gate.budget_share if gate.budget == "wall_clock" else None,
     )
 

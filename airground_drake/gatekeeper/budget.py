@@ -19,7 +19,6 @@ class Budget:
 
     Attributes:
         iterations: of each call of the solver of a relaxation.
-        nodes: of each enumeration.
         search_s: time that a search by branch and bound may take, s. It is generous, so that no result depends on it
             but for problems that are far beyond real time; decisions that meet it are counted in the report.
         deadline_s: time on `clock` at which the solution must stand, s; inf: counted work only.
@@ -27,7 +26,6 @@ class Budget:
     """
 
     iterations: int = 100
-    nodes: int = 15_000
     search_s: float = 1.0
     deadline_s: float = math.inf
     clock: Clock = field(default=time.monotonic, compare=False)
@@ -38,8 +36,8 @@ class Budget:
         Raises:
             ValueError: if there is no iteration, no time to search, or the deadline is not a number.
         """
-        if self.iterations < 1 or self.nodes < 1 or not self.search_s > 0.0 or math.isnan(self.deadline_s):
-            raise ValueError(f"a budget needs iterations >= 1, nodes >= 1, search_s > 0 and a deadline, got {self}")
+        if self.iterations < 1 or not self.search_s > 0.0 or math.isnan(self.deadline_s):
+            raise ValueError(f"a budget needs iterations >= 1, search_s > 0 and a deadline, got {self}")
 
     def spent(self) -> bool:
         """Whether the deadline has passed; counted work alone never makes it so."""
@@ -50,5 +48,5 @@ class Budget:
         return math.inf if self.deadline_s == math.inf else max(0.0, self.deadline_s - self.clock())
 
 
-UNLIMITED = Budget(iterations=10_000, nodes=2**31, search_s=math.inf)
+UNLIMITED = Budget(iterations=10_000, search_s=math.inf)
 """Bounded only in principle: for oracles, benchmarks and tests."""

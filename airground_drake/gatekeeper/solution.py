@@ -25,9 +25,9 @@ class Solution:
             the budget was spent or a solver failed, with its gap; 'refused_not_finite': no plan, so that the
             proposal is refused.
         objective: cost (25) of the plan returned.
-        route_bound: lower bound of the problem that the route solves, which is not (26) with the exact distances of
-            (26d), whose optimum may be lower: relaxed or branched, for the same supporting
-            half-planes; enumerated, for the same dwell. A local optimum has none.
+        route_bound: lower bound of the problem that the route solves, with supporting half-planes for the exact
+            distances of (26d), whose optimum may be lower: over binary plans by `mixed_integer`, over relaxed ones by
+            `relaxed`. A local optimum has none.
         gap: (objective - route_bound) / objective, the objective being that of the same problem.
         objective_accept: lowest cost found of a plan that starts by accepting.
         objective_refuse: lowest cost found of a plan that starts by refusing.
@@ -75,12 +75,6 @@ class ConstantPlans:
         """Evaluate them by the mode velocities, which are exact for them up to rounding."""
         stages = problem.stages
         return cls(problem.evaluate(np.ones(stages)), problem.evaluate(np.zeros(stages)))
-
-    @classmethod
-    def of_closed_loop(cls, problem: Problem) -> ConstantPlans:
-        """Evaluate them on the closed loop."""
-        stages = problem.stages
-        return cls(problem.evaluate_closed_loop(np.ones(stages)), problem.evaluate_closed_loop(np.zeros(stages)))
 
     @property
     def both(self) -> tuple[Evaluation, Evaluation]:

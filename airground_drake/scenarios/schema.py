@@ -194,9 +194,10 @@ class Gatekeeper:
     """The accept/refuse decision, eqs (21)-(29).
 
     Under method (c) a decision on a proposal is reversed only for a plan that is cheaper by the (relative) switching
-    margin, and not before `min_dwell_s` have passed. A decision may take `budget_iterations` of a solver and
-    `budget_nodes` of a search (budget 'counted': a run is the same on every machine), or besides the share
-    `budget_share` of the sampling period by the clock (budget 'wall_clock': for real time). `terminal_weight_s` is the
+    margin, and not before `min_dwell_s` have passed. A decision may take `budget_iterations` of the solver of
+    a relaxation and a second of the search of `mixed_integer` (budget 'counted': a run is the same on every machine
+    unless a search meets that limit, which the report counts), or besides the share `budget_share` of the sampling
+    period by the clock (budget 'wall_clock': for real time). `terminal_weight_s` is the
     w of a terminal cost w a ||rho_rd - rho_N||^2 besides (25); the paper has none.
 
     Under method (d) outcomes are compared instead, `settling_s` past the end of motion and preset trajectory. An
@@ -228,9 +229,7 @@ class Gatekeeper:
     budget: str = "counted"
     """What bounds a decision's effort: counts only, or also the clock."""
     budget_iterations: int = 100
-    """Iterations of a solver."""
-    budget_nodes: int = 15000
-    """Nodes of a search."""
+    """Iterations of the solver of a relaxation."""
     budget_share: float = 0.5
     """Share of the sampling period, by the clock; at most 1."""
     longest_s: float = 30.0

@@ -9,13 +9,14 @@ from typing import ClassVar
 import numpy as np
 import pytest
 from builders.problems import random_problem
+from gatekeeper.oracles import Enumeration
 
 from airground_drake import components
 from airground_drake.gatekeeper import sample
 from airground_drake.gatekeeper.answer import Rules
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.problem import Problem
-from airground_drake.gatekeeper.routes.enumeration import EnumerationRoute
+from airground_drake.gatekeeper.routes.mixed_integer import MixedIntegerRoute
 from airground_drake.gatekeeper.solution import ConstantPlans, Solution, after_failure
 from airground_drake.registry import ROUTES
 from airground_drake.report import metrics
@@ -56,7 +57,7 @@ class FailingLater:
     calls: int = 0
 
     def __post_init__(self) -> None:
-        self._route = EnumerationRoute()
+        self._route = MixedIntegerRoute(10)
 
     def solve(self, problem: Problem, budget: Budget) -> Solution:
         self.calls += 1
@@ -110,7 +111,7 @@ def test_after_a_failure_the_rest_of_the_plan_before_counts(case_a: Scenario, mo
 def test_the_best_of_what_is_known_after_a_failure() -> None:
     problem, failed = random_problem(0), Solution(False, "solver_failed")
     constants = ConstantPlans.of(problem)
-    best = EnumerationRoute().solve(problem)
+    best = Enumeration().solve(problem)
     assert best.plan is not None
     assert best.objective < constants.better.objective
     assert after_failure(replace(problem, previous=best.plan), failed).objective == best.objective
@@ -165,10 +166,10 @@ def recorded_budgets(scenario: Scenario, monkeypatch: pytest.MonkeyPatch, clock:
 
 
 def test_in_simulation_a_decision_has_counts_and_no_deadline(case_a: Scenario, monkeypatch: pytest.MonkeyPatch) -> None:
-    case_a.gatekeeper.budget_iterations, case_a.gatekeeper.budget_nodes = 7, 11
+    case_a.gatekeeper.budget_iterations = 7
     budgets = recorded_budgets(case_a, monkeypatch, None)
     assert budgets
-    assert {(b.iterations, b.nodes, b.deadline_s) for b in budgets} == {(7, 11, math.inf)}
+    assert {(b.iterations, b.search_s, b.deadline_s) for b in budgets} == {(7, 1.0, math.inf)}
     assert not any(b.spent() for b in budgets)
 
 

@@ -11,6 +11,7 @@ import pytest
 from builders.problems import INSTANCES, random_problem, rolled_out
 from gatekeeper.contract import check_contract
 from gatekeeper.formulas import cost, half_plane_cost
+from gatekeeper.oracles import every_plan
 from pydrake.solvers import MathematicalProgram
 
 from airground_drake.gatekeeper import daqp_solver
@@ -22,13 +23,7 @@ from airground_drake.gatekeeper.problem import Problem
 from airground_drake.gatekeeper.routes.mixed_integer import MixedIntegerRoute
 from airground_drake.gatekeeper.solution import ConstantPlans
 from airground_drake.scenarios.load import load
-from airground_drake.simulation import simulate
-
-
-def all_plans(stages: int, blocks: int) -> np.ndarray:
-    """Every binary plan (2^blocks, stages) that is constant on blocks of any length."""
-    bits = np.arange(2**blocks)[:, None] >> np.arange(blocks) & 1
-    return bits[:, block_of_stage(stages, blocks)].astype(float)
+from airground_drake.simulation import simulate, warm_up
 
 
 def along_half_planes(problem: Problem, plans: np.ndarray, normals: np.ndarray) -> np.ndarray:
@@ -36,13 +31,13 @@ def along_half_planes(problem: Problem, plans: np.ndarray, normals: np.ndarray) 
 
 
 @pytest.mark.parametrize("seed", range(30))
-def test_the_optimum_is_that_of_all_plans(seed: int) -> None:
+def test_the_optimum_is_that_of_every_plan(seed: int) -> None:
     """Twelve stages, one to three points, with and without a terminal cost; one binary per stage."""
     problem = random_problem(seed, 12, 1 + seed % 3)
     solution = check_contract(MixedIntegerRoute(), problem, budget=UNLIMITED)
     assert solution.status == "optimal"
     assert solution.normals is not None
-    least = along_half_planes(problem, all_plans(12, 12), solution.normals).min()
+    least = along_half_planes(problem, every_plan(12, 12), solution.normals).min()
     assert solution.route_bound == pytest.approx(least, rel=1e-9)
     assert solution.gap == pytest.approx(0.0, abs=1e-12)
 
@@ -53,7 +48,7 @@ def test_the_optimum_of_blocks_is_that_of_all_their_plans(seed: int, blocks: int
     """Seven blocks do not divide the sixty stages."""
     problem = rolled_out(seed)
     solution = check_contract(MixedIntegerRoute(blocks), problem, budget=UNLIMITED)
-    plans = all_plans(problem.stages, blocks)
+    plans = every_plan(problem.stages, blocks)
     assert solution.plan is not None
     assert solution.normals is not None
     assert (plans == solution.plan).all(axis=1).any()
@@ -177,6 +172,7 @@ def test_runs_of_c_solve_a_program_with_binaries(name: str, monkeypatch: pytest.
             calls.append(rows)
             return super().NewBinaryVariables(rows, name)
 
+    warm_up()  # once per process, with a small program
     monkeypatch.setattr("airground_drake.gatekeeper.binary_program.MathematicalProgram", Counting)
     scenario = load(name)[0]
     decisions = simulate(scenario, "c").decisions
