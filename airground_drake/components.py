@@ -100,7 +100,8 @@ def make_route(scenario: Scenario) -> Route:
     Raises:
         UnknownNameError, PluginError: if the scenario names a route that cannot be made.
     """
-    return ROUTES.make(scenario.gatekeeper.route, of=Route)
+    blocks = scenario.gatekeeper.blocks
+    return ROUTES.make(scenario.gatekeeper.route, of=Route, **({"blocks": blocks} if blocks else {}))
 
 
 def first_order_plant(robot: str, start: Array) -> LinearSystem:
@@ -152,7 +153,7 @@ def make_rules(scenario: Scenario) -> Rules:
     return Rules(
         switching_margin=gate.switching_margin,
         min_dwell=gate.min_dwell_s,
-        budget=Budget(gate.budget_iterations, gate.budget_nodes),
+        budget=Budget(gate.budget_iterations),
         budget_share=gate.budget_share if gate.budget == "wall_clock" else None,
     )
 

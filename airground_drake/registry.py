@@ -285,14 +285,19 @@ ROUTES = Registry(
     "route",
     "routes",
     {
+        "mixed_integer": "airground_drake.gatekeeper.routes.mixed_integer:MixedIntegerRoute",
         "relaxed": "airground_drake.gatekeeper.routes.relaxed:RelaxedRoute",
-        "enumeration": "airground_drake.gatekeeper.routes.enumeration:EnumerationRoute",
         "nonlinear": "airground_drake.gatekeeper.routes.nonlinear:NonlinearRoute",
-        "branch_and_bound": "airground_drake.gatekeeper.routes.branch_and_bound:BranchAndBoundRoute",
-        "rollout": "airground_drake.gatekeeper.routes.closed_loop_enumeration:ClosedLoopEnumerationRoute",
     },
 )
 """Ways to solve the gatekeeper's problem (26)."""
+
+RETIRED_ROUTES = {
+    "enumeration": "mixed_integer, with gatekeeper.blocks: 10 for the same plans",
+    "branch_and_bound": "mixed_integer, with gatekeeper.blocks: 10 for the same plans",
+    "rollout": "mixed_integer, or method (d), which compares outcomes on the closed loop",
+}
+"""Routes of earlier versions, and what to write in their place."""
 
 UAV_TASKS = Registry("task", "uav_tasks", {"formation": "airground_drake.nsbc.tasks:FormationTask"})
 """What the UAV does below obstacle avoidance: subclasses of `nsbc.task.Task`."""

@@ -18,14 +18,15 @@ class Budget:
     A route asks `spent()` between its steps and hands the counts, and `left_s()`, to the solvers that it calls.
 
     Attributes:
-        iterations: of each call of a convex or nonlinear solver.
-        nodes: of each tree search.
+        iterations: of each call of the solver of a relaxation.
+        search_s: time that a search by branch and bound may take, s. It is generous, so that no result depends on it
+            but for problems that are far beyond real time; decisions that meet it are counted in the report.
         deadline_s: time on `clock` at which the solution must stand, s; inf: counted work only.
         clock: what `deadline_s` refers to.
     """
 
     iterations: int = 100
-    nodes: int = 15_000
+    search_s: float = 1.0
     deadline_s: float = math.inf
     clock: Clock = field(default=time.monotonic, compare=False)
 
@@ -33,10 +34,10 @@ class Budget:
         """Check the limits.
 
         Raises:
-            ValueError: if a count is below 1 or the deadline is not a number.
+            ValueError: if there is no iteration, no time to search, or the deadline is not a number.
         """
-        if self.iterations < 1 or self.nodes < 1 or math.isnan(self.deadline_s):
-            raise ValueError(f"a budget needs iterations >= 1, nodes >= 1 and a deadline, got {self}")
+        if self.iterations < 1 or not self.search_s > 0.0 or math.isnan(self.deadline_s):
+            raise ValueError(f"a budget needs iterations >= 1, search_s > 0 and a deadline, got {self}")
 
     def spent(self) -> bool:
         """Whether the deadline has passed; counted work alone never makes it so."""
@@ -47,5 +48,5 @@ class Budget:
         return math.inf if self.deadline_s == math.inf else max(0.0, self.deadline_s - self.clock())
 
 
-UNLIMITED = Budget(iterations=10_000, nodes=2**31)
+UNLIMITED = Budget(iterations=10_000, search_s=math.inf)
 """Bounded only in principle: for oracles, benchmarks and tests."""

@@ -1,4 +1,4 @@
-"""(26) and its relaxation (27) for a team of UGVs, with half-planes for (26d), as one `MathematicalProgram`."""
+"""The relaxation (27) for a team of UGVs, with half-planes for (26d), as one `MathematicalProgram`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from pydrake.solvers import MathematicalProgram
 from scipy.sparse import csc_matrix
 
 from airground_drake.arrays import Array
-from airground_drake.gatekeeper.blocks import block_of_stage
 from airground_drake.gatekeeper.cost import error_weights
 from airground_drake.gatekeeper.half_planes import offsets
 from airground_drake.gatekeeper.problem import Problem
@@ -32,7 +31,6 @@ class Shape:
         error_weight: a of (25), in the program's unit of cost.
         slack_weight: b of (25), in the program's unit of cost.
         terminal_weight: of the terminal cost, s.
-        blocks: variables omega of the UGV, each for a block of N / `blocks` stages.
     """
 
     stages: int
@@ -40,46 +38,41 @@ class Shape:
     error_weight: float
     slack_weight: float
     terminal_weight: float
-    blocks: int
 
     @classmethod
-    def of(cls, problem: Problem, *, blocks: int | None = None, scale: float = 1.0) -> Shape:
-        """Of a problem: one omega per stage unless `blocks` says so; `scale` is the cost that counts as 1."""
-        count = problem.stages if blocks is None else min(blocks, problem.stages)
+    def of(cls, problem: Problem, *, scale: float = 1.0) -> Shape:
+        """Of a problem; `scale` is the cost that counts as 1."""
         weights = problem.error_weight / scale, problem.slack_weight / scale, problem.terminal_weight
-        return cls(problem.stages, problem.dt, *weights, count)
+        return cls(problem.stages, problem.dt, *weights)
 
 
 class UgvProgram:
     """The variables, costs and constraints of one UGV within a program.
 
     Variables: start (2,), the state (26b); task errors e = p - reference at the ends of the stages (2N,), in
-    which the cost (25) is constant; omega (B,), the share of accepting, so that (24) is 1 - omega for the other
+    which the cost (25) is constant; omega (N,), the share of accepting, so that (24) is 1 - omega for the other
     mode; u (N,), the slack.
 
     Attributes:
-        omega: Drake variables, (B,).
-        block: of each stage, (N,).
+        omega: Drake variables, (N,).
     """
 
-    def __init__(self, program: MathematicalProgram, shape: Shape, name: str, *, relaxed: bool) -> None:
+    def __init__(self, program: MathematicalProgram, shape: Shape, name: str) -> None:
         """Add them to `program`; `name` of the UGV ends every description."""
         n, size = shape.stages, AXES * shape.stages
         self._dt = shape.dt
-        self.block = block_of_stage(n, shape.blocks)
         start = program.NewContinuousVariables(AXES, f"start_{name}")
         e = program.NewContinuousVariables(size, f"e_{name}")
-        new = program.NewContinuousVariables if relaxed else program.NewBinaryVariables
-        self.omega: Any = new(shape.blocks, f"omega_{name}")
+        self.omega: Any = program.NewContinuousVariables(n, f"omega_{name}")
         u = program.NewContinuousVariables(n, f"u_{name}")
         # rows 2k + axis of (23); the columns of omega come last, in the order of the stages
         before = np.hstack([-np.eye(size, AXES), np.eye(size) - np.eye(size, k=-AXES)])
-        steps = np.concatenate([[0], np.cumsum(np.bincount(self.block))]) * AXES
+        steps = np.arange(n + 1) * AXES
         fixed = csc_matrix(before)
         self._indices = np.concatenate([fixed.indices, np.arange(size)])
         self._indptr = np.concatenate([fixed.indptr, fixed.indptr[-1] + steps[1:]])
         self._data = np.concatenate([fixed.data, np.zeros(size)])
-        self._width = AXES + size + shape.blocks
+        self._width = AXES + size + n
         self._initial = program.AddLinearEqualityConstraint(np.eye(AXES), np.zeros(AXES), start)
         self._dynamics = program.AddLinearEqualityConstraint(
             np.zeros((size, self._width)), np.zeros(size), np.concatenate([start, e, self.omega])
@@ -87,15 +80,12 @@ class UgvProgram:
         self.avoidance = program.AddLinearConstraint(
             np.zeros((1, size + n)), np.full(1, -np.inf), np.full(1, np.inf), np.concatenate([e, u])
         )
-        equation = 27 if relaxed else 26
         constraints = {
-            f"({equation}b) initial state": self._initial,
+            "(27b) initial state": self._initial,
             "(23) dynamics": self._dynamics,
-            "(27c) relaxed share of accepting" if relaxed else "(24), (26c) accept or refuse": (
-                program.AddBoundingBoxConstraint(0.0, 1.0, self.omega)
-            ),
-            f"({equation}d) as half-planes": self.avoidance,
-            f"({equation}e) slack": program.AddBoundingBoxConstraint(0.0, np.inf, u),
+            "(27c) relaxed share of accepting": program.AddBoundingBoxConstraint(0.0, 1.0, self.omega),
+            "(27d) as half-planes": self.avoidance,
+            "(27e) slack": program.AddBoundingBoxConstraint(0.0, np.inf, u),
         }
         of_error = error_weights(n, shape.dt, shape.error_weight, shape.terminal_weight).repeat(AXES)
         of_slack = np.full(n, shape.slack_weight)
@@ -130,11 +120,6 @@ class UgvProgram:
             matrix = csc_matrix((data, indices, indptr), shape=(len(lower), size + n))
             self.avoidance.evaluator().UpdateCoefficients(matrix, lower, np.full(len(lower), np.inf))
         return within
-
-    def plan(self, values: Array) -> Array:
-        """Of omega's values (B,), one per stage, (N,)."""
-        stages: Array = values[self.block]
-        return stages
 
 
 @njit(cache=True)
@@ -173,12 +158,12 @@ class TeamProgram:
     ugvs: tuple[UgvProgram, ...]
 
 
-def empty_program(shapes: Sequence[Shape], *, relaxed: bool) -> TeamProgram:
-    """(21)-(26), or with `relaxed` (27), of UGVs of these shapes, still without any problem's data."""
+def empty_program(shapes: Sequence[Shape]) -> TeamProgram:
+    """(27) of UGVs of these shapes, still without any problem's data."""
     program = MathematicalProgram()
     return TeamProgram(
         program,
-        tuple(UgvProgram(program, shape, f"UGV {i + 1}", relaxed=relaxed) for i, shape in enumerate(shapes)),
+        tuple(UgvProgram(program, shape, f"UGV {i + 1}") for i, shape in enumerate(shapes)),
     )
 
 
@@ -186,23 +171,19 @@ def team_program(
     problems: Sequence[Problem],
     normals: Sequence[Array],
     *,
-    relaxed: bool,
-    blocks: int | None = None,
     scale: float = 1.0,
 ) -> TeamProgram:
-    """(21)-(26) of a team: binary accept variables (24), or with `relaxed` (27), every constraint named.
+    """(27) of a team, every constraint named.
 
     The predicted motion of the others is data in each UGV's problem, so that the program separates: its optimum
-    is the sum of the UGVs' optima. (26d) stands as n.(p - o) >= d - u, which implies it for unit n.
+    is the sum of the UGVs' optima. (27d) stands as n.(p - o) >= d - u, which implies it for unit n.
 
     Args:
         problems: one per UGV.
         normals: of each UGV's half-planes, (N, m, 3).
-        relaxed: shares of accepting in [0, 1] in place of binaries.
-        blocks: accept variables per UGV, each for a block of stages; None: one per stage.
         scale: cost (25) that is 1 in the program.
     """
-    team = empty_program([Shape.of(p, blocks=blocks, scale=scale) for p in problems], relaxed=relaxed)
+    team = empty_program([Shape.of(p, scale=scale) for p in problems])
     for ugv, problem, n in zip(team.ugvs, problems, normals, strict=True):
         ugv.update(problem, n)
     return team

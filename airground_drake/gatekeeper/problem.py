@@ -32,6 +32,8 @@ class Problem:
         slack_weight: b_i of (25), 1/(m^2 s).
         terminal_weight: of the terminal cost, see `cost.error_weights`, s; 0: none, as the paper has it.
         loop: what the mode velocities were rolled out from; None for a problem that is given by them alone.
+        previous: what is left of the plan decided on at the sample before, (N,), 0 or 1; None if there is none. It is
+            no part of (26), but a plan to start from.
     """
 
     dt: float
@@ -45,6 +47,7 @@ class Problem:
     slack_weight: float
     terminal_weight: float = 0.0
     loop: ClosedLoop | None = None
+    previous: Array | None = None
 
     @property
     def stages(self) -> int:

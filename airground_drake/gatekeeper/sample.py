@@ -207,9 +207,10 @@ class PaperGatekeepers(Gatekeepers):
     def _decide(self, seen: Situation, i: int, proposal: Proposal, budgets: Iterator[Budget]) -> Decision:
         started = thread_time()
         problem = predicted_problem(self._scene(seen, i), self._law, proposal, self._judging.horizon)
+        problem = replace(problem, previous=self._rest_of_plan(seen, i, proposal))
         solution = self._judging.route.solve(problem, next(budgets))
         if solution.status == "solver_failed":
-            solution = after_failure(problem, solution, self._rest_of_plan(seen, i, proposal))
+            solution = after_failure(problem, solution)
         self.times_s.append(thread_time() - started)
         standing, stood = answer_to(proposal, seen.before.answers, i), seen.t - seen.before.since[i]
         throughout = costs_throughout(problem, solution)

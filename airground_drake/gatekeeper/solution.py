@@ -25,9 +25,9 @@ class Solution:
             the budget was spent or a solver failed, with its gap; 'refused_not_finite': no plan, so that the
             proposal is refused.
         objective: cost (25) of the plan returned.
-        route_bound: lower bound of the problem that the route solves, which is not (26) with the exact distances of
-            (26d), whose optimum may be lower: relaxed or branched, for the same supporting
-            half-planes; enumerated, for the same dwell. A local optimum has none.
+        route_bound: lower bound of the problem that the route solves, with supporting half-planes for the exact
+            distances of (26d), whose optimum may be lower: over binary plans by `mixed_integer`, over relaxed ones by
+            `relaxed`. A local optimum has none.
         gap: (objective - route_bound) / objective, the objective being that of the same problem.
         objective_accept: lowest cost found of a plan that starts by accepting.
         objective_refuse: lowest cost found of a plan that starts by refusing.
@@ -75,12 +75,6 @@ class ConstantPlans:
         """Evaluate them by the mode velocities, which are exact for them up to rounding."""
         stages = problem.stages
         return cls(problem.evaluate(np.ones(stages)), problem.evaluate(np.zeros(stages)))
-
-    @classmethod
-    def of_closed_loop(cls, problem: Problem) -> ConstantPlans:
-        """Evaluate them on the closed loop."""
-        stages = problem.stages
-        return cls(problem.evaluate_closed_loop(np.ones(stages)), problem.evaluate_closed_loop(np.zeros(stages)))
 
     @property
     def both(self) -> tuple[Evaluation, Evaluation]:
@@ -174,18 +168,17 @@ def cut_short(
     )
 
 
-def after_failure(problem: Problem, solution: Solution, previous: Array | None) -> Solution:
+def after_failure(problem: Problem, solution: Solution) -> Solution:
     """The solution after a solver failure: the cheapest of its own plan, the constant plans and the previous one.
 
     Args:
         problem: what they are plans of.
         solution: the route's, with or without a plan.
-        previous: what is left of the plan decided on at the sample before, (N,); None if there is none.
     """
     constants = ConstantPlans.of(problem)
     if not (problem.is_finite() and constants.are_finite()):
         return Solution(False, "refused_not_finite")
-    known = [problem.evaluate(plan) for plan in (solution.plan, previous) if plan is not None]
+    known = [problem.evaluate(plan) for plan in (solution.plan, problem.previous) if plan is not None]
     bound = max(0.0, solution.route_bound)
     found = cut_short(
         problem, (*constants.both, *known), bound, status="solver_failed",

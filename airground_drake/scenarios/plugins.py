@@ -87,6 +87,6 @@ def without(scenario: Scenario) -> Scenario:
         scenario,
         uav=replace(scenario.uav, task="formation"),
         intervention=replace(scenario.intervention, policies=[]),
-        gatekeeper=replace(scenario.gatekeeper, route="relaxed"),
+        gatekeeper=replace(scenario.gatekeeper, route="mixed_integer", blocks=0),
         choices=[],
     )

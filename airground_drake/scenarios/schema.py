@@ -197,9 +197,10 @@ class Gatekeeper:
     """The accept/refuse decision, eqs (21)-(29).
 
     Under method (c) a decision on a proposal is reversed only for a plan that is cheaper by the (relative) switching
-    margin, and not before `min_dwell_s` have passed. A decision may take `budget_iterations` of a solver and
-    `budget_nodes` of a search (budget 'counted': a run is the same on every machine), or besides the share
-    `budget_share` of the sampling period by the clock (budget 'wall_clock': for real time). `terminal_weight_s` is the
+    margin, and not before `min_dwell_s` have passed. A decision may take `budget_iterations` of the solver of
+    a relaxation and a second of the search of `mixed_integer` (budget 'counted': a run is the same on every machine
+    unless a search meets that limit, which the report counts), or besides the share `budget_share` of the sampling
+    period by the clock (budget 'wall_clock': for real time). `terminal_weight_s` is the
     w of a terminal cost w a ||rho_rd - rho_N||^2 besides (25); the paper has none.
 
     Under method (d) outcomes are compared instead, `settling_s` past the end of motion and preset trajectory. An
@@ -208,7 +209,7 @@ class Gatekeeper:
     on its own for `rest_s`.
     """
 
-    route: str = "relaxed"
+    route: str = "mixed_integer"
     """How (26) is solved under method (c)."""
     period_s: float = 0.05
     """How often it decides; a multiple of the control period."""
@@ -216,6 +217,8 @@ class Gatekeeper:
     """How far (26) looks ahead, and how long other robots are predicted to go on."""
     stages: int = 60
     """Stages of (26): horizon_s / stages is a multiple of the control period."""
+    blocks: int = 0
+    """Accept variables of (26), each for a block of stages, for route mixed_integer; 0: one per stage."""
     error_weight_1_m2_s: float = 1.0
     """a of (25): weight of the distance to the preset trajectory."""
     slack_weight_1_m2_s: float = field(default=1000.0, metadata=FROM_ZERO)
@@ -229,9 +232,7 @@ class Gatekeeper:
     budget: str = "counted"
     """What bounds a decision's effort: counts only, or also the clock."""
     budget_iterations: int = 100
-    """Iterations of a solver."""
-    budget_nodes: int = 15000
-    """Nodes of a search."""
+    """Iterations of the solver of a relaxation."""
     budget_share: float = 0.5
     """Share of the sampling period, by the clock; at most 1."""
     longest_s: float = 30.0

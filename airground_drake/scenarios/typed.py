@@ -98,5 +98,9 @@ def _wanted(hint: Any, name: str) -> str:
 
 
 def _unknown(node: yaml.Node, key: str, part: str, options: Iterable[str]) -> NoReturn:
+    if validate.dotted(key, part) in validate.RETIRED_KEYS:
+        raise ScenarioError(
+            where(node), validate.dotted(key, part), Fault("no longer a key"), validate.RETIRED_KEYS[f"{key}.{part}"]
+        )
     wanted = f"{suggestion(part, options)}allowed: {', '.join(options) or 'none'}"
     raise ScenarioError(where(node), validate.dotted(key, part), Fault("unknown key"), wanted)

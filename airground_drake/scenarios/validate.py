@@ -31,6 +31,7 @@ from airground_drake.registry import (
     PLUGIN,
     POLICIES,
     RETIRED_CLAIMS,
+    RETIRED_ROUTES,
     ROUTES,
     RUN_CLAIMS,
     UAV_TASKS,
@@ -165,12 +166,21 @@ def _names(scenario: Scenario) -> Problems:
             yield key, name, "a name that no other UGV, obstacle or UAV has"
 
 
+RETIRED_KEYS = {"gatekeeper.budget_nodes": "remove it: the search of the route mixed_integer is limited in time only"}
+"""Keys of earlier versions, and what to do about them."""
+
+
 def _counts(scenario: Scenario) -> Problems:
     if not 0 <= scenario.seed <= MAX_SEED:
         yield "seed", scenario.seed, f"a whole number from 0 to {MAX_SEED}"
     if not 1 <= scenario.gatekeeper.stages <= MAX_STAGES:
         yield "gatekeeper.stages", scenario.gatekeeper.stages, f"a whole number from 1 to {MAX_STAGES}"
-    for name in ("budget_iterations", "budget_nodes", "tries"):
+    if not 0 <= scenario.gatekeeper.blocks <= scenario.gatekeeper.stages:
+        allowed = "a whole number from 1 to gatekeeper.stages, or 0: one accept variable per stage"
+        yield "gatekeeper.blocks", scenario.gatekeeper.blocks, allowed
+    if scenario.gatekeeper.blocks and scenario.gatekeeper.route in (set(ROUTES.own) - {"mixed_integer"}):
+        yield "gatekeeper.blocks", scenario.gatekeeper.blocks, "0: only the route mixed_integer has blocks"
+    for name in ("budget_iterations", "tries"):
         if not 1 <= getattr(scenario.gatekeeper, name) <= MAX_SEED:
             yield f"gatekeeper.{name}", getattr(scenario.gatekeeper, name), f"a whole number from 1 to {MAX_SEED}"
     if scenario.gatekeeper.budget_share > 1.0:
@@ -183,7 +193,11 @@ def _counts(scenario: Scenario) -> Problems:
 
 def _options(scenario: Scenario) -> Problems:
     yield from _one_of("intervention.ranking", scenario.intervention.ranking, RANKINGS)
-    yield from _registered("gatekeeper.route", scenario.gatekeeper.route, ROUTES)
+    if scenario.gatekeeper.route in RETIRED_ROUTES:
+        what = f"no longer a route: use {RETIRED_ROUTES[scenario.gatekeeper.route]}"
+        yield "gatekeeper.route", scenario.gatekeeper.route, what
+    else:
+        yield from _registered("gatekeeper.route", scenario.gatekeeper.route, ROUTES)
     yield from _registered("uav.task", scenario.uav.task, UAV_TASKS)
     for index, policy in enumerate(scenario.intervention.policies):
         yield from _registered(f"intervention.policies.{index}.name", policy.name, POLICIES)

@@ -118,23 +118,20 @@ def solve_as_documented(data: GateData, route: str) -> Solution:
     """As the route's documentation has it."""
     relaxed, optimum = data.relaxed()
     rounded = sum_up_rounding(relaxed)
-    every = route in ("enumeration", "branch_and_bound")
-    plans = [*ALL_PLANS] if every else [rounded, np.ones(STAGES), np.zeros(STAGES)]
+    cheapest = min(ALL_PLANS, key=lambda plan: data.plan_cost(plan, along=True))
+    plans = [cheapest if route == "mixed_integer" else rounded, np.ones(STAGES), np.zeros(STAGES)]
     best = min(plans, key=data.plan_cost)
     positions = data.positions(best)
-    along = route in ("relaxed", "branch_and_bound")
-    least = min(data.plan_cost(plan, along) for plan in (best, rounded, np.ones(STAGES), np.zeros(STAGES)))
-    bound = {"relaxed": optimum, "enumeration": least}.get(route, -1.0)
-    if route == "branch_and_bound":
-        bound = 0.99 * min(data.plan_cost(plan, along=True) for plan in ALL_PLANS)
-        least = min(data.plan_cost(plan, along=True) for plan in (best, np.ones(STAGES), np.zeros(STAGES)))
-    rounds, solves = route in ("relaxed", "nonlinear"), route in ("relaxed", "enumeration", "branch_and_bound")
+    along = route != "nonlinear"
+    least = min(data.plan_cost(plan, along=True) for plan in plans)
+    bound = {"relaxed": optimum, "mixed_integer": least}.get(route, -1.0)
+    rounds = route != "mixed_integer"
     return Solution(
         accept_first=best[0] == 1.0,
         status="optimal",
         objective=data.cost(positions),
         route_bound=bound,
-        gap=(least - bound) / least if solves else -1.0,
+        gap=(least - bound) / least if along else -1.0,
         objective_accept=min(data.plan_cost(plan) for plan in plans if plan[0] == 1.0),
         objective_refuse=min(data.plan_cost(plan) for plan in plans if plan[0] == 0.0),
         relaxed_first_stage=float(relaxed[0]) if rounds else -1.0,

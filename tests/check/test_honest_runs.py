@@ -34,7 +34,7 @@ KINDS: dict[str, dict[str, dict[str, Any]]] = {
     },
     "small_budgets": {
         "decision": {"threshold": {"rule": "fixed", "zeta_m": 0.01}, "release_m": 0.0105},
-        "gatekeeper": {"budget_iterations": 1, "budget_nodes": 1},
+        "gatekeeper": {"budget_iterations": 1},
     },
 }
 METHODS = dict(zip(KINDS, "bddbcdcc", strict=True))

@@ -41,7 +41,7 @@ def test_the_bound_of_the_relaxation_is_tight() -> None:
         options.SetOption(ClarabelSolver.id(), name, 1e-9)
     for problem in [*(random_problem(s, 24, 1 + s % 3) for s in range(8)), *(rolled_out(s) for s in range(8))]:
         solution = used("relaxed").solve(problem)
-        program = team_program([problem], [solution.normals], relaxed=True).program
+        program = team_program([problem], [solution.normals]).program
         optimum = ClarabelSolver().Solve(program, None, options).get_optimal_cost()
         assert solution.route_bound == pytest.approx(optimum, rel=2e-5, abs=1e-8)
         assert solution.route_bound <= optimum * (1.0 + 1e-7) + 1e-9

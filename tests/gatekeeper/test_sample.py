@@ -9,7 +9,7 @@ import numpy as np
 from airground_drake.gatekeeper.answer import Decision, Foreseen, Rules
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.prediction import Horizon
-from airground_drake.gatekeeper.routes.enumeration import EnumerationRoute
+from airground_drake.gatekeeper.routes.relaxed import RelaxedRoute
 from airground_drake.gatekeeper.sample import Judging, Memory, PaperGatekeepers, Situation
 from airground_drake.intervention.messages import ACCEPT
 from airground_drake.intervention.policy import Proposal
@@ -30,9 +30,7 @@ def test_the_dwell_of_an_answer_begins_anew_with_each_proposal() -> None:
     team = Team(("ugv",), "uav", np.empty((0, 3)), 2.0, 2.0, 1.0, np.ones(2))
     law = UgvLaw(Avoidance(3.0, 0.05, 4.0), 2.0, 1.5, intervention_on_top=True)
     motion = Motion(np.zeros(1), np.zeros((1, 3)))
-    judging = Judging(
-        EnumerationRoute(), Horizon(4, 1, 1.0, 1.0, 0.0), Rules(switching_margin=0.1, min_dwell=0.2), 0.05
-    )
+    judging = Judging(RelaxedRoute(), Horizon(4, 1, 1.0, 1.0, 0.0), Rules(switching_margin=0.1, min_dwell=0.2), 0.05)
     gate, memory = Agreeing(team, law, [motion], judging), Memory.empty(1)
     since = []
     for k, number in enumerate((0, 0, 1, 1)):

@@ -72,6 +72,12 @@ BAD: list[tuple[str, object, list[str]]] = [
     ("gatekeeper.stages", 0, ["gatekeeper.stages: 0", "from 1 to 1000"]),
     ("gatekeeper.stages", 1001, ["gatekeeper.stages: 1001", "from 1 to 1000"]),
     # options
+    ("gatekeeper.route", "enumeration", ["no longer a route", "mixed_integer", "gatekeeper.blocks: 10"]),
+    ("gatekeeper.route", "branch_and_bound", ["no longer a route", "mixed_integer"]),
+    ("gatekeeper.route", "rollout", ["no longer a route", "mixed_integer", "method (d)"]),
+    ("gatekeeper.budget_nodes", 15000, ["gatekeeper.budget_nodes: no longer a key", "remove it"]),
+    ("gatekeeper.blocks", 61, ["gatekeeper.blocks: 61", "1 to gatekeeper.stages"]),
+    ("gatekeeper", {"route": "relaxed", "blocks": 10}, ["gatekeeper.blocks: 10", "only the route mixed_integer"]),
     ("gatekeeper.route", "exact", ["gatekeeper.route: 'exact'", "relaxed"]),
     ("decision.trigger", "x", ["decision.trigger: 'x'", "automaton, bare"]),
     ("decision.threshold.rule", "x", ["decision.threshold.rule: 'x'", "fixed, bayes"]),

@@ -9,13 +9,14 @@ from typing import ClassVar
 import numpy as np
 import pytest
 from builders.problems import random_problem
+from gatekeeper.oracles import Enumeration
 
 from airground_drake import components
 from airground_drake.gatekeeper import sample
 from airground_drake.gatekeeper.answer import Rules
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.problem import Problem
-from airground_drake.gatekeeper.routes.enumeration import EnumerationRoute
+from airground_drake.gatekeeper.routes.mixed_integer import MixedIntegerRoute
 from airground_drake.gatekeeper.solution import ConstantPlans, Solution, after_failure
 from airground_drake.registry import ROUTES
 from airground_drake.report import metrics
@@ -56,7 +57,7 @@ class FailingLater:
     calls: int = 0
 
     def __post_init__(self) -> None:
-        self._route = EnumerationRoute()
+        self._route = MixedIntegerRoute(10)
 
     def solve(self, problem: Problem, budget: Budget) -> Solution:
         self.calls += 1
@@ -92,9 +93,9 @@ def test_after_a_failure_the_rest_of_the_plan_before_counts(case_a: Scenario, mo
                 solutions[-1] = replace(solutions[-1], plan=plan.omega, positions=plan.positions)
             return solutions[-1]
 
-    def listening(problem: Problem, solution: Solution, previous: np.ndarray | None) -> Solution:
-        before.append(previous)
-        return after_failure(problem, solution, previous)
+    def listening(problem: Problem, solution: Solution) -> Solution:
+        before.append(problem.previous)
+        return after_failure(problem, solution)
 
     monkeypatch.setattr(sample, "after_failure", listening)
     case_a.gatekeeper.route = "failing"
@@ -110,16 +111,16 @@ def test_after_a_failure_the_rest_of_the_plan_before_counts(case_a: Scenario, mo
 def test_the_best_of_what_is_known_after_a_failure() -> None:
     problem, failed = random_problem(0), Solution(False, "solver_failed")
     constants = ConstantPlans.of(problem)
-    best = EnumerationRoute().solve(problem)
+    best = Enumeration().solve(problem)
     assert best.plan is not None
     assert best.objective < constants.better.objective
-    assert after_failure(problem, failed, best.plan).objective == best.objective
+    assert after_failure(replace(problem, previous=best.plan), failed).objective == best.objective
     for own, previous in ((failed, None), (failed, constants.better.omega)):
-        assert after_failure(problem, own, previous).objective == constants.better.objective
+        assert after_failure(replace(problem, previous=previous), own).objective == constants.better.objective
     own = replace(best, status="solver_failed")
-    assert after_failure(problem, own, np.ones(problem.stages)).objective == best.objective
+    assert after_failure(replace(problem, previous=np.ones(problem.stages)), own).objective == best.objective
     broken = replace(problem, initial=np.full(3, np.nan))
-    assert after_failure(broken, failed, best.plan).status == "refused_not_finite"
+    assert after_failure(replace(broken, previous=best.plan), failed).status == "refused_not_finite"
 
 
 def test_a_proposal_that_leads_nowhere_is_refused_under_d_and_the_uav_is_told_where() -> None:
@@ -165,10 +166,10 @@ def recorded_budgets(scenario: Scenario, monkeypatch: pytest.MonkeyPatch, clock:
 
 
 def test_in_simulation_a_decision_has_counts_and_no_deadline(case_a: Scenario, monkeypatch: pytest.MonkeyPatch) -> None:
-    case_a.gatekeeper.budget_iterations, case_a.gatekeeper.budget_nodes = 7, 11
+    case_a.gatekeeper.budget_iterations = 7
     budgets = recorded_budgets(case_a, monkeypatch, None)
     assert budgets
-    assert {(b.iterations, b.nodes, b.deadline_s) for b in budgets} == {(7, 11, math.inf)}
+    assert {(b.iterations, b.search_s, b.deadline_s) for b in budgets} == {(7, 1.0, math.inf)}
     assert not any(b.spent() for b in budgets)
 
 

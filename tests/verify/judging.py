@@ -59,7 +59,7 @@ def comparisons(claim: TraceClaim, trace: Trace) -> list[Off]:
     if claim is OPT:
         pairs = zip(rows, enclose(rows), strict=True)
         return [one for row in rows for one in gate_opt.compare_with_constant_plans(row)] + [
-            one for row, found in pairs for one in gate_opt.compare_bounds(row, found, row["normals"])
+            one for row, found in pairs for one in gate_opt.compare_bounds(row, found, 0)
         ]
     described = [
         one for row in rows for one in (*gate_feas.compare_situation(trace, row), *gate_feas.compare_plan(trace, row))

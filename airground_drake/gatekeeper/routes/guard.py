@@ -16,23 +16,21 @@ Search = Callable[[Problem, ConstantPlans, Budget], Solution]
 """A route's own work on a finite problem, with its constant plans, while there is budget left."""
 
 
-def guarded(problem: Problem, budget: Budget, search: Search, *, closed_loop: bool = False) -> Solution:
+def guarded(problem: Problem, budget: Budget, search: Search) -> Solution:
     """Search, unless the problem or its costs are not finite, or the budget is spent.
 
     Args:
         problem: data of (26).
         budget: asked when the constant plans are evaluated: there is always one of them to go by.
         search: what to do then.
-        closed_loop: evaluate the constant plans on the closed loop.
     """
     if not problem.is_finite():
         return Solution(False, "refused_not_finite")
-    constants = ConstantPlans.of_closed_loop(problem) if closed_loop else ConstantPlans.of(problem)
+    constants = ConstantPlans.of(problem)
     if not constants.are_finite():
         return Solution(False, "refused_not_finite")
     if budget.spent():
-        # the box is one of the mode velocities: it bounds nothing on the closed loop
-        return cut_short(problem, constants.both, 0.0 if closed_loop else unavoidable_cost(problem))
+        return cut_short(problem, constants.both, unavoidable_cost(problem))
     return search(problem, constants, budget)
 
 

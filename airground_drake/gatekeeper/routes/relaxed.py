@@ -85,7 +85,7 @@ class RelaxedRoute:
         scale = _scale(cost)
         shape = Shape.of(problem, scale=scale)
         if shape not in self._programs:
-            self._programs[shape] = empty_program([shape], relaxed=True)
+            self._programs[shape] = empty_program([shape])
         team = self._programs[shape]
         (ugv,) = team.ugvs
         rows = ugv.update(problem, normals)

@@ -23,8 +23,8 @@ class Route(Protocol):
     - It keeps the budget: the counts, and the deadline but for one step of its own. At the end of the budget it
       returns the best plan known, with status 'budget_spent'. Counts alone give the same solution on every machine
       and at every call.
-    - `plan` is binary, `positions` is where it leads, `objective` its cost (25), both by `Problem.evaluate` or
-      by `Problem.evaluate_closed_loop`; no constant plan is cheaper.
+    - `plan` is binary, `positions` is where it leads, `objective` its cost (25), both by `Problem.evaluate`; no
+      constant plan is cheaper.
     - `objective_accept` and `objective_refuse` are costs of plans as well; `objective` is the lower of the two, and
       `accept_first` says whose.
     - `route_bound`, `gap`: a valid bound of what `Solution` says that it bounds, or -1. Never a guess: the

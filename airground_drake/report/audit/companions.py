@@ -144,8 +144,6 @@ def _no_dynamics() -> Item:
         moves = np.reshape(first[f"{name}_m_s"], (stages, 3))
         errors[name] = start + dt * np.cumsum(moves, axis=0) - reference
         costs[name] = {"printed": printed_cost, "with_23": float(weight * dt * np.sum(errors[name] ** 2))}
-    omega = np.concatenate([np.asarray(row, dtype=float) for row in trace.problems["relaxed"]] or [np.zeros(0)])
-    fractional = int(np.sum((omega > 1e-3) & (omega < 1.0 - 1e-3)))
     printed, ours = (abs(costs["accept"][kind] - costs["refuse"][kind]) for kind in ("printed", "with_23"))
     return {
         "id": 11,
@@ -162,7 +160,6 @@ def _no_dynamics() -> Item:
             "cost": costs,
             "task_error": {"t_s": (dt * np.arange(1, stages + 1)).round(6).tolist()}
             | {f"{name}_m": np.linalg.norm(error, axis=1).round(6).tolist() for name, error in errors.items()},
-            "relaxed_omega_strictly_between_0_and_1": {"count": fractional, "of": len(omega)},
         },
     }
 

@@ -26,7 +26,12 @@ from airground_drake.verify.runs.gate_record import (
 from airground_drake.verify.runs.interventions import intervening
 from airground_drake.verify.runs.pairs import around
 from airground_drake.verify.runs.proposals import proposals_of
-from airground_drake.verify.runs.sum_up_rounding import compare_rounding, integrated_error_s, is_rounded
+from airground_drake.verify.runs.sum_up_rounding import (
+    compare_rounding,
+    compare_without_rounding,
+    integrated_error_s,
+    is_rounded,
+)
 
 SPEED_TOLERANCE = 1e-4
 """A step may be longer than the speed limit allows by this, relative."""
@@ -72,10 +77,10 @@ class GateFeas(GateClaim):
         "robot may be missing only if no plan can come within its safe distance. The rules (no difference below a "
         "relative gain of 1e-6, switching margin, dwell) are run again over the decisions of each UGV, which "
         "must follow each other without a gap while a proposal stands; a proposal that stands for a period of the "
-        "planner and one of the gatekeeper must have one. Route 'rollout' predicts the nonlinear closed "
-        "loop: there (23) is checked up to the first change of mode, after it that no step is longer than the speed "
-        "limit allows. Constant plans keep to it, except where they begin more than 1e-6 m inside a safe distance: "
-        "avoidance may then demand more; so do other plans where the constant plan of their stage's choice does. "
+        "planner and one of the gatekeeper must have one. No step of a constant plan is longer than the speed "
+        "limit allows, except where it begins more than 1e-6 m inside a safe distance: "
+        "avoidance may then demand more. The same goes for other plans, where the constant plan of their stage's "
+        "choice keeps clear. "
         "Rounding is judged stage by stage, by running sums of the recorded relaxed and rounded plans; deficits within "
         "1e-9 of 1/2 are a tie, where either mode may follow. "
         "Under method (d), which solves no problem (26), it is about the times of the decisions; what its answers rest "
@@ -104,6 +109,7 @@ class GateFeas(GateClaim):
         compared += compare_answers(trace, rows)
         rounded = [row for row in rows if is_rounded(row)]
         compared += [one for row in rounded for one in compare_rounding(row)]
+        compared += [one for row in rows if row.planned for one in compare_without_rounding(row)]
         slack = [float(np.maximum(0.0, -row.clearance(row["positions_m"])).max()) for row in rows if row.planned]
         return judge_compared(
             trace, rows, compared,
@@ -195,8 +201,6 @@ def compare_situation(trace: Trace, row: Row) -> Iterator[Off]:
         if found <= POSITION_TOLERANCE_M:
             left.pop(nearest)
     fastest = np.linalg.norm(np.stack([row["accept_m_s"], row["refuse_m_s"]]), axis=2).max(axis=0)
-    if row.given["route"] == "rollout":  # between two changes of mode a plan may be as fast as any
-        fastest = np.maximum(fastest, trace.scenario["ugvs"][robot]["max_speed_m_s"])
     reach = row.dt * np.cumsum(fastest)
     for name, at, safe in left:
         lacking = np.minimum(
@@ -238,13 +242,10 @@ def compare_plan(trace: Trace, row: Row) -> Iterator[Off]:
         positions = row["positions_m"]
         given = row.given
         yield Off(row, "omega is not binary", np.minimum(np.abs(plan), np.abs(plan - 1.0)), 0.0)
-        same = np.logical_and.accumulate(plan == plan[0]) | (given["route"] != "rollout")
         away = positions - row.positions(plan)
-        yield Off(row, "positions are not those of (23), m", away[same], POSITION_TOLERANCE_M)
-        clear = _clear(row, positions, period)
-        if given["route"] != "rollout":  # by (23) a mode's velocity is that of its own way, wherever the plan is
-            clear = np.where(plan == 1.0, clear_accepting, clear_refusing)
-        ways.append(("the plan", positions, clear))
+        yield Off(row, "positions are not those of (23), m", away, POSITION_TOLERANCE_M)
+        # by (23) a mode's velocity is that of its own way, wherever the plan is
+        ways.append(("the plan", positions, np.where(plan == 1.0, clear_accepting, clear_refusing)))
         cost = float(row.cost(positions))
         clearance = min(float(row.clearance(positions).min()), 1e9)
         first = "accept" if plan[0] == 1.0 else "refuse"

@@ -211,14 +211,9 @@ def predicted_positions_moved(folder: Path) -> None:
 
 
 @tampering()
-def relaxed_plan_changed(folder: Path) -> None:
-    with edited_table(folder, "problems") as frame:
-        frame.at[0, "relaxed"] = np.clip(frame.at[0, "relaxed"] + 0.1, 0.0, 1.0)
-
-
-@tampering()
-def rounded_plan_changed(folder: Path) -> None:
-    edit_arrays(folder, "rounded", lambda rounded: np.roll(rounded, 1))
+def relaxation_invented(folder: Path) -> None:
+    for name in ("relaxed", "rounded"):
+        edit_arrays(folder, name, lambda omega: np.ones(60))
 
 
 @tampering()
@@ -305,12 +300,6 @@ def problem_with_nan(folder: Path) -> None:
 @tampering()
 def positions_of_a_plan_missing(folder: Path) -> None:
     edit_arrays(folder, "positions_m", lambda positions: positions[:30])
-
-
-@tampering()
-def relaxations_removed(folder: Path) -> None:
-    for name in ("relaxed", "rounded"):
-        edit_arrays(folder, name, lambda omega: omega[:0])
 
 
 @tampering()

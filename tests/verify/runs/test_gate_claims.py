@@ -21,9 +21,7 @@ from airground_drake.trace import Trace
     [
         ("relaxed", ("holds", "holds")),
         ("nonlinear", ("holds", "inconclusive")),
-        ("enumeration", ("holds", "holds")),
-        ("branch_and_bound", ("holds", "holds")),
-        ("rollout", ("holds", "inconclusive")),
+        ("mixed_integer", ("holds", "holds")),
     ],
 )
 def test_good_decisions_pass_where_there_is_something_to_check(route: str, expected: tuple[str, ...]) -> None:
@@ -50,7 +48,7 @@ def test_malformed_records_are_errors(relaxed: Trace) -> None:
         problem["plan"] = []
 
     def other_route(row: dict[str, Any], problem: dict[str, Any]) -> None:
-        row["route"] = "enumeration"
+        row["route"] = "nonlinear"
 
     for claim in (FEAS, OPT):
         for edit in (nan, nan_cost, cut, planless, other_route):

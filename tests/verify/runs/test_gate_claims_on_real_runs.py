@@ -49,23 +49,21 @@ def record_of(run: Callable[[str, str], Trace]) -> Simulated:
     return get
 
 
+@pytest.mark.parametrize("route", ["mixed_integer", "relaxed"])
 @pytest.mark.parametrize(("name", "run_name"), [("case_b", "c"), ("case_a", "c"), ("soft_gate", "c")])
-def test_real_runs_pass(record_of: Simulated, name: str, run_name: str) -> None:
-    trace = record_of(name, run_name, "relaxed")
+def test_real_runs_pass(record_of: Simulated, name: str, run_name: str, route: str) -> None:
+    trace = record_of(name, run_name, route)
     assert len(trace.decisions) > 5
     for claim in (FEAS, OPT):
         finding = claim.judge(trace)
         assert finding.status == "holds", finding
 
 
-@pytest.mark.parametrize("route", ["enumeration", "branch_and_bound", "nonlinear", "rollout"])
-def test_real_runs_of_other_routes(record_of: Simulated, route: str) -> None:
-    trace = record_of("case_b", "c", route)
+def test_a_local_optimum_bounds_nothing(record_of: Simulated) -> None:
+    trace = record_of("case_b", "c", "nonlinear")
     assert FEAS.judge(trace).status == "holds"
-    bounded = route in ("enumeration", "branch_and_bound")
-    assert OPT.judge(trace).status == ("holds" if bounded else "inconclusive")
-    rounded = FEAS.judge(trace).evidence["rounded_plans"]
-    assert bool(rounded) == (route == "nonlinear")
+    assert OPT.judge(trace).status == "inconclusive"
+    assert FEAS.judge(trace).evidence["rounded_plans"] > 0
 
 
 def test_a_real_run_saved_and_broken(record_of: Simulated, tmp_path: Any) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from builders.decisions import ALL_PLANS, STAGES, decided_run, gate_data_at
-from builders.edits import DecisionEdit, with_decision
+from builders.edits import DecisionEdit, with_decision, with_scenario
 from verify.judging import FEAS, OPT, assert_decision_refuted
 from verify.runs.cases import inflate_loser, long_normals, overstate_bound, understate_bound, understate_gap, worst_plan
 
@@ -92,17 +92,56 @@ def test_a_bad_solution_decides_nothing(relaxed: Trace, monkeypatch: pytest.Monk
 
 
 def test_blocks_are_enumerated_exactly() -> None:
-    trace = decided_run("enumeration")
+    trace = decided_run("mixed_integer")
     for row in rows_of(trace):
         data = gate_data_at(trace, row.given["t_s"])
-        best = min(data.plan_cost(plan) for plan in ALL_PLANS)
-        assert gate_opt.cheapest_of_blocks(row, None).lower == pytest.approx(best, rel=1e-12)
+        best = min(data.plan_cost(plan, along=True) for plan in ALL_PLANS)
+        assert gate_opt.cheapest_of_blocks(row, STAGES).lower == pytest.approx(best, rel=1e-12)
 
-    def second_best(row: dict[str, Any], problem: dict[str, Any]) -> None:
-        row["route_bound"] *= 1.01
-        row["gap"] = 0.0
 
-    assert OPT.judge(with_decision(trace, second_best)).status == "refuted"
+def test_blocks_that_are_few_need_no_relaxation(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With blocks the optimum is that of their plans: the relaxation over all stages may be far below."""
+    trace = decided_run("mixed_integer")
+    with_blocks = with_scenario(trace, gatekeeper__blocks=STAGES)
+    monkeypatch.setattr(gate_opt, "enclose", None)
+    finding = OPT.judge(with_blocks)
+    assert finding.status == "holds"
+    assert finding.evidence["widest_enclosure"] == 0.0
+
+
+def not_the_optimum(row: dict[str, Any], problem: dict[str, Any]) -> None:
+    """A bound above what another choice at one stage costs."""
+    row["route_bound"] *= 1.0 + 1e-3
+    row["gap"] = 0.0
+
+
+def with_a_gap(row: dict[str, Any], problem: dict[str, Any]) -> None:
+    row["route_bound"] *= 1.0 - 1e-4
+    row["gap"] = 1e-4
+
+
+@pytest.mark.parametrize(
+    ("edit", "what"),
+    [(not_the_optimum, "lower bound"), (with_a_gap, "optimal, but with a gap"), (long_normals, "length of a normal")],
+)
+def test_a_proof_that_is_none_is_refuted(edit: DecisionEdit, what: str) -> None:
+    assert_decision_refuted(OPT, with_decision(decided_run("mixed_integer"), edit), what)
+
+
+def test_a_plan_with_a_cheaper_neighbour_is_no_optimum() -> None:
+    """The record is consistent in itself: only the bound is that of the worse plan."""
+    trace = decided_run("mixed_integer")
+
+    def second(row: dict[str, Any], problem: dict[str, Any]) -> None:
+        data = gate_data_at(trace, row["t_s"])
+        best = min(ALL_PLANS, key=lambda plan: data.plan_cost(plan, along=True))
+        worse = np.where(np.arange(STAGES) == STAGES // 2, 1.0 - best, best)
+        cost = data.plan_cost(worse, along=True)
+        positions = data.positions(worse)
+        problem["plan"], problem["positions_m"] = worse, positions.ravel()
+        row |= {"objective": data.cost(positions), "route_bound": cost, "gap": 0.0}
+
+    assert_decision_refuted(OPT, with_decision(trace, second), "lower bound overstated")
 
 
 @pytest.mark.parametrize(("gap", "status"), [(0.0499, "holds"), (0.0501, "inconclusive"), (0.4, "inconclusive")])
@@ -112,10 +151,10 @@ def test_a_gap_is_too_wide_from_five_per_cent_on(
     """On either side of what the statement says, and what the independent checker allows."""
     assert "at most 5 %" in OPT.statement
     assert OPT.largest_gap == 0.05
-    bounded = gate_opt.bound(rows_of(relaxed), "relaxed")
+    bounded = gate_opt.bound(rows_of(relaxed), 0)
     assert max(each.gap for each in bounded) < 0.0499
     bounded[1].__dict__["gap"] = gap  # a cached property
     assert OPT._finding(bounded, []).status == status
     # and through the claim, with nothing else wrong: blocks of stages show no cheaper plan
-    monkeypatch.setattr(gate_opt, "bound", lambda rows, route: bounded)
+    monkeypatch.setattr(gate_opt, "bound", lambda rows, blocks: bounded)
     assert OPT.judge(relaxed).status == status

@@ -1,0 +1,123 @@
+"""(26) of one UGV as a mixed-integer quadratic program: binary accept variables, positions eliminated."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from pydrake.solvers import MathematicalProgram
+
+from airground_drake.arrays import Array
+from airground_drake.gatekeeper.blocks import block_of_stage
+from airground_drake.gatekeeper.half_planes import offsets
+from airground_drake.gatekeeper.problem import Problem
+from airground_drake.gatekeeper.reachable_box import within_reach
+
+AXES = 2  # UGVs move in their plane
+
+
+@dataclass(frozen=True)
+class Size:
+    """What a program is built for; everything else are coefficients, see `BinaryProgram.update`.
+
+    Attributes:
+        stages: N.
+        blocks: B, accept variables, each for a block of stages; B <= N.
+    """
+
+    stages: int
+    blocks: int
+
+
+class BinaryProgram:
+    """(21)-(26) with half-planes for (26d), in the accept variables and the slack alone.
+
+    By (23) the positions are affine in omega. So (25) is a quadratic cost in omega, and (26d) as half-planes are rows
+    over omega and u: n.(rho(omega) - o) >= d - u. As constraints, the positions would make a solver ten times slower.
+
+    Attributes:
+        program: what a solver takes.
+        omega: binary variables (24), (26c), (B,): 1 accepts, and 1 - omega is the other mode.
+        u: slack (26e), (N,), m.
+        error: cost of task errors in (25).
+        slack: cost of slack in (25).
+        half_planes: (26d), one row per half-plane that some plan can violate, over (omega, u).
+        block: of each stage, (N,).
+    """
+
+    def __init__(self, size: Size) -> None:
+        """A program without any problem's data."""
+        n, b = size.stages, size.blocks
+        self.program = MathematicalProgram()
+        self.block = block_of_stage(n, b)
+        self.omega: Any = self.program.NewBinaryVariables(b, "omega")
+        self.u: Any = self.program.NewContinuousVariables(n, "u")
+        self.error = self.program.AddQuadraticCost(np.zeros((b, b)), np.zeros(b), self.omega, is_convex=True)
+        self.slack = self.program.AddQuadraticCost(np.zeros((n, n)), np.zeros(n), self.u, is_convex=True)
+        self.half_planes = self.program.AddLinearConstraint(
+            np.zeros((1, b + n)), np.full(1, -np.inf), np.full(1, np.inf), np.concatenate([self.omega, self.u])
+        )
+        positive = self.program.AddBoundingBoxConstraint(0.0, np.inf, self.u)
+        for description, binding in (
+            ("(25) task error", self.error),
+            ("(25) slack", self.slack),
+            ("(26d) as half-planes", self.half_planes),
+            ("(26e) slack", positive),
+        ):
+            binding.evaluator().set_description(description)
+        self._of_block = np.equal.outer(self.block, np.arange(b)).astype(np.float64)
+
+    def update(self, problem: Problem, normals: Array) -> None:
+        """Put in the data of a problem of this size, with half-planes along unit normals (N, m, 3)."""
+        n = problem.stages
+        steps = (problem.dt * (problem.accept - problem.refuse))[:, :AXES]
+        refused = problem.positions(np.zeros(n))
+        away = (refused - problem.reference)[:, :AXES]
+        weights = 2.0 * problem.dt * problem.terms.error_weights
+        # a stage's choice moves all later ends: column j of d rho_k / d omega_j is steps[j] for k >= j
+        remaining = np.cumsum(weights[::-1])[::-1]
+        later = np.maximum.outer(np.arange(n), np.arange(n))
+        hessian = self._of_block.T @ (steps @ steps.T * remaining[later]) @ self._of_block
+        force = np.cumsum((weights[:, None] * away)[::-1], axis=0)[::-1]
+        gradient = self._of_block.T @ (steps * force).sum(axis=1)
+        height = refused[:, 2] - problem.reference[:, 2]  # no choice changes it
+        constant = 0.5 * float(weights @ (np.square(away).sum(axis=1) + np.square(height)))
+        self.error.evaluator().UpdateCoefficients(hessian, gradient, constant, is_convex=True)
+        of_slack = np.full(n, 2.0 * problem.dt * problem.slack_weight)
+        self.slack.evaluator().UpdateCoefficients(np.diag(of_slack), np.zeros(n), is_convex=True)
+        rows, lower = self._rows(problem, normals, steps, refused - problem.reference)
+        self.half_planes.evaluator().UpdateCoefficients(rows, lower, np.full(len(lower), np.inf))
+
+    def _rows(
+        self, problem: Problem, normals: Array, steps: Array, away: Array
+    ) -> tuple[Array, npt.NDArray[np.float64]]:
+        """Coefficients (rows, B + N) and lower bounds of the half-planes; one row that asks nothing if there is none.
+
+        Args:
+            problem: data of (26).
+            normals: (N, m, 3).
+            steps: what accepting at a stage adds to the position, (N, 2), m.
+            away: task errors of refusing throughout, (N, 3), m.
+        """
+        n, b = problem.stages, self._of_block.shape[1]
+        stage, point = np.nonzero(within_reach(problem) & (problem.slack_weight > 0.0))
+        if len(stage) == 0:
+            return np.zeros((1, b + n)), np.full(1, -np.inf)
+        normal = normals[stage, point]
+        before = np.arange(n) <= stage[:, None]
+        of_omega = (normal[:, :AXES] @ steps.T * before) @ self._of_block
+        of_u = np.equal.outer(stage, np.arange(n)).astype(np.float64)
+        lower = offsets(problem, normals)[stage, point] - (normal[:, :AXES] * away[stage, :AXES]).sum(axis=1)
+        return np.hstack([of_omega, of_u]), lower
+
+    def plan(self, values: Array) -> Array:
+        """Of omega's values (B,), one per stage, (N,)."""
+        stages: Array = values[self.block]
+        return stages
+
+    def blocked(self, plan: Array) -> Array:
+        """Of a plan (N,), the mode that has most stages of each block, (B,), 0 or 1; accepting on a tie."""
+        share = self._of_block.T @ plan / self._of_block.sum(axis=0)
+        return (share >= 0.5).astype(np.float64)

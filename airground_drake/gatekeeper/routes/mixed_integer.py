@@ -1,0 +1,143 @@
+"""(26) with its binary variables, solved to a proven optimum: the default route."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from airground_drake.arrays import Array
+from airground_drake.gatekeeper.binary_program import BinaryProgram, Size
+from airground_drake.gatekeeper.budget import Budget
+from airground_drake.gatekeeper.cost import Terms, half_plane_cost
+from airground_drake.gatekeeper.daqp_solver import minimise
+from airground_drake.gatekeeper.dual_bound import dual_bound, multipliers_at
+from airground_drake.gatekeeper.half_planes import normals_along
+from airground_drake.gatekeeper.problem import Kinematics, Problem
+from airground_drake.gatekeeper.rounding import sum_up_rounding
+from airground_drake.gatekeeper.routes.guard import guarded, unavoidable_cost
+from airground_drake.gatekeeper.solution import ConstantPlans, Solution, Status, cheapest
+
+_AGREE = 1e-6
+"""A plan cheaper than a proven optimum by more than this, relative, shows that the solver is wrong."""
+
+
+class MixedIntegerRoute:
+    """Mixed-integer quadratic program with one binary per stage, or per block of stages, and a proof of optimality.
+
+    The program (`BinaryProgram`) is one `MathematicalProgram` with the half-planes of `RelaxedRoute`. DAQP takes its
+    numbers and searches by branch and bound. First its relaxation is solved, and the best of sum-up rounding, the
+    constant plans and what is left of the previous plan is improved by changing one choice at a time. The cost of that
+    plan, the incumbent, cuts the search.
+
+    The plan returned is the cheapest by exact distances of the optimum, the incumbent, the constant plans, and each
+    of the first two with the other first choice. `route_bound` is the optimum along the half-planes; the gap is 0.
+
+    Budget: the search has a limit in time, `search_s`, because DAQP counts no nodes. At that limit, and when the
+    solver fails, the incumbent decides, which does not depend on the clock; its bound is that of the relaxation.
+
+    The program is built once for a number of stages and blocks, then only its coefficients change.
+    """
+
+    def __init__(self, blocks: int | None = None) -> None:
+        """Start without any program.
+
+        Args:
+            blocks: binaries, each for a block of stages; they need not divide the stages. None: one per stage.
+
+        Raises:
+            ValueError: if there is less than one block.
+        """
+        if blocks is not None and blocks < 1:
+            raise ValueError(f"blocks: {blocks}, allowed: 1 or more")
+        self._blocks = blocks
+        self._programs: dict[Size, BinaryProgram] = {}
+
+    def solve(self, problem: Problem, budget: Budget = Budget()) -> Solution:  # noqa: B008 (immutable)
+        """See `Route`."""
+        return guarded(problem, budget, self._solve)
+
+    def _solve(self, problem: Problem, constants: ConstantPlans, budget: Budget) -> Solution:
+        normals = normals_along(problem, constants.better.positions)
+        binary = self._program(problem)
+        binary.update(problem, normals)
+        bound, incumbent = _incumbent(binary, problem, normals)
+        known = problem.evaluate_half_planes(problem.positions(incumbent), normals)
+        found = minimise(binary, known=known, seconds=min(budget.search_s, budget.left_s()))
+        status: Status = found.ended
+        plans = [incumbent]
+        if found.omega is not None:
+            optimum = binary.plan(found.omega)
+            cost = problem.evaluate_half_planes(problem.positions(optimum), normals)
+            if abs(cost - known) <= _AGREE * known or cost < known:
+                plans, bound = [optimum, incumbent], min(cost, known)
+            else:
+                status = "solver_failed"
+        turned = [np.where(binary.block == 0, 1.0 - plan[0], plan) for plan in plans]
+        evaluated = [problem.evaluate(plan) for plan in (*plans, *turned)]
+        return cheapest(
+            problem,
+            (constants.accept, constants.refuse, *evaluated),
+            status=status,
+            route_bound=max(bound, unavoidable_cost(problem)),
+            normals=normals,
+        )
+
+    def _program(self, problem: Problem) -> BinaryProgram:
+        stages = problem.stages
+        size = Size(stages, stages if self._blocks is None else min(self._blocks, stages))
+        if size not in self._programs:
+            self._programs[size] = BinaryProgram(size)
+        return self._programs[size]
+
+
+def _incumbent(binary: BinaryProgram, problem: Problem, normals: Array) -> tuple[float, Array]:
+    """A lower bound by the relaxation, and a good plan (N,), without a search by the clock."""
+    count = len(binary.omega)
+    known = [np.ones(count), np.zeros(count)]
+    if problem.previous is not None:
+        known.append(binary.blocked(problem.previous))
+    bound, relaxed = -math.inf, minimise(binary, relaxed=True).omega
+    if relaxed is not None:
+        known.append(sum_up_rounding(relaxed))
+        omega = binary.plan(relaxed)
+        bound = dual_bound(problem, normals, omega, multipliers_at(problem, normals, problem.positions(omega)))
+    costs = [problem.evaluate_half_planes(problem.positions(binary.plan(values)), normals) for values in known]
+    start = binary.plan(known[int(np.argmin(costs))])
+    return bound, _improved(problem.kinematics, problem.terms, normals, binary.block, start)
+
+
+@njit(cache=True)
+def _improved(motion: Kinematics, terms: Terms, normals: Array, block: npt.NDArray[np.int64], start: Array) -> Array:
+    """A plan (N,) that no change of a single block makes cheaper, with distances along the half-planes.
+
+    Args:
+        motion: (23).
+        terms: (25).
+        normals: (N, m, 3).
+        block: that each stage belongs to, (N,).
+        start: where to begin, (N,), constant on each block.
+    """
+    plan, positions = start.copy(), np.empty((len(start), 3))
+    best, changed = np.inf, True
+    while changed:
+        changed = False
+        for turned in range(-1, block[-1] + 1):
+            x, y, z = motion.initial[0], motion.initial[1], motion.initial[2]
+            for k in range(len(plan)):
+                mode = int(plan[k]) if block[k] != turned else 1 - int(plan[k])
+                x += motion.dt * motion.velocities[mode, k, 0]
+                y += motion.dt * motion.velocities[mode, k, 1]
+                z += motion.dt * motion.velocities[mode, k, 2]
+                positions[k, 0], positions[k, 1], positions[k, 2] = x, y, z
+            cost = half_plane_cost(terms, positions, normals)
+            if cost < best * (1.0 - 1e-12):
+                if best < np.inf:
+                    changed = True
+                    for k in range(len(plan)):
+                        if block[k] == turned:
+                            plan[k] = 1.0 - plan[k]
+                best = cost
+    return plan
