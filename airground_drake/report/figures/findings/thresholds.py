@@ -56,12 +56,12 @@ def optimum(item: Mapping[str, Any]) -> Lines:
 
 
 def first_passage(item: Mapping[str, Any]) -> Lines:
-    """Item 5: when noise alone reaches the threshold, over its intensity, and the paper's trigger."""
+    """Item 5: when noise alone reaches either threshold, over its intensity, and the paper's trigger."""
     known, printed = item["evidence"], item["paper"]["trigger_s"]
     zeta, at = known["zeta_m"], known["noise_m_sqrt_s"]
     noise = np.geomspace(0.05 * at, 2.0 * at, POINTS)
     return Lines(
-        "Mean time in which noise alone reaches the threshold", "noise intensity, m/√s", "time, s",
+        "Mean time in which noise alone reaches either threshold", "noise intensity, m/√s", "time, s",
         {"noise alone": (noise, (zeta / noise) ** 2), "the paper's trigger": (noise, np.full(POINTS, printed))},
         {f"{at:g}, finite differences": (at, known["by_finite_differences_s"])}, log="xy",
     )  # fmt: skip
@@ -69,7 +69,7 @@ def first_passage(item: Mapping[str, Any]) -> Lines:
 
 def one_or_two(item: Mapping[str, Any]) -> Lines:
     """Item 18: mean decision time over the drift, with two thresholds and with the one that the trigger has."""
-    known = item["evidence"]["Table 1"]
+    known = item["evidence"]["Table 1, drift assumed"]
     zeta, noise, at = known["zeta_m"], known["noise_m_sqrt_s"], known["drift_m_s"]
     drift = np.geomspace(0.1 * at, 10.0 * at, POINTS)
     two = np.array([decision_time(zeta, a, noise) for a in drift])
