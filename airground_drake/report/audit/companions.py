@@ -187,7 +187,7 @@ def _method_b(direct: Trace, gated: Trace) -> Item:
     """Item 23: method (b) with a gatekeeper, as in section 5.1, is method (c)."""
     answer = gated.decisions.iloc[0]
     nearest = {name: closest_obstacle(trace, "ugv1") for name, trace in (("without", direct), ("with", gated))}
-    least = {name: found[0] if found else None for name, found in nearest.items()}
+    least = {name: round(found[0], 9) if found else None for name, found in nearest.items()}
     triggers = {name: MEASURES["trigger_time"](trace, "ugv1") for name, trace in (("without", direct), ("with", gated))}
     return {
         "id": 23,
@@ -223,7 +223,7 @@ def _proper_tasks(direct: Trace) -> Item:
         "interventions'. That is in no equation: in (14), (20) and (23) the UAV intervenes on a UGV, and what goes "
         "back to the UAV are the UGVs' positions, in (9) and (15).",
         "paper": "interventions are proper and bidirectional",
-        "ours": {"wrong_intervention_ends_at_m_from_the_obstacle": away, "safe_distance_m": d},
+        "ours": {"wrong_intervention_to_obstacle_m": away, "safe_distance_m": d},
         "unit": "",
         "demonstrated": away < d,
         "evidence": {"ends_at_m": ends.tolist(), "obstacle_m": obstacle.tolist(), "rest": "by reading"},
