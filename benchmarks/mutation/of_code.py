@@ -916,8 +916,8 @@ MIX_UPS = (
     Mutant(
         "progress is compared with the prediction of the next sample",
         "gatekeeper/certified.py",
-        "k = min(round((t - turn.since) / self._law.avoidance.period),",
-        "k = min(1 + round((t - turn.since) / self._law.avoidance.period),",
+        "k = min(round((t - commitment.begun) / self._law.avoidance.period),",
+        "k = min(1 + round((t - commitment.begun) / self._law.avoidance.period),",
     ),
     Mutant(
         "a cause that names nobody is a favour",

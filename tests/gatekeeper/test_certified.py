@@ -72,6 +72,20 @@ def test_the_first_sample_decides_and_what_makes_no_difference_is_refused() -> N
     assert memory.answers == (REFUSE, -1.0)
 
 
+def test_an_obstacle_that_nobody_knew_is_a_reason_to_look_again_and_costs_no_try() -> None:
+    """The second rock comes into sight under way, on the map or not."""
+    way = Motion(np.array([0.0, 3.0, 6.0]), np.array([[0.0, 0.0, 0.0], [3.0, 3.0, 0.0], [20.0, 3.0, 0.0]]))
+    rocks = np.concatenate([ROCK, [[7.0, 1.0, 0.0]]])
+    for mapped, looked in ((rocks[:1], [True, False, True, False]), (rocks, [True, False, False, False])):
+        gate, memory = gatekeepers("ugv", rocks=rocks), Memory.empty(1)
+        proposal = Proposal("way", 0.0, way, mapped=mapped, mapped_radii=np.zeros(len(mapped)), number=0)
+        for k, x in enumerate((0.0, 0.1, 3.5, 3.6)):
+            memory = sampled(gate, 0.05 * k, x, proposal, memory)
+        assert [decision.grounds.accept is not None for decision in memory.decisions] == looked
+        assert [decision.grounds.tries for decision in memory.decisions] == [1, 1, 1, 1]
+        assert memory.turns[0].tries == 1
+
+
 def test_a_favour_is_done_unless_it_strands_the_ugv() -> None:
     way = np.zeros((2, 3))
     plain, stranded = Outcome(way, False, 0.0, 2.0), Outcome(way, True, 1.0, 2.0)
@@ -91,7 +105,7 @@ def test_only_another_ugv_is_made_way_for(cause: str, answer: float) -> None:
 
 def making_way(issued: float, cause: str = "other") -> Proposal:
     """One that "ugv" accepts as a favour to the other; with its own name for the cause it refuses."""
-    return Proposal("way", issued, STAYS, cause=cause)
+    return Proposal("way", issued, STAYS, cause=cause, number=round(issued / 0.05))
 
 
 class Pair:

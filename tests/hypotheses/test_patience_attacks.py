@@ -167,7 +167,7 @@ def test_a_gatekeeper_that_miscounts_is_noticed(monkeypatch: pytest.MonkeyPatch,
     assert source.count(old) == 1
     broken: dict[str, Any] = {"__name__": certified.__name__}
     exec(compile(source.replace(old, new), certified.__file__, "exec"), broken)
-    for method in ("sample", "_judge"):
+    for method in ("sample", "_judge", "_weigh"):
         monkeypatch.setattr(CertifiedGatekeepers, method, getattr(broken["CertifiedGatekeepers"], method))
     assert gets_through()
 
