@@ -169,7 +169,7 @@ DEVIATIONS: tuple[Deviation, ...] = (
     ),
     Deviation(
         "(26)", "gatekeeper: mixed-integer optimal control problem",
-        (*_PROGRAM, "gatekeeper.sample:PaperGatekeepers"), "changed",
+        (*_PROGRAM, "gatekeeper.mpc_gatekeeper:PaperGatekeepers"), "changed",
         "The kinematics (23) are among the constraints. (26d) is a half-plane for each point and stage, which implies "
         "the distance; the route `nonlinear` has the circles.",
         "Without kinematics the decision does not matter. Half-planes make the program convex but for omega.",

@@ -10,9 +10,9 @@ import numpy as np
 from pydrake.solvers import ClarabelSolver, MathematicalProgram
 
 from airground_drake.arrays import Array
-from airground_drake.gatekeeper.certified import CertifiedGatekeepers
+from airground_drake.gatekeeper.mpc_gatekeeper import Situation
 from airground_drake.gatekeeper.outcome import Outcome
-from airground_drake.gatekeeper.sample import Situation
+from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
 from airground_drake.intervention.policy import Proposal
 from airground_drake.report.audit.item import Item
 from airground_drake.report.figures.canvas import thin
@@ -31,7 +31,7 @@ EVERYTHING = "d, all accepted"
 LIGHT = "c, error weight 1"
 
 
-class Believing(CertifiedGatekeepers):
+class Believing(OutcomeGatekeepers):
     """Takes every proposal for useful, followed without any lag."""
 
     def foresee(self, seen: Situation, i: int, proposal: Proposal) -> tuple[Outcome, Outcome]:
@@ -54,7 +54,7 @@ def _run(name: str, run: str, changes: tuple[str, ...] = ()) -> Trace:
 
 def _accepting(name: str, run: str) -> Trace:
     """A run of method (d) whose gatekeeper takes every proposal for useful."""
-    with mock.patch.object(CertifiedGatekeepers, "foresee", Believing.foresee):
+    with mock.patch.object(OutcomeGatekeepers, "foresee", Believing.foresee):
         return _run(name, run)
 
 

@@ -22,9 +22,9 @@ import numpy.typing as npt
 
 from airground_drake.arrays import Array
 from airground_drake.gatekeeper.answer import Decision, Foreseen, Reason
+from airground_drake.gatekeeper.mpc_gatekeeper import Commitment, Gatekeepers, Memory, Situation
 from airground_drake.gatekeeper.outcome import Other, Outcome, Outlook, outcomes
 from airground_drake.gatekeeper.patience import Patience, Turn
-from airground_drake.gatekeeper.sample import Commitment, Gatekeepers, Memory, Situation
 from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT, Proposals, Report, answer_to
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.kernels import news_within, within
@@ -40,7 +40,7 @@ SAME_M = 1e-9
 """Obstacles closer to each other than this are one, m."""
 
 
-class CertifiedGatekeepers(Gatekeepers):
+class OutcomeGatekeepers(Gatekeepers):
     """The UGVs of a team under method (d)."""
 
     def __init__(
