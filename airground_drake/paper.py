@@ -33,7 +33,7 @@ class Deviation(NamedTuple):
     findings: tuple[int, ...] = ()
 
 
-_PROGRAM = ("gatekeeper.problem:Problem", "gatekeeper.convex_program:team_program")
+_PROGRAM = ("gatekeeper.problem:Problem",)
 
 DEVIATIONS: tuple[Deviation, ...] = (
     Deviation("(1)", "task value sigma = f(rho)", ("nsbc.task:Task.value",), "faithful"),
@@ -176,7 +176,7 @@ DEVIATIONS: tuple[Deviation, ...] = (
         (10, 11, 22),
     ),
     Deviation(
-        "(27)", "its relaxation", ("gatekeeper.routes.nonlinear:Relaxation", "gatekeeper.routes.relaxed:RelaxedRoute"),
+        "(27)", "its relaxation", ("gatekeeper.routes.nonlinear:Relaxation", "gatekeeper.convex_program:team_program"),
         "changed",
         "The relaxation is solved under the routes `relaxed` (half-planes) and `nonlinear` (circles, "
         "multiple shooting); the default route does not need its solution.",

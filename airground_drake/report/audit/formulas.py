@@ -41,7 +41,7 @@ def _task_and_configuration() -> Item:
         8, "(3), (27c), caption of Figure 10",
         "(3) and (4) write rho (the configuration) where sigma (the task) is meant: for the avoidance task J^+ is 3 x "
         "1 and rho has 3 components. Besides, (27c) still says {0, 1} where the text relaxes to [0, 1] (as printed the "
-        "rounding (28)-(29) would have nothing to round: see item 11), and the caption of Figure 10 names methods (b) "
+        "rounding (28)-(29) would have nothing to round), and the caption of Figure 10 names methods (b) "
         "and (c) the wrong way round: the text of 5.2 has the refusal under (c).",
         "v = J^+ d(rho_d)/dt", "v = J^+ d(sigma_d)/dt",
         not fits and pseudo_inverse.shape == (3, 1),
