@@ -14,12 +14,12 @@ from airground_drake.decision.bayes import COMPUTED
 from airground_drake.decision.trigger import Trigger
 from airground_drake.gatekeeper.answer import Rules
 from airground_drake.gatekeeper.budget import Budget
-from airground_drake.gatekeeper.certified import CertifiedGatekeepers
+from airground_drake.gatekeeper.mpc_gatekeeper import Gatekeepers, Judging, PaperGatekeepers
 from airground_drake.gatekeeper.outcome import Outlook
+from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
 from airground_drake.gatekeeper.patience import Patience
 from airground_drake.gatekeeper.prediction import Horizon
 from airground_drake.gatekeeper.routes.route import Route
-from airground_drake.gatekeeper.sample import Gatekeepers, Judging, PaperGatekeepers
 from airground_drake.intervention.database import BehaviourDatabase, make_policy
 from airground_drake.intervention.planner import Planner
 from airground_drake.nsbc.avoidance import Avoidance, Composition
@@ -178,7 +178,7 @@ def make_gatekeepers(scenario: Scenario, law: UgvLaw) -> Gatekeepers:
     """
     team, presets = make_team(scenario), make_presets(scenario)
     if not law.intervention_on_top:
-        return CertifiedGatekeepers(team, law, presets, make_outlook(scenario), make_patience(scenario))
+        return OutcomeGatekeepers(team, law, presets, make_outlook(scenario), make_patience(scenario))
     judging = Judging(make_route(scenario), make_horizon(scenario), make_rules(scenario), scenario.gatekeeper.period_s)
     return PaperGatekeepers(team, law, presets, judging)
 

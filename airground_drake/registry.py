@@ -233,7 +233,7 @@ class Method:
         id: as in scenario files.
         says: in words.
         intervenes: whether the UAV proposes anything.
-        gated: whether the UGVs decide about proposals by optimisation, (21)-(29).
+        gated: whether the UGVs decide about proposals, by (21)-(29) or by outcomes.
         intervention_on_top: priorities of (20); False: avoidance above the intervention.
     """
 
@@ -250,7 +250,7 @@ METHODS: dict[str, Method] = {
         Method("a", "no intervention", intervenes=False, gated=False, intervention_on_top=True),
         Method("b", "direct intervention, no gatekeeper", intervenes=True, gated=False, intervention_on_top=True),
         Method("c", "the paper's MPC gatekeeper", intervenes=True, gated=True, intervention_on_top=True),
-        Method("d", "certified gatekeeper", intervenes=True, gated=True, intervention_on_top=False),
+        Method("d", "avoidance on top, outcome gatekeeper", intervenes=True, gated=True, intervention_on_top=False),
     )
 }
 """The methods that are compared, by identifier: (a) to (c) are the paper's."""

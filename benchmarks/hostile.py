@@ -29,7 +29,7 @@ from hostile_uav import CHOICES, LyingPlanner, Tactic, drawn, mutated
 from airground_drake import components
 from airground_drake.arrays import Array
 from airground_drake.components import make_planner, make_presets, make_team
-from airground_drake.gatekeeper.certified import CertifiedGatekeepers
+from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
 from airground_drake.gatekeeper.prediction import Horizon, Scene, predicted_problem
 from airground_drake.gatekeeper.routes.relaxed import RelaxedRoute
 from airground_drake.intervention.planner import Planner
@@ -143,7 +143,7 @@ def whole_run(seed: int) -> tuple[float, int, float, float, float]:
     margins, executed, stolen = {}, 0, 0.0
     for method in ("d", "c"):
         scenario.runs, scenario.reproduction = {method: Run(method=method)}, []
-        with mock.patch.object(CertifiedGatekeepers, "foresee", Believing.foresee):
+        with mock.patch.object(OutcomeGatekeepers, "foresee", Believing.foresee):
             trace = Recorder(scenario, method).simulate()
         margin = SafeTrace().check(trace).margin
         margins[method] = np.nan if margin is None else margin
@@ -201,10 +201,10 @@ def told(lie: Lie) -> Told:
         parts = {f.name: getattr(honest, f.name) for f in fields(Planner)}
         return LyingPlanner(**parts, tactic=lie.tactic, random=random)
 
-    foresee = Believing.foresee if lie.believed else CertifiedGatekeepers.foresee
+    foresee = Believing.foresee if lie.believed else OutcomeGatekeepers.foresee
     with (
         mock.patch.object(components, "make_planner", lying),
-        mock.patch.object(CertifiedGatekeepers, "foresee", foresee),
+        mock.patch.object(OutcomeGatekeepers, "foresee", foresee),
     ):
         trace = Recorder(scenario, "d").simulate()
     margin = SafeTrace().check(trace).margin

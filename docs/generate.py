@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import ast
 import html
 import inspect
 import json
@@ -13,11 +12,11 @@ from collections import defaultdict
 from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
-import airground_drake
 from airground_drake import files
 from airground_drake.commands import COMMANDS
+from airground_drake.paper import DEVIATIONS, Kind
 from airground_drake.proofs import THEOREMS
 from airground_drake.registry import (
     METHODS,
@@ -35,46 +34,12 @@ from airground_drake.verify.claim import Claim
 
 DOCS = Path(__file__).parent
 EXAMPLES = DOCS.parent / "examples"
-PACKAGE = Path(airground_drake.__file__).parent
 WIDTH = 120
 
-EQUATIONS = {
-    "1": "task value sigma = f(rho)",
-    "2": "its rate, through the Jacobian",
-    "3": "velocity by the pseudoinverse",
-    "4": "the same in closed loop",
-    "5": "composition by null-space projection",
-    "6": "move to target, track the preset trajectory",
-    "7": "obstacle avoidance of a UGV: task value",
-    "8": "obstacle avoidance of a UGV: velocity",
-    "9": "centroid of the UGVs: task value",
-    "10": "centroid of the UGVs: velocity",
-    "11": "obstacle avoidance of the UAV",
-    "12": "intervention: task value",
-    "13": "intervention: desired value",
-    "14": "intervention: velocity",
-    "15": "drift-diffusion model",
-    "16": "Bayes risk",
-    "17": "mean decision time",
-    "18": "decision error",
-    "19": "optimal threshold",
-    "20": "event-triggered composition",
-    "21": "gatekeeper: choice of each UGV",
-    "22": "gatekeeper: state",
-    "23": "gatekeeper: predicted motion under both choices",
-    "24": "gatekeeper: one choice per stage",
-    "25": "gatekeeper: cost",
-    "26": "gatekeeper: mixed-integer optimal control problem",
-    "27": "its relaxation, by multiple shooting",
-    "28": "sum-up rounding: accumulated deficit",
-    "29": "sum-up rounding: choice",
-}
-"""The paper's equations in words."""
+EQUATIONS = {row.place[1:-1] for row in DEVIATIONS if row.place.startswith("(")}
+"""Numbers of the paper's equations."""
 
 SCENARIO = json_schema.scenario_schema(installed=False)
-
-REALISED_IN = ("nsbc", "decision", "intervention", "gatekeeper", "systems")
-"""Packages whose docstrings say which equations they realise, in their first sentence or paragraph."""
 
 _RECIPE = re.compile(r"```(?P<language>\w+)\n# file: (?P<name>\S+)\n.*?```", re.DOTALL)
 _NUMBER = re.compile(r"(?<!` )(?<![\w\]])\((\d{1,2})[a-e]?\)(?:-\((\d{1,2})[a-e]?\))?")
@@ -126,39 +91,32 @@ def proofs() -> str:
 
 
 def equations() -> str:
-    """From each equation of the paper to the code that realises it and the claims about it."""
-    code, claimed = defaultdict(list), defaultdict(list)
-    for place, numbers in _realised():
-        for number in numbers:
-            code[number].append(place)
+    """What has become of each place of the paper: code, deviation and its reason, findings and claims."""
+    claimed = defaultdict(list)
     for name, claim in _claims():
         for number in _numbers(claim.equations):
-            claimed[number].append(name)
+            claimed[f"({number})"].append(f"[{name}](claims.md#{name.lower()})")
     lines = []
-    for number, what in EQUATIONS.items():
-        about = ", ".join(f"[{name}](claims.md#{name.lower()})" for name in claimed[number])
-        lines += [f"## ({number}) {what}", "", *(f"- `{place}`" for place in code[number])]
-        lines += [f"- claims: {about}"] * bool(about) + [""]
+    for kind in get_args(Kind):
+        places = "; ".join(row.place for row in DEVIATIONS if row.kind == kind)
+        lines += [f"- **{kind}**: {places}."]
+    for row in DEVIATIONS:
+        lines += ["", f"## {row.place}: {row.says}", "", f"**{row.kind.capitalize()}.** {row.here}".rstrip()]
+        lines += ["", f"*Why:* {row.why}"] * bool(row.why)
+        entries = {
+            "code": [f"`{place.replace(':', '.')}`" for place in row.realised_in],
+            "findings": [f"[{number}](audit.md)" for number in row.findings],
+            "claims": claimed[row.place],
+        }
+        told = [f"- {what}: {', '.join(found)}" for what, found in entries.items() if found]
+        lines += ["", *told] if told else []
     return _page(
-        "From the paper's equations to the code",
-        "Code whose docstring says in its first paragraph that it is about the equation, and claims that name it: all "
-        "that there is to read to follow, say, the gatekeeper's cost (25).",
+        "From the paper to the code, and where they differ",
+        "Every equation, table, figure and remark of the paper: what realises it here, whether faithfully or changed, "
+        "and why. Made of the table in `airground_drake/paper.py`, whose names a test imports. Findings are those of "
+        "[the audit](audit.md).",
         lines,
     )
-
-
-def _realised() -> Iterator[tuple[str, list[str]]]:
-    """(name below the package, equations) of everything public whose docstring names equations at its beginning."""
-    for path in sorted(path for package in REALISED_IN for path in (PACKAGE / package).rglob("*.py")):
-        module = ".".join(path.relative_to(PACKAGE).with_suffix("").parts)
-        tree = ast.parse(path.read_text(encoding="utf-8"))
-        classes = [node for node in tree.body if isinstance(node, ast.ClassDef)]
-        for parent, prefix in [(tree, module), *((each, f"{module}.{each.name}") for each in classes)]:
-            for node in parent.body:
-                if isinstance(node, ast.ClassDef | ast.FunctionDef) and not node.name.startswith("__"):
-                    first = (ast.get_docstring(node) or "").split("\n\n")[0]
-                    if numbers := _numbers(first):
-                        yield f"{prefix}.{node.name}", numbers
 
 
 def _numbers(text: str) -> list[str]:

@@ -15,7 +15,7 @@ from hypothesis import HealthCheck, settings
 from hypothesis.internal.conjecture import providers
 from sharing import once
 
-from airground_drake.gatekeeper import certified, sample
+from airground_drake.gatekeeper import mpc_gatekeeper, outcome_gatekeeper
 from airground_drake.report.__main__ import main as write_report
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Scenario
@@ -61,7 +61,7 @@ def _steady_clock() -> Iterator[None]:
     """Every decision of a gatekeeper takes 1/1024 s by the clock: no verdict depends on what else the machine does."""
     ticks = itertools.count()
     with pytest.MonkeyPatch.context() as patch:
-        for module in (sample, certified):
+        for module in (mpc_gatekeeper, outcome_gatekeeper):
             patch.setattr(module, "thread_time", lambda: next(ticks) / 1024)
         yield
 

@@ -12,7 +12,7 @@ import pytest
 
 from airground_drake import components, events
 from airground_drake.arrays import Array
-from airground_drake.gatekeeper.certified import CertifiedGatekeepers
+from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
 from airground_drake.nsbc.team import Team
 from airground_drake.report import metrics
 from airground_drake.scenarios.load import load, validated
@@ -94,13 +94,13 @@ def test_a_collision_is_of_surfaces(bodies: Trace) -> None:
     assert collisions(larger(bodies, "ugv1", needed + 1e-6))
 
 
-def points_in_mind(self: CertifiedGatekeepers, *args: Any) -> tuple[Array, Array]:
+def points_in_mind(self: OutcomeGatekeepers, *args: Any) -> tuple[Array, Array]:
     """What a gatekeeper knows that takes obstacles for points."""
     discs, distances = KNOWN(self, *args)
     return discs, np.full_like(distances, self._team.obstacle_distance)
 
 
-KNOWN = CertifiedGatekeepers._known
+KNOWN = OutcomeGatekeepers._known
 PAIRS, TEAM = Team.pair_distance, components.make_team
 
 FORGETFUL: dict[str, tuple[Callable[[pytest.MonkeyPatch], None], set[str]]] = {
@@ -113,7 +113,7 @@ FORGETFUL: dict[str, tuple[Callable[[pytest.MonkeyPatch], None], set[str]]] = {
         {"SAFE-TRACE", "SAFE-HYP", "EXEC"},
     ),
     "radii in the gatekeeper only": (
-        lambda patch: patch.setattr(CertifiedGatekeepers, "_known", points_in_mind),
+        lambda patch: patch.setattr(OutcomeGatekeepers, "_known", points_in_mind),
         {"GATE-MODEL"},
     ),
 }

@@ -271,7 +271,7 @@ def test_what_a_refusal_teaches_is_on_the_uavs_map_afterwards(run: Runs) -> None
     assert np.linalg.norm(after - [5.5, 5.8, 0.0], axis=1).min() >= 2.0 - 1e-9
 
 
-def test_the_soft_gate_accepts_a_predicted_intrusion_and_the_certified_one_is_safe(run: Runs) -> None:
+def test_the_soft_gate_accepts_a_predicted_intrusion_and_avoidance_on_top_is_safe(run: Runs) -> None:
     accepted = run("soft_gate", "c").decisions.iloc[0]
     assert accepted["decision"] == "accept"
     assert accepted["predicted_clearance_m"] < -1.0

@@ -54,7 +54,7 @@ class Run:
 
     @cached_property
     def method(self) -> str:
-        """a: no intervention, b: no gatekeeper, c: the paper's, d: the certified one."""
+        """a: no intervention, b: no gatekeeper, c: the paper's, d: by outcomes, avoidance on top."""
         return str(self.scenario["runs"][self.name]["method"])
 
     @cached_property

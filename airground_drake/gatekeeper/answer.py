@@ -55,7 +55,7 @@ Reason = Literal[
     "cheaper", "not_cheaper", "waits", "no_difference", "kept", "dwell", "reversed", "no_plan",
     "stalls", "makes_way", "exhausted", "no_progress", "over",
 ]  # fmt: skip
-"""Why an answer is what it is: see `settle` for method (c), `certified` for method (d)."""
+"""Why an answer is what it is: see `settle` for method (c), `outcome_gatekeeper` for method (d)."""
 
 WORDS: dict[Reason, str] = {
     "cheaper": "the proposal leads to a better outcome than the UGV's own task",

@@ -3,14 +3,14 @@
 Two choices only, never and now: follow the proposed motion until it is over and then the own task, or the own task all
 along. "Wait, then accept" is not among them; it looks cheaper at every sample and never comes to an acceptance.
 
-Each is worth the cost (25) along the roll-out plus a terminal cost, in the sense of the stability theory of model
-predictive control: a bound of what (25) will still grow by,
+Each is worth the cost (25) along the roll-out plus a heuristic cost-to-go,
 
     V(p) = L(p)^3 / (3 v),
 
-with L the length of the shortest way to the goal among the safe circles that are known and v the reference speed. Along
-that way V falls at the rate L^2 >= ||goal - p||^2, the integrand of (25). A roll-out that comes to rest short of the
-goal will never get there: its terminal cost is infinite. Of two such the one that leaves less of the way is better.
+with L the length of the shortest way to the goal among the safe circles that are known and v the reference speed: the
+integral of L^2 for a UGV that goes this way at that speed. It is not a bound of what (25) will still grow by, as the
+own task does not go the shortest way. A roll-out that comes to rest short of the goal will never get there: its
+cost-to-go counts as infinite. Of two such the one that leaves less of the way is better.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class Outcome:
         positions: at the control samples, (S + 1, 3), m.
         stalls: whether it comes to rest short of the goal.
         left: length of the way that is left at the end, m.
-        cost: (25) with weight 1, plus the terminal cost; without the former for one that stalls, m^2 s.
+        cost: (25) with weight 1, plus the cost-to-go V; V alone for one that stalls, m^2 s.
     """
 
     positions: Array

@@ -9,7 +9,7 @@ from pydrake.common.value import AbstractValue, Value
 from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSystem, State
 
 from airground_drake.gatekeeper.answer import Decision
-from airground_drake.gatekeeper.sample import Gatekeepers, Memory
+from airground_drake.gatekeeper.mpc_gatekeeper import Gatekeepers, Memory
 from airground_drake.intervention.messages import ACCEPT, SILENT, Report
 from airground_drake.systems.lifetime import weakly
 from airground_drake.systems.ticks import Ticks
@@ -19,9 +19,9 @@ class Gatekeeper(LeafSystem):
     """Decides at every sample about the proposal in force for each UGV, (21)-(29).
 
     Under method (c) each UGV predicts its own closed loop under both choices from what it senses (23), solves (26)
-    through a route and answers by the first stage of the plan, see `gatekeeper.sample`; under (d) it judges the
-    outcome and watches the progress, see `gatekeeper.certified`. The answer goes to its controller and back to the
-    UAV.
+    through a route and answers by the first stage of the plan, see `gatekeeper.mpc_gatekeeper`; under (d) it judges the
+    outcome and watches the progress, see `gatekeeper.outcome_gatekeeper`. The answer goes to its controller and back
+    to the UAV.
 
     Ports (n UGVs):
         in  `team_position` (3(n+1)) m; `ugv_command` (3n) and `uav_command` (3) m/s, for the predicted motion

@@ -88,7 +88,7 @@ def test_no_roll_out_takes_longer_than_the_longest_try_and_what_comes_past_it() 
 
 
 def test_what_is_under_way_at_the_end_costs_the_way_that_is_left_as_well() -> None:
-    """Squared distances to the preset trajectory, and the time-to-go along the way left: L^3 / (3 v)."""
+    """Squared distances to the preset trajectory, and the cost-to-go along the way left: L^3 / (3 v)."""
     scene, _ = situation()
     speed, look = 0.2, Outlook(longest=4.0, past=2.0)
     slow = replace(scene, preset=Motion.at_speed(scene.preset.positions, speed), max_speed=1.0)
@@ -162,7 +162,7 @@ def test_of_very_many_circles_those_beside_the_way_count() -> None:
     assert left == pytest.approx(2.0 * np.sqrt(12.0) + 2.0 * np.pi / 3.0)
 
 
-def test_the_terminal_cost_falls_along_the_way_by_what_is_left_squared() -> None:
+def test_the_cost_to_go_falls_along_the_way_by_what_is_left_squared() -> None:
     """The condition of the stability theory: dV = -L^2 dt, and L is no less than the distance to the goal."""
     scene, discs = situation((4.0, 0.0))
     goal, v, step = scene.preset.positions[-1], 1.0, 1e-4

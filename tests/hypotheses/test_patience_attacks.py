@@ -1,4 +1,4 @@
-"""UAVs that waste a UGV's time, against the running `CertifiedGatekeepers`: they keep the bound of LIVE-WAIT.
+"""UAVs that waste a UGV's time, against the running `OutcomeGatekeepers`: they keep the bound of LIVE-WAIT.
 
 The gatekeeper believes whatever is predicted: its roll-outs are replaced by ones in which refusing stalls and accepting
 does not, as a lying map could make it; or ones in which accepting is worse, for proposals that ask it to make way. The
@@ -17,11 +17,11 @@ import numpy as np
 import pytest
 
 from airground_drake.arrays import Array
-from airground_drake.gatekeeper import certified
-from airground_drake.gatekeeper.certified import CertifiedGatekeepers
+from airground_drake.gatekeeper import outcome_gatekeeper
+from airground_drake.gatekeeper.mpc_gatekeeper import Gatekeepers, Memory, Situation
 from airground_drake.gatekeeper.outcome import Outcome, Outlook
+from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
 from airground_drake.gatekeeper.patience import Patience
-from airground_drake.gatekeeper.sample import Gatekeepers, Memory, Situation
 from airground_drake.intervention.messages import ACCEPT, answer_to
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
@@ -163,12 +163,12 @@ TURNED = [
 
 @pytest.mark.parametrize(("old", "new"), TURNED, ids=["replaced", "rests in silence only", "forged favours"])
 def test_a_gatekeeper_that_miscounts_is_noticed(monkeypatch: pytest.MonkeyPatch, old: str, new: str) -> None:
-    source = inspect.getsource(certified)
+    source = inspect.getsource(outcome_gatekeeper)
     assert source.count(old) == 1
-    broken: dict[str, Any] = {"__name__": certified.__name__}
-    exec(compile(source.replace(old, new), certified.__file__, "exec"), broken)
-    for method in ("sample", "_judge"):
-        monkeypatch.setattr(CertifiedGatekeepers, method, getattr(broken["CertifiedGatekeepers"], method))
+    broken: dict[str, Any] = {"__name__": outcome_gatekeeper.__name__}
+    exec(compile(source.replace(old, new), outcome_gatekeeper.__file__, "exec"), broken)
+    for method in ("sample", "_judge", "_weigh"):
+        monkeypatch.setattr(OutcomeGatekeepers, method, getattr(broken["OutcomeGatekeepers"], method))
     assert gets_through()
 
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from airground_drake.gatekeeper.answer import Foreseen
-from airground_drake.gatekeeper.certified import CertifiedGatekeepers
+from airground_drake.gatekeeper.mpc_gatekeeper import Memory, Situation
 from airground_drake.gatekeeper.outcome import Outcome, Outlook
+from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
 from airground_drake.gatekeeper.patience import Patience
-from airground_drake.gatekeeper.sample import Memory, Situation
 from airground_drake.intervention.messages import ACCEPT
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
@@ -28,7 +28,7 @@ LEGS = 3
 FAR = np.array([0.0, -1e3, 0.0])
 
 
-class Stalled(CertifiedGatekeepers):
+class Stalled(OutcomeGatekeepers):
     """Takes its own way for stalled, so that every proposal is worth it; predicts acceptance as always."""
 
     def foresee(self, seen: Situation, i: int, proposal: Proposal) -> tuple[Outcome, Outcome]:

@@ -12,7 +12,7 @@ from builders.problems import random_problem
 from gatekeeper.oracles import Enumeration
 
 from airground_drake import components
-from airground_drake.gatekeeper import sample
+from airground_drake.gatekeeper import mpc_gatekeeper
 from airground_drake.gatekeeper.answer import Rules
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.problem import Problem
@@ -97,7 +97,7 @@ def test_after_a_failure_the_rest_of_the_plan_before_counts(case_a: Scenario, mo
         before.append(problem.previous)
         return after_failure(problem, solution)
 
-    monkeypatch.setattr(sample, "after_failure", listening)
+    monkeypatch.setattr(mpc_gatekeeper, "after_failure", listening)
     case_a.gatekeeper.route = "failing"
     with ROUTES.adding("failing", Listening):
         simulate(case_a, "c")

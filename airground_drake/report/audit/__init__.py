@@ -32,7 +32,9 @@ def whole(scenario: Scenario, verdicts: Sequence[Verdict]) -> list[dict[str, Any
     """
     from airground_drake.report.audit.companions import companion_findings  # imports Drake
     from airground_drake.report.audit.formulas import formula_findings
+    from airground_drake.report.audit.readings import reading_findings
     from airground_drake.report.audit.thresholds import threshold_findings
 
     proofs = {verdict.claim.id: verdict.finding for verdict in verdicts if not verdict.run}
-    return typeset([*threshold_findings(scenario, proofs), *formula_findings(scenario), *companion_findings()])
+    computed = [*threshold_findings(scenario, proofs), *formula_findings(scenario), *reading_findings(scenario)]
+    return typeset([*computed, *companion_findings()])

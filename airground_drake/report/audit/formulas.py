@@ -41,7 +41,7 @@ def _task_and_configuration() -> Item:
         8, "(3), (27c), caption of Figure 10",
         "(3) and (4) write rho (the configuration) where sigma (the task) is meant: for the avoidance task J^+ is 3 x "
         "1 and rho has 3 components. Besides, (27c) still says {0, 1} where the text relaxes to [0, 1] (as printed the "
-        "rounding (28)-(29) would have nothing to round: see item 11), and the caption of Figure 10 names methods (b) "
+        "rounding (28)-(29) would have nothing to round), and the caption of Figure 10 names methods (b) "
         "and (c) the wrong way round: the text of 5.2 has the refusal under (c).",
         "v = J^+ d(rho_d)/dt", "v = J^+ d(sigma_d)/dt",
         not fits and pseudo_inverse.shape == (3, 1),
@@ -157,7 +157,9 @@ def _null_space() -> Item:
     return item(
         16, "(20), (23)",
         "Where the intervention is a position, J_int = I, (20) executes nothing of the UGV's own task, avoidance "
-        "included, although the text says that it is partly executed. That is why UGV1 crashes in case B, method (b).",
+        "included, although the text says that it is partly executed. The paper does not say what J_int is: the "
+        "identity is our choice, and the reason why UGV1 crashes in our case B, method (b). Under an intervention in "
+        "one direction something of the own task is left.",
         {"rank_of_the_null_space": int(np.linalg.matrix_rank(left))},
         {"rank_for_an_intervention_in_one_direction": int(np.linalg.matrix_rank(partly))},
         not left.any() and bool(partly.any()),
@@ -166,16 +168,24 @@ def _null_space() -> Item:
 
 
 def _one_speed(scenario: Scenario) -> Item:
-    """Item 17: the times of cases A and B need two speeds of the same preset trajectory."""
+    """Item 17: the times of cases A and B need two speeds of the same preset trajectory, or three."""
     speed = {name: load(name)[0].ugvs["ugv1"].preset.speed_m_s for name in ("case_a", "case_b")}
     travelled = {name: speed[name] * time for name, time in (("case_a", 14.45), ("case_b", 10.6))}
     crossed = {"case_a": travelled["case_a"] / speed["case_b"], "case_b": travelled["case_b"] / speed["case_a"]}
+    late_s = 18.1
+    third = travelled["case_b"] / late_s
     return item(
-        17, "Table 1, section 5",
+        17, "Table 1, section 5, Figure 10",
         f"One Table 1 serves both cases, but triggers at 14.45 s and at 10.6 s need reference speeds of "
         f"{speed['case_a']:g} and {speed['case_b']:g} m/s: with the other case's speed case A would trigger about "
-        f"{crossed['case_a']:.1f} s, case B about {crossed['case_b']:.1f} s.",
+        f"{crossed['case_a']:.1f} s, case B about {crossed['case_b']:.1f} s. The caption of Figure 10 has wrong "
+        f"interventions 'after {late_s:g} s' in one method and at 10.6 s in the other. If they begin there, it needs a "
+        f"third speed, {third:.4f} m/s, though before the trigger the methods of a case do not differ. It may only say "
+        f"that they still go on then.",
         {"trigger_s": {"case_a": 14.45, "case_b": 10.6}, "speed_m_s": 1.0}, {"speed_m_s": speed},
         abs(travelled["case_a"] - travelled["case_b"]) < 0.1 and abs(speed["case_a"] - speed["case_b"]) > 0.1,
-        {"reference_travelled_at_the_trigger_m": travelled, "trigger_with_the_other_speed_s": crossed},
+        {
+            "reference_travelled_at_the_trigger_m": travelled, "trigger_with_the_other_speed_s": crossed,
+            "caption_of_figure_10_s": late_s, "speed_if_it_begins_there_m_s": third,
+        },
     )  # fmt: skip

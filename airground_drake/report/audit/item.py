@@ -9,6 +9,15 @@ from airground_drake.verify import Finding
 
 Item = dict[str, Any]
 
+CONVERSION = {
+    6: "The table's '1t' may have lost something.",
+    7: "A minus sign is easily lost.",
+    8: "rho and sigma, {0, 1} and [0, 1], (b) and (c) are easily mistaken for each other.",
+    12: "The subscripts m and md, j and d are easily mistaken for each other.",
+    22: "Some of the indices may have been other letters: n and N, j and r.",
+}
+"""By number: findings that a fault of the text conversion which we have of the paper could explain, and how."""
+
 
 def item(
     number: int, where: str, finding: str, paper: Any, ours: Any, shown: bool, evidence: Item, unit: str = ""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from airground_drake.report.audit.item import Item
+from airground_drake.report.audit.item import CONVERSION, Item
 
 FORMULAS: dict[int, tuple[tuple[str, ...], tuple[str, ...]]] = {
     1: (
@@ -32,12 +32,15 @@ FORMULAS: dict[int, tuple[tuple[str, ...], tuple[str, ...]]] = {
         ),
     ),
     4: (
-        (r"\zeta = 3 \text{ m}",),
-        (r"\operatorname{argmin}_\zeta B(\zeta; \mu) = 3 \text{ m for two drifts } \mu \text{ only}",),
+        (r"\zeta = 3 \text{ m solves (19) for two drifts } \mu \text{ only}",),
+        (r"\operatorname{argmin}_\zeta B(\zeta; \mu) = 3 \text{ m for two other drifts } \mu \text{ only}",),
     ),
     5: (
         (r"dx = \mu \, dt + \sigma_j \, dW, \quad \sigma_j = 10",),
-        (r"\mathbb{E}[\min\{t : |\sigma_j W(t)| \ge \zeta\}] = \frac{\zeta^2}{\sigma_j^2}",),
+        (
+            r"t_{1/2} = \frac{\zeta^2}{(\Phi^{-1}(3/4))^2 \, \sigma_j^2} \quad \text{(median, one threshold)}",
+            r"\mathbb{E}[\min\{t : |\sigma_j W(t)| \ge \zeta\}] = \frac{\zeta^2}{\sigma_j^2}",
+        ),
     ),
     7: ((r"\rho_{rd,2} = [1.3, \; t, \; 0]",), (r"\rho_{rd,2} = [-1.3, \; t, \; 0]",)),
     8: (
@@ -89,14 +92,19 @@ FORMULAS: dict[int, tuple[tuple[str, ...], tuple[str, ...]]] = {
         ),
         (r"T = \frac{\zeta}{\mu} \quad \text{(one threshold, } \mu > 0 \text{)}", r"E = 0"),
     ),
+    19: (
+        (r"v_{int} = J^+ (J v_{int} + \Lambda (\sigma_{int} - \sigma_{in}))",),
+        (r"v_{int} = J^+ (\dot\sigma_d + \Lambda (\sigma_d - \sigma))",),
+    ),
 }
 """By number of the finding; what is about numbers alone has none."""
 
 
 def typeset(items: Iterable[Item]) -> list[dict[str, Any]]:
-    """The items with their formulas, `latex`: rows as printed and corrected."""
+    """The items with their formulas, `latex`: rows as printed and corrected; and what a `conversion` may have done."""
     found = []
     for item in items:
         paper, ours = FORMULAS.get(item["id"], ((), ()))
-        found.append({**item, "latex": {"paper": list(paper), "ours": list(ours)}})
+        latex = {"paper": list(paper), "ours": list(ours)}
+        found.append({**item, "latex": latex, "conversion": CONVERSION.get(item["id"], "")})
     return found

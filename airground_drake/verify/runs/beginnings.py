@@ -127,6 +127,35 @@ def known_discs(trace: Trace, robot: str, t: float, on: Sent) -> tuple[Array, Ar
     return known[:, :3], trace.scenario["safe_distance"]["obstacle_m"] + (radius[robot] + known[:, 3])
 
 
+def discovers(trace: Trace, robot: str, t: float, on: Sent) -> bool:
+    """Whether at a sample of the gatekeeper a UGV senses an obstacle for the first time that the message does not show.
+
+    Args:
+        trace: the run.
+        robot: the UGV.
+        t: time of the sample, s.
+        on: the proposal.
+    """
+    first = trace.derived(f"first sensed by {robot}", lambda: _first_sensed(trace, robot))
+    obstacles = np.array([o["position_m"] for o in trace.scenario["obstacles"].values()]).reshape(-1, 3)
+    new = obstacles[np.abs(first - t) <= TIME_TOLERANCE_S]
+    shown = (np.linalg.norm(new[:, None] - on.mapped_m, axis=2) <= 1e-9).any(axis=1)
+    return bool((~shown).any())
+
+
+def _first_sensed(trace: Trace, robot: str) -> Array:
+    """When a UGV senses each obstacle for the first time, at the gatekeeper's samples, (m,), s; inf if never."""
+    period_s = trace.scenario["gatekeeper"]["period_s"]
+    samples = period_s * np.arange(np.floor(trace.t[-1] / period_s + 1e-9) + 1.0)
+    was = interpolate(trace.t, trace.position(robot), np.minimum(samples, trace.t[-1]))
+    first = []
+    for obstacle in trace.scenario["obstacles"].values():
+        away = np.linalg.norm(was - np.asarray(obstacle["position_m"]), axis=1)
+        seen = np.flatnonzero(away <= trace.scenario["control"]["sensing_range_m"])
+        first.append(samples[seen[0]] if seen.size else np.inf)
+    return np.array(first)
+
+
 def _other(
     trace: Trace, robot: str, t: float, after: Array, pair: Any, sent: Sequence[Sent]
 ) -> tuple[tuple[Array, Array], float, float, float]:

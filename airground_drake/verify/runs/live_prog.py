@@ -13,6 +13,7 @@ from airground_drake.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.segments import interpolate
 from airground_drake.verify.finding import Finding
+from airground_drake.verify.runs.beginnings import discovers
 from airground_drake.verify.runs.gate_record import GateClaim, Off, Row, conclude
 from airground_drake.verify.runs.outcome_rolls import foreseen
 from airground_drake.verify.runs.proposals import Sent, proposals_of
@@ -33,7 +34,8 @@ class Patience:
         since: when it was last on its own, or began to be, s.
         until: when what it executes is over, s; None if it is on its own.
         on_time: when it was last no farther behind than it may be, s.
-        lags: predicted distances from where it is to be, at the control samples since the acceptance, m.
+        lags: predicted distances from where it is to be, at the control samples since they were predicted, m.
+        begun: when they were predicted, s.
     """
 
     tries: int = 0
@@ -41,6 +43,7 @@ class Patience:
     until: float | None = None
     on_time: float = 0.0
     lags: Array | None = None
+    begun: float = 0.0
 
 
 class LiveProg(GateClaim):
@@ -57,7 +60,8 @@ class LiveProg(GateClaim):
         "lag(t) = ||J^+ J (p(t) - rho_int(t))||, predicted along the roll-out; not for longer than behind_s lag > "
         "predicted + lag_m; accepted(t0) to min(end of motion, t0 + longest_s); tries <= most, 0 after rest_s on its "
         "own; first answer: accept iff tries left and (stalls, cost) of accepting is better than of refusing by 1e-6, "
-        "or it is another UGV's trigger and accepting does not stall"
+        "or it is another UGV's trigger and accepting does not stall; so again, at no try, when an obstacle is sensed "
+        "that is not on the proposal's map"
     )
     latex = (
         r"\text{lag}(t) = \lVert J^+ J (p(t) - \rho_{int}(t)) \rVert",
@@ -152,6 +156,11 @@ def judge_decision(trace: Trace, row: Row, last: Row | None, patience: Patience,
         if lag <= predicted + gate["lag_m"]:
             patience.on_time = t
         answer = _kept(t, patience, gate)
+        on = next(one for one in sent if one.number == given["number"])
+        if answer[0] == "accept" and discovers(trace, str(given["robot"]), t, on):
+            answer = _by_outcome(row, on)
+            if answer[0] == "accept":
+                _commit(trace, given, on, patience, sent)
         if answer[0] == "refuse":
             patience.until, patience.since = None, t
     elif standing == "refuse":
@@ -160,13 +169,9 @@ def judge_decision(trace: Trace, row: Row, last: Row | None, patience: Patience,
         on = next(one for one in sent if one.number == given["number"])
         answer = _first(row, on, patience, gate)
         if answer[0] == "accept":
-            places = foreseen(trace, given, sent)[1].places_m
-            after = trace.scenario["control"]["period_s"] * np.arange(float(len(places)))
-            away = (places - on.place(t + after)) @ on.chosen.T
-            patience.lags = np.linalg.norm(away, axis=1)
-            lag = predicted = float(patience.lags[0])
+            lag = predicted = _commit(trace, given, on, patience, sent)
             end = min(float(on.times_s[-1]), t + gate["longest_s"])
-            patience.tries, patience.since, patience.until, patience.on_time = patience.tries + 1, t, end, t
+            patience.tries, patience.since, patience.until = patience.tries + 1, t, end
     theirs = (given["decision"], given["reason"])
     yield Off(row, "answer or reason", float(answer != theirs), 0.0, recomputed=list(answer), standing=standing)
     yield Off(row, "tries", given["tries"] - patience.tries, 0.0, recomputed=patience.tries)
@@ -175,13 +180,22 @@ def judge_decision(trace: Trace, row: Row, last: Row | None, patience: Patience,
     yield Off(row, "predicted lag, m", given["predicted_lag_m"] - predicted, LAG_TOLERANCE_M, recomputed=predicted)
 
 
+def _commit(trace: Trace, given: dict[str, Any], on: Sent, patience: Patience, sent: Sequence[Sent]) -> float:
+    """Keep the lags that are predicted now, where the UGV is on time; returns the first, m."""
+    t, places = float(given["t_s"]), foreseen(trace, given, sent)[1].places_m
+    after = trace.scenario["control"]["period_s"] * np.arange(float(len(places)))
+    patience.lags = np.linalg.norm((places - on.place(t + after)) @ on.chosen.T, axis=1)
+    patience.on_time = patience.begun = t
+    return float(patience.lags[0])
+
+
 def _lags(trace: Trace, row: Row, patience: Patience, sent: Sequence[Sent]) -> tuple[float, float]:
     """How far from where it is to be the UGV is, and was predicted to be, m."""
     t, robot = float(row.given["t_s"]), str(row.given["robot"])
     on = next(one for one in sent if one.number == row.given["number"])
     away = on.chosen @ (interpolate(trace.t, trace.position(robot), t) - on.place(t))
     assert patience.lags is not None
-    k = min(round((t - patience.since) / trace.scenario["control"]["period_s"]), len(patience.lags) - 1)
+    k = min(round((t - patience.begun) / trace.scenario["control"]["period_s"]), len(patience.lags) - 1)
     return float(np.linalg.norm(away)), float(patience.lags[k])
 
 
@@ -195,9 +209,12 @@ def _kept(t: float, patience: Patience, gate: dict[str, Any]) -> tuple[str, str]
 
 def _first(row: Row, on: Sent, patience: Patience, gate: dict[str, Any]) -> tuple[str, str]:
     """The first answer to a proposal."""
+    return ("refuse", "exhausted") if patience.tries >= gate["tries"] else _by_outcome(row, on)
+
+
+def _by_outcome(row: Row, on: Sent) -> tuple[str, str]:
+    """The answer that follows from the recorded outcomes."""
     given = row.given
-    if patience.tries >= gate["tries"]:
-        return "refuse", "exhausted"
     if given["accept_stalls"] < 0.0:
         return "refuse", "no_plan"
     stalls, cost = ([float(given[f"{choice}_{what}"]) for choice in ("refuse", "accept")] for what in

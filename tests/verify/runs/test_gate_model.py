@@ -10,7 +10,7 @@ import pytest
 from builders.edits import with_decision, with_scenario
 from verify.judging import judge
 
-from airground_drake.gatekeeper import certified, outcome, prediction
+from airground_drake.gatekeeper import outcome, outcome_gatekeeper, prediction
 from airground_drake.gatekeeper.closed_loop import ClosedLoop
 from airground_drake.scenarios.load import from_data, load, resolved
 from airground_drake.scenarios.schema import Policy
@@ -75,7 +75,7 @@ def queue() -> Trace:
 
 
 def test_of_a_map_without_end_the_nearest_obstacles_count() -> None:
-    assert certified.MOST_CLAIMED == beginnings.MOST_CLAIMED == 64
+    assert outcome_gatekeeper.MOST_CLAIMED == beginnings.MOST_CLAIMED == 64
     scenario = load("case_a", ["duration_s=15.5"])[0]
     scenario.runs, scenario.reproduction, scenario.choices = {"d": scenario.runs["d"]}, [], []
     scenario.intervention.policies = [Policy("towards", {"x_m": 6.0, "y_m": 5.0, "speed_m_s": 2.0})]

@@ -12,6 +12,7 @@ import pytest
 from verify.judging import CLAIMS
 
 from airground_drake.scenarios.load import load
+from airground_drake.scenarios.schema import Obstacle
 from airground_drake.simulation import simulate
 from airground_drake.trace import Trace
 from airground_drake.verify.runs.way_left import bounds_of_way_left
@@ -111,6 +112,24 @@ def test_a_ugv_that_is_held_up_gives_the_intervention_back_and_the_claims_hold()
     late = replace(trace, decisions=trace.decisions.replace({"reason": {"no_progress": "over"}}))
     assert CLAIMS["LIVE-PROG"].judge(late).status == "refuted"
     assert given_back["lag_m"] > given_back["predicted_lag_m"] + 0.01
+
+
+@pytest.mark.parametrize(("hidden", "answer"), [((6.5, 9.0), "refuse"), ((4.5, 10.0), "accept")])
+def test_an_accepted_intervention_is_reconsidered_when_an_obstacle_is_new(
+    hidden: tuple[float, float], answer: str
+) -> None:
+    """The obstacle is not on the UAV's map; it comes into sight after the acceptance."""
+    scenario = load("case_a")[0]
+    scenario.obstacles["hidden"] = Obstacle(position_m=[*hidden, 0.0], known_to_uav=False)
+    trace = simulate(scenario, "d")
+    mine = trace.decisions[trace.decisions["number"] == trace.decisions["number"].iloc[0]]
+    first, again = (row for _, row in mine[mine["accept_stalls"] >= 0.0].iterrows())
+    assert (first["decision"], again["decision"]) == ("accept", answer)
+    assert first["tries"] == again["tries"] == 1.0
+    for claim in ("LIVE-PROG", "GATE-MODEL", "GATE-FEAS"):
+        assert CLAIMS[claim].judge(trace).status == "holds"
+    late = edited(trace, lambda table: table.index == again.name, decision="accept", reason="kept")
+    assert CLAIMS["LIVE-PROG"].judge(late).status == "refuted"
 
 
 def test_the_way_left_is_bounded_from_both_sides() -> None:

@@ -44,24 +44,30 @@ def time(item: Mapping[str, Any]) -> Lines:
 
 
 def optimum(item: Mapping[str, Any]) -> Lines:
-    """Item 4: the Bayes-optimal threshold over the drift, and the printed one."""
+    """Item 4: the threshold over the drift, Bayes-optimal and by (19) as printed, and Table 1's."""
     known, zeta = item["evidence"], item["paper"]["zeta_m"]
-    drift = np.geomspace(0.3, 3.0 * max(item["ours"]["drift_m_s"], default=10.0), POINTS)
-    best = np.array([optimal_threshold(a, known["noise_m_sqrt_s"], known["c1_1_s"], known["c2"]) for a in drift])
+    right, printed = item["ours"]["drift_m_s"], item["paper"]["drift_m_s"]
+    drift = np.geomspace(0.3, 3.0 * max(right, default=10.0), POINTS)
+    noise, c1, c2 = known["noise_m_sqrt_s"], known["c1_1_s"], known["c2"]
+    best = np.array([optimal_threshold(a, noise, c1, c2) for a in drift])
+    root = np.array([optimal_threshold(a, noise, c2, c1) for a in drift])
     return Lines(
-        "Bayes-optimal threshold over the drift", "drift, m/s", "threshold, m",
-        {"Bayes-optimal": (drift, best), "Table 1": (drift, np.full(POINTS, zeta))},
-        {f"{a:.3g} m/s": (a, zeta) for a in item["ours"]["drift_m_s"]}, log="x",
+        "Threshold over the drift, Bayes-optimal and by (19) as printed", "drift, m/s", "threshold, m",
+        {
+            "Bayes-optimal": (drift, best), "(19) as printed": (drift, root),
+            "Table 1": (drift, np.full(POINTS, zeta)),
+        },
+        {f"{a:.3g} m/s": (a, zeta) for a in (*right, *printed)}, log="x",
     )  # fmt: skip
 
 
 def first_passage(item: Mapping[str, Any]) -> Lines:
-    """Item 5: when noise alone reaches the threshold, over its intensity, and the paper's trigger."""
+    """Item 5: when noise alone reaches either threshold, over its intensity, and the paper's trigger."""
     known, printed = item["evidence"], item["paper"]["trigger_s"]
     zeta, at = known["zeta_m"], known["noise_m_sqrt_s"]
     noise = np.geomspace(0.05 * at, 2.0 * at, POINTS)
     return Lines(
-        "Mean time in which noise alone reaches the threshold", "noise intensity, m/√s", "time, s",
+        "Mean time in which noise alone reaches either threshold", "noise intensity, m/√s", "time, s",
         {"noise alone": (noise, (zeta / noise) ** 2), "the paper's trigger": (noise, np.full(POINTS, printed))},
         {f"{at:g}, finite differences": (at, known["by_finite_differences_s"])}, log="xy",
     )  # fmt: skip
@@ -69,7 +75,7 @@ def first_passage(item: Mapping[str, Any]) -> Lines:
 
 def one_or_two(item: Mapping[str, Any]) -> Lines:
     """Item 18: mean decision time over the drift, with two thresholds and with the one that the trigger has."""
-    known = item["evidence"]["Table 1"]
+    known = item["evidence"]["Table 1, drift assumed"]
     zeta, noise, at = known["zeta_m"], known["noise_m_sqrt_s"], known["drift_m_s"]
     drift = np.geomspace(0.1 * at, 10.0 * at, POINTS)
     two = np.array([decision_time(zeta, a, noise) for a in drift])

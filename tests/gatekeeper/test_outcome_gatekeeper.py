@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from airground_drake.gatekeeper.certified import CertifiedGatekeepers, reason_of
+from airground_drake.gatekeeper.mpc_gatekeeper import Memory, Situation
 from airground_drake.gatekeeper.outcome import Outcome, Outlook
+from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers, reason_of
 from airground_drake.gatekeeper.patience import Patience, Turn
-from airground_drake.gatekeeper.sample import Memory, Situation
 from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
@@ -20,16 +20,16 @@ ROCK = np.array([[3.0, 0.0, 0.0]])
 STAYS = Motion(np.array([0.0, 5.0]), np.array([[20.0, 0.0, 0.0], [20.0, 0.0, 0.0]]))
 
 
-def gatekeepers(*ugvs: str, rocks: np.ndarray = ROCK) -> CertifiedGatekeepers:
+def gatekeepers(*ugvs: str, rocks: np.ndarray = ROCK) -> OutcomeGatekeepers:
     """Of UGVs that are to be at (20, 0), with a rock on the way and a sensing range of 4 m."""
     team = Team(ugvs, "uav", rocks, 2.0, 2.0, 1.0, np.full(len(ugvs) + 1, 3.0))
     law = UgvLaw(Avoidance(3.0, 0.05, 4.0), 2.0, 1.5, intervention_on_top=False)
     patience = Patience(most=2, rest=1.0, longest=5.0, lag=0.5, behind=1.0)
     preset = Motion(np.zeros(1), np.array([[20.0, 0.0, 0.0]]))
-    return CertifiedGatekeepers(team, law, [preset] * len(ugvs), Outlook(5.0), patience)
+    return OutcomeGatekeepers(team, law, [preset] * len(ugvs), Outlook(5.0), patience)
 
 
-def sampled(gate: CertifiedGatekeepers, t: float, x: float, proposal: Proposal | None, memory: Memory) -> Memory:
+def sampled(gate: OutcomeGatekeepers, t: float, x: float, proposal: Proposal | None, memory: Memory) -> Memory:
     places = np.array([[x, 0.0, 0.0], [x, 0.0, 2.0]])
     return gate.sample(t, (proposal,), places, np.zeros((2, 3)), memory)
 
@@ -70,6 +70,20 @@ def test_the_first_sample_decides_and_what_makes_no_difference_is_refused() -> N
     memory = sampled(gatekeepers("ugv"), 0.05, 20.0, Proposal("way", 0.0, STAYS), Memory.empty(1))
     assert [decision.reason for decision in memory.decisions] == ["not_cheaper"]
     assert memory.answers == (REFUSE, -1.0)
+
+
+def test_an_obstacle_that_nobody_knew_is_a_reason_to_look_again_and_costs_no_try() -> None:
+    """The second rock comes into sight under way, on the map or not."""
+    way = Motion(np.array([0.0, 3.0, 6.0]), np.array([[0.0, 0.0, 0.0], [3.0, 3.0, 0.0], [20.0, 3.0, 0.0]]))
+    rocks = np.concatenate([ROCK, [[7.0, 1.0, 0.0]]])
+    for mapped, looked in ((rocks[:1], [True, False, True, False]), (rocks, [True, False, False, False])):
+        gate, memory = gatekeepers("ugv", rocks=rocks), Memory.empty(1)
+        proposal = Proposal("way", 0.0, way, mapped=mapped, mapped_radii=np.zeros(len(mapped)), number=0)
+        for k, x in enumerate((0.0, 0.1, 3.5, 3.6)):
+            memory = sampled(gate, 0.05 * k, x, proposal, memory)
+        assert [decision.grounds.accept is not None for decision in memory.decisions] == looked
+        assert [decision.grounds.tries for decision in memory.decisions] == [1, 1, 1, 1]
+        assert memory.turns[0].tries == 1
 
 
 def test_a_favour_is_done_unless_it_strands_the_ugv() -> None:

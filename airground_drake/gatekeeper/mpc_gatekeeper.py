@@ -32,12 +32,14 @@ class Commitment:
     """What a UGV watches while it executes a proposal.
 
     Attributes:
-        lags: predicted distances from where it is to be, at the control samples since the acceptance, (S + 1,), m.
+        lags: predicted distances from where it is to be, at the control samples since they were predicted, (S + 1,), m.
         on_time: when it was last no farther behind than it may be, s.
+        begun: when the lags were predicted: at the acceptance or when it was reconsidered, s.
     """
 
     lags: Array
     on_time: float
+    begun: float
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,7 +3,9 @@
 At the first sample at which a UGV sees a proposal it rolls out what comes of accepting it now and of refusing it for
 ever (`outcome`), and takes the better one. That answer stands: a refusal for good, an acceptance until the proposal is
 withdrawn, its motion is over, or the UGV has been farther behind it than predicted for too long. It is never reversed
-because waiting looks cheaper, nor because the other choice does. How often a UGV goes along is bounded (`patience`).
+because waiting looks cheaper, nor because the other choice does, with one exception: when the UGV senses an obstacle
+that it did not know at the acceptance, it looks at both outcomes again. That is no new try: how often a UGV goes along
+is bounded (`patience`).
 
 Nothing here has a part in safety: whatever is accepted is executed below the avoidance inequalities.
 """
@@ -16,12 +18,13 @@ from dataclasses import replace
 from time import thread_time
 
 import numpy as np
+import numpy.typing as npt
 
 from airground_drake.arrays import Array
 from airground_drake.gatekeeper.answer import Decision, Foreseen, Reason
+from airground_drake.gatekeeper.mpc_gatekeeper import Commitment, Gatekeepers, Memory, Situation
 from airground_drake.gatekeeper.outcome import Other, Outcome, Outlook, outcomes
 from airground_drake.gatekeeper.patience import Patience, Turn
-from airground_drake.gatekeeper.sample import Commitment, Gatekeepers, Memory, Situation
 from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT, Proposals, Report, answer_to
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.kernels import news_within, within
@@ -37,7 +40,7 @@ SAME_M = 1e-9
 """Obstacles closer to each other than this are one, m."""
 
 
-class CertifiedGatekeepers(Gatekeepers):
+class OutcomeGatekeepers(Gatekeepers):
     """The UGVs of a team under method (d)."""
 
     def __init__(
@@ -70,7 +73,8 @@ class CertifiedGatekeepers(Gatekeepers):
                 continue
             started = thread_time()
             if standing == ACCEPT:
-                decision, turns[i], commitments[i] = self._watch(seen, i, proposal)
+                again = self._discovers(sensed, memory, i, proposal)
+                decision, turns[i], commitments[i] = self._watch(seen, i, proposal, again=again)
             elif standing == REFUSE:
                 decision = Decision(t, i, proposal, False, "kept", Foreseen(tries=turns[i].tries))
             else:
@@ -94,29 +98,45 @@ class CertifiedGatekeepers(Gatekeepers):
             return memory.sensed | within(points, own, reach)
         return memory.sensed
 
+    def _discovers(self, sensed: npt.NDArray[np.bool_], memory: Memory, i: int, proposal: Proposal) -> bool:
+        """Whether a UGV senses an obstacle for the first time that is not on the proposal's map."""
+        if sensed is memory.sensed:
+            return False
+        new = self._team.obstacles[sensed[i] & ~memory.sensed[i]]
+        apart = np.linalg.norm(new[:, None] - proposal.mapped, axis=2)
+        return not (apart <= SAME_M).any(axis=1).all()
+
     def _judge(
         self, seen: Situation, i: int, proposal: Proposal, turn: Turn
     ) -> tuple[Decision, Turn, Commitment | None]:
         """The first decision about a proposal."""
         if self._patience.exhausted(turn):
             return Decision(seen.t, i, proposal, False, "exhausted", Foreseen(tries=turn.tries)), turn, None
+        reason, grounds, commitment = self._weigh(seen, i, proposal)
+        if commitment is not None:
+            turn = self._patience.accept(turn, seen.t, proposal.motion.end)
+        decision = Decision(seen.t, i, proposal, commitment is not None, reason, replace(grounds, tries=turn.tries))
+        return decision, turn, commitment
+
+    def _weigh(self, seen: Situation, i: int, proposal: Proposal) -> tuple[Reason, Foreseen, Commitment | None]:
+        """The better outcome: the reason, what it rests on, and what is to be watched if it is to accept."""
         refuse, accept = self.foresee(seen, i, proposal)
         favour = proposal.cause in self._team.ugvs and proposal.cause != self._team.ugvs[i]
         reason = reason_of(refuse, accept, favour=favour)
         if reason not in ACCEPTING:
-            return Decision(seen.t, i, proposal, False, reason, Foreseen(refuse, accept, tries=turn.tries)), turn, None
-        turn = self._patience.accept(turn, seen.t, proposal.motion.end)
+            return reason, Foreseen(refuse, accept), None
         after = self._law.avoidance.period * np.arange(0.0, len(accept.positions))
         lags = lags_of(proposal, seen.t + after, accept.positions)
-        grounds = Foreseen(refuse, accept, float(lags[0]), float(lags[0]), turn.tries)
-        return Decision(seen.t, i, proposal, True, reason, grounds), turn, Commitment(lags, seen.t)
+        return reason, Foreseen(refuse, accept, float(lags[0]), float(lags[0])), Commitment(lags, seen.t, seen.t)
 
-    def _watch(self, seen: Situation, i: int, proposal: Proposal) -> tuple[Decision, Turn, Commitment | None]:
-        """A later decision about a proposal that is executed."""
+    def _watch(
+        self, seen: Situation, i: int, proposal: Proposal, *, again: bool
+    ) -> tuple[Decision, Turn, Commitment | None]:
+        """A later decision about a proposal that is executed; `again`: look at both outcomes once more."""
         t, turn, patience = seen.t, seen.before.turns[i], self._patience
         commitment = seen.before.commitments[i]
         assert commitment is not None
-        k = min(round((t - turn.since) / self._law.avoidance.period), len(commitment.lags) - 1)
+        k = min(round((t - commitment.begun) / self._law.avoidance.period), len(commitment.lags) - 1)
         predicted = float(commitment.lags[k])
         lag = lag_of(proposal, t, seen.positions[i])
         on_time = t if lag <= predicted + patience.lag else commitment.on_time
@@ -125,7 +145,12 @@ class CertifiedGatekeepers(Gatekeepers):
         if late or patience.over(turn, t):
             reason: Reason = "no_progress" if late else "over"
             return Decision(t, i, proposal, False, reason, grounds), patience.stop(turn, t), None
-        return Decision(t, i, proposal, True, "kept", grounds), turn, Commitment(commitment.lags, on_time)
+        if again:
+            reason, outcomes, renewed = self._weigh(seen, i, proposal)
+            grounds = replace(grounds, refuse=outcomes.refuse, accept=outcomes.accept)
+            stays = renewed is not None
+            return Decision(t, i, proposal, stays, reason, grounds), turn if stays else patience.stop(turn, t), renewed
+        return Decision(t, i, proposal, True, "kept", grounds), turn, replace(commitment, on_time=on_time)
 
     def foresee(self, seen: Situation, i: int, proposal: Proposal) -> tuple[Outcome, Outcome]:
         """What comes of refusing and of accepting, with what the UGV knows."""
