@@ -12,7 +12,7 @@ from .rules import agrees, holds, same
 
 SCHEMA = "airground_drake.report/2"
 EXIT_CODES = {"as_expected": 0, "not_as_expected": 1, "inconclusive": 3}
-FINDINGS = 24
+FINDINGS = 25
 """Number of findings about the paper in a report of `report audit`."""
 
 EVERY_RUN = ("SAFE-TRACE", "SAFE-HYP", "EXEC", "ZENO-TRACE", "THR-TRIG", "LIVE-GOAL")

@@ -23,7 +23,7 @@ from airground_drake.verify import Finding, cache_folder, verify_model
 
 DOCS = Path(__file__).parent.parent.parent / "docs"
 FORMULAS = (2, 3, 4, 5, 8, 9, *range(12, 23))
-COMPANIONS = (7, 10, 11, 23, 24)
+COMPANIONS = (7, 10, 11, 23, 24, 25)
 
 
 def from_formulas(proofs: dict[str, Finding]) -> list[dict[str, Any]]:
@@ -81,6 +81,9 @@ def test_the_numbers_of_the_audit(items: dict[int, dict[str, Any]], companion_it
     assert companion_items[10]["evidence"][companions.LIGHT]["accepted"] == 0
     assert companion_items[11]["paper"]["cost_accept_minus_refuse"] == pytest.approx(0.0, abs=1e-9)
     assert companion_items[11]["ours"]["cost_accept_minus_refuse"] == pytest.approx(2.625, abs=5e-4)
+    literal = {name: found["literal"] for name, found in companion_items[25]["evidence"]["answers"].items()}
+    assert literal["case_a"][:2] == [(14.55, "accept"), (15.55, "refuse")]
+    assert literal["case_b"][1:3] == [(13.1, "accept"), (14.1, "refuse")]
     assert companion_items[11]["ours"]["cost_with_slack_accept_minus_refuse"] > 9000.0
 
 

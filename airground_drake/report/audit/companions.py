@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import Any
 from unittest import mock
 
@@ -10,9 +11,12 @@ import numpy as np
 from pydrake.solvers import ClarabelSolver, MathematicalProgram
 
 from airground_drake.arrays import Array
+from airground_drake.gatekeeper import mpc_gatekeeper
+from airground_drake.gatekeeper.answer import Reason
 from airground_drake.gatekeeper.mpc_gatekeeper import Situation
 from airground_drake.gatekeeper.outcome import Outcome
 from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
+from airground_drake.gatekeeper.solution import Solution
 from airground_drake.intervention.policy import Proposal
 from airground_drake.report.audit.item import Item
 from airground_drake.report.figures.canvas import thin
@@ -42,10 +46,12 @@ class Believing(OutcomeGatekeepers):
 
 
 def companion_findings() -> list[Item]:
-    """Items 7, 10, 11, 23 and 24."""
+    """Items 7, 10, 11 and 23 to 25."""
     changes = "duration_s=13.0", "reproduction=[]", PAPERS_ROUTE
     direct, gated = (_run("case_b", run, changes) for run in ("b", "c"))
-    return [_sign(), _soft_gate(), _no_dynamics(gated), _method_b(direct, gated), _proper_tasks(direct)]
+    return [
+        _sign(), _soft_gate(), _no_dynamics(gated), _method_b(direct, gated), _proper_tasks(direct), _literal_rule(),
+    ]  # fmt: skip
 
 
 def _run(name: str, run: str, changes: tuple[str, ...] = ()) -> Trace:
@@ -225,6 +231,52 @@ def _proper_tasks(direct: Trace) -> Item:
         "demonstrated": away < d,
         "evidence": {"ends_at_m": ends.tolist(), "obstacle_m": obstacle.tolist(), "rest": "by reading"},
     }
+
+
+def first_stage(solution: Solution, *_: Any) -> tuple[bool, Reason]:
+    """The paper's rule to the letter, in place of `settle`: the first stage of the rounded plan, at every sample."""
+    if solution.rounded is None or not len(solution.rounded):
+        return False, "no_plan"
+    return (True, "cheaper") if solution.rounded[0] == 1.0 else (False, "not_cheaper")
+
+
+def _literal_rule() -> Item:
+    """Item 25: executing the first stage of each rounded plan gives no lasting acceptance."""
+    answers: dict[str, dict[str, list[Any]]] = {}
+    for name, duration_s in (("case_a", 18), ("case_b", 16)):
+        changes = f"duration_s={duration_s}.0", "reproduction=[]", PAPERS_ROUTE
+        with mock.patch.object(mpc_gatekeeper, "settle", first_stage):
+            literal = _run(name, "c", changes)
+        answers[name] = {
+            rule: _answers(trace) for rule, trace in (("literal", literal), ("ours", _run(name, "c", changes)))
+        }
+    reversals = {
+        rule: [
+            sum(b == "refuse" and a == "accept" for (_, a), (_, b) in pairwise(found[rule]))
+            for found in answers.values()
+        ]
+        for rule in ("literal", "ours")
+    }
+    return {
+        "id": 25,
+        "where": "(28)-(29), Figures 6 and 10",
+        "finding": "The paper's rule to the letter, the first stage of the rounded plan at every sample, takes an "
+        "acceptance back about a second later, in both cases, and accepts again: the UGV's own task has become the "
+        "cheaper one for a moment. Figures 6 and 10 are described as one lasting acceptance. Here an answer changes "
+        "only by a margin and after a dwell. That holds for our choice of weights and speeds, which the paper does "
+        "not give.",
+        "paper": {"acceptances_taken_back": reversals["literal"]},
+        "ours": {"acceptances_taken_back": reversals["ours"]},
+        "unit": "",
+        "demonstrated": min(reversals["literal"]) > 0 and max(reversals["ours"]) == 0,
+        "evidence": {"answers": answers, "runs": "c of case_a (18 s) and case_b (16 s)", "figures": "by reading"},
+    }
+
+
+def _answers(trace: Trace) -> list[tuple[float, str]]:
+    """When UGV1 accepted or refused, s, and which."""
+    kinds = "accept", "refuse"
+    return [(round(e["t_s"], 9), e["kind"]) for e in trace.events if e["robot"] == "ugv1" and e["kind"] in kinds]
 
 
 def _printed_optimum(reference: Array, start: Array, weight: float, dt: float) -> tuple[float, Array]:
