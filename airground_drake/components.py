@@ -153,6 +153,7 @@ def make_rules(scenario: Scenario) -> Rules:
     return Rules(
         switching_margin=gate.switching_margin,
         min_dwell=gate.min_dwell_s,
+        first_stage=gate.rule == "first_stage",
         budget=Budget(gate.budget_iterations),
         budget_share=gate.budget_share if gate.budget == "wall_clock" else None,
     )

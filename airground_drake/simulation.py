@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -30,7 +31,7 @@ from airground_drake.nsbc.law import UgvLaw
 from airground_drake.nsbc.motion import Motion
 from airground_drake.nsbc.team import Team
 from airground_drake.scenarios.load import resolved, validated
-from airground_drake.scenarios.schema import Scenario
+from airground_drake.scenarios.schema import Run, Scenario
 from airground_drake.systems.decision import FIELDS, DecisionVariable
 from airground_drake.systems.lifetime import untie
 from airground_drake.trace import (
@@ -66,7 +67,8 @@ class Recorder:
             raise UnknownNameError("run", name, self._scenario.runs)
         self._run = self._scenario.runs[name]
         composition: Composition = self._run.composition  # type: ignore[assignment]
-        self._model: Model = build_model(self._scenario, self._run.method, composition, decision_block=decision_block)
+        scenario = _with_rule(self._scenario, self._run)
+        self._model: Model = build_model(scenario, self._run.method, composition, decision_block=decision_block)
         builder = DiagramBuilder()
         builder.AddSystem(self._model.diagram)
         ports = [self._model.diagram.GetOutputPort(name) for name in RECORDED]
@@ -151,6 +153,11 @@ class Recorder:
         trace = Trace(meta, signals, decisions, timings, _problems(decided), proposals)
         meta["events"] = extract(trace, sent)
         return trace
+
+
+def _with_rule(scenario: Scenario, run: Run) -> Scenario:
+    """The scenario as the run has it: with its own rule of the gatekeeper, if it names one."""
+    return replace(scenario, gatekeeper=replace(scenario.gatekeeper, rule=run.rule)) if run.rule else scenario
 
 
 def _controllers(model: Model) -> dict[str, Any]:

@@ -25,6 +25,7 @@ class Rules:
     Attributes:
         switching_margin: relative gain that a reversal needs over keeping the answer throughout.
         min_dwell: least time between opposite answers to a proposal, s.
+        first_stage: the paper's own rule: the first stage of every plan is the answer, whatever was answered before.
         budget: of one solution, in counts.
         budget_share: of the sampling period that all solutions of a sample may take by the clock; None: no limit.
         clock: what that is measured with.
@@ -32,6 +33,7 @@ class Rules:
 
     switching_margin: float = 0.0
     min_dwell: float = 0.0
+    first_stage: bool = False
     budget: Budget = field(default_factory=Budget)
     budget_share: float | None = None
     clock: Clock = time.monotonic
@@ -53,6 +55,7 @@ class Rules:
 
 Reason = Literal[
     "cheaper", "not_cheaper", "waits", "no_difference", "kept", "dwell", "reversed", "no_plan",
+    "first_stage",
     "stalls", "makes_way", "exhausted", "no_progress", "over",
 ]  # fmt: skip
 """Why an answer is what it is: see `settle` for method (c), `outcome_gatekeeper` for method (d)."""
@@ -65,6 +68,7 @@ WORDS: dict[Reason, str] = {
     "kept": "as answered before",
     "dwell": "as answered before: it is too early for another answer",
     "reversed": "the best plan begins with the other answer, and is cheaper than this one throughout",
+    "first_stage": "the best plan begins with this answer",
     "no_plan": "no outcome could be computed",
     "stalls": "with the proposal the UGV would come to rest short of its goal, no nearer than without",
     "makes_way": "the UGV makes way for the one whose trigger the proposal is for, and gets to its goal all the same",
@@ -157,7 +161,9 @@ def settle(
 ) -> tuple[bool, Reason]:
     """Whether the proposal is accepted, and why.
 
-    Without a plan (the data are not finite) it is refused, whatever stands. A new proposal is accepted if the best plan
+    Without a plan (the data are not finite) it is refused, whatever stands. By the rule `first_stage` the answer is, at
+    every sample, the first stage of the rounded plan, or of the optimum if the route rounds nothing. Otherwise there is
+    hysteresis. A new proposal is accepted if the best plan
     starts by accepting it, unless it makes no difference. If that plan accepts it later, the proposal is refused as
     well, even if accepting throughout costs less than refusing throughout: so a UGV may wait for ever.
 
@@ -175,6 +181,9 @@ def settle(
     """
     if not solution.has_plan:
         return False, "no_plan"
+    if rules.first_stage:
+        plan = solution.plan if solution.rounded is None else solution.rounded
+        return plan is not None and bool(plan[0] == 1.0), "first_stage"
     if standing == SILENT:
         return _first_answer(solution, throughout)
     accepted = standing == ACCEPT

@@ -27,7 +27,7 @@ from airground_drake.trace import Trace
 from airground_drake.verify import Verdict, verify_all
 from airground_drake.verify.registry import model_claims
 
-PACKAGES = ("airground_drake", "drake", "numpy", "scipy", "numba", "pandas", "matplotlib")
+PACKAGES = ("airground_drake", "drake", "numpy", "scipy", "numba", "pandas", "matplotlib", "daqp")
 
 
 class Judged(NamedTuple):
@@ -123,12 +123,19 @@ def provenance(scenario: Scenario, started: datetime, command: str) -> dict[str,
         "drake": versions.pop("drake"),
         "python": platform.python_version(),
         "packages": versions,
+        "solver": _solver(scenario, versions["daqp"]),
         "platform": platform.platform(),
         "git": _git(),
         "seed": scenario.seed,
         "started": started.isoformat(timespec="seconds"),
         "command": command,
     }
+
+
+def _solver(scenario: Scenario, daqp: str) -> str:
+    """What solves (26) under method (c)."""
+    route = scenario.gatekeeper.route
+    return f"DAQP {daqp}, one thread" if route == "mixed_integer" else f"that of the route {route}"
 
 
 def _git() -> str:

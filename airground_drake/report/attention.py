@@ -20,6 +20,7 @@ REFUSED = {
     "waits": "the best plan began by refusing and accepted later",
     "not_cheaper": "its own task looked as good, or better",
     "no_difference": "it would have changed nothing",
+    "first_stage": "the best plan began by refusing",
     "no_plan": "no outcome could be computed",
     "stalls": "with the proposal it would have come to rest short of its goal, no nearer than without",
     "exhausted": "it had gone along as often as it does without a rest",

@@ -59,8 +59,10 @@ def gatekeeper(trace: Trace) -> dict[str, Any] | None:
 
     Returns:
         `calls`, `decisions` (decision -> count), `solver_failures` (decisions for which the solver failed, so
-        that they rest on the best plan known), `refusals` (robot -> reason -> proposals refused at the first
-        answer), `max_gap` (largest optimality gap), `period_s` of the gatekeeper, `time_s` (p50, p99, max
+        that they rest on the best plan known), `budget_spent` (the same for those that met the limit of their budget),
+        `refusals` (robot -> reason -> proposals refused at the first
+        answer), `max_gap` (largest optimality gap), `gaps` (decisions with a gap of 0, up to
+        1 %, and more), `period_s` of the gatekeeper, `time_s` (p50, p99, max
         of the CPU times, order statistics), `late` (decisions that took a period or longer; simulated time waits for
         them) and `closest_call`: where the costs of accepting and refusing were closest,
         relative to the smaller one, so that nobody has to trust a knife edge. None where not recorded.
@@ -78,11 +80,27 @@ def gatekeeper(trace: Trace) -> dict[str, Any] | None:
         "decisions": {str(name): int(count) for name, count in table["decision"].value_counts().sort_index().items()},
         "solver_failures": int((table["status"] == "solver_failed").sum()),
         "refusals": _refusals(trace),
+        "budget_spent": int((table["status"] == "budget_spent").sum()),
         "max_gap": float(gaps.max()) if len(gaps) else None,
+        "gaps": _gaps(table["gap"].to_numpy(dtype=np.float64)),
         "period_s": period,
         "time_s": time_s or None,
         "late": int((times >= period).sum()) if times.size else None,
         "closest_call": _closest_call(trace),
+    }
+
+
+NO_GAP = 1e-9
+"""Gaps up to this, relative, are 0 but for rounding."""
+
+
+def _gaps(gaps: Array) -> dict[str, int]:
+    """How many decisions have no gap, one up to 1 %, and a larger one; -1 is unknown."""
+    none = (gaps <= NO_GAP) & (gaps != -1.0)
+    return {
+        "zero": int(none.sum()),
+        "up_to_1_percent": int(((gaps > NO_GAP) & (gaps <= 0.01)).sum()),
+        "more": int((gaps > 0.01).sum()),
     }
 
 

@@ -34,6 +34,7 @@ from airground_drake.scenarios.validate import (
     MAX_STAGES,
     MAX_TEXT,
     NAME_PATTERN,
+    RULES,
     SMALLEST,
     SOURCES,
     THRESHOLD_RULES,
@@ -53,6 +54,8 @@ _ONE_OF: dict[tuple[str, str], Iterable[str]] = {
     ("Decision", "trigger"): TRIGGERS,
     ("Intervention", "ranking"): RANKINGS,
     ("Gatekeeper", "budget"): BUDGETS,
+    ("Gatekeeper", "rule"): RULES,
+    ("Run", "rule"): ("", *RULES),
     ("Choice", "source"): SOURCES,
 }
 _REGISTERED = {("Uav", "task"): UAV_TASKS, ("Gatekeeper", "route"): ROUTES, ("Policy", "name"): POLICIES}

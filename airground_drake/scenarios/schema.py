@@ -197,8 +197,9 @@ class Gatekeeper:
     """The accept/refuse decision, eqs (21)-(29).
 
     Under method (c) a decision on a proposal is reversed only for a plan that is cheaper by the (relative) switching
-    margin, and not before `min_dwell_s` have passed. A decision may take `budget_iterations` of the solver of
-    a relaxation and a second of the search of `mixed_integer` (budget 'counted': a run is the same on every machine
+    margin, and not before `min_dwell_s` have passed. That is ours: by the paper's own rule, `first_stage`, the first
+    stage of each plan is executed, whatever was answered before. A decision may take `budget_iterations` of the solver
+    of a relaxation and a second of the search of `mixed_integer` (budget 'counted': a run is the same on every machine
     unless a search meets that limit, which the report counts), or besides the share `budget_share` of the sampling
     period by the clock (budget 'wall_clock': for real time). `terminal_weight_s` is the
     w of a terminal cost w a ||rho_rd - rho_N||^2 besides (25); the paper has none.
@@ -225,6 +226,8 @@ class Gatekeeper:
     """Weight of the slack of the soft constraints in (25)."""
     terminal_weight_s: float = field(default=0.0, metadata=FROM_ZERO)
     """w of a terminal cost that the paper does not have."""
+    rule: str = "hysteresis"
+    """How a plan becomes the answer under method (c): with margin and dwell, or by its first stage alone."""
     switching_margin: float = field(default=0.05, metadata=FROM_ZERO)
     """How much cheaper, relatively, a plan must be to reverse a decision of method (c)."""
     min_dwell_s: float = field(default=0.2, metadata=FROM_ZERO)
@@ -262,6 +265,8 @@ class Run:
     """How UAV and UGVs are coupled."""
     composition: str = "augmented"
     """How avoidance is composed with the tasks below: 'augmented' or a reading of recursion (5)."""
+    rule: str = ""
+    """Instead of `gatekeeper.rule`, in this run; '': that one."""
     stalls_m: dict[str, Vector] = field(default_factory=dict)
     """Where UGVs must end short of their target, by UGV."""
     expected: dict[str, str] = field(default_factory=dict)

@@ -46,6 +46,7 @@ TRIGGERS: tuple[str, ...] = ("automaton", "bare")
 THRESHOLD_RULES: tuple[str, ...] = ("fixed", *COMPUTED)
 SOURCES: tuple[str, ...] = ("calibrated", "ours")
 BUDGETS: tuple[str, ...] = ("counted", "wall_clock")
+RULES: tuple[str, ...] = ("hysteresis", "first_stage")
 
 MAX_STAGES = 1000
 MAX_TEXT = 10_000  # characters
@@ -201,6 +202,7 @@ def _options(scenario: Scenario) -> Problems:
     yield from _registered("uav.task", scenario.uav.task, UAV_TASKS)
     for index, policy in enumerate(scenario.intervention.policies):
         yield from _registered(f"intervention.policies.{index}.name", policy.name, POLICIES)
+    yield from _one_of("gatekeeper.rule", scenario.gatekeeper.rule, RULES)
     yield from _one_of("gatekeeper.budget", scenario.gatekeeper.budget, BUDGETS)
     yield from _one_of("decision.trigger", scenario.decision.trigger, TRIGGERS)
     yield from _one_of("decision.threshold.rule", scenario.decision.threshold.rule, THRESHOLD_RULES)
@@ -210,6 +212,7 @@ def _runs(scenario: Scenario) -> Problems:
     for name, run in scenario.runs.items():
         yield from _one_of(f"runs.{name}.method", run.method, METHODS)
         yield from _one_of(f"runs.{name}.composition", run.composition, COMPOSITIONS)
+        yield from _one_of(f"runs.{name}.rule", run.rule, ("", *RULES), "'' (gatekeeper.rule) or one of")
         for robot in run.stalls_m:
             yield from _one_of(f"runs.{name}.stalls_m.{robot}", robot, scenario.ugvs, "one of the UGVs")
         for claim, status in run.expected.items():

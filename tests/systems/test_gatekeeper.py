@@ -199,3 +199,15 @@ def test_with_no_time_left_the_better_constant_plan_decides(
     best = decisions[["accept_throughout", "refuse_throughout"]].min(axis=1)
     assert decisions["objective"].to_numpy() == pytest.approx(best.to_numpy(), rel=1e-9)
     assert set(decisions["decision"]) == {"accept"}
+
+
+@pytest.mark.parametrize(("name", "policy"), [("case_a", "detour"), ("case_b", "detour")])
+def test_by_the_papers_own_rule_no_acceptance_lasts(name: str, policy: str) -> None:
+    """The first stage of each plan is executed: the detour is accepted, and given back on the way; c keeps it."""
+    scenario = load(name)[0]
+    literal, ours = (simulate(scenario, run).decisions for run in ("c_literal", "c"))
+    answers = [decisions[decisions["policy"] == policy]["decision"].tolist() for decisions in (literal, ours)]
+    assert answers[0][0] == answers[1][0] == "accept"
+    assert "refuse" in answers[0]
+    assert "refuse" not in answers[1]
+    assert set(literal["reason"]) == {"first_stage"}

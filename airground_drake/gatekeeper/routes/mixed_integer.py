@@ -32,8 +32,8 @@ class MixedIntegerRoute:
     constant plans and what is left of the previous plan is improved by changing one choice at a time. The cost of that
     plan, the incumbent, cuts the search.
 
-    The plan returned is the cheapest by exact distances of the optimum, the incumbent, the constant plans, and each
-    of the first two with the other first choice. `route_bound` is the optimum along the half-planes; the gap is 0.
+    The plan returned is the cheapest by exact distances of the optimum, the incumbent, what that was chosen from, and
+    each of these with the other first choice. `route_bound` is the optimum along the half-planes; the gap is 0.
 
     Budget: the search has a limit in time, `search_s`, because DAQP counts no nodes. At that limit, and when the
     solver fails, the incumbent decides, which does not depend on the clock; its bound is that of the relaxation.
@@ -63,16 +63,19 @@ class MixedIntegerRoute:
         normals = normals_along(problem, constants.better.positions)
         binary = self._program(problem)
         binary.update(problem, normals)
-        bound, incumbent = _incumbent(binary, problem, normals)
+        bound, known_plans = _known(binary, problem, normals)
+        costs = [problem.evaluate_half_planes(problem.positions(plan), normals) for plan in known_plans]
+        start = known_plans[int(np.argmin(costs))]
+        incumbent = _improved(problem.kinematics, problem.terms, normals, binary.block, start)
         known = problem.evaluate_half_planes(problem.positions(incumbent), normals)
         found = minimise(binary, known=known, seconds=min(budget.search_s, budget.left_s()))
         status: Status = found.ended
-        plans = [incumbent]
+        plans = [incumbent, *known_plans]
         if found.omega is not None:
             optimum = binary.plan(found.omega)
             cost = problem.evaluate_half_planes(problem.positions(optimum), normals)
             if abs(cost - known) <= _AGREE * known or cost < known:
-                plans, bound = [optimum, incumbent], min(cost, known)
+                plans, bound = [optimum, *plans], min(cost, known)
             else:
                 status = "solver_failed"
         turned = [np.where(binary.block == 0, 1.0 - plan[0], plan) for plan in plans]
@@ -93,8 +96,8 @@ class MixedIntegerRoute:
         return self._programs[size]
 
 
-def _incumbent(binary: BinaryProgram, problem: Problem, normals: Array) -> tuple[float, Array]:
-    """A lower bound by the relaxation, and a good plan (N,), without a search by the clock."""
+def _known(binary: BinaryProgram, problem: Problem, normals: Array) -> tuple[float, list[Array]]:
+    """A lower bound by the relaxation, and plans (N,) that need no search."""
     count = len(binary.omega)
     known = [np.ones(count), np.zeros(count)]
     if problem.previous is not None:
@@ -104,9 +107,7 @@ def _incumbent(binary: BinaryProgram, problem: Problem, normals: Array) -> tuple
         known.append(sum_up_rounding(relaxed))
         omega = binary.plan(relaxed)
         bound = dual_bound(problem, normals, omega, multipliers_at(problem, normals, problem.positions(omega)))
-    costs = [problem.evaluate_half_planes(problem.positions(binary.plan(values)), normals) for values in known]
-    start = binary.plan(known[int(np.argmin(costs))])
-    return bound, _improved(problem.kinematics, problem.terms, normals, binary.block, start)
+    return bound, [binary.plan(values) for values in known]
 
 
 @njit(cache=True)

@@ -75,9 +75,9 @@ class GateFeas(GateClaim):
     method = (
         "All recomputed in numpy from the scenario, the signals and the recorded mode velocities. A sensed obstacle or "
         "robot may be missing only if no plan can come within its safe distance. The rules (no difference below a "
-        "relative gain of 1e-6, switching margin, dwell) are run again over the decisions of each UGV, which "
-        "must follow each other without a gap while a proposal stands; a proposal that stands for a period of the "
-        "planner and one of the gatekeeper must have one. No step of a constant plan is longer than the speed "
+        "relative gain of 1e-6, switching margin, dwell; or the first stage alone) are run again over those of each "
+        "UGV, which must follow each other without a gap while a proposal stands; a proposal that stands for a period "
+        "of the planner and one of the gatekeeper must have one. No step of a constant plan is longer than the speed "
         "limit allows, except where it begins more than 1e-6 m inside a safe distance: "
         "avoidance may then demand more. The same goes for other plans, where the constant plan of their stage's "
         "choice keeps clear. "
@@ -280,6 +280,7 @@ def _clear(row: Row, positions: Array, period: float) -> npt.NDArray[np.bool_]:
 def compare_answers(trace: Trace, rows: Sequence[Row]) -> Iterator[Off]:
     """The answers against the rules, decision by decision, and the times of the decisions."""
     gate = trace.scenario["gatekeeper"]
+    literal = (trace.scenario["runs"][trace.run]["rule"] or gate["rule"]) == "first_stage"
     yield from compare_times(trace, rows)
     for ugv in trace.ugvs:
         last: Row | None = None
@@ -290,7 +291,7 @@ def compare_answers(trace: Trace, rows: Sequence[Row]) -> Iterator[Off]:
             if last is not None and last.given["number"] != given["number"]:
                 last = None
             standing = None if last is None else str(last.given["decision"])
-            accept, reason = rule(row, standing, t - since, gate)
+            accept, reason = rule(row, standing, t - since, gate, literal=literal)
             ours = ("accept" if accept else "refuse", reason)
             theirs = (given["decision"], given["reason"])
             yield Off(row, "answer or reason", float(ours != theirs), 0.0, recomputed=list(ours), standing=standing)
@@ -298,7 +299,9 @@ def compare_answers(trace: Trace, rows: Sequence[Row]) -> Iterator[Off]:
             last = row
 
 
-def rule(row: Row, standing: str | None, stood: float, gate: dict[str, Any]) -> tuple[bool, str]:
+def rule(
+    row: Row, standing: str | None, stood: float, gate: dict[str, Any], *, literal: bool = False
+) -> tuple[bool, str]:
     """Whether a proposal is accepted and why, from the recorded costs.
 
     Args:
@@ -306,10 +309,14 @@ def rule(row: Row, standing: str | None, stood: float, gate: dict[str, Any]) -> 
         standing: the answer to this proposal so far, or None.
         stood: for how long it has been that, s.
         gate: the scenario's margins.
+        literal: the first stage of the rounded plan is the answer, whatever stands; of the plan if none was rounded.
     """
     given = row.given
     if not row.planned:
         return False, "no_plan"
+    if literal:
+        plan = row["plan"] if row.data["rounded"] is None else row["rounded"]
+        return bool(plan[0] == 1.0), "first_stage"
     if standing is None:
         gains = given["objective"] < (1.0 - NO_DIFFERENCE) * given["refuse_throughout"]
         if row["plan"][0] != 1.0:

@@ -124,6 +124,8 @@ def test_without_decisions_it_has_not_run_though_something_was_executed(relaxed:
     st.sampled_from([0.0, 0.05, 0.2]),
     st.booleans(),
     st.booleans(),
+    st.booleans(),
+    st.sampled_from([None, 0.0, 1.0]),
 )
 def test_the_rules_are_those_of_the_running_gatekeeper(
     costs: tuple[float, float],
@@ -133,18 +135,21 @@ def test_the_rules_are_those_of_the_running_gatekeeper(
     margin: float,
     equal: bool,
     planned: bool,
+    literal: bool,
+    rounded: float | None,
 ) -> None:
     accept, refuse = (costs[0], costs[0]) if equal else costs
     status: Any = "optimal" if planned else "refused_not_finite"
-    decision = Solution(accept <= refuse, status, objective=min(costs))
     kept = throughout
     plan = np.array([float(accept <= refuse)]) if planned else None
+    first = None if rounded is None else np.array([rounded])
+    decision = Solution(accept <= refuse, status, objective=min(costs), plan=plan, rounded=first)
     given = {"objective": min(costs), "accept_throughout": kept[0], "refuse_throughout": kept[1]}
-    row = Row(given, 1.0, 1.0, 1.0, 0.0, {"plan": plan})
+    row = Row(given, 1.0, 1.0, 1.0, 0.0, {"plan": plan, "rounded": first})
     gate = {"switching_margin": margin, "min_dwell_s": 0.2}
     stands = {SILENT: None, ACCEPT: "accept", REFUSE: "refuse"}[standing]
-    rules = Rules(switching_margin=margin, min_dwell=0.2)
-    assert gate_feas.rule(row, stands, stood, gate) == settle(decision, kept, standing, stood, rules)
+    rules = Rules(switching_margin=margin, min_dwell=0.2, first_stage=literal)
+    assert gate_feas.rule(row, stands, stood, gate, literal=literal) == settle(decision, kept, standing, stood, rules)
 
 
 @pytest.mark.parametrize("run_name", ["c", "d"])
