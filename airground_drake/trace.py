@@ -12,7 +12,8 @@ Columns (units in the names; one set per robot or UGV):
     <robot>.vx_m_s .vy_m_s .vz_m_s            command in force up to this row
     <ugv>.ref_x_m .ref_y_m .ref_z_m           preset trajectory rho_rd(t)
     <ugv>.noise_m                             integrated noise of (15)
-    <ugv>.decision_variable_m                 x = ||rho_rd - rho|| + noise
+    <ugv>.decision_variable_m                 x, the signal that the trigger has: ||rho_rd - rho|| + noise, unless
+                                              another block computes it
     <ugv>.mode                                0 supervising, 1 intervening, 2 refractory
     <ugv>.triggers                            number of triggers so far
     <ugv>.triggered_at_s .released_at_s       time of the last one, -1 before the first
@@ -119,8 +120,9 @@ class Trace:
         meta: strict JSON: `schema`, `run` (identifier), `method`, `composition`, `seed`, `robots`, `ugvs`
             (names, array order; the UAV is the last robot), `zeta_m` (threshold in force), `scenario` (the
             resolved scenario as nested dicts), `events` (list, by time), `controllers` (what the controllers were
-            built with, read back from the diagram: see `systems.controllers.read_back`), `faults` (list of what
-            went wrong in a policy or solver).
+            built with, read back from the diagram: see `systems.controllers.read_back`), `decision_block` (name of
+            the class that computes the decision variables, read back from the diagram; empty for that of (15)),
+            `faults` (list of what went wrong in a policy or solver).
         signals: see the module's docstring.
         decisions: see DECISION_COLUMNS.
         problems: see PROBLEM_ARRAYS.
