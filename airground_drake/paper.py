@@ -33,7 +33,7 @@ class Deviation(NamedTuple):
     findings: tuple[int, ...] = ()
 
 
-_PROGRAM = ("gatekeeper.problem:Problem",)
+_PROGRAM = ("gatekeeper.problem:Problem", "gatekeeper.binary_program:BinaryProgram")
 
 DEVIATIONS: tuple[Deviation, ...] = (
     Deviation("(1)", "task value sigma = f(rho)", ("nsbc.task:Task.value",), "faithful"),

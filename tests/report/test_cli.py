@@ -45,7 +45,10 @@ def test_the_reproduction_table_meets_its_targets(report: Report) -> None:
     assert "ours rounds to 3.4 m, the paper prints 3.3 m" in rows["A1"]["why"]
     page = (report("case_a") / "report.html").read_text()
     banner = " ".join(page[page.index('class="banner') :].partition("</section>")[0].split())
-    assert "Paper's results, 8 in all: 1 reproduced untuned; 6 reproduced after calibration; <strong>not reproduced: A8" in banner
+    assert (
+        "Paper's results, 8 in all: 1 reproduced untuned; 6 reproduced after calibration; <strong>not reproduced: A8"
+        in banner
+    )
     assert "the scenario admits either verdict for 4 of them" in banner
     assert page.count("stuck, as declared</span>") >= 1
     assert document["runs"]["d"]["metrics"]["min_distance_m"]["ugv1"]["obstacle_1"]["value"] >= 2.0 - 1e-9
