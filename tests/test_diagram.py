@@ -88,8 +88,8 @@ def test_shipped_pictures_are_current() -> None:
 
 def test_an_outdated_picture_is_noticed() -> None:
     pictures = graphviz.pictures()
-    assert not graphviz.is_current("case_a.dot", pictures["case_a.dot"], pictures["case_a_table1.dot"])
-    assert not graphviz.is_current("case_a.svg", pictures["case_a.svg"], pictures["case_a_table1.svg"])
+    assert not graphviz.is_current("case_a.dot", pictures["case_a.dot"], pictures["case_b.dot"])
+    assert not graphviz.is_current("case_a.svg", pictures["case_a.svg"], pictures["case_b.svg"])
 
 
 def test_data_flows_one_way() -> None:
