@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 NEEDED = ("report", "files", "trace")
 """Checks that must agree before claims are judged again: else the files are not those of the report."""
+EXIT_UNUSABLE = 2
+"""Of `airground prove`: without Coq, or with a report that it cannot read."""
 
 
 def parser() -> argparse.ArgumentParser:
@@ -51,7 +53,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     lines += judged_again(options.report, lines, options.limit_s)
     if options.coq:
-        lines.append(_proved_again(options.report))
+        lines += _proved_again(options.report)
     checker.show(lines, options.report, as_json=options.json)
     return checker.verdict(lines)
 
@@ -79,11 +81,25 @@ def judged_again(folder: Path, lines: Sequence[Line], limit_s: float) -> Iterato
         yield line("report", "", OPEN, f"not all was judged again: {why[0]}", "the files can be judged")
 
 
-def _proved_again(folder: Path) -> Line:
-    from airground_drake.check.report import AGREES, DISAGREES, Line
+def _proved_again(folder: Path) -> Iterator[Line]:
+    """What Coq says of each run, from positions written anew."""
+    from airground_drake.check.files import read_json
+    from airground_drake.check.report import AGREES, DISAGREES, OPEN, Line
+    from airground_drake.check.rules import Disagreement, NotEstablished
 
+    line = partial(Line, "proofs", by="Coq")
     command = [sys.executable, "-P", "-m", "airground_drake", "prove", str(folder)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
-    said = (done.stdout or done.stderr).strip().splitlines()
-    outcome = DISAGREES if done.returncode else AGREES
-    return Line("proofs", "", outcome, said[-1] if said else "nothing was said", "", by="Coq")
+    try:
+        found = read_json(folder / "proofs" / "proofs.json") if done.returncode < EXIT_UNUSABLE else {"runs": {}}
+    except (Disagreement, NotEstablished) as error:
+        yield line("", OPEN, f"what Coq found cannot be read: {error}", "what Coq found can be read")
+        return
+    for run, entry in found["runs"].items():
+        kept, law = entry["distances"]["proved"], entry["law"]["proved"]
+        outcome = AGREES if kept or not entry["expected"] else DISAGREES
+        words = "machine-checked for this run: " if kept else "not proved: "
+        says = f"{words}every distance is kept; the law {'is obeyed without error' if law else 'is not proved'}"
+        yield line(run, outcome, says, "" if outcome == AGREES else "expected distances are kept")
+    if not found["runs"]:
+        yield line("", OPEN, (done.stderr.strip().splitlines() or ["Coq said nothing"])[-1], "Coq can be asked")

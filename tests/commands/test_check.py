@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -74,3 +76,12 @@ def test_usage_and_what_is_no_report(tmp_path: Path, capsys: pytest.CaptureFixtu
     for arguments in ([], [str(tmp_path)], ["--limit-s", "0", str(tmp_path)]):
         assert check.main(arguments) == 2
         assert capsys.readouterr().err.count("\n") == 1
+
+
+@pytest.mark.skipif(shutil.which("coqc") is None and not os.environ.get("CI"), reason="Coq is not installed")
+def test_coq_proves_the_runs_again(short: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert check.main(["--json", "--coq", str(copy(short, tmp_path / "copy"))]) == 0
+    lines = json.loads(capsys.readouterr().out)["checks"]
+    (proved,) = (line for line in lines if line["by"] == "Coq")
+    assert (proved["run"], proved["outcome"]) == ("d", "agrees")
+    assert proved["text"].startswith("machine-checked for this run: every distance is kept; the law is obeyed")
