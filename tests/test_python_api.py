@@ -99,7 +99,7 @@ def test_a_seed_is_checked_like_that_of_a_file(case_a: Scenario, seed: Any) -> N
 
 
 def test_unknown_names_say_what_is_allowed(case_a: Scenario) -> None:
-    with pytest.raises(UnknownNameError, match="unknown run 'z'; allowed: a, b, c, d"):
+    with pytest.raises(UnknownNameError, match="unknown run 'z'; allowed: a, b, c, c_literal, d"):
         simulate(case_a, "z")
     with pytest.raises(UnknownNameError, match="unknown method 'z'; allowed: a, b, c, d"):
         build_diagram(case_a, method="z")

@@ -140,10 +140,10 @@ def test_a_report_counts_what_was_not_exercised_apart(report: Callable[[str], Pa
     document = json.loads((report("case_b") / "report.json").read_text(encoding="utf-8"))
     overall = document["overall"]
     assert overall["not_exercised"] == [
-        *({"id": "ZENO-TRACE", "run": run} for run in "bcd"),
+        *({"id": "ZENO-TRACE", "run": run} for run in ("b", "c", "c_literal", "d")),
         {"id": "THR-CHOICE", "run": ""},  # its threshold is declared
     ]
-    assert overall["counts"]["not_exercised"] == 4
-    assert overall["counts"]["holds"] == sum(c["status"] == "holds" for c in document["claims"]) - 4
-    assert overall["why"].endswith("4 of them had nothing to check: ZENO-TRACE on run b, c, d; THR-CHOICE.")
+    assert overall["counts"]["not_exercised"] == 5
+    assert overall["counts"]["holds"] == sum(c["status"] == "holds" for c in document["claims"]) - 5
+    assert overall["why"].endswith("5 of them had nothing to check: ZENO-TRACE on run b, c, c_literal, d; THR-CHOICE.")
     assert all(claim["exercised"] is not None and claim["exercised_by"] for claim in document["claims"])

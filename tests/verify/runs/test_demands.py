@@ -148,8 +148,8 @@ def test_they_are_read_from_the_controllers_in_the_diagram(monkeypatch: pytest.M
     """Whoever changes the system after it was built is found out, too."""
     right = simulation.build_model
 
-    def wrong(*args: Any) -> Model:
-        model = right(*args)
+    def wrong(*args: Any, **more: Any) -> Model:
+        model = right(*args, **more)
         controller = model.diagram.GetSubsystemByName("ugvs").GetSubsystemByName("ugv_controller")
         controller._max_speed = 2.0 * controller._max_speed
         return model

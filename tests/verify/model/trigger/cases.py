@@ -7,7 +7,7 @@ from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorC
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
 from pydrake.systems.primitives import ConstantVectorSource, Integrator, LogVectorOutput, ZeroOrderHold
 
-from airground_drake.systems.decision import FIELDS, EventTrigger
+from airground_drake.systems.decision import FIELDS, DecisionVariable, EventTrigger
 
 NOISE = {"noise_m_sqrt_s": 0.004, "leak_1_s": 0.0, "noise_period_s": 0.05, "duration_s": 30.0}
 
@@ -19,12 +19,15 @@ def simulate(system: EventTrigger, noise: LeafSystem, until: float, step: float,
     builder = DiagramBuilder()
     builder.AddNamedSystem("noise", noise)
     builder.AddNamedSystem("event_trigger", system)
+    variable = builder.AddNamedSystem("decision_variable", DecisionVariable(noise.get_output_port().size()))
+    for port in ("decision_variable", "decision_range"):
+        builder.Connect(variable.GetOutputPort(port), system.GetInputPort(port))
     count = noise.get_output_port().size()
     reference = np.concatenate([[error_m, 0.0, 0.0] * count, np.zeros(3 * count)])
     for name, value in (("team_position", np.zeros(3 * count + 3)), ("reference", reference)):
         constant = builder.AddNamedSystem(name, ConstantVectorSource(value))
-        builder.Connect(constant.get_output_port(), system.GetInputPort(name))
-    builder.Connect(noise.get_output_port(), system.GetInputPort("noise"))
+        builder.Connect(constant.get_output_port(), variable.GetInputPort(name))
+    builder.Connect(noise.get_output_port(), variable.GetInputPort("noise"))
     # steps end at the multiples of `step`, as they do at the noise samples in the diagram; they need a continuous state
     clock = builder.AddNamedSystem("clock", Integrator(1))
     sampled = builder.AddNamedSystem("sampled", ZeroOrderHold(step, 1))
