@@ -96,7 +96,7 @@ def _sampled(table: pd.DataFrame, scenario: Json) -> tuple[Array, Mapping[str, A
     robots, obstacles = robots_of(scenario), scenario["obstacles"]
     names = table["body"].astype(str)
     if strange := sorted({*names} - {*robots}):
-        raise UnusableError(f"body {strange[0]!r} is no robot of the scenario; its robots are {', '.join(robots)}")
+        raise UnusableError(f"body {strange[0]!r} is not a robot of the scenario; its robots are {', '.join(robots)}")
     found: dict[str, Array] = {}
     times: dict[str, Array] = {}
     for robot in robots:
@@ -124,5 +124,5 @@ def _numbers(rows: pd.DataFrame, robot: str) -> Any:
     numbers = np.column_stack(values)
     if not np.isfinite(numbers).all():
         k = int(np.argmax(~np.isfinite(numbers).all(axis=1)))
-        raise UnusableError(f"{robot}: row {rows.index[k]} has a value that is no finite number")
+        raise UnusableError(f"{robot}: row {rows.index[k]} has a value that is not a finite number")
     return numbers

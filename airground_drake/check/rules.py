@@ -60,7 +60,7 @@ class Found:
 
     Attributes:
         status: the verdict.
-        margin: None if there is none.
+        margin: distance from refutation; None where the claim has no number.
         exercised: how often the claim was put to the test, at least and at most; they differ where rounding decides.
         because: the broken rule that refutes the claim; None if its margin decides.
     """

@@ -129,10 +129,7 @@ def safe_hyp(run: Run) -> Found:
         if run.apart_m[pair.robot, pair.other] > pair.safe_m + pair.closing_m_s * period + FAR_M:
             continue
         own, other = run.position_m[pair.robot][rows], run.position_m[pair.other][rows]
-        missed, start = shortfall_m(own, other, pair, gain, last), float(np.linalg.norm(own[0] - other[0]))
-        lost = max(
-            lost, lost_m(missed, gain, len(run.sample_row)), pair.safe_m - start if start < pair.safe_m - FAR_M else 0.0
-        )
+        lost = max(lost, lost_m(shortfall_m(own, other, pair, gain, last), gain, len(run.sample_row)))
     return Found("holds" if lost <= SMALL else "refuted", -lost if lost <= SMALL else None)
 
 

@@ -147,8 +147,8 @@ def check_files(folder: Path, there: Sequence[str], recorded: Json) -> str:
     return f"{len(found)} files"
 
 
-ADDED_LATER = "proofs"
-"""Beginning of the names of files that `airground prove` adds to a report."""
+ADDED_LATER = "proofs/"
+"""Folder of the files that `airground prove` adds to a report."""
 
 
 def _overall(report: Json) -> Json:

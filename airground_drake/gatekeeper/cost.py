@@ -63,17 +63,6 @@ def add_stage(total: float, terms: Terms, k: int, x: float, y: float, z: float, 
 
 
 @njit(cache=True)
-def stage_cost(terms: Terms, k: int, x: float, y: float, z: float) -> float:
-    """What stage k adds to (25) if it ends in (x, y, z), m; roots are drawn only within a safe distance."""
-    slack = 0.0
-    for m in range(len(terms.distances)):
-        squared = _squared_distance(terms, k, m, x, y, z)
-        if squared < terms.distances[m] ** 2:
-            slack = max(slack, terms.distances[m] - np.sqrt(squared))
-    return terms.dt * add_stage(0.0, terms, k, x, y, z, slack)
-
-
-@njit(cache=True)
 def plan_cost(terms: Terms, positions: Array) -> tuple[float, float]:
     """(25) by the right-hand rectangle rule through positions (N, 3), m, and the least distance minus d, m.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
@@ -10,6 +11,8 @@ import pytest
 from check.tampering.base import claim_of, copy, edited_report, edited_scenarios, judged, mend
 
 from airground_drake import check
+from airground_drake.check.run import read_run
+from airground_drake.check.safety import safe_hyp
 from airground_drake.report import rebuild
 from airground_drake.report.__main__ import main as write
 
@@ -85,3 +88,17 @@ def test_what_is_expected_of_a_claim_of_others_is_the_scenarios(
     assert check.main(["--json", str(tmp_path / "r")]) == 1
     found = [one for one in json.loads(capsys.readouterr().out)["checks"] if one["claim"] == "MINE"]
     assert [one["rule"] for one in found] == ["expected verdict"] * 2
+
+
+def test_the_checker_decides_the_hypotheses_by_itself(report: Path) -> None:
+    """Run b of case B hits an obstacle: its steps break the inequalities, and no other hypothesis."""
+    document = json.loads((report / "report.json").read_text(encoding="utf-8"))
+    runs = {name: read_run(report / "trace" / name, name, document) for name in "bd"}
+    found = {name: safe_hyp(run) for name, run in runs.items()}
+    assert [(each.status, each.because) for each in found.values()] == [("refuted", None), ("holds", None)]
+    assert found["d"].margin == pytest.approx(0.0, abs=1e-12)
+    for key, value in (("avoidance_gain_1_s", 1e3), ("sensing_range_m", 2.0)):
+        scenario = {**runs["d"].scenario, "control": {**runs["d"].scenario["control"], key: value}}
+        broken = safe_hyp(replace(runs["d"], scenario=scenario))
+        assert broken.status == "refuted"
+        assert broken.because is not None

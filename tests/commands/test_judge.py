@@ -80,11 +80,11 @@ def test_parquet_and_the_text_for_people(run: Run, tmp_path: Path, capsys: pytes
     ("edit", "says"),
     [
         (lambda table: table.drop(columns="z_m"), "its columns are"),
-        (lambda table: table.assign(body=table["body"].replace("ugv1", "car")), "body 'car' is no robot"),
+        (lambda table: table.assign(body=table["body"].replace("ugv1", "car")), "body 'car' is not a robot"),
         (lambda table: table[table["body"] != "ugv2"], "ugv2 has 0 rows"),
         (
             lambda table: table.assign(x_m=table["x_m"].where(table.index != 7)),
-            "row 7 has a value that is no",
+            "row 7 has a value that is not a finite number",
         ),
         (lambda table: table.iloc[::-1], "does not come after the row before"),
         (lambda table: table.drop(index=3), "are not sampled at the same times"),

@@ -180,3 +180,8 @@ def file_outside_named(folder: Path) -> None:
     outside.write_bytes(b"")
     with edited_report(folder) as report:
         report["files"][f"../{outside.name}"] = hashlib.sha256(b"").hexdigest()
+
+
+@tampering(mended=False)
+def file_added_whose_name_begins_like_the_folder_of_proofs(folder: Path) -> None:
+    write(folder / "proofs.html", b"<p>All is proved.")
