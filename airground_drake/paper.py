@@ -1,7 +1,7 @@
 """The paper, place by place: what realises it here, whether that is faithful to it, and why where it is not.
 
-`docs/generate.py` makes docs/equations.md of this table. A test imports every name in it, and requires that the code
-named for an equation names the equation in its documentation.
+`docs/generate.py` makes a part of docs/paper.md of this table. A test imports every name in it, and requires that the
+code named for an equation names the equation in its documentation.
 """
 
 from __future__ import annotations

@@ -70,7 +70,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if name is None:
         parser.error(f"a command is needed: {', '.join(COMMANDS)}")
     if name in GONE:
-        return refuse(f"`airground {name}` is gone: use `{GONE[name]}` (docs/migration.md)")
+        return refuse(f"`airground {name}` is gone: use `{GONE[name]}` (CHANGELOG.md)")
     if name not in COMMANDS:
         close = difflib.get_close_matches(name, COMMANDS, n=1)
         meant = f"did you mean {close[0]}? " if close else ""

@@ -60,7 +60,7 @@ def read(folder: Path) -> Document:
         document = json.loads(text, parse_constant=_finite, parse_float=_finite, parse_int=_short)
         json.dumps(document, ensure_ascii=False).encode()  # no halves of characters
         if is_earlier(document):
-            raise ReportError(f"{path} is by an earlier version: make the report again (docs/migration.md)")
+            raise ReportError(f"{path} is by an earlier version: make the report again (CHANGELOG.md)")
         if document["schema"] != REPORT:
             raise ValueError(f"its schema is not {REPORT}")
         _usable(document)

@@ -227,4 +227,4 @@ def test_a_damaged_trace_is_said(report: Path, coq_version: str, capsys: pytest.
 
 def test_the_command_of_before_names_its_successor(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["proofs", "reports/case_a"]) == 2
-    assert capsys.readouterr().err == "error: `airground proofs` is gone: use `airground prove` (docs/migration.md)\n"
+    assert capsys.readouterr().err == "error: `airground proofs` is gone: use `airground prove` (CHANGELOG.md)\n"

@@ -181,7 +181,7 @@ def test_a_report_by_an_earlier_version_is_told_so(
     assert main([str(earlier), str(now)]) == 2
     said = capsys.readouterr().err
     assert said.count("\n") == 1
-    assert "is by an earlier version: make the report again (docs/migration.md)" in said
+    assert "is by an earlier version: make the report again (CHANGELOG.md)" in said
 
 
 class Seen(HTMLParser):

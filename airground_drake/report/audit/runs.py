@@ -1,4 +1,4 @@
-"""Findings about the paper that the runs of a report demonstrate by themselves (numbered as in docs/audit.md)."""
+"""Findings about the paper that the runs of a report demonstrate by themselves (numbered as in docs/paper.md)."""
 
 from __future__ import annotations
 
