@@ -142,8 +142,8 @@ def _small(path: Path) -> Path:
 def _save(search: Search, best: Best, path: Path, tests: int) -> None:
     """Write the scenario of the best point; beside it a small one, if it is a counterexample."""
     from airground_drake.campaign.shrink import shrink
+    from airground_drake.scenarios.limits import MAX_NAME
     from airground_drake.scenarios.load import resolved
-    from airground_drake.scenarios.schema import MAX_NAME
 
     scenario = search.spec.scenario_of(search.values(best.point), 0)
     data = resolved(scenario)

@@ -49,6 +49,8 @@ def test_a_mapping_whose_names_are_free_takes_new_ones(write: Write) -> None:
     assert scenario.intervention.policies[0].parameters == {"speed_m_s": 2.85, "clearance_m": 0.2}
     assert [*scenario.obstacles][-1] == "box"
     assert [*scenario.runs][-1] == "again"
+    private = load(write(SMALL), ["obstacles={_box: {position_m: [-9, -9, 0]}}"])[0]
+    assert [*private.obstacles] == ["_box"]  # a name, no template
     assert load(write(SMALL), ["obstacles.box.position_m=[-9, -9, 0]"])[0].obstacles["box"].known_to_uav
 
 
