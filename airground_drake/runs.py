@@ -25,10 +25,10 @@ from airground_drake import files, interruption, trace
 from airground_drake.errors import AirgroundError, PluginError, SimulationError, described, one_line
 from airground_drake.intervention.process import end_all
 from airground_drake.nsbc import kernels
+from airground_drake.parallel import forks, processors
 from airground_drake.progress import SILENT, Watch
 from airground_drake.scenarios.load import validated
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.side_by_side import forks, processors
 from airground_drake.simulation import simulate, warm_up
 from airground_drake.trace import Trace
 

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any
 from airground_drake import files
 from airground_drake.campaign.rows import UNFINISHED
 from airground_drake.errors import AirgroundError, FolderError, LimitError, ScenarioError, UnknownNameError, one_line
+from airground_drake.parallel import processors
 from airground_drake.progress import told
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.estimate import DEFAULT_LIMITS, Limits
 from airground_drake.scenarios.shipped import argument
-from airground_drake.side_by_side import processors
 from airground_drake.usage import EXIT_TOOL, Parser, positive, refuse, whole
 
 if TYPE_CHECKING:

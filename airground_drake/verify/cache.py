@@ -23,8 +23,8 @@ from typing import Any, NoReturn
 from uuid import uuid4
 
 from airground_drake import files
+from airground_drake.parallel import run_parallel
 from airground_drake.progress import SILENT, Watch
-from airground_drake.side_by_side import side_by_side
 from airground_drake.statuses import PASSING
 from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.finding import Finding
@@ -48,7 +48,7 @@ def find(
         watch: is told of each finding.
     """
     pieces = [partial(found, claim, given, folder) for claim, given in zip(claims, inputs, strict=True)]
-    return side_by_side(pieces, names=[claim.id for claim in claims], watch=watch)
+    return run_parallel(pieces, names=[claim.id for claim in claims], watch=watch)
 
 
 def found(claim: ModelClaim, inputs: dict[str, Any], folder: Path | None = None) -> Finding:

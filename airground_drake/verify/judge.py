@@ -8,9 +8,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from airground_drake.parallel import run_parallel
 from airground_drake.progress import SILENT, Watch
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.side_by_side import side_by_side
 from airground_drake.trace import Trace
 from airground_drake.verify.applications import Count, counts, measured, with_counts, with_runs
 from airground_drake.verify.cache import find, found
@@ -108,7 +108,7 @@ def verify_all(
     pieces += [partial(_judged, trace, claims) for trace, claims in of_runs]
     names = [*(claim.id for claim in chosen), *(f"claims about run {trace.run}" for trace, _ in of_runs)]
     watch.stage("judging", len(pieces), "claims about the model or a run")
-    done = side_by_side(pieces, names=names, watch=watch)
+    done = run_parallel(pieces, names=names, watch=watch)
     about_the_model, about_runs = done[: len(chosen)], done[len(chosen) :]
     verdicts = [
         verdict

@@ -1,6 +1,7 @@
-"""Independent pieces of work, as many at a time as there are processors, each in a process forked from this one.
+"""Independent pieces of work in processes forked from this one, as many at a time as there are processors.
 
-A piece sees everything that there was before the first one began, and leaves nothing behind but what it returns.
+A piece sees everything that there was before the first one began, and leaves nothing behind but what it returns. A
+process does several pieces, one after the other: one for each piece would import and load anew what pieces share.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ def processors() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def side_by_side(
+def run_parallel(
     pieces: Sequence[Callable[[], T]], jobs: int | None = None, *, names: Sequence[str] = (), watch: Watch = SILENT
 ) -> list[T]:
     """What each piece returns, in their order.
@@ -44,7 +45,7 @@ def side_by_side(
         pieces: what they return is pickled. The longest come first, or the last one is waited for.
         jobs: processes at a time; default: one for each processor. Where there is one, or one piece, or no fork, the
             pieces are done here, one after the other.
-        names: of the pieces, for whoever watches.
+        names: of the pieces, for `watch`.
         watch: is told of each piece that is done.
 
     Raises:
@@ -72,8 +73,8 @@ def side_by_side(
         _pieces = ()
 
 
-def begun(work: Callable[[], T]) -> Callable[[], T]:
-    """Begin some work in a process of its own; what is returned waits for what comes of it, and is to be called once.
+def start_in_process(work: Callable[[], T]) -> Callable[[], T]:
+    """Start some work in a process of its own; what is returned waits for its result, and is to be called once.
 
     Where there is one processor, or no fork, the work is done when it is waited for.
 
@@ -95,7 +96,7 @@ def begun(work: Callable[[], T]) -> Callable[[], T]:
             found: T = receiver.recv()
         except EOFError:
             process.join()
-            raise AirgroundError(f"a process that was begun died (exit code {process.exitcode})") from None
+            raise AirgroundError(f"a process died before its work was done (exit code {process.exitcode})") from None
         process.join()
         return found
 
