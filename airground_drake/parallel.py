@@ -18,7 +18,7 @@ from concurrent.futures.process import BrokenProcessPool
 from typing import TypeVar
 
 from airground_drake.errors import AirgroundError
-from airground_drake.progress import SILENT, Watch
+from airground_drake.progress import SILENT, Progress
 
 T = TypeVar("T")
 
@@ -37,7 +37,11 @@ def processors() -> int:
 
 
 def run_parallel(
-    pieces: Sequence[Callable[[], T]], jobs: int | None = None, *, names: Sequence[str] = (), watch: Watch = SILENT
+    pieces: Sequence[Callable[[], T]],
+    jobs: int | None = None,
+    *,
+    names: Sequence[str] = (),
+    progress: Progress = SILENT,
 ) -> list[T]:
     """What each piece returns, in their order.
 
@@ -45,8 +49,8 @@ def run_parallel(
         pieces: what they return is pickled. The longest come first, or the last one is waited for.
         jobs: processes at a time; default: one for each processor. Where there is one, or one piece, or no fork, the
             pieces are done here, one after the other.
-        names: of the pieces, for `watch`.
-        watch: is told of each piece that is done.
+        names: of the pieces, for `progress`.
+        progress: is told of each piece that is done.
 
     Raises:
         AirgroundError: if a process dies.
@@ -56,7 +60,7 @@ def run_parallel(
     called = names or [""] * len(pieces)
     most = min(len(pieces), processors() if jobs is None else jobs)
     if most <= 1 or not forks() or _pieces:
-        return [_done(_timed(piece), name, watch) for piece, name in zip(pieces, called, strict=True)]
+        return [_done(_timed(piece), name, progress) for piece, name in zip(pieces, called, strict=True)]
     _pieces = pieces
     try:
         with warnings.catch_warnings():
@@ -65,7 +69,7 @@ def run_parallel(
             with ProcessPoolExecutor(most, context, initializer=_begin) as pool:
                 futures = {pool.submit(_piece, index): index for index in range(len(pieces))}
                 for future in as_completed(futures):
-                    _done(future.result(), called[futures[future]], watch)
+                    _done(future.result(), called[futures[future]], progress)
                 return [future.result()[0] for future in futures]  # type: ignore[misc]
     except BrokenProcessPool as error:
         raise AirgroundError("a process that judged claims died") from error
@@ -117,7 +121,7 @@ def _timed(piece: Callable[[], T]) -> tuple[T, float]:
     return piece(), time.perf_counter() - started
 
 
-def _done(found: tuple[T, float], name: str, watch: Watch) -> T:
-    watch.took(name, found[1])
-    watch.advance(1.0, name)
+def _done(found: tuple[T, float], name: str, progress: Progress) -> T:
+    progress.elapsed_s(name, found[1])
+    progress.advance(1.0, name)
     return found[0]

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 from airground_drake import files, graphviz, trace
 from airground_drake.diagram import build_diagram, most_complete
 from airground_drake.parallel import start_in_process
-from airground_drake.progress import Watch
+from airground_drake.progress import Progress
 from airground_drake.report import audit, document, folder, html, junit
 from airground_drake.report.figures import moments, threshold, zeno_refine
 from airground_drake.report.figures.draw import draw
@@ -39,7 +39,13 @@ class Judged(NamedTuple):
 
 
 def judge(
-    scenario: Scenario, traces: Mapping[str, Trace], kept: Path | None, *, audited: bool, drawn: bool, watch: Watch
+    scenario: Scenario,
+    traces: Mapping[str, Trace],
+    kept: Path | None,
+    *,
+    audited: bool,
+    drawn: bool,
+    progress: Progress,
 ) -> Judged:
     """Judge the runs and the model and, if asked for, the paper; draw the runs at the same time.
 
@@ -48,9 +54,9 @@ def judge(
         AirgroundError: if a process dies.
     """
     figures = start_in_process(partial(draw, scenario, traces)) if drawn else list
-    verdicts = verify_all(scenario, traces.values(), kept=kept, watch=watch)
+    verdicts = verify_all(scenario, traces.values(), kept=kept, progress=progress)
     if audited:
-        watch.stage("auditing the paper")
+        progress.stage("auditing the paper")
     findings = audit.whole(scenario, verdicts) if audited else ()
     return Judged(verdicts, findings, figures())
 

@@ -24,7 +24,7 @@ from uuid import uuid4
 
 from airground_drake import files
 from airground_drake.parallel import run_parallel
-from airground_drake.progress import SILENT, Watch
+from airground_drake.progress import SILENT, Progress
 from airground_drake.statuses import PASSING
 from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.finding import Finding
@@ -37,7 +37,11 @@ ENGINES = ("numpy", "scipy", "numba", "pyddm")
 
 
 def find(
-    claims: Sequence[ModelClaim], inputs: Sequence[dict[str, Any]], *, folder: Path | None = None, watch: Watch = SILENT
+    claims: Sequence[ModelClaim],
+    inputs: Sequence[dict[str, Any]],
+    *,
+    folder: Path | None = None,
+    progress: Progress = SILENT,
 ) -> list[Finding]:
     """The finding of each claim for its inputs.
 
@@ -45,10 +49,10 @@ def find(
         claims: the claims.
         inputs: what each is about, strict JSON.
         folder: where findings are kept; None: computed anew, kept nowhere.
-        watch: is told of each finding.
+        progress: is told of each finding.
     """
     pieces = [partial(found, claim, given, folder) for claim, given in zip(claims, inputs, strict=True)]
-    return run_parallel(pieces, names=[claim.id for claim in claims], watch=watch)
+    return run_parallel(pieces, names=[claim.id for claim in claims], progress=progress)
 
 
 def found(claim: ModelClaim, inputs: dict[str, Any], folder: Path | None = None) -> Finding:
