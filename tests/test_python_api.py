@@ -55,6 +55,7 @@ def set_to(path: str, value: Any) -> Edit:
         ),
         (set_to("runs.d.method", "e"), "runs.d.method: 'e' is not allowed"),
         (set_to("obstacles", {"o": object()}), "obstacles.o"),
+        (set_to("uav.start_m", {0.0, 1.0, 2.0}), "uav.start_m: .* is not allowed; wanted: 3 numbers in m"),
     ],
 )
 @pytest.mark.parametrize("use", [build_diagram, lambda scenario: simulate(scenario, "d"), validated])

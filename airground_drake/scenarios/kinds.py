@@ -79,7 +79,7 @@ Real = Annotated[_Number, Field(ge=-LARGEST), BeforeValidator(_as_float)]
 Positive = Annotated[_Number, Field(ge=SMALLEST), BeforeValidator(_as_float)]
 Share = Annotated[_Number, Field(ge=SMALLEST, le=1.0), BeforeValidator(_as_float)]
 NotNegative = Annotated[_Number, Field(ge=0.0), BeforeValidator(_as_float)]
-Point = Annotated[list[Real], Field(min_length=3, max_length=3)]
+Point = Annotated[list[Real], Field(strict=True, min_length=3, max_length=3)]  # no set, which has no order
 GroundPoint = Annotated[Point, AfterValidator(_on_the_ground)]
 
 
@@ -102,7 +102,7 @@ class Rule:
         return {**handler(schema), **self.says()}
 
 
-PointOrNone = Annotated[list[Real], Rule(_all_or_none, lambda: {"minItems": 0, "maxItems": 3})]
+PointOrNone = Annotated[list[Real], Field(strict=True), Rule(_all_or_none, lambda: {"minItems": 0, "maxItems": 3})]
 
 
 def one_of(options: Iterable[str], place: str = "") -> Rule:

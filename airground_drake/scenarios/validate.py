@@ -250,10 +250,11 @@ def _extent(scenario: Scenario) -> Problems:
     speeds = sorted([scenario.uav.max_speed_m_s, *(ugv.max_speed_m_s for ugv in scenario.ugvs.values())])
     speed, closing = speeds[-1], speeds[-2] + speeds[-1]
     loss = Rounding(control.sensing_range_m, closing, control.period_s, control.avoidance_gain_1_s)
-    points = [("uav.start_m", scenario.uav.start_m)]
+    points: list[tuple[str, Vector]] = []
     for name, ugv in scenario.ugvs.items():
         points += [(f"ugvs.{name}.start_m", ugv.start_m), (f"ugvs.{name}.target_m", ugv.target_m)]
         points += [(f"ugvs.{name}.preset.waypoints_m.{i}", each) for i, each in enumerate(ugv.preset.waypoints_m)]
+    points.append(("uav.start_m", scenario.uav.start_m))
     points += [(f"obstacles.{name}.position_m", each.position_m) for name, each in scenario.obstacles.items()]
     key, point = max(points, key=lambda entry: max(map(abs, entry[1])))
     farthest = max(map(abs, point))
