@@ -131,7 +131,7 @@ def _in_words(error: ErrorDetails, document: Document) -> ScenarioError:
     kind, given, says = error["type"], error["input"], error.get("ctx", {})
     loc = [str(part) for part in error["loc"]]
     at = [part for part in (*loc, *says.get("at", ())) if part != json_schema.NAMES]
-    of_type = kind.endswith(("_type", "missing"))  # wrong all through: named by the line of the value
+    of_type = kind.endswith(("_type", "missing"))  # then the line of the value is named, not that of its key
     key, source = ".".join(at), document.where(*at, key=not of_type)
     if kind == "rule":
         return ScenarioError(source, key, says["value"], says["allowed"])
