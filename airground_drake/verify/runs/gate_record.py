@@ -68,6 +68,11 @@ class Row:
         """Whether it rests on a plan; otherwise it is a refusal for want of one."""
         return self.data["plan"] is not None
 
+    @property
+    def stages(self) -> int:
+        """N."""
+        return len(self["reference_m"])
+
     def positions(self, omega: Array) -> Array:
         """(23): omega (..., N) to positions at the ends of the stages, (..., N, 3), m."""
         velocity = self["refuse_m_s"] + omega[..., None] * (self["accept_m_s"] - self["refuse_m_s"])

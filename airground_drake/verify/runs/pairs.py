@@ -142,23 +142,3 @@ def snapshot(trace: Trace, names: Iterable[str], t_s: float) -> dict[str, Any]:
 DISTANCE_TOLERANCE_M = 1e-9
 """A distance may be this much below the safe one, m: the controller steers *onto* the safe distance, and sums of
 some thousand rounded steps err by 1e-12 m. The reported margin does not contain it."""
-
-
-def slack_of(offset: Array, velocity: Array, pair: Pair, control: dict[str, Any], *, planar: bool) -> Array:
-    """n.v minus its bound for one pair at S samples, (S,), m/s; +inf out of sensing range.
-
-    Args:
-        offset: from the other to the robot, (S, 3), m; n is its direction.
-        velocity: of the robot, (S, 3), m/s.
-        pair: safe distance and share.
-        control: gain A, period h and sensing range of the scenario.
-        planar: whether the robot cannot use the z component of n.
-    """
-    distance = np.sqrt((offset**2).sum(axis=1))
-    normal = np.divide(offset, distance[:, None], out=np.zeros_like(offset), where=distance[:, None] > 0.0)
-    if planar:
-        normal[:, 2] = 0.0
-    excess = distance - pair.safe_m
-    bound = -pair.share * np.where(excess <= 0.0, control["avoidance_gain_1_s"], 1.0 / control["period_s"]) * excess
-    slack = (normal * velocity).sum(axis=1) - bound
-    return np.where(distance <= control["sensing_range_m"], slack, np.inf)

@@ -22,16 +22,16 @@ from airground_drake.verify.claim import TIME_TOLERANCE_S, TraceClaim
 from airground_drake.verify.engines.segments import MERGE_S, interpolate
 from airground_drake.verify.engines.shortfalls import SCREEN_M, rounded_up, shortage, shortfalls
 from airground_drake.verify.finding import Finding
+from airground_drake.verify.runs.control_law import inequalities_of, spare
 from airground_drake.verify.runs.control_samples import control_samples
 from airground_drake.verify.runs.demands import differences
 from airground_drake.verify.runs.pairs import (
     DISTANCE_TOLERANCE_M,
     Pair,
     apart_of,
-    near_pairs,
+    around,
     pairs_of,
     places_of,
-    slack_of,
     snapshot,
     speed_limits,
 )
@@ -255,17 +255,12 @@ def _binding(trace: Trace) -> tuple[int, dict[str, int]]:
     count = {"ugv beside obstacle": 0, "uav beside obstacle": 0}
     count |= {"ugv beside ugv": 0, "ugv beside uav": 0, "uav beside ugv": 0}
     kind = dict.fromkeys(trace.ugvs, "ugv") | {trace.robots[-1]: "uav"}
-    control, samples, in_range = trace.scenario["control"], _samples(trace), 0
-    chosen = _chosen(trace, samples)
-    places = {name: p if p.ndim == 1 else p[samples] for name, p in places_of(trace).items()}
-    velocities = {robot: trace.command(robot)[chosen] for robot in trace.robots}
-    for pair in near_pairs(trace):
-        for robot, other in ((pair.first, pair.second), (pair.second, pair.first)):
-            if robot in velocities:
-                away, planar = places[robot] - places[other], robot in trace.ugvs
-                slack = slack_of(away, velocities[robot], pair, control, planar=planar)
-                in_range += int(np.isfinite(slack).sum())
-                count[f"{kind[robot]} beside {kind.get(other, 'obstacle')}"] += int((slack <= BINDING_M_S).sum())
+    samples, in_range = _samples(trace), 0
+    for robot in trace.robots:
+        slack = spare(inequalities_of(trace, robot, samples), trace.command(robot)[_chosen(trace, samples)])
+        in_range += int(np.isfinite(slack).sum())
+        for (other, _), binds in zip(around(trace, robot), (slack <= BINDING_M_S).sum(axis=0).tolist(), strict=True):
+            count[f"{kind[robot]} beside {kind.get(other, 'obstacle')}"] += binds
     return in_range, count
 
 
@@ -282,7 +277,7 @@ def _static(trace: Trace) -> Iterator[_Hypothesis]:
     yield _Hypothesis("gain: A h <= 1", "1", trace.t[:1], stable, 0.0, {})
 
     @cache
-    def spare(safe: float, *speeds: float) -> float:
+    def room(safe: float, *speeds: float) -> float:
         return float(reach - _written(safe) - sum(map(_written, speeds)) * period)
 
     order = {robot: k for k, robot in enumerate(trace.robots)}
@@ -295,7 +290,7 @@ def _static(trace: Trace) -> Iterator[_Hypothesis]:
         start, about = np.full(len(beside), trace.t[0]), {"first": robot}
         excess = np.linalg.norm(away, axis=1) - np.array([pair.safe_m for pair in beside])
         yield _Hypothesis("safe start", "m", start, excess, DISTANCE_TOLERANCE_M, about, others)
-        left = [spare(pair.safe_m, limit[robot], limit.get(pair.second, 0.0)) for pair in beside]
+        left = [room(pair.safe_m, limit[robot], limit.get(pair.second, 0.0)) for pair in beside]
         yield _Hypothesis("sensing range", "m", start, np.array(left), 0.0, about, others)
 
 
