@@ -1,9 +1,9 @@
 """Findings of experiments about the model, kept by content: equal code and inputs, equal finding.
 
 An entry is a file that says what it is about: claim, inputs, digest of the code, versions of the engines, the finding
-and its SHA-256. It is taken if all of that is what is asked for and the finding is well formed, passes and has that
-digest. Anything else is decided anew, so that a damaged entry costs time and no more. An entry that somebody forged
-with its digest is believed: see docs/verification.md.
+and its SHA-256. It is taken if all of that is what is asked for and the finding passes and has that digest. Anything
+else is decided anew, so that a damaged entry costs time and no more. An entry that somebody forged with its digest is
+believed: see docs/verification.md.
 """
 
 from __future__ import annotations
@@ -134,12 +134,12 @@ def _read(folder: Path | None, claim: ModelClaim, inputs: Mapping[str, Any]) -> 
             return None
         entry = json.loads(path.read_text(encoding="utf-8"), parse_constant=_refused, parse_float=_finite)
         made, digest = entry.pop("finding"), entry.pop("sha256")
-        finding = Finding.from_json(made)
+        finding = Finding(**made)
+        sound = digest == _digest(made) and finding.status in PASSING
     except (OSError, ValueError, TypeError, AttributeError, KeyError, RecursionError):
         return None
     about = json.dumps(entry, sort_keys=True) == json.dumps(content(claim, inputs), sort_keys=True)
-    sound = about and digest == _digest(made) and finding.status in PASSING
-    return replace(finding, from_cache=True) if sound else None
+    return replace(finding, from_cache=True) if sound and about else None
 
 
 def _digest(finding: Mapping[str, Any]) -> str:

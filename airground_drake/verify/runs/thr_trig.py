@@ -15,9 +15,16 @@ from airground_drake.trace import Trace
 from airground_drake.verify.claim import TraceClaim
 from airground_drake.verify.engines.segments import NormSignal
 from airground_drake.verify.finding import Finding
-from airground_drake.verify.runs.decision_noise import noise_conflict
-from airground_drake.verify.runs.trigger_record import Conflict, Transition, column_conflict, recorded_events
-from airground_drake.verify.runs.trigger_replay import decision_variable, recorded_variable, transitions
+from airground_drake.verify.runs.triggers import (
+    Conflict,
+    Transition,
+    column_conflict,
+    decision_variable,
+    noise_conflict,
+    recorded_events,
+    recorded_variable,
+    transitions,
+)
 
 EVENT_TOLERANCE_S = 1e-5
 """Recorded and recomputed events may differ by this, s: ten times the accuracy of the simulator's event isolation."""

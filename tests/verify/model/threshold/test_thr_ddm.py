@@ -9,8 +9,8 @@ from statistics import NormalDist
 import pytest
 
 from airground_drake.verify.finding import Finding
-from airground_drake.verify.model.threshold import thr_ddm
-from airground_drake.verify.model.threshold.first_passages import PassageExperiment
+from airground_drake.verify.model import thr_ddm
+from airground_drake.verify.model.first_passages import PassageExperiment
 
 
 def test_formulas_are_supported(simulated: Finding) -> None:

@@ -30,7 +30,7 @@ from airground_drake.statuses import Status
 from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.model.levels import levels_of
-from airground_drake.verify.model.trigger.refined_paths import (
+from airground_drake.verify.model.refined_paths import (
     HALVINGS,
     PATHS,
     SEED,

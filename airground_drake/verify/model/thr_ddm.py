@@ -22,7 +22,7 @@ from scipy.special import betainccinv, betaincinv, ndtri
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.finding import Finding
-from airground_drake.verify.model.threshold.first_passages import (
+from airground_drake.verify.model.first_passages import (
     PassageExperiment,
     Sample,
     experiments,
