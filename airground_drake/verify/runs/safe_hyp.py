@@ -149,25 +149,16 @@ class SafeHyp(TraceClaim):
         broken = [h.at(int(k)) for h in [*others, *_avoidance(trace, kept)] for k in h.broken()[:1]]
         broken += [{"hypothesis": BUILT, "t_s": float(trace.t[0]), **each} for each in different[:1]]
         first = min(broken, key=lambda entry: float(entry["t_s"]), default=None)
-        worst: dict[tuple[str, str], dict[str, Any]] = {}
-        for h in others:
-            entry = h.at(int(np.argmin(h.margin)))
-            key = h.name, str(next(iter(h.about.values()), ""))
-            if entry["margin"] <= worst.get(key, entry)["margin"]:
-                worst[key] = entry
-        listed = [_listed(trace, one) for one in kept[:MOST_LISTED]]
-        least: dict[str, Any] = {"margin": kept[0].margin_m if kept else 0.0, "unit": "m", "hypothesis": AVOIDANCE}
-        least |= {key: listed[0][key] for key in ("first", "second")} if kept else {}
-        name = first["hypothesis"] if first else AVOIDANCE
-        leading = min((w for w in worst.values() if w["hypothesis"] == name), key=lambda w: w["margin"], default=least)
-        leading = first if first and name == BUILT else leading
+        worst, listed = _worst(others), [_listed(trace, one) for one in kept[:MOST_LISTED]]
+        shown = _shown(first, worst, listed, kept)
+        name = shown["hypothesis"]
         in_range, binding = _binding(trace)
         return Finding(
             "refuted" if first else "holds",
-            margin=leading.get("margin"),
-            unit=leading.get("unit", ""),
+            margin=shown.get("margin"),
+            unit=shown.get("unit", ""),
             quantity="distance promised less the safe one" if name == AVOIDANCE else f"least slack of {name!r}",
-            where={key: leading[key] for key in leading if key not in ("margin", "unit")},
+            where={key: shown[key] for key in shown if key not in ("margin", "unit")},
             counterexample=first | snapshot(trace, map(str, first.values()), first["t_s"]) if first else None,
             evidence={
                 "e_m": float(max((one.missed_m.max() for one in kept), default=0.0)),
@@ -175,13 +166,36 @@ class SafeHyp(TraceClaim):
                 "pairs": listed,
                 "pairs_in_reach": len(kept),
                 "different_parameters": different,
-                "worst": list(worst.values()),
+                "worst": worst,
                 "inequalities_in_range": in_range,
                 "inequalities_that_bind": binding,
                 "tolerance_m": DISTANCE_TOLERANCE_M,
             },
             exercised=sum(binding.values()),
         )
+
+
+def _worst(hypotheses: Sequence[_Hypothesis]) -> list[dict[str, Any]]:
+    """Where each hypothesis has its least margin, for each robot or pair that it is about."""
+    found: dict[tuple[str, str], dict[str, Any]] = {}
+    for h in hypotheses:
+        entry = h.at(int(np.argmin(h.margin)))
+        key = h.name, str(next(iter(h.about.values()), ""))
+        if entry["margin"] <= found.get(key, entry)["margin"]:
+            found[key] = entry
+    return list(found.values())
+
+
+def _shown(
+    first: dict[str, Any] | None, worst: Sequence[dict[str, Any]], listed: Sequence[Any], kept: Sequence[Guarantee]
+) -> dict[str, Any]:
+    """Whose margin is the finding's: of the hypothesis that was broken first, or else of the inequalities."""
+    if first and first["hypothesis"] == BUILT:
+        return first
+    name = first["hypothesis"] if first else AVOIDANCE
+    least: dict[str, Any] = {"margin": kept[0].margin_m if kept else 0.0, "unit": "m", "hypothesis": AVOIDANCE}
+    least |= {key: listed[0][key] for key in ("first", "second")} if kept else {}
+    return min((one for one in worst if one["hypothesis"] == name), key=lambda one: float(one["margin"]), default=least)
 
 
 def _listed(trace: Trace, one: Guarantee) -> dict[str, Any]:
