@@ -32,7 +32,7 @@ from airground_drake.verify.finding import Finding
 SCHEMA = "airground_drake.finding/2"
 LARGEST_BYTES = 16_000_000
 """A larger entry is not read."""
-ENGINES = ("numpy", "scipy", "numba", "pyddm")
+ENGINES = ("numpy", "scipy", "numba")
 """Packages whose versions are part of a finding's key."""
 
 

@@ -20,7 +20,6 @@ from airground_drake.verify.runs.gate_record import (
     GateClaim,
     Off,
     Row,
-    bare_row,
     conclude,
     cost_tolerance,
 )
@@ -173,7 +172,7 @@ def compare_proposals(trace: Trace, rows: Sequence[Row]) -> Iterator[Off]:
         replaced = any(other.ugv == one.ugv and one.issued_s < other.issued_s <= until for other in sent)
         if called and not replaced and one.times_s[-1] > until:
             given = dict.fromkeys(("decision", "reason", "status"), "")
-            row = bare_row({"t_s": one.issued_s, "robot": one.ugv, "policy": one.policy, **given})
+            row = Row({"t_s": one.issued_s, "robot": one.ugv, "policy": one.policy, **given})
             yield Off(row, "nothing is decided on a proposal", float(one.number not in decided), 0.0)
 
 
