@@ -190,10 +190,18 @@ def _shaped(flat: dict[str, Array], n: int) -> dict[str, Array | None]:
 
 
 class Off:
-    """How far something is from what it should be, and how far it may be."""
+    """A comparison: how far a recorded value is from what it should be, and how far it may be."""
 
     def __init__(self, row: Row, what: str, by: Any, allowed: float, **more: Any) -> None:
-        """`by`: absolute differences, any shape, of which the largest counts; `more` goes into a counterexample."""
+        """Compare.
+
+        Args:
+            row: the decision.
+            what: is compared.
+            by: differences, of any shape; the largest absolute one counts.
+            allowed: largest difference allowed.
+            more: goes into a counterexample.
+        """
         self.row = row
         self.what = what
         self.allowed = allowed
@@ -202,7 +210,7 @@ class Off:
 
     @property
     def wrong(self) -> bool:
-        """Whether it is too far; also for a comparison that came out as no number."""
+        """Whether the difference is too large, or is not a number."""
         return not self.off <= self.allowed
 
     def to_json(self) -> dict[str, Any]:
@@ -217,7 +225,7 @@ def cost_tolerance(cost: float) -> float:
 
 
 def conclude(finding: Finding, compared: Iterable[Off]) -> Finding:
-    """The finding; refuted if anything is wrong, by what is so first in time."""
+    """The finding, or if a comparison is wrong a refutation by the first such one in time."""
     wrong = [one for one in compared if one.wrong]
     if not wrong:
         return finding
@@ -226,10 +234,10 @@ def conclude(finding: Finding, compared: Iterable[Off]) -> Finding:
 
 
 def without_decisions(trace: Trace) -> list[str]:
-    """UGVs that executed something, or were intervened on for long enough to decide on a proposal, but never decided.
+    """UGVs that had reason to decide, but never did: they executed something, or were intervened on for long enough.
 
-    That is a fault of the UGV only if it got a proposal that stood for long enough (GATE-FEAS) or executed something
-    (EXEC): the UAV's policies may have found nothing to propose. The other UGVs are judged all the same.
+    This is no refutation: the UAV's policies may have found nothing to propose. GATE-FEAS refutes it where a proposal
+    stood for long enough, EXEC where something was executed.
     """
     called = [ugv for ugv in trace.ugvs if (trace.column(f"{ugv}.accepted") != 0.0).any() or talk_is_due(trace, ugv)]
     return [ugv for ugv in called if not (trace.decisions["robot"] == ugv).any()]

@@ -15,10 +15,14 @@ from airground_drake.verify.engines.segments import MERGE_S, interpolate
 
 
 class Pair(NamedTuple):
-    """Two things to keep apart: a robot, and an obstacle or robot; `share` is the part that each robot takes.
+    """A robot, and an obstacle or another robot that it has to keep apart from.
 
-    `safe_m` is the safe distance between centres: that of the kind of pair and both radii. In one control period they
-    come nearer to each other by `reach_m` at most.
+    Attributes:
+        first: the robot.
+        second: the obstacle or other robot.
+        safe_m: safe distance of the centres: that of the kind of pair, and both radii.
+        share: part of the avoidance inequality that each robot takes.
+        reach_m: by how much they can approach each other in one control period, at most.
     """
 
     first: str
@@ -63,10 +67,13 @@ def _apart_of(trace: Trace) -> Array:
 
 
 def least_of(bounds: Array, most: int, value: Callable[[int], float]) -> list[int]:
-    """Numbers, in their order, of so many of the least values, of which bounds (K,) from below are known.
+    """Indices of the `most` least of K values, in increasing order; few values have to be computed.
 
-    As many values as are wanted, of whatever, say how large a wanted one can be: those with larger bounds are not
-    looked at.
+    Args:
+        bounds: lower bounds of the values, (K,).
+        most: how many are wanted.
+        value: computes the k-th value. The wanted ones are at most the largest of any `most` values, so those with
+            larger bounds are not computed.
     """
     if len(bounds) <= most:
         return list(range(len(bounds)))

@@ -223,9 +223,9 @@ def _written(number: float) -> Fraction:
 
 
 def guarantees(trace: Trace) -> list[Guarantee]:
-    """What is promised for each pair that comes so near that its steps could break its distance.
+    """The distance that is promised for each pair that comes near.
 
-    Pairs in bounds of whose distance there is room for both robots' longest steps are far at every sample.
+    Other pairs stay so far apart that the longest steps of both could not break their distance.
     """
     return trace.derived("guarantees", lambda: list(_guarantees(trace)))
 
@@ -279,7 +279,7 @@ def _binding(trace: Trace) -> tuple[int, dict[str, int]]:
 
 
 def _chosen(trace: Trace, samples: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
-    """Rows with the velocities that were chosen at the samples: a command is that of the next row."""
+    """Rows whose commands were chosen at the samples: the command of a row led to it, so it is the row after."""
     return np.searchsorted(trace.t, trace.t[samples] + MERGE_S)
 
 
