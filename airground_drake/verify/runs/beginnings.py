@@ -12,7 +12,7 @@ from airground_drake.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.segments import corner_times, interpolate, travelled
 from airground_drake.verify.runs.closed_loops import Scene
-from airground_drake.verify.runs.pairs import Pair, around, pairs_of, places_of, radii_of, speed_limits
+from airground_drake.verify.runs.pairs import Pair, around, pairs_of, places_of, preset_of, radii_of, speed_limits
 from airground_drake.verify.runs.proposals import Sent
 
 NONE = np.empty(0), np.empty(0), np.empty(0)
@@ -104,12 +104,6 @@ def scene(
         safe=safe,
         share=share,
     )
-
-
-def preset_of(trace: Trace, ugv: str) -> tuple[Array, float]:
-    """Corners of a UGV's preset trajectory, (m, 3), m, and its speed along them, m/s."""
-    preset = trace.scenario["ugvs"][ugv]["preset"]
-    return np.asarray(preset["waypoints_m"], dtype=np.float64), float(preset["speed_m_s"])
 
 
 class Sensed(NamedTuple):

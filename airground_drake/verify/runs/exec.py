@@ -13,7 +13,7 @@ from airground_drake.arrays import Array
 from airground_drake.errors import TraceError
 from airground_drake.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S, TraceClaim
-from airground_drake.verify.engines.segments import MERGE_S, corner_times, travelled
+from airground_drake.verify.engines.segments import corner_times, travelled
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.control_law import (
     Asked,
@@ -25,7 +25,8 @@ from airground_drake.verify.runs.control_law import (
     spare,
     tracking,
 )
-from airground_drake.verify.runs.control_samples import control_samples
+from airground_drake.verify.runs.control_samples import chosen_at, samples_of
+from airground_drake.verify.runs.pairs import preset_of
 from airground_drake.verify.runs.proposals import Sent, accepted_at
 
 COMMAND_TOLERANCE_M_S = 1e-6
@@ -121,7 +122,7 @@ class Exec(TraceClaim):
 
     def check(self, trace: Trace) -> Finding:
         """Compare every command with the law; the margin is the tolerance less the largest difference."""
-        samples = control_samples(trace.t, trace.scenario["control"]["period_s"])
+        samples = samples_of(trace)
         judged = [_judge_ugv(trace, ugv, samples) for ugv in trace.ugvs]
         formation = trace.scenario["uav"]["task"] == "formation"
         if formation:
@@ -172,20 +173,14 @@ def _first_wrong(one: Judged) -> dict[str, Any] | None:
     }
 
 
-def _chosen(trace: Trace, samples: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
-    """Rows that have the command chosen at each control sample: the next ones."""
-    return np.asarray(np.searchsorted(trace.t, trace.t[samples] + MERGE_S))
-
-
 def _judge_ugv(trace: Trace, ugv: str, samples: npt.NDArray[np.intp]) -> Judged:
     """A UGV's commands against the law, with whatever it has accepted."""
     scenario, control, t = trace.scenario, trace.scenario["control"], trace.t[samples]
-    spec, chosen = scenario["ugvs"][ugv], _chosen(trace, samples)
+    spec, chosen = scenario["ugvs"][ugv], chosen_at(trace, samples)
     position, recorded = trace.position(ugv)[samples], trace.command(ugv)[chosen]
     given, limit = inequalities_of(trace, ugv, samples), np.full(len(samples), spec["max_speed_m_s"])
     accepted = accepted_at(trace, ugv)
-    waypoints = np.asarray(spec["preset"]["waypoints_m"], dtype=np.float64)
-    speed = float(spec["preset"]["speed_m_s"])
+    waypoints, speed = preset_of(trace, ugv)
     preset = travelled(waypoints, speed, t)
     own_rates = _preset_rates(waypoints, speed, t)
     asked = _asked(accepted, t)
@@ -236,7 +231,7 @@ def _asked(accepted: Sequence[Sent | None], t: Array) -> list[Asked]:
 
 def _judge_uav(trace: Trace, samples: npt.NDArray[np.intp]) -> Judged:
     """The UAV's commands against (9)-(11)."""
-    uav, control, chosen = trace.scenario["uav"], trace.scenario["control"], _chosen(trace, samples)
+    uav, control, chosen = trace.scenario["uav"], trace.scenario["control"], chosen_at(trace, samples)
     name = uav["name"]
     if name != trace.robots[-1]:
         raise TraceError(f"the last robot is {trace.robots[-1]}, not the UAV {name}")

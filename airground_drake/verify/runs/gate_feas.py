@@ -13,7 +13,7 @@ from airground_drake.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.segments import interpolate, travelled
 from airground_drake.verify.finding import Finding
-from airground_drake.verify.runs.beginnings import preset_of, sensed
+from airground_drake.verify.runs.beginnings import sensed
 from airground_drake.verify.runs.control_law import ON_TOP
 from airground_drake.verify.runs.gate_record import (
     POSITION_TOLERANCE_M,
@@ -24,6 +24,7 @@ from airground_drake.verify.runs.gate_record import (
     cost_tolerance,
 )
 from airground_drake.verify.runs.interventions import intervening
+from airground_drake.verify.runs.pairs import preset_of
 from airground_drake.verify.runs.proposals import proposals_of
 from airground_drake.verify.runs.sum_up_rounding import (
     compare_rounding,

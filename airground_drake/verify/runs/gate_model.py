@@ -16,7 +16,7 @@ from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.beginnings import scene, sensed
 from airground_drake.verify.runs.closed_loops import Scene, in_batches, roll_out, stacked
 from airground_drake.verify.runs.control_law import ON_TOP
-from airground_drake.verify.runs.control_samples import control_samples
+from airground_drake.verify.runs.control_samples import samples_of
 from airground_drake.verify.runs.gate_record import GateClaim, Off, Row, conclude
 from airground_drake.verify.runs.outcome_rolls import foreseen
 from airground_drake.verify.runs.proposals import accepted_at, proposals_of
@@ -148,7 +148,7 @@ def velocities(places: Array, row: Row) -> Array:
 
 def _realised(trace: Trace, rows: Sequence[Row]) -> dict[str, Any]:
     """By how much UGVs were elsewhere than predicted while the answer stood."""
-    t = trace.t[control_samples(trace.t, trace.scenario["control"]["period_s"])]
+    t = trace.t[samples_of(trace)]
     accepted = {ugv: accepted_at(trace, ugv) for ugv in trace.ugvs}
     farthest: dict[str, Any] = {}
     stood = 0

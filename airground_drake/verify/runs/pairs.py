@@ -121,6 +121,12 @@ def speed_limits(trace: Trace) -> dict[str, float]:
     return {name: float(robot["max_speed_m_s"]) for name, robot in robots.items()}
 
 
+def preset_of(trace: Trace, ugv: str) -> tuple[Array, float]:
+    """Corners of a UGV's preset trajectory, (m, 3), m, and its speed along them, m/s."""
+    preset = trace.scenario["ugvs"][ugv]["preset"]
+    return np.asarray(preset["waypoints_m"], dtype=np.float64), float(preset["speed_m_s"])
+
+
 def places_of(trace: Trace) -> dict[str, Array]:
     """Positions by name, m: (T, 3) of a robot, (3,) of an obstacle, whether the UAV knows it or not."""
 

@@ -19,11 +19,11 @@ import numpy.typing as npt
 from airground_drake.arrays import Array
 from airground_drake.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S, TraceClaim
-from airground_drake.verify.engines.segments import MERGE_S, interpolate
+from airground_drake.verify.engines.segments import interpolate
 from airground_drake.verify.engines.shortfalls import SCREEN_M, rounded_up, shortage, shortfalls
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.control_law import inequalities_of, spare
-from airground_drake.verify.runs.control_samples import control_samples
+from airground_drake.verify.runs.control_samples import chosen_at, samples_of
 from airground_drake.verify.runs.demands import differences
 from airground_drake.verify.runs.pairs import (
     DISTANCE_TOLERANCE_M,
@@ -202,13 +202,8 @@ def _listed(trace: Trace, one: Guarantee) -> dict[str, Any]:
     """A row of the evidence, with the sample at which the most was missed, if anything was."""
     e, k = float(one.missed_m.max()), int(np.argmax(one.missed_m))
     described = {"first": one.pair.first, "second": one.pair.second, "safe_distance_m": one.pair.safe_m}
-    t = float(trace.t[_samples(trace)[k]]) if e > 0.0 else None
+    t = float(trace.t[samples_of(trace)[k]]) if e > 0.0 else None
     return {**described, "guarantee_m": one.distance_m, "e_m": e, "t_s": t}
-
-
-def _samples(trace: Trace) -> npt.NDArray[np.intp]:
-    """Rows of the control samples."""
-    return control_samples(trace.t, trace.scenario["control"]["period_s"])
 
 
 def _gain(trace: Trace) -> Fraction:
@@ -231,7 +226,7 @@ def guarantees(trace: Trace) -> list[Guarantee]:
 
 
 def _guarantees(trace: Trace) -> Iterator[Guarantee]:
-    samples, period = np.append(_samples(trace), len(trace.t) - 1), trace.scenario["control"]["period_s"]
+    samples, period = np.append(samples_of(trace), len(trace.t) - 1), trace.scenario["control"]["period_s"]
     lasting = float(trace.t[samples[-1]] - trace.t[samples[-2]])
     last = Fraction(1) if abs(lasting - period) <= TIME_TOLERANCE_S else Fraction(lasting) / Fraction(period)
     places = {name: p if p.ndim == 1 else p[samples] for name, p in places_of(trace).items()}
@@ -257,7 +252,7 @@ def _longest(places: Array, last: float) -> float:
 
 def _avoidance(trace: Trace, kept: Sequence[Guarantee]) -> Iterator[_Hypothesis]:
     """What is missed of the inequalities at each sample, as what it costs of the distance."""
-    t, gain = trace.t[_samples(trace)], float(_gain(trace))
+    t, gain = trace.t[samples_of(trace)], float(_gain(trace))
     for one in kept:
         lost = one.missed_m / gain if gain else one.missed_m * len(t)
         about = {"first": one.pair.first, "second": one.pair.second}
@@ -269,18 +264,13 @@ def _binding(trace: Trace) -> tuple[int, dict[str, int]]:
     count = {"ugv beside obstacle": 0, "uav beside obstacle": 0}
     count |= {"ugv beside ugv": 0, "ugv beside uav": 0, "uav beside ugv": 0}
     kind = dict.fromkeys(trace.ugvs, "ugv") | {trace.robots[-1]: "uav"}
-    samples, in_range = _samples(trace), 0
+    samples, in_range = samples_of(trace), 0
     for robot in trace.robots:
-        slack = spare(inequalities_of(trace, robot, samples), trace.command(robot)[_chosen(trace, samples)])
+        slack = spare(inequalities_of(trace, robot, samples), trace.command(robot)[chosen_at(trace, samples)])
         in_range += int(np.isfinite(slack).sum())
         for (other, _), binds in zip(around(trace, robot), (slack <= BINDING_M_S).sum(axis=0).tolist(), strict=True):
             count[f"{kind[robot]} beside {kind.get(other, 'obstacle')}"] += binds
     return in_range, count
-
-
-def _chosen(trace: Trace, samples: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
-    """Rows whose commands were chosen at the samples: the command of a row led to it, so it is the row after."""
-    return np.searchsorted(trace.t, trace.t[samples] + MERGE_S)
 
 
 def _static(trace: Trace) -> Iterator[_Hypothesis]:
@@ -310,7 +300,7 @@ def _static(trace: Trace) -> Iterator[_Hypothesis]:
 
 def _sampled(trace: Trace) -> Iterator[_Hypothesis]:
     """Hypotheses at the control samples: their spacing, straight motion between them, speed limits, planar motion."""
-    period, limits, t, samples = trace.scenario["control"]["period_s"], speed_limits(trace), trace.t, _samples(trace)
+    period, limits, t, samples = trace.scenario["control"]["period_s"], speed_limits(trace), trace.t, samples_of(trace)
     spacing = np.diff(np.append(t[samples], t[-1]))
     yield _Hypothesis("sampling", "s", t[samples], period - spacing, TIME_TOLERANCE_S, {})
     ends = np.append(samples, len(t) - 1)

@@ -15,6 +15,7 @@ from airground_drake.arrays import Array
 from airground_drake.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.segments import NormSignal, corner_times, interpolate, travelled
+from airground_drake.verify.runs.pairs import preset_of
 
 Transition = tuple[float, str]
 """Time in s, and a key of MODES or kind of event."""
@@ -53,9 +54,7 @@ def column_conflict(trace: Trace, ugv: str, events: list[Transition]) -> Conflic
 
 def decision_variable(trace: Trace, ugv: str) -> NormSignal:
     """x(t) of (15) from positions and noise of the trace and the preset of its scenario, not the recorded one."""
-    rows, preset = trace.t, trace.scenario["ugvs"][ugv]["preset"]
-    waypoints = np.asarray(preset["waypoints_m"], dtype=np.float64)
-    speed = preset["speed_m_s"]
+    rows, (waypoints, speed) = trace.t, preset_of(trace, ugv)
     corners = corner_times(waypoints, speed)
     t = np.union1d(rows, corners[(corners > rows[0]) & (corners < rows[-1])])
     parts = interpolate(rows, np.column_stack([trace.position(ugv), trace.column(f"{ugv}.noise_m")]), t)
