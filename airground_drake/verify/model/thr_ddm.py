@@ -74,7 +74,6 @@ class ThrDdm(ModelClaim):
         "period or leak. Statistics exclude deviations larger than the intervals, not smaller ones."
     )
     expected = "supported"
-    kept = True
 
     exercised_by = "simulated paths"
 

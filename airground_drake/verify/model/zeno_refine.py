@@ -59,7 +59,6 @@ class ZenoRefine(ModelClaim):
 
     id = "ZENO-REFINE"
     expected = "supported"
-    kept = True
     summary = "With ever finer noise a bare threshold triggers ever more often; the trigger in use does not."
     statement = (
         "As the step of the decision noise is refined, the number of events of the bare threshold grows without bound, "
