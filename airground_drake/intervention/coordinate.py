@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from functools import cache
+from collections.abc import Callable, Sequence
+from functools import cache, partial
 from itertools import pairwise
 
 import numpy as np
@@ -28,6 +28,12 @@ ON_PRESET_M = 0.5
 """A motion that ends within this of the preset goes on along it."""
 BLEND_S = 1.0
 """Time constant with which a UGV is taken to come back to its preset, s."""
+
+SAME_PLACE_M = 1e-3
+"""A UGV that has moved no farther than this is where it was, m."""
+
+Alone = Callable[[int], Way | None]
+"""The way that a UGV of the team, given by its index, would have if there were no others."""
 
 
 class Coordinate(Policy):
@@ -64,23 +70,41 @@ class Coordinate(Policy):
         self.clearance = clearance_m
         self.spacing = spacing_m
         self.follow = follow_s
+        self._shut_in: dict[str, Observation] = {}
         warm_up()
 
     def propose(self, seen: Observation) -> dict[str, Motion] | None:
         """Motions by UGV; None if no triggered UGV can be helped."""
-        if not seen.team:
+        if not seen.team or self._is_known_to_be_shut_in(seen):
             return None
         own, tried = [mate.name for mate in seen.team].index(seen.robot), []
         for share in NARROWER:
             space = self._space(seen, share * self.clearance)
-            tried.append(self._joint(seen, space))
+            alone = cache(partial(self._alone, seen, space))
+            tried.append(self._joint(seen, space, alone))
             lost = tried[-1][0][0]
-            if not lost or self._alone(seen, space, own) is not None:
+            if not lost or alone(own) is not None:
                 break
+        else:
+            self._shut_in[seen.robot] = seen
         _, group, found = min(tried, key=lambda each: each[0])
         return self._proposals(seen, group, found)
 
-    def _joint(self, seen: Observation, space: Space) -> tuple[tuple[float, ...], list[int], Plan]:
+    def _is_known_to_be_shut_in(self, seen: Observation) -> bool:
+        """Whether the UGV found no way here before, even alone, on the same map: later there is none either.
+
+        Time takes away places at which the preset can be joined, and adds none.
+        """
+        before = self._shut_in.get(seen.robot)
+        return (
+            before is not None
+            and before.t <= seen.t
+            and math.dist(before.position, seen.position) <= SAME_PLACE_M
+            and np.array_equal(before.obstacles, seen.obstacles)
+            and np.array_equal(before.obstacle_radii, seen.obstacle_radii)
+        )
+
+    def _joint(self, seen: Observation, space: Space, alone: Alone) -> tuple[tuple[float, ...], list[int], Plan]:
         """The best plan, its cost and whom it is for."""
         everyone = range(len(seen.team))
         group = [i for i in everyone if seen.team[i].name == seen.robot or _waits(seen.team[i], seen.t)]
@@ -93,7 +117,7 @@ class Coordinate(Policy):
                 best, least = (group, found), cost
             if cost[0] == 0:
                 break
-            more = self._in_the_way(seen, space, group, found)
+            more = self._in_the_way(seen, space, group, found, alone)
             if not more:
                 break
             group = sorted([*group, *more])
@@ -107,20 +131,25 @@ class Coordinate(Policy):
         speeds = [min(self.speed, SHARE * team[i].max_speed) for i in group]
         return plan(space, errands, speeds, fixed, follow=self.follow, effort=Effort())
 
-    def _in_the_way(self, seen: Observation, space: Space, group: Sequence[int], found: Plan) -> list[int]:
-        """Willing UGVs that keep triggered ones of a group, that found no way, from the way they would have alone."""
+    def _in_the_way(
+        self, seen: Observation, space: Space, group: Sequence[int], found: Plan, alone: Alone
+    ) -> list[int]:
+        """Willing UGVs outside a group that are near the ways that its lost triggered UGVs would have alone.
+
+        All willing ones if none is near; nobody if no lost UGV has a way even alone.
+        """
+        lost = [i for i, way in zip(group, found.ways, strict=True) if way is None and seen.team[i].triggered]
+        ways = [(seen.team[i], way) for i in lost if (way := alone(i)) is not None]
+        if not ways:
+            return []
         others = [i for i, mate in enumerate(seen.team) if i not in group and _is_willing(mate, seen.t)]
-        ahead = {i: predicted(seen.team[i], seen.start) for i in others}
-        more = set()
-        for i, way in zip(group, found.ways, strict=True):
-            if way is not None or not seen.team[i].triggered:
-                continue
-            mate, alone = seen.team[i], self._alone(seen, space, i)
-            if alone is None:
-                continue
-            near = {j: self.spacing + space.apart + (mate.radius + seen.team[j].radius) for j in others}
-            more |= {j for j in others if distance(alone.motion, ahead[j]) < near[j]}
-        return sorted(more or others)
+        near = []
+        for j in others:
+            other, ahead = seen.team[j], predicted(seen.team[j], seen.start)
+            apart = self.spacing + space.apart
+            if any(distance(way.motion, ahead) < apart + (mate.radius + other.radius) for mate, way in ways):
+                near.append(j)
+        return near or others
 
     def _alone(self, seen: Observation, space: Space, i: int) -> Way | None:
         """What a UGV would do if there were no others."""

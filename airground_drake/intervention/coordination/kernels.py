@@ -253,6 +253,49 @@ def search(
 
 
 @njit(cache=True)
+def free_points(points: Array, discs: Array) -> npt.NDArray[np.bool_]:
+    """Which points (K, 2), m, are outside all discs (m, 3) of centre and radius, m."""
+    free = np.ones(len(points), np.bool_)
+    for k in range(len(points)):
+        for m in range(len(discs)):
+            x, y = points[k, 0] - discs[m, 0], points[k, 1] - discs[m, 1]
+            if np.sqrt(x * x + y * y) < discs[m, 2]:
+                free[k] = False
+                break
+    return free
+
+
+@njit(cache=True)
+def free_segments(begin: Array, end: Array, discs: Array, slack: float) -> npt.NDArray[np.bool_]:
+    """Which segments (K, 2)-(K, 2), m, come nearer to no disc than its radius or than one of their ends is.
+
+    Args:
+        begin: (K, 2), m.
+        end: (K, 2), m.
+        discs: (m, 3) of centre and radius, m.
+        slack: distances may fall short by this, m.
+    """
+    free = np.ones(len(begin), np.bool_)
+    for k in range(len(begin)):
+        sx, sy = end[k, 0] - begin[k, 0], end[k, 1] - begin[k, 1]
+        squared = max(sx * sx + sy * sy, 1e-300)
+        reach = 1.001 * np.sqrt(squared)
+        for m in range(len(discs)):
+            ax, ay = begin[k, 0] - discs[m, 0], begin[k, 1] - discs[m, 1]
+            to_begin = np.sqrt(ax * ax + ay * ay)
+            if to_begin > discs[m, 2] + reach:
+                continue
+            bx, by = end[k, 0] - discs[m, 0], end[k, 1] - discs[m, 1]
+            share = min(max(-(ax * sx + ay * sy) / squared, 0.0), 1.0)
+            x, y = ax + share * sx, ay + share * sy
+            allowed = min(discs[m, 2], to_begin, np.sqrt(bx * bx + by * by))
+            if np.sqrt(x * x + y * y) < allowed - slack:
+                free[k] = False
+                break
+    return free
+
+
+@njit(cache=True)
 def straight_is_free(motion: Array, i: int, j: int, discs: Array, others: Array, begins: Indices, apart: Array) -> bool:
     """Whether a timed motion may go straight from row i to row j.
 

@@ -13,6 +13,7 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
 from airground_drake.arrays import Array
+from airground_drake.intervention.coordination import kernels
 from airground_drake.intervention.paths import NoPath, shortest_path
 
 Indices = npt.NDArray[np.int64]
@@ -76,30 +77,22 @@ class Space:
     @property
     def discs(self) -> Array:
         """Centres, and the distances that motions keep but near their ends, (m, 3), m."""
-        return np.column_stack([self.centres, self.radii + CHORDS * self.clearance])
+        return self._discs(CHORDS * self.clearance)
+
+    def _discs(self, clearance: float) -> Array:
+        """Centres, and distances to keep with a clearance, (m, 3), m."""
+        return np.column_stack([self.centres, self.radii + clearance])
 
     def segments_are_free(self, begin: Array, end: Array) -> npt.NDArray[np.bool_]:
         """Which of the segments (K, 2)-(K, 2), m, come no nearer to a disc than they have to or than their ends are.
 
         So a segment that begins too near to a disc is free if it only leads away.
         """
-        free = np.ones(len(begin), dtype=bool)
-        step = end - begin
-        squared = np.maximum(np.square(step).sum(axis=1), 1e-300)
-        for centre, radius in zip(self.centres, self.radii, strict=True):
-            offset = begin - centre
-            share = np.clip(-(offset * step).sum(axis=1) / squared, 0.0, 1.0)
-            nearest = np.linalg.norm(offset + share[:, None] * step, axis=1)
-            ends = np.minimum(np.linalg.norm(offset, axis=1), np.linalg.norm(end - centre, axis=1))
-            free &= nearest >= np.minimum(radius + CHORDS * self.clearance, ends) - ROUNDING_M
-        return free
+        return kernels.free_segments(begin, end, self.discs, ROUNDING_M)
 
     def points_are_free(self, points: Array, clearance: float) -> npt.NDArray[np.bool_]:
         """Which of the points (K, 2), m, keep every distance, and so much more, m."""
-        if not len(self.centres):
-            return np.ones(len(points), dtype=bool)
-        gaps = np.linalg.norm(points[:, None] - self.centres, axis=2) - self.radii
-        return np.asarray((gaps >= clearance - ROUNDING_M).all(axis=1))
+        return kernels.free_points(points, self._discs(clearance - ROUNDING_M))
 
 
 @dataclass(frozen=True, eq=False)
