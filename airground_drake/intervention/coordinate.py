@@ -11,7 +11,7 @@ import numpy as np
 
 from airground_drake.arrays import Array
 from airground_drake.intervention.coordination.joint import Effort, Plan, plan
-from airground_drake.intervention.coordination.roadmap import Errand, Space
+from airground_drake.intervention.coordination.roadmap import RobotTask, Space
 from airground_drake.intervention.coordination.single import Body, Way
 from airground_drake.intervention.coordination.timed import at_rest, distance, speed, timed, without_repeats
 from airground_drake.intervention.policy import Observation, Policy, Teammate
@@ -127,9 +127,9 @@ class Coordinate(Policy):
     def _plan(self, seen: Observation, space: Space, group: Sequence[int]) -> Plan:
         team = seen.team
         fixed = [Body(predicted(mate, seen.start), mate.radius) for i, mate in enumerate(team) if i not in group]
-        errands = [errand(team[i], seen.start) for i in group]
+        tasks = [task_of(team[i], seen.start) for i in group]
         speeds = [min(self.speed, SHARE * team[i].max_speed) for i in group]
-        return plan(space, errands, speeds, fixed, follow=self.follow, effort=Effort())
+        return plan(space, tasks, speeds, fixed, follow=self.follow, effort=Effort())
 
     def _in_the_way(
         self, seen: Observation, space: Space, group: Sequence[int], found: Plan, alone: Alone
@@ -155,7 +155,7 @@ class Coordinate(Policy):
         """What a UGV would do if there were no others."""
         mate = seen.team[i]
         pace = min(self.speed, SHARE * mate.max_speed)
-        return plan(space, [errand(mate, seen.start)], [pace], follow=self.follow).ways[0]
+        return plan(space, [task_of(mate, seen.start)], [pace], follow=self.follow).ways[0]
 
     def _proposals(self, seen: Observation, group: Sequence[int], found: Plan) -> dict[str, Motion] | None:
         motions = {}
@@ -174,11 +174,11 @@ class Coordinate(Policy):
         return Space(seen.obstacles[:, :2], radii, clearance, seen.robot_distance, self.spacing, above)
 
 
-def errand(mate: Teammate, start: float) -> Errand:
+def task_of(mate: Teammate, start: float) -> RobotTask:
     """From where a UGV is to its preset, from time `start`, s, on."""
     preset = mate.preset
     times = np.append(start, preset.times[preset.times > start + 1e-6])
-    return Errand(mate.position[:2].copy(), timed(times - start, preset.sample(times)[:, :2]), mate.radius)
+    return RobotTask(mate.position[:2].copy(), timed(times - start, preset.sample(times)[:, :2]), mate.radius)
 
 
 def predicted(mate: Teammate, start: float) -> Array:
@@ -240,5 +240,5 @@ def warm_up() -> None:
     """Load the compiled loops before a plan is asked for, which has little time."""
     room = Space(np.array([[0.0, 1.0]]), np.array([0.1]), 0.1, 1.0, 0.1)
     ends = [np.array([0.0, 0.0]), np.array([3.0, 0.0])]
-    errands = [Errand(a, np.array([[0.0, *b]])) for a, b in pairwise([*ends, ends[0]])]
-    plan(room, errands, [1.0, 1.0], effort=Effort(orders=2))
+    tasks = [RobotTask(a, np.array([[0.0, *b]])) for a, b in pairwise([*ends, ends[0]])]
+    plan(room, tasks, [1.0, 1.0], effort=Effort(orders=2))
