@@ -109,6 +109,7 @@ class _Search:
         self._movers, self._fixed, self._follow, self._effort = movers, fixed, follow, effort
         self.orders, self.searches, self.spent = 0, 0, 0
         self._limit = effort.expansions
+        self._without_way: list[int] = []
 
     def in_orders(self) -> list[Way | None] | None:
         """The best complete plan; None without any."""
@@ -125,8 +126,9 @@ class _Search:
             self.orders += 1
             left -= 1
             ways, failed = self._in_order(order)
-            if failed == order[0]:
-                return None  # it has no way even if the others of the plan are left out
+            if failed == order[0]:  # it has no way even if the others of the plan are left out
+                self._without_way.append(failed)
+                return None
             if failed is not None:
                 ways, failed = self._in_order(order, considerate=True)
             if failed is None:
@@ -182,7 +184,7 @@ class _Search:
     def partly(self) -> list[Way | None]:
         """A plan in which some robots stay: each one that finds no way is dropped, and the others are planned anew."""
         self._limit = self._effort.expansions
-        staying: list[int] = []
+        staying = self._without_way
         order = next(self._drawn())
         for _ in self._movers:
             ways, failed = self._in_order([i for i in order if i not in staying], staying)

@@ -296,8 +296,8 @@ def _other_edges(points: Array, radii: Array) -> Indices:
     near = cKDTree(points).query_ball_point(points[others], radii, return_sorted=True)
     tails = np.concatenate([np.zeros(0, dtype=np.int64), *(np.array(found, dtype=np.int64) for found in near)])
     heads = np.repeat(others, [len(found) for found in near])
-    pairs = np.column_stack([np.minimum(tails, heads), np.maximum(tails, heads)])[tails != heads]
-    return np.unique(pairs, axis=0)
+    keys = (np.minimum(tails, heads) * len(points) + np.maximum(tails, heads))[tails != heads]
+    return np.column_stack(np.divmod(np.unique(keys), len(points)))
 
 
 def _is_short_cut(points: Array, pairs: Indices, robots: Sequence[RobotNodes]) -> npt.NDArray[np.bool_]:
@@ -320,8 +320,7 @@ def _fan(space: Space, start: Array, far: float) -> Array:
 def _in_rows(points: Array, pairs: Indices) -> tuple[Indices, Indices, Array]:
     """Edges in both directions, sorted by tail and head: first edge of each node, heads, lengths."""
     tails, heads = np.concatenate([pairs, pairs[:, ::-1]]).T
-    order = np.lexsort((heads, tails))
-    tails, heads = tails[order], heads[order]
+    tails, heads = np.divmod(np.sort(tails * len(points) + heads), len(points))
     first = np.searchsorted(tails, np.arange(len(points) + 1)).astype(np.int64)
     lengths = np.maximum(np.linalg.norm(points[heads] - points[tails], axis=1), ROUNDING_M)
     return first, np.ascontiguousarray(heads), lengths
