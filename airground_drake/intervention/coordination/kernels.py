@@ -292,12 +292,12 @@ def search(
     closed, node_of = np.zeros(len(times), np.bool_), np.empty(len(times), np.int64)
     for n in range(len(first) - 1):
         node_of[first[n] : first[n + 1]] = n
-    heap = [(np.inf, np.int64(-1))]
+    heap: list[tuple[float, int]] = [(np.inf, -1)]
     heap.pop()
     if first[start] < first[start + 1] and times[first[start], 0] == 0.0 and to_go[start] < np.inf:
         arrival[first[start]] = 0.0
-        heappush(heap, (to_go[start], first[start]))
-    best, last, expanded = np.inf, np.int64(-1), 0
+        heappush(heap, (to_go[start], int(first[start])))
+    best, last, expanded = np.inf, -1, 0
     while len(heap) > 0 and expanded < budget:
         bound, i = heappop(heap)
         if bound >= best:
@@ -306,7 +306,7 @@ def search(
             continue
         closed[i] = True
         expanded += 1
-        n = node_of[i]
+        n = int(node_of[i])
         joined = join_time(arrival[i], times[i, 1], joins[n, 0], joins[n, 1])
         if joined < best:
             best, last = joined, i
@@ -350,7 +350,7 @@ def reach_neighbours(
             there = max(arrival[i], times[j, 0]) + duration
             if there <= min(times[j, 1], end) and there < arrival[j]:
                 arrival[j], before[j] = there, i
-                heappush(heap, (there + to_go[head], np.int64(j)))
+                heappush(heap, (there + to_go[head], j))
 
 
 @njit(cache=True)
