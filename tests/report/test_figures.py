@@ -91,7 +91,7 @@ def test_runs_with_identical_paths_share_a_panel(scenario: Scenario, traces: dic
         "Run a: method (a), no intervention", "Runs b = c: identical paths",
     ]  # fmt: skip
     assert trajectories.caption.startswith(
-        "Run a: ugv1 stands still at (3.37, 5.10) m. Runs b = c: not all UGVs arrive."
+        "Run a: ugv1 stands still at (3.37, 5.10) m. Run b = c: not all UGVs arrive."
     )
 
 

@@ -182,7 +182,7 @@ def _distances(chosen: _Selection) -> Figure | None:
     least += f": {ugv} comes to {distance(value, needed)} of {other} at {t_s:.2f} s, {needed:g} m required"
     caption = (
         f"{least} ({_runs(heading).lower()}). No line may enter the hatched band. "
-        f"Circle: the smallest distance, exact between samples; red: too small.{_left_out(chosen, chosen.ugvs)}"
+        f"Circle: the smallest distance, exact; red: too small.{_left_out(chosen, chosen.ugvs)}"
     )
     return Figure("distances", "Distances to the nearest obstacles and robot", caption, tuple(panels))
 
@@ -313,8 +313,8 @@ def _ends(chosen: _Selection) -> str:
             words = [*words[:LISTED], f"{len(words) - LISTED} more do not arrive"]
         if not words and all(MEASURES["arrives"](trace, ugv)[0] for ugv in trace.ugvs):
             words = ["all UGVs arrive"]
-        told.setdefault(", ".join(words) or "not all UGVs arrive", []).append(_runs(heading))
-    return "".join(f"{', '.join(runs)}: {what}. " for what, runs in told.items())
+        told.setdefault(", ".join(words) or "not all UGVs arrive", []).append(_runs(heading).partition(" ")[2])
+    return "".join(f"Run{'s' * (len(runs) > 1)} {', '.join(runs)}: {what}. " for what, runs in told.items())
 
 
 def _first_triggers(chosen: _Selection) -> str:

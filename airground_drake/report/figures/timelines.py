@@ -53,16 +53,10 @@ def decision(trace: Trace, ugvs: Sequence[str], top: float) -> Figure:
     for position, ugv in enumerate(ugvs):
         x = trace.column(f"{ugv}.decision_variable_m")
         time_line(axes, trace.t, x, look(position))
-        labels.append((float(x[-1]), short(ugv, 12), look(position).color))
-        for k, event in enumerate(events_of(trace, ugv, "trigger")):
-            at = event["t_s"], float(np.interp(event["t_s"], trace.t, x))
-            axes.plot(*at, marker="^", markersize=8, color=look(position).color, markeredgecolor="white")
-            if k == 0:
-                early = event["t_s"] < 0.3 * float(trace.t[-1])
-                axes.annotate(
-                    f"{event['t_s']:.2f} s", at, (7.0 if early else -5.0, 3.0 - 10.0 * position * early),
-                    textcoords="offset points", ha="left" if early else "right", color=look(position).color, fontsize=8,
-                )  # fmt: skip
+        times = [event["t_s"] for event in events_of(trace, ugv, "trigger")]
+        color = look(position).color
+        axes.plot(times, np.interp(times, trace.t, x), "^", markersize=8, color=color, markeredgecolor="white")
+        labels.append((float(x[-1]), short(ugv, 12) + (f" ▲ {times[0]:.2f} s" if times else ""), color))
     rule(axes, "time, s", "decision variable, m")
     label_right(axes, labels)
     return figure
@@ -131,7 +125,11 @@ def told(trace: Trace, ugv: str) -> str:
     if len(found) <= MAX_TOLD:
         return _wrapped(f"{event['kind']} {event['t_s']:.2f}" for event in found)
     counts = {kind: [event["t_s"] for event in found if event["kind"] == kind] for kind in MARKS}
-    many = (f"{len(t)} {kind} {t[0]:.2f}" if len(t) > 1 else f"{kind} {t[0]:.2f}" for kind, t in counts.items() if t)
+    many = (
+        f"{len(t)} \N{MULTIPLICATION SIGN} {kind} from {t[0]:.2f}" if len(t) > 1 else f"{kind} {t[0]:.2f}"
+        for kind, t in counts.items()
+        if t
+    )
     return _wrapped(many)
 
 
