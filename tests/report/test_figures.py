@@ -78,8 +78,8 @@ def test_a_large_team_is_in_histograms_and_who_was_triggered_is_drawn(scenario: 
     drawn = {figure.id: figure for figure in draw.draw(*team(scenario, 12, triggered="ugv11"))}
     assert "Run a: 0 of 12 UGVs arrive, 1 triggered." in drawn["team"].caption
     assert drawn["team"].panels[0].table.rows[0][:2] == ("a", "12")
-    assert ">ugv11</text>" in drawn["decision"].panels[0].svg
-    assert ">ugv12</text>" not in drawn["decision"].panels[0].svg
+    assert ">ugv11 ▲ 14.50 s</text>" in drawn["decision"].panels[0].svg
+    assert "ugv12" not in drawn["decision"].panels[0].svg
     assert "8 more UGVs" in drawn["trajectories"].caption
 
 
