@@ -80,7 +80,7 @@ class Separation(NamedTuple):
 
 def _separated(found: Mapping[str, Any]) -> list[Separation]:
     """One for each claim whose violations depend on what was drawn."""
-    separations = []
+    separations = list[Separation]()
     for claim in found["claims"]:
         if where := claim["fails_where"]:
             cells = sorted(where["cells"], key=lambda cell: cell["refuted"] / cell["runs"])

@@ -99,6 +99,7 @@ def test_each_ugv_has_its_nearest_obstacles_and_robot_and_a_shortfall_says_from_
     scenario: Scenario, traces: dict[str, Trace]
 ) -> None:
     _, distances, *_ = draw.draw(scenario, traces)
+    assert distances.caption.startswith(("Closest: ugv", "Too close: ugv"))
     assert {"ugv1 to obstacle_2", "ugv1 to uav"} <= set(distances.panels[0].table.columns)
     one = {"printed": replace(traces["a_printed"], meta={**traces["a_printed"].meta, "run": "printed"})}
     _, distances, *_ = draw.draw(replace(scenario, runs={"printed": Run("a")}), one)
