@@ -208,8 +208,8 @@ def _decision(chosen: _Selection) -> Figure:
         )  # fmt: skip
         panels.append(Panel(_runs(heading), text, series(trace, "Decision variables, m", columns[heading])))
     caption = (
-        f"{_first_triggers(chosen)} ▲: the trigger. A UGV that stands still falls behind its "
-        f"reference.{_left_out(chosen, chosen.team)}"
+        f"{_first_triggers(chosen)} A UGV that stands still falls behind its reference and "
+        f"triggers (▲) at the threshold.{_left_out(chosen, chosen.team)}"
     )
     return Figure("decision", "Decision variables", caption, tuple(panels))
 
@@ -318,12 +318,14 @@ def _ends(chosen: _Selection) -> str:
 
 
 def _first_triggers(chosen: _Selection) -> str:
-    first: dict[str, list[str]] = {}
+    """When the UGVs of each run reach the threshold, the first ones."""
+    told: dict[str, list[str]] = {}
     for name, trace in chosen.runs.items():
         early = sorted((event["t_s"], event["robot"]) for event in trace.events if event["kind"] == "trigger")[:LISTED]
-        what = ", ".join(f"{robot} reaches the threshold at {t:.3f} s" for t, robot in early)
-        first.setdefault(what or "no UGV reaches the threshold", []).append(name)
-    return " ".join(f"Run{'s' * (len(names) > 1)} {', '.join(names)}: {what}." for what, names in first.items())
+        times = {ugv: ", ".join(f"{t:.3f}" for t, other in early if other == ugv) for _, ugv in early}
+        what = ", ".join(f"{ugv} at {listed} s" for ugv, listed in times.items())
+        told.setdefault(f"triggers {what}" if what else "no trigger", []).append(name)
+    return " ".join(f"Run{'s' * (len(names) > 1)} {', '.join(names)}: {what}." for what, names in told.items())
 
 
 def _accepted(chosen: _Selection) -> str:

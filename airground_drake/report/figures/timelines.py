@@ -146,7 +146,8 @@ def gaps(of_runs: Mapping[str, Sequence[tuple[float, float]]], bound_s: float, t
     level(axes, bound_s, "-")
     for position, (name, found) in enumerate(of_runs.items()):
         color, _, marker = look(position)
-        axes.plot(*zip(*found, strict=True), linestyle="none", marker=marker, markersize=5, color=color)
+        size = 5.0 + 3.0 * position  # hollow and of different sizes: runs may trigger at the same times
+        axes.plot(*zip(*found, strict=True), marker, markersize=size, color=color, markerfacecolor="none")
         labels.append((found[-1][1], f"run {short(name, 8)}", color))
     rule(axes, "time of the trigger, s", "time since the last, s")
     label_right(axes, labels)
