@@ -1,4 +1,8 @@
-"""From a scenario to a Drake Diagram of four: the decision layer, the world, the UGVs, the UAV; wired by port names."""
+"""From a scenario to a Drake Diagram of the layers of the paper's Figure 2 and the vehicles, wired by port names.
+
+Data flows through `decision_making` (noise, DDM, trigger), `task_planning` (presets, planner, controllers),
+`optimisation` (gatekeeper) and `vehicles` (commands, disturbances, plants), whose positions are fed back.
+"""
 
 from __future__ import annotations
 
@@ -56,16 +60,20 @@ class Model:
         method: which method's priorities and gatekeeper it has.
         team: names, safe distances, speed limits.
         zeta: decision threshold in force, m.
+        decision_block: what drives the trigger.
         planner: the UAV's planner.
         gatekeeper: of methods (c) and (d), else None.
+        controllers: of the UGVs, and of the UAV.
     """
 
     diagram: Diagram
     method: Method
     team: Team
     zeta: float
+    decision_block: System
     planner: InterventionPlanner
     gatekeeper: Gatekeeper | None
+    controllers: tuple[UgvController, UavController]
 
 
 def build_diagram(
@@ -117,23 +125,27 @@ def build_model(
     law = components.make_law(scenario, chosen, composition)
     # first, so that the seed of its noise does not depend on what a plant may draw
     block = _checked_block(n, decision_block(n, presets))
-    decision = _decision(scenario, n, block, components.make_trigger(scenario, zeta))
+    decision = _decision_making(scenario, n, block, components.make_trigger(scenario, zeta))
     starts = dict(zip(team.robots, components.make_starts(scenario), strict=True))
-    world = _world(team, {robot: _checked(robot, plants(robot, start)) for robot, start in starts.items()})
+    vehicles = _vehicles(team, {robot: _checked(robot, plants(robot, start)) for robot, start in starts.items()})
     planner = InterventionPlanner(components.make_planner(scenario, chosen), scenario.control.period_s)
     gatekeeper = None
     if chosen.gated:
         gatekeepers = components.make_gatekeepers(scenario, law)
         gatekeeper = Gatekeeper(gatekeepers, n, period=scenario.gatekeeper.period_s, control=scenario.control.period_s)
-    ugvs = _ugvs(presets, UgvController(team, law), gatekeeper if gatekeeper is not None else DirectAcceptance(n))
-    uav = _uav(planner, _uav_controller(scenario, team))
-    parts = {"decision": decision, "uav": uav, "ugvs": ugvs, "world": world}
+    controllers = UgvController(team, law), _uav_controller(scenario, team)
+    parts = {
+        "decision_making": decision,
+        "task_planning": _task_planning(presets, planner, *controllers),
+        "optimisation": _optimisation(gatekeeper if gatekeeper is not None else DirectAcceptance(n)),
+        "vehicles": vehicles,
+    }
     if monitor is not None:
         parts["monitor"] = monitor
     named = {port.get_name(): port for part in parts.values() for port in _outputs(part)}
     exported = [*RECORDED, *(["violation"] if monitor is not None else [])]
     diagram = _assembled(f"{scenario.name}_method_{chosen.id}", parts, named, exported)
-    return Model(diagram, chosen, team, zeta, planner, gatekeeper)
+    return Model(diagram, chosen, team, zeta, block, planner, gatekeeper, controllers)
 
 
 def most_complete(scenario: Scenario) -> str:
@@ -157,8 +169,8 @@ def _chosen(scenario: Scenario, method: str | None, composition: str | None) -> 
     return method_of(method), composition
 
 
-def _decision(scenario: Scenario, n: int, variable: System, trigger: Trigger) -> Diagram:
-    """The decision layer of n UGVs: noise, the block of the decision variables, triggers."""
+def _decision_making(scenario: Scenario, n: int, variable: System, trigger: Trigger) -> Diagram:
+    """The decision-making layer of n UGVs: noise, the block of the decision variables, triggers."""
     source, noise = components.make_noise(n, scenario.decision)
     events = EventTrigger(n, trigger)
     systems = {
@@ -171,29 +183,34 @@ def _decision(scenario: Scenario, n: int, variable: System, trigger: Trigger) ->
         "status": events.GetOutputPort("status"),
     }
     exported = [name for name in named if name != "decision_range"]
-    return _assembled("decision", systems, named, exported, [(source.get_output_port(), noise.get_input_port())])
+    return _assembled("decision_making", systems, named, exported, [(source.get_output_port(), noise.get_input_port())])
 
 
-def _ugvs(presets: Sequence[Motion], controller: UgvController, gatekeeper: Gatekeeper | DirectAcceptance) -> Diagram:
-    """The UGVs: preset trajectories, controllers, gatekeepers."""
+def _task_planning(
+    presets: Sequence[Motion], planner: InterventionPlanner, ugvs: UgvController, uav: UavController
+) -> Diagram:
+    """The task planning layer: preset trajectories, the UAV's proposals, and the tasks that all robots compose."""
     reference = TrajectorySource(components.stack_presets(list(presets)), output_derivative_order=1)
+    systems = {
+        "reference": reference, "intervention_planner": planner, "ugv_controller": ugvs, "uav_controller": uav,
+    }  # fmt: skip
     named = {
         "reference": reference.get_output_port(),
-        "ugv_command": controller.GetOutputPort("command"),
-        "accepted": controller.GetOutputPort("accepted"),
-        "answers": gatekeeper.GetOutputPort("answers"),
-        "reports": gatekeeper.GetOutputPort("reports"),
+        "proposals": planner.GetOutputPort("proposals"),
+        "ugv_command": ugvs.GetOutputPort("command"),
+        "accepted": ugvs.GetOutputPort("accepted"),
+        "uav_command": uav.GetOutputPort("command"),
     }
-    return _assembled("ugvs", {"reference": reference, "gatekeeper": gatekeeper, "ugv_controller": controller}, named)
+    return _assembled("task_planning", systems, named)
 
 
-def _uav(planner: InterventionPlanner, controller: UavController) -> Diagram:
-    """The UAV: planner and controller."""
-    named = {"proposals": planner.GetOutputPort("proposals"), "uav_command": controller.GetOutputPort("command")}
-    return _assembled("uav", {"intervention_planner": planner, "uav_controller": controller}, named)
+def _optimisation(gatekeeper: Gatekeeper | DirectAcceptance) -> Diagram:
+    """The optimisation layer: the UGVs accept or refuse."""
+    named = {name: gatekeeper.GetOutputPort(name) for name in ("answers", "reports")}
+    return _assembled("optimisation", {"gatekeeper": gatekeeper}, named)
 
 
-def _world(team: Team, plants: Mapping[str, System]) -> Diagram:
+def _vehicles(team: Team, plants: Mapping[str, System]) -> Diagram:
     """Where the robots are, and what moves them: commands, disturbances, plants."""
     n = len(team.ugvs)
     builder = DiagramBuilder()
@@ -214,7 +231,7 @@ def _world(team: Team, plants: Mapping[str, System]) -> Diagram:
         builder.ExportInput(disturbance.GetInputPort(f"disturbance_{robot}"), f"disturbance_{robot}")
     builder.ExportOutput(team_position.get_output_port(), "team_position")
     builder.ExportOutput(team_command.get_output_port(), "team_command")
-    return _built("world", builder)
+    return _built("vehicles", builder)
 
 
 def _assembled(

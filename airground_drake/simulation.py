@@ -162,15 +162,13 @@ def _with_rule(scenario: Scenario, run: Run) -> Scenario:
 
 def _controllers(model: Model) -> dict[str, Any]:
     """What the controllers in the diagram were built with, by name: see `controllers.read_back`."""
-    ugvs, uav = (model.diagram.GetSubsystemByName(name) for name in ("ugvs", "uav"))
-    systems = (ugvs.GetSubsystemByName("ugv_controller"), uav.GetSubsystemByName("uav_controller"))
-    return {system.get_name(): system.parameters() for system in systems}
+    return {system.get_name(): system.parameters() for system in model.controllers}
 
 
 def _decision_block(model: Model) -> str:
     """Name of the class that computes the decision variables in the diagram; "" for that of (15)."""
-    block = model.diagram.GetSubsystemByName("decision").GetSubsystemByName("decision_variable")
-    return "" if type(block) is DecisionVariable else type(block).__qualname__
+    kind = type(model.decision_block)
+    return "" if kind is DecisionVariable else kind.__qualname__
 
 
 def _decision(decision: Decision, robot: str, route: str) -> dict[str, Any]:

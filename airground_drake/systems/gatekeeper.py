@@ -51,6 +51,11 @@ class Gatekeeper(LeafSystem):
         self.DeclarePeriodicUnrestrictedUpdateEvent(self._ticks.period, 0.0, weakly(self._update))
 
     @property
+    def judges(self) -> str:
+        """Name of the class that judges the proposals."""
+        return type(self._gatekeepers).__name__
+
+    @property
     def decision_times_s(self) -> list[float]:
         """CPU time of every decision since construction or `reset_timing`.
 
