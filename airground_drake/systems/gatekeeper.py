@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from typing import Any, Self
 
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
-from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSystem, State
+from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSystem, State, ValueProducer
 
 from airground_drake.gatekeeper.answer import Decision
 from airground_drake.gatekeeper.mpc_gatekeeper import Gatekeepers, Memory
 from airground_drake.intervention.messages import ACCEPT, SILENT, Report
 from airground_drake.systems.lifetime import weakly
 from airground_drake.systems.ticks import Ticks
+
+
+class DecisionLog(list[Decision]):
+    """Decisions by time, for the trace."""
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        """Of a copied Context: a log of its own, with the same decisions."""
+        return type(self)(self)
 
 
 class Gatekeeper(LeafSystem):
@@ -28,7 +36,8 @@ class Gatekeeper(LeafSystem):
             of the other robots; `proposals` abstract, n of Proposal or None.
         out `answers` (2n) and `reports` (abstract), see `messages`; held.
     State: abstract, a `Memory`.
-    Rate: one update per gatekeeper period, from t = 0.
+    Rate: one update per gatekeeper period, from t = 0. What it decides there is published at the end of the
+    simulator's step: put into a log that the Context holds, as Drake's loggers do. The log decides nothing.
     """
 
     def __init__(self, gatekeepers: Gatekeepers, count: int, *, period: float, control: float) -> None:
@@ -47,6 +56,9 @@ class Gatekeeper(LeafSystem):
         self.DeclareAbstractOutputPort(
             "reports", lambda: Value(object()), weakly(self._calc_reports), prerequisites_of_calc=held
         )
+        empty = ValueProducer(allocate=lambda: Value(DecisionLog()), calc=ValueProducer.NoopCalc)
+        self._log = self.DeclareCacheEntry("decisions", empty, {self.nothing_ticket()})
+        self.DeclarePerStepPublishEvent(weakly(self._publish))
         self._ticks = Ticks(period, control)
         self.DeclarePeriodicUnrestrictedUpdateEvent(self._ticks.period, 0.0, weakly(self._update))
 
@@ -67,9 +79,10 @@ class Gatekeeper(LeafSystem):
         """Forget the measured decision times."""
         self._gatekeepers.times_s = []
 
-    def decisions(self, context: Context) -> Sequence[Decision]:
-        """Every decision up to the context's time."""
-        return self._memory(context).decisions
+    def decisions(self, context: Context) -> DecisionLog:
+        """Every decision that was published in a simulation of this Context."""
+        log: DecisionLog = self._log.get_mutable_cache_entry_value(context).GetMutableValueOrThrow()
+        return log
 
     def _memory(self, context: Context) -> Memory:
         memory: Memory = context.get_abstract_state(self._state).get_value()
@@ -80,6 +93,13 @@ class Gatekeeper(LeafSystem):
 
     def _calc_reports(self, context: Context, output: AbstractValue) -> None:
         output.set_value(self._memory(context).reports)
+
+    def _publish(self, context: Context) -> EventStatus:
+        made, log = self._memory(context).decisions, self.decisions(context)
+        if not made or (log and log[-1] is made[-1]):
+            return EventStatus.DidNothing()
+        log.extend(made)
+        return EventStatus.Succeeded()
 
     def _update(self, context: Context, state: State) -> EventStatus:
         if not self._ticks.due(context.get_time()):
