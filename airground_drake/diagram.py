@@ -14,7 +14,6 @@ from pydrake.systems.primitives import Demultiplexer, Multiplexer, TrajectorySou
 
 from airground_drake import components
 from airground_drake.arrays import Array
-from airground_drake.decision.trigger import Trigger
 from airground_drake.errors import PluginError, UnknownNameError
 from airground_drake.nsbc.avoidance import COMPOSITIONS, Composition
 from airground_drake.nsbc.motion import Motion
@@ -59,8 +58,8 @@ class Model:
         diagram: the whole system; its exported output ports are RECORDED.
         method: which method's priorities and gatekeeper it has.
         team: names, safe distances, speed limits.
-        zeta: decision threshold in force, m.
         decision_block: what drives the trigger.
+        trigger: of all UGVs.
         planner: the UAV's planner.
         gatekeeper: of methods (c) and (d), else None.
         controllers: of the UGVs, and of the UAV.
@@ -69,8 +68,8 @@ class Model:
     diagram: Diagram
     method: Method
     team: Team
-    zeta: float
     decision_block: System
+    trigger: EventTrigger
     planner: InterventionPlanner
     gatekeeper: Gatekeeper | None
     controllers: tuple[UgvController, UavController]
@@ -116,18 +115,24 @@ def build_model(
     plants: PlantFactory = components.first_order_plant,
     monitor: Monitor | None = None,
     decision_block: DecisionFactory = DecisionVariable,
+    *,
+    disturbed: bool = True,
 ) -> Model:
-    """Build and wire all components of one method of a valid scenario; else as `build_diagram`."""
+    """Build and wire all components of one method of a valid scenario; else as `build_diagram`.
+
+    If it is not to be `disturbed`, the diagram has no inputs for disturbances: commands go straight to the plants.
+    """
     chosen, composition = _chosen(scenario, method, composition)
     team, presets = components.make_team(scenario), components.make_presets(scenario)
     n = len(team.ugvs)
-    zeta = components.threshold(scenario)
     law = components.make_law(scenario, chosen, composition)
     # first, so that the seed of its noise does not depend on what a plant may draw
     block = _checked_block(n, decision_block(n, presets))
-    decision = _decision_making(scenario, n, block, components.make_trigger(scenario, zeta))
+    trigger = EventTrigger(n, components.make_trigger(scenario, components.threshold(scenario)))
+    decision = _decision_making(scenario, n, block, trigger)
     starts = dict(zip(team.robots, components.make_starts(scenario), strict=True))
-    vehicles = _vehicles(team, {robot: _checked(robot, plants(robot, start)) for robot, start in starts.items()})
+    checked = {robot: _checked(robot, plants(robot, start)) for robot, start in starts.items()}
+    vehicles = _vehicles(team, checked, disturbed=disturbed)
     planner = InterventionPlanner(components.make_planner(scenario, chosen), scenario.control.period_s)
     gatekeeper = None
     if chosen.gated:
@@ -145,7 +150,7 @@ def build_model(
     named = {port.get_name(): port for part in parts.values() for port in _outputs(part)}
     exported = [*RECORDED, *(["violation"] if monitor is not None else [])]
     diagram = _assembled(f"{scenario.name}_method_{chosen.id}", parts, named, exported)
-    return Model(diagram, chosen, team, zeta, block, planner, gatekeeper, controllers)
+    return Model(diagram, chosen, team, block, trigger, planner, gatekeeper, controllers)
 
 
 def most_complete(scenario: Scenario) -> str:
@@ -169,10 +174,9 @@ def _chosen(scenario: Scenario, method: str | None, composition: str | None) -> 
     return method_of(method), composition
 
 
-def _decision_making(scenario: Scenario, n: int, variable: System, trigger: Trigger) -> Diagram:
+def _decision_making(scenario: Scenario, n: int, variable: System, events: EventTrigger) -> Diagram:
     """The decision-making layer of n UGVs: noise, the block of the decision variables, triggers."""
     source, noise = components.make_noise(n, scenario.decision)
-    events = EventTrigger(n, trigger)
     systems = {
         "noise_source": source, "decision_noise": noise, "decision_variable": variable, "event_trigger": events,
     }  # fmt: skip
@@ -210,12 +214,11 @@ def _optimisation(gatekeeper: Gatekeeper | DirectAcceptance) -> Diagram:
     return _assembled("optimisation", {"gatekeeper": gatekeeper}, named)
 
 
-def _vehicles(team: Team, plants: Mapping[str, System]) -> Diagram:
+def _vehicles(team: Team, plants: Mapping[str, System], *, disturbed: bool) -> Diagram:
     """Where the robots are, and what moves them: commands, disturbances, plants."""
     n = len(team.ugvs)
     builder = DiagramBuilder()
     team_command = builder.AddNamedSystem("team_command", Multiplexer([3 * n, 3]))
-    disturbance = builder.AddNamedSystem("velocity_disturbance", VelocityDisturbance(team.robots))
     velocities = builder.AddNamedSystem("team_velocity", Demultiplexer(3 * (n + 1), 3))
     for robot, plant in plants.items():
         builder.AddNamedSystem(f"{robot}_plant", plant)
@@ -223,11 +226,15 @@ def _vehicles(team: Team, plants: Mapping[str, System]) -> Diagram:
     for i, plant in enumerate(plants.values()):
         builder.Connect(plant.get_output_port(0), team_position.get_input_port(i))
         builder.Connect(velocities.get_output_port(i), plant.get_input_port(0))
-    builder.Connect(team_command.get_output_port(), disturbance.GetInputPort("command"))
-    builder.Connect(disturbance.GetOutputPort("velocity"), velocities.get_input_port())
+    if disturbed:
+        disturbance = builder.AddNamedSystem("velocity_disturbance", VelocityDisturbance(team.robots))
+        builder.Connect(team_command.get_output_port(), disturbance.GetInputPort("command"))
+        builder.Connect(disturbance.GetOutputPort("velocity"), velocities.get_input_port())
+    else:
+        builder.Connect(team_command.get_output_port(), velocities.get_input_port())
     for i, robots in enumerate(("ugv", "uav")):
         builder.ExportInput(team_command.get_input_port(i), f"{robots}_command")
-    for robot in team.robots:
+    for robot in team.robots if disturbed else ():
         builder.ExportInput(disturbance.GetInputPort(f"disturbance_{robot}"), f"disturbance_{robot}")
     builder.ExportOutput(team_position.get_output_port(), "team_position")
     builder.ExportOutput(team_command.get_output_port(), "team_command")

@@ -12,6 +12,7 @@ from airground_drake.gatekeeper.answer import Decision
 from airground_drake.gatekeeper.mpc_gatekeeper import Gatekeepers, Memory
 from airground_drake.intervention.messages import ACCEPT, SILENT, Report
 from airground_drake.systems.lifetime import weakly
+from airground_drake.systems.signals import Answer, laid_out, no_proposals, no_reports
 from airground_drake.systems.ticks import Ticks
 
 
@@ -34,7 +35,7 @@ class Gatekeeper(LeafSystem):
     Ports (n UGVs):
         in  `team_position` (3(n+1)) m; `ugv_command` (3n) and `uav_command` (3) m/s, for the predicted motion
             of the other robots; `proposals` abstract, n of Proposal or None.
-        out `answers` (2n) and `reports` (abstract), see `messages`; held.
+        out `answers` (2n), an `Answer` per UGV, and `reports` (abstract), see `messages`; held.
     State: abstract, a `Memory`.
     Rate: one update per gatekeeper period, from t = 0. What it decides there is published at the end of the
     simulator's step: put into a log that the Context holds, as Drake's loggers do. The log decides nothing.
@@ -48,16 +49,16 @@ class Gatekeeper(LeafSystem):
         self._position = self.DeclareVectorInputPort("team_position", 3 * (n + 1))
         self._ugv_command = self.DeclareVectorInputPort("ugv_command", 3 * n)
         self._uav_command = self.DeclareVectorInputPort("uav_command", 3)
-        self._proposals = self.DeclareAbstractInputPort("proposals", Value(object()))
+        self._proposals = self.DeclareAbstractInputPort("proposals", no_proposals(n))
         state = self.DeclareAbstractState(Value(Memory.empty(n)))
         self._state = int(state)
         held = {self.abstract_state_ticket(state)}
         self.DeclareVectorOutputPort("answers", 2 * n, weakly(self._calc_answers), prerequisites_of_calc=held)
         self.DeclareAbstractOutputPort(
-            "reports", lambda: Value(object()), weakly(self._calc_reports), prerequisites_of_calc=held
+            "reports", lambda: no_reports(n), weakly(self._calc_reports), prerequisites_of_calc=held
         )
         empty = ValueProducer(allocate=lambda: Value(DecisionLog()), calc=ValueProducer.NoopCalc)
-        self._log = self.DeclareCacheEntry("decisions", empty, {self.nothing_ticket()})
+        self._log = self.DeclareCacheEntry("decisions", empty, {self.nothing_ticket()}).cache_index()
         self.DeclarePerStepPublishEvent(weakly(self._publish))
         self._ticks = Ticks(period, control)
         self.DeclarePeriodicUnrestrictedUpdateEvent(self._ticks.period, 0.0, weakly(self._update))
@@ -81,7 +82,8 @@ class Gatekeeper(LeafSystem):
 
     def decisions(self, context: Context) -> DecisionLog:
         """Every decision that was published in a simulation of this Context."""
-        log: DecisionLog = self._log.get_mutable_cache_entry_value(context).GetMutableValueOrThrow()
+        entry = self.get_cache_entry(self._log)  # kept by its index: Python's object would keep the system
+        log: DecisionLog = entry.get_mutable_cache_entry_value(context).GetMutableValueOrThrow()
         return log
 
     def _memory(self, context: Context) -> Memory:
@@ -124,17 +126,17 @@ class DirectAcceptance(LeafSystem):
     def __init__(self, count: int) -> None:
         """Declare ports for `count` UGVs."""
         super().__init__()
-        self._proposals = self.DeclareAbstractInputPort("proposals", Value(object()))
+        self._proposals = self.DeclareAbstractInputPort("proposals", no_proposals(count))
         self.DeclareVectorOutputPort(
             "answers", 2 * count, weakly(self._calc_answers), prerequisites_of_calc={self._proposals.ticket()}
         )
         self.DeclareAbstractOutputPort(
             "reports",
-            lambda: Value(object()),
+            lambda: no_reports(count),
             lambda context, output: output.set_value((Report(),) * count),
             prerequisites_of_calc={self.nothing_ticket()},
         )
 
     def _calc_answers(self, context: Context, output: BasicVector) -> None:
-        answers = [(SILENT, -1.0) if p is None else (ACCEPT, p.number) for p in self._proposals.Eval(context)]
-        output.SetFromVector(np.array(answers).ravel())
+        answers = [[SILENT, -1.0] if p is None else [ACCEPT, p.number] for p in self._proposals.Eval(context)]
+        output.SetFromVector(laid_out(Answer, answers))

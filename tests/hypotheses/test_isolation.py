@@ -12,7 +12,8 @@ import pytest
 from airground_drake.arrays import Array
 from airground_drake.decision.excursion import extremes
 from airground_drake.decision.trigger import Mode, Trigger
-from airground_drake.systems.decision import FIELDS, DecisionBlock, DecisionVariable, EventTrigger
+from airground_drake.systems.decision import DecisionBlock, DecisionVariable, EventTrigger
+from airground_drake.systems.signals import FIELDS
 
 UGVS = 400
 """Steps compared at a time."""

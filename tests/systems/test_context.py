@@ -11,6 +11,7 @@ from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorC
 from pydrake.systems.framework import Context, Diagram
 
 from airground_drake.diagram import RECORDED, Model, build_model
+from airground_drake.intervention.messages import ACCEPT, SILENT
 from airground_drake.scenarios.load import load
 from airground_drake.simulation import EVENT_ACCURACY, simulate
 
@@ -80,3 +81,23 @@ def test_decisions_are_published_at_the_end_of_the_step_and_are_those_of_the_tra
     assert [d.t for d in decided] == recorded["t_s"].tolist()
     assert [d.reason for d in decided] == recorded["reason"].tolist()
     assert np.diff([d.t for d in decided]).min() >= 0.0
+
+
+def test_controllers_act_on_answers_of_the_same_instant_and_the_gatekeeper_on_proposals_of_the_one_before() -> None:
+    """Drake makes all unrestricted updates of an instant before the discrete ones."""
+    scenario = load("case_a")[0]
+    model = build_model(scenario, "d")
+    assert model.gatekeeper is not None
+    proposed = float(simulate(scenario, "d").proposals["issued_s"].min())
+    answered = proposed + scenario.gatekeeper.period_s
+    simulator = advanced(model.diagram, begun(model.diagram, scenario.seed), answered)
+    root = simulator.get_context()
+    answers = model.gatekeeper.GetOutputPort("answers")
+    accepted = model.diagram.GetOutputPort("accepted")
+    assert any(model.planner.GetOutputPort("proposals").Eval(model.planner.GetMyContextFromRoot(root)))
+    assert answers.Eval(model.gatekeeper.GetMyContextFromRoot(root))[::2].tolist() == [SILENT, SILENT]
+    assert accepted.Eval(root).tolist() == [0.0, 0.0]
+    simulator.AdvancePendingEvents()
+    said = answers.Eval(model.gatekeeper.GetMyContextFromRoot(root))[::2].tolist()
+    assert ACCEPT in said
+    assert accepted.Eval(root).tolist() == [float(each == ACCEPT) for each in said]

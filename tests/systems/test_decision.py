@@ -25,7 +25,8 @@ from airground_drake.errors import PluginError
 from airground_drake.nsbc.motion import Motion
 from airground_drake.scenarios.load import load
 from airground_drake.simulation import simulate
-from airground_drake.systems.decision import FIELDS, DecisionBlock, DecisionVariable, EventTrigger
+from airground_drake.systems.decision import DecisionBlock, DecisionVariable, EventTrigger
+from airground_drake.systems.signals import FIELDS
 from airground_drake.trace import Trace
 from airground_drake.verify.engines.segments import NormSignal
 from airground_drake.verify.runs.trigger_replay import transitions
