@@ -99,7 +99,7 @@ class LyingPlanner(Planner):
         intervening: Sequence[bool],
         answers: Array,
         reports: Reports,
-        standing: Sequence[bool] | Array = (),
+        standing: Sequence[bool] = (),
     ) -> PlannerMemory:
         """Speak, whoever stands or has said what."""
         return self._speak(memory, t, positions, answers)

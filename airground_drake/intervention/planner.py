@@ -121,7 +121,7 @@ class Planner:
         intervening: Sequence[bool],
         answers: Array,
         reports: Reports,
-        standing: Sequence[bool] | Array = (),
+        standing: Sequence[bool] = (),
     ) -> PlannerMemory:
         """One planning period.
 
@@ -208,7 +208,7 @@ class Planner:
         intervening: Sequence[bool],
         answers: Array,
         desks: Sequence[Desk],
-        standing: Sequence[bool] | Array,
+        standing: Sequence[bool],
     ) -> tuple[Teammate, ...]:
         """Every UGV as it is now."""
         return tuple(
@@ -219,7 +219,7 @@ class Planner:
                 preset=self.presets[i],
                 max_speed=float(self.max_speed[i]),
                 triggered=bool(intervening[i]),
-                standing=bool(standing[i]) if len(standing) else False,
+                standing=standing[i] if standing else False,
                 proposal=desks[i].proposal,
                 answered=_answered(desks[i].proposal, answers, i),
                 refusals=desks[i].refusals,

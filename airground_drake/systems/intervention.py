@@ -83,7 +83,7 @@ class InterventionPlanner(LeafSystem):
             return EventStatus.DidNothing()
         positions = self._position.Eval(context).reshape(-1, 3)
         answers, reports = self._answers.Eval(context), self._reports.Eval(context)
-        stands = standing(self._halts(context), t)  # of this instant: the state is updated after this
+        stands = standing(self._halts(context), t).tolist()  # of this instant: the state is updated after this
         memory = self._planner.plan(before, t, positions, intervening, answers, reports, stands)
         state.get_mutable_abstract_state(self._memory).set_value(sent_after(before, memory, t))
         return EventStatus.Succeeded()
