@@ -219,6 +219,11 @@ def _vehicles(team: Team, plants: Mapping[str, System], *, disturbed: bool) -> D
     n = len(team.ugvs)
     builder = DiagramBuilder()
     team_command = builder.AddNamedSystem("team_command", Multiplexer([3 * n, 3]))
+    commanded = team_command.get_output_port()
+    if disturbed:
+        disturbance = builder.AddNamedSystem("velocity_disturbance", VelocityDisturbance(team.robots))
+        builder.Connect(commanded, disturbance.GetInputPort("command"))
+        commanded = disturbance.GetOutputPort("velocity")
     velocities = builder.AddNamedSystem("team_velocity", Demultiplexer(3 * (n + 1), 3))
     for robot, plant in plants.items():
         builder.AddNamedSystem(f"{robot}_plant", plant)
@@ -226,12 +231,7 @@ def _vehicles(team: Team, plants: Mapping[str, System], *, disturbed: bool) -> D
     for i, plant in enumerate(plants.values()):
         builder.Connect(plant.get_output_port(0), team_position.get_input_port(i))
         builder.Connect(velocities.get_output_port(i), plant.get_input_port(0))
-    if disturbed:
-        disturbance = builder.AddNamedSystem("velocity_disturbance", VelocityDisturbance(team.robots))
-        builder.Connect(team_command.get_output_port(), disturbance.GetInputPort("command"))
-        builder.Connect(disturbance.GetOutputPort("velocity"), velocities.get_input_port())
-    else:
-        builder.Connect(team_command.get_output_port(), velocities.get_input_port())
+    builder.Connect(commanded, velocities.get_input_port())
     for i, robots in enumerate(("ugv", "uav")):
         builder.ExportInput(team_command.get_input_port(i), f"{robots}_command")
     for robot in team.robots if disturbed else ():

@@ -70,8 +70,8 @@ TEAM = (
     Mutant(
         "plants driven by positions",
         "diagram.py",
-        'builder.Connect(team_command.get_output_port(), disturbance.GetInputPort("command"))',
-        'builder.Connect(team_position.get_output_port(), disturbance.GetInputPort("command"))',
+        "builder.Connect(commanded, velocities.get_input_port())",
+        "builder.Connect(team_position.get_output_port(), velocities.get_input_port())",
     ),
     Mutant(
         "sensing range cut",
