@@ -13,7 +13,7 @@ from airground_drake.scenarios.schema import Scenario
 from airground_drake.side_by_side import side_by_side
 from airground_drake.trace import Trace
 from airground_drake.verify.applications import Count, counts, measured, with_counts, with_runs
-from airground_drake.verify.cache import find, found
+from airground_drake.verify.cache import found
 from airground_drake.verify.claim import ModelClaim, TraceClaim, Verdict
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.registry import model_claims, run_claims
@@ -79,7 +79,9 @@ def verify_model(
     """
     chosen = model_claims(claims, scenario.claims)
     inputs = [claim.judge_inputs(scenario) for claim in chosen]
-    return _model_verdicts(scenario, chosen, inputs, find(chosen, inputs, folder=kept, watch=watch))
+    pieces = [partial(found, claim, given, kept) for claim, given in zip(chosen, inputs, strict=True)]
+    findings = side_by_side(pieces, names=[claim.id for claim in chosen], watch=watch)
+    return _model_verdicts(scenario, chosen, inputs, findings)
 
 
 def verify_all(
@@ -103,7 +105,7 @@ def verify_all(
     inputs = [claim.judge_inputs(scenario) for claim in chosen]
     of_runs = [(replace(trace), _applicable(trace)) for trace in traces]  # as in `verify`
     pieces: list[Callable[[], Any]] = [
-        partial(_found, claim, given, kept) for claim, given in zip(chosen, inputs, strict=True)
+        partial(found, claim, given, kept) for claim, given in zip(chosen, inputs, strict=True)
     ]
     pieces += [partial(_judged, trace, claims) for trace, claims in of_runs]
     names = [*(claim.id for claim in chosen), *(f"claims about run {trace.run}" for trace, _ in of_runs)]
@@ -121,10 +123,6 @@ def verify_all(
         for claim, each in zip(chosen, about_the_model, strict=True)
     ]
     return verdicts + _model_verdicts(scenario, chosen, inputs, findings)
-
-
-def _found(claim: ModelClaim, inputs: dict[str, Any], kept: Path | None) -> Finding:
-    return found(claim, inputs, kept)
 
 
 def _judged(trace: Trace, claims: Sequence[TraceClaim]) -> tuple[list[Finding], dict[str, Count], dict[str, Any]]:

@@ -29,7 +29,7 @@ from airground_drake.systems.decision import DecisionBlock, DecisionVariable, Ev
 from airground_drake.systems.signals import FIELDS
 from airground_drake.trace import Trace
 from airground_drake.verify.engines.segments import NormSignal
-from airground_drake.verify.runs.trigger_replay import transitions
+from airground_drake.verify.runs.triggers import transitions
 
 
 @dataclass(frozen=True)
