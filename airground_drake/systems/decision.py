@@ -173,10 +173,13 @@ class DecisionVariable(DecisionBlock):
         return extremes(before, after, ends)
 
     def _with_variable(self, signals: Array) -> Array:
-        return signals
+        """They have it already, unless a subclass has another one."""
+        return signals if type(self).value is DecisionVariable.value else super()._with_variable(signals)
 
     def _spans(self, begun: Array, now: Array) -> Array:
-        return spans(begun, now)
+        if type(self).extremes is DecisionVariable.extremes:
+            return spans(begun, now)
+        return super()._spans(begun, now)
 
 
 class EventTrigger(LeafSystem):

@@ -219,6 +219,16 @@ def test_a_decision_block_that_returns_0_triggers_nothing() -> None:
     assert finding.evidence["ugvs"][0]["port_against_15"]["status"] == "not_run"
 
 
+def test_a_subclass_of_the_built_in_block_has_its_own_say() -> None:
+    class Nothing(DecisionVariable):
+        def value(self, t: float, parts: Array) -> Array:
+            return np.zeros(len(parts))
+
+    trace = simulate(load("case_a", {"duration_s": 15.0})[0], "b", decision_block=Nothing)
+    assert of_kind(trace, "trigger") == []
+    assert not trace.column("ugv1.decision_variable_m").any()
+
+
 def test_another_norm_triggers_when_it_reaches_the_threshold() -> None:
     scenario = load("case_a")[0]
     trace = simulate(scenario, "b", decision_block=MaxNorm)
