@@ -276,7 +276,7 @@ def _node(name: str, system: System, box: Box) -> str:
     small = "" if name.endswith("_plant") else f'<BR/><FONT POINT-SIZE="{SMALL_PT}">{escape(_does(system))}</FONT>'
     return (
         f'"{name}" [pos="{box.x:g},{box.y:g}", width={(box.right - box.left) / 72:.4f}, '
-        f'height={(box.up - box.low) / 72:.4f}, tooltip="{name}", label=<<B>{escape(name)}</B>{small}>]'
+        f"height={(box.up - box.low) / 72:.4f}, label=<<B>{escape(name)}</B>{small}>]"
     )
 
 
