@@ -32,8 +32,9 @@ from airground_drake.nsbc.motion import Motion
 from airground_drake.nsbc.team import Team
 from airground_drake.scenarios.load import resolved, validated
 from airground_drake.scenarios.schema import Run, Scenario
-from airground_drake.systems.decision import FIELDS, DecisionVariable
+from airground_drake.systems.decision import DecisionVariable
 from airground_drake.systems.lifetime import untie
+from airground_drake.systems.signals import FIELDS, Status
 from airground_drake.trace import (
     DECISION_COLUMNS,
     PROBLEM_ARRAYS,
@@ -68,7 +69,9 @@ class Recorder:
         self._run = self._scenario.runs[name]
         composition: Composition = self._run.composition  # type: ignore[assignment]
         scenario = _with_rule(self._scenario, self._run)
-        self._model: Model = build_model(scenario, self._run.method, composition, decision_block=decision_block)
+        self._model: Model = build_model(
+            scenario, self._run.method, composition, decision_block=decision_block, disturbed=False
+        )
         builder = DiagramBuilder()
         builder.AddSystem(self._model.diagram)
         ports = [self._model.diagram.GetOutputPort(name) for name in RECORDED]
@@ -140,10 +143,9 @@ class Recorder:
             "seed": seed,
             "robots": list(robots),
             "ugvs": list(ugvs),
-            "zeta_m": model.zeta,
             "scenario": resolved(self._scenario),
             "events": [],
-            "controllers": _controllers(model),
+            **read_back(model, context),
             "decision_block": _decision_block(model),
             "faults": [{"t_s": f.t, "robot": f.robot, "policy": f.policy, "what": f.what} for f in memory.faults],
         }
@@ -160,17 +162,17 @@ def _with_rule(scenario: Scenario, run: Run) -> Scenario:
     return replace(scenario, gatekeeper=replace(scenario.gatekeeper, rule=run.rule)) if run.rule else scenario
 
 
-def _controllers(model: Model) -> dict[str, Any]:
-    """What the controllers in the diagram were built with, by name: see `controllers.read_back`."""
-    ugvs, uav = (model.diagram.GetSubsystemByName(name) for name in ("ugvs", "uav"))
-    systems = (ugvs.GetSubsystemByName("ugv_controller"), uav.GetSubsystemByName("uav_controller"))
-    return {system.get_name(): system.parameters() for system in systems}
+def read_back(model: Model, root: Context) -> dict[str, Any]:
+    """What runs in a Context, for `Trace.meta`: `zeta_m`, and `controllers` by name (see `controllers.read_back`)."""
+    levels = model.trigger.levels(model.trigger.GetMyContextFromRoot(root))
+    ran = {each.get_name(): each.parameters(each.GetMyContextFromRoot(root)) for each in model.controllers}
+    return {"zeta_m": float(levels.zeta_m), "controllers": ran}
 
 
 def _decision_block(model: Model) -> str:
     """Name of the class that computes the decision variables in the diagram; "" for that of (15)."""
-    block = model.diagram.GetSubsystemByName("decision").GetSubsystemByName("decision_variable")
-    return "" if type(block) is DecisionVariable else type(block).__qualname__
+    kind = type(model.decision_block)
+    return "" if kind is DecisionVariable else kind.__qualname__
 
 
 def _decision(decision: Decision, robot: str, route: str) -> dict[str, Any]:
@@ -323,7 +325,7 @@ def _signals(t: Array, data: dict[str, Array], ugvs: tuple[str, ...], robots: tu
             columns[f"{ugv}.ref_{axis}_m"] = data["reference"][3 * i + a]
         columns[f"{ugv}.noise_m"] = data["noise"][i]
         columns[f"{ugv}.decision_variable_m"] = data["decision_variable"][i]
-        for k, name in enumerate(("mode", "triggers", "triggered_at_s", "released_at_s")):
+        for k, name in enumerate(Status.get_fields()):
             columns[f"{ugv}.{name}"] = data["status"][FIELDS * i + k]
         columns[f"{ugv}.accepted"] = data["accepted"][i]
     return pd.DataFrame(columns)

@@ -155,7 +155,7 @@ def test_a_simulator_initialised_again_begins_anew_before_its_first_step_and_goe
     simulator = Simulator(diagram)
     context = simulator.get_mutable_context()
     context.SetAccuracy(1e-6)
-    plant = diagram.GetSubsystemByName("world").GetSubsystemByName("ugv1_plant")
+    plant = diagram.GetSubsystemByName("vehicles").GetSubsystemByName("ugv1_plant")
     home = plant.GetMyContextFromRoot(context).get_continuous_state_vector().CopyToVector()
 
     def put(away_m: float) -> None:
@@ -189,7 +189,7 @@ def test_a_simulator_initialised_again_begins_anew_before_its_first_step_and_goe
 )
 def test_what_is_not_asked_for_is_of_the_last_run(case_a: Scenario, asked: Any, built: tuple[str, str]) -> None:
     diagram = build_diagram(case_a, **asked)
-    controller = diagram.GetSubsystemByName("ugvs").GetSubsystemByName("ugv_controller")
+    controller = diagram.GetSubsystemByName("task_planning").GetSubsystemByName("ugv_controller")
     assert (diagram.get_name(), controller.avoidance.composition) == built
 
 
