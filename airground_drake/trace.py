@@ -218,7 +218,8 @@ class Trace:
     def to_pandas(self) -> pd.DataFrame:
         """The signals as a new table: a row per time, the index `t_s`; columns by robot, then by signal."""
         table = self.signals.set_index("t_s")
-        table.columns = pd.MultiIndex.from_tuples([str(name).split(".", 1) for name in table], names=["robot", "signal"])
+        parts = [tuple(str(name).split(".", 1)) for name in table]
+        table.columns = pd.MultiIndex.from_tuples(parts, names=["robot", "signal"])
         return table
 
     def __repr__(self) -> str:
