@@ -41,6 +41,7 @@ COMMANDS: dict[str, Command] = {
     "falsify": Command("airground_drake.commands.falsify", "search for a scenario that violates a claim"),
     "replay": Command("airground_drake.commands.replay", "show the runs of a report: a page each, or a video"),
     "export": Command("airground_drake.commands.export", "write the runs of a report as CSV or MCAP files"),
+    "figures": Command("airground_drake.commands.figures", "write the figures of a report as PDF, with LaTeX tables"),
     "diagram": Command("airground_drake.commands.diagram", "draw the diagram of a scenario"),
     "list": Command("airground_drake.commands.listing", "list scenarios, methods, policies, routes, tasks and claims"),
     "init": Command("airground_drake.commands.init", "write a small scenario to start from"),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -11,12 +10,14 @@ from airground_drake.statuses import outcome
 _SPECIAL = {
     "\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "<": r"\textless{}",
     ">": r"\textgreater{}", "|": r"\textbar{}", **{each: f"\\{each}" for each in "&%$#_{}"},
+    "○": r"$\circ$", "●": r"$\bullet$", "\N{MULTIPLICATION SIGN}": r"$\times$", "✖": r"$\times$", "□": r"$\square$",
+    "◆": r"$\blacklozenge$", "▲": r"$\blacktriangle$", "▼": r"$\blacktriangledown$", "…": r"\ldots{}",
 }  # fmt: skip
 
 
 def escaped(text: str) -> str:
-    """Text as LaTeX shows it; a line break becomes a space."""
-    return re.sub(r"[\\~^<>|&%$#_{}]", lambda found: _SPECIAL[found[0]], " ".join(text.split()))
+    """Text as LaTeX shows it, with the packages amssymb and booktabs; a line break becomes a space."""
+    return "".join(_SPECIAL.get(each, each) for each in " ".join(text.split()))
 
 
 def verdicts(report: Mapping[str, Any]) -> str:
