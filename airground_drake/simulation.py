@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -44,6 +44,9 @@ from airground_drake.trace import (
     Trace,
 )
 
+if TYPE_CHECKING:
+    from pydrake.geometry import Meshcat
+
 EVENT_ACCURACY = 1e-6
 """Accuracy of the Context: witness functions are isolated to it (relative to the time scale of 1 s)."""
 
@@ -54,8 +57,14 @@ MERGE_S = 1e-9
 class Recorder:
     """A model inside a diagram that logs its exported outputs at every step; may be used for several seeds."""
 
-    def __init__(self, scenario: Scenario, name: str, decision_block: DecisionFactory = DecisionVariable) -> None:
-        """Build the model of a run of the scenario and its loggers; `decision_block` as in `build_diagram`.
+    def __init__(
+        self,
+        scenario: Scenario,
+        name: str,
+        decision_block: DecisionFactory = DecisionVariable,
+        meshcat: Meshcat | None = None,
+    ) -> None:
+        """Build the model of a run of the scenario and its loggers; the last two arguments as in `simulate`.
 
         Raises:
             ScenarioError: if the scenario is not valid.
@@ -79,13 +88,23 @@ class Recorder:
         for i, port in enumerate(ports):
             builder.Connect(port, together.get_input_port(i))
         self._log = LogVectorOutput(together.get_output_port(), builder)  # one for all: a log costs a step 10 us
+        if meshcat is not None:
+            from airground_drake.view.live_view import LiveView  # half a second of imports
+
+            view = builder.AddNamedSystem("live_view", LiveView(meshcat, self._scenario))
+            for port in (view.get_input_port(i) for i in range(view.num_input_ports())):
+                builder.Connect(self._model.diagram.GetOutputPort(port.get_name()), port)
         self._root = builder.Build()
         self._root.set_name("recorded")
         untie(self._root)
         warm_up()
 
     def simulate(
-        self, seed: int | None = None, duration: float | None = None, watch: Callable[[float], None] | None = None
+        self,
+        seed: int | None = None,
+        duration: float | None = None,
+        watch: Callable[[float], None] | None = None,
+        speed: float = 0.0,
     ) -> Trace:
         """One run from the initial state.
 
@@ -93,6 +112,7 @@ class Recorder:
             seed: of the decision noise; default: the scenario's.
             duration: s; default: the scenario's.
             watch: is told the time, s, at every step.
+            speed: simulated seconds per second at most; 0: as fast as it goes.
 
         Raises:
             SimulationError: if Drake or a system stops; names the run and the time.
@@ -105,6 +125,7 @@ class Recorder:
         period = self._scenario.control.period_s
         config = SimulatorConfig(integration_scheme="explicit_euler", max_step_size=period, use_error_control=False)
         ApplySimulatorConfig(config, simulator)  # velocities are held between samples: Euler's method is exact
+        simulator.set_target_realtime_rate(speed)
         if self._model.gatekeeper is not None:
             self._model.gatekeeper.reset_timing()
         if watch is not None:
@@ -280,6 +301,8 @@ def simulate(
     seed: int | None = None,
     watch: Callable[[float], None] | None = None,
     decision_block: DecisionFactory = DecisionVariable,
+    meshcat: Meshcat | None = None,
+    speed: float = 0.0,
 ) -> Trace:
     """Simulate one run of a scenario.
 
@@ -289,6 +312,8 @@ def simulate(
         seed: of the decision noise, in place of the scenario's.
         watch: is told the time, s, at every step.
         decision_block: makes the block that drives the trigger; see `build_diagram`.
+        meshcat: shows the robots while they move; the run is the same with it and without.
+        speed: simulated seconds per second at most, for those who watch; 0: as fast as it goes.
 
     Raises:
         ScenarioError: if the scenario, or the seed, is not valid.
@@ -298,7 +323,7 @@ def simulate(
     """
     if seed is not None:
         scenario = validated(scenario, {"seed": seed})
-    return Recorder(scenario, run, decision_block).simulate(watch=watch)
+    return Recorder(scenario, run, decision_block, meshcat).simulate(watch=watch, speed=speed)
 
 
 def _distinct(t: Array, command: Array) -> npt.NDArray[np.intp]:

@@ -488,6 +488,7 @@ DECISION = (
         "B=intensity / np.sqrt(period) * eye",
         "B=1.05 * intensity / np.sqrt(period) * eye",
         proofs=("THR-DDM",),
+        tests=("tests/systems/test_noise.py",),
     ),
     Mutant(
         "the noise is exponential",
@@ -509,6 +510,7 @@ DECISION = (
         "integrated_noise(count, given.noise_m_sqrt_s,",
         "integrated_noise(count, 2.0 * given.noise_m_sqrt_s,",
         proofs=("THR-DDM",),
+        tests=("tests/systems/test_noise.py",),
     ),
     Mutant("the noise grows in place of leaking", "components.py", "A=-leak * eye", "A=leak * eye"),
     Mutant(
