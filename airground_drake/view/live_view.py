@@ -11,8 +11,8 @@ from pydrake.systems.framework import Context, LeafSystem
 
 from airground_drake.decision.trigger import Mode
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.systems.decision import FIELDS
 from airground_drake.systems.lifetime import weakly
+from airground_drake.systems.signals import FIELDS
 from airground_drake.view.draw import draw, robot_path, shadow_path, state_path
 from airground_drake.view.stage import INTERVENED, OWN, STATES, TRIGGERED, stage
 
