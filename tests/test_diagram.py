@@ -27,11 +27,11 @@ LAYERS = (
     ("scenarios",),
     ("systems",),
     ("components", "trace"),
-    ("diagram", "events", "proofs"),
+    ("diagram", "events", "proofs", "view"),
     ("simulation", "blocks", "schematic", "graphviz", "verify"),
     ("runs", "testing"),
     ("report", "replay"),
-    ("campaign",),
+    ("campaign", "export"),
     ("commands", "__main__"),
 )
 """From left to right: a module imports from its own layer or from those before it."""
