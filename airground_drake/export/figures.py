@@ -87,10 +87,17 @@ def _undated(kind: str) -> dict[str, None]:
 
 def _environment(figure: Figure, names: Sequence[str], width: str, report: Mapping[str, Any]) -> str:
     """A figure in LaTeX: its panels one below the other, and a caption that says what is established."""
+    across, width = ("figure*", r"\textwidth") if figure.look == "wide" else ("figure", width)
     panels = [rf"  \includegraphics[width={width}]{{{name}}}\\" for name in names]
     caption = latex.escaped(" ".join([figure.caption, *_established(SHOWN.get(figure.id, ()), report)]))
-    lines = [r"\begin{figure}", r"  \centering", *panels, rf"  \caption{{{caption}}}", rf"  \label{{fig:{figure.id}}}"]
-    return "\n".join([*lines, r"\end{figure}", ""])
+    lines = [
+        rf"\begin{{{across}}}",
+        r"  \centering",
+        *panels,
+        rf"  \caption{{{caption}}}",
+        rf"  \label{{fig:{figure.id}}}",
+    ]
+    return "\n".join([*lines, rf"\end{{{across}}}", ""])
 
 
 def _established(claims: Sequence[str], report: Mapping[str, Any]) -> Iterator[str]:

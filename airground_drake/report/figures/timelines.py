@@ -134,7 +134,7 @@ def told(trace: Trace, ugv: str) -> str:
 
 
 def _wrapped(words: Iterable[str]) -> str:
-    return fill(f"{', '.join(words)} s", TOLD_CHARS)
+    return fill(f"{', '.join(words)}\N{NO-BREAK SPACE}s", TOLD_CHARS)
 
 
 def gaps(of_runs: Mapping[str, Sequence[tuple[float, float]]], bound_s: float, trace: Trace) -> Figure:
