@@ -187,7 +187,7 @@ def _decision(decision: Decision, robot: str, route: str) -> dict[str, Any]:
     }
     grounds = decision.grounds
     if isinstance(grounds, Foreseen):
-        row |= {"lag_m": grounds.lag, "predicted_lag_m": grounds.predicted_lag, "tries": grounds.tries}
+        row |= {"tries": grounds.tries}
         for choice, outcome in (("refuse", grounds.refuse), ("accept", grounds.accept)):
             if outcome is not None:
                 row |= {
@@ -229,6 +229,7 @@ def _proposals(sent: Sequence[tuple[str, Proposal]]) -> pd.DataFrame:
             np.asarray(proposal.selection, dtype=np.float64).ravel().tolist(),
             np.asarray(proposal.mapped, dtype=np.float64).ravel().tolist(),
             np.broadcast_to(proposal.mapped_radii, len(proposal.mapped)).tolist(), proposal.cause or robot,
+            list(proposal.party),
         )
         for robot, proposal in sent
     ]  # fmt: skip

@@ -22,7 +22,7 @@ OF_PROBLEMS = (
 )  # fmt: skip
 OF_OUTCOMES = (
     "refuse_outcome_m2_s", "accept_outcome_m2_s", "refuse_stalls", "accept_stalls", "refuse_left_m", "accept_left_m",
-    "lag_m", "predicted_lag_m", "tries",
+    "tries",
 )  # fmt: skip
 
 

@@ -183,7 +183,7 @@ class Intervention:
     period_s: float = 0.05
     """How often the UAV plans; a multiple of the control period."""
     retry_s: float = field(default=1.0, metadata=FROM_ZERO)
-    """How long it rests after a refusal, or when no policy has proposed anything."""
+    """How long it rests after a refusal; when no policy has a proposal, twice as long each time in a row."""
     ranking: str = "predicted"
     """Which policy is asked first."""
     budget_s: float = 2.0
@@ -205,9 +205,8 @@ class Gatekeeper:
     w of a terminal cost w a ||rho_rd - rho_N||^2 besides (25); the paper has none.
 
     Under method (d) outcomes are compared instead, `settling_s` past the end of motion and preset trajectory. An
-    accepted proposal is executed for `longest_s` at most, and given back when the UGV has been farther behind it than
-    predicted, by more than `lag_m`, for `behind_s`. A UGV accepts `tries` proposals, and then none until it has been
-    on its own for `rest_s`.
+    accepted proposal is executed for `longest_s` at most. A UGV accepts `tries` proposals, and then none until it has
+    been on its own for `rest_s`.
     """
 
     route: str = "mixed_integer"
@@ -246,10 +245,6 @@ class Gatekeeper:
     """Acceptances until a rest."""
     rest_s: float = 5.0
     """How long a UGV is then on its own."""
-    lag_m: float = 0.5
-    """How much farther behind than predicted is tolerated."""
-    behind_s: float = 2.0
-    """For how long."""
 
 
 @dataclass(slots=True)

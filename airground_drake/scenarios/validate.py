@@ -167,7 +167,12 @@ def _names(scenario: Scenario) -> Problems:
             yield key, name, "a name that no other UGV, obstacle or UAV has"
 
 
-RETIRED_KEYS = {"gatekeeper.budget_nodes": "remove it: the search of the route mixed_integer is limited in time only"}
+_NO_LAG = "remove it: longest_s, tries and rest_s bound how long a UGV goes along"
+RETIRED_KEYS = {
+    "gatekeeper.budget_nodes": "remove it: the search of the route mixed_integer is limited in time only",
+    "gatekeeper.lag_m": _NO_LAG,
+    "gatekeeper.behind_s": _NO_LAG,
+}
 """Keys of earlier versions, and what to do about them."""
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -12,7 +11,7 @@ import numpy as np
 from airground_drake.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.segments import interpolate
-from airground_drake.verify.runs.proposals import answers_of, proposals_of, withdrawn_s
+from airground_drake.verify.runs.proposals import answers_to, parts_of, proposals_of, withdrawn_s
 
 SENSED_M = 1e-9
 """Within this of the sensing range an obstacle may have been sensed or not, m."""
@@ -51,27 +50,28 @@ def map_conflicts(trace: Trace) -> Iterator[dict[str, Any]]:
 
 
 def standing_conflicts(trace: Trace) -> Iterator[dict[str, Any]]:
-    """Decisions on proposals that had been withdrawn, and proposals that have replaced one in force for no reason.
+    """Joint plans of which a part was not sent, decisions on what was withdrawn, and replacements for no reason.
 
-    Proposals that are sent at the same instant may be parts of a joint plan: one of which another UGV has refused its
-    part may be replaced at any time, and so may any other proposal by a part of such a plan. While another UGV is
-    intervened on, too, any proposal may be replaced: the policies may have been asked about that one.
+    A proposal in force is replaced only by a part of a joint plan, or while another UGV is intervened on, for which the
+    policies may have been asked.
     """
     every = proposals_of(trace)
-    together = Counter(sent.issued_s for sent in every)
+    for sent in every:
+        there = {sent.ugv, *(part.ugv for part in parts_of(trace, sent))}
+        if missing := sorted(set(sent.party) - there):
+            yield {"robot": sent.ugv, "kind": "part of a joint plan not sent", "t_s": sent.issued_s, "to": missing}
+        end = withdrawn_s(trace, sent)
+        for answer in answers_to(trace, sent):
+            if answer.t_s > end + TIME_TOLERANCE_S:
+                late = {"withdrawn_s": end, "number": sent.number}
+                yield {"robot": sent.ugv, "kind": "decision on what was withdrawn", "t_s": answer.t_s, **late}
     for ugv in trace.ugvs:
-        answers, mine = answers_of(trace, ugv), [sent for sent in every if sent.ugv == ugv]
-        ends = {sent.number: withdrawn_s(trace, ugv, sent, mine, answers) for sent in mine}
-        for when, number, _ in answers:
-            if when > ends[number] + TIME_TOLERANCE_S:
-                late = {"withdrawn_s": ends[number], "number": number}
-                yield {"robot": ugv, "kind": "decision on what was withdrawn", "t_s": when, **late}
-        for before, after in pairwise(mine):
+        for before, after in pairwise(sent for sent in every if sent.ugv == ugv):
             t = after.issued_s + TIME_TOLERANCE_S
-            alone = together[before.issued_s] == together[after.issued_s] == 1 and after.cause == ugv
             row = min(int(np.searchsorted(trace.t, after.issued_s - TIME_TOLERANCE_S)), len(trace.t) - 1)
-            alone &= not any(trace.column(f"{other}.mode")[row] == 1.0 for other in trace.ugvs if other != ugv)
-            if alone and withdrawn_s(trace, ugv, before, [before], answers) > t and before.times_s[-1] > t:
+            others = any(trace.column(f"{other}.mode")[row] == 1.0 for other in trace.ugvs if other != ugv)
+            alone = not (after.party or others) and after.cause == ugv
+            if alone and withdrawn_s(trace, before, unless_replaced=True) > t and before.times_s[-1] > t:
                 yield {"robot": ugv, "kind": "replaced while in force", "t_s": after.issued_s, "by": after.policy}
 
 
@@ -79,19 +79,14 @@ def _told(trace: Trace) -> Iterator[Told]:
     reach = trace.scenario["control"]["sensing_range_m"]
     discs = [_disc(each) for each in trace.scenario["obstacles"].values()]
     centres = np.array(discs).reshape(-1, 4)[:, :3]
-    for ugv in trace.ugvs:
-        answers, mine = answers_of(trace, ugv), [sent for sent in proposals_of(trace) if sent.ugv == ugv]
-        ends = {sent.number: withdrawn_s(trace, ugv, sent, mine, answers) for sent in mine}
-        refused = [(when, number) for when, number, accepted in answers if not accepted]
-        for (when, number), here in zip(
-            refused, interpolate(trace.t, trace.position(ugv), np.array([when for when, _ in refused])), strict=True
-        ):
-            away = np.linalg.norm(centres - here, axis=1) - reach
+    for sent in proposals_of(trace):
+        noticed = withdrawn_s(trace, sent)
+        refused = [answer.t_s for answer in answers_to(trace, sent) if not answer.accepted]
+        for when in refused:
+            away = np.linalg.norm(centres - interpolate(trace.t, trace.position(sent.ugv), when), axis=1) - reach
             surely, possibly = ({disc for disc, far in zip(discs, away, strict=True) if far <= side * SENSED_M}
                                 for side in (-1.0, 1.0))  # fmt: skip
-            later = [other for other, on in refused if on == number and other > when]
-            noticed = ends[number]
-            last = not any(other < noticed - TIME_TOLERANCE_S for other in later)
+            last = not any(when < other < noticed - TIME_TOLERANCE_S for other in refused)
             in_time = last and when < noticed - TIME_TOLERANCE_S
             yield Told(when, noticed if in_time else np.inf, surely, possibly)
 
