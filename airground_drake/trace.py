@@ -95,8 +95,8 @@ PROPOSAL_COLUMNS = (
 order of sending; for which UGV, by which policy, when; the vertices of the
 motion that it asks for, times (M) and positions (M x 3, flattened in C order), and J_int of (12)-(14), (m x 3, ditto):
 the directions that it concerns, and the obstacles that the UAV knows, centres (k x 3, ditto) and radii (k); and the UGV
-whose trigger it was sent for: this one, or another one that it is to make way for; and the names of all UGVs with a
-part in the same joint plan (empty: the proposal stands alone)."""
+whose trigger it was sent for: this one, or another one that it is to make way for; and where all UGVs with a
+part in the same joint plan are in `ugvs`, counted from 0 (empty: the proposal stands alone)."""
 
 
 TABLES = ("signals", "decisions", "problems", "proposals")

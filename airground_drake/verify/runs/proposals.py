@@ -110,9 +110,9 @@ def _proposals_of(trace: Trace) -> list[Sent]:
             raise TraceError(f"{label}: no motion of a UGV of the trace")
         if row["cause"] not in trace.ugvs or not _is_cause(trace, row["robot"], row["cause"], row["issued_s"]):
             raise TraceError(f"{label}: its cause {row['cause']!r} is no UGV whose trigger it can have been sent for")
-        party = tuple(map(str, row["party"]))
-        if party and (str(row["robot"]) not in party or not set(party) <= set(trace.ugvs)):
-            raise TraceError(f"{label}: it is no part of a joint plan of {', '.join(party)}")
+        party = tuple(ugv for i, ugv in enumerate(trace.ugvs) if i in row["party"])
+        if len(party) != len(row["party"]) or (party and row["robot"] not in party):
+            raise TraceError(f"{label}: it is no part of a joint plan of the UGVs {list(row['party'])}")
         found.append(
             Sent(
                 int(row["number"]), str(row["robot"]), str(row["policy"]), float(row["issued_s"]), times,
