@@ -11,7 +11,17 @@ import numpy as np
 
 from airground_drake.arrays import Array
 from airground_drake.intervention.database import BehaviourDatabase, Fault, Negotiation
-from airground_drake.intervention.messages import ACCEPT, DONE, REFUSE, Disc, Point, Proposals, Reports, answer_to
+from airground_drake.intervention.messages import (
+    ACCEPT,
+    DONE,
+    REFUSE,
+    SILENT,
+    Disc,
+    Point,
+    Proposals,
+    Reports,
+    answer_to,
+)
 from airground_drake.intervention.policy import Answered, Observation, Proposal, Teammate
 from airground_drake.nsbc.motion import Motion
 
@@ -42,7 +52,7 @@ class PlannerMemory:
 
     Attributes:
         talks: where it stands with each UGV.
-        learnt: obstacles that came with refusals and were not on the map.
+        learnt: obstacles that came with answers and were not on the map.
         sent: (UGV, proposal), in order.
         faults: of policies, in order.
         halts: of the UGVs, one each; none before the first planning instant.
@@ -91,7 +101,7 @@ class Planner:
     Policies are asked for UGVs that are intervened on. What they propose to others, which are to make way, is a
     proposal like any other, in force as long as the UGV that it is for is intervened on. A refusal withdraws the
     proposal, and all other parts of its joint plan; the next behaviour is tried after a rest. The obstacles that the
-    UGV senses come with the refusal, and the UAV knows them from then on. See docs/protocol.md.
+    UGV senses come with every answer, and the UAV knows them from then on. See docs/protocol.md.
 
     Attributes:
         ugvs: names.
@@ -171,8 +181,8 @@ class Planner:
             reports: what they sensed, see `messages`.
         """
         said = [answer_to(talk.proposal, answers, i) for i, talk in enumerate(memory.talks)]
-        ended = [report for report, answer in zip(reports, said, strict=True) if answer in (REFUSE, DONE)]
-        reported = {disc for report in ended for disc in report.sensed}
+        heard = [report for report, answer in zip(reports, said, strict=True) if answer != SILENT]
+        reported = {disc for report in heard for disc in report.sensed}
         mapped = np.column_stack([self.mapped, np.broadcast_to(self.mapped_radii, len(self.mapped))])
         fresh = tuple(sorted(reported - set(memory.learnt) - set(map(tuple, mapped.tolist()))))
         learnt = memory.learnt + fresh

@@ -62,7 +62,7 @@ class Observation:
         position: its position, (3,), m, world frame.
         target: its target, (3,), m.
         preset: its preset trajectory.
-        obstacles: centres of the obstacles that the UAV knows: its own map, and what refusals have taught it,
+        obstacles: centres of the obstacles that the UAV knows: its own map, and what answers have taught it,
             (m, 3), m.
         mapped: those of its own map alone, (k, 3), m.
         others: positions of the other robots, (n, 3), m.

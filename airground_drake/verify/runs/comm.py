@@ -37,14 +37,14 @@ class Comm(TraceClaim):
         "All parts of a joint plan were sent together, and one refusal withdrew them all. No proposal was decided on "
         "once it was taken back. None in force was replaced but by a part of a joint plan, or while another UGV was "
         "intervened on, too. What it said of obstacles was what the UAV knew: its own map, and what UGVs sensed when "
-        "they refused."
+        "they answered."
     )
     formula = (
         "every proposal and decision in [trigger, release + intervention period + gatekeeper period]; "
         "proposals <= n ceil(duration / intervention period), decisions <= n ceil(duration / gatekeeper period); "
         "all parts of a joint plan sent; no decision on a proposal that is withdrawn; none in force replaced but by a "
         "part of a joint plan or while another UGV is intervened on; "
-        "map of a proposal = known and phantom obstacles, then all sensed by UGVs at refusals that the UAV has noticed"
+        "map of a proposal = known and phantom obstacles, then all sensed by UGVs at answers that the UAV has read"
     )
     latex = (
         r"t_{\text{message}} \in [t_{\text{trigger}}, t_{\text{release}} + h_{\text{UAV}} + h_{\text{gate}}]",
@@ -56,7 +56,7 @@ class Comm(TraceClaim):
         "in which the mode column of the UGV, or of the one whose trigger is the proposal's cause, says "
         "'intervening'. After a release the UAV withdraws its proposal at its next "
         "planning instant and the gatekeeper notices at its next sample: hence the allowance of one period each. What "
-        "UGVs sensed at refusals follows from their positions; the UAV notices a refusal at the next planning instant, "
+        "UGVs sensed at answers follows from their positions; the UAV reads an answer at the next planning instant, "
         "if the proposal is in force until then. When a proposal is withdrawn follows as for EXEC."
     )
     equations = "(20), (26)"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -19,30 +19,20 @@ Disc = tuple[float, ...]
 """Centre and radius, m."""
 
 
-class Told(NamedTuple):
-    """A refusal, with the obstacles that the UGV sensed then: surely, and those that it may have sensed besides."""
-
-    refused_s: float
-    noticed_s: float
-    surely: set[Disc]
-    perhaps: set[Disc]
-
-
 def map_conflicts(trace: Trace) -> Iterator[dict[str, Any]]:
     """Proposals whose obstacles are not those that the UAV knew: own policies send its map as it is.
 
-    What comes with a refusal the UAV knows from the planning instant on at which it notices that: the next one, if the
-    proposal is in force until then.
+    What comes with an answer the UAV knows from the next planning instant on, if the proposal is in force until then.
     """
     scenario = trace.scenario
     known = [_disc(each) for each in scenario["obstacles"].values() if each["known_to_uav"]]
     known += [(*map(float, place), 0.0) for place in scenario["uav"]["phantoms_m"]]
-    told = list(_told(trace))
+    surely, perhaps = _told(trace)
     for sent in proposals_of(trace):
         listed = [tuple(row) for row in np.column_stack([sent.mapped_m, sent.mapped_radius_m]).tolist()]
         learnt, t = listed[len(known) :], sent.issued_s
-        least = {disc for each in told if each.noticed_s <= t + TIME_TOLERANCE_S for disc in each.surely}
-        most = {disc for each in told if each.refused_s < t - TIME_TOLERANCE_S for disc in each.surely | each.perhaps}
+        least = {disc for disc, noticed in surely.items() if noticed <= t + TIME_TOLERANCE_S}
+        most = {disc for disc, answered in perhaps.items() if answered < t - TIME_TOLERANCE_S}
         right = listed[: len(known)] == known and len({*learnt}) == len(learnt)
         right &= least - {*known} <= {*learnt} <= most - {*known}
         if not right and ":" not in sent.policy:
@@ -75,20 +65,31 @@ def standing_conflicts(trace: Trace) -> Iterator[dict[str, Any]]:
                 yield {"robot": ugv, "kind": "replaced while in force", "t_s": after.issued_s, "by": after.policy}
 
 
-def _told(trace: Trace) -> Iterator[Told]:
-    reach = trace.scenario["control"]["sensing_range_m"]
+def _told(trace: Trace) -> tuple[dict[Disc, float], dict[Disc, float]]:
+    """What came with answers: from when on the UAV surely knew each obstacle, and since when it may have, s.
+
+    At a planning instant the UAV reads the last answer before, if the proposal has been in force until then.
+    """
+    reach, period = trace.scenario["control"]["sensing_range_m"], trace.scenario["intervention"]["period_s"]
     discs = [_disc(each) for each in trace.scenario["obstacles"].values()]
     centres = np.array(discs).reshape(-1, 4)[:, :3]
+    surely, perhaps = dict[Disc, float](), dict[Disc, float]()
     for sent in proposals_of(trace):
-        noticed = withdrawn_s(trace, sent)
-        refused = [answer.t_s for answer in answers_to(trace, sent) if not answer.accepted]
-        for when in refused:
-            away = np.linalg.norm(centres - interpolate(trace.t, trace.position(sent.ugv), when), axis=1) - reach
-            surely, possibly = ({disc for disc, far in zip(discs, away, strict=True) if far <= side * SENSED_M}
-                                for side in (-1.0, 1.0))  # fmt: skip
-            last = not any(when < other < noticed - TIME_TOLERANCE_S for other in refused)
-            in_time = last and when < noticed - TIME_TOLERANCE_S
-            yield Told(when, noticed if in_time else np.inf, surely, possibly)
+        end = min(withdrawn_s(trace, sent), float(trace.t[-1])) + TIME_TOLERANCE_S
+        read = dict[float, float]()  # by time of the last answer before a planning instant
+        for k in range(round(sent.issued_s / period) + 1, int(end / period + 1e-6) + 1):
+            before = [answer.t_s for answer in answers_to(trace, sent) if answer.t_s < k * period - TIME_TOLERANCE_S]
+            if before:
+                read.setdefault(before[-1], k * period)
+        for answer in answers_to(trace, sent):
+            here = interpolate(trace.t, trace.position(sent.ugv), answer.t_s)
+            away = np.linalg.norm(centres - here, axis=1) - reach
+            for disc, far in zip(discs, away.tolist(), strict=True):
+                if far <= SENSED_M:
+                    perhaps[disc] = min(answer.t_s, perhaps.get(disc, np.inf))
+                if far <= -SENSED_M:
+                    surely[disc] = min(read.get(answer.t_s, np.inf), surely.get(disc, np.inf))
+    return surely, perhaps
 
 
 def _disc(obstacle: dict[str, Any]) -> Disc:
