@@ -58,6 +58,7 @@ def make_database(scenario: Scenario, method: Method) -> BehaviourDatabase:
         retry=given.retry_s,
         ranking=given.ranking,  # type: ignore[arg-type]
         budget=given.budget_s,
+        joint=not method.intervention_on_top,  # the paper's UGVs decide each for itself
     )
 
 

@@ -98,6 +98,7 @@ class BehaviourDatabase:
         ranking: 'listed' takes the policies in turn; 'predicted' asks them all and takes the proposal with the
             best predicted outcome on the UAV's own map, after refusals the next best.
         budget: wall-clock time that a policy may take for one proposal, s, unless it counts its effort.
+        joint: whether a joint plan takes effect as a whole or not at all; otherwise each part is a proposal of its own.
     """
 
     def __init__(
@@ -107,12 +108,14 @@ class BehaviourDatabase:
         retry: float = 0.0,
         ranking: Ranking = "listed",
         budget: float = 2.0,
+        joint: bool = True,
     ) -> None:
         """See the attributes."""
         self.policies = tuple(policies)
         self.retry = retry
         self.ranking = ranking
         self.budget = budget
+        self.joint = joint
 
     def close(self) -> None:
         """End the processes of policies that have one."""
@@ -149,7 +152,7 @@ class BehaviourDatabase:
         rest = self.retry * 2.0 ** min(max(0, in_vain - 1), MOST_DOUBLINGS)
         found = {seen.robot: replace(held, in_vain=in_vain, retry_at=seen.t + rest)}
         for turn, name, motions in candidates[:1]:
-            party = tuple(sorted(motions)) if len(motions) > 1 else ()
+            party = tuple(sorted(motions)) if self.joint and len(motions) > 1 else ()
             for robot, motion in motions.items():
                 mate = None if robot == seen.robot else _mate(seen, robot)
                 before = held if mate is None else Negotiation(refusals=mate.refusals)
