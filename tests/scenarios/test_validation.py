@@ -76,6 +76,8 @@ BAD: list[tuple[str, object, list[str]]] = [
     ("gatekeeper.route", "branch_and_bound", ["no longer a route", "mixed_integer"]),
     ("gatekeeper.route", "rollout", ["no longer a route", "mixed_integer", "method (d)"]),
     ("gatekeeper.budget_nodes", 15000, ["gatekeeper.budget_nodes: no longer a key", "remove it"]),
+    ("gatekeeper.lag_m", 0.5, ["gatekeeper.lag_m: no longer a key", "longest_s, tries and rest_s"]),
+    ("gatekeeper.behind_s", 2.0, ["gatekeeper.behind_s: no longer a key", "longest_s, tries and rest_s"]),
     ("gatekeeper.blocks", 61, ["gatekeeper.blocks: 61", "1 to gatekeeper.stages"]),
     ("gatekeeper", {"route": "relaxed", "blocks": 10}, ["gatekeeper.blocks: 10", "only the route mixed_integer"]),
     ("gatekeeper.route", "exact", ["gatekeeper.route: 'exact'", "relaxed"]),
