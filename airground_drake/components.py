@@ -58,6 +58,7 @@ def make_database(scenario: Scenario, method: Method) -> BehaviourDatabase:
         retry=given.retry_s,
         ranking=given.ranking,  # type: ignore[arg-type]
         budget=given.budget_s,
+        joint=not method.intervention_on_top,  # the paper's UGVs decide each for itself
     )
 
 
@@ -168,7 +169,7 @@ def make_outlook(scenario: Scenario) -> Outlook:
 def make_patience(scenario: Scenario) -> Patience:
     """How long UGVs go along with the UAV."""
     gate = scenario.gatekeeper
-    return Patience(gate.tries, gate.rest_s, gate.longest_s, gate.lag_m, gate.behind_s)
+    return Patience(gate.tries, gate.rest_s, gate.longest_s)
 
 
 def make_gatekeepers(scenario: Scenario, law: UgvLaw) -> Gatekeepers:

@@ -172,7 +172,7 @@ class Recorder:
         }
         times = list(gatekeeper.decision_times_s) if gatekeeper is not None else []
         timings = {"wall_s": wall, "decision_times_s": times}
-        proposals = _proposals([(ugvs[i], proposal) for i, proposal in memory.sent])
+        proposals = _proposals(ugvs, memory.sent)
         trace = Trace(meta, signals, decisions, timings, _problems(decided), proposals)
         meta["events"] = extract(trace, sent)
         return trace
@@ -210,7 +210,7 @@ def _decision(decision: Decision, robot: str, route: str) -> dict[str, Any]:
     }
     grounds = decision.grounds
     if isinstance(grounds, Foreseen):
-        row |= {"lag_m": grounds.lag, "predicted_lag_m": grounds.predicted_lag, "tries": grounds.tries}
+        row |= {"tries": grounds.tries}
         for choice, outcome in (("refuse", grounds.refuse), ("accept", grounds.accept)):
             if outcome is not None:
                 row |= {
@@ -243,17 +243,18 @@ def _decisions(rows: Sequence[dict[str, Any]]) -> pd.DataFrame:
     return pd.DataFrame({name: pd.Series(values, dtype=DECISION_COLUMNS[name]) for name, values in columns.items()})
 
 
-def _proposals(sent: Sequence[tuple[str, Proposal]]) -> pd.DataFrame:
+def _proposals(ugvs: Sequence[str], sent: Sequence[tuple[int, Proposal]]) -> pd.DataFrame:
     """`Trace.proposals` of what was sent to whom."""
     rows = [
         (
-            proposal.number, robot, proposal.policy, float(proposal.issued), proposal.motion.times.tolist(),
+            proposal.number, ugvs[i], proposal.policy, float(proposal.issued), proposal.motion.times.tolist(),
             proposal.motion.positions.ravel().tolist(),
             np.asarray(proposal.selection, dtype=np.float64).ravel().tolist(),
             np.asarray(proposal.mapped, dtype=np.float64).ravel().tolist(),
-            np.broadcast_to(proposal.mapped_radii, len(proposal.mapped)).tolist(), proposal.cause or robot,
+            np.broadcast_to(proposal.mapped_radii, len(proposal.mapped)).tolist(), proposal.cause or ugvs[i],
+            [float(ugvs.index(name)) for name in proposal.party],
         )
-        for robot, proposal in sent
+        for i, proposal in sent
     ]  # fmt: skip
     return pd.DataFrame(rows, columns=list(PROPOSAL_COLUMNS))
 

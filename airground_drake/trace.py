@@ -41,7 +41,7 @@ from airground_drake.errors import TraceError, one_line
 
 T = TypeVar("T")
 
-SCHEMA = "airground_drake.trace/6"
+SCHEMA = "airground_drake.trace/7"
 
 DECISION_COLUMNS = {
     "t_s": "float64",
@@ -70,15 +70,13 @@ DECISION_COLUMNS = {
     "accept_stalls": "float64",
     "refuse_left_m": "float64",
     "accept_left_m": "float64",
-    "lag_m": "float64",
-    "predicted_lag_m": "float64",
     "tries": "float64",
 }
 """Columns of `Trace.decisions`, one row per robot and gatekeeper call; -1 where a number does not apply. `number` is
 that of the proposal in `Trace.proposals`. Those up to
 `predicted_clearance_m` are of decisions by problem (26), the others of decisions by outcomes: what comes of either
-choice as `gatekeeper.outcome` has it (cost, 1 if it comes to rest short of the goal, way left), how far the UGV is
-behind the proposed motion, and how often it has gone along since it last rested."""
+choice as `gatekeeper.outcome` has it (cost, 1 if it comes to rest short of the goal, way left), and how often the UGV
+has gone along since it last rested."""
 
 PROBLEM_SCALARS = ("dt_s", "error_weight_1_m2_s", "slack_weight_1_m2_s", "terminal_weight_s")
 PROBLEM_ARRAYS = (
@@ -92,13 +90,14 @@ empty where the route has none. Normals are those of the half-planes that `route
 
 PROPOSAL_COLUMNS = (
     "number", "robot", "policy", "issued_s", "times_s", "positions_m", "selection", "mapped_m", "mapped_radius_m",
-    "cause",
+    "cause", "party",
 )  # fmt: skip
 """Columns of `Trace.proposals`, one row per proposal sent: its number, which identifies it and counts from 0 in the
 order of sending; for which UGV, by which policy, when; the vertices of the
 motion that it asks for, times (M) and positions (M x 3, flattened in C order), and J_int of (12)-(14), (m x 3, ditto):
 the directions that it concerns, and the obstacles that the UAV knows, centres (k x 3, ditto) and radii (k); and the UGV
-whose trigger it was sent for: this one, or another one that it is to make way for."""
+whose trigger it was sent for: this one, or another one that it is to make way for; and where all UGVs with a
+part in the same joint plan are in `ugvs`, counted from 0 (empty: the proposal stands alone)."""
 
 
 TABLES = ("signals", "decisions", "problems", "proposals")

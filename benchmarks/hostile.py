@@ -185,8 +185,7 @@ def told(lie: Lie) -> Told:
     scenario = load("case_a", [f"seed={lie.seed}"])[0]
     gate = scenario.gatekeeper
     gate.tries, gate.longest_s = int(random.integers(1, 5)), float(random.uniform(0.5, 4.0))
-    gate.rest_s, gate.behind_s = float(random.uniform(0.3, 3.0)), float(random.uniform(0.2, 2.0))
-    gate.lag_m, gate.period_s = float(random.uniform(0.05, 1.0)), float(random.choice([0.05, 0.1, 0.15]))
+    gate.rest_s, gate.period_s = float(random.uniform(0.3, 3.0)), float(random.choice([0.05, 0.1, 0.15]))
     scenario.intervention.period_s = float(random.choice([0.05, 0.1]))
     scenario.duration_s = max(20.0, 2.5 * (gate.tries * gate.longest_s + gate.rest_s))
     scenario.obstacles["obstacle_2"].known_to_uav = bool(random.integers(2))

@@ -133,7 +133,6 @@ def scenario_of(number: int) -> dict[str, Any]:
     data["gatekeeper"] = {
         "period_s": float(rng.choice([0.05, 0.1])),
         "longest_s": float(rng.choice([2.0, 10.0])),
-        "behind_s": float(rng.choice([0.3, 1.0])),
         "tries": int(rng.integers(1, 6)),
     }
     return data

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from airground_drake.arrays import Array
 from airground_drake.gatekeeper.answer import Decision, Planned, Rules, costs_throughout, in_words, settle
 from airground_drake.gatekeeper.budget import Budget
-from airground_drake.gatekeeper.patience import Turn
+from airground_drake.gatekeeper.patience import Commitment
 from airground_drake.gatekeeper.prediction import Horizon, Scene, predicted_problem
 from airground_drake.gatekeeper.routes.route import Route
 from airground_drake.gatekeeper.solution import after_failure
@@ -27,21 +27,6 @@ from airground_drake.nsbc.team import Team
 
 
 @dataclass(frozen=True, eq=False)
-class Commitment:
-    """What a UGV watches while it executes a proposal.
-
-    Attributes:
-        lags: predicted distances from where it is to be, at the control samples since they were predicted, (S + 1,), m.
-        on_time: when it was last no farther behind than it may be, s.
-        begun: when the lags were predicted: at the acceptance or when it was reconsidered, s.
-    """
-
-    lags: Array
-    on_time: float
-    begun: float
-
-
-@dataclass(frozen=True, eq=False)
 class Memory:
     """What the gatekeepers of n UGVs keep from sample to sample.
 
@@ -50,8 +35,7 @@ class Memory:
         since: when each UGV's answer became what it is, (n,), s.
         reports: what came with them.
         decisions: those of the last sample at which anything was to be judged or remembered.
-        turns: under method (d), each UGV's patience.
-        commitments: under method (d), what each UGV watches while it executes a proposal.
+        commitments: under method (d), what each UGV has committed itself to.
         sensed: under method (d), which obstacles each UGV has sensed so far, (n, m).
     """
 
@@ -59,17 +43,14 @@ class Memory:
     since: tuple[float, ...]
     reports: Reports
     decisions: tuple[Decision, ...] = ()
-    turns: tuple[Turn, ...] = ()
-    commitments: tuple[Commitment | None, ...] = ()
+    commitments: tuple[Commitment, ...] = ()
     sensed: npt.NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 0), dtype=bool))
 
     @classmethod
     def empty(cls, count: int) -> Memory:
         """Of `count` UGVs that have answered nothing yet."""
-        return cls(
-            (SILENT, -1.0) * count, (0.0,) * count, (Report(),) * count,
-            turns=(Turn(),) * count, commitments=(None,) * count,
-        )  # fmt: skip
+        held = (Commitment(),) * count
+        return cls((SILENT, -1.0) * count, (0.0,) * count, (Report(),) * count, commitments=held)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
         """Immutable: the copy is the object itself."""
@@ -94,7 +75,7 @@ class Judging:
 
 
 @dataclass(frozen=True, eq=False)
-class Situation:
+class View:
     """What all UGVs see at a sample.
 
     Attributes:
@@ -157,7 +138,7 @@ class Gatekeepers(abc.ABC):
         discs: tuple[Disc, ...] = tuple((x, y, z, radius) for x, y, z, radius in self._discs[near].tolist())
         return Report(discs, decision.reason, in_words(decision))
 
-    def _scene(self, seen: Situation, i: int) -> Scene:
+    def _scene(self, seen: View, i: int) -> Scene:
         """What a UGV has around it: all obstacles and robots, whether within sensing range or not."""
         around = self._neighbourhood
         return Scene(
@@ -182,7 +163,7 @@ class PaperGatekeepers(Gatekeepers):
 
     def sample(self, t: float, proposals: Proposals, positions: Array, velocities: Array, memory: Memory) -> Memory:
         """Judge every proposal in force by (26)."""
-        seen = Situation(t, proposals, positions, velocities, memory)
+        seen = View(t, proposals, positions, velocities, memory)
         answers: list[float] = []
         since: list[float] = []
         reports: list[Report] = []
@@ -205,7 +186,7 @@ class PaperGatekeepers(Gatekeepers):
             decisions=tuple(decisions),
         )  # fmt: skip
 
-    def _decide(self, seen: Situation, i: int, proposal: Proposal, budgets: Iterator[Budget]) -> Decision:
+    def _decide(self, seen: View, i: int, proposal: Proposal, budgets: Iterator[Budget]) -> Decision:
         started = thread_time()
         problem = predicted_problem(self._scene(seen, i), self._law, proposal, self._judging.horizon)
         problem = replace(problem, previous=self._rest_of_plan(seen, i, proposal))
@@ -218,7 +199,7 @@ class PaperGatekeepers(Gatekeepers):
         accepted, reason = settle(solution, throughout, standing, stood, self._judging.rules)
         return Decision(seen.t, i, proposal, accepted, reason, Planned(problem, solution, throughout))
 
-    def _rest_of_plan(self, seen: Situation, i: int, proposal: Proposal) -> Array | None:
+    def _rest_of_plan(self, seen: View, i: int, proposal: Proposal) -> Array | None:
         """What the plan that was decided on at the sample before says from now on, (N,); None if there was none.
 
         It ends earlier by a sampling period; its last choice stands for the rest.

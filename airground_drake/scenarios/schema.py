@@ -39,7 +39,12 @@ SOURCES: tuple[str, ...] = ("calibrated", "ours")
 BUDGETS: tuple[str, ...] = ("counted", "wall_clock")
 RULES: tuple[str, ...] = ("hysteresis", "first_stage")
 
-RETIRED_KEYS = {"gatekeeper.budget_nodes": "remove it: the search of the route mixed_integer is limited in time only"}
+_NO_LAG = "remove it: longest_s, tries and rest_s bound how long a UGV goes along"
+RETIRED_KEYS = {
+    "gatekeeper.budget_nodes": "remove it: the search of the route mixed_integer is limited in time only",
+    "gatekeeper.lag_m": _NO_LAG,
+    "gatekeeper.behind_s": _NO_LAG,
+}
 """Keys of earlier versions, and what to do about them."""
 
 
@@ -206,7 +211,7 @@ class Intervention:
     period_s: Positive = 0.05
     """How often the UAV plans; a multiple of the control period."""
     retry_s: NotNegative = 1.0
-    """How long it rests after a refusal, or when no policy has proposed anything."""
+    """How long it rests after a refusal; when no policy has a proposal, twice as long each time in a row."""
     ranking: Annotated[Words, one_of((), "intervention.database:RANKINGS")] = "predicted"
     """Which policy is asked first."""
     budget_s: Positive = 2.0
@@ -228,9 +233,8 @@ class Gatekeeper:
     w of a terminal cost w a ||rho_rd - rho_N||^2 besides (25); the paper has none.
 
     Under method (d) outcomes are compared instead, `settling_s` past the end of motion and preset trajectory. An
-    accepted proposal is executed for `longest_s` at most, and given back when the UGV has been farther behind it than
-    predicted, by more than `lag_m`, for `behind_s`. A UGV accepts `tries` proposals, and then none until it has been
-    on its own for `rest_s`.
+    accepted proposal is executed for `longest_s` at most. A UGV accepts `tries` proposals, and then none until it has
+    been on its own for `rest_s`.
     """
 
     route: Annotated[Words, registered(ROUTES, RETIRED_ROUTES)] = "mixed_integer"
@@ -269,10 +273,6 @@ class Gatekeeper:
     """Acceptances until a rest."""
     rest_s: Positive = 5.0
     """How long a UGV is then on its own."""
-    lag_m: Positive = 0.5
-    """How much farther behind than predicted is tolerated."""
-    behind_s: Positive = 2.0
-    """For how long."""
 
 
 @dataclass(slots=True)

@@ -18,7 +18,7 @@ from builders.hostile_policies import KILLS_OTHERS, KINDS
 from builders.observations import mate, seen
 
 from airground_drake.errors import FAULT_WIDTH, PluginError, PolicyError
-from airground_drake.intervention.database import BehaviourDatabase, Desk, make_policy
+from airground_drake.intervention.database import BehaviourDatabase, Negotiation, make_policy
 from airground_drake.intervention.guest import process
 from airground_drake.intervention.guest.codec import KINDS as CLASSES
 from airground_drake.intervention.guest.codec import decoded, encoded
@@ -57,18 +57,17 @@ def test_whatever_a_policy_does_counts_as_no_intervention(name: str, guests: dic
     kind, before = KINDS[name], (Avoidance.apply, TraceClaim.judge, os.getcwd())
     guest = guests[kind.hangs]
     database = BehaviourDatabase([("hostile", guest)], ranking="predicted")
-    planned = database.plan(Desk(refusals=doing(name).refusals), TEAM)
+    found, faults = database.plan(Negotiation(refusals=doing(name).refusals), TEAM)
     if kind.reported is None:
-        assert not planned.faults
+        assert not faults
     else:
         # one that answers in the worker's place does so from the next question on
-        planned = planned if planned.faults else database.plan(Desk(), TEAM)
-        (fault,) = planned.faults
+        found, faults = (found, faults) if faults else database.plan(Negotiation(), TEAM)
+        (fault,) = faults
         assert re.search(kind.reported, fault.what), fault.what
         assert fault.what.isprintable()
         assert len(fault.what) <= 600
-    assert planned.desk.proposal is None
-    assert not planned.asked
+    assert [talk.proposal for talk in found.values()] == [None]
     assert (Avoidance.apply, TraceClaim.judge, os.getcwd()) == before
     if not kind.tame or not guest._end.alive:
         guest.close()  # the next kind gets a new process
@@ -115,7 +114,7 @@ def test_a_fault_begins_with_the_line_of_the_policy_that_it_came_from(
     (tmp_path / "boom.py").write_text(BOOM)
     guest = kind == "in a process of its own"
     policy = GuestPolicy("boom.py:It", {}, LONG_S) if guest else POLICIES.make("boom.py:It", Policy)
-    (fault,) = BehaviourDatabase([("boom", policy)], ranking="listed").plan(Desk(), TEAM).faults
+    _, (fault,) = BehaviourDatabase([("boom", policy)], ranking="listed").plan(Negotiation(), TEAM)
     if isinstance(policy, GuestPolicy):
         policy.close()
     assert fault.what.startswith("boom.py:5 ValueError: invalid literal for int()")

@@ -13,7 +13,7 @@ from pydrake.solvers import ClarabelSolver, MathematicalProgram
 from airground_drake.arrays import Array
 from airground_drake.gatekeeper import mpc_gatekeeper
 from airground_drake.gatekeeper.answer import Reason
-from airground_drake.gatekeeper.mpc_gatekeeper import Situation
+from airground_drake.gatekeeper.mpc_gatekeeper import View
 from airground_drake.gatekeeper.outcome import Outcome
 from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
 from airground_drake.gatekeeper.solution import Solution
@@ -36,9 +36,9 @@ LIGHT = "c, error weight 1"
 
 
 class Believing(OutcomeGatekeepers):
-    """Takes every proposal for useful, followed without any lag."""
+    """Takes every proposal for useful."""
 
-    def foresee(self, seen: Situation, i: int, proposal: Proposal) -> tuple[Outcome, Outcome]:
+    def foresee(self, seen: View, i: int, proposal: Proposal) -> tuple[Outcome, Outcome]:
         """Refusing stalls, accepting does not."""
         steps = np.arange(0.0, 2.0, self._law.avoidance.period)
         follows = proposal.motion.sample(seen.t + steps)
