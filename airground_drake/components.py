@@ -18,7 +18,7 @@ from airground_drake.gatekeeper.mpc_gatekeeper import Gatekeepers, Judging, Pape
 from airground_drake.gatekeeper.outcome import Outlook
 from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
 from airground_drake.gatekeeper.patience import Patience
-from airground_drake.gatekeeper.prediction import Horizon
+from airground_drake.gatekeeper.problem import Horizon
 from airground_drake.gatekeeper.routes.route import Route
 from airground_drake.intervention.database import BehaviourDatabase, make_policy
 from airground_drake.intervention.planner import Planner

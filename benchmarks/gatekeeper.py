@@ -33,8 +33,8 @@ import numpy as np
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.half_planes import normals_along
 from airground_drake.gatekeeper.outcome import Other, Outlook, outcomes
-from airground_drake.gatekeeper.prediction import Horizon, Scene, predicted_problem
-from airground_drake.gatekeeper.problem import Problem
+from airground_drake.gatekeeper.problem import Horizon, Problem, predicted_problem
+from airground_drake.gatekeeper.rollout import Scene
 from airground_drake.gatekeeper.rounding import sum_up_rounding
 from airground_drake.gatekeeper.routes.mixed_integer import MixedIntegerRoute
 from airground_drake.gatekeeper.routes.nonlinear import NonlinearRoute

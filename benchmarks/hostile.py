@@ -30,7 +30,8 @@ from airground_drake import components
 from airground_drake.arrays import Array
 from airground_drake.components import make_planner, make_presets, make_team
 from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
-from airground_drake.gatekeeper.prediction import Horizon, Scene, predicted_problem
+from airground_drake.gatekeeper.problem import Horizon, predicted_problem
+from airground_drake.gatekeeper.rollout import Scene
 from airground_drake.gatekeeper.routes.relaxed import RelaxedRoute
 from airground_drake.intervention.planner import Planner
 from airground_drake.intervention.policy import Proposal

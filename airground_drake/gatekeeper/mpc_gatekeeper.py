@@ -16,7 +16,8 @@ from airground_drake.gatekeeper.answer import Decision, Planned, Rules, costs_th
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.history import History
 from airground_drake.gatekeeper.patience import Turn
-from airground_drake.gatekeeper.prediction import Horizon, Scene, predicted_problem
+from airground_drake.gatekeeper.problem import Horizon, predicted_problem
+from airground_drake.gatekeeper.rollout import Scene
 from airground_drake.gatekeeper.routes.route import Route
 from airground_drake.gatekeeper.solution import after_failure
 from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT, Disc, Proposals, Report, Reports, answer_to

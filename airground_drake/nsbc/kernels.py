@@ -180,11 +180,17 @@ def limit_speed(velocity: Array, max_speed: Array) -> Array:
     """Velocities (n, 3) scaled down to at most max_speed (n,), m/s, keeping their direction."""
     limited = velocity.copy()
     for i in range(len(velocity)):
-        speed = np.sqrt(_dot(velocity[i], velocity[i]))
-        if speed > max_speed[i]:
-            for a in range(3):
-                limited[i, a] *= max_speed[i] / speed
+        limit_one(limited[i], max_speed[i])
     return limited
+
+
+@njit(cache=True)
+def limit_one(velocity: Array, max_speed: float) -> None:
+    """Scale a velocity (3,) down to a speed limit, m/s, in place."""
+    speed = np.sqrt(_dot(velocity, velocity))
+    if speed > max_speed:
+        for a in range(3):
+            velocity[a] *= max_speed / speed
 
 
 @njit(cache=True)

@@ -17,7 +17,7 @@ from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance, limit_speed
 from airground_drake.nsbc.law import Intervention, UgvLaw
 from airground_drake.nsbc.task import Task
-from airground_drake.nsbc.tasks import FormationTask, PositionTask
+from airground_drake.nsbc.tasks import FormationTask
 from airground_drake.nsbc.team import Neighbourhood, Team
 from airground_drake.systems.lifetime import weakly
 
@@ -86,7 +86,8 @@ class UgvController(LeafSystem):
         own = positions[: self._count]
         return self.law.velocity(
             own,
-            PositionTask(reference, rate, self.law.motion_gain),
+            reference,
+            rate,
             [None if p is None else Intervention(*p.motion.at(t), p.chosen) for p in accepted],
             self.avoidance.half_spaces(own, self._mobility, self._neighbourhood.around(positions)),
             self._mobility,

@@ -9,7 +9,7 @@ import numpy as np
 from airground_drake.gatekeeper.answer import Decision, Foreseen, Rules
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.mpc_gatekeeper import Judging, Memory, PaperGatekeepers, Situation
-from airground_drake.gatekeeper.prediction import Horizon
+from airground_drake.gatekeeper.problem import Horizon
 from airground_drake.gatekeeper.routes.relaxed import RelaxedRoute
 from airground_drake.intervention.messages import ACCEPT
 from airground_drake.intervention.policy import Proposal

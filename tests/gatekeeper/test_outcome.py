@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from airground_drake.gatekeeper.outcome import Other, Outcome, Outlook, outcomes, way_left
-from airground_drake.gatekeeper.prediction import Scene
+from airground_drake.gatekeeper.rollout import Scene
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.law import UgvLaw

@@ -121,16 +121,17 @@ def executed_after_it_is_over(monkeypatch: pytest.MonkeyPatch) -> None:
 def no_avoidance_of_one_ugv(monkeypatch: pytest.MonkeyPatch) -> None:
     honest = law.UgvLaw.velocity
 
-    def velocity(self: Any, position: Array, target: Any, asked: Any, spaces: HalfSpaces, *rest: Any) -> Array:
+    def velocity(self: Any, position: Array, target: Array, rate: Array, asked: Any, spaces: Any, *rest: Any) -> Array:
         bound = spaces.bound.copy()
         bound[1] = -np.inf
-        return honest(self, position, target, asked, HalfSpaces(spaces.normal, bound), *rest)
+        return honest(self, position, target, rate, asked, HalfSpaces(spaces.normal, bound), *rest)
 
     monkeypatch.setattr(law.UgvLaw, "velocity", velocity)
 
 
 def no_speed_limit(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(law, "limit_speed", lambda velocity, limit: velocity)
+    honest = law.UgvLaw.velocity
+    monkeypatch.setattr(law.UgvLaw, "velocity", lambda *given: honest(*given[:-1], 1e9 * given[-1]))
 
 
 def no_speed_limit_of_the_uav(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -145,12 +146,13 @@ def one_direction_only(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def selection_ignored(monkeypatch: pytest.MonkeyPatch) -> None:
     one_direction_only(monkeypatch)
-    honest = law.UgvLaw._intervened
+    honest = law.UgvLaw.velocity
 
-    def intervened(self: Any, asked: law.Intervention, *rest: Any) -> Array:
-        return honest(self, asked._replace(chosen=np.eye(3)), *rest)
+    def velocity(self: Any, position: Array, target: Array, rate: Array, asked: Any, *rest: Any) -> Array:
+        everywhere = [None if one is None else one._replace(chosen=np.eye(3)) for one in asked]
+        return honest(self, position, target, rate, everywhere, *rest)
 
-    monkeypatch.setattr(law.UgvLaw, "_intervened", intervened)
+    monkeypatch.setattr(law.UgvLaw, "velocity", velocity)
 
 
 def avoidance_gain_of_the_controller(monkeypatch: pytest.MonkeyPatch) -> None:
