@@ -94,7 +94,7 @@ def news_within(points: Array, positions: Array, reach: float, known: npt.NDArra
 
 @njit(cache=True)
 def avoid_one(lower: Array, normal: Array, bound: Array, composition: int) -> Array:
-    """Velocity of one robot, (3,) m/s: the avoidance tasks above `lower`; see `avoid`.
+    """Velocity of one robot, (3,) m/s: the avoidance tasks above `lower`, composed by (5) or as `Avoidance` says.
 
     A `lower` that is not finite asks for nothing.
     """
