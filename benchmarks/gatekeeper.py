@@ -41,11 +41,11 @@ from airground_drake.gatekeeper.routes.nonlinear import NonlinearRoute
 from airground_drake.gatekeeper.routes.relaxed import RelaxedRoute
 from airground_drake.gatekeeper.routes.route import Route
 from airground_drake.gatekeeper.solution import ConstantPlans, Solution, cheapest
-from airground_drake.intervention.paths import NoPath, shortest_path
+from airground_drake.geometry.motion import Motion
+from airground_drake.geometry.paths import NoPath, shortest_path
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.law import UgvLaw
-from airground_drake.nsbc.motion import Motion
 from airground_drake.registry import ROUTES
 from airground_drake.scenarios.load import load
 from airground_drake.simulation import Recorder

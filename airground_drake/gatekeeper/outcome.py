@@ -31,10 +31,10 @@ from airground_drake.gatekeeper.rollout import (
     velocity_of,
     workspace,
 )
-from airground_drake.intervention.paths import NoPath, shortest_path
+from airground_drake.geometry.motion import Motion
+from airground_drake.geometry.paths import NoPath, shortest_path
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.law import UgvLaw
-from airground_drake.nsbc.motion import Motion
 
 USELESS = 1e-6
 """Relative gain below which an intervention makes no difference."""

@@ -10,10 +10,10 @@ import numpy.typing as npt
 from numba import njit
 
 from airground_drake.arrays import Array
+from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.kernels import fill_half_spaces
 from airground_drake.nsbc.law import Intervention, Numbers, UgvLaw, command
-from airground_drake.nsbc.motion import Motion
 
 REFUSED, ACCEPTED = 0, 1
 """Modes of a control period: whether the proposal is in force."""

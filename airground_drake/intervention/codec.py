@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from airground_drake.arrays import Array
+from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.policy import Observation, Proposal, Teammate
-from airground_drake.nsbc.motion import Motion
 
 _KINDS: dict[str, type] = {kind.__name__: kind for kind in (Observation, Teammate, Proposal, Motion)}
 

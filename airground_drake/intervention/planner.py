@@ -10,10 +10,10 @@ from typing import Any, Self
 import numpy as np
 
 from airground_drake.arrays import Array
+from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.database import BehaviourDatabase, Desk, Fault
 from airground_drake.intervention.messages import ACCEPT, REFUSE, Disc, Point, Proposals, Reports, answer_to
 from airground_drake.intervention.policy import Answered, Observation, Proposal, Teammate
-from airground_drake.nsbc.motion import Motion
 
 OVER = "over"
 """Why a UGV gives back what it has executed to its end, which is no refusal."""

@@ -18,10 +18,10 @@ from collections.abc import Mapping
 from typing import IO, Any
 
 from airground_drake.errors import FAULT_WIDTH, AirgroundError, PluginError, PolicyError, one_line
+from airground_drake.geometry.motion import Motion
 from airground_drake.intervention import frames
 from airground_drake.intervention.codec import packed, unpacked_motions
 from airground_drake.intervention.policy import Observation, Policy
-from airground_drake.nsbc.motion import Motion
 
 START_S = 30.0
 """For the interpreter, the policy's imports and its construction, s."""

@@ -19,7 +19,7 @@ from mutation.mutant import PACKAGE, Mutant
 
 RUNNING = (
     "arrays.py", "components.py", "diagram.py", "events.py", "simulation.py",
-    "decision", "gatekeeper", "intervention", "nsbc", "systems",
+    "decision", "gatekeeper", "geometry", "intervention", "nsbc", "systems",
 )  # fmt: skip
 """Files and folders of what produces a run."""
 PROBES = ("crowd d", "crowd c", "bodies d", "case_b d", "soft_gate c", "crowd b")

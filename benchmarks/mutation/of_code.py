@@ -372,11 +372,11 @@ LAW = (
     ),
     Mutant(
         "presets end with a jump to the target",
-        "nsbc/motion.py",
+        "geometry/motion.py",
         "return self.positions[max(k, 0)], np.zeros(3)",
         "return self.positions[-1], np.zeros(3)",
         runs=("crowd b", "crowd d"),
-        tests=("tests/nsbc/test_motion.py",),
+        tests=("tests/geometry/test_motion.py",),
     ),
 )
 

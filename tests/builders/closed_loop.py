@@ -8,10 +8,10 @@ import numpy as np
 
 from airground_drake.gatekeeper.problem import Horizon, Problem, predicted_problem
 from airground_drake.gatekeeper.rollout import ClosedLoop, Scene, closed_loop
+from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.law import UgvLaw
-from airground_drake.nsbc.motion import Motion
 from airground_drake.nsbc.team import Team
 from airground_drake.systems.controllers import UgvController
 

@@ -19,9 +19,9 @@ from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
+from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.codec import packed_motions
 from airground_drake.intervention.policy import Observation, Policy
-from airground_drake.nsbc.motion import Motion
 
 
 class Kind(NamedTuple):

@@ -10,14 +10,14 @@ import pytest
 from builders.observations import mate, seen
 
 from airground_drake.components import make_planner
+from airground_drake.geometry.motion import Motion
+from airground_drake.geometry.paths import Path, shortest_path
 from airground_drake.intervention import detour
 from airground_drake.intervention.database import predicted_cost
 from airground_drake.intervention.detour import Detour
-from airground_drake.intervention.paths import Path, shortest_path
 from airground_drake.intervention.planner import STANDS_S, PlannerMemory
 from airground_drake.intervention.policy import Observation, Proposal
 from airground_drake.intervention.wrong import StaleMap
-from airground_drake.nsbc.motion import Motion
 from airground_drake.registry import METHODS
 from airground_drake.scenarios.load import load
 
