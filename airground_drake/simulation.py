@@ -269,7 +269,7 @@ def warm_up() -> None:
     team.neighbourhood(slice(0, 1)).around(np.ones((2, 3)))
     scene = Scene(0.0, one[0], motion, one, one, np.ones(1), np.ones(1), 1.0)
     law, horizon = UgvLaw(avoidance, 1.0, 1.0, False), Horizon(2, 1, 1.0, 1.0)
-    law.velocity(one, one, one, [None], spaces, one, np.ones(1))
+    law.velocity(np.ones((2, 3)), team.neighbourhood(slice(0, 1)), one, one, [None], one, np.ones(1))
     MixedIntegerRoute().solve(predicted_problem(scene, law, Proposal("", 0.0, motion), horizon))
     outcomes(scene, law, Proposal("", 0.0, motion), one, 1.0, (), Outlook(longest=1.0))
 

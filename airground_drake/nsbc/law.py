@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache, cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -15,8 +16,9 @@ import numpy.typing as npt
 from numba import njit
 
 from airground_drake.arrays import Array
-from airground_drake.nsbc.avoidance import Avoidance, HalfSpaces
-from airground_drake.nsbc.kernels import avoid_one, limit_one
+from airground_drake.nsbc.avoidance import Avoidance
+from airground_drake.nsbc.kernels import avoid_one, fill_half_spaces, gather, limit_one
+from airground_drake.nsbc.team import Neighbourhood
 
 
 class Intervention(NamedTuple):
@@ -61,7 +63,7 @@ class UgvLaw:
     intervention_gain: float
     intervention_on_top: bool
 
-    @property
+    @cached_property
     def numbers(self) -> Numbers:
         """For compiled code."""
         layer = self.avoidance
@@ -72,35 +74,43 @@ class UgvLaw:
 
     def velocity(
         self,
-        position: Array,
+        positions: Array,
+        near: Neighbourhood,
         target: Array,
         rate: Array,
         asked: Sequence[Intervention | None],
-        spaces: HalfSpaces,
         mobility: Array,
         max_speed: Array,
     ) -> Array:
         """Commands of n UGVs, (n, 3), m/s: `command` for each.
 
         Args:
-            position: (n, 3), m, world frame.
+            positions: of all robots, the UGVs first, (N, 3), m, world frame.
+            near: obstacles and robots around the UGVs.
             target: of the UGVs' own task (6), (n, 3), m.
             rate: velocity of the target, (n, 3), m/s.
             asked: per UGV, what the accepted intervention asks for, or None.
-            spaces: avoidance inequalities at these positions.
             mobility: (n, 3), 1 where a robot can move, else 0.
             max_speed: (n,), m/s.
         """
-        count = len(position)
-        executing = np.zeros(count, dtype=np.bool_)
-        together = Intervention(np.zeros((count, 3)), np.zeros((count, 3)), np.zeros((count, 3, 3)))
-        for i, intervention in enumerate(asked):
-            if intervention is not None:
-                executing[i] = True
-                together.wanted[i], together.rate[i], together.chosen[i] = intervention
+        executing, together = _nothing_asked(len(target))
+        if any(one is not None for one in asked):
+            executing, together = executing.copy(), Intervention(*(array.copy() for array in together))
+            for i, one in enumerate(asked):
+                if one is not None:
+                    executing[i] = True
+                    together.wanted[i], together.rate[i], together.chosen[i] = one
         return _commands(
-            self.numbers, position, target, rate, executing, together, spaces.normal, spaces.bound, mobility, max_speed
-        )
+            self.numbers, positions, near.obstacles, near.others, near.distance, near.share, target, rate,
+            executing, together, mobility, max_speed,
+        )  # fmt: skip
+
+
+@cache
+def _nothing_asked(count: int) -> tuple[npt.NDArray[np.bool_], Intervention]:
+    """Nobody executes anything: flags (n,), and arrays that are not looked at then; not written to."""
+    zero = np.zeros((count, 3))
+    return np.zeros(count, dtype=np.bool_), Intervention(zero, zero, np.zeros((count, 3, 3)))
 
 
 @njit(cache=True)
@@ -157,22 +167,28 @@ def command(
 @njit(cache=True)
 def _commands(
     law: Numbers,
-    position: Array,
+    positions: Array,
+    obstacles: Array,
+    others: npt.NDArray[np.intp],
+    distance: Array,
+    share: Array,
     target: Array,
     rate: Array,
     executing: npt.NDArray[np.bool_],
     asked: Intervention,
-    normal: Array,
-    bound: Array,
     mobility: Array,
     max_speed: Array,
 ) -> Array:
-    """`command` for n UGVs, (n, 3), m/s; all arrays have their first axis more."""
-    velocity = np.empty(position.shape)
-    for i in range(len(position)):
+    """`command` for n UGVs, (n, 3), m/s: arrays as in `UgvLaw.velocity` and `Neighbourhood`."""
+    velocity, centre = np.empty(target.shape), gather(positions, obstacles, others)
+    normal, bound = np.empty(centre.shape[1:]), np.empty(centre.shape[1])
+    for i in range(len(target)):
+        fill_half_spaces(
+            positions[i], centre[i], distance[i], share[i], law.avoidance_gain, law.period, mobility[i],
+            law.sensing_range, normal, bound,
+        )  # fmt: skip
         velocity[i] = command(
-            law, position[i], target[i], rate[i], executing[i],
-            Intervention(asked.wanted[i], asked.rate[i], asked.chosen[i]),
-            normal[i], bound[i], mobility[i], max_speed[i],
+            law, positions[i], target[i], rate[i], executing[i],
+            Intervention(asked.wanted[i], asked.rate[i], asked.chosen[i]), normal, bound, mobility[i], max_speed[i],
         )  # fmt: skip
     return velocity

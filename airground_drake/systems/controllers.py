@@ -40,7 +40,6 @@ class UgvController(LeafSystem):
         """Declare ports, state and the periodic update."""
         super().__init__()
         n = len(team.ugvs)
-        self._count = n
         self.law, self.avoidance = law, law.avoidance
         self._neighbourhood = team.neighbourhood(slice(0, n))
         self._mobility = team.mobility[:n]
@@ -83,15 +82,9 @@ class UgvController(LeafSystem):
         Returns:
             Commands, (n, 3), m/s.
         """
-        own = positions[: self._count]
+        asked = [None if p is None else Intervention(*p.motion.at(t), p.chosen) for p in accepted]
         return self.law.velocity(
-            own,
-            reference,
-            rate,
-            [None if p is None else Intervention(*p.motion.at(t), p.chosen) for p in accepted],
-            self.avoidance.half_spaces(own, self._mobility, self._neighbourhood.around(positions)),
-            self._mobility,
-            self._max_speed,
+            positions, self._neighbourhood, reference, rate, asked, self._mobility, self._max_speed
         )
 
 

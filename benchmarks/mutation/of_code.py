@@ -248,8 +248,8 @@ LAW = (
     Mutant(
         "every intervention filtered with the first UGV's inequalities",
         "nsbc/law.py",
-        "            normal[i], bound[i], mobility[i], max_speed[i],",
-        "            normal[0 if executing[i] else i], bound[0 if executing[i] else i], mobility[i], max_speed[i],",
+        "positions[i], centre[i], distance[i], share[i],",
+        "positions[i], centre[0 if executing[i] else i], distance[i], share[i],",
     ),
     Mutant(
         "own task not filtered",
@@ -280,8 +280,8 @@ LAW = (
     Mutant(
         "every intervention limited to the first UGV's speed",
         "nsbc/law.py",
-        "bound[i], mobility[i], max_speed[i],",
-        "bound[i], mobility[i], max_speed[0 if executing[i] else i],",
+        "normal, bound, mobility[i], max_speed[i],",
+        "normal, bound, mobility[i], max_speed[0 if executing[i] else i],",
         runs=("crowd d", "crowd c", "crowd b", "bodies d", "bodies b"),
     ),
     Mutant(
@@ -813,11 +813,11 @@ MIX_UPS = (
         "velocity = self.velocity(context.get_time() - 0.05, positions, reference, rate, proposals)",
     ),
     Mutant(
-        "neighbours are sensed a sample late",
+        "positions are sensed a sample late",
         "systems/controllers.py",
-        "        own = positions[: self._count]\n",
-        "        own, now = positions[: self._count], positions\n"
-        "        positions, self._before = getattr(self, '_before', now), now\n",
+        "        asked = [None if p is None else",
+        "        positions, self._before = getattr(self, '_before', positions), positions.copy()\n"
+        "        asked = [None if p is None else",
     ),
     Mutant(
         "the intervention gain has the wrong sign along y",
