@@ -17,11 +17,13 @@ These are counts, not times: how long a step takes depends on the machine.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from airground_drake.errors import LimitError
 from airground_drake.registry import METHODS
-from airground_drake.scenarios.schema import Run, Scenario
+
+if TYPE_CHECKING:  # pydantic, which the schema imports, would delay `report --list`
+    from airground_drake.scenarios.schema import Run, Scenario
 
 PREDICTED = 2e-4
 """Work of a period predicted for one UGV next to one point (compiled, some 30 ns) in steps simulated (some 0.2 ms)."""
