@@ -18,13 +18,13 @@ from airground_drake.gatekeeper.mpc_gatekeeper import Gatekeepers, Judging, Pape
 from airground_drake.gatekeeper.outcome import Outlook
 from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
 from airground_drake.gatekeeper.patience import Patience
-from airground_drake.gatekeeper.prediction import Horizon
+from airground_drake.gatekeeper.problem import Horizon
 from airground_drake.gatekeeper.routes.route import Route
+from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.database import BehaviourDatabase, make_policy
 from airground_drake.intervention.planner import Planner
 from airground_drake.nsbc.avoidance import Avoidance, Composition
 from airground_drake.nsbc.law import UgvLaw
-from airground_drake.nsbc.motion import Motion
 from airground_drake.nsbc.team import Team
 from airground_drake.registry import ROUTES, Method
 from airground_drake.scenarios.schema import Decision, Scenario

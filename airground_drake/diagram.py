@@ -15,8 +15,8 @@ from pydrake.systems.primitives import Demultiplexer, Multiplexer, TrajectorySou
 from airground_drake import components
 from airground_drake.arrays import Array
 from airground_drake.errors import PluginError, UnknownNameError
+from airground_drake.geometry.motion import Motion
 from airground_drake.nsbc.avoidance import COMPOSITIONS, Composition
-from airground_drake.nsbc.motion import Motion
 from airground_drake.nsbc.task import Task
 from airground_drake.nsbc.team import Team
 from airground_drake.registry import METHODS, UAV_TASKS, Method, method_of

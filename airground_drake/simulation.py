@@ -22,13 +22,14 @@ from airground_drake.errors import SimulationError, UnknownNameError, described
 from airground_drake.events import extract
 from airground_drake.gatekeeper.answer import Decision, Foreseen, Planned
 from airground_drake.gatekeeper.outcome import Outlook, outcomes
-from airground_drake.gatekeeper.prediction import Horizon, Scene, predicted_problem
+from airground_drake.gatekeeper.problem import Horizon, predicted_problem
+from airground_drake.gatekeeper.rollout import Scene
 from airground_drake.gatekeeper.routes.mixed_integer import MixedIntegerRoute
+from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance, Composition, Surroundings, limit_speed
 from airground_drake.nsbc.kernels import distances, news_within, within
 from airground_drake.nsbc.law import UgvLaw
-from airground_drake.nsbc.motion import Motion
 from airground_drake.nsbc.team import Team
 from airground_drake.scenarios.load import resolved, validated
 from airground_drake.scenarios.schema import Run, Scenario
@@ -292,6 +293,7 @@ def warm_up() -> None:
     team.neighbourhood(slice(0, 1)).around(np.ones((2, 3)))
     scene = Scene(0.0, one[0], motion, one, one, np.ones(1), np.ones(1), 1.0)
     law, horizon = UgvLaw(avoidance, 1.0, 1.0, False), Horizon(2, 1, 1.0, 1.0)
+    law.velocity(np.ones((2, 3)), team.neighbourhood(slice(0, 1)), one, one, [None], one, np.ones(1))
     MixedIntegerRoute().solve(predicted_problem(scene, law, Proposal("", 0.0, motion), horizon))
     outcomes(scene, law, Proposal("", 0.0, motion), one, 1.0, (), Outlook(longest=1.0))
 

@@ -30,13 +30,14 @@ from airground_drake import components
 from airground_drake.arrays import Array
 from airground_drake.components import make_planner, make_presets, make_team
 from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
-from airground_drake.gatekeeper.prediction import Horizon, Scene, predicted_problem
+from airground_drake.gatekeeper.problem import Horizon, predicted_problem
+from airground_drake.gatekeeper.rollout import Scene
 from airground_drake.gatekeeper.routes.relaxed import RelaxedRoute
+from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.planner import Planner
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.law import UgvLaw
-from airground_drake.nsbc.motion import Motion
 from airground_drake.registry import Method
 from airground_drake.report.audit.companions import Believing
 from airground_drake.scenarios.load import load

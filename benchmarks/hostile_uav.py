@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 
 from airground_drake.arrays import Array
+from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.database import Negotiation
 from airground_drake.intervention.messages import ACCEPT, DONE, REFUSE, Reports, answer_to
 from airground_drake.intervention.planner import Planner, PlannerMemory
 from airground_drake.intervention.policy import Proposal
-from airground_drake.nsbc.motion import Motion
 
 CHOICES: dict[str, tuple[Any, ...]] = {
     "mapped": ("true", "moved", "nothing", "phantoms", "on the robot", "ahead", "huge"),

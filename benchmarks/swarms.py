@@ -23,8 +23,8 @@ import yaml
 from maps import Array, Course
 from numpy.typing import NDArray
 
+from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.policy import Observation, Policy, Teammate
-from airground_drake.nsbc.motion import Motion
 from airground_drake.registry import POLICIES
 from airground_drake.scenarios.load import from_data
 from airground_drake.simulation import simulate

@@ -12,7 +12,7 @@ from pydrake.systems.primitives import Adder, ConstantVectorSource, Gain, PassTh
 
 from airground_drake import blocks, graphviz, schematic
 from airground_drake.diagram import build_diagram, make_monitor
-from airground_drake.nsbc.motion import Motion
+from airground_drake.geometry.motion import Motion
 from airground_drake.registry import METHODS
 from airground_drake.scenarios.load import load, shipped
 from airground_drake.systems import DecisionBlock

@@ -13,7 +13,7 @@ import airground_drake
 from airground_drake import graphviz
 from airground_drake.components import stack_presets
 from airground_drake.diagram import RECORDED, build_diagram
-from airground_drake.nsbc.motion import Motion
+from airground_drake.geometry.motion import Motion
 from airground_drake.registry import METHODS
 from airground_drake.scenarios.load import load
 
@@ -21,6 +21,7 @@ PACKAGE = Path(airground_drake.__file__).parent
 LAYERS = (
     ("arrays", "errors", "files", "interruption", "parallel", "progress", "usage", "check"),
     ("registry", "statuses"),
+    ("geometry",),
     ("nsbc",),
     ("decision", "intervention"),
     ("gatekeeper",),
@@ -90,6 +91,17 @@ def test_an_outdated_picture_is_noticed() -> None:
     pictures = graphviz.pictures()
     assert not graphviz.is_current("case_a.dot", pictures["case_a.dot"], pictures["case_b.dot"])
     assert not graphviz.is_current("case_a.svg", pictures["case_a.svg"], pictures["case_b.svg"])
+
+
+def test_gatekeepers_know_of_interventions_only_what_is_sent() -> None:
+    """Proposals and messages; neither planner nor policies, and those know no gatekeeper."""
+    found = {
+        node.module
+        for path in (PACKAGE / "gatekeeper").rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("airground_drake.intervention")
+    }
+    assert found == {"airground_drake.intervention.messages", "airground_drake.intervention.policy"}
 
 
 def test_data_flows_one_way() -> None:

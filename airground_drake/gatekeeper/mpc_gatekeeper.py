@@ -15,14 +15,15 @@ from airground_drake.arrays import Array
 from airground_drake.gatekeeper.answer import Decision, Planned, Rules, costs_throughout, in_words, settle
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.patience import Commitment
-from airground_drake.gatekeeper.prediction import Horizon, Scene, predicted_problem
+from airground_drake.gatekeeper.problem import Horizon, predicted_problem
+from airground_drake.gatekeeper.rollout import Scene
 from airground_drake.gatekeeper.routes.route import Route
 from airground_drake.gatekeeper.solution import after_failure
+from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT, Disc, Proposals, Report, Reports, answer_to
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.kernels import distances
 from airground_drake.nsbc.law import UgvLaw
-from airground_drake.nsbc.motion import Motion
 from airground_drake.nsbc.team import Team
 
 

@@ -24,11 +24,11 @@ from airground_drake.gatekeeper.answer import Decision, Foreseen, Reason
 from airground_drake.gatekeeper.mpc_gatekeeper import Gatekeepers, Memory, View
 from airground_drake.gatekeeper.outcome import Other, Outcome, Outlook, outcomes
 from airground_drake.gatekeeper.patience import Commitment, Patience
+from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.messages import ACCEPT, DONE, REFUSE, SILENT, Proposals, Report, answer_to
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.kernels import news_within, within
 from airground_drake.nsbc.law import UgvLaw
-from airground_drake.nsbc.motion import Motion
 from airground_drake.nsbc.team import Team
 
 ACCEPTING: tuple[Reason, ...] = ("cheaper", "makes_way")

@@ -10,12 +10,12 @@ from itertools import pairwise
 import numpy as np
 
 from airground_drake.arrays import Array
+from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.coordination.joint import Effort, Plan, plan
 from airground_drake.intervention.coordination.roadmap import RobotTask, Space
 from airground_drake.intervention.coordination.single import Body, Way
 from airground_drake.intervention.coordination.timed import at_rest, distance, speed, timed, without_repeats
 from airground_drake.intervention.policy import Observation, Policy, Teammate
-from airground_drake.nsbc.motion import Motion
 
 SHARE = 0.8
 """A plan uses this share of a UGV's speed limit; the rest is for catching up."""

@@ -10,10 +10,10 @@ from typing import Any, Literal, Self, get_args
 import numpy as np
 
 from airground_drake.errors import PolicyError, described
+from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.guest.process import GuestPolicy
 from airground_drake.intervention.guest.time_limit import OutOfTime, time_limit
 from airground_drake.intervention.policy import Observation, Policy, Proposal, Teammate, motions_of
-from airground_drake.nsbc.motion import Motion
 from airground_drake.registry import POLICIES
 
 Ranking = Literal["listed", "predicted"]

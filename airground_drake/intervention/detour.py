@@ -7,9 +7,9 @@ import math
 import numpy as np
 
 from airground_drake.arrays import Array
-from airground_drake.intervention.paths import NoPath, Path, shortest_path
+from airground_drake.geometry.motion import Motion
+from airground_drake.geometry.paths import NoPath, Path, shortest_path
 from airground_drake.intervention.policy import Observation, Policy, Teammate
-from airground_drake.nsbc.motion import Motion
 
 SAMPLE_S = 0.05
 """Spacing of the vertices of the motion, s."""

@@ -9,6 +9,7 @@ from typing import Any, Self
 import numpy as np
 
 from airground_drake.arrays import Array
+from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.database import BehaviourDatabase, Fault, Negotiation
 from airground_drake.intervention.messages import (
     ACCEPT,
@@ -21,7 +22,6 @@ from airground_drake.intervention.messages import (
     answer_to,
 )
 from airground_drake.intervention.policy import Answered, Observation, Proposal, Teammate
-from airground_drake.nsbc.motion import Motion
 
 
 @dataclass(frozen=True)

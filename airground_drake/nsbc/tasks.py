@@ -1,7 +1,8 @@
-"""The tasks of the paper: move to target or track, keep a distance, stay over the centroid, intervene.
+"""The tasks of the paper: move to target or track, keep a distance, stay over the centroid.
 
-The controllers run `DistanceTask` as inequalities (`avoidance.py`) and `InterventionTask` in the closed form that
-a constant Jacobian allows; tests hold those against the tasks as stated here.
+The UAV's controller runs the task it is given, by default `FormationTask`. The UGVs' law is compiled: it has
+`DistanceTask` as inequalities (`avoidance.py`), and `PositionTask` and the intervention (14) in closed form (`law.py`).
+Tests hold it against the tasks.
 """
 
 from __future__ import annotations
@@ -92,33 +93,3 @@ class FormationTask(PositionTask):
 def _share(count: int) -> Array:
     """What each of `count` robots has in their centroid, (1, count)."""
     return read_only(np.full((1, count), 1.0 / count))
-
-
-class InterventionTask(Task):
-    """The UAV's intervention on UGVs, eqs (12)-(14): sigma_int = S rho (gain Lambda).
-
-    Attributes:
-        target: intervened positions, (n, 3), m.
-        rate: their velocities, (n, 3), m/s.
-        selection: constant task Jacobian J_int = S, (m, 3): the directions in which the UAV intervenes
-            (the identity: all of them, so that nothing is left for the UGV's own tasks).
-    """
-
-    def __init__(self, target: Array, rate: Array, gain: float, selection: Array) -> None:
-        """Steer `selection @ rho` to `selection @ target`; raises ValueError on a bad gain."""
-        super().__init__(gain)
-        self.target = target
-        self.rate = rate
-        self.selection = selection
-
-    def value(self, position: Array) -> Array:
-        """S rho, (n, m), m."""
-        return position @ self.selection.T
-
-    def jacobian(self, position: Array) -> Array:
-        """S for every robot, (n, m, 3)."""
-        return np.broadcast_to(self.selection, (len(position), *self.selection.shape))
-
-    def desired(self) -> tuple[Array, Array]:
-        """S target in m and S rate in m/s, each (n, m)."""
-        return self.target @ self.selection.T, self.rate @ self.selection.T

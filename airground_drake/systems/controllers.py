@@ -31,7 +31,7 @@ from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance, limit_speed
 from airground_drake.nsbc.law import Intervention, UgvLaw
 from airground_drake.nsbc.task import Task
-from airground_drake.nsbc.tasks import FormationTask, PositionTask
+from airground_drake.nsbc.tasks import FormationTask
 from airground_drake.nsbc.team import Neighbourhood, Team
 from airground_drake.systems.lifetime import weakly
 from airground_drake.systems.signals import UavGains, UgvGains, no_proposals
@@ -56,7 +56,6 @@ class UgvController(LeafSystem):
         """Declare ports, state and the periodic update."""
         super().__init__()
         n = len(team.ugvs)
-        self._count = n
         self.law, self.avoidance = law, law.avoidance
         self._neighbourhood = team.neighbourhood(slice(0, n))
         self._mobility = team.mobility[:n]
@@ -130,15 +129,8 @@ class UgvController(LeafSystem):
             Commands, (n, 3), m/s.
         """
         law = self.law if law is None else law
-        own = positions[: self._count]
-        return law.velocity(
-            own,
-            PositionTask(reference, rate, law.motion_gain),
-            [None if p is None else Intervention(*p.motion.at(t), p.chosen) for p in accepted],
-            law.avoidance.half_spaces(own, self._mobility, self._neighbourhood.around(positions)),
-            self._mobility,
-            self._max_speed,
-        )
+        asked = [None if p is None else Intervention(*p.motion.at(t), p.chosen) for p in accepted]
+        return law.velocity(positions, self._neighbourhood, reference, rate, asked, self._mobility, self._max_speed)
 
 
 class UavController(LeafSystem):

@@ -24,7 +24,7 @@ from pydrake.systems.framework import (
 from airground_drake.arrays import Array
 from airground_drake.decision.excursion import anything_due, extremes, gathered, spans, transitions_due, variables
 from airground_drake.decision.trigger import Mode, Trigger, TriggerState
-from airground_drake.nsbc.motion import Motion
+from airground_drake.geometry.motion import Motion
 from airground_drake.systems.lifetime import weakly
 from airground_drake.systems.signals import FIELDS, Status, TriggerLevels, laid_out, of_ugv
 

@@ -196,36 +196,29 @@ KERNELS = (
         runs=("crowd d",),
         tests=WIRING,
     ),
-    Mutant(
-        "speeds up to twice the limit", "nsbc/kernels.py", "if speed > max_speed[i]:", "if speed > 2.0 * max_speed[i]:"
-    ),
+    Mutant("speeds up to twice the limit", "nsbc/kernels.py", "if speed > max_speed:", "if speed > 2.0 * max_speed:"),
     Mutant(
         "of two active inequalities, one is enough",
         "nsbc/kernels.py",
-        "for m in range(j, j + 1 if planar or j == i else count):",
-        "for m in range(j, j + 1 if j == i else j):",
+        "                size += 1\n",
+        "                size = 1\n",
+        tests=(*WIRING, "tests/nsbc/test_projection.py"),
     ),
     Mutant(
-        "three active inequalities are never tried",
+        "active inequalities never leave",
         "nsbc/kernels.py",
-        "for m in range(j, j + 1 if planar or j == i else count):",
-        "for m in range(j, j + 1):",
+        "if pull[m] > 0.0 and",
+        "if pull[m] > 1e300 and",
         runs=("crowd d",),
-        tests=(
-            *WIRING,
-            "tests/nsbc/test_avoidance.py",
-        ),
+        tests=(*WIRING, "tests/nsbc/test_projection.py"),
     ),
     Mutant(
         "contradictions are not looked for",
         "nsbc/kernels.py",
-        "return velocity if shortfall <= CONTRADICTION_M_S else _least_violation(normal, bound)",
+        "return velocity if missed == 0.0 else _least_violation(normal, bound + MARGIN_M_S)",
         "return velocity",
         runs=("crowd b", "crowd d"),
-        tests=(
-            *WIRING,
-            "tests/nsbc/test_avoidance.py",
-        ),
+        tests=(*WIRING, "tests/nsbc/test_projection.py"),
     ),
     Mutant(
         "the recursion starts with the highest priority",
@@ -249,41 +242,46 @@ LAW = (
     Mutant(
         "interventions not filtered under (d)",
         "nsbc/law.py",
-        "            if not self.intervention_on_top:\n                velocity",
-        "            if self.intervention_on_top:\n                velocity",
+        "return task if law.intervention_on_top else avoid_one(task,",
+        "return task if not law.intervention_on_top else avoid_one(task,",
     ),
     Mutant(
         "every intervention filtered with the first UGV's inequalities",
         "nsbc/law.py",
-        "row = slice(i, i + 1)",
-        "row = slice(0, 1)",
+        "positions[i], centre[i], distance[i], share[i],",
+        "positions[i], centre[0 if executing[i] else i], distance[i], share[i],",
     ),
-    Mutant("own task not filtered", "nsbc/law.py", "composite = self.avoidance.apply(own, spaces)", "composite = own"),
+    Mutant(
+        "own task not filtered",
+        "nsbc/law.py",
+        "        return avoid_one(own, normal, bound, law.composition)\n",
+        "        return own\n",
+    ),
     Mutant(
         "intervention away from what was asked",
         "nsbc/law.py",
-        "self.intervention_gain * (wanted - position)",
-        "self.intervention_gain * (position - wanted)",
+        "law.intervention_gain * (asked.wanted[b] - position[b])",
+        "law.intervention_gain * (position[b] - asked.wanted[b])",
     ),
     Mutant(
         "rate of the intervention not fed forward",
         "nsbc/law.py",
-        "asked = mobility * (rate + ",
-        "asked = mobility * (0.0 * rate + ",
+        "mobility[b] * (asked.rate[b] + ",
+        "mobility[b] * (0.0 * asked.rate[b] + ",
     ),
     Mutant(
         "null space of the intervention empty",
         "nsbc/law.py",
-        "return below + chosen @ (asked - below)",
-        "return chosen @ asked",
+        "task = below.copy()",
+        "task = 0.0 * below",
         runs=("crowd d",),
         tests=("tests/verify/runs/test_exec.py",),
     ),
     Mutant(
         "every intervention limited to the first UGV's speed",
         "nsbc/law.py",
-        "velocity = limit_speed(task[None], max_speed[row])",
-        "velocity = limit_speed(task[None], max_speed[:1])",
+        "normal, bound, mobility[i], max_speed[i],",
+        "normal, bound, mobility[i], max_speed[0 if executing[i] else i],",
         runs=("crowd d", "crowd c", "crowd b", "bodies d", "bodies b"),
     ),
     Mutant(
@@ -374,11 +372,11 @@ LAW = (
     ),
     Mutant(
         "presets end with a jump to the target",
-        "nsbc/motion.py",
+        "geometry/motion.py",
         "return self.positions[max(k, 0)], np.zeros(3)",
         "return self.positions[-1], np.zeros(3)",
         runs=("crowd b", "crowd d"),
-        tests=("tests/nsbc/test_motion.py",),
+        tests=("tests/geometry/test_motion.py",),
     ),
 )
 
@@ -716,7 +714,7 @@ GATEKEEPER = (
     ),
     Mutant(
         "what a UGV might come near is left out",
-        "gatekeeper/prediction.py",
+        "gatekeeper/problem.py",
         "near = ((gap < 0.0) & ",
         "near = ((gap < -1.0) & ",
     ),
@@ -728,15 +726,15 @@ GATEKEEPER = (
     ),
     Mutant(
         "points are predicted to stand where they are",
-        "gatekeeper/closed_loop.py",
+        "gatekeeper/rollout.py",
         "position, loop.points[k], loop.distances,",
         "position, loop.points[0], loop.distances,",
     ),
     Mutant(
         "the prediction has no avoidance",
-        "gatekeeper/closed_loop.py",
-        "return task if loop.intervention_on_top else avoid_one(task, normal, bound, loop.composition)",
-        "return task",
+        "gatekeeper/rollout.py",
+        "mode == ACCEPTED, Intervention(loop.wanted[k], asked, loop.chosen),\n        normal, bound,",
+        "mode == ACCEPTED, Intervention(loop.wanted[k], asked, loop.chosen),\n        0.0 * normal, 0.0 * bound,",
     ),
     Mutant(
         "a first stage that refuses is accepted",
@@ -838,17 +836,17 @@ MIX_UPS = (
         "velocity = self.velocity(context.get_time() - 0.05, positions, reference, rate, proposals, law)",
     ),
     Mutant(
-        "neighbours are sensed a sample late",
+        "positions are sensed a sample late",
         "systems/controllers.py",
-        "        own = positions[: self._count]\n",
-        "        own, now = positions[: self._count], positions\n"
-        "        positions, self._before = getattr(self, '_before', now), now\n",
+        "        asked = [None if p is None else",
+        "        positions, self._before = getattr(self, '_before', positions), positions.copy()\n"
+        "        asked = [None if p is None else",
     ),
     Mutant(
         "the intervention gain has the wrong sign along y",
         "nsbc/law.py",
-        "self.intervention_gain * (wanted - position)",
-        "self.intervention_gain * np.array([1.0, -1.0, 1.0]) * (wanted - position)",
+        "law.intervention_gain * (asked.wanted[b] - position[b])",
+        "law.intervention_gain * (1.0 - 2.0 * (b == 1)) * (asked.wanted[b] - position[b])",
     ),
     Mutant(
         "the UAV takes the UGV that it plans for for a point",

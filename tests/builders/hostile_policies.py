@@ -19,8 +19,8 @@ from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
+from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.policy import Observation, Policy
-from airground_drake.nsbc.motion import Motion
 
 
 class Hostile(Policy):

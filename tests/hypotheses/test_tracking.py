@@ -10,11 +10,11 @@ from airground_drake.gatekeeper.mpc_gatekeeper import Memory, View
 from airground_drake.gatekeeper.outcome import Outcome, Outlook
 from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
 from airground_drake.gatekeeper.patience import Commitment, Patience
+from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.messages import ACCEPT
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.law import UgvLaw
-from airground_drake.nsbc.motion import Motion
 from airground_drake.nsbc.team import Team
 from airground_drake.scenarios.load import load
 from airground_drake.systems.controllers import UgvController

@@ -17,8 +17,8 @@ from pydrake.common.value import Value
 
 from airground_drake.arrays import Array
 from airground_drake.diagram import build_model
+from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.policy import Proposal
-from airground_drake.nsbc.motion import Motion
 from airground_drake.scenarios.schema import Scenario
 
 ANSWERS = {"none": 1.0, "accepted": 1.0, "refused": -1.0, "silent": 0.0, "answered another": 1.0}

@@ -13,10 +13,10 @@ from builders.observations import mate, seen
 from timeline import times
 from verify.judging import judge
 
+from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.coordinate import NARROWER, Coordinate, predicted
 from airground_drake.intervention.coordination.joint import Plan, plan
 from airground_drake.intervention.policy import Observation, Proposal
-from airground_drake.nsbc.motion import Motion
 from airground_drake.scenarios.schema import (
     Control,
     Decision,

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from builders.observations import mate, seen
 
+from airground_drake.geometry.motion import Motion
+from airground_drake.geometry.paths import Path, shortest_path
 from airground_drake.intervention import detour
 from airground_drake.intervention.database import predicted_cost
 from airground_drake.intervention.detour import Detour
 from airground_drake.intervention.halts import NOT_WATCHED, STANDS_S, room, standing, watched
-from airground_drake.intervention.paths import Path, shortest_path
 from airground_drake.intervention.policy import Observation, Proposal
 from airground_drake.intervention.wrong import StaleMap
-from airground_drake.nsbc.motion import Motion
 
 DETOUR = Detour(speed_m_s=1.0)
 

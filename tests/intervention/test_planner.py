@@ -12,11 +12,11 @@ import pytest
 from airground_drake import components, load, simulate
 from airground_drake.arrays import Array
 from airground_drake.components import make_planner
+from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.database import BehaviourDatabase
 from airground_drake.intervention.messages import ACCEPT, DONE, REFUSE, SILENT, Report, accepted_proposals, answer_to
 from airground_drake.intervention.planner import Planner, PlannerMemory, sent_after
 from airground_drake.intervention.policy import Observation, Policy
-from airground_drake.nsbc.motion import Motion
 from airground_drake.registry import METHODS
 from airground_drake.verify import verify
 

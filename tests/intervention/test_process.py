@@ -18,6 +18,7 @@ from builders.hostile_policies import KILLS_OTHERS, KINDS
 from builders.observations import mate, seen
 
 from airground_drake.errors import FAULT_WIDTH, PluginError, PolicyError
+from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.database import BehaviourDatabase, Negotiation, make_policy
 from airground_drake.intervention.guest import process
 from airground_drake.intervention.guest.codec import KINDS as CLASSES
@@ -25,7 +26,6 @@ from airground_drake.intervention.guest.codec import decoded, encoded
 from airground_drake.intervention.guest.process import LIVES, GuestPolicy
 from airground_drake.intervention.policy import Observation, Policy, Proposal
 from airground_drake.nsbc.avoidance import Avoidance
-from airground_drake.nsbc.motion import Motion
 from airground_drake.registry import POLICIES
 from airground_drake.scenarios.load import load
 from airground_drake.simulation import simulate

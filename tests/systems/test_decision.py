@@ -22,7 +22,7 @@ from airground_drake.components import integrated_noise
 from airground_drake.decision.trigger import Trigger
 from airground_drake.diagram import build_diagram
 from airground_drake.errors import PluginError
-from airground_drake.nsbc.motion import Motion
+from airground_drake.geometry.motion import Motion
 from airground_drake.scenarios.load import load
 from airground_drake.simulation import simulate
 from airground_drake.systems.decision import DecisionBlock, DecisionVariable, EventTrigger

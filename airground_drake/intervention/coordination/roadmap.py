@@ -13,8 +13,8 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
 from airground_drake.arrays import Array
+from airground_drake.geometry.paths import NoPath, shortest_path
 from airground_drake.intervention.coordination import kernels
-from airground_drake.intervention.paths import NoPath, shortest_path
 
 Indices = kernels.Indices
 

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.policy import Observation, Proposal, Teammate
-from airground_drake.nsbc.motion import Motion
 
 KINDS: tuple[type, ...] = (Observation, Teammate, Proposal, Motion)
 """Classes whose objects can be part of a message."""

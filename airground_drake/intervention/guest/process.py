@@ -21,10 +21,10 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from airground_drake.errors import FAULT_WIDTH, PluginError, PolicyError, one_line
+from airground_drake.geometry.motion import Motion
 from airground_drake.interruption import ended_how
 from airground_drake.intervention.guest.codec import LONGEST, decoded, encoded
 from airground_drake.intervention.policy import Observation, Policy
-from airground_drake.nsbc.motion import Motion
 
 START_S = 30.0
 """Time for the interpreter, the policy's imports and its construction, s."""

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from properties import examples
 from scipy.sparse.csgraph import dijkstra
 
-from airground_drake.intervention import paths
-from airground_drake.intervention.paths import TOL, NoPath, Path, shortest_path
+from airground_drake.geometry import paths
+from airground_drake.geometry.paths import TOL, NoPath, Path, shortest_path
 
 Array = NDArray[np.float64]
 Point = tuple[float, float]

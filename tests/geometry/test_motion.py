@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from airground_drake.nsbc.motion import Motion
+from airground_drake.geometry.motion import Motion
 
 
 def test_motion_interpolates_and_rests_at_its_ends() -> None:
