@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -30,8 +29,8 @@ from airground_drake.nsbc.kernels import distances, news_within, within
 from airground_drake.nsbc.law import UgvLaw
 from airground_drake.nsbc.motion import Motion
 from airground_drake.nsbc.team import Team
-from airground_drake.scenarios.load import resolved, validated
-from airground_drake.scenarios.schema import Run, Scenario
+from airground_drake.scenarios.load import own, resolved, validated
+from airground_drake.scenarios.schema import Scenario
 from airground_drake.systems.decision import FIELDS, DecisionVariable
 from airground_drake.systems.lifetime import untie
 from airground_drake.trace import (
@@ -67,8 +66,8 @@ class Recorder:
             raise UnknownNameError("run", name, self._scenario.runs)
         self._run = self._scenario.runs[name]
         composition: Composition = self._run.composition  # type: ignore[assignment]
-        scenario = _with_rule(self._scenario, self._run)
-        self._model: Model = build_model(scenario, self._run.method, composition, decision_block=decision_block)
+        self._own = own(self._scenario, name)
+        self._model: Model = build_model(self._own, self._run.method, composition, decision_block=decision_block)
         builder = DiagramBuilder()
         builder.AddSystem(self._model.diagram)
         ports = [self._model.diagram.GetOutputPort(name) for name in RECORDED]
@@ -130,7 +129,7 @@ class Recorder:
         gatekeeper = model.gatekeeper
         decided = gatekeeper.decisions(gatekeeper.GetMyContextFromRoot(context)) if gatekeeper is not None else ()
         memory = model.planner.memory(model.planner.GetMyContextFromRoot(context))
-        decisions = _decisions([_decision(r, ugvs[r.robot], self._scenario.gatekeeper.route) for r in decided])
+        decisions = _decisions([_decision(r, ugvs[r.robot], self._own.gatekeeper.route) for r in decided])
         sent = [(ugvs[i], proposal.issued, proposal.policy) for i, proposal in memory.sent]
         meta: dict[str, Any] = {
             "schema": SCHEMA,
@@ -153,11 +152,6 @@ class Recorder:
         trace = Trace(meta, signals, decisions, timings, _problems(decided), proposals)
         meta["events"] = extract(trace, sent)
         return trace
-
-
-def _with_rule(scenario: Scenario, run: Run) -> Scenario:
-    """The scenario as the run has it: with its own rule of the gatekeeper, if it names one."""
-    return replace(scenario, gatekeeper=replace(scenario.gatekeeper, rule=run.rule)) if run.rule else scenario
 
 
 def _controllers(model: Model) -> dict[str, Any]:

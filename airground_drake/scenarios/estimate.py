@@ -21,6 +21,7 @@ from typing import NamedTuple
 
 from airground_drake.errors import LimitError
 from airground_drake.registry import METHODS
+from airground_drake.scenarios.load import own
 from airground_drake.scenarios.schema import Run, Scenario
 
 PREDICTED = 2e-4
@@ -92,7 +93,7 @@ class Estimate(NamedTuple):
 
 def estimate(scenario: Scenario) -> Estimate:
     """What all runs of a validated scenario ask for, from its numbers alone; takes no time whatever they are."""
-    of_runs = [_of_run(scenario, run) for run in scenario.runs.values()]
+    of_runs = [_of_run(own(scenario, name), run) for name, run in scenario.runs.items()]
     rows, steps, decisions, predicted, memory = (sum(column) for column in zip(*of_runs, strict=True))
     return Estimate(rows, steps, decisions, predicted, PROGRAM + memory + _planning(scenario))
 

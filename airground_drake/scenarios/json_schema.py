@@ -35,6 +35,7 @@ from airground_drake.scenarios.validate import (
     MAX_TEXT,
     NAME_PATTERN,
     RULES,
+    SETTABLE,
     SMALLEST,
     SOURCES,
     THRESHOLD_RULES,
@@ -55,7 +56,6 @@ _ONE_OF: dict[tuple[str, str], Iterable[str]] = {
     ("Intervention", "ranking"): RANKINGS,
     ("Gatekeeper", "budget"): BUDGETS,
     ("Gatekeeper", "rule"): RULES,
-    ("Run", "rule"): ("", *RULES),
     ("Choice", "source"): SOURCES,
 }
 _REGISTERED = {("Uav", "task"): UAV_TASKS, ("Gatekeeper", "route"): ROUTES, ("Policy", "name"): POLICIES}
@@ -131,6 +131,8 @@ def _value(kind: str, field: Field[Any], installed: bool) -> Schema:
         return _expectations(_EXPECTED[place], installed)
     if place == ("Scenario", "claims"):
         return {"type": "object", "patternProperties": {CLAIM_PATTERN: _PLUGIN}, "additionalProperties": False}
+    if place == ("Run", "set"):
+        return {"type": "object", "propertyNames": {"pattern": _SET_KEY}, "additionalProperties": _ONE_VALUE}
     if field.type is int:
         least, most = int(field.default != 0), _MOST.get(field.name, MAX_SEED)
         return {"type": "integer", "minimum": least, "maximum": most}
@@ -144,6 +146,8 @@ def _value(kind: str, field: Field[Any], installed: bool) -> Schema:
     return typed
 
 
+_SET_KEY = rf"^(({'|'.join(SETTABLE)})\..+|<<)$"
+_ONE_VALUE: Schema = {"type": ["number", "string", "boolean"]}
 _PLUGIN: Schema = {"type": "string", "pattern": PLUGIN_PATTERN}
 _NAME: Schema = {"type": "string", "pattern": NAME_PATTERN, "maxLength": MAX_NAME}
 _PLAIN: dict[Any, Schema] = {

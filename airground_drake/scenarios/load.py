@@ -19,12 +19,12 @@ import yaml
 from airground_drake import files
 from airground_drake.errors import Fault, ScenarioError, short
 from airground_drake.scenarios import validate
-from airground_drake.scenarios.document import compose, nearest, of_data, read, simple, where, within_limits
+from airground_drake.scenarios.document import compose, entries_of, nearest, of_data, read, simple, where, within_limits
 from airground_drake.scenarios.schema import Scenario, Vector
 from airground_drake.scenarios.shipped import shipped
 from airground_drake.scenarios.typed import made, replaced
 
-__all__ = ["from_data", "load", "resolved", "shipped", "validated"]
+__all__ = ["from_data", "load", "own", "resolved", "shipped", "validated"]
 
 Overrides = Sequence[str] | Mapping[str, Any]
 """`dotted.key=value` with the value in YAML, or values by dotted key."""
@@ -105,6 +105,45 @@ def resolved(scenario: Scenario) -> dict[str, Any]:
 def _build(root: yaml.Node, source: str) -> Scenario:
     """The scenario of a document, checked."""
     within_limits(root)
+    scenario = _checked(root, source)
+    for name, run in scenario.runs.items():
+        if run.set:
+            _as_set(root, name, source)
+    return scenario
+
+
+def own(scenario: Scenario, run: str) -> Scenario:
+    """The scenario as a run of it has it: with the values that the run sets.
+
+    Args:
+        scenario: validated.
+        run: name of one of its runs.
+    """
+    return (
+        _as_set(of_data(resolved(scenario), scenario.name), run, scenario.name) if scenario.runs[run].set else scenario
+    )
+
+
+def _as_set(root: yaml.Node, run: str, source: str) -> Scenario:
+    """The scenario of a document with the values that a run sets.
+
+    Raises:
+        ScenarioError: if it is not valid; names the run, too.
+    """
+    node = root
+    for part in ("runs", run, "set"):
+        node = entries_of(node, "")[part][1]
+    try:
+        for key, (_, value) in entries_of(node, "").items():
+            root = replaced(root, Scenario, key.split("."), "", value)
+        return _checked(root, source)
+    except ScenarioError as error:
+        allowed = f"{error.allowed} (as run {run} sets it)"
+        raise ScenarioError(error.source, error.key, error.value, allowed) from None
+
+
+def _checked(root: yaml.Node, source: str) -> Scenario:
+    """The scenario of a document, whatever its runs set."""
     scenario: Scenario = made(root, Scenario, "", "")
     _complete(scenario)
     try:

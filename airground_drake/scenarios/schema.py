@@ -7,6 +7,7 @@ are in the world frame, z up, the ground at z = 0.
 
 # No `from __future__ import annotations` here: `typed.py` needs the types themselves, not their names.
 from dataclasses import dataclass, field
+from typing import Any
 
 Vector = list[float]
 
@@ -259,14 +260,16 @@ class Run:
     `stalls_m` names the UGVs that must end (to within `stall_tolerance_m`) at that point short of their
     target. `expected` maps claim identifiers to the expected verdict; a claim not named must hold. Where
     there is no guarantee, "holds or refuted" admits either. `exercised` is "holds, and something put it to the test".
+    `set: {decision.threshold.zeta_m: 2.0}` gives this run a value of its own, as `--set` gives one to all runs. Claims
+    about the model whose constants it changes are judged for this run, too; `expected` may name them.
     """
 
     method: str = field(default_factory=str, metadata=REQUIRED)
     """How UAV and UGVs are coupled."""
     composition: str = "augmented"
     """How avoidance is composed with the tasks below: 'augmented' or a reading of recursion (5)."""
-    rule: str = ""
-    """Instead of `gatekeeper.rule`, in this run; '': that one."""
+    set: dict[str, Any] = field(default_factory=dict)
+    """Other values in this run, by dotted key of `decision`, `gatekeeper` or `intervention`."""
     stalls_m: dict[str, Vector] = field(default_factory=dict)
     """Where UGVs must end short of their target, by UGV."""
     expected: dict[str, str] = field(default_factory=dict)

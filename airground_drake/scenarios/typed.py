@@ -30,6 +30,10 @@ def made(node: yaml.Node, hint: Any, key: str, name: str) -> Any:
         if type(value) is not hint:
             raise ScenarioError(where(node), key, value, _wanted(hint, name))
         return value
+    if hint is Any:
+        if isinstance(value := value_of(node), Fault):
+            raise ScenarioError(where(node), key, value, "wanted: one value: a number, a text, true or false")
+        return value
     children = _children(node, hint, key, name)
     if not (isinstance(hint, type) and dataclasses.is_dataclass(hint)):
         item, named = get_args(hint)[-1], get_origin(hint) is dict and not validate.unit_of(name)
@@ -60,7 +64,7 @@ def replaced(node: yaml.Node | None, hint: Any, parts: list[str], key: str, new:
     """A node in which another stands at the place of the dotted parts below `key`; the node itself is left as it is."""
     if not parts:
         return new
-    part, *rest = parts
+    part, *rest = parts if hint != dict[str, Any] else [".".join(parts)]  # whose keys have dots
     children = {} if node is None or hint in _WANTED else _children(node, hint, key, key.rpartition(".")[2])
     options = _hints(hint) if dataclasses.is_dataclass(hint) else {name: get_args(hint)[-1] for name in children}
     if part and get_origin(hint) is dict:

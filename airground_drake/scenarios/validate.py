@@ -47,6 +47,9 @@ THRESHOLD_RULES: tuple[str, ...] = ("fixed", *COMPUTED)
 SOURCES: tuple[str, ...] = ("calibrated", "ours")
 BUDGETS: tuple[str, ...] = ("counted", "wall_clock")
 RULES: tuple[str, ...] = ("hysteresis", "first_stage")
+SETTABLE: tuple[str, ...] = ("decision", "gatekeeper", "intervention")
+"""Sections that a run may change for itself. Bodies, distances and controllers are those of all runs: a report draws
+them once, and proves safety once."""
 
 MAX_STAGES = 1000
 MAX_TEXT = 10_000  # characters
@@ -212,11 +215,17 @@ def _runs(scenario: Scenario) -> Problems:
     for name, run in scenario.runs.items():
         yield from _one_of(f"runs.{name}.method", run.method, METHODS)
         yield from _one_of(f"runs.{name}.composition", run.composition, COMPOSITIONS)
-        yield from _one_of(f"runs.{name}.rule", run.rule, ("", *RULES), "'' (gatekeeper.rule) or one of")
+        for key, value in run.set.items():
+            if key.partition(".")[0] not in SETTABLE or "." not in key:
+                yield (
+                    f"runs.{name}.set.{key}",
+                    value,
+                    f"a run may set keys of {', '.join(SETTABLE)}, such as gatekeeper.rule",
+                )
         for robot in run.stalls_m:
             yield from _one_of(f"runs.{name}.stalls_m.{robot}", robot, scenario.ugvs, "one of the UGVs")
         for claim, status in run.expected.items():
-            known = (*RUN_CLAIMS, *scenario.claims)
+            known = (*RUN_CLAIMS, *scenario.claims, *(MODEL_CLAIMS if run.set else ()))
             if claim in RETIRED_CLAIMS:
                 yield f"runs.{name}.expected.{claim}", claim, f"no longer a claim, {RETIRED_CLAIMS[claim]}: remove it"
                 continue
