@@ -136,8 +136,10 @@ def provenance(scenario: Scenario, started: datetime, command: str) -> dict[str,
 
 def _solver(scenario: Scenario, daqp: str) -> str:
     """What solves (26) under method (c)."""
-    route = scenario.gatekeeper.route
-    return f"DAQP {daqp}, one thread" if route == "mixed_integer" else f"that of the route {route}"
+    route, solver = scenario.gatekeeper.route, scenario.gatekeeper.solver
+    if route != "mixed_integer":
+        return f"that of the route {route}"
+    return f"DAQP {daqp}, one thread" if solver == "daqp" else f"{solver}, through Drake, one thread"
 
 
 def _git() -> str:

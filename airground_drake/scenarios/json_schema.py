@@ -37,6 +37,7 @@ from airground_drake.scenarios.validate import (
     RULES,
     SETTABLE,
     SMALLEST,
+    SOLVERS,
     SOURCES,
     THRESHOLD_RULES,
     TRIGGERS,
@@ -56,6 +57,7 @@ _ONE_OF: dict[tuple[str, str], Iterable[str]] = {
     ("Intervention", "ranking"): RANKINGS,
     ("Gatekeeper", "budget"): BUDGETS,
     ("Gatekeeper", "rule"): RULES,
+    ("Gatekeeper", "solver"): SOLVERS,
     ("Choice", "source"): SOURCES,
 }
 _REGISTERED = {("Uav", "task"): UAV_TASKS, ("Gatekeeper", "route"): ROUTES, ("Policy", "name"): POLICIES}

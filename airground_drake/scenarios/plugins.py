@@ -93,7 +93,7 @@ def without(scenario: Scenario) -> Scenario:
         scenario,
         uav=replace(scenario.uav, task="formation"),
         intervention=replace(scenario.intervention, policies=[]),
-        gatekeeper=replace(scenario.gatekeeper, route="mixed_integer", blocks=0),
+        gatekeeper=replace(scenario.gatekeeper, route="mixed_integer", blocks=0, solver="daqp"),
         runs={name: replace(run, set={}) for name, run in scenario.runs.items()},
         choices=[],
     )

@@ -221,6 +221,8 @@ class Gatekeeper:
     """Stages of (26): horizon_s / stages is a multiple of the control period."""
     blocks: int = 0
     """Accept variables of (26), each for a block of stages, for route mixed_integer; 0: one per stage."""
+    solver: str = "daqp"
+    """What searches for the optimum of route mixed_integer; the others need a Drake that has them, and a licence."""
     error_weight_1_m2_s: float = 1.0
     """a of (25): weight of the distance to the preset trajectory."""
     slack_weight_1_m2_s: float = field(default=1000.0, metadata=FROM_ZERO)

@@ -47,6 +47,7 @@ THRESHOLD_RULES: tuple[str, ...] = ("fixed", *COMPUTED)
 SOURCES: tuple[str, ...] = ("calibrated", "ours")
 BUDGETS: tuple[str, ...] = ("counted", "wall_clock")
 RULES: tuple[str, ...] = ("hysteresis", "first_stage")
+SOLVERS: tuple[str, ...] = ("daqp", "gurobi", "mosek")
 SETTABLE: tuple[str, ...] = ("decision", "gatekeeper", "intervention")
 """Sections that a run may change for itself. Bodies, distances and controllers are those of all runs: a report draws
 them once, and proves safety once."""
@@ -184,6 +185,8 @@ def _counts(scenario: Scenario) -> Problems:
         yield "gatekeeper.blocks", scenario.gatekeeper.blocks, allowed
     if scenario.gatekeeper.blocks and scenario.gatekeeper.route in (set(ROUTES.own) - {"mixed_integer"}):
         yield "gatekeeper.blocks", scenario.gatekeeper.blocks, "0: only the route mixed_integer has blocks"
+    if scenario.gatekeeper.solver != "daqp" and scenario.gatekeeper.route in (set(ROUTES.own) - {"mixed_integer"}):
+        yield "gatekeeper.solver", scenario.gatekeeper.solver, "daqp: only the route mixed_integer has other solvers"
     for name in ("budget_iterations", "tries"):
         if not 1 <= getattr(scenario.gatekeeper, name) <= MAX_SEED:
             yield f"gatekeeper.{name}", getattr(scenario.gatekeeper, name), f"a whole number from 1 to {MAX_SEED}"
@@ -206,6 +209,7 @@ def _options(scenario: Scenario) -> Problems:
     for index, policy in enumerate(scenario.intervention.policies):
         yield from _registered(f"intervention.policies.{index}.name", policy.name, POLICIES)
     yield from _one_of("gatekeeper.rule", scenario.gatekeeper.rule, RULES)
+    yield from _one_of("gatekeeper.solver", scenario.gatekeeper.solver, SOLVERS)
     yield from _one_of("gatekeeper.budget", scenario.gatekeeper.budget, BUDGETS)
     yield from _one_of("decision.trigger", scenario.decision.trigger, TRIGGERS)
     yield from _one_of("decision.threshold.rule", scenario.decision.threshold.rule, THRESHOLD_RULES)
