@@ -200,10 +200,10 @@ class Gatekeeper:
     Under method (c) a decision on a proposal is reversed only for a plan that is cheaper by the (relative) switching
     margin, and not before `min_dwell_s` have passed. That is ours: by the paper's own rule, `first_stage`, the first
     stage of each plan is executed, whatever was answered before. A decision may take `budget_iterations` of the solver
-    of a relaxation and a second of the search of `mixed_integer` (budget 'counted': a run is the same on every machine
-    unless a search meets that limit, which the report counts), or besides the share `budget_share` of the sampling
-    period by the clock (budget 'wall_clock': for real time). `terminal_weight_s` is the
-    w of a terminal cost w a ||rho_rd - rho_N||^2 besides (25); the paper has none.
+    of a relaxation and 20,000 iterations of the search of `mixed_integer` (budget 'counted': a run is the same on every
+    machine on which these take less than 10 s, ten times what they take), or besides the share `budget_share` of the
+    sampling period by the clock (budget 'wall_clock': for real time). `terminal_weight_s` is the w of a terminal cost
+    w a ||rho_rd - rho_N||^2 besides (25); the paper has none.
 
     Under method (d) outcomes are compared instead, `settling_s` past the end of motion and preset trajectory. An
     accepted proposal is executed for `longest_s` at most, and given back when the UGV has been farther behind it than

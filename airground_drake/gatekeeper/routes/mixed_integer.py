@@ -31,14 +31,15 @@ class MixedIntegerRoute:
 
     The program (`BinaryProgram`) is one `MathematicalProgram` with the half-planes of `RelaxedRoute`. DAQP takes its
     numbers and searches by branch and bound; Gurobi and Mosek can do so in its place, where Drake has them. First the
-    relaxation is solved, and the best of sum-up rounding, the constant plans and what is left of the previous plan is improved by changing one choice at a time. The cost of that
-    plan, the incumbent, cuts the search.
+    relaxation is solved, and the best of sum-up rounding, the constant plans and what is left of the previous plan is
+    improved by changing one choice at a time. The cost of that plan, the incumbent, cuts the search.
 
     The plan returned is the cheapest by exact distances of the optimum, the incumbent, what that was chosen from, and
     each of these with the other first choice. `route_bound` is the optimum along the half-planes; the gap is 0.
 
-    Budget: the search has a limit in time, `search_s`, because DAQP counts no nodes. At that limit, and when the
-    solver fails, the incumbent decides, which does not depend on the clock; its bound is that of the relaxation.
+    Budget: DAQP can be stopped by the clock only (its limit of iterations is one for each node), but it says how many
+    iterations it took. If they are more than `search_iterations`, or the time `search_s` was up, or the solver fails,
+    the incumbent decides, which does not depend on the clock; its bound is that of the relaxation.
 
     The program is built once for a number of stages and blocks, then only its coefficients change.
     """
@@ -73,9 +74,9 @@ class MixedIntegerRoute:
         incumbent = _improved(problem.kinematics, problem.terms, normals, binary.block, start)
         known = problem.evaluate_half_planes(problem.positions(incumbent), normals)
         found = self._search(binary, known=known, seconds=min(budget.search_s, budget.left_s()))
-        status: Status = found.ended
+        status: Status = found.ended if found.iterations <= budget.search_iterations else "budget_spent"
         plans = [incumbent, *known_plans]
-        if found.omega is not None:
+        if found.omega is not None and status == "optimal":
             optimum = binary.plan(found.omega)
             cost = problem.evaluate_half_planes(problem.positions(optimum), normals)
             if abs(cost - known) <= _AGREE * known or cost < known:
