@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -179,6 +179,10 @@ def make_patience(scenario: Scenario) -> Patience:
     """How long UGVs go along with the UAV."""
     gate = scenario.gatekeeper
     return Patience(gate.tries, gate.rest_s, gate.longest_s, gate.lag_m, gate.behind_s)
+
+
+GatekeepersFactory = Callable[[Scenario, UgvLaw], Gatekeepers]
+"""Makes what judges proposals, of a scenario and the law of its UGVs."""
 
 
 def make_gatekeepers(scenario: Scenario, law: UgvLaw) -> Gatekeepers:

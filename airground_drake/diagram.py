@@ -108,8 +108,12 @@ def build_model(
     plants: PlantFactory = components.first_order_plant,
     monitor: Monitor | None = None,
     decision_block: DecisionFactory = DecisionVariable,
+    make_gatekeepers: components.GatekeepersFactory = components.make_gatekeepers,
 ) -> Model:
-    """Build and wire all components of one method of a valid scenario; else as `build_diagram`."""
+    """Build and wire all components of one method of a valid scenario; else as `build_diagram`.
+
+    `make_gatekeepers` makes what judges proposals in another way; claims about decisions are about the default.
+    """
     chosen, composition = _chosen(scenario, method, composition)
     team, presets = components.make_team(scenario), components.make_presets(scenario)
     n = len(team.ugvs)
@@ -123,7 +127,7 @@ def build_model(
     planner = InterventionPlanner(components.make_planner(scenario, chosen), scenario.control.period_s)
     gatekeeper = None
     if chosen.gated:
-        gatekeepers = components.make_gatekeepers(scenario, law)
+        gatekeepers = make_gatekeepers(scenario, law)
         gatekeeper = Gatekeeper(gatekeepers, n, period=scenario.gatekeeper.period_s, control=scenario.control.period_s)
     ugvs = _ugvs(presets, UgvController(team, law), gatekeeper if gatekeeper is not None else DirectAcceptance(n))
     uav = _uav(planner, _uav_controller(scenario, team))

@@ -16,6 +16,7 @@ from pydrake.systems.framework import Context, DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput, Multiplexer
 
 from airground_drake.arrays import Array
+from airground_drake.components import GatekeepersFactory, make_gatekeepers
 from airground_drake.diagram import RECORDED, DecisionFactory, Model, build_model
 from airground_drake.errors import SimulationError, UnknownNameError, described
 from airground_drake.events import extract
@@ -52,8 +53,14 @@ MERGE_S = 1e-9
 class Recorder:
     """A model inside a diagram that logs its exported outputs at every step; may be used for several seeds."""
 
-    def __init__(self, scenario: Scenario, name: str, decision_block: DecisionFactory = DecisionVariable) -> None:
-        """Build the model of a run of the scenario and its loggers; `decision_block` as in `build_diagram`.
+    def __init__(
+        self,
+        scenario: Scenario,
+        name: str,
+        decision_block: DecisionFactory = DecisionVariable,
+        make_gatekeepers: GatekeepersFactory = make_gatekeepers,
+    ) -> None:
+        """Build the model of a run of the scenario and its loggers; the rest as in `build_model`.
 
         Raises:
             ScenarioError: if the scenario is not valid.
@@ -67,7 +74,13 @@ class Recorder:
         self._run = self._scenario.runs[name]
         composition: Composition = self._run.composition  # type: ignore[assignment]
         self._own = own(self._scenario, name)
-        self._model: Model = build_model(self._own, self._run.method, composition, decision_block=decision_block)
+        self._model: Model = build_model(
+            self._own,
+            self._run.method,
+            composition,
+            decision_block=decision_block,
+            make_gatekeepers=make_gatekeepers,
+        )
         builder = DiagramBuilder()
         builder.AddSystem(self._model.diagram)
         ports = [self._model.diagram.GetOutputPort(name) for name in RECORDED]
