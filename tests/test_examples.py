@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
 import json
 import os
@@ -79,6 +80,25 @@ def test_a_plant_of_ones_own_needs_more_room() -> None:
         distances.append(own.nearest_to_the_rock(scenario))
     assert distances[0] < own.NEEDED_M <= distances[1]
     assert distances == pytest.approx([1.867, 2.117], abs=2e-3)
+
+
+def test_a_supervisor_of_priorities_gets_where_a_fixed_order_does_not() -> None:
+    """As its README says; whatever the supervisor, the distance is kept."""
+    own = imported("priorities/priorities")
+    corner, wall = own.SCENES.values()
+    found = {name: (own.run(corner, decide), own.run(wall, decide)) for name, decide in own.supervisors().items()}
+    assert {name: [each.arrived_s for each in both] for name, both in found.items()} == {
+        "fixed order": [None, None],
+        "rule": [pytest.approx(18.15), pytest.approx(20.7)],
+        "table": [pytest.approx(18.05), None],
+    }
+    rng = np.random.default_rng(5)
+    taught_badly = own.run(corner, lambda _: int(rng.integers(3)))
+    assert (
+        min(each.nearest_m for each in (*(one for both in found.values() for one in both), taught_badly)) > 2.0 - 1e-9
+    )
+    table = np.array(json.loads(own.TABLE.read_text()))
+    assert table.shape == own.train(episodes=1).shape
 
 
 @pytest.mark.parametrize("kind", ["CrossEntropy", "MultiArmedBandit"])
