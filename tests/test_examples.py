@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 
 from airground_drake.scenarios.load import load
+from airground_drake.simulation import simulate
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 OPTIONS = ("-p", "airground_drake.testing.plugin", "-p", "no:cacheprovider", "--hypothesis-profile=ci")
@@ -94,11 +95,24 @@ def test_a_supervisor_of_priorities_gets_where_a_fixed_order_does_not() -> None:
     }
     rng = np.random.default_rng(5)
     taught_badly = own.run(corner, lambda _: int(rng.integers(3)))
-    assert (
-        min(each.nearest_m for each in (*(one for both in found.values() for one in both), taught_badly)) > 2.0 - 1e-9
-    )
+    every = [taught_badly, *(each for both in found.values() for each in both)]
+    assert min(each.nearest_m for each in every) > 2.0 - 1e-9
     table = np.array(json.loads(own.TABLE.read_text()))
     assert table.shape == own.train(episodes=1).shape
+
+
+def test_a_learned_policy_is_trained_and_proposes_ways(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A few generations improve on the first; the weights that are there are better than those."""
+    monkeypatch.syspath_prepend(EXAMPLES)
+    learned = importlib.import_module("my_robots.learned")
+    _, history = learned.train(generations=12)
+    assert min(history) < 0.8 * history[0]
+    kept = np.array(json.loads(learned.WEIGHTS.read_text()))
+    assert learned.price(kept, *learned.situations(np.random.default_rng(7), 500, 2.0), 2.0) < 0.8 * min(history)
+    scenario = load("minimal", {"intervention.policies": [{"name": "my_robots.learned:Learned",
+                                                           "parameters": {"speed_m_s": 3.0}}]})[0]  # fmt: skip
+    trace = simulate(scenario, "d")
+    assert [event["t_s"] for event in trace.events if event["kind"] == "arrival" and event["robot"] == "ugv1"]
 
 
 @pytest.mark.parametrize("kind", ["CrossEntropy", "MultiArmedBandit"])
