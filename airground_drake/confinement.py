@@ -34,7 +34,7 @@ def limit_memory(bytes_: int) -> None:
             resource.setrlimit(kind, (most, most))
 
 
-def leave_others_alone() -> bool:
+def restrict_signals() -> bool:
     """Give up signals to, and the memory of, processes that this one has not started, for good.
 
     Returns:

@@ -58,7 +58,7 @@ class Preset:
 
     @property
     def corner_s(self) -> Array:
-        """When corners are passed and the end is reached, (m - 1,); at standstill none is."""
+        """Times at which the corners and the end are reached, (m - 1,); empty at standstill."""
         return self.length_m[1:] / self.speed_m_s if self.speed_m_s > 0.0 else np.empty(0)
 
     def position_m(self, t_s: Array) -> Array:
@@ -96,18 +96,18 @@ def pairs_of(scenario: Json) -> list[Pair]:
     beside_robots = []
     for one, other in combinations(robots, 2):
         safe = apart_m(scenario, "air_ground_m" if other == uav else "ugv_m", robots[one], robots[other])
-        beside_robots.append(Pair(one, other, safe, _sum(limit[one], limit[other]), 0.5))
+        beside_robots.append(Pair(one, other, safe, _decimal_sum(limit[one], limit[other]), 0.5))
     return beside_obstacles + beside_robots
 
 
 @lru_cache(maxsize=10_000)
-def _sum(one: float, other: float) -> float:
-    """Of two decimals as they are written: 1.1 and 2.2 make 3.3."""
+def _decimal_sum(one: float, other: float) -> float:
+    """The sum of two numbers as they are written: 1.1 and 2.2 make 3.3. Teams have few speeds, so few sums."""
     return float(written(one) + written(other))
 
 
 def apart_m(scenario: Json, kind: str, one: Json, other: Json) -> float:
-    """A distance of surfaces, of a kind of pair, as one of centres: with both radii."""
+    """A distance that surfaces keep, by its name in the scenario, as a distance of centres: both radii are added."""
     return float(scenario["safe_distance"][kind]) + (float(one["radius_m"]) + float(other["radius_m"]))
 
 

@@ -36,7 +36,7 @@ _PROGRAM = (
     "import json, sys; sys.path[:] = json.loads(sys.argv[2]); "
     "from airground_drake import confinement, interruption; "
     "interruption.end_with_pipe(int(sys.argv[4])); "
-    "confinement.limit_memory(int(sys.argv[3])); confinement.leave_others_alone(); "
+    "confinement.limit_memory(int(sys.argv[3])); confinement.restrict_signals(); "
     "from airground_drake.intervention.worker import main; main(int(sys.argv[1]))"
 )
 _ENVIRONMENT = {"PYTHONHASHSEED": "0", "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}

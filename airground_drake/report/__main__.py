@@ -23,7 +23,7 @@ from airground_drake.errors import (
     UnknownNameError,
     one_line,
 )
-from airground_drake.progress import told
+from airground_drake.progress import progress_bar
 from airground_drake.report import folder
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.estimate import DEFAULT_LIMITS, GIB, Limits
@@ -83,10 +83,10 @@ def _reported(options: argparse.Namespace, command: str) -> int:
     limits = Limits(options.limit_steps, options.limit_memory * GIB)
     with (
         plugins.admitted(scenario, options.scenario, allow=options.allow_plugins),
-        told(quiet=options.quiet, verbose=options.verbose) as watch,
+        progress_bar(quiet=options.quiet, verbose=options.verbose) as progress,
     ):
         report = make.write_report(
-            scenario, digest, output, options.format, command, kept, options.scenario == AUDIT, limits, watch
+            scenario, digest, output, options.format, command, kept, options.scenario == AUDIT, limits, progress
         )
     overall = report["overall"]
     if not options.quiet:

@@ -14,7 +14,8 @@ from typing import Any, NamedTuple
 
 from airground_drake import files, graphviz, trace
 from airground_drake.diagram import build_diagram, most_complete
-from airground_drake.progress import Watch
+from airground_drake.parallel import start_in_process
+from airground_drake.progress import Progress
 from airground_drake.report import audit, document, folder, html, junit
 from airground_drake.report.figures import moments, threshold, zeno_refine
 from airground_drake.report.figures.draw import draw
@@ -22,7 +23,6 @@ from airground_drake.report.figures.findings import draw as draw_findings
 from airground_drake.report.figures.panels import Figure
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.side_by_side import begun
 from airground_drake.trace import Trace
 from airground_drake.verify import Verdict, verify_all
 from airground_drake.verify.registry import model_claims
@@ -39,7 +39,13 @@ class Judged(NamedTuple):
 
 
 def judge(
-    scenario: Scenario, traces: Mapping[str, Trace], kept: Path | None, *, audited: bool, drawn: bool, watch: Watch
+    scenario: Scenario,
+    traces: Mapping[str, Trace],
+    kept: Path | None,
+    *,
+    audited: bool,
+    drawn: bool,
+    progress: Progress,
 ) -> Judged:
     """Judge the runs and the model and, if asked for, the paper; draw the runs at the same time.
 
@@ -47,10 +53,10 @@ def judge(
         PluginError: if a claim of the scenario cannot be made.
         AirgroundError: if a process dies.
     """
-    figures = begun(partial(draw, scenario, traces)) if drawn else list
-    verdicts = verify_all(scenario, traces.values(), kept=kept, watch=watch)
+    figures = start_in_process(partial(draw, scenario, traces)) if drawn else list
+    verdicts = verify_all(scenario, traces.values(), kept=kept, progress=progress)
     if audited:
-        watch.stage("auditing the paper")
+        progress.stage("auditing the paper")
     findings = audit.whole(scenario, verdicts) if audited else ()
     return Judged(verdicts, findings, figures())
 

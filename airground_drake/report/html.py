@@ -23,6 +23,7 @@ from airground_drake.report.figures import svg
 from airground_drake.report.figures.canvas import DARK
 from airground_drake.report.figures.panels import Figure, Table
 from airground_drake.report.mathml import mathml
+from airground_drake.report.proved import place
 from airground_drake.report.reproduction import YES_NO
 from airground_drake.report.templating import environment_of
 from airground_drake.statuses import NOT_EXERCISED, PASSING, outcome
@@ -96,7 +97,7 @@ def _environment() -> Environment:
     scripts = [_template(name) for name in SCRIPTS]
     environment.filters.update(
         num=number, value=value, pretty=pretty, together=attention.faults_together, inline=Markup, mathml=mathml,
-        evidence=evidence_tables, records=partial(evidence.tables, number=number), brief=brief,
+        evidence=evidence_tables, proof=place, records=partial(evidence.tables, number=number), brief=brief,
     )  # fmt: skip
     environment.globals.update(
         chips=CHIPS, shown=_shown, refused=attention.REFUSED, max_faults=MAX_FAULTS,

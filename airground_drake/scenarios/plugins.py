@@ -9,10 +9,13 @@ from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from airground_drake.errors import ScenarioError
 from airground_drake.registry import POLICIES, ROUTES, UAV_TASKS, Registry, is_plugin
-from airground_drake.scenarios.schema import Scenario
+
+if TYPE_CHECKING:  # pydantic, which the schema imports, would delay `report --list`
+    from airground_drake.scenarios.schema import Scenario
 
 OPTION = "--allow-plugins"
 HELP = "import and run what is named as module:Class or file.py:Class; looked for beside the scenario or spec, too"

@@ -8,25 +8,25 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from airground_drake.progress import SILENT, Watch
+from airground_drake.parallel import run_parallel
+from airground_drake.progress import SILENT, Progress
 from airground_drake.scenarios.load import own
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.side_by_side import side_by_side
 from airground_drake.trace import Trace
 from airground_drake.verify.applications import Count, counts, measured, with_counts, with_runs
-from airground_drake.verify.cache import find, found
+from airground_drake.verify.cache import found
 from airground_drake.verify.claim import ModelClaim, TraceClaim, Verdict
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.registry import model_claims, run_claims
 
 
-def verify(trace: Trace, claims: Collection[str] | None = None, watch: Watch = SILENT) -> list[Verdict]:
+def verify(trace: Trace, claims: Collection[str] | None = None, progress: Progress = SILENT) -> list[Verdict]:
     """Judge the claims that apply to the run's method.
 
     Args:
         trace: one run.
         claims: identifiers of the claims to judge; default: all.
-        watch: is told of each.
+        progress: is told of each.
 
     Returns:
         One verdict per applicable claim, with the status that the scenario expects of this run ('holds' unless
@@ -39,7 +39,7 @@ def verify(trace: Trace, claims: Collection[str] | None = None, watch: Watch = S
     chosen, trace = _applicable(trace, claims), replace(trace)  # nothing kept from before: its tables may have changed
     findings = []
     for claim in chosen:
-        with watch.item(f"{claim.id} {trace.meta.get('run')}"):
+        with progress.item(f"{claim.id} {trace.meta.get('run')}"):
             findings.append(claim.judge(trace))
     return _verdicts(trace, chosen, findings)
 
@@ -59,7 +59,7 @@ def _verdicts(trace: Trace, claims: Sequence[TraceClaim], findings: Sequence[Fin
 
 
 def verify_model(
-    scenario: Scenario, *, kept: Path | None = None, claims: Collection[str] | None = None, watch: Watch = SILENT
+    scenario: Scenario, *, kept: Path | None = None, claims: Collection[str] | None = None, progress: Progress = SILENT
 ) -> list[Verdict]:
     """Judge the claims about the model of a scenario.
 
@@ -68,7 +68,7 @@ def verify_model(
         kept: folder of findings that are reused if nothing that they depend on has changed (`cache_folder()`);
             None: everything anew.
         claims: identifiers of the claims to judge; default: all.
-        watch: is told of each.
+        progress: is told of each.
 
     Returns:
         One verdict per claim, run '', with the status that the scenario expects ('proved' or 'supported' unless
@@ -79,12 +79,13 @@ def verify_model(
         PluginError: if a claim of the scenario cannot be made.
     """
     asked = _asked(scenario, claims)
-    findings = find([each.claim for each in asked], [each.inputs for each in asked], folder=kept, watch=watch)
+    pieces = [partial(found, each.claim, each.inputs, kept) for each in asked]
+    findings = run_parallel(pieces, names=[each.name for each in asked], progress=progress)
     return [each.verdict(scenario, finding) for each, finding in zip(asked, findings, strict=True)]
 
 
 def verify_all(
-    scenario: Scenario, traces: Iterable[Trace], *, kept: Path | None = None, watch: Watch = SILENT
+    scenario: Scenario, traces: Iterable[Trace], *, kept: Path | None = None, progress: Progress = SILENT
 ) -> list[Verdict]:
     """Judge every claim: on runs of a scenario, and then about its model.
 
@@ -94,7 +95,7 @@ def verify_all(
         scenario: its constants.
         traces: its runs.
         kept: see `verify_model`.
-        watch: is told of each claim about the model and of the claims about each run.
+        progress: is told of each claim about the model and of the claims about each run.
 
     Raises:
         PluginError: if a claim of the scenario cannot be made.
@@ -104,12 +105,9 @@ def verify_all(
     of_runs = [(replace(trace), _applicable(trace)) for trace in traces]  # as in `verify`
     pieces: list[Callable[[], Any]] = [partial(found, each.claim, each.inputs, kept) for each in asked]
     pieces += [partial(_judged, trace, claims) for trace, claims in of_runs]
-    names = [
-        *(f"{each.claim.id} {each.run}".strip() for each in asked),
-        *(f"claims about run {trace.run}" for trace, _ in of_runs),
-    ]
-    watch.stage("judging", len(pieces), "claims about the model or a run")
-    done = side_by_side(pieces, names=names, watch=watch)
+    names = [*(each.name for each in asked), *(f"claims about run {trace.run}" for trace, _ in of_runs)]
+    progress.stage("judging", len(pieces), "claims about the model or a run")
+    done = run_parallel(pieces, names=names, progress=progress)
     about_the_model, about_runs = done[: len(asked)], done[len(asked) :]
     verdicts = [
         verdict
@@ -133,6 +131,11 @@ class _Asked(NamedTuple):
     claim: ModelClaim
     run: str
     inputs: dict[str, Any]
+
+    @property
+    def name(self) -> str:
+        """For whoever waits for it."""
+        return f"{self.claim.id} {self.run}".strip()
 
     def verdict(self, scenario: Scenario, finding: Finding) -> Verdict:
         """With what the scenario expects."""

@@ -19,8 +19,8 @@ import airground_drake
 from airground_drake.commands import COMMANDS, main
 from airground_drake.commands.listing import KINDS
 from airground_drake.registry import METHODS, MODEL_CLAIMS, POLICIES, ROUTES, RUN_CLAIMS, SAMPLERS, UAV_TASKS
+from airground_drake.scenarios.limits import MAX_UGVS
 from airground_drake.scenarios.load import load, shipped
-from airground_drake.scenarios.schema import MAX_UGVS
 
 
 @pytest.mark.parametrize("name", COMMANDS)
@@ -50,7 +50,7 @@ def test_help_names_all_commands() -> None:
 )
 def test_what_takes_long_is_imported_when_it_is_used(arguments: tuple[str, ...]) -> None:
     said, modules = imported(*arguments)
-    heavy = "numpy pandas scipy numba cvxpy flint matplotlib jinja2 pydrake pygraphviz"
+    heavy = "numpy pandas scipy numba cvxpy flint matplotlib jinja2 pydantic pydrake pygraphviz"
     assert said
     assert not set(heavy.split()) & modules
 

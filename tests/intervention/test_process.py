@@ -260,5 +260,5 @@ def test_the_process_loads_what_a_policy_needs_and_no_more() -> None:
 
 
 def _landlock() -> bool:
-    program = "from airground_drake.confinement import leave_others_alone; print(leave_others_alone())"
+    program = "from airground_drake.confinement import restrict_signals; print(restrict_signals())"
     return "True" in subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout

@@ -30,11 +30,11 @@ def with_run(settings: str, expected: str = "{}") -> str:
         ("gatekeeper.rule: last_stage", ["bad.yaml:13: gatekeeper.rule: 'last_stage'", "first_stage"]),
         ("gatekeeper.tries: 2.5", ["bad.yaml:13: gatekeeper.tries: 2.5", "a whole number", "as run other sets it"]),
         ("decision.release_m: 4.0", ["bad.yaml:13: decision.release_m: 4.0", "less than the fixed threshold, 3 m"]),
-        ("decision.threshold: {zeta_m: 2}", ["bad.yaml:13: runs.other.set.decision.threshold: a mapping is given"]),
+        ("decision.threshold: {zeta_m: 2}", ["bad.yaml:13: runs.other.set.decision.threshold: {'zeta_m'", "one value"]),
         ("duration_s: 7.0", ["runs.other.set.duration_s: 7.0", "decision, gatekeeper, intervention"]),
         ("control.period_s: 0.1", ["runs.other.set.control.period_s: 0.1", "decision, gatekeeper, intervention"]),
         ("gatekeeper: 3", ["runs.other.set.gatekeeper: 3", "such as gatekeeper.rule"]),
-        ("intervention.policies.1.name: detour", ["intervention.policies.1: unknown key", "allowed: 0"]),
+        ("intervention.policies.1.name: detour", ["bad.yaml:13: intervention.policies.1: unknown key", "allowed: 0"]),
     ],
 )
 def test_a_mistake_is_one_line(settings: str, fragments: list[str], write: Write) -> None:

@@ -28,7 +28,7 @@ from airground_drake.simulation import simulate
 from airground_drake.systems.decision import FIELDS, DecisionBlock, DecisionVariable, EventTrigger
 from airground_drake.trace import Trace
 from airground_drake.verify.engines.segments import NormSignal
-from airground_drake.verify.runs.trigger_replay import transitions
+from airground_drake.verify.runs.triggers import transitions
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,7 @@ from airground_drake.proofs import THEOREMS, Standing
 from airground_drake.registry import MODEL_CLAIMS
 from airground_drake.scenarios.load import load, shipped
 from airground_drake.verify.claim import ModelClaim
-from airground_drake.verify.model import theorem
-from airground_drake.verify.model.avoidance import safe_inv
+from airground_drake.verify.model import safe_inv, theorem
 from airground_drake.verify.model.theorem import TheoremClaim
 
 CLAIMS: dict[str, TheoremClaim] = {

@@ -28,16 +28,7 @@ def test_shipped_runs_hold(run: Run, name: str) -> None:
     finding = judge("GATE-MODEL", run(name, "c"))
     assert finding.status == "holds", finding
     assert finding.margin == pytest.approx(1e-6, rel=0.02)
-    assert finding.evidence["regrets"] >= 8
-
-
-def test_what_came_of_predictions_and_plans_is_reported(run: Run) -> None:
-    """The paper's own way, relaxation and rounding, chose a plan that the closed loop disowns; the optimum does not."""
-    evidence = judge("GATE-MODEL", simulate(load("case_b", ["gatekeeper.route=relaxed"])[0], "c")).evidence
-    assert evidence["largest_regret_against_blocks"]["against_blocks"] > 5.0
-    exact = judge("GATE-MODEL", run("case_b", "c")).evidence
-    assert exact["largest_regret_against_blocks"]["against_blocks"] < 1.0
-    assert evidence["farthest_from_predicted"]["away_m"] > 0.0
+    assert finding.evidence["farthest_from_predicted"]["away_m"] > 0.0
 
 
 def test_stages_of_several_control_periods_hold() -> None:

@@ -17,7 +17,6 @@ from airground_drake.trace import Trace
 from airground_drake.verify.claim import MOTION_TOLERANCE_M, TIME_TOLERANCE_S
 from airground_drake.verify.registry import run_claims
 from airground_drake.verify.runs import gate_model, gate_opt
-from airground_drake.verify.runs.decision_noise import NOISE_TOLERANCE_M
 from airground_drake.verify.runs.exec import COMMAND_TOLERANCE_M_S
 from airground_drake.verify.runs.gate_feas import SPEED_TOLERANCE
 from airground_drake.verify.runs.gate_record import POSITION_TOLERANCE_M, Row, cost_tolerance, rows_of
@@ -29,6 +28,7 @@ from airground_drake.verify.runs.proposals import answers_of, proposals_of
 from airground_drake.verify.runs.standing import SENSED_M
 from airground_drake.verify.runs.sum_up_rounding import TIE
 from airground_drake.verify.runs.thr_trig import EVENT_TOLERANCE_S, VARIABLE_TOLERANCE_M
+from airground_drake.verify.runs.triggers import NOISE_TOLERANCE_M
 
 Edit = Callable[[Trace, float], Trace]
 """Changes a record by so much."""

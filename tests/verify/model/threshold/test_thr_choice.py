@@ -18,7 +18,7 @@ from airground_drake.trace import Trace
 from airground_drake.verify import verify_all, verify_model
 from airground_drake.verify.applications import with_runs
 from airground_drake.verify.finding import Finding
-from airground_drake.verify.model.threshold.thr_choice import ThrChoice, of_run
+from airground_drake.verify.model.thr_choice import ThrChoice, of_run
 
 
 def judged(inputs: dict[str, Any], **changes: Any) -> Finding:

@@ -30,7 +30,7 @@ from airground_drake.statuses import Status
 from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.model.levels import levels_of
-from airground_drake.verify.model.trigger.refined_paths import (
+from airground_drake.verify.model.refined_paths import (
     HALVINGS,
     PATHS,
     SEED,
@@ -59,7 +59,6 @@ class ZenoRefine(ModelClaim):
 
     id = "ZENO-REFINE"
     expected = "supported"
-    kept = True
     summary = "With ever finer noise a bare threshold triggers ever more often; the trigger in use does not."
     statement = (
         "As the step of the decision noise is refined, the number of events of the bare threshold grows without bound, "

@@ -22,7 +22,7 @@ from scipy.special import betainccinv, betaincinv, ndtri
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.finding import Finding
-from airground_drake.verify.model.threshold.first_passages import (
+from airground_drake.verify.model.first_passages import (
     PassageExperiment,
     Sample,
     experiments,
@@ -60,7 +60,7 @@ class ThrDdm(ModelClaim):
         "Monte Carlo with fixed seeds: six experiments, 36000 paths with the increments of the diagram's noise, "
         "barriers corrected for sampling. Supported if all simultaneous 99 % "
         "confidence intervals, widened by the bias that the correction leaves (2e-4 in the error rate, a twentieth of "
-        "the noise period in the time), contain the formulas. PyDDM's values, where it is installed, are evidence only."
+        "the noise period in the time), contain the formulas. Tests compare the formulas with PyDDM's values."
     )
     equations = "(15), (17)-(18) with the initial deviation divided by the drift"
     assumptions = (
@@ -74,7 +74,6 @@ class ThrDdm(ModelClaim):
         "period or leak. Statistics exclude deviations larger than the intervals, not smaller ones."
     )
     expected = "supported"
-    kept = True
 
     exercised_by = "simulated paths"
 
@@ -103,7 +102,6 @@ def compare(chosen: tuple[PassageExperiment, ...], formulas: Formulas) -> Findin
         "paths": paths,
         "comparisons": rows,
         "family_level": LEVEL,
-        "pyddm": {each.name: _pyddm(each) for each in chosen},
     }
     return Finding(
         "supported" if supported else "refuted",
@@ -152,26 +150,3 @@ def _rows(sample: Sample, formula: tuple[float, float], comparisons: int) -> lis
         }
         for quantity, unit, estimate, error, interval, value in found
     ]
-
-
-def _pyddm(experiment: PassageExperiment) -> dict[str, float] | str:
-    """PyDDM's mean time over all decisions, s, and error rate, computed in units of zeta and zeta^2/noise^2."""
-    try:
-        import pyddm
-    except ImportError:
-        return "not installed"
-    unit = (experiment.zeta / experiment.noise) ** 2
-    model = pyddm.gddm(
-        drift=experiment.drift * unit / experiment.zeta,
-        noise=1.0,
-        bound=1.0,
-        starting_position=experiment.deviation / experiment.zeta,
-        T_dur=20.0,
-        mixture_coef=0.0,
-    )
-    solution = model.solve()
-    density = solution.pdf("correct") + solution.pdf("error")
-    return {
-        "decision_time_s": float(density @ solution.t_domain) * float(model.dt) * unit,
-        "error_rate": float(solution.prob("error")),
-    }

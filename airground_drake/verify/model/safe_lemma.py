@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.verify.model.avoidance.kinds import constants, kinds_of
+from airground_drake.verify.model.pair_kinds import constants, kinds_of
 from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim
 
 

@@ -9,7 +9,7 @@ from airground_drake.decision.bayes import bayes_risk
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.engines.signs import Ends, Rule, ball, enclose, sign, value
 from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim, decimal
-from airground_drake.verify.model.threshold.thr_root import NUMBERS, ThrRoot, as_floats, rule_of, two_signs
+from airground_drake.verify.model.thr_root import NUMBERS, ThrRoot, as_floats, rule_of, two_signs
 
 
 class ThrOpt(TheoremClaim):

@@ -10,7 +10,7 @@ from fractions import Fraction
 from typing import Any
 
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.verify.model.avoidance.kinds import SHARES, constants, kinds_of
+from airground_drake.verify.model.pair_kinds import SHARES, constants, kinds_of
 from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim, decimal
 
 

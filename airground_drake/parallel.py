@@ -1,6 +1,7 @@
-"""Independent pieces of work, as many at a time as there are processors, each in a process forked from this one.
+"""Independent pieces of work in processes forked from this one, as many at a time as there are processors.
 
-A piece sees everything that there was before the first one began, and leaves nothing behind but what it returns.
+A piece sees everything that there was before the first one began, and leaves nothing behind but what it returns. A
+process does several pieces, one after the other: one for each piece would import and load anew what pieces share.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from concurrent.futures.process import BrokenProcessPool
 from typing import TypeVar
 
 from airground_drake.errors import AirgroundError
-from airground_drake.progress import SILENT, Watch
+from airground_drake.progress import SILENT, Progress
 
 T = TypeVar("T")
 
@@ -35,8 +36,12 @@ def processors() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def side_by_side(
-    pieces: Sequence[Callable[[], T]], jobs: int | None = None, *, names: Sequence[str] = (), watch: Watch = SILENT
+def run_parallel(
+    pieces: Sequence[Callable[[], T]],
+    jobs: int | None = None,
+    *,
+    names: Sequence[str] = (),
+    progress: Progress = SILENT,
 ) -> list[T]:
     """What each piece returns, in their order.
 
@@ -44,8 +49,8 @@ def side_by_side(
         pieces: what they return is pickled. The longest come first, or the last one is waited for.
         jobs: processes at a time; default: one for each processor. Where there is one, or one piece, or no fork, the
             pieces are done here, one after the other.
-        names: of the pieces, for whoever watches.
-        watch: is told of each piece that is done.
+        names: of the pieces, for `progress`.
+        progress: is told of each piece that is done.
 
     Raises:
         AirgroundError: if a process dies.
@@ -55,7 +60,7 @@ def side_by_side(
     called = names or [""] * len(pieces)
     most = min(len(pieces), processors() if jobs is None else jobs)
     if most <= 1 or not forks() or _pieces:
-        return [_done(_timed(piece), name, watch) for piece, name in zip(pieces, called, strict=True)]
+        return [_done(_timed(piece), name, progress) for piece, name in zip(pieces, called, strict=True)]
     _pieces = pieces
     try:
         with warnings.catch_warnings():
@@ -64,7 +69,7 @@ def side_by_side(
             with ProcessPoolExecutor(most, context, initializer=_begin) as pool:
                 futures = {pool.submit(_piece, index): index for index in range(len(pieces))}
                 for future in as_completed(futures):
-                    _done(future.result(), called[futures[future]], watch)
+                    _done(future.result(), called[futures[future]], progress)
                 return [future.result()[0] for future in futures]  # type: ignore[misc]
     except BrokenProcessPool as error:
         raise AirgroundError("a process that judged claims died") from error
@@ -72,8 +77,8 @@ def side_by_side(
         _pieces = ()
 
 
-def begun(work: Callable[[], T]) -> Callable[[], T]:
-    """Begin some work in a process of its own; what is returned waits for what comes of it, and is to be called once.
+def start_in_process(work: Callable[[], T]) -> Callable[[], T]:
+    """Start some work in a process of its own; what is returned waits for its result, and is to be called once.
 
     Where there is one processor, or no fork, the work is done when it is waited for.
 
@@ -95,7 +100,7 @@ def begun(work: Callable[[], T]) -> Callable[[], T]:
             found: T = receiver.recv()
         except EOFError:
             process.join()
-            raise AirgroundError(f"a process that was begun died (exit code {process.exitcode})") from None
+            raise AirgroundError(f"a process died before its work was done (exit code {process.exitcode})") from None
         process.join()
         return found
 
@@ -116,7 +121,7 @@ def _timed(piece: Callable[[], T]) -> tuple[T, float]:
     return piece(), time.perf_counter() - started
 
 
-def _done(found: tuple[T, float], name: str, watch: Watch) -> T:
-    watch.took(name, found[1])
-    watch.advance(1.0, name)
+def _done(found: tuple[T, float], name: str, progress: Progress) -> T:
+    progress.elapsed_s(name, found[1])
+    progress.advance(1.0, name)
     return found[0]

@@ -48,7 +48,6 @@ class Refinement:
         leak_1_s: leak.
         duration_s: of a path.
         dt_s: noise steps, coarsest first, each half the one before.
-        smooth: a sine about the threshold in place of the noise.
     """
 
     trigger: Trigger
@@ -57,7 +56,6 @@ class Refinement:
     leak_1_s: float
     duration_s: float
     dt_s: tuple[float, ...]
-    smooth: bool = False
 
 
 def experiment(inputs: dict[str, Any]) -> Refinement:
@@ -74,12 +72,9 @@ def experiment(inputs: dict[str, Any]) -> Refinement:
 
 
 def path(setting: Refinement, index: int) -> list[Array]:
-    """x - zeta at the grid points of every dt, m, for one path of unit intensity (or the sine)."""
+    """x - zeta at the grid points of every dt, m, for one path of unit intensity."""
     coarse = setting.dt_s[0]
     steps = [round(setting.duration_s / dt) for dt in setting.dt_s]
-    if setting.smooth:
-        phase = 2.0 * np.pi * (index + math.sqrt(0.5)) / PATHS
-        return [np.sin(2.0 * np.pi * np.linspace(0.0, 10.0, count + 1) + phase) for count in steps]
     rng = np.random.default_rng([SEED, index])
     start = math.sqrt(coarse) * rng.standard_normal()
     increments = math.sqrt(setting.dt_s[-1]) * rng.standard_normal(steps[-1])

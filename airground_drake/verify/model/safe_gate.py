@@ -7,8 +7,8 @@ from typing import Any
 
 from airground_drake.registry import METHODS
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.verify.model.avoidance.kinds import constants
-from airground_drake.verify.model.avoidance.safe_inv import SafeInv
+from airground_drake.verify.model.pair_kinds import constants
+from airground_drake.verify.model.safe_inv import SafeInv
 from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim
 
 

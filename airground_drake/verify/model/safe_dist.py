@@ -10,8 +10,8 @@ from fractions import Fraction
 from typing import Any
 
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.verify.model.avoidance.kinds import Kind, constants, kinds_of
-from airground_drake.verify.model.avoidance.safe_inv import stable
+from airground_drake.verify.model.pair_kinds import Kind, constants, kinds_of
+from airground_drake.verify.model.safe_inv import stable
 from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim, decimal
 
 
