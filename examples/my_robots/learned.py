@@ -1,8 +1,8 @@
 """A small learned policy: a net of two layers looks at the target and the nearest obstacles, and draws two corners.
 
-Training is a search over its 82 weights by the evolution strategy that `airground falsify` has. What is made least, on
+Training is a search over its 84 weights by the evolution strategy that `airground falsify` has. What is made least, on
 situations drawn at random, is the length of the way with a price on what lacks of the safe distance; nothing is
-simulated. From this folder's parent: `python -m my_robots.learned` (a minute), which writes learned.json.
+simulated. From this folder's parent: `python -m my_robots.learned` (two minutes), which writes learned.json.
 """
 
 from __future__ import annotations
