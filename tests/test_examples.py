@@ -104,12 +104,12 @@ def test_a_supervisor_of_priorities_gets_where_a_fixed_order_does_not() -> None:
 def test_a_learned_policy_is_trained_and_proposes_ways(monkeypatch: pytest.MonkeyPatch) -> None:
     """A few generations improve on the first; the weights that are there are better than those."""
     monkeypatch.syspath_prepend(EXAMPLES)
-    learned = importlib.import_module("my_robots.learned")
+    learned = importlib.import_module("learned_policy")
     _, history = learned.train(generations=12)
     assert min(history) < 0.8 * history[0]
     kept = np.array(json.loads(learned.WEIGHTS.read_text()))
     assert learned.price(kept, *learned.situations(np.random.default_rng(7), 500, 2.0), 2.0) < 0.8 * min(history)
-    scenario = load("minimal", {"intervention.policies": [{"name": "my_robots.learned:Learned",
+    scenario = load("minimal", {"intervention.policies": [{"name": "learned_policy:Learned",
                                                            "parameters": {"speed_m_s": 3.0}}]})[0]  # fmt: skip
     trace = simulate(scenario, "d")
     assert [event["t_s"] for event in trace.events if event["kind"] == "arrival" and event["robot"] == "ugv1"]

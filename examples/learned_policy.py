@@ -2,7 +2,7 @@
 
 Training is a search over its 84 weights by the evolution strategy that `airground falsify` has. What is made least, on
 situations drawn at random, is the length of the way with a price on what lacks of the safe distance; nothing is
-simulated. From this folder's parent: `python -m my_robots.learned` (two minutes), which writes learned.json.
+simulated. `python learned_policy.py` (two minutes of CPU time) writes learned_policy.json.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from airground_drake.campaign.search import CmaEs
 from airground_drake.intervention.policy import Observation, Policy
 from airground_drake.nsbc.motion import Motion
 
-WEIGHTS = Path(__file__).with_name("learned.json")
+WEIGHTS = Path(__file__).with_suffix(".json")
 SEEN, HIDDEN, DRAWN = 3, 7, 4
 """Obstacles that the net sees, its units, and the numbers that it gives: two corners of two coordinates."""
 SHAPES = ((2 * SEEN + 1, HIDDEN), (HIDDEN,), (HIDDEN, DRAWN))
