@@ -23,7 +23,7 @@ from typing import Any
 
 from airground_drake import files, interruption, trace
 from airground_drake.errors import AirgroundError, PluginError, ScenarioError, SimulationError, described, one_line
-from airground_drake.intervention.process import end_all
+from airground_drake.intervention.guest.process import end_all
 from airground_drake.nsbc import kernels
 from airground_drake.parallel import forks, processors
 from airground_drake.progress import SILENT, Progress

@@ -19,7 +19,7 @@ from airground_drake.scenarios.load import load
 
 PACKAGE = Path(airground_drake.__file__).parent
 LAYERS = (
-    ("arrays", "confinement", "errors", "files", "interruption", "parallel", "progress", "usage", "check"),
+    ("arrays", "errors", "files", "interruption", "parallel", "progress", "usage", "check"),
     ("registry", "statuses"),
     ("nsbc",),
     ("decision", "intervention"),

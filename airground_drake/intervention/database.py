@@ -10,9 +10,9 @@ from typing import Literal, get_args
 import numpy as np
 
 from airground_drake.errors import PolicyError, described
-from airground_drake.intervention.guard import OutOfTime, time_limit
+from airground_drake.intervention.guest.process import GuestPolicy
+from airground_drake.intervention.guest.time_limit import OutOfTime, time_limit
 from airground_drake.intervention.policy import Observation, Policy, Proposal, Teammate, motions_of
-from airground_drake.intervention.process import GuestPolicy
 from airground_drake.nsbc.motion import Motion
 from airground_drake.registry import POLICIES
 

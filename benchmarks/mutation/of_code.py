@@ -603,7 +603,7 @@ INTERVENTION = (
     ),
     Mutant(
         "no time limit for policies",
-        "intervention/guard.py",
+        "intervention/guest/time_limit.py",
         "signal.setitimer(signal.ITIMER_REAL, min(seconds, outer or _LONGEST_S, _LONGEST_S))",
         "signal.setitimer(signal.ITIMER_REAL, 0.0)",
         tests=PLANNER,

@@ -1,4 +1,4 @@
-"""A time limit for code in this process; `process.py` has policies in processes of their own."""
+"""A time limit for code in this process."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from contextlib import contextmanager
 from types import FrameType
 
 _LONGEST_S = 1e9
-"""Thirty years: a timer takes no more than three hundred."""
+"""Thirty years; the system's timer takes at most three hundred."""
 _AT_ONCE_S = 1e-6
-"""The least that a timer is set to; 0 would turn it off."""
+"""Shortest time that a timer is set to, s; 0 would turn it off."""
 
 
 class OutOfTime(BaseException):
@@ -23,9 +23,9 @@ class OutOfTime(BaseException):
 def time_limit(seconds: float, error: type[BaseException] = OutOfTime) -> Iterator[None]:
     """Raise an error in the body after so many seconds of wall-clock time.
 
-    By an interval timer: it works in the main thread of a process, on systems that have such timers (a body
-    that never returns to the Python interpreter is interrupted only when it does). Elsewhere there is no limit.
-    A limit within another is cut to what that leaves, which then raises its own error as soon as the inner has ended.
+    This needs the main thread and a system with interval timers; elsewhere there is no limit. Code that does not return
+    to the Python interpreter is interrupted only when it does. Limits can be nested: an inner limit is no longer than
+    the rest of the outer one, which raises its own error as soon as the inner has ended.
     """
     if threading.current_thread() is not threading.main_thread() or not hasattr(signal, "setitimer"):
         yield

@@ -1,8 +1,8 @@
-"""What a child process gives up before it runs code of others, as far as the system has it.
+"""Limits that a process sets itself before it runs third-party code, as far as the system supports them.
 
-Memory and core files are limited by `resource` (POSIX; macOS does not enforce the limit of the address space). By
-Landlock (Linux 6.12 and later) the process can neither send a signal to a process that it has not started, nor look
-into its memory, nor gain privileges. Nothing here keeps it from files or the network.
+`resource` limits memory and core files (POSIX; macOS does not enforce the limit of the address space). With Landlock
+(Linux 6.12 and later) the process cannot send a signal to a process that it has not started, look into the memory of
+such a process, or gain privileges. Nothing here keeps it from files or the network.
 """
 
 from __future__ import annotations
@@ -13,6 +13,8 @@ import os
 import struct
 import sys
 
+from airground_drake import interruption
+
 PR_SET_NO_NEW_PRIVS = 38
 LANDLOCK_CREATE_RULESET, LANDLOCK_RESTRICT_SELF = 444, 446
 LANDLOCK_SCOPES = 0b11
@@ -21,8 +23,20 @@ RULESET = struct.pack("=QQQ", 0, 0, LANDLOCK_SCOPES)
 """`struct landlock_ruleset_attr`: no file and no port is restricted, the scopes are."""
 
 
+def confine(alive: int, memory: int) -> None:
+    """Set all limits; to be called before any import that may start a thread.
+
+    Args:
+        alive: descriptor of a pipe's reading end; this process is killed when the pipe has no writer any more.
+        memory: limit of the address space, bytes.
+    """
+    interruption.end_with_pipe(alive)
+    limit_memory(memory)
+    restrict_signals()
+
+
 def limit_memory(bytes_: int) -> None:
-    """Let allocations beyond so many bytes of address space fail (MemoryError), and write no core files."""
+    """Limit the address space, so that larger allocations fail (MemoryError), and write no core files."""
     try:
         import resource
     except ImportError:
@@ -35,10 +49,10 @@ def limit_memory(bytes_: int) -> None:
 
 
 def restrict_signals() -> bool:
-    """Give up signals to, and the memory of, processes that this one has not started, for good.
+    """Give up, for good, signals to processes that this one has not started, and access to their memory.
 
     Returns:
-        Whether the kernel has it (Landlock, ABI 6).
+        Whether the kernel supports it (Landlock, ABI 6).
     """
     if sys.platform != "linux":
         return False

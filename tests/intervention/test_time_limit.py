@@ -8,7 +8,7 @@ from contextlib import suppress
 
 import pytest
 
-from airground_drake.intervention.guard import OutOfTime, time_limit
+from airground_drake.intervention.guest.time_limit import OutOfTime, time_limit
 
 
 def _forever() -> None:
