@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -32,8 +32,9 @@ from airground_drake.nsbc.motion import Motion
 from airground_drake.nsbc.team import Team
 from airground_drake.scenarios.load import own, resolved, validated
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.systems.decision import FIELDS, DecisionVariable
+from airground_drake.systems.decision import DecisionVariable
 from airground_drake.systems.lifetime import untie
+from airground_drake.systems.signals import FIELDS, Status
 from airground_drake.trace import (
     DECISION_COLUMNS,
     PROBLEM_ARRAYS,
@@ -42,6 +43,9 @@ from airground_drake.trace import (
     SCHEMA,
     Trace,
 )
+
+if TYPE_CHECKING:
+    from pydrake.geometry import Meshcat
 
 EVENT_ACCURACY = 1e-6
 """Accuracy of the Context: witness functions are isolated to it (relative to the time scale of 1 s)."""
@@ -58,9 +62,13 @@ class Recorder:
         scenario: Scenario,
         name: str,
         decision_block: DecisionFactory = DecisionVariable,
+        meshcat: Meshcat | None = None,
+        *,
         make_gatekeepers: GatekeepersFactory = make_gatekeepers,
     ) -> None:
-        """Build the model of a run of the scenario and its loggers; the rest as in `build_model`.
+        """Build the model of a run of the scenario and its loggers; `decision_block` and `meshcat` as in `simulate`.
+
+        `make_gatekeepers` is that of `build_model`.
 
         Raises:
             ScenarioError: if the scenario is not valid.
@@ -79,6 +87,7 @@ class Recorder:
             self._run.method,
             composition,
             decision_block=decision_block,
+            disturbed=False,
             make_gatekeepers=make_gatekeepers,
         )
         builder = DiagramBuilder()
@@ -88,13 +97,23 @@ class Recorder:
         for i, port in enumerate(ports):
             builder.Connect(port, together.get_input_port(i))
         self._log = LogVectorOutput(together.get_output_port(), builder)  # one for all: a log costs a step 10 us
+        if meshcat is not None:
+            from airground_drake.view.live_view import LiveView  # half a second of imports
+
+            view = builder.AddNamedSystem("live_view", LiveView(meshcat, self._scenario))
+            for port in (view.get_input_port(i) for i in range(view.num_input_ports())):
+                builder.Connect(self._model.diagram.GetOutputPort(port.get_name()), port)
         self._root = builder.Build()
         self._root.set_name("recorded")
         untie(self._root)
         warm_up()
 
     def simulate(
-        self, seed: int | None = None, duration: float | None = None, watch: Callable[[float], None] | None = None
+        self,
+        seed: int | None = None,
+        duration: float | None = None,
+        watch: Callable[[float], None] | None = None,
+        speed: float = 0.0,
     ) -> Trace:
         """One run from the initial state.
 
@@ -102,6 +121,7 @@ class Recorder:
             seed: of the decision noise; default: the scenario's.
             duration: s; default: the scenario's.
             watch: is told the time, s, at every step.
+            speed: simulated seconds per second at most; 0: as fast as it goes.
 
         Raises:
             SimulationError: if Drake or a system stops; names the run and the time.
@@ -114,6 +134,7 @@ class Recorder:
         period = self._scenario.control.period_s
         config = SimulatorConfig(integration_scheme="explicit_euler", max_step_size=period, use_error_control=False)
         ApplySimulatorConfig(config, simulator)  # velocities are held between samples: Euler's method is exact
+        simulator.set_target_realtime_rate(speed)
         if self._model.gatekeeper is not None:
             self._model.gatekeeper.reset_timing()
         if watch is not None:
@@ -152,10 +173,9 @@ class Recorder:
             "seed": seed,
             "robots": list(robots),
             "ugvs": list(ugvs),
-            "zeta_m": model.zeta,
             "scenario": resolved(self._scenario),
             "events": [],
-            "controllers": _controllers(model),
+            **read_back(model, context),
             "decision_block": _decision_block(model),
             "faults": [{"t_s": f.t, "robot": f.robot, "policy": f.policy, "what": f.what} for f in memory.faults],
         }
@@ -167,17 +187,17 @@ class Recorder:
         return trace
 
 
-def _controllers(model: Model) -> dict[str, Any]:
-    """What the controllers in the diagram were built with, by name: see `controllers.read_back`."""
-    ugvs, uav = (model.diagram.GetSubsystemByName(name) for name in ("ugvs", "uav"))
-    systems = (ugvs.GetSubsystemByName("ugv_controller"), uav.GetSubsystemByName("uav_controller"))
-    return {system.get_name(): system.parameters() for system in systems}
+def read_back(model: Model, root: Context) -> dict[str, Any]:
+    """What runs in a Context, for `Trace.meta`: `zeta_m`, and `controllers` by name (see `controllers.read_back`)."""
+    levels = model.trigger.levels(model.trigger.GetMyContextFromRoot(root))
+    ran = {each.get_name(): each.parameters(each.GetMyContextFromRoot(root)) for each in model.controllers}
+    return {"zeta_m": float(levels.zeta_m), "controllers": ran}
 
 
 def _decision_block(model: Model) -> str:
     """Name of the class that computes the decision variables in the diagram; "" for that of (15)."""
-    block = model.diagram.GetSubsystemByName("decision").GetSubsystemByName("decision_variable")
-    return "" if type(block) is DecisionVariable else type(block).__qualname__
+    kind = type(model.decision_block)
+    return "" if kind is DecisionVariable else kind.__qualname__
 
 
 def _decision(decision: Decision, robot: str, route: str) -> dict[str, Any]:
@@ -285,6 +305,8 @@ def simulate(
     seed: int | None = None,
     watch: Callable[[float], None] | None = None,
     decision_block: DecisionFactory = DecisionVariable,
+    meshcat: Meshcat | None = None,
+    speed: float = 0.0,
 ) -> Trace:
     """Simulate one run of a scenario.
 
@@ -294,6 +316,8 @@ def simulate(
         seed: of the decision noise, in place of the scenario's.
         watch: is told the time, s, at every step.
         decision_block: makes the block that drives the trigger; see `build_diagram`.
+        meshcat: shows the robots while they move; the run is the same with it and without.
+        speed: simulated seconds per second at most, for those who watch; 0: as fast as it goes.
 
     Raises:
         ScenarioError: if the scenario, or the seed, is not valid.
@@ -303,7 +327,7 @@ def simulate(
     """
     if seed is not None:
         scenario = validated(scenario, {"seed": seed})
-    return Recorder(scenario, run, decision_block).simulate(watch=watch)
+    return Recorder(scenario, run, decision_block, meshcat).simulate(watch=watch, speed=speed)
 
 
 def _distinct(t: Array, command: Array) -> npt.NDArray[np.intp]:
@@ -330,7 +354,7 @@ def _signals(t: Array, data: dict[str, Array], ugvs: tuple[str, ...], robots: tu
             columns[f"{ugv}.ref_{axis}_m"] = data["reference"][3 * i + a]
         columns[f"{ugv}.noise_m"] = data["noise"][i]
         columns[f"{ugv}.decision_variable_m"] = data["decision_variable"][i]
-        for k, name in enumerate(("mode", "triggers", "triggered_at_s", "released_at_s")):
+        for k, name in enumerate(Status.get_fields()):
             columns[f"{ugv}.{name}"] = data["status"][FIELDS * i + k]
         columns[f"{ugv}.accepted"] = data["accepted"][i]
     return pd.DataFrame(columns)

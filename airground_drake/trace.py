@@ -29,6 +29,7 @@ import io
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from html import escape
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -110,7 +111,7 @@ def no_proposals() -> pd.DataFrame:
     return pd.DataFrame(columns=list(PROPOSAL_COLUMNS))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Trace:
     """One run.
 
@@ -215,6 +216,24 @@ class Trace:
     def reference(self, ugv: str) -> Array:
         """Preset trajectory, (T, 3), m."""
         return self.vector(ugv, "ref_")
+
+    def to_pandas(self) -> pd.DataFrame:
+        """The signals as a new table: a row per time, the index `t_s`; columns by robot, then by signal."""
+        table = self.signals.set_index("t_s")
+        parts = [tuple(str(name).split(".", 1)) for name in table]
+        table.columns = pd.MultiIndex.from_tuples(parts, names=["robot", "signal"])
+        return table
+
+    def __repr__(self) -> str:
+        """In one line: which run of which scenario, how many rows and events."""
+        scenario, events = self.meta.get("scenario", {}).get("name"), self.meta.get("events", [])
+        return f"<Trace: run {self.meta.get('run')!r} of {scenario!r}, {len(self.signals)} rows, {len(events)} events>"
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the line of `repr` and a table of the events."""
+        rows = [(f"{event['t_s']:.3f}", event["robot"], event["kind"]) for event in self.events]
+        table = pd.DataFrame(rows, columns=["time, s", "robot", "event"]).to_html(index=False, border=0)
+        return f"<p>{escape(repr(self))}</p>{table}"
 
 
 def _with(resolved: dict[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:

@@ -87,11 +87,9 @@ class LyingPlanner(Planner):
     tactic: Tactic
     random: np.random.Generator
 
-    def watch(self, memory: PlannerMemory, t: float, positions: Array) -> PlannerMemory:
-        """Speak whether anybody is intervened on or not."""
-        spoken = super().watch(memory, t, positions)
-        silent = not any(spoken.proposals)
-        return self._speak(spoken, t, positions, np.zeros(2 * len(self.ugvs))) if silent else spoken
+    def idle(self, memory: PlannerMemory, intervening: Sequence[bool]) -> bool:
+        """Speaks whether anybody is intervened on or not."""
+        return False
 
     def plan(
         self,
@@ -101,8 +99,9 @@ class LyingPlanner(Planner):
         intervening: Sequence[bool],
         answers: Array,
         reports: Reports,
+        standing: Sequence[bool] = (),
     ) -> PlannerMemory:
-        """Speak again."""
+        """Speak, whoever stands or has said what."""
         return self._speak(memory, t, positions, answers)
 
     def _speak(self, memory: PlannerMemory, t: float, positions: Array, answers: Array) -> PlannerMemory:

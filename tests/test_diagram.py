@@ -27,11 +27,11 @@ LAYERS = (
     ("scenarios",),
     ("systems",),
     ("components", "trace"),
-    ("diagram", "events", "proofs"),
-    ("simulation", "blocks", "graphviz", "verify"),
+    ("diagram", "events", "proofs", "view"),
+    ("simulation", "blocks", "schematic", "graphviz", "verify"),
     ("runs", "testing"),
     ("report", "replay"),
-    ("campaign",),
+    ("campaign", "export"),
     ("commands", "__main__"),
 )
 """From left to right: a module imports from its own layer or from those before it."""
@@ -41,10 +41,10 @@ def test_every_system_and_port_has_a_name() -> None:
     diagram = build_diagram(load("case_a")[0], "d")
     inside = {part.get_name(): [system.get_name() for system in part.GetSystems()] for part in diagram.GetSystems()}
     assert inside == {
-        "decision": ["noise_source", "decision_noise", "decision_variable", "event_trigger"],
-        "uav": ["intervention_planner", "uav_controller"],
-        "ugvs": ["reference", "gatekeeper", "ugv_controller"],
-        "world": [
+        "decision_making": ["noise_source", "decision_noise", "decision_variable", "event_trigger"],
+        "task_planning": ["reference", "intervention_planner", "ugv_controller", "uav_controller"],
+        "optimisation": ["gatekeeper"],
+        "vehicles": [
             "team_command", "velocity_disturbance", "team_velocity", "ugv1_plant", "ugv2_plant", "uav_plant",
             "team_position",
         ],

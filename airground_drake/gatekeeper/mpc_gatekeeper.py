@@ -14,7 +14,6 @@ import numpy.typing as npt
 from airground_drake.arrays import Array
 from airground_drake.gatekeeper.answer import Decision, Planned, Rules, costs_throughout, in_words, settle
 from airground_drake.gatekeeper.budget import Budget
-from airground_drake.gatekeeper.history import History
 from airground_drake.gatekeeper.patience import Turn
 from airground_drake.gatekeeper.prediction import Horizon, Scene, predicted_problem
 from airground_drake.gatekeeper.routes.route import Route
@@ -50,7 +49,7 @@ class Memory:
         answers: in force, (2n,), see `messages`.
         since: when each UGV's answer became what it is, (n,), s.
         reports: what came with them.
-        decisions: every one so far.
+        decisions: those of the last sample at which anything was to be judged or remembered.
         turns: under method (d), each UGV's patience.
         commitments: under method (d), what each UGV watches while it executes a proposal.
         sensed: under method (d), which obstacles each UGV has sensed so far, (n, m).
@@ -59,7 +58,7 @@ class Memory:
     answers: tuple[float, ...]
     since: tuple[float, ...]
     reports: Reports
-    decisions: History[Decision] = field(default_factory=History)
+    decisions: tuple[Decision, ...] = ()
     turns: tuple[Turn, ...] = ()
     commitments: tuple[Commitment | None, ...] = ()
     sensed: npt.NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 0), dtype=bool))
@@ -203,7 +202,7 @@ class PaperGatekeepers(Gatekeepers):
             reports.append(self._report(positions[i], decision))
         return replace(
             memory, answers=tuple(answers), since=tuple(since), reports=tuple(reports),
-            decisions=memory.decisions.extended(decisions),
+            decisions=tuple(decisions),
         )  # fmt: skip
 
     def _decide(self, seen: Situation, i: int, proposal: Proposal, budgets: Iterator[Budget]) -> Decision:
@@ -224,7 +223,7 @@ class PaperGatekeepers(Gatekeepers):
 
         It ends earlier by a sampling period; its last choice stands for the rest.
         """
-        for decision in reversed(seen.before.decisions[-len(self._team.ugvs) :]):
+        for decision in reversed(seen.before.decisions):
             grounds = decision.grounds
             if decision.robot == i and decision.proposal is proposal and isinstance(grounds, Planned):
                 plan = grounds.solution.plan

@@ -85,7 +85,7 @@ class OutcomeGatekeepers(Gatekeepers):
             reports.append(self._report(positions[i], decision))
         return replace(
             memory, answers=tuple(answers), reports=tuple(reports),
-            decisions=memory.decisions.extended(decisions), turns=tuple(turns),
+            decisions=tuple(decisions), turns=tuple(turns),
             commitments=tuple(commitments), sensed=sensed,
         )  # fmt: skip
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Self
@@ -11,31 +10,12 @@ import numpy as np
 
 from airground_drake.arrays import Array
 from airground_drake.intervention.database import BehaviourDatabase, Desk, Fault
-from airground_drake.intervention.messages import ACCEPT, REFUSE, Disc, Point, Proposals, Reports, answer_to
+from airground_drake.intervention.messages import ACCEPT, REFUSE, Disc, Proposals, Reports, answer_to
 from airground_drake.intervention.policy import Answered, Observation, Proposal, Teammate
 from airground_drake.nsbc.motion import Motion
 
 OVER = "over"
 """Why a UGV gives back what it has executed to its end, which is no refusal."""
-STANDS_S = 1.0
-"""A UGV stands once it has kept to one place for this long, s."""
-STANDS_M = 0.1
-"""One place: no farther than this from where it came to a halt, m; for slow UGVs it is less."""
-STANDS_SHARE = 0.1
-"""Of what a UGV can do in `STANDS_S`: one place is no larger than this."""
-
-
-@dataclass(frozen=True)
-class Halt:
-    """Where a UGV has been since when.
-
-    Attributes:
-        place: m, world frame.
-        since: s.
-    """
-
-    place: Point
-    since: float
 
 
 @dataclass(frozen=True)
@@ -47,14 +27,12 @@ class PlannerMemory:
         learnt: obstacles that came with refusals and were not on the map.
         sent: (UGV, proposal), in order.
         faults: of policies, in order.
-        halts: of the UGVs, one each; none before the first planning instant.
     """
 
     desks: tuple[Desk, ...]
     learnt: tuple[Disc, ...] = ()
     sent: tuple[tuple[int, Proposal], ...] = ()
     faults: tuple[Fault, ...] = ()
-    halts: tuple[Halt, ...] = ()
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
         """Immutable: the copy is the object itself."""
@@ -131,28 +109,9 @@ class Planner:
         """What is remembered at the beginning: nothing."""
         return PlannerMemory((Desk(),) * len(self.ugvs))
 
-    def watch(self, memory: PlannerMemory, t: float, positions: Array) -> PlannerMemory:
-        """Notice which UGVs have moved; to be called at every planning instant.
-
-        Args:
-            memory: before.
-            t: time, s.
-            positions: of all robots, (n + 1, 3), m, world frame.
-
-        Returns:
-            The new memory; the same object if none has left its place.
-        """
-        places: list[Point] = [(x, y, z) for x, y, z in positions[: len(self.ugvs)].tolist()]
-        if not memory.halts:
-            return replace(memory, halts=tuple(Halt(place, t) for place in places))
-        moved = [
-            math.dist(halt.place, place) > min(STANDS_M, STANDS_SHARE * STANDS_S * speed)
-            for halt, place, speed in zip(memory.halts, places, self.max_speed.tolist(), strict=True)
-        ]
-        if not any(moved):
-            return memory
-        halts = [Halt(places[i], t) if moved[i] else halt for i, halt in enumerate(memory.halts)]
-        return replace(memory, halts=tuple(halts))
+    def idle(self, memory: PlannerMemory, intervening: Sequence[bool]) -> bool:
+        """Whether a planning instant changes nothing: nobody is intervened on, and nothing is in force."""
+        return not any(intervening) and not any(memory.proposals)
 
     def plan(
         self,
@@ -162,16 +121,18 @@ class Planner:
         intervening: Sequence[bool],
         answers: Array,
         reports: Reports,
+        standing: Sequence[bool] = (),
     ) -> PlannerMemory:
         """One planning period.
 
         Args:
-            memory: before, and watching up to now.
+            memory: before.
             t: time, s.
             positions: of all robots, (n + 1, 3), m, world frame.
             intervening: per UGV, whether the trigger has it in mode INTERVENING.
             answers: of the UGVs, (2n,), see `messages`.
             reports: what they sensed, see `messages`.
+            standing: per UGV, whether it stands, see `halts`; default: none does.
         """
         no = [answer_to(desk.proposal, answers, i) == REFUSE for i, desk in enumerate(memory.desks)]
         reported = {disc for i, report in enumerate(reports) if no[i] for disc in report.sensed}
@@ -200,7 +161,7 @@ class Planner:
                 others=np.delete(positions, i, axis=0),
                 safe_distance=self.safe_distance,
                 refusals=desks[i].refusals,
-                team=self._team(t, positions, intervening, answers, desks, memory.halts),
+                team=self._team(t, positions, intervening, answers, desks, standing),
                 robot_distance=self.robot_distance,
                 radius=float(self.radii[i]),
                 obstacle_radii=discs[:, 3],
@@ -247,7 +208,7 @@ class Planner:
         intervening: Sequence[bool],
         answers: Array,
         desks: Sequence[Desk],
-        halts: Sequence[Halt],
+        standing: Sequence[bool],
     ) -> tuple[Teammate, ...]:
         """Every UGV as it is now."""
         return tuple(
@@ -258,7 +219,7 @@ class Planner:
                 preset=self.presets[i],
                 max_speed=float(self.max_speed[i]),
                 triggered=bool(intervening[i]),
-                standing=t - halts[i].since >= STANDS_S if halts else False,
+                standing=standing[i] if standing else False,
                 proposal=desks[i].proposal,
                 answered=_answered(desks[i].proposal, answers, i),
                 refusals=desks[i].refusals,

@@ -29,7 +29,7 @@ class Teammate:
         preset: its preset trajectory.
         max_speed: m/s.
         triggered: whether its trigger has it in mode INTERVENING.
-        standing: whether it has stood where it is for a while (`planner.STANDS_S`).
+        standing: whether it has stood where it is for a while (`halts.STANDS_S`).
         proposal: the one in force, or None.
         answered: what the UGV says to it.
         refusals: proposals that it has refused since its trigger, or since that of the UGV that it was asked for.

@@ -6,9 +6,11 @@ a constant Jacobian allows; tests hold those against the tasks as stated here.
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
-from airground_drake.arrays import Array
+from airground_drake.arrays import Array, read_only
 from airground_drake.nsbc.task import Task
 
 
@@ -82,8 +84,14 @@ class FormationTask(PositionTask):
 
     def __init__(self, ugv_positions: Array, ugv_velocities: Array, altitude: float, gain: float) -> None:
         """Fly `altitude` m over the centroid of UGVs at (n, 3) m moving at (n, 3) m/s."""
-        share = np.full((1, len(ugv_positions)), 1.0 / len(ugv_positions))
+        share = _share(len(ugv_positions))
         super().__init__(share @ ugv_positions + np.array([0.0, 0.0, altitude]), share @ ugv_velocities, gain)
+
+
+@cache
+def _share(count: int) -> Array:
+    """What each of `count` robots has in their centroid, (1, count)."""
+    return read_only(np.full((1, count), 1.0 / count))
 
 
 class InterventionTask(Task):

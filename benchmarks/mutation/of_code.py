@@ -70,8 +70,8 @@ TEAM = (
     Mutant(
         "plants driven by positions",
         "diagram.py",
-        'builder.Connect(team_command.get_output_port(), disturbance.GetInputPort("command"))',
-        'builder.Connect(team_position.get_output_port(), disturbance.GetInputPort("command"))',
+        "builder.Connect(commanded, velocities.get_input_port())",
+        "builder.Connect(team_position.get_output_port(), velocities.get_input_port())",
     ),
     Mutant(
         "sensing range cut",
@@ -332,14 +332,14 @@ LAW = (
     Mutant(
         "the UAV's commands not filtered",
         "systems/controllers.py",
-        "velocity: Array = self.avoidance.apply(lower, spaces)[0]",
+        "velocity: Array = avoidance.apply(lower, spaces)[0]",
         "velocity: Array = lower[0]",
     ),
     Mutant(
         "the UAV without a speed limit",
         "systems/controllers.py",
-        "lower = limit_speed(_velocity_of(task, read_only(positions[-1:])), self._max_speed)",
-        "lower = _velocity_of(task, read_only(positions[-1:]))",
+        "lower = limit_speed(self._asked(positions, ugv_commands, gain), self._max_speed)",
+        "lower = self._asked(positions, ugv_commands, gain)",
     ),
     Mutant(
         "UGVs sampled at half the rate",
@@ -362,14 +362,14 @@ LAW = (
     Mutant(
         "executed whatever the answer, the answer recorded",
         "systems/controllers.py",
-        "velocity = self.velocity(context.get_time(), positions, reference, rate, proposals)",
-        "velocity = self.velocity(context.get_time(), positions, reference, rate, self._proposals.Eval(context))",
+        "velocity = self.velocity(context.get_time(), positions, reference, rate, proposals, law)",
+        "velocity = self.velocity(context.get_time(), positions, reference, rate, self._proposals.Eval(context), law)",
     ),
     Mutant(
         "executed as nothing was accepted, the answer recorded",
         "systems/controllers.py",
-        "velocity = self.velocity(context.get_time(), positions, reference, rate, proposals)",
-        "velocity = self.velocity(context.get_time(), positions, reference, rate, [None] * len(proposals))",
+        "velocity = self.velocity(context.get_time(), positions, reference, rate, proposals, law)",
+        "velocity = self.velocity(context.get_time(), positions, reference, rate, [None] * len(proposals), law)",
         runs=("crowd b", "crowd d"),
     ),
     Mutant(
@@ -422,7 +422,7 @@ DECISION = (
     Mutant(
         "what is above the threshold at the start triggers after the first tick",
         "systems/decision.py",
-        "discrete.set_value(0, _pack([self._trigger.start(t, each) for each in x.tolist()]))",
+        "discrete.set_value(0, _pack([trigger.start(t, each) for each in x.tolist()]))",
         "pass",
         tests=TRIGGER,
     ),
@@ -450,15 +450,15 @@ DECISION = (
     Mutant(
         "extremes at the ends of steps only",
         "systems/decision.py",
-        "return extremes(before, after, np.array([self.value(begin, before), self.value(end, after)]))",
-        "return super().extremes(begin, before, end, after)",
+        "return spans(begun, now)",
+        "return np.sort(np.stack([begun[5::5], now[5::5]]), axis=0)",
         tests=(*ISOLATION, *TRIGGER),
     ),
     Mutant(
         "corners of presets are not looked at",
         "systems/decision.py",
-        "self._corner_times[first] < end:",
-        "self._corner_times[first] < begin:",
+        "self._corner_times[first] < now[0]:",
+        "self._corner_times[first] < begun[0]:",
         tests=(*ISOLATION, *TRIGGER),
     ),
     Mutant(
@@ -470,9 +470,9 @@ DECISION = (
     ),
     Mutant(
         "noise is no part of the decision variable",
-        "systems/decision.py",
-        "math.hypot(x, y, z) + n for",
-        "math.hypot(x, y, z) for",
+        "decision/excursion.py",
+        "signals[3 + 5 * j]) + noise[j]",
+        "signals[3 + 5 * j])",
         tests=TRIGGER,
     ),
     Mutant(
@@ -488,6 +488,7 @@ DECISION = (
         "B=intensity / np.sqrt(period) * eye",
         "B=1.05 * intensity / np.sqrt(period) * eye",
         proofs=("THR-DDM",),
+        tests=("tests/systems/test_noise.py",),
     ),
     Mutant(
         "the noise is exponential",
@@ -509,6 +510,7 @@ DECISION = (
         "integrated_noise(count, given.noise_m_sqrt_s,",
         "integrated_noise(count, 2.0 * given.noise_m_sqrt_s,",
         proofs=("THR-DDM",),
+        tests=("tests/systems/test_noise.py",),
     ),
     Mutant("the noise grows in place of leaking", "components.py", "A=-leak * eye", "A=leak * eye"),
     Mutant(
@@ -758,15 +760,15 @@ GATEKEEPER = (
     Mutant(
         "(b) accepts nothing",
         "systems/gatekeeper.py",
-        "else (ACCEPT, p.number) for p in",
-        "else (SILENT, p.number) for p in",
+        "else [ACCEPT, p.number] for p in",
+        "else [SILENT, p.number] for p in",
         runs=("crowd b",),
     ),
     Mutant(
         "(b) refuses everything",
         "systems/gatekeeper.py",
-        "else (ACCEPT, p.number) for p in",
-        "else (-ACCEPT, p.number) for p in",
+        "else [ACCEPT, p.number] for p in",
+        "else [-ACCEPT, p.number] for p in",
         runs=("crowd b",),
     ),
     Mutant(
@@ -811,8 +813,8 @@ MIX_UPS = (
     Mutant(
         "motions are followed a sample late",
         "systems/controllers.py",
-        "velocity = self.velocity(context.get_time(), positions, reference, rate, proposals)",
-        "velocity = self.velocity(context.get_time() - 0.05, positions, reference, rate, proposals)",
+        "velocity = self.velocity(context.get_time(), positions, reference, rate, proposals, law)",
+        "velocity = self.velocity(context.get_time() - 0.05, positions, reference, rate, proposals, law)",
     ),
     Mutant(
         "neighbours are sensed a sample late",

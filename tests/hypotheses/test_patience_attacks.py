@@ -67,6 +67,7 @@ def _attack(name: str, patience: Patience, period: float) -> dict[str, Any]:
     memory, proposal, place = Memory.empty(2), None, np.zeros(3)
     accepted, executed, worst, began, longest, tries, unexpected = False, 0.0, 0.0, 0.0, 0.0, 0, 0
     left, alone = patience.most, 0.0
+    reasons: set[str] = set()
     for k in range(min(MOST_SAMPLES, int(1.2 * patience.most * (patience.longest + patience.rest) / period))):
         t, before, asked = k * period, accepted, proposal
         proposal = _next(name, proposal, memory, t, rng, patience)
@@ -80,6 +81,7 @@ def _attack(name: str, patience: Patience, period: float) -> dict[str, Any]:
         positions = np.stack([place] * 3)
         if not gatekeepers.idle((proposal, None), positions, memory):
             memory = gatekeepers.sample(t, (proposal, None), positions, np.zeros((3, 3)), memory)
+            reasons |= {decision.reason for decision in memory.decisions}
         accepted = answer_to(proposal, memory.answers, 0) == ACCEPT
         if before and not (accepted and proposal is asked):
             alone, longest = t, max(longest, t - began)
@@ -90,10 +92,9 @@ def _attack(name: str, patience: Patience, period: float) -> dict[str, Any]:
         unexpected += accepted != (left > 0 and name not in FORGED)
         if accepted:
             began, tries, left = t, tries + 1, left - 1
-    reasons = sorted({decision.reason for decision in memory.decisions})
     return {
-        "attack": name, "tries": tries, "longest_between_rests_s": worst, "longest_try_s": longest, "reasons": reasons,
-        "unexpected": unexpected,
+        "attack": name, "tries": tries, "longest_between_rests_s": worst, "longest_try_s": longest,
+        "reasons": sorted(reasons),        "unexpected": unexpected,
     }  # fmt: skip
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from airground_drake.gatekeeper.answer import Foreseen
+from airground_drake.gatekeeper.answer import Decision, Foreseen
 from airground_drake.gatekeeper.mpc_gatekeeper import Memory, Situation
 from airground_drake.gatekeeper.outcome import Outcome, Outlook
 from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
@@ -138,18 +138,20 @@ def test_a_direction_that_is_left_to_the_own_task_may_cost_the_room(selection: l
     motion = Motion(np.array([0.0, 20.0]), np.array([[0.0, 0.0, 0.0], [10.0, 0.0, 0.0]]))
     proposal = Proposal("way", 0.0, motion, selection=np.array(selection))
     memory, place, push = Memory.empty(1), np.zeros(3), np.array([0.0, 0.99 * patience.lag, 0.0])
+    decisions: list[Decision] = []
     for k in range(round(motion.end / h) + 1):
         positions = np.stack([place, FAR])
         if k % 2 == 0:
             memory = gatekeepers.sample(k * h, (proposal,), positions, np.zeros((2, 3)), memory)
+            decisions += memory.decisions
         accepted = [proposal if memory.answers[0] == ACCEPT else None]
         velocity = controller.velocity(k * h, positions, at, at, accepted)[0]
         place = place + h * (velocity + push)
-    first = memory.decisions[0].grounds
+    first = decisions[0].grounds
     assert isinstance(first, Foreseen)
     assert first.accept is not None
     along = first.accept.positions[: round(motion.end / h)]
     assert np.linalg.norm(along[:, None] - stands, axis=2).min() >= d + limit * h + patience.lag
-    reasons = [decision.reason for decision in memory.decisions]
+    reasons = [decision.reason for decision in decisions]
     assert ("no_progress" in reasons) != kept
     assert ("over" in reasons) == kept

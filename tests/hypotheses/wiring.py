@@ -81,10 +81,10 @@ class Probe:
         diagram = build(scenario, "d").diagram
         self._root = diagram.CreateDefaultContext()
         self._root.SetTime(TIME_S)
-        world, ugvs, uav = (diagram.GetSubsystemByName(each) for each in ("world", "ugvs", "uav"))
-        plants = [world.GetSubsystemByName(f"{robot}_plant") for robot in demands.robots]
+        vehicles, tasks = (diagram.GetSubsystemByName(each) for each in ("vehicles", "task_planning"))
+        plants = [vehicles.GetSubsystemByName(f"{robot}_plant") for robot in demands.robots]
         self._plants = [(plant, plant.GetMyMutableContextFromRoot(self._root)) for plant in plants]
-        self._systems = ugvs.GetSubsystemByName("ugv_controller"), uav.GetSubsystemByName("uav_controller")
+        self._systems = tasks.GetSubsystemByName("ugv_controller"), tasks.GetSubsystemByName("uav_controller")
 
     def sampled_otherwise(self) -> list[str]:
         """Controllers whose updates do not come every control period from t = 0."""

@@ -61,8 +61,7 @@ def step(
         number = desk.proposal.number if desk.proposal else -1
         given += [(answers or {}).get(name, SILENT), number]
     called = [name in intervening.split() for name in UGVS]
-    watched = uav.watch(memory, t, PLACES)
-    return sent_after(memory, uav.plan(watched, t, PLACES, called, np.array(given), (report,) * 3), t)
+    return sent_after(memory, uav.plan(memory, t, PLACES, called, np.array(given), (report,) * 3), t)
 
 
 def in_force(memory: PlannerMemory) -> dict[str, tuple[float, str]]:
@@ -272,9 +271,8 @@ def test_a_policy_sees_each_robot_as_it_is() -> None:
     policy = Scripted()
     uav = replace(planner(policy), max_speed=np.array([1.0, 2.0, 3.0]))
     moved = PLACES + np.array([[0.0], [1.0], [0.0], [0.0]])
-    memory = uav.watch(uav.start(), 0.0, PLACES)
-    memory = uav.watch(memory, 1.0, moved)
-    uav.plan(memory, 1.0, moved, [True, True, True], np.array([SILENT, -1.0] * 3), NOBODY)
+    standing = [True, False, True]
+    uav.plan(uav.start(), 1.0, moved, [True, True, True], np.array([SILENT, -1.0] * 3), NOBODY, standing)
     assert [seen.robot for seen in policy.seen] == list(UGVS)
     for i, seen in enumerate(policy.seen):
         np.testing.assert_array_equal(seen.position, moved[i])

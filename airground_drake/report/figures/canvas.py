@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, NamedTuple
 
@@ -96,11 +96,11 @@ def short(name: str, limit: int = 18) -> str:
 
 
 @contextmanager
-def style() -> Iterator[None]:
-    """The settings of all figures, whatever the user's own, for as long as the context lasts."""
+def style(settings: Mapping[Any, Any] | None = None) -> Iterator[None]:
+    """The settings of all figures, whatever the user's own, for as long as the context lasts; `settings` besides."""
     with matplotlib.rc_context():
         matplotlib.rcdefaults()
-        matplotlib.rcParams.update(_RC)
+        matplotlib.rcParams.update({**_RC, **(settings or {})})
         yield
 
 

@@ -9,8 +9,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure as Drawing
 
 from airground_drake.registry import METHODS
 from airground_drake.report.figures import canvas, comparison, maps, svg, timelines
@@ -57,12 +59,13 @@ class _Selection:
         return next(iter(self.runs.values()))
 
 
-def draw(scenario: Scenario, traces: Mapping[str, Trace]) -> list[Figure]:
+def draw(scenario: Scenario, traces: Mapping[str, Trace], settings: Mapping[str, Any] | None = None) -> list[Figure]:
     """All figures of a report; none without traces.
 
     Args:
         scenario: names the runs.
         traces: by run.
+        settings: of matplotlib (rcParams), in place of a report's.
 
     Raises:
         TraceError: if a trace lacks a column or holds numbers that are not finite.
@@ -70,7 +73,7 @@ def draw(scenario: Scenario, traces: Mapping[str, Trace]) -> list[Figure]:
     if not traces:
         return []
     numbers = next((paper for name, paper in _PAPER.items() if scenario.name.startswith(name)), ())
-    with canvas.style():
+    with canvas.style(settings):
         chosen = _select(scenario, traces)
         drawn = [_trajectories(chosen), _distances(chosen), _decision(chosen), _events(chosen), _gaps(chosen)]
         drawn += [_team(chosen)] if len(chosen.first.ugvs) > MAX_TEAM else []
@@ -151,8 +154,8 @@ def _trajectories(chosen: _Selection) -> Figure:
         columns = {f"{r} {a}": trace.position(r)[:, k] for r in robots for k, a in enumerate("xy")}
         finals = ", ".join(f"{r} ({x:.2f}, {y:.2f}) m" for r in robots for x, y, _ in [trace.position(r)[-1]])
         says = f"Paths of {', '.join(robots)} in the ground plane; final positions: {finals}."
-        text = svg.inline(canvas.svg(drawing), f"trajectories-{position}", f"Map of {heading}", says)
-        panels.append(Panel(heading, text, series(trace, "Positions, m", columns), tracks(drawing, trace, chosen.team)))
+        table, ways = series(trace, "Positions, m", columns), tracks(drawing, trace, chosen.team)
+        panels.append(_panel(drawing, f"trajectories-{position}", f"Map of {heading}", says, heading, table, ways))
     return Figure("trajectories", "Maps", caption, tuple(panels), look="" if roomy else "narrow")
 
 
@@ -172,10 +175,10 @@ def _distances(chosen: _Selection) -> Figure | None:
         of_ugvs = {ugv: near[heading, ugv] for ugv in ugvs}
         gaps = {f"{ugv} to {at.other}": gap_m(trace, ugv, at.other) for ugv, each in of_ugvs.items() for at in each}
         smallest = "; ".join(f"{ugv} {_told(each[0])}" for ugv, each in of_ugvs.items() if each)
-        drawing = canvas.svg(timelines.distances(trace, of_ugvs, looks, top))
-        says = f"Smallest distances: {smallest}."
-        text = svg.inline(drawing, f"distances-{len(panels)}", f"Distances, {heading}", says)
-        panels.append(Panel(_runs(heading), text, series(trace, "Distances, m", gaps)))
+        drawing = timelines.distances(trace, of_ugvs, looks, top)
+        table, says = series(trace, "Distances, m", gaps), f"Smallest distances: {smallest}."
+        name = f"distances-{len(panels)}"
+        panels.append(_panel(drawing, name, f"Distances, {heading}", says, _runs(heading), table))
     pairs = [(*each[0], ugv, heading) for (heading, ugv), each in near.items() if each]
     value, t_s, other, needed, ugv, heading = min(pairs, key=lambda pair: pair[0] - pair[3])
     least = "Too close" if value < needed - SLACK_M else "Closest"
@@ -201,12 +204,11 @@ def _decision(chosen: _Selection) -> Figure:
     panels = []
     for position, (heading, trace) in enumerate(chosen.shown.items()):
         largest = ", ".join(f"{ugv} {x.max():.2f} m" for ugv, x in columns[heading].items())
-        text = svg.inline(
-            canvas.svg(timelines.decision(trace, chosen.team, top)), f"decision-{position}",
-            f"Decision variables, {heading}",
-            f"Largest values: {largest}; threshold {float(trace.meta['zeta_m']):.3g} m.",
-        )  # fmt: skip
-        panels.append(Panel(_runs(heading), text, series(trace, "Decision variables, m", columns[heading])))
+        drawing = timelines.decision(trace, chosen.team, top)
+        table = series(trace, "Decision variables, m", columns[heading])
+        says = f"Largest values: {largest}; threshold {float(trace.meta['zeta_m']):.3g} m."
+        name = f"decision-{position}"
+        panels.append(_panel(drawing, name, f"Decision variables, {heading}", says, _runs(heading), table))
     caption = (
         f"{_first_triggers(chosen)} A UGV that stands still falls behind its reference and "
         f"triggers (▲) at the threshold.{_left_out(chosen, chosen.team)}"
@@ -229,15 +231,13 @@ def _events(chosen: _Selection) -> Figure | None:
     some = "" if len(listed) <= MAX_TABLE_ROWS else f", the first {MAX_TABLE_ROWS} of {len(listed)}"
     table = Table(f"Events{some}", ("run", "t, s", "robot", "event", "position x, y, z, m"), cells)
     words = "; ".join(f"run {trace.run}, {ugv}: {timelines.told(trace, ugv)}" for trace, ugv in drawn)
-    text = svg.inline(
-        canvas.svg(timelines.events(drawn)), "events-0", "Events over time", f"{words}.", scale=canvas.SCALE
-    )
+    panel = _panel(timelines.events(drawn), "events-0", "Events over time", f"{words}.", "", table, scale=canvas.SCALE)
     more = f" {len(rows) - len(drawn)} more rows are in the trace." if len(rows) > len(drawn) else ""
     caption = (
         f"{_accepted(chosen)} ▲ trigger, ▼ release; grey bar: the UAV is called. "
         f"◆ proposal, ● accepted, ✖ refused; hatched bar: the UGV follows the UAV.{more}"
     )
-    return Figure("events", "Triggers, proposals, decisions", caption, (Panel("", text, table),), look="wide")
+    return Figure("events", "Triggers, proposals, decisions", caption, (panel,), look="wide")
 
 
 def _gaps(chosen: _Selection) -> Figure | None:
@@ -258,8 +258,8 @@ def _gaps(chosen: _Selection) -> Figure | None:
     )
     rows = [(name, f"{t:.3f}", f"{gap:.4f}") for name, found in gaps.items() for t, gap in found]
     table = Table("Gaps between triggers", ("run", "t, s", "gap, s"), tuple(rows[:MAX_TABLE_ROWS]))
-    text = svg.inline(canvas.svg(timelines.gaps(gaps, bound, chosen.first)), "gaps-0", "Gaps between triggers", caption)
-    return Figure("gaps", "Gaps between triggers", caption, (Panel("", text, table),))
+    drawing, title = timelines.gaps(gaps, bound, chosen.first), "Gaps between triggers"
+    return Figure("gaps", title, caption, (_panel(drawing, "gaps-0", title, caption, "", table),))
 
 
 def _team(chosen: _Selection) -> Figure:
@@ -289,13 +289,27 @@ def _team(chosen: _Selection) -> Figure:
         says = "; ".join(
             f"run {name}: {least} to {largest}, median {middle}" for name, _, least, middle, largest in rows
         )
-        text = svg.inline(canvas.svg(timelines.histogram(what, of_runs)), f"team-{position}", f"UGVs by {what}", says)
-        panels.append(Panel(f"UGVs by {what.partition(',')[0]}", text, table))
+        drawing, heading = timelines.histogram(what, of_runs), f"UGVs by {what.partition(',')[0]}"
+        panels.append(_panel(drawing, f"team-{position}", f"UGVs by {what}", says, heading, table))
     there = []
     for name, of in quantities["time of arrival, s"].items():
         called = sum(bool(events_of(chosen.runs[name], ugv, "trigger")) for ugv in ugvs)
         there.append(f"Run {name}: {len(of)} of {len(ugvs)} UGVs arrive, {called} triggered.")
     return Figure("team", "The whole team", f"{' '.join(there)} Each bar counts UGVs.", tuple(panels))
+
+
+def _panel(
+    drawing: Drawing,
+    name: str,
+    title: str,
+    says: str,
+    heading: str,
+    table: Table,
+    ways: Mapping[str, Any] | None = None,
+    scale: float = 0.0,
+) -> Panel:
+    """A panel of a drawing; `name` is unique in the page, `title` and `says` are for those who cannot see it."""
+    return Panel(heading, svg.inline(canvas.svg(drawing), name, title, says, scale=scale), table, ways, drawing)
 
 
 def _ends(chosen: _Selection) -> str:

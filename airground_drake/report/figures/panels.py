@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure as Drawing
 
 from airground_drake.arrays import Array
 from airground_drake.trace import Trace
@@ -33,6 +34,8 @@ class Panel:
     table: Table
     tracks: Mapping[str, Any] | None = None
     """Of a drawing of the ground plane: where the robots are in it, see `report.scrubber`."""
+    drawing: Drawing | None = field(default=None, compare=False, repr=False)
+    """What the SVG was made of, for files of other formats."""
 
 
 @dataclass(frozen=True)

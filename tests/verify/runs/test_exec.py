@@ -82,8 +82,10 @@ def executed_whatever_the_answer(monkeypatch: pytest.MonkeyPatch) -> None:
     """The answer is recorded as it was given."""
     honest = controllers.UgvController.velocity
 
-    def velocity(self: Any, t: float, positions: Array, reference: Array, rate: Array, accepted: Any) -> Array:
-        return honest(self, t, positions, reference, rate, WAITING[:] or accepted)
+    def velocity(
+        self: Any, t: float, positions: Array, reference: Array, rate: Array, accepted: Any, *law: Any
+    ) -> Array:
+        return honest(self, t, positions, reference, rate, WAITING[:] or accepted, *law)
 
     def accepted(proposals: Sequence[Proposal | None], answers: Array) -> list[Proposal | None]:
         WAITING[:] = proposals

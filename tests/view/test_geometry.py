@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from airground_drake.arrays import Array
-from airground_drake.replay import geometry
+from airground_drake.view import geometry
 
 coordinates = st.floats(-50.0, 50.0)
 boxes = arrays(np.float64, (2, 3), elements=coordinates)
