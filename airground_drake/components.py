@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from pydrake.common import RandomDistribution
@@ -12,8 +13,10 @@ from pydrake.trajectories import PiecewisePolynomial
 from airground_drake.arrays import Array
 from airground_drake.decision.bayes import COMPUTED
 from airground_drake.decision.trigger import Trigger
+from airground_drake.errors import ScenarioError
 from airground_drake.gatekeeper.answer import Rules
 from airground_drake.gatekeeper.budget import Budget
+from airground_drake.gatekeeper.drake_solvers import SOLVERS, lacking
 from airground_drake.gatekeeper.mpc_gatekeeper import Gatekeepers, Judging, PaperGatekeepers
 from airground_drake.gatekeeper.outcome import Outlook
 from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
@@ -100,9 +103,16 @@ def make_route(scenario: Scenario) -> Route:
 
     Raises:
         UnknownNameError, PluginError: if the scenario names a route that cannot be made.
+        ScenarioError: if it names a solver that cannot be used here; says why, and which can.
     """
-    blocks = scenario.gatekeeper.blocks
-    return ROUTES.make(scenario.gatekeeper.route, of=Route, **({"blocks": blocks} if blocks else {}))
+    gate = scenario.gatekeeper
+    chosen: dict[str, Any] = {"blocks": gate.blocks} if gate.blocks else {}
+    if gate.solver != "daqp":
+        if why := lacking(gate.solver):
+            allowed = ", ".join(["daqp", *(name for name in SOLVERS if not lacking(name))])
+            raise ScenarioError(scenario.name, "gatekeeper.solver", gate.solver, f"{why}; allowed here: {allowed}")
+        chosen["solver"] = gate.solver
+    return ROUTES.make(gate.route, of=Route, **chosen)
 
 
 def first_order_plant(robot: str, start: Array) -> LinearSystem:
@@ -170,6 +180,10 @@ def make_patience(scenario: Scenario) -> Patience:
     """How long UGVs go along with the UAV."""
     gate = scenario.gatekeeper
     return Patience(gate.tries, gate.rest_s, gate.longest_s)
+
+
+GatekeepersFactory = Callable[[Scenario, UgvLaw], Gatekeepers]
+"""Makes what judges proposals, of a scenario and the law of its UGVs."""
 
 
 def make_gatekeepers(scenario: Scenario, law: UgvLaw) -> Gatekeepers:

@@ -117,10 +117,12 @@ def build_model(
     decision_block: DecisionFactory = DecisionVariable,
     *,
     disturbed: bool = True,
+    make_gatekeepers: components.GatekeepersFactory = components.make_gatekeepers,
 ) -> Model:
     """Build and wire all components of one method of a valid scenario; else as `build_diagram`.
 
     If it is not to be `disturbed`, the diagram has no inputs for disturbances: commands go straight to the plants.
+    `make_gatekeepers` makes what judges proposals in another way; claims about decisions are about the default.
     """
     chosen, composition = _chosen(scenario, method, composition)
     team, presets = components.make_team(scenario), components.make_presets(scenario)
@@ -136,7 +138,7 @@ def build_model(
     planner = InterventionPlanner(components.make_planner(scenario, chosen), scenario.control.period_s)
     gatekeeper = None
     if chosen.gated:
-        gatekeepers = components.make_gatekeepers(scenario, law)
+        gatekeepers = make_gatekeepers(scenario, law)
         gatekeeper = Gatekeeper(gatekeepers, n, period=scenario.gatekeeper.period_s, control=scenario.control.period_s)
     controllers = UgvController(team, law), _uav_controller(scenario, team)
     parts = {

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +16,7 @@ from pydrake.systems.framework import Context, DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput, Multiplexer
 
 from airground_drake.arrays import Array
+from airground_drake.components import GatekeepersFactory, make_gatekeepers
 from airground_drake.diagram import RECORDED, DecisionFactory, Model, build_model
 from airground_drake.errors import SimulationError, UnknownNameError, described
 from airground_drake.events import extract
@@ -31,8 +31,8 @@ from airground_drake.nsbc.avoidance import Avoidance, Composition, Surroundings,
 from airground_drake.nsbc.kernels import distances, news_within, within
 from airground_drake.nsbc.law import UgvLaw
 from airground_drake.nsbc.team import Team
-from airground_drake.scenarios.load import resolved, validated
-from airground_drake.scenarios.schema import Run, Scenario
+from airground_drake.scenarios.load import own, resolved, validated
+from airground_drake.scenarios.schema import Scenario
 from airground_drake.systems.decision import DecisionVariable
 from airground_drake.systems.lifetime import untie
 from airground_drake.systems.signals import FIELDS, Status
@@ -64,8 +64,12 @@ class Recorder:
         name: str,
         decision_block: DecisionFactory = DecisionVariable,
         meshcat: Meshcat | None = None,
+        *,
+        make_gatekeepers: GatekeepersFactory = make_gatekeepers,
     ) -> None:
-        """Build the model of a run of the scenario and its loggers; the last two arguments as in `simulate`.
+        """Build the model of a run of the scenario and its loggers; `decision_block` and `meshcat` as in `simulate`.
+
+        `make_gatekeepers` is that of `build_model`.
 
         Raises:
             ScenarioError: if the scenario is not valid.
@@ -78,9 +82,14 @@ class Recorder:
             raise UnknownNameError("run", name, self._scenario.runs)
         self._run = self._scenario.runs[name]
         composition: Composition = self._run.composition  # type: ignore[assignment]
-        scenario = _with_rule(self._scenario, self._run)
+        self._own = own(self._scenario, name)
         self._model: Model = build_model(
-            scenario, self._run.method, composition, decision_block=decision_block, disturbed=False
+            self._own,
+            self._run.method,
+            composition,
+            decision_block=decision_block,
+            disturbed=False,
+            make_gatekeepers=make_gatekeepers,
         )
         builder = DiagramBuilder()
         builder.AddSystem(self._model.diagram)
@@ -155,7 +164,7 @@ class Recorder:
         gatekeeper = model.gatekeeper
         decided = gatekeeper.decisions(gatekeeper.GetMyContextFromRoot(context)) if gatekeeper is not None else ()
         memory = model.planner.memory(model.planner.GetMyContextFromRoot(context))
-        decisions = _decisions([_decision(r, ugvs[r.robot], self._scenario.gatekeeper.route) for r in decided])
+        decisions = _decisions([_decision(r, ugvs[r.robot], self._own.gatekeeper.route) for r in decided])
         sent = [(ugvs[i], proposal.issued, proposal.policy) for i, proposal in memory.sent]
         meta: dict[str, Any] = {
             "schema": SCHEMA,
@@ -177,11 +186,6 @@ class Recorder:
         trace = Trace(meta, signals, decisions, timings, _problems(decided), proposals)
         meta["events"] = extract(trace, sent)
         return trace
-
-
-def _with_rule(scenario: Scenario, run: Run) -> Scenario:
-    """The scenario as the run has it: with its own rule of the gatekeeper, if it names one."""
-    return replace(scenario, gatekeeper=replace(scenario.gatekeeper, rule=run.rule)) if run.rule else scenario
 
 
 def read_back(model: Model, root: Context) -> dict[str, Any]:

@@ -24,9 +24,10 @@ Rows closer than 1e-9 s are one.
 
 from __future__ import annotations
 
+import copy
 import io
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
@@ -157,9 +158,10 @@ class Trace:
 
     @property
     def scenario(self) -> dict[str, Any]:
-        """The resolved scenario, as nested dicts with the keys of the scenario file."""
+        """The resolved scenario as this run has it, as nested dicts with the keys of the scenario file."""
         resolved: dict[str, Any] = self.meta["scenario"]
-        return resolved
+        given = resolved["runs"].get(self.run, {}).get("set")
+        return self.derived("scenario", lambda: _with(resolved, given)) if given else resolved
 
     @property
     def events(self) -> list[dict[str, Any]]:
@@ -231,6 +233,18 @@ class Trace:
         rows = [(f"{event['t_s']:.3f}", event["robot"], event["kind"]) for event in self.events]
         table = pd.DataFrame(rows, columns=["time, s", "robot", "event"]).to_html(index=False, border=0)
         return f"<p>{escape(repr(self))}</p>{table}"
+
+
+def _with(resolved: dict[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
+    """A copy of nested dicts and lists with other values at dotted keys."""
+    changed = copy.deepcopy(resolved)
+    for key, value in given.items():
+        *above, last = key.split(".")
+        place: Any = changed
+        for part in above:
+            place = place[int(part) if isinstance(place, list) else part]
+        place[last] = value
+    return changed
 
 
 def save(trace: Trace, folder: Path) -> list[str]:

@@ -58,5 +58,5 @@ def _written(folder: Path, kind: str, output: Path) -> Iterator[Path]:
         yield from tables.write(saved, output)
         return
     path = output / f"{saved.run}.mcap"
-    files.write_bytes(path, recording.recorded(saved, from_data(saved.scenario, str(folder))))
+    files.write_bytes(path, recording.recorded(saved, from_data(saved.meta["scenario"], str(folder))))
     yield path

@@ -47,7 +47,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         traces = {name: trace.load(options.folder / "trace" / name) for name in runs}
         document = read(options.folder)
         traces = {name: traces[name] for name in document["runs"] if name in traces}
-        scenario = from_data(next(iter(traces.values())).scenario, str(options.folder))
+        scenario = from_data(next(iter(traces.values())).meta["scenario"], str(options.folder))
         for path in figures.write(document, scenario, traces, options.output, options.style, options.format):
             print(path)
     except (AirgroundError, OSError) as error:

@@ -146,4 +146,4 @@ def _scene(folder: Path, run: str) -> Scene:
     from airground_drake.scenarios.load import from_data
 
     saved = trace.load(folder / "trace" / run)
-    return scene(saved, from_data(saved.scenario, str(folder / "trace" / run)))
+    return scene(saved, from_data(saved.meta["scenario"], str(folder / "trace" / run)))

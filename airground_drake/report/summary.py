@@ -451,6 +451,8 @@ def _paper(document: Document) -> Iterator[Line]:
 
 def _row(document: Document, course: Course) -> Row:
     says = METHODS[course.method].says if course.method in METHODS else course.method
+    own = document["scenario"]["resolved"]["runs"][course.name].get("set", {})
+    says += "".join(f", {key}: {value}" for key, value in own.items())
     proved = ", proved" if course.method == "d" and _proved_for_d(document, [course]) else ""
     if course.safe is None:
         safe = Line("open", f"not known, {course.why}")
