@@ -530,10 +530,13 @@ INTERVENTION = (
         "if proposal is None:",
         tests=WIRING,
     ),
-    Mutant("silence counts as acceptance", "intervention/messages.py", "== ACCEPT else None", "!= REFUSE else None"),
     Mutant(
-        "a refusal is not noticed", "intervention/planner.py", "answers, i) == REFUSE for i", "answers, i) == 2.0 for i"
+        "silence counts as acceptance",
+        "intervention/messages.py",
+        "answer == ACCEPT and (not",
+        "answer != REFUSE and (not",
     ),
+    Mutant("a refusal is not noticed", "intervention/planner.py", "elif answer == REFUSE:", "elif answer == 3.0:"),
     Mutant(
         "answers are decided on and not sent",
         "systems/gatekeeper.py",
@@ -931,12 +934,6 @@ MIX_UPS = (
         "gatekeeper/outcome_gatekeeper.py",
         "            if proposal is None:\n                answers",
         "            if proposal is None or t < proposal.issued + 0.075:\n                answers",
-    ),
-    Mutant(
-        "progress is compared with the prediction of the next sample",
-        "gatekeeper/outcome_gatekeeper.py",
-        "k = min(round((t - commitment.begun) / self._law.avoidance.period),",
-        "k = min(1 + round((t - commitment.begun) / self._law.avoidance.period),",
     ),
     Mutant(
         "a cause that names nobody is a favour",
