@@ -1,4 +1,4 @@
-"""What long work says of itself: its stages, how much of each is done, and what took how long."""
+"""Progress of long work: its stages, how much of each is done, and how long its parts took."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ _FORMAT = "{desc} {percentage:3.0f}% |{bar}| {n:.4g}/{total:.4g} {unit}, {elapse
 _WITHOUT_AMOUNT = "{desc} {elapsed}"
 
 
-class Watch:
-    """Is told what long work does; this one keeps it to itself. It may be told from several threads."""
+class Progress:
+    """Receives the progress of long work. This class shows nothing. Several threads may call it."""
 
     def stage(self, name: str, amount: float = 0.0, unit: str = "") -> None:
         """A stage begins, the one before is over.
@@ -30,7 +30,7 @@ class Watch:
     def advance(self, amount: float, what: str = "") -> None:
         """So much more of the stage is done, the last of it on `what`."""
 
-    def took(self, what: str, seconds: float) -> None:
+    def elapsed_s(self, what: str, seconds: float) -> None:
         """A part of the stage is over."""
 
     @contextmanager
@@ -38,15 +38,15 @@ class Watch:
         """One of the things that the stage counts."""
         started = time.perf_counter()
         yield
-        self.took(what, time.perf_counter() - started)
+        self.elapsed_s(what, time.perf_counter() - started)
         self.advance(1.0, what)
 
 
-SILENT = Watch()
+SILENT = Progress()
 
 
-class Told(Watch):
-    """Tells on standard error: a bar on a terminal, in a line; a line for what took how long if that is asked for."""
+class ProgressBar(Progress):
+    """Shows progress on standard error: a bar for the stage, a line for each part that took time, or both."""
 
     def __init__(self, *, bar: bool, lines: bool) -> None:
         """A bar for the stage that is under way; lines for everything that took time."""
@@ -69,7 +69,7 @@ class Told(Watch):
                 self._bar.set_postfix_str(what, refresh=False)
                 self._bar.update(amount)
 
-    def took(self, what: str, seconds: float) -> None:
+    def elapsed_s(self, what: str, seconds: float) -> None:
         """A line, if lines are wanted and it is worth one."""
         if self._shows_lines and seconds >= SHOWN_S:
             with self._lock:
@@ -84,18 +84,18 @@ class Told(Watch):
                 self._bar.close()
                 self._bar = None
         if self._stage:
-            self.took(self._stage, time.perf_counter() - self._since)
+            self.elapsed_s(self._stage, time.perf_counter() - self._since)
             self._stage = ""
 
 
 @contextmanager
-def told(*, quiet: bool = False, verbose: bool = False) -> Iterator[Watch]:
-    """What tells a person at a terminal of the work, as much as was asked for."""
-    watch = Told(bar=not quiet and sys.stderr.isatty(), lines=verbose)
+def progress_bar(*, quiet: bool = False, verbose: bool = False) -> Iterator[Progress]:
+    """A bar if standard error is a terminal and `quiet` is not set; with `verbose`, a line for each part."""
+    progress = ProgressBar(bar=not quiet and sys.stderr.isatty(), lines=verbose)
     try:
-        yield watch
+        yield progress
     finally:
-        watch.close()
+        progress.close()
 
 
 def _bar(name: str, amount: float, unit: str) -> Any:

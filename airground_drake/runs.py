@@ -22,13 +22,13 @@ from pathlib import Path
 from typing import Any
 
 from airground_drake import files, interruption, trace
-from airground_drake.errors import AirgroundError, PluginError, SimulationError, described, one_line
-from airground_drake.intervention.process import end_all
+from airground_drake.errors import AirgroundError, PluginError, ScenarioError, SimulationError, described, one_line
+from airground_drake.intervention.guest.process import end_all
 from airground_drake.nsbc import kernels
-from airground_drake.progress import SILENT, Watch
+from airground_drake.parallel import forks, processors
+from airground_drake.progress import SILENT, Progress
 from airground_drake.scenarios.load import validated
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.side_by_side import forks, processors
 from airground_drake.simulation import simulate, warm_up
 from airground_drake.trace import Trace
 
@@ -41,19 +41,22 @@ step of the package's own is bounded in counts."""
 
 
 def simulate_all(
-    scenario: Scenario, jobs: int | None = None, watch: Watch = SILENT, meanwhile: Callable[[], object] | None = None
+    scenario: Scenario,
+    jobs: int | None = None,
+    progress: Progress = SILENT,
+    meanwhile: Callable[[], object] | None = None,
 ) -> dict[str, Trace]:
     """Simulate every run of a scenario, in its order, each in a process of its own.
 
     Args:
         scenario: from a file or made in Python.
         jobs: number of processes at a time; default: one for each processor that this process may use.
-        watch: is told the simulated time.
+        progress: is told the simulated time.
         meanwhile: is called once, when the first processes have begun.
 
     Raises:
         ScenarioError: if the scenario is not valid.
-        PluginError: if it names a policy, route or task that cannot be made.
+        PluginError: if it names a policy, route, task or solver that cannot be made.
         SimulationError: if a simulation stops before its end, or comes no further.
         AirgroundError: if its process dies.
     """
@@ -61,10 +64,10 @@ def simulate_all(
     most = processors() if jobs is None else max(1, jobs)
     context = multiprocessing.get_context("fork") if forks() else multiprocessing.get_context("spawn")
     if not _compiled():
-        watch.stage("compiling, once, about half a minute")
+        progress.stage("compiling, once, about half a minute")
     if forks():
         warm_up()
-    watch.stage(f"simulating {', '.join(scenario.runs)}", scenario.duration_s * len(scenario.runs), "s")
+    progress.stage(f"simulating {', '.join(scenario.runs)}", scenario.duration_s * len(scenario.runs), "s")
     clocks = {name: context.RawValue("d") for name in scenario.runs}
     waiting, running = deque(scenario.runs), dict[str, BaseProcess]()
     traces: dict[str, Trace] = {}
@@ -83,7 +86,7 @@ def simulate_all(
                     meanwhile = None
                 wait([process.sentinel for process in running.values()], TOLD_S)
                 reached, before = sum(clock.value for clock in clocks.values()), reached
-                watch.advance(reached - before)
+                progress.advance(reached - before)
                 for name, process in list(running.items()):
                     if not process.is_alive():
                         traces[name] = _result(made / name, running.pop(name), f"run {name} of {scenario.name}")
@@ -107,7 +110,7 @@ def _simulate(scenario: Scenario, run: str, folder: Path, clock: Any) -> None:
     except BaseException as error:
         stopped = [error.run, error.t, error.what] if isinstance(error, SimulationError) else None
         plain = str(error) if isinstance(error, AirgroundError) else described(error)
-        refused = isinstance(error, PluginError)
+        refused = isinstance(error, PluginError | ScenarioError)
         with suppress(OSError):  # a full disk; the parent says that this process died
             files.write_json(folder / FAILURE, {"what": plain, "refused": refused, "stopped": stopped})
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-NAMES = ("airground_drake", "cvc5", "json", "loky", "multiprocessing", "numpy", "pandas", "pickle", "z3")
+NAMES = ("airground_drake", "cvc5", "joblib", "json", "multiprocessing", "numpy", "pandas", "pickle", "z3")
 HOSTILE = "import os\nopen(os.path.join(os.path.dirname(os.path.abspath(__file__)), 'ran'), 'a').write(__name__)\n"
 CAMPAIGN = {
     "name": "few", "scenario": "minimal", "set": {"duration_s": 0.2}, "claims": ["SAFE-TRACE"],

@@ -8,7 +8,7 @@ import threading
 
 import pytest
 
-from airground_drake.progress import told
+from airground_drake.progress import progress_bar
 
 
 class Terminal(io.StringIO):
@@ -17,17 +17,17 @@ class Terminal(io.StringIO):
 
 
 def work(**asked: bool) -> None:
-    with told(**asked) as watch:
-        watch.stage("simulating", 40.0, "s")
-        watch.advance(10.0)
-        watch.stage("checking", 3, "claims")
-        watch.advance(1.0, "MINE a")
-        watch.took("THEIRS a", 1.5)
-        watch.took("OURS a", 1e-6)
-        helper = threading.Thread(target=watch.advance, args=(1.0, "MINE b"))
+    with progress_bar(**asked) as progress:
+        progress.stage("simulating", 40.0, "s")
+        progress.advance(10.0)
+        progress.stage("checking", 3, "claims")
+        progress.advance(1.0, "MINE a")
+        progress.elapsed_s("THEIRS a", 1.5)
+        progress.elapsed_s("OURS a", 1e-6)
+        helper = threading.Thread(target=progress.advance, args=(1.0, "MINE b"))
         helper.start()
         helper.join()
-        watch.stage("writing")
+        progress.stage("writing")
 
 
 def test_a_terminal_is_shown_what_of_how_much_is_done(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -54,8 +54,8 @@ def test_what_is_no_terminal_is_told_what_it_has_asked_for(
 
 
 def break_off() -> None:
-    with told() as watch:
-        watch.stage("simulating", 40.0, "s")
+    with progress_bar() as progress:
+        progress.stage("simulating", 40.0, "s")
         raise ValueError("why")
 
 

@@ -15,7 +15,7 @@ from timeline import kinds, times
 
 from airground_drake import runs, trace
 from airground_drake.errors import TraceError
-from airground_drake.progress import Watch
+from airground_drake.progress import Progress
 from airground_drake.report.reproduction import MEASURES
 from airground_drake.runs import simulate_all
 from airground_drake.scenarios.load import load, shipped
@@ -101,11 +101,11 @@ def test_runs_in_several_processes_are_those_in_one(
     monkeypatch.setattr(runs, "_compiled", lambda: False)
     told: list[float] = []
     stages: list[str] = []
-    watch = Watch()
-    watch.advance = lambda amount, what="": told.append(amount)  # type: ignore[method-assign]
-    watch.stage = lambda name, *_: stages.append(name)  # type: ignore[method-assign]
+    progress = Progress()
+    progress.advance = lambda amount, what="": told.append(amount)  # type: ignore[method-assign]
+    progress.stage = lambda name, *_: stages.append(name)  # type: ignore[method-assign]
     called: list[str] = []
-    one, two = simulate_all(case_a, 1), simulate_all(case_a, 2, watch, meanwhile=lambda: called.append("once"))
+    one, two = simulate_all(case_a, 1), simulate_all(case_a, 2, progress, meanwhile=lambda: called.append("once"))
     assert called == ["once"]
     assert sum(told) == pytest.approx(2.0 * case_a.duration_s)
     assert stages == ["compiling, once, about half a minute", "simulating a, d"]
@@ -117,13 +117,13 @@ def test_runs_in_several_processes_are_those_in_one(
 
 WARM_UP = """
 from airground_drake import simulation
-from airground_drake.gatekeeper import closed_loop, cost, dual_bound, outcome, reachable_box
-from airground_drake.nsbc import kernels
+from airground_drake.gatekeeper import cost, dual_bound, outcome, reachable_box, rollout
+from airground_drake.nsbc import kernels, law
 from airground_drake.scenarios.load import load
 
 
 def compiled():
-    modules = (kernels, closed_loop, cost, dual_bound, outcome, reachable_box)
+    modules = (kernels, law, rollout, cost, dual_bound, outcome, reachable_box)
     functions = [(f.__qualname__, f) for module in modules for f in vars(module).values() if hasattr(f, "signatures")]
     return {name: list(map(str, f.signatures)) for name, f in functions}
 

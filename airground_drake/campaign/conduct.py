@@ -19,7 +19,7 @@ from airground_drake.campaign.stopping import InOrder, Stopping
 from airground_drake.campaign.store import Store
 from airground_drake.campaign.work import died, rows_of
 from airground_drake.errors import FolderError, LimitError, one_line
-from airground_drake.progress import SILENT, Watch
+from airground_drake.progress import SILENT, Progress
 from airground_drake.registry import RUN_CLAIMS
 from airground_drake.scenarios.estimate import DEFAULT_LIMITS, MOST_ROWS, Limits
 
@@ -36,7 +36,7 @@ def conduct(
     stopping: Stopping | None = None,
     limits: Limits = DEFAULT_LIMITS,
     allow_plugins: bool = False,
-    watch: Watch = SILENT,
+    progress: Progress = SILENT,
 ) -> dict[str, Any]:
     """Do what is left of a campaign, and write the evidence and its page.
 
@@ -49,7 +49,7 @@ def conduct(
         stopping: when to end early.
         limits: what the scenario of a draw may ask for.
         allow_plugins: whether code of others may be imported and run.
-        watch: is told how far it is.
+        progress: is told how far it is.
 
     Returns:
         The evidence, strict JSON.
@@ -77,13 +77,13 @@ def conduct(
         rule = InOrder(stopping, wanted) if stopping is not None else None
         met = rule is not None and any(rule.met(index, rows) for index, rows in _known(store))
         left = [] if met else [index for index in wanted if index not in store.finished]
-        watch.stage(spec.name, len(left), "draws")
+        progress.stage(spec.name, len(left), "draws")
         refuted = Counter[str]()
         for index, judged in pool(partial(rows_of, spec, limits=limits, allow_plugins=allow_plugins), left):
             rows = died(index) if judged is None else judged
             store.add(rows)
             refuted.update(row["claim"] for row in rows if row["status"] == "refuted")
-            watch.advance(1.0, _refuted(refuted))
+            progress.advance(1.0, _refuted(refuted))
             if rule is not None and rule.met(index, rows):
                 break
         table = store.table()

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.stats import qmc, truncnorm
 
 from airground_drake.arrays import Array
-from airground_drake.scenarios.schema import MAX_SEED
+from airground_drake.scenarios.limits import MAX_SEED
 
 
 class Distribution(abc.ABC):

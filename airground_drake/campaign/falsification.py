@@ -19,7 +19,7 @@ from airground_drake.campaign.search import Sampler
 from airground_drake.campaign.spec import Spec
 from airground_drake.campaign.work import rows_at, rows_of_scenario, trace_of
 from airground_drake.errors import PluginError, ScenarioError, described, one_line
-from airground_drake.progress import SILENT, Watch
+from airground_drake.progress import SILENT, Progress
 from airground_drake.scenarios.estimate import Limits
 from airground_drake.scenarios.load import from_data
 from airground_drake.trace import Trace
@@ -86,7 +86,7 @@ class Best:
     found: bool
 
 
-def falsify(search: Search, sampler: Sampler, number: int, pool: Pool, watch: Watch = SILENT) -> Best:
+def falsify(search: Search, sampler: Sampler, number: int, pool: Pool, progress: Progress = SILENT) -> Best:
     """Try points until there is a counterexample, or so many were tried.
 
     Args:
@@ -94,7 +94,7 @@ def falsify(search: Search, sampler: Sampler, number: int, pool: Pool, watch: Wa
         sampler: where.
         number: of points, at least; the last batch is finished.
         pool: that does the work.
-        watch: is told how far it is.
+        progress: is told how far it is.
 
     Raises:
         PluginError: if the sampler raises, ends the process, or asks for what are no points.
@@ -115,7 +115,7 @@ def falsify(search: Search, sampler: Sampler, number: int, pool: Pool, watch: Wa
             best = Best(tried, float(values[k]), points[k], bool(found[k]))
         else:
             best = replace(best, tried=tried)
-        watch.advance(len(points), f"least {best.value:.6g}")
+        progress.advance(len(points), f"least {best.value:.6g}")
     return best
 
 

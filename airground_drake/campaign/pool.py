@@ -1,4 +1,4 @@
-"""Much of the same work, on the processors of this machine (loky) or on a Dask cluster."""
+"""Much of the same work, on the processors of this machine (joblib's loky) or on a Dask cluster."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Pool(Protocol):
 @contextmanager
 def local(jobs: int) -> Iterator[Pool]:
     """So many processes of this machine, which end in the end."""
-    import loky  # takes a while, which other commands need not wait for
+    from joblib.externals import loky  # takes a while, which other commands need not wait for
 
     others = set(threading.enumerate())
     try:
@@ -61,10 +61,10 @@ def local(jobs: int) -> Iterator[Pool]:
 def _locally(jobs: int, work: Callable[[int], T], items: Iterable[int]) -> Iterator[tuple[int, T | None]]:
     """See `Pool`.
 
-    A process whose memory grows, by code of others, is replaced (loky sees to it). If one dies, those that are there
-    end with it, and the items that they may have been at are done again, each in a process of its own.
+    If a process dies, those that are there end with it, and the items that they may have been at are done again, each
+    in a process of its own.
     """
-    import loky
+    from joblib.externals import loky
 
     waiting, under_way = iter(items), dict[Any, int]()
     while True:
@@ -80,7 +80,7 @@ def _locally(jobs: int, work: Callable[[int], T], items: Iterable[int]) -> Itera
 
 def _submitted(call: Callable[[], T], jobs: int) -> Any:
     """The future of a call in one of so many processes; failed already if one of them has just died."""
-    import loky
+    from joblib.externals import loky
 
     try:
         processes = loky.get_reusable_executor(jobs, timeout=IDLE_S, env=ENVIRONMENT, initializer=end_with_parent)
@@ -93,7 +93,7 @@ def _submitted(call: Callable[[], T], jobs: int) -> Any:
 
 def _lost(future: Any) -> bool:
     """Whether a process died before it had finished this."""
-    import loky
+    from joblib.externals import loky
 
     return isinstance(future.exception(), loky.BrokenProcessPool)
 

@@ -30,8 +30,9 @@ from airground_drake.errors import Fault, ScenarioError
 from airground_drake.registry import RUN_CLAIMS
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.document import read_data
+from airground_drake.scenarios.limits import MAX_NAME, MAX_UGVS
 from airground_drake.scenarios.load import from_data, load, shipped
-from airground_drake.scenarios.schema import MAX_NAME, MAX_UGVS, Scenario
+from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.finding import PLAIN_NAME
 
 MOST_OBSTACLES = 10_000

@@ -14,16 +14,18 @@ from .rules import SMALL, Array, Disagreement, close, holds, same
 from .run import Run
 from .scenario import apart_m
 
-NOTHING = -1.0
-"""Stands in a column of decisions that says nothing under the run's method."""
+UNUSED = -1.0
+"""Value of a column of decisions that does not belong to the run's method."""
 OF_PROBLEMS = (
     "relaxed_first_stage", "objective", "route_bound", "gap", "objective_accept", "objective_refuse",
     "accept_throughout", "refuse_throughout", "rounding_deviation_s", "predicted_clearance_m",
 )  # fmt: skip
+"""Columns of decisions that method (c) fills: it solves problem (26)."""
 OF_OUTCOMES = (
     "refuse_outcome_m2_s", "accept_outcome_m2_s", "refuse_stalls", "accept_stalls", "refuse_left_m", "accept_left_m",
-    "lag_m", "predicted_lag_m", "tries",
+    "tries",
 )  # fmt: skip
+"""Columns of decisions that method (d) fills: it compares outcomes."""
 
 
 class Event(NamedTuple):
@@ -46,7 +48,7 @@ class Event(NamedTuple):
 
     @classmethod
     def of(cls, recorded: Json) -> Event:
-        """A recorded one; its place is another rule's."""
+        """A recorded event without its position, which has a rule of its own."""
         said = {name: value for name, value in recorded.items() if name != "position_m"}
         unknown = sorted(said.keys() - {*cls._fields})
         holds("what is said of an event", not unknown, unknown, ", ".join(cls._fields), t_s=said["t_s"])
@@ -87,7 +89,7 @@ def _events_follow_from_signals_and_decisions(run: Run) -> None:
 
 
 def _crossings(run: Run) -> Iterator[Event]:
-    """Triggers and releases: every time that the signals have had as the last one."""
+    """Triggers and releases: the columns hold the time of the latest one, so each value is the time of one."""
     for ugv in run.ugvs:
         for kind, name in (("trigger", "triggered_at_s"), ("release", "released_at_s")):
             for when in np.unique(run.column(f"{ugv}.{name}")):
@@ -96,7 +98,7 @@ def _crossings(run: Run) -> Iterator[Event]:
 
 
 def _messages(run: Run) -> Iterator[Event]:
-    """What the UAV has proposed."""
+    """Proposals of the UAV."""
     for row in run.proposals.to_dict("records"):
         yield Event(float(row["issued_s"]), row["robot"], "proposal", row["policy"])
 
@@ -122,9 +124,10 @@ def _arrivals(run: Run) -> Iterator[Event]:
 
 
 def _collisions(run: Run) -> Iterator[Event]:
-    """Visits within collision distance of an obstacle or another robot, from surface to surface.
+    """Collisions with obstacles and other robots: surfaces are closer than the collision distance.
 
-    They begin at the first row that is so near, and one that is over before the next row, at the row before it.
+    A collision has the time of the first row inside that distance. If a robot passes between two rows outside it, the
+    collision has the time of the earlier of them.
     """
     bodies = {**run.robots, **run.scenario["obstacles"]}
     for pair in run.pairs:
@@ -166,7 +169,7 @@ def _nothing_is_executed_before_it_was_proposed(run: Run) -> None:
 
 
 def _decisions_are_on_proposals(run: Run) -> None:
-    """Each decision is on a proposal that was sent, and has nothing in the columns of the other method."""
+    """Each decision is on a proposal that was sent, and the columns of the other method are unused."""
     key = ["robot", "issued_s", "policy"]
     sent = set(run.proposals[key].itertuples(index=False, name=None))
     unused = OF_OUTCOMES if run.method == "c" else OF_PROBLEMS
@@ -174,4 +177,4 @@ def _decisions_are_on_proposals(run: Run) -> None:
         about, on = f"decision of {row['robot']}", tuple(row[name] for name in key)
         holds("a decision is on a proposal", on in sent, str(on), "one that was sent", about=about, t_s=row["t_s"])
         for name in unused:
-            same(f"nothing is said of {name}", row[name], NOTHING, about=about, t_s=row["t_s"])
+            same(f"column {name} is unused", row[name], UNUSED, about=about, t_s=row["t_s"])

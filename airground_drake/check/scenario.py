@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
 from itertools import combinations
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -57,13 +58,25 @@ class Preset:
 
     @property
     def corner_s(self) -> Array:
-        """When corners are passed and the end is reached, (m - 1,); at standstill none is."""
+        """Times at which the corners and the end are reached, (m - 1,); empty at standstill."""
         return self.length_m[1:] / self.speed_m_s if self.speed_m_s > 0.0 else np.empty(0)
 
     def position_m(self, t_s: Array) -> Array:
         """At times (K,): (K, 3)."""
         travelled = self.speed_m_s * np.asarray(t_s)
         return np.stack([np.interp(travelled, self.length_m, axis) for axis in self.corners_m.T], axis=-1)
+
+
+def as_run(scenario: Json, name: str) -> Json:
+    """The scenario with the values that a run sets for itself, by dotted key."""
+    changed: Json = json.loads(json.dumps(scenario))
+    for key, value in scenario["runs"][name]["set"].items():
+        *above, last = key.split(".")
+        place: Any = changed
+        for part in above:
+            place = place[int(part) if isinstance(place, list) else part]
+        place[last] = value
+    return changed
 
 
 def robots_of(scenario: Json) -> dict[str, Json]:
@@ -83,18 +96,18 @@ def pairs_of(scenario: Json) -> list[Pair]:
     beside_robots = []
     for one, other in combinations(robots, 2):
         safe = apart_m(scenario, "air_ground_m" if other == uav else "ugv_m", robots[one], robots[other])
-        beside_robots.append(Pair(one, other, safe, _sum(limit[one], limit[other]), 0.5))
+        beside_robots.append(Pair(one, other, safe, _decimal_sum(limit[one], limit[other]), 0.5))
     return beside_obstacles + beside_robots
 
 
 @lru_cache(maxsize=10_000)
-def _sum(one: float, other: float) -> float:
-    """Of two decimals as they are written: 1.1 and 2.2 make 3.3."""
+def _decimal_sum(one: float, other: float) -> float:
+    """The sum of two numbers as they are written: 1.1 and 2.2 make 3.3. Teams have few speeds, so few sums."""
     return float(written(one) + written(other))
 
 
 def apart_m(scenario: Json, kind: str, one: Json, other: Json) -> float:
-    """A distance of surfaces, of a kind of pair, as one of centres: with both radii."""
+    """A distance that surfaces keep, by its name in the scenario, as a distance of centres: both radii are added."""
     return float(scenario["safe_distance"][kind]) + (float(one["radius_m"]) + float(other["radius_m"]))
 
 

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any
 from airground_drake import files
 from airground_drake.campaign.rows import UNFINISHED
 from airground_drake.errors import AirgroundError, FolderError, LimitError, ScenarioError, UnknownNameError, one_line
-from airground_drake.progress import told
+from airground_drake.parallel import processors
+from airground_drake.progress import progress_bar
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.estimate import DEFAULT_LIMITS, Limits
 from airground_drake.scenarios.shipped import argument
-from airground_drake.side_by_side import processors
 from airground_drake.usage import EXIT_TOOL, Parser, positive, refuse, whole
 
 if TYPE_CHECKING:
@@ -91,12 +91,12 @@ def _all(spec: Spec, options: argparse.Namespace) -> int:
     folder = options.output or Path("campaigns") / spec.name
     jobs = options.jobs or processors()
     with (
-        told(quiet=options.quiet) as watch,
+        progress_bar(quiet=options.quiet) as progress,
         pool.cluster(options.scheduler) if options.scheduler else pool.local(jobs) as processes,
     ):
         found = conduct(
             spec, folder, processes, options.number, resume=options.resume, stopping=stopping,
-            limits=_limits(options), allow_plugins=options.allow_plugins, watch=watch,
+            limits=_limits(options), allow_plugins=options.allow_plugins, progress=progress,
         )  # fmt: skip
     print(f"{_summary(found, looked=bool(options.stop_when or options.resume))}\n{one_line(str(folder))}")
     return _code(found)

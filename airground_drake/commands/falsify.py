@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Any
 from airground_drake import files
 from airground_drake.campaign.rows import COLUMNS
 from airground_drake.errors import AirgroundError, Fault, FolderError, ScenarioError, UnknownNameError, one_line
-from airground_drake.progress import told
+from airground_drake.parallel import processors
+from airground_drake.progress import progress_bar
 from airground_drake.registry import RUN_CLAIMS, SAMPLERS, is_plugin
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.estimate import DEFAULT_LIMITS
 from airground_drake.scenarios.shipped import argument
-from airground_drake.side_by_side import processors
 from airground_drake.usage import EXIT_TOOL, Parser, positive, refuse, whole
 
 if TYPE_CHECKING:
@@ -104,10 +104,10 @@ def _run(spec: Spec, options: argparse.Namespace) -> int:
     files.try_to_create(path)
     files.try_to_create(_small(path))
     search = Search(replace(spec, claims=(options.claim,)), objective, DEFAULT_LIMITS, options.allow_plugins)
-    with told(quiet=options.quiet) as watch, pool.local(options.jobs or processors()) as processes:
+    with progress_bar(quiet=options.quiet) as progress, pool.local(options.jobs or processors()) as processes:
         _try(search, processes)
-        watch.stage(spec.name, options.number, "scenarios")
-        best = falsify(search, sampler, options.number, processes, watch)
+        progress.stage(spec.name, options.number, "scenarios")
+        best = falsify(search, sampler, options.number, processes, progress)
     tried = f"{spec.name}: {best.tried} tried by {options.sampler}"
     if not len(best.point):
         print(f"{tried}, never judged: no {options.most or f'margin of {options.claim}'} in any of them")
@@ -142,8 +142,8 @@ def _small(path: Path) -> Path:
 def _save(search: Search, best: Best, path: Path, tests: int) -> None:
     """Write the scenario of the best point; beside it a small one, if it is a counterexample."""
     from airground_drake.campaign.shrink import shrink
+    from airground_drake.scenarios.limits import MAX_NAME
     from airground_drake.scenarios.load import resolved
-    from airground_drake.scenarios.schema import MAX_NAME
 
     scenario = search.spec.scenario_of(search.values(best.point), 0)
     data = resolved(scenario)

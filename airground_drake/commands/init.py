@@ -10,7 +10,7 @@ from pathlib import Path
 from airground_drake import files
 from airground_drake.errors import FolderError, one_line
 from airground_drake.scenarios.fleet import fleet
-from airground_drake.scenarios.schema import MAX_NAME, MAX_SEED, MAX_UGVS
+from airground_drake.scenarios.limits import MAX_NAME, MAX_SEED, MAX_UGVS
 from airground_drake.scenarios.shipped import argument, json_schema_file, shipped_files
 from airground_drake.usage import Parser, refuse, whole
 

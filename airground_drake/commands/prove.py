@@ -86,12 +86,15 @@ def _theorems(*, record: bool, limit_s: float) -> int:
 def _runs(options: argparse.Namespace) -> int:
     """Prove the runs of a report."""
     from airground_drake.proofs.runs import prove_report
+    from airground_drake.report import proved
 
     code = 0
     for found in prove_report(options.report, options.run, options.limit):
         print("\n".join(_lines(found)), flush=True)
         if (found.expected or options.run) and not found.distances.proved:
             code = EXIT_UNPROVED
+    if proved.write(options.report):
+        print(f"{options.report / 'report.html'} says so beside {proved.CLAIM}")
     return code
 
 

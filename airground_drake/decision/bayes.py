@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import math
 
-from scipy.optimize import brentq
-
 
 def decision_time(zeta: float, drift: float, noise: float, deviation: float = 0.0) -> float:
     """Mean time to reach +-zeta from `deviation`, (17), s.
@@ -50,6 +48,8 @@ def optimal_threshold(drift: float, noise: float, c1: float, c2: float) -> float
             raise ValueError(f"{name} must be positive and finite, got {value!r}")
     scale = 2.0 * drift / noise**2
     level = c2 / c1 * drift**2 / noise**2
+
+    from scipy.optimize import brentq  # takes long to import, and a fixed threshold needs none of it
 
     def residual(u: float) -> float:  # u = 2 zeta drift / noise^2
         return math.sinh(u) + u - level

@@ -1,7 +1,7 @@
-"""Reads an exported Coq file back and compares it with the run: that its numbers are the recorded ones, Coq cannot see.
+"""Reads an exported Coq file back and compares it with the run.
 
-The file is taken apart by patterns of its own; nothing of the exporter is used but its account of who is to keep which
-distance from whom.
+Coq cannot see whether the numbers in the file are the recorded ones. Patterns of this module take the file apart. Of
+the exporter only `demands` is used: who keeps which distance from whom.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from fractions import Fraction
+from itertools import chain
 from typing import NamedTuple
 
 from airground_drake.errors import AirgroundError
@@ -36,31 +37,23 @@ def compare(text: str, trace: Trace) -> Rounding:
     """
     run = f"run_{trace.run}"
     unit, times, listed = _parts(rf"^Definition {run} := Run (\w+) \[\n(.*?)\] \[\n(.*?)\]\.$", text)
-    parts_in_a_metre = int(unit, 0)
-    if [Fraction(int(t, 0), parts_in_a_metre) for t in times.split(";\n")] != [Fraction(t) for t in trace.t.tolist()]:
+    if [Fraction(int(t, 0), int(unit, 0)) for t in times.split(";\n")] != [Fraction(t) for t in trace.t.tolist()]:
         raise ReadbackError(f"{run}: the times are not those of the trace")
-    obstacles = trace.scenario["obstacles"]
-    recorded = {name: [obstacle["position_m"]] for name, obstacle in obstacles.items()}
+    recorded = {name: [obstacle["position_m"]] for name, obstacle in trace.scenario["obstacles"].items()}
     recorded |= {robot: trace.position(robot).tolist() for robot in trace.robots}
-    numbers = dict(re.findall(r"^Definition (\w+) := (\d+)%nat\.$", text, re.MULTILINE))
     bodies = [name.removesuffix("_places") for name in listed.split("; ")]
-    if list(numbers.items()) != [(name, str(k)) for k, name in enumerate(bodies)] or len(bodies) != len(recorded):
+    numbers = re.findall(r"^Definition (\w+) := (\d+)%nat\.$", text, re.MULTILINE)
+    if numbers != [(name, str(k)) for k, name in enumerate(bodies)] or len(bodies) != len(recorded):
         raise ReadbackError(f"{run}: the bodies are not numbered in their order")
-    off = [
-        abs(said - Fraction(was))
-        for body, places in zip(bodies, recorded.values(), strict=True)
-        for said, was in zip(
-            _coordinates(body, text, len(trace.t), parts_in_a_metre, len(places)),
-            (axis for place in places for axis in place),
-            strict=True,
-        )
-    ]
+    off = list[Fraction]()
+    for body, places in zip(bodies, recorded.values(), strict=True):
+        said = _coordinates(body, text, len(trace.t), int(unit, 0), len(places))
+        off += [abs(one - Fraction(axis)) for one, axis in zip(said, chain(*places), strict=True)]
     if max(off) > Fraction(1, 2 * PARTS):
         raise ReadbackError(f"{run}: a position differs from the trace by {float(max(off)):.3g} m")
     spelled = dict(zip(recorded, bodies, strict=True))
-    _compare_statement(
-        run, text, trace, [(spelled[one], spelled[two], safe) for one, two, safe in demands(trace.scenario)]
-    )
+    wanted = [(spelled[one], spelled[two], safe) for one, two, safe in demands(trace.scenario)]
+    _compare_statement(run, text, trace, wanted)
     return Rounding(sum(each > 0 for each in off), float(max(off)))
 
 
@@ -83,7 +76,7 @@ def _compare_statement(run: str, text: str, trace: Trace, wanted: Sequence[tuple
         raise ReadbackError(f"{run}: the theorem is not about all of the run's time")
     claim = re.compile(rf"{number} <= norm \(sub \(position {run} (\w+) t\) \(position {run} (\w+) t\)\)")
     claims = [(first, second, _value(safe)) for safe, first, second in claim.findall(body)]
-    between = claim.sub("", body)  # nothing but conjunctions, in groups
+    between = claim.sub("", body)  # has to be conjunctions and their parentheses alone
     if claims != list(wanted) or re.sub(r"[\s()]", "", between) != "/\\" * (len(claims) - 1):
         raise ReadbackError(f"{run}: the theorem does not claim the scenario's distance of every pair")
 

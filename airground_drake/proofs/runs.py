@@ -6,7 +6,7 @@ import re
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from airground_drake.errors import TraceError, UnknownNameError, one_line
 from airground_drake.proofs import coq, readback
 from airground_drake.proofs.export import Demand, Recorded, distances_file, law_file, recorded
 from airground_drake.proofs.record import FOLDER, digest
+from airground_drake.proofs.too_near import TooNear, too_near
 from airground_drake.trace import Trace
 
 SCHEMA = "airground_drake.proofs/1"
@@ -36,6 +37,8 @@ class Answer:
         theorem: its name.
         file: it is in.
         why: if it is not proved, in words.
+        refused: the first pair of which Coq computes that it is false.
+        too_near: pairs that do not keep their distance, where that is why.
         axioms: that it rests on.
         seconds: how long Coq took, s.
     """
@@ -44,6 +47,8 @@ class Answer:
     theorem: str
     file: str
     why: str = ""
+    refused: Demand | None = None
+    too_near: Sequence[TooNear] = ()
     axioms: Sequence[str] = ()
     seconds: float = 0.0
 
@@ -118,6 +123,9 @@ def prove(place: Workshop, run: Trace, limit_s: float = coq.LIMIT_S) -> tuple[An
         raise TraceError(one_line(f"run {run.run}: the scenario in meta.json cannot be used: {error!r}")) from None
     rounded = readback.compare(text, run)
     distances = decide(place, exact, f"{exact.name}.v", text, f"{exact.name}_keeps_its_distances", limit_s)
+    if distances.refused and (found := too_near(exact)):
+        words = f"Coq refuses {_pair(distances.refused)}. In exact arithmetic {'; '.join(map(str, found))}"
+        distances = replace(distances, why=words, too_near=found)
     law = Answer(False, f"{exact.name}_obeys_the_law", f"{exact.name}_law.v", "not tried: a distance is not kept")
     if distances.proved:
         law = decide(place, exact, law.file, law_file(exact), law.theorem, limit_s)
@@ -131,16 +139,14 @@ def decide(place: Workshop, run: Recorded, name: str, text: str, theorem: str, l
     try:
         axioms = coq.listed(theorem, coq.compile_file(place.folder / name, limit_s))
     except coq.CoqError as error:
-        return Answer(False, theorem, name, _why(error, _about(run, text, error.line)))
-    return Answer(True, theorem, name, "", axioms, time.perf_counter() - started)
+        refused = _about(run, text, error.line) if COMPUTED in str(error) else None
+        why = f"Coq refuses {_pair(refused)}; later pairs were not tried" if refused else str(error)
+        return Answer(False, theorem, name, why, refused)
+    return Answer(True, theorem, name, axioms=axioms, seconds=time.perf_counter() - started)
 
 
-def _why(error: coq.CoqError, demand: Demand | None) -> str:
-    """Why a theorem is not proved: Coq computes that a pair does not do it, or something keeps Coq from an answer."""
-    if demand is None or COMPUTED not in str(error):
-        return str(error)
-    pair = f"{demand.first} and {demand.second}, {float(demand.safe_m):g} m"
-    return f"Coq computes that it is false of {pair}; later pairs were not tried"
+def _pair(demand: Demand) -> str:
+    return f"{demand.first} and {demand.second}, {float(demand.safe_m):g} m"
 
 
 def _about(run: Recorded, text: str, line: int) -> Demand | None:
@@ -223,4 +229,9 @@ def _entry(answer: Answer) -> dict[str, Any]:
     entry: dict[str, Any] = {"proved": answer.proved, "theorem": answer.theorem, "file": answer.file}
     if answer.proved:
         return entry | {"axioms": list(answer.axioms), "seconds": round(answer.seconds, 3)}
-    return entry | {"why": answer.why}
+    near = [
+        {"first": one.demand.first, "second": one.demand.second, "safe_distance_m": float(one.demand.safe_m)}
+        | {"least_m": one.least_m, "short_m": one.short_m, "t_s": one.t_s}
+        for one in answer.too_near
+    ]
+    return entry | {"why": answer.why} | ({"too_near": near} if near else {})

@@ -23,7 +23,7 @@ from airground_drake.errors import (
     UnknownNameError,
     one_line,
 )
-from airground_drake.progress import told
+from airground_drake.progress import progress_bar
 from airground_drake.report import folder
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.estimate import DEFAULT_LIMITS, GIB, Limits
@@ -75,7 +75,7 @@ def _reported(options: argparse.Namespace, command: str) -> int:
     scenario, digest = load(AUDITED if audited else options.scenario, overrides)
     if audited:
         scenario.name, scenario.title, scenario.description = AUDIT, AUDIT_TITLE, AUDIT_DESCRIPTION
-    from airground_drake.report import attention, make  # once the scenario is valid: this takes long to import
+    from airground_drake.report import attention, make, summary  # once the scenario is valid: this takes long to import
     from airground_drake.verify.cache import cache_folder
 
     kept = None if options.no_cache else cache_folder()
@@ -83,16 +83,18 @@ def _reported(options: argparse.Namespace, command: str) -> int:
     limits = Limits(options.limit_steps, options.limit_memory * GIB)
     with (
         plugins.admitted(scenario, options.scenario, allow=options.allow_plugins),
-        told(quiet=options.quiet, verbose=options.verbose) as watch,
+        progress_bar(quiet=options.quiet, verbose=options.verbose) as progress,
     ):
         report = make.write_report(
-            scenario, digest, output, options.format, command, kept, options.scenario == AUDIT, limits, watch
+            scenario, digest, output, options.format, command, kept, options.scenario == AUDIT, limits, progress
         )
     overall = report["overall"]
     if not options.quiet:
         for item in attention.beforehand(report):
             print(f"{item.words}{f', run {item.run}' if item.run else ''}")
-        print(f"{scenario.name}: {overall['status'].replace('_', ' ')}. {overall['why']}\n{one_line(str(output))}")
+        print(summary.text(report))
+        print(f"{scenario.name}: {overall['status'].replace('_', ' ')}. {summary.as_declared(report).text}")
+        print(one_line(str(output)))
     if options.open and "html" in options.format:
         webbrowser.open((output / "report.html").resolve().as_uri())
     return int(overall["exit_code"])

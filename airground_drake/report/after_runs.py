@@ -14,7 +14,8 @@ from typing import Any, NamedTuple
 
 from airground_drake import files, graphviz, trace
 from airground_drake.diagram import build_diagram, most_complete
-from airground_drake.progress import Watch
+from airground_drake.parallel import start_in_process
+from airground_drake.progress import Progress
 from airground_drake.report import audit, document, folder, html, junit
 from airground_drake.report.figures import moments, threshold, zeno_refine
 from airground_drake.report.figures.draw import draw
@@ -22,7 +23,6 @@ from airground_drake.report.figures.findings import draw as draw_findings
 from airground_drake.report.figures.panels import Figure
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.side_by_side import begun
 from airground_drake.trace import Trace
 from airground_drake.verify import Verdict, verify_all
 from airground_drake.verify.registry import model_claims
@@ -39,7 +39,13 @@ class Judged(NamedTuple):
 
 
 def judge(
-    scenario: Scenario, traces: Mapping[str, Trace], kept: Path | None, *, audited: bool, drawn: bool, watch: Watch
+    scenario: Scenario,
+    traces: Mapping[str, Trace],
+    kept: Path | None,
+    *,
+    audited: bool,
+    drawn: bool,
+    progress: Progress,
 ) -> Judged:
     """Judge the runs and the model and, if asked for, the paper; draw the runs at the same time.
 
@@ -47,10 +53,10 @@ def judge(
         PluginError: if a claim of the scenario cannot be made.
         AirgroundError: if a process dies.
     """
-    figures = begun(partial(draw, scenario, traces)) if drawn else list
-    verdicts = verify_all(scenario, traces.values(), kept=kept, watch=watch)
+    figures = start_in_process(partial(draw, scenario, traces)) if drawn else list
+    verdicts = verify_all(scenario, traces.values(), kept=kept, progress=progress)
     if audited:
-        watch.stage("auditing the paper")
+        progress.stage("auditing the paper")
     findings = audit.whole(scenario, verdicts) if audited else ()
     return Judged(verdicts, findings, figures())
 
@@ -99,13 +105,15 @@ def write(
 
 def _refinement(verdicts: Sequence[Verdict], audited: bool) -> list[Figure]:
     """The figure of ZENO-REFINE, if there is such a verdict: beside finding 9, where that is in the report."""
-    drawn = [zeno_refine.draw(verdict.finding.evidence) for verdict in verdicts if verdict.claim.id == "ZENO-REFINE"]
+    drawn = [
+        zeno_refine.draw(each.finding.evidence) for each in verdicts if (each.claim.id, each.run) == ("ZENO-REFINE", "")
+    ]
     return [replace(figure, beside="audit-9") if audited else figure for figure in drawn if figure is not None]
 
 
 def _threshold(verdicts: Sequence[Verdict]) -> list[Figure]:
-    """The figure of THR-CHOICE, if there is such a verdict."""
-    chosen = [verdict for verdict in verdicts if verdict.claim.id == "THR-CHOICE"]
+    """The figure of THR-CHOICE, if there is such a verdict about the model of all runs."""
+    chosen = [verdict for verdict in verdicts if (verdict.claim.id, verdict.run) == ("THR-CHOICE", "")]
     drawn = [threshold.draw(verdict.inputs, verdict.finding.evidence) for verdict in chosen]
     return [figure for figure in drawn if figure is not None]
 
@@ -134,8 +142,10 @@ def provenance(scenario: Scenario, started: datetime, command: str) -> dict[str,
 
 def _solver(scenario: Scenario, daqp: str) -> str:
     """What solves (26) under method (c)."""
-    route = scenario.gatekeeper.route
-    return f"DAQP {daqp}, one thread" if route == "mixed_integer" else f"that of the route {route}"
+    route, solver = scenario.gatekeeper.route, scenario.gatekeeper.solver
+    if route != "mixed_integer":
+        return f"that of the route {route}"
+    return f"DAQP {daqp}, one thread" if solver == "daqp" else f"{solver}, through Drake, one thread"
 
 
 def _git() -> str:

@@ -13,7 +13,7 @@ from typing import Any
 
 from airground_drake import files
 from airground_drake.errors import ReportError
-from airground_drake.progress import SILENT, Watch
+from airground_drake.progress import SILENT, Progress
 from airground_drake.report import folder
 from airground_drake.report.folder import PAGES
 from airground_drake.runs import simulate_all
@@ -33,7 +33,7 @@ def write_report(
     kept: Path | None = None,
     audited: bool = False,
     limits: Limits = DEFAULT_LIMITS,
-    watch: Watch = SILENT,
+    progress: Progress = SILENT,
 ) -> dict[str, Any]:
     """Simulate every run, judge it, and write everything to a folder.
 
@@ -46,7 +46,7 @@ def write_report(
         kept: folder of kept findings about the model, see `verify_model`; None: everything anew.
         audited: add all findings about the paper, also those that take other runs.
         limits: what the scenario may ask for.
-        watch: is told what is done.
+        progress: is told what is done.
 
     Returns:
         The document, as in report.json.
@@ -67,11 +67,11 @@ def write_report(
     with folder.held(output):
         if kept is not None and kept.is_dir():
             files.sweep(kept)
-        traces = simulate_all(scenario, watch=watch, meanwhile=partial(import_module, _NEXT))
+        traces = simulate_all(scenario, progress=progress, meanwhile=partial(import_module, _NEXT))
         from airground_drake.report import after_runs
 
-        judged = after_runs.judge(scenario, traces, kept, audited=audited, drawn="html" in formats, watch=watch)
-        watch.stage("writing")
+        judged = after_runs.judge(scenario, traces, kept, audited=audited, drawn="html" in formats, progress=progress)
+        progress.stage("writing")
         provenance = after_runs.provenance(scenario, started, command)
         provenance["wall_s"] = time.perf_counter() - clock
         report = after_runs.write(scenario, digest, output, formats, traces, judged, provenance)

@@ -1,4 +1,4 @@
-"""YAML text, or data made in Python, as nodes that know where they come from; every mistake becomes one line.
+"""YAML text, or data made in Python, as plain data that knows where it comes from; every mistake becomes one line.
 
 Scalars are read by the rules of YAML 1.2 (`1e-3` is a number, `yes` and `1:30` are text). Anchors, merge keys
 (`<<`) and templates under top-level keys that begin with an underscore work as in Drake's own files.
@@ -9,17 +9,16 @@ from __future__ import annotations
 import difflib
 import itertools
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import yaml
 
 from airground_drake import files
-from airground_drake.errors import Fault, ScenarioError
-from airground_drake.scenarios import validate
+from airground_drake.errors import Fault, ScenarioError, short
 from airground_drake.scenarios.shipped import shipped, shipped_files
 
 MAX_BYTES = 2**20
@@ -27,9 +26,6 @@ MAX_VALUES = 50_000
 """Values of a scenario with every alias and merge expanded."""
 MAX_DEPTH = 100
 """Of values within values."""
-NO_LINE = -1
-"""Line of what was made in Python."""
-
 TAG = "tag:yaml.org,2002:"
 _SCALARS: dict[str, tuple[str | None, Callable[[str], object]]] = {  # tag: its plain scalars, conversion
     "null": (r"~|null|Null|NULL|", lambda _: None),
@@ -44,6 +40,34 @@ _SCALARS: dict[str, tuple[str | None, Callable[[str], object]]] = {  # tag: its 
 
 Children = dict[str, tuple[yaml.Node, yaml.Node]]
 """Key node (for its line) and value node of each entry."""
+
+Places = dict[tuple[str, ...], tuple[str, str]]
+"""File and line, or command-line option, of key and value, by the names and indices that lead there."""
+
+
+class Document(NamedTuple):
+    """Plain data, and where it comes from.
+
+    Attributes:
+        data: dicts, lists and scalars; None where no value is given.
+        source: where all of it comes from.
+        places: where its entries and items come from.
+    """
+
+    data: Any
+    source: str
+    places: Places
+
+    def where(self, *at: str, key: bool = False) -> str:
+        """File and line, or option, of the entry at a place, or else of what it would be in.
+
+        Args:
+            at: names and indices that lead to it.
+            key: whether the key is meant, which may be in a line before its value.
+        """
+        if at in self.places:
+            return self.places[at][not key]
+        return self.where(*at[:-1], key=key) if at else self.source
 
 
 class _Loader(yaml.BaseLoader):
@@ -90,13 +114,12 @@ def read_data(path: Path) -> tuple[Any, str]:
     Raises:
         ScenarioError: if it cannot be read.
     """
-    root, _, data = read(path)
-    within_limits(root)
-    return _plain(root, ""), files.sha256(data)
+    document, data = read(path)
+    return document.data, files.sha256(data)
 
 
-def read(name_or_path: str | Path) -> tuple[yaml.Node, str, bytes]:
-    """A YAML file, or a shipped scenario: its root node, where it is, and its bytes.
+def read(name_or_path: str | Path) -> tuple[Document, bytes]:
+    """A YAML file, or a shipped scenario; and its bytes.
 
     Raises:
         ScenarioError: if it cannot be read, is no YAML text, or larger than the limits.
@@ -107,7 +130,7 @@ def read(name_or_path: str | Path) -> tuple[yaml.Node, str, bytes]:
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
         raise ScenarioError(f"{source}:{line}", "", Fault("not UTF-8 text"), "wanted: a YAML file") from None
-    return compose(text, source), source, data
+    return parsed(text, source), data
 
 
 def _read_bytes(name_or_path: str) -> tuple[str, bytes]:
@@ -129,7 +152,24 @@ def _read_bytes(name_or_path: str) -> tuple[str, bytes]:
     return source, data
 
 
-def compose(text: str, source: str) -> yaml.Node:
+def parsed(text: str, source: str, at: tuple[str, ...] = ()) -> Document:
+    """The data of YAML text, within the limits.
+
+    Args:
+        text: the text; keys of a whole document that begin with an underscore are templates, and left out.
+        source: file or command-line option, for messages.
+        at: where the data belongs in a document.
+
+    Raises:
+        ScenarioError: if it is no YAML, no plain data, or larger than the limits.
+    """
+    root = _composed(text, source)
+    _within_limits(root)
+    places: Places = {at: (_where(root), _where(root))}
+    return Document(_plain(root, at, places), source, places)
+
+
+def _composed(text: str, source: str) -> yaml.Node:
     """Nodes of a YAML document whose marks bear the source's name."""
     try:
         loader = _Loader(text)
@@ -145,107 +185,125 @@ def compose(text: str, source: str) -> yaml.Node:
     return root
 
 
-def of_data(data: Any, source: str) -> yaml.Node:
+def of_data(data: Any, source: str) -> Document:
     """A document of nested dicts and lists made in Python.
 
     Raises:
         ScenarioError: if it is nested too deeply.
     """
     try:
-        return _node(data, source)
+        return Document(simple(data), source, {})
     except RecursionError:
         raise _excess(source, deep=True) from None
 
 
-def _node(value: Any, source: str) -> yaml.Node:
-    """A value made in Python as a node of a document; what YAML has no word for is a node of its own tag."""
-    mark = yaml.Mark(source, 0, NO_LINE, 0, None, 0)
-    value = simple(value)
-    if isinstance(value, dict):
-        pairs = [(_node(name, source), _node(each, source)) for name, each in value.items()]
-        return yaml.MappingNode(f"{TAG}map", pairs, mark, mark)
-    if isinstance(value, list):
-        return yaml.SequenceNode(f"{TAG}seq", [_node(each, source) for each in value], mark, mark)
-    kinds = {str: "str", bool: "bool", int: "int", float: "float", type(None): "null"}
-    text = repr(value).replace("inf", ".inf").replace("nan", ".nan") if isinstance(value, float) else str(value)
-    return yaml.ScalarNode(TAG + kinds.get(type(value), type(value).__name__), text, mark, mark)
-
-
 def simple(value: Any) -> Any:
-    """Values of numpy, and tuples, as what YAML knows."""
+    """A copy in which values of numpy, and tuples, are what YAML knows."""
     if isinstance(value, Mapping):
-        return {name: simple(each) for name, each in value.items()}
+        return {str(name): simple(each) for name, each in value.items()}
     if isinstance(value, np.ndarray | np.generic):
         return simple(value.tolist())
     return [simple(each) for each in value] if isinstance(value, list | tuple) else value
 
 
-def _plain(node: yaml.Node, key: str) -> Any:
-    """What a node stands for."""
+def replace(document: Document, override: str) -> None:
+    """Put another value into a document, which is changed.
+
+    Args:
+        document: to be changed.
+        override: `dotted.key=value`; items of lists by index, names that are not there yet are added.
+
+    Raises:
+        ScenarioError: if it has another form, its value is no YAML, or there is no such item.
+    """
+    source = f"--set {short(override)}"
+    key, equals, text = override.partition("=")
+    if not equals or not key.strip():
+        raise ScenarioError(source, "", override, "wanted: dotted.key=value, such as control.period_s=0.05")
+    at = tuple(key.strip().split("."))
+    if at[::2][:2] == ("runs", "set"):  # whose keys have dots
+        at = at[:3] + (".".join(at[3:]),) * (len(at) > 3)
+    put(document, at, parsed(text, source, at).data, source)
+
+
+def put(document: Document, at: tuple[str, ...], new: Any, source: str) -> None:
+    """Put another value at a place of a document, which is changed.
+
+    Raises:
+        ScenarioError: if it leads to no such item of a list.
+    """
+    data = document.data
+    for place in [each for each in document.places if each[: len(at)] == at]:
+        del document.places[place]
+    for depth, name in enumerate(at, start=1):
+        options = [*data] if isinstance(data, dict) else [*map(str, range(len(data if isinstance(data, list) else ())))]
+        if name not in options and not (name and isinstance(data, dict)):
+            raise unknown(source, ".".join(at[:depth]), name, options)
+        index: Any = int(name) if isinstance(data, list) else name
+        if depth == len(at) or name not in options:
+            data[index] = new if depth == len(at) else {}
+            document.places[at[:depth]] = (source, source)
+        data = data[index]
+
+
+def _plain(node: yaml.Node, at: tuple[str, ...], places: Places) -> Any:
+    """What a node stands for; the places of what is in it are added."""
+    key = ".".join(at)
     if isinstance(node, yaml.ScalarNode):
-        value = value_of(node)
-        if isinstance(value, Fault) and node.tag != f"{TAG}null":
-            raise ScenarioError(where(node), key, value, "wanted: plain YAML")
-        return None if isinstance(value, Fault) else value
-    entries = {name: _plain(child, validate.dotted(key, name)) for name, (_, child) in entries_of(node, key).items()}
-    return list(entries.values()) if isinstance(node, yaml.SequenceNode) else entries
+        value = _value_of(node)
+        if isinstance(value, Fault):
+            raise ScenarioError(_where(node), key, value, "wanted: plain YAML")
+        return value
+    if node.tag not in (f"{TAG}map", f"{TAG}seq"):
+        raise ScenarioError(_where(node), key, _value_of(node), "wanted: plain YAML")
+    values = {}
+    for name, (name_node, child) in _entries_of(node, key).items():
+        if at or not name.startswith("_"):  # the others are templates
+            places[*at, name] = _where(name_node), _where(child)
+            values[name] = _plain(child, (*at, name), places)
+    return list(values.values()) if isinstance(node, yaml.SequenceNode) else values
 
 
-def value_of(node: yaml.Node) -> object:
-    """Value of a scalar node; a `Fault` that says what it is for any other."""
+def _value_of(node: yaml.Node) -> object:
+    """Value of a scalar node, None where none is given; a `Fault` that says what it is for any other."""
     tag = node.tag.removeprefix(TAG)
     if not isinstance(node, yaml.ScalarNode) or tag not in _SCALARS:
         return Fault({"map": "a mapping is given", "seq": "a list is given"}.get(tag, f"the tag {tag} is given"))
     try:
-        value = _SCALARS[tag][1](node.value)
+        return _SCALARS[tag][1](node.value)
     except ValueError:
         return Fault("a value is given that cannot be read")
-    return Fault("no value is given") if value is None else value
 
 
-def entries_of(node: yaml.Node, key: str) -> Children:
+def _entries_of(node: yaml.Node, key: str) -> Children:
     """Entries of a mapping with what it merges, items of a list by index; none of a scalar."""
     if isinstance(node, yaml.SequenceNode):
         return {str(index): (child, child) for index, child in enumerate(node.value)}
     entries: Children = {}
     for name, child in node.value if isinstance(node, yaml.MappingNode) else ():
         if not isinstance(name, yaml.ScalarNode):
-            raise ScenarioError(where(name), key, Fault("a list or mapping is given as a key"), "wanted: a name")
+            raise ScenarioError(_where(name), key, Fault("a list or mapping is given as a key"), "wanted: a name")
         if name.value in entries:
-            first = where(entries[name.value][0])
-            raise ScenarioError(where(name), validate.dotted(key, name.value), Fault("given twice"), f"first: {first}")
+            first = _where(entries[name.value][0])
+            raise ScenarioError(_where(name), _dotted(key, name.value), Fault("given twice"), f"first: {first}")
         entries[name.value] = (name, child)
     if "<<" in entries:
         _, template = entries.pop("<<")
         parts = [entries]  # by precedence
         for each in template.value if isinstance(template, yaml.SequenceNode) else [template]:
             if not isinstance(each, yaml.MappingNode):
-                raise ScenarioError(
-                    where(each), validate.dotted(key, "<<"), value_of(each), "wanted: mappings to merge"
-                )
-            parts.append(entries_of(each, key))
+                raise ScenarioError(_where(each), _dotted(key, "<<"), _value_of(each), "wanted: mappings to merge")
+            parts.append(_entries_of(each, key))
         entries = dict(entry for part in reversed(parts) for entry in part.items())
     return entries
 
 
-def nearest(node: yaml.Node, key: str) -> yaml.Node:
-    """Node where a dotted key, or else its nearest ancestor, is given."""
-    found = node
-    for part in key.split("."):
-        children = entries_of(node, "")
-        if part not in children:
-            break
-        found, node = children[part]
-    return found
+def _where(node: yaml.Node) -> str:
+    """File and line of a node."""
+    return f"{node.start_mark.name}:{node.start_mark.line + 1}"
 
 
-def where(node: yaml.Node) -> str:
-    """File and line, or command-line option or Python object, of a node."""
-    mark = node.start_mark
-    return str(mark.name) if mark.line == NO_LINE or mark.name.startswith("--set ") else f"{mark.name}:{mark.line + 1}"
-
-
-def within_limits(root: yaml.Node) -> None:
+def _within_limits(root: yaml.Node) -> None:
     """Count the values of a document with its aliases and merges expanded, looking at each node once.
 
     Raises:
@@ -260,7 +318,7 @@ def within_limits(root: yaml.Node) -> None:
             counted[id(node)] = 1 + sum(n for n, _ in within), 1 + max((levels for _, levels in within), default=0)
         values, levels = counted.get(id(node), (1, 1))
         if values > MAX_VALUES or above + levels > MAX_DEPTH:
-            raise _excess(where(node), deep=above + levels > MAX_DEPTH)
+            raise _excess(_where(node), deep=above + levels > MAX_DEPTH)
         return values, levels
 
     count(root, 0)
@@ -284,3 +342,15 @@ def suggestion(name: str, options: Iterable[str]) -> str:
     """The beginning of a message: which of the options may have been meant, if one is close to a name."""
     close = difflib.get_close_matches(name, list(options), n=1)
     return f"did you mean {close[0]}? " if close else ""
+
+
+def unknown(source: str, key: str, part: str, options: Sequence[str]) -> ScenarioError:
+    """The error of a key that there is not, the last part of a dotted one."""
+    return ScenarioError(
+        source, key, Fault("unknown key"), f"{suggestion(part, options)}allowed: {', '.join(options) or 'none'}"
+    )
+
+
+def _dotted(key: str, part: str) -> str:
+    """Key of a part of what has this key ('' for the document itself)."""
+    return f"{key}.{part}" if key else part

@@ -17,11 +17,13 @@ These are counts, not times: how long a step takes depends on the machine.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from airground_drake.errors import LimitError
 from airground_drake.registry import METHODS
-from airground_drake.scenarios.schema import Run, Scenario
+
+if TYPE_CHECKING:  # pydantic, which the schema imports, would delay `report --list`
+    from airground_drake.scenarios.schema import Run, Scenario
 
 PREDICTED = 2e-4
 """Work of a period predicted for one UGV next to one point (compiled, some 30 ns) in steps simulated (some 0.2 ms)."""
@@ -92,7 +94,9 @@ class Estimate(NamedTuple):
 
 def estimate(scenario: Scenario) -> Estimate:
     """What all runs of a validated scenario ask for, from its numbers alone; takes no time whatever they are."""
-    of_runs = [_of_run(scenario, run) for run in scenario.runs.values()]
+    from airground_drake.scenarios.load import own
+
+    of_runs = [_of_run(own(scenario, name), run) for name, run in scenario.runs.items()]
     rows, steps, decisions, predicted, memory = (sum(column) for column in zip(*of_runs, strict=True))
     return Estimate(rows, steps, decisions, predicted, PROGRAM + memory + _planning(scenario))
 

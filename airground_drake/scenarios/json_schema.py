@@ -1,4 +1,4 @@
-"""Scenario files as JSON Schema (draft 2020-12), made from the dataclasses of `schema.py`, for editors and validators.
+"""Scenario files as JSON Schema (draft 2020-12), made by pydantic from `schema.py`, for editors, messages and docs.
 
 It has what can be said key by key: types, units, defaults, bounds, what may be named. How values must go together is
 for `validate.py`: what this accepts may still be refused there, never the other way round (with merge keys expanded).
@@ -6,63 +6,28 @@ for `validate.py`: what this accepts may still be refused there, never the other
 
 from __future__ import annotations
 
-import ast
-import inspect
+import functools
 import json
-from collections.abc import Iterable
-from dataclasses import MISSING, Field, fields, is_dataclass
-from typing import Any, get_args, get_origin
+from collections.abc import Sequence
+from dataclasses import MISSING, fields
+from typing import Any
 
-from airground_drake.arrays import LARGEST
-from airground_drake.intervention.database import RANKINGS
-from airground_drake.nsbc.avoidance import COMPOSITIONS
-from airground_drake.registry import (
-    METHODS,
-    MODEL_CLAIMS,
-    PLUGIN_PATTERN,
-    POLICIES,
-    ROUTES,
-    RUN_CLAIMS,
-    UAV_TASKS,
-    Registry,
-)
+from pydantic import TypeAdapter
+
+from airground_drake.registry import Registry
 from airground_drake.scenarios import schema
-from airground_drake.scenarios.schema import MAX_NAME, MAX_SEED, MAX_UGVS
-from airground_drake.scenarios.validate import (
-    BUDGETS,
-    CLAIM_PATTERN,
-    MAX_STAGES,
-    MAX_TEXT,
-    NAME_PATTERN,
-    RULES,
-    SMALLEST,
-    SOURCES,
-    THRESHOLD_RULES,
-    TRIGGERS,
-    unit_of,
-)
+from airground_drake.scenarios.kinds import CLAIM_PATTERN, EXPECTED, NAME_PATTERN, unit_of
+from airground_drake.scenarios.limits import MAX_NAME, MAX_TEXT
 from airground_drake.statuses import EXPECTATIONS
 
 Schema = dict[str, Any]
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
-_ONE_OF: dict[tuple[str, str], Iterable[str]] = {
-    ("Run", "method"): METHODS,
-    ("Run", "composition"): COMPOSITIONS,
-    ("Threshold", "rule"): THRESHOLD_RULES,
-    ("Decision", "trigger"): TRIGGERS,
-    ("Intervention", "ranking"): RANKINGS,
-    ("Gatekeeper", "budget"): BUDGETS,
-    ("Gatekeeper", "rule"): RULES,
-    ("Run", "rule"): ("", *RULES),
-    ("Choice", "source"): SOURCES,
-}
-_REGISTERED = {("Uav", "task"): UAV_TASKS, ("Gatekeeper", "route"): ROUTES, ("Policy", "name"): POLICIES}
-_EXPECTED = {("Run", "expected"): RUN_CLAIMS, ("Scenario", "expected"): MODEL_CLAIMS}
-_MOST = {"stages": MAX_STAGES}
-_MOST_ENTRIES = {"ugvs": {"maxProperties": MAX_UGVS}}
-_AT_LEAST_ONE = {"ugvs", "runs", "paper"}
+NAMES = "[key]"
+"""What pydantic calls the names of a mapping's entries in the place of an error."""
+
+_NAMES = {"anyOf": [{"type": "string", "pattern": NAME_PATTERN, "maxLength": MAX_NAME}, {"const": "<<"}]}
 
 
 def text(*, installed: bool = True) -> str:
@@ -76,116 +41,104 @@ def scenario_schema(*, installed: bool = True) -> Schema:
     Args:
         installed: whether it has the names that installed packages add through entry points, besides our own.
     """
-    kinds = [kind for _, kind in inspect.getmembers(schema, inspect.isclass) if kind.__module__ == schema.__name__]
-    top = _object(schema.Scenario, installed)
+    made = _adapted(TypeAdapter(schema.Scenario).json_schema(), installed)
+    kinds = {name: _object(getattr(schema, name), made["$defs"][name]) for name in sorted(made["$defs"])}
+    top = _object(schema.Scenario, made)
     top["patternProperties"] = {"^_": {"description": "A template, for anchors and aliases."}}
-    return {"$schema": DIALECT, "title": "Scenario of airground_drake", **top} | {
-        "$defs": {kind.__name__: _object(kind, installed) for kind in kinds if kind is not schema.Scenario}
-    }
+    return {"$schema": DIALECT, "title": "Scenario of airground_drake", **top, "$defs": kinds}
 
 
-def says_of_keys() -> dict[tuple[str, str], str]:
-    """What the text below each field of the dataclasses says, by class and field."""
-    found = {}
-    for kind in ast.parse(inspect.getsource(schema)).body:
-        for field, below in zip(getattr(kind, "body", []), getattr(kind, "body", [])[1:], strict=False):
-            if isinstance(field, ast.AnnAssign) and isinstance(below, ast.Expr) and isinstance(kind, ast.ClassDef):
-                found[kind.name, ast.unparse(field.target)] = str(ast.literal_eval(below.value))
-    return found
-
-
-def _object(kind: type, installed: bool) -> Schema:
-    """A dataclass."""
-    says = says_of_keys()
-    properties = {}
-    for field in fields(kind):
-        unit = unit_of(field.name)
-        described = f"{says[kind.__name__, field.name]}{f' [{unit}]' if unit else ''}"
-        value = _value(kind.__name__, field, installed)
-        properties[field.name] = {"description": described, **value, **_default(field)}
-    return {
-        "type": "object",
-        "description": " ".join((kind.__doc__ or "").split()),
-        "properties": {**properties, "<<": True},
-        "required": [field.name for field in fields(kind) if "required" in field.metadata],
-        "additionalProperties": False,
-    }
-
-
-def _default(field: Field[Any]) -> Schema:
-    if "required" in field.metadata:
-        return {}
-    if field.default is not MISSING:
-        return {"default": field.default}
-    return {"default": [] if get_origin(field.type) is list else {}}
-
-
-def _value(kind: str, field: Field[Any], installed: bool) -> Schema:
-    """What may stand under a key."""
-    place = (kind, field.name)
-    if place in _ONE_OF:
-        return {"enum": [*_ONE_OF[place]]}
-    if place in _REGISTERED:
-        return {"anyOf": [{"enum": _names(_REGISTERED[place], installed)}, _PLUGIN]}
-    if place in _EXPECTED:
-        return _expectations(_EXPECTED[place], installed)
-    if place == ("Scenario", "claims"):
-        return {"type": "object", "patternProperties": {CLAIM_PATTERN: _PLUGIN}, "additionalProperties": False}
-    if field.type is int:
-        least, most = int(field.default != 0), _MOST.get(field.name, MAX_SEED)
-        return {"type": "integer", "minimum": least, "maximum": most}
-    if field.type is float:
-        return {"type": "number", "minimum": 0 if "from_zero" in field.metadata else SMALLEST, "maximum": LARGEST}
-    if field.name == "name":
-        return _NAME
-    typed = _typed(field.type, field.name)
-    if field.type == schema.Vector and "required" not in field.metadata:
-        return typed | {"minItems": 0}
-    return typed
-
-
-_PLUGIN: Schema = {"type": "string", "pattern": PLUGIN_PATTERN}
-_NAME: Schema = {"type": "string", "pattern": NAME_PATTERN, "maxLength": MAX_NAME}
-_PLAIN: dict[Any, Schema] = {
-    bool: {"type": "boolean"},
-    str: {"type": "string", "maxLength": MAX_TEXT},
-    float: {"type": "number", "minimum": -LARGEST, "maximum": LARGEST},
-}
-
-
-def _typed(hint: Any, name: str) -> Schema:
-    """A value of this type under a key of this name, whose unit tells points from other lists of numbers."""
-    if hint in _PLAIN:
-        return _PLAIN[hint]
-    if is_dataclass(hint):
-        return {"$ref": f"#/$defs/{getattr(hint, '__name__', '')}"}
-    item = _typed(get_args(hint)[-1], name)
-    some = int(name in _AT_LEAST_ONE)
-    if get_origin(hint) is dict:
-        entries = {"minProperties": some, **_MOST_ENTRIES.get(name, {})}
-        return {"type": "object", "propertyNames": _NAME_OR_MERGE, "additionalProperties": item, **entries}
-    if hint == schema.Vector and unit_of(name) == "m":
-        return {"type": "array", "items": item, "minItems": 3, "maxItems": 3}
-    return {"type": "array", "items": item, "minItems": 2 if name == "waypoints_m" else some}
-
-
-_NAME_OR_MERGE = {"anyOf": [_NAME, {"const": "<<"}]}
+def _adapted(part: Any, installed: bool) -> Any:
+    """Part of what pydantic says, with the names of registries, merge keys among free names, and no titles."""
+    if isinstance(part, Registry):
+        return [*part] if installed else [*part.own]
+    if isinstance(part, list):
+        return [_adapted(each, installed) for each in part]
+    if not isinstance(part, dict):
+        return part
+    says = {name: _adapted(each, installed) for name, each in part.items() if name != "title" or isinstance(each, dict)}
+    if entries := says.get("patternProperties", {}).pop(NAME_PATTERN, None):
+        del says["patternProperties"]
+        says |= {"propertyNames": _NAMES, "additionalProperties": entries}
+    if claims := part.get(EXPECTED):
+        del says[EXPECTED]
+        says |= _expectations(claims, installed)
+    return says
 
 
 def _expectations(claims: Registry, installed: bool) -> Schema:
     """Expected verdicts by claim."""
     one = "|".join(EXPECTATIONS)
     verdict = {"anyOf": [{"enum": [*EXPECTATIONS]}, {"type": "string", "pattern": f"^({one})( or ({one}))*$"}]}
+    known = {name: {"description": claims.says(name), **verdict} for name in _adapted(claims, installed)}
     return {
-        "type": "object",
-        "properties": {
-            **{name: {"description": claims.says(name), **verdict} for name in _names(claims, installed)},
-            "<<": True,
-        },
+        "properties": {**known, "<<": True},
         "patternProperties": {CLAIM_PATTERN: verdict},
         "additionalProperties": False,
     }
 
 
-def _names(registry: Registry, installed: bool) -> list[str]:
-    return [*registry] if installed else [*registry.own]
+def _object(kind: type, made: Schema) -> Schema:
+    """A dataclass: its keys in their order, described with their units, and every default."""
+    properties: Schema = {}
+    for field in fields(kind):
+        says = properties[field.name] = made["properties"][field.name]
+        if unit := unit_of(field.name):
+            says["description"] += f" [{unit}]"
+        if field.default_factory is not MISSING:
+            says["default"] = [] if says.get("type") == "array" else {}
+    return {
+        "type": "object",
+        "description": " ".join(made["description"].split()),
+        "properties": {**properties, "<<": True},
+        "required": made.get("required", []),
+        "additionalProperties": False,
+    }
+
+
+def keys_at(*at: str) -> list[str]:
+    """Keys of the mapping at a place in a scenario, a place being the names and indices that lead to it."""
+    return [key for key in _at(at)[0]["properties"] if key != "<<"]
+
+
+def wanted_at(*at: str) -> str:
+    """What may stand at a place in a scenario, in words."""
+    says, name = _at(at)
+    kind, unit = says.get("type", "string"), unit_of(name, " in ")
+    if "properties" in says:
+        return f"a mapping with the keys {', '.join(keys_at(*at))}"
+    if kind in ("array", "object"):
+        what, size = ("list", "Items") if kind == "array" else ("mapping", "Properties")
+        least, most = says.get(f"min{size}"), says.get(f"max{size}")
+        if least == most == 3:
+            return f"3 numbers{unit}: [x, y, z]"
+        many = f" of {least} {f'to {most}' if most else 'or more'} entries" if least or most else ""
+        return f"a {what}{many}{unit}"
+    return {
+        "number": "a number{unit} from {minimum:g} to {maximum:g}",
+        "integer": "a whole number from {minimum} to {maximum}",
+        "boolean": "true or false",
+        "string": "a name of at most {maxLength} letters, digits and underscores that does not begin with a digit"
+        if says.get("pattern") == NAME_PATTERN
+        else "text of at most {maxLength} characters (in quotes where it looks like a number)",
+    }[kind].format(unit=unit, **{"maxLength": MAX_TEXT, **says})
+
+
+@functools.cache
+def _whole() -> Schema:
+    return scenario_schema()
+
+
+def _at(at: Sequence[str]) -> tuple[Schema, str]:
+    """What is said of a place in a scenario, and the name whose suffix gives its unit."""
+    whole = _whole()
+    says, name = whole, ""
+    for part in at:
+        inner = says.get("properties", {}).get(part)
+        if inner is not None or not unit_of(name):
+            name = name if part.isdecimal() else part
+        if part == NAMES:
+            inner = says["propertyNames"]["anyOf"][0]
+        says = inner or says.get("items") or says.get("additionalProperties") or {}
+        says = whole["$defs"][says["$ref"].rpartition("/")[2]] if "$ref" in says else says
+    return says, name

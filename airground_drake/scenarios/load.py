@@ -1,30 +1,31 @@
 """From the name or file of a scenario to a validated `Scenario`; every mistake becomes one line.
 
-The YAML text is composed to nodes, which know their line (`document.py`); `--set` replaces nodes; the nodes are checked
-against the type hints of the schema, whose dataclasses are built as they are (`typed.py`); `validate.py` checks the
-meaning.
+YAML text becomes plain data that knows its lines, in which `--set` replaces values (`document.py`). pydantic checks the
+data against the dataclasses of `schema.py` and builds them. `validate.py` checks how values go together.
 """
 
 from __future__ import annotations
 
+import copy
 import dataclasses
+import functools
 import json
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import yaml
+from pydantic import TypeAdapter, ValidationError
+from pydantic_core import ErrorDetails
 
 from airground_drake import files
-from airground_drake.errors import Fault, ScenarioError, short
-from airground_drake.scenarios import validate
-from airground_drake.scenarios.document import compose, nearest, of_data, read, simple, where, within_limits
-from airground_drake.scenarios.schema import Scenario, Vector
+from airground_drake.errors import Fault, ScenarioError
+from airground_drake.scenarios import json_schema, validate
+from airground_drake.scenarios.document import Document, of_data, put, read, replace, simple, unknown
+from airground_drake.scenarios.schema import RETIRED_KEYS, Scenario, Vector
 from airground_drake.scenarios.shipped import shipped
-from airground_drake.scenarios.typed import made, replaced
 
-__all__ = ["from_data", "load", "resolved", "shipped", "validated"]
+__all__ = ["from_data", "load", "own", "resolved", "shipped", "validated"]
 
 Overrides = Sequence[str] | Mapping[str, Any]
 """`dotted.key=value` with the value in YAML, or values by dotted key."""
@@ -44,12 +45,9 @@ def load(name_or_path: str | Path, overrides: Overrides = ()) -> tuple[Scenario,
     Raises:
         ScenarioError: if the file cannot be read or an override or the scenario is not valid.
     """
-    root, source, data = read(name_or_path)
+    document, data = read(name_or_path)
     texts = _texts(overrides)
-    for override in texts:
-        within_limits(root)
-        root = _override(root, override)
-    scenario = _build(root, source)
+    scenario = _build(document, texts)
     digest = files.sha256(b"\0".join([data, *(override.encode() for override in texts)]))
     return scenario, digest
 
@@ -85,10 +83,7 @@ def from_data(data: Mapping[str, Any], source: str, overrides: Overrides = ()) -
     Raises:
         ScenarioError: if it is not valid.
     """
-    root = of_data(data, source)
-    for override in _texts(overrides):
-        root = _override(root, override)
-    return _build(root, source)
+    return _build(of_data(data, source), _texts(overrides))
 
 
 def resolved(scenario: Scenario) -> dict[str, Any]:
@@ -102,16 +97,96 @@ def resolved(scenario: Scenario) -> dict[str, Any]:
     return dataclasses.asdict(scenario)
 
 
-def _build(root: yaml.Node, source: str) -> Scenario:
-    """The scenario of a document, checked."""
-    within_limits(root)
-    scenario: Scenario = made(root, Scenario, "", "")
+def _build(document: Document, overrides: Sequence[str]) -> Scenario:
+    """The scenario of a document with overrides, checked."""
+    for override in overrides:
+        replace(document, override)
+    scenario = _checked(document)
+    for name, run in scenario.runs.items():
+        if run.set:
+            _as_set(document, name, run.set)
+    return scenario
+
+
+def own(scenario: Scenario, run: str) -> Scenario:
+    """The scenario as a run of it has it: with the values that the run sets.
+
+    Args:
+        scenario: validated.
+        run: name of one of its runs.
+    """
+    settings = scenario.runs[run].set
+    return _as_set(of_data(resolved(scenario), scenario.name), run, settings) if settings else scenario
+
+
+def _as_set(document: Document, run: str, settings: Mapping[str, Any]) -> Scenario:
+    """The scenario of a document with the values that a run sets.
+
+    Raises:
+        ScenarioError: if it is not valid; names the run, too.
+    """
+    changed = Document(copy.deepcopy(document.data), document.source, dict(document.places))
+    try:
+        for key, value in settings.items():
+            put(changed, tuple(key.split(".")), value, document.where("runs", run, "set", key))
+        return _checked(changed)
+    except ScenarioError as error:
+        allowed = f"{error.allowed} (as run {run} sets it)"
+        raise ScenarioError(error.source, error.key, error.value, allowed) from None
+
+
+def _checked(document: Document) -> Scenario:
+    """The scenario of a document, whatever its runs set."""
+    try:
+        scenario = _adapter().validate_python(document.data)
+    except ValidationError as error:
+        raise _in_words(min(error.errors(include_url=False), key=_rank), document) from None
     _complete(scenario)
     try:
-        validate.check(scenario, source)
+        validate.check(scenario, document.source)
     except ScenarioError as error:
-        raise ScenarioError(where(nearest(root, error.key)), error.key, error.value, error.allowed) from None
+        place = document.where(*error.key.split("."), key=True)
+        raise ScenarioError(place, error.key, error.value, error.allowed) from None
     return scenario
+
+
+@functools.cache
+def _adapter() -> TypeAdapter[Scenario]:
+    return TypeAdapter(Scenario)
+
+
+_UNKNOWN = ("unexpected_keyword_argument", "invalid_key")
+
+
+def _rank(error: ErrorDetails) -> int:
+    """Of several errors one is shown: a key that is not known may be why another is missing."""
+    return 0 if error["type"] in _UNKNOWN else 1 if error["type"] == "missing" else 2
+
+
+def _in_words(error: ErrorDetails, document: Document) -> ScenarioError:
+    """What pydantic says of a value, in one line: where it is, its key, the value, and what is allowed."""
+    kind, given, says = error["type"], error["input"], error.get("ctx", {})
+    loc = [str(part) for part in error["loc"]]
+    at = [part for part in (*loc, *says.get("at", ())) if part != json_schema.NAMES]
+    of_type = kind.endswith(("_type", "missing"))  # then the line of the value is named, not that of its key
+    key, source = ".".join(at), document.where(*at, key=not of_type)
+    if kind == "rule":
+        return ScenarioError(source, key, says["value"], says["allowed"])
+    if key in RETIRED_KEYS:
+        return ScenarioError(source, key, Fault("no longer a key"), RETIRED_KEYS[key])
+    if kind in _UNKNOWN:
+        return unknown(source, key, at[-1], json_schema.keys_at(*at[:-1]))
+    wanted = f"wanted: {json_schema.wanted_at(*(loc[:-2] + loc[-1:] if loc[-1:] == [json_schema.NAMES] else at))}"
+    if kind == "missing":
+        new = f", as {'.'.join(at[:-1])} is new" * source.startswith("--set ")
+        return ScenarioError(source, key, Fault("missing"), wanted + new)
+    if given is None:
+        given = Fault("no value is given")
+    elif isinstance(given, dict):
+        given = Fault("a mapping is given" if of_type else f"{len(given)} entries")
+    elif isinstance(given, list) and of_type:
+        given = Fault("a list is given")
+    return ScenarioError(source, key, given, wanted)
 
 
 def _complete(scenario: Scenario) -> None:
@@ -136,8 +211,8 @@ def _rounded_down(gain: float, period: float) -> float:
 
 def _over_the_targets(scenario: Scenario) -> Vector:
     """Where the UAV's task (9) leads if every UGV reaches its target: over their centroid, [x, y, z], m."""
-    targets = [ugv.target_m for ugv in scenario.ugvs.values() if len(ugv.target_m) == 3]
-    x, y = (sum(target[axis] for target in targets) / max(len(targets), 1) for axis in range(2))
+    targets = [ugv.target_m for ugv in scenario.ugvs.values()]
+    x, y = (sum(target[axis] for target in targets) / len(targets) for axis in range(2))
     return [x, y, scenario.uav.altitude_m]
 
 
@@ -163,12 +238,3 @@ def _texts(overrides: Overrides) -> list[str]:
 def _yaml_of(text: str) -> str:
     """JSON as YAML: any character as it is, where YAML takes the pairs of escapes that JSON has for halves."""
     return "".join(each if " " <= each <= "~" else f"\\U{ord(each):08x}" for each in text)
-
-
-def _override(root: yaml.Node, override: str) -> yaml.Node:
-    """The document with one value replaced; the document itself is left as it is, as aliases may share nodes."""
-    source = f"--set {short(override)}"
-    key, equals, value = override.partition("=")
-    if not equals or not key.strip():
-        raise ScenarioError(source, "", override, "wanted: dotted.key=value, such as control.period_s=0.05")
-    return replaced(root, Scenario, key.strip().split("."), "", compose(value, source))

@@ -1,32 +1,66 @@
-"""The scenario file as dataclasses: every key, its unit (in the key's name) and its meaning.
+"""The scenario file as dataclasses: every key, its unit (in the key's name), what may stand there, and its meaning.
 
-`typed.py` fills them by their type hints. They are mutable, for scenarios changed in Python; after validation
-(`validate.py`) nothing changes them. They have slots, so that Python refuses an attribute that is no key. Positions
-are in the world frame, z up, the ground at z = 0.
+`load.py` has pydantic fill them. They are mutable, for scenarios changed in Python; after validation (`validate.py`)
+nothing changes them. They have slots, so that Python refuses an attribute that is no key. A key without a default is
+needed in a file. Positions are in the world frame, z up, the ground at z = 0.
 """
 
-# No `from __future__ import annotations` here: `typed.py` needs the types themselves, not their names.
+# No `from __future__ import annotations` here: pydantic needs the types themselves, not their names.
 from dataclasses import dataclass, field
+from typing import Annotated, ClassVar
+
+from pydantic import ConfigDict, Field
+
+from airground_drake.registry import METHODS, MODEL_CLAIMS, POLICIES, RETIRED_ROUTES, ROUTES, RUN_CLAIMS, UAV_TASKS
+from airground_drake.scenarios.kinds import (
+    CLAIMS,
+    Count,
+    CountFromZero,
+    GroundPoint,
+    Name,
+    NotNegative,
+    OneValue,
+    Point,
+    PointOrNone,
+    Positive,
+    Real,
+    Share,
+    Words,
+    YesNo,
+    expected_of,
+    one_of,
+    registered,
+    settings_of,
+)
+from airground_drake.scenarios.limits import MAX_STAGES, MAX_UGVS
 
 Vector = list[float]
 
-MAX_UGVS, MAX_SEED = 100, 2**31 - 1
-MAX_NAME = 64  # characters
+TRIGGERS: tuple[str, ...] = ("automaton", "bare")
+SOURCES: tuple[str, ...] = ("calibrated", "ours")
+BUDGETS: tuple[str, ...] = ("counted", "wall_clock")
+RULES: tuple[str, ...] = ("hysteresis", "first_stage")
+SOLVERS: tuple[str, ...] = ("daqp", "gurobi", "mosek")
+SETTABLE: tuple[str, ...] = ("decision", "gatekeeper", "intervention")
+"""Sections that a run may change for itself. Bodies, distances and controllers are those of all runs: a report draws
+them once, and proves safety once."""
 
-REQUIRED = {"required": True}
-"""Of a key that a scenario must have; what stands there before is what pydrake needs."""
-
-FROM_ZERO = {"from_zero": True}
-"""Of a number that may be 0; every other number of the schema must be positive."""
+_NO_LAG = "remove it: longest_s, tries and rest_s bound how long a UGV goes along"
+RETIRED_KEYS = {
+    "gatekeeper.budget_nodes": "remove it: the search of the route mixed_integer is limited in time only",
+    "gatekeeper.lag_m": _NO_LAG,
+    "gatekeeper.behind_s": _NO_LAG,
+}
+"""Keys of earlier versions, and what to do about them."""
 
 
 @dataclass(slots=True)
 class Preset:
     """Preset trajectory rho_rd of a UGV: a polyline travelled at constant speed from t = 0, then held."""
 
-    waypoints_m: list[Vector] = field(default_factory=list, metadata=REQUIRED)
+    waypoints_m: Annotated[list[GroundPoint], Field(min_length=2)]
     """Its corners, at least two: the first at t = 0, the last at the target wherever a run expects the UGV there."""
-    speed_m_s: float = 1.0
+    speed_m_s: Positive = 1.0
     """Constant speed along it; not above the UGV's `max_speed_m_s`."""
 
 
@@ -34,15 +68,15 @@ class Preset:
 class Ugv:
     """One UGV: a planar first-order robot, a disc of radius `radius_m` on the ground."""
 
-    start_m: Vector = field(default_factory=list, metadata=REQUIRED)
+    start_m: GroundPoint
     """Where it starts; z = 0."""
-    target_m: Vector = field(default_factory=list, metadata=REQUIRED)
+    target_m: GroundPoint
     """Where it is to end; z = 0."""
-    preset: Preset = field(default_factory=Preset, metadata=REQUIRED)
+    preset: Preset
     """The trajectory that it follows."""
-    max_speed_m_s: float = 6.0
+    max_speed_m_s: Positive = 6.0
     """Commands are shortened to this speed."""
-    radius_m: float = field(default=0.0, metadata=FROM_ZERO)
+    radius_m: NotNegative = 0.0
     """Of its body, added to the safe distances of its pairs; 0: a point."""
 
 
@@ -54,21 +88,21 @@ class Uav:
     not there, points without a radius. Its own body is a ball of radius `radius_m`.
     """
 
-    name: str = "uav"
+    name: Name = "uav"
     """What it is called in traces and reports."""
-    start_m: Vector = field(default_factory=list, metadata=REQUIRED)
+    start_m: Point = field(kw_only=True)
     """Where it starts."""
-    target_m: Vector = field(default_factory=list)
+    target_m: PointOrNone = field(default_factory=list)
     """Where it is to end; left out or empty: over the centroid of the UGVs' targets, at `altitude_m`."""
-    altitude_m: float = 2.0
+    altitude_m: Positive = 2.0
     """Height over the centroid of the UGVs; more than `air_ground_m` and both radii."""
-    task: str = "formation"
+    task: Annotated[Words, registered(UAV_TASKS)] = "formation"
     """What it does below obstacle avoidance."""
-    max_speed_m_s: float = 10.0
+    max_speed_m_s: Positive = 10.0
     """Commands are shortened to this speed."""
-    phantoms_m: list[Vector] = field(default_factory=list)
+    phantoms_m: list[Point] = field(default_factory=list)
     """Obstacles on its map that are not there."""
-    radius_m: float = field(default=0.0, metadata=FROM_ZERO)
+    radius_m: NotNegative = 0.0
     """Of its body, added to the safe distances of its pairs; 0: a point."""
 
 
@@ -76,11 +110,11 @@ class Uav:
 class Obstacle:
     """A ball to keep away from by the safe distance of (7)-(8); a point with the default radius."""
 
-    position_m: Vector = field(default_factory=list, metadata=REQUIRED)
+    position_m: Point
     """Where it is."""
-    known_to_uav: bool = True
+    known_to_uav: YesNo = True
     """Whether it is on the UAV's map from the beginning."""
-    radius_m: float = field(default=0.0, metadata=FROM_ZERO)
+    radius_m: NotNegative = 0.0
     """Of its body, added to the safe distances of its pairs; 0: a point."""
 
 
@@ -92,13 +126,13 @@ class SafeDistance:
     (radius + radius). All other distances, `control.sensing_range_m` among them, are of centres.
     """
 
-    obstacle_m: float = 2.0
+    obstacle_m: Positive = 2.0
     """Of a robot to an obstacle."""
-    ugv_m: float = 2.0
+    ugv_m: Positive = 2.0
     """Of two UGVs."""
-    air_ground_m: float = 1.0
+    air_ground_m: Positive = 1.0
     """Of the UAV to a UGV."""
-    collision_m: float = 0.05
+    collision_m: Positive = 0.05
     """What is closer than this counts as a collision; less than the others."""
 
 
@@ -106,17 +140,17 @@ class SafeDistance:
 class Control:
     """NSBC controllers of all robots: sampled with zero-order hold."""
 
-    period_s: float = 0.025
+    period_s: Positive = 0.025
     """Control period h of all robots."""
-    avoidance_gain_1_s: float = field(default=3.0, metadata=FROM_ZERO)
+    avoidance_gain_1_s: NotNegative = 3.0
     """Of obstacle avoidance; gain times period at most 1, as for all gains (1/period is rounded down to that)."""
-    motion_gain_1_s: float = field(default=2.0, metadata=FROM_ZERO)
+    motion_gain_1_s: NotNegative = 2.0
     """Of tracking the preset trajectory, (6)."""
-    formation_gain_1_s: float = field(default=5.0, metadata=FROM_ZERO)
+    formation_gain_1_s: NotNegative = 5.0
     """Of the UAV's task, (10)."""
-    intervention_gain_1_s: float = field(default=1.5, metadata=FROM_ZERO)
+    intervention_gain_1_s: NotNegative = 1.5
     """Of tracking an intervention, (14)."""
-    sensing_range_m: float = 4.0
+    sensing_range_m: Positive = 4.0
     """What is farther away is not seen; it must cover every safe distance with both radii and a period's closing."""
 
 
@@ -127,17 +161,17 @@ class Threshold:
     'printed' takes the root of (19) as the paper prints it, for comparison: it does not minimise the risk.
     """
 
-    rule: str = "fixed"
+    rule: Annotated[Words, one_of(("fixed",), "decision.bayes:COMPUTED")] = "fixed"
     """Where the threshold comes from."""
-    zeta_m: float = 3.0
+    zeta_m: Positive = 3.0
     """The threshold under the rule 'fixed'."""
-    c1_1_s: float = 0.5
+    c1_1_s: Positive = 0.5
     """Cost of a second until the decision, in the Bayes risk (16)."""
-    c2: float = 1.0
+    c2: Positive = 1.0
     """Cost of an error, in the Bayes risk (16)."""
-    drift_m_s: float = 6.05
+    drift_m_s: Positive = 6.05
     """Drift that the Bayes risk takes."""
-    noise_m_sqrt_s: float = 10.0
+    noise_m_sqrt_s: Positive = 10.0
     """Noise that the Bayes risk takes."""
 
 
@@ -147,17 +181,17 @@ class Decision:
 
     threshold: Threshold = field(default_factory=Threshold)
     """The decision threshold zeta."""
-    trigger: str = "automaton"
+    trigger: Annotated[Words, one_of(TRIGGERS)] = "automaton"
     """With hysteresis and a minimum inter-event time, or without both as in the paper."""
-    release_m: float = 1.5
+    release_m: Positive = 1.5
     """An intervention ends when the decision variable falls to it; below the threshold."""
-    min_inter_event_s: float = field(default=0.5, metadata=FROM_ZERO)
+    min_inter_event_s: NotNegative = 0.5
     """Minimum inter-event time: no trigger follows another sooner."""
-    noise_m_sqrt_s: float = field(default=0.0, metadata=FROM_ZERO)
+    noise_m_sqrt_s: NotNegative = 0.0
     """Noise of the decision variable in the simulation."""
-    leak_1_s: float = field(default=0.0, metadata=FROM_ZERO)
+    leak_1_s: NotNegative = 0.0
     """Rate at which accumulated noise decays; 0: never."""
-    noise_period_s: float = 0.025
+    noise_period_s: Positive = 0.025
     """How often noise is drawn."""
 
 
@@ -165,9 +199,9 @@ class Decision:
 class Policy:
     """One entry of the UAV's behaviour database: a policy's name and its numbers."""
 
-    name: str = field(default_factory=str, metadata=REQUIRED)
+    name: Annotated[Words, registered(POLICIES)]
     """Which policy."""
-    parameters: dict[str, float] = field(default_factory=dict)
+    parameters: dict[Name, Real] = field(default_factory=dict)
     """Its numbers, by name."""
 
 
@@ -180,13 +214,13 @@ class Intervention:
     effort in counts, such as `coordinate`, is not timed (one of others is, after a minute).
     """
 
-    period_s: float = 0.05
+    period_s: Positive = 0.05
     """How often the UAV plans; a multiple of the control period."""
-    retry_s: float = field(default=1.0, metadata=FROM_ZERO)
-    """How long it rests after a refusal, or when no policy has proposed anything."""
-    ranking: str = "predicted"
+    retry_s: NotNegative = 1.0
+    """How long it rests after a refusal; when no policy has a proposal, twice as long each time in a row."""
+    ranking: Annotated[Words, one_of((), "intervention.database:RANKINGS")] = "predicted"
     """Which policy is asked first."""
-    budget_s: float = 2.0
+    budget_s: Positive = 2.0
     """Time that a policy may take for a proposal, by the clock."""
     policies: list[Policy] = field(default_factory=list)
     """The behaviour database, in order."""
@@ -199,57 +233,54 @@ class Gatekeeper:
     Under method (c) a decision on a proposal is reversed only for a plan that is cheaper by the (relative) switching
     margin, and not before `min_dwell_s` have passed. That is ours: by the paper's own rule, `first_stage`, the first
     stage of each plan is executed, whatever was answered before. A decision may take `budget_iterations` of the solver
-    of a relaxation and a second of the search of `mixed_integer` (budget 'counted': a run is the same on every machine
-    unless a search meets that limit, which the report counts), or besides the share `budget_share` of the sampling
-    period by the clock (budget 'wall_clock': for real time). `terminal_weight_s` is the
-    w of a terminal cost w a ||rho_rd - rho_N||^2 besides (25); the paper has none.
+    of a relaxation and 20,000 iterations of the search of `mixed_integer` (budget 'counted': a run is the same on every
+    machine on which these take less than 10 s, ten times what they take), or besides the share `budget_share` of the
+    sampling period by the clock (budget 'wall_clock': for real time). `terminal_weight_s` is the w of a terminal cost
+    w a ||rho_rd - rho_N||^2 besides (25); the paper has none.
 
     Under method (d) outcomes are compared instead, `settling_s` past the end of motion and preset trajectory. An
-    accepted proposal is executed for `longest_s` at most, and given back when the UGV has been farther behind it than
-    predicted, by more than `lag_m`, for `behind_s`. A UGV accepts `tries` proposals, and then none until it has been
-    on its own for `rest_s`.
+    accepted proposal is executed for `longest_s` at most. A UGV accepts `tries` proposals, and then none until it has
+    been on its own for `rest_s`.
     """
 
-    route: str = "mixed_integer"
+    route: Annotated[Words, registered(ROUTES, RETIRED_ROUTES)] = "mixed_integer"
     """How (26) is solved under method (c)."""
-    period_s: float = 0.05
+    period_s: Positive = 0.05
     """How often it decides; a multiple of the control period."""
-    horizon_s: float = 3.0
+    horizon_s: Positive = 3.0
     """How far (26) looks ahead, and how long other robots are predicted to go on."""
-    stages: int = 60
+    stages: Annotated[Count, Field(le=MAX_STAGES)] = 60
     """Stages of (26): horizon_s / stages is a multiple of the control period."""
-    blocks: int = 0
+    blocks: CountFromZero = 0
     """Accept variables of (26), each for a block of stages, for route mixed_integer; 0: one per stage."""
-    error_weight_1_m2_s: float = 1.0
+    solver: Annotated[Words, one_of(SOLVERS)] = "daqp"
+    """What searches for the optimum of route mixed_integer; the others need a Drake that has them, and a licence."""
+    error_weight_1_m2_s: Positive = 1.0
     """a of (25): weight of the distance to the preset trajectory."""
-    slack_weight_1_m2_s: float = field(default=1000.0, metadata=FROM_ZERO)
+    slack_weight_1_m2_s: NotNegative = 1000.0
     """Weight of the slack of the soft constraints in (25)."""
-    terminal_weight_s: float = field(default=0.0, metadata=FROM_ZERO)
+    terminal_weight_s: NotNegative = 0.0
     """w of a terminal cost that the paper does not have."""
-    rule: str = "hysteresis"
+    rule: Annotated[Words, one_of(RULES)] = "hysteresis"
     """How a plan becomes the answer under method (c): with margin and dwell, or by its first stage alone."""
-    switching_margin: float = field(default=0.05, metadata=FROM_ZERO)
+    switching_margin: NotNegative = 0.05
     """How much cheaper, relatively, a plan must be to reverse a decision of method (c)."""
-    min_dwell_s: float = field(default=0.2, metadata=FROM_ZERO)
+    min_dwell_s: NotNegative = 0.2
     """How long a decision of method (c) stands at least."""
-    budget: str = "counted"
+    budget: Annotated[Words, one_of(BUDGETS)] = "counted"
     """What bounds a decision's effort: counts only, or also the clock."""
-    budget_iterations: int = 100
+    budget_iterations: Count = 100
     """Iterations of the solver of a relaxation."""
-    budget_share: float = 0.5
+    budget_share: Share = 0.5
     """Share of the sampling period, by the clock; at most 1."""
-    longest_s: float = 30.0
+    longest_s: Positive = 30.0
     """How long an accepted proposal is executed at most."""
-    settling_s: float = 10.0
+    settling_s: Positive = 10.0
     """How far outcomes are compared past the end of motion and preset trajectory."""
-    tries: int = 5
+    tries: Count = 5
     """Acceptances until a rest."""
-    rest_s: float = 5.0
+    rest_s: Positive = 5.0
     """How long a UGV is then on its own."""
-    lag_m: float = 0.5
-    """How much farther behind than predicted is tolerated."""
-    behind_s: float = 2.0
-    """For how long."""
 
 
 @dataclass(slots=True)
@@ -259,17 +290,19 @@ class Run:
     `stalls_m` names the UGVs that must end (to within `stall_tolerance_m`) at that point short of their
     target. `expected` maps claim identifiers to the expected verdict; a claim not named must hold. Where
     there is no guarantee, "holds or refuted" admits either. `exercised` is "holds, and something put it to the test".
+    `set: {decision.threshold.zeta_m: 2.0}` gives this run a value of its own, as `--set` gives one to all runs. Claims
+    about the model whose constants it changes are judged for this run, too; `expected` may name them.
     """
 
-    method: str = field(default_factory=str, metadata=REQUIRED)
+    method: Annotated[Words, one_of(METHODS)]
     """How UAV and UGVs are coupled."""
-    composition: str = "augmented"
+    composition: Annotated[Words, one_of((), "nsbc.avoidance:COMPOSITIONS")] = "augmented"
     """How avoidance is composed with the tasks below: 'augmented' or a reading of recursion (5)."""
-    rule: str = ""
-    """Instead of `gatekeeper.rule`, in this run; '': that one."""
-    stalls_m: dict[str, Vector] = field(default_factory=dict)
+    set: Annotated[dict[Words, OneValue], settings_of(SETTABLE)] = field(default_factory=dict)
+    """Other values in this run, by dotted key of `decision`, `gatekeeper` or `intervention`."""
+    stalls_m: dict[Name, GroundPoint] = field(default_factory=dict)
     """Where UGVs must end short of their target, by UGV."""
-    expected: dict[str, str] = field(default_factory=dict)
+    expected: Annotated[dict[Words, Words], expected_of(RUN_CLAIMS)] = field(default_factory=dict)
     """Expected verdicts of claims about this run, by claim; unnamed ones must hold."""
 
 
@@ -282,29 +315,29 @@ class Reproduction:
     is then neither reproduced nor not.
     """
 
-    id: str = field(default_factory=str, metadata=REQUIRED)
+    id: Words
     """Identifier of the row."""
-    quantity: str = field(default_factory=str, metadata=REQUIRED)
+    quantity: Words
     """What is compared, in words."""
-    measure: str = field(default_factory=str, metadata=REQUIRED)
+    measure: Words
     """How our value is measured: see `report/reproduction.py`."""
-    run: str = field(default_factory=str, metadata=REQUIRED)
+    run: Words
     """On which run."""
-    robot: str = field(default_factory=str, metadata=REQUIRED)
+    robot: Words
     """Of which robot."""
-    paper: list[float] = field(default_factory=list, metadata=REQUIRED)
+    paper: Annotated[list[Real], Field(min_length=1)]
     """The paper's value, one number for each component."""
-    unit: str = ""
+    unit: Words = ""
     """Its unit."""
-    tolerance: float = field(default=0.0, metadata=FROM_ZERO)
+    tolerance: NotNegative = 0.0
     """How far ours may be off."""
-    calibrated: bool = False
+    calibrated: YesNo = False
     """Whether something was chosen so that the value comes out."""
-    why: str = ""
+    why: Words = ""
     """Why the row is as it is."""
-    ambiguous: str = ""
+    ambiguous: Words = ""
     """Another way to read the paper, in words."""
-    by_construction: bool = False
+    by_construction: YesNo = False
     """Whether the scenario itself says the value."""
 
 
@@ -312,13 +345,13 @@ class Reproduction:
 class Choice:
     """Where a value that is not the paper's comes from: `source` is 'calibrated' or 'ours'."""
 
-    key: str = field(default_factory=str, metadata=REQUIRED)
+    key: Words
     """Dotted key of the value."""
-    source: str = field(default_factory=str, metadata=REQUIRED)
+    source: Annotated[Words, one_of(SOURCES)]
     """Where it comes from."""
-    paper: str = ""
+    paper: Words = ""
     """What the paper has instead."""
-    reason: str = field(default_factory=str, metadata=REQUIRED)
+    reason: Words = field(kw_only=True)
     """Why it is as it is."""
 
 
@@ -331,25 +364,29 @@ class Scenario:
     to those of the package: `module:Class` or `file.py:Class` by identifier.
     """
 
-    name: str = field(default_factory=str, metadata=REQUIRED)
+    __pydantic_config__: ClassVar = ConfigDict(
+        extra="forbid", revalidate_instances="always", use_attribute_docstrings=True
+    )
+
+    name: Name
     """What it is called: letters, digits and underscores."""
-    title: str = ""
+    title: Words = ""
     """One line."""
-    description: str = ""
+    description: Words = ""
     """What it shows."""
-    seed: int = 0
+    seed: CountFromZero = 0
     """Of the decision noise."""
-    duration_s: float = 30.0
+    duration_s: Positive = 30.0
     """How long each run is simulated, at least one control period."""
-    arrival_tolerance_m: float = 0.1
+    arrival_tolerance_m: Positive = 0.1
     """How close to its target a robot has arrived."""
-    stall_tolerance_m: float = 0.1
+    stall_tolerance_m: Positive = 0.1
     """How close to its point in `stalls_m` a UGV must end."""
-    ugvs: dict[str, Ugv] = field(default_factory=dict, metadata=REQUIRED)
+    ugvs: Annotated[dict[Name, Ugv], Field(min_length=1, max_length=MAX_UGVS)] = field(kw_only=True)
     """The UGVs, 1 to 100, by name, in the order of all arrays."""
-    uav: Uav = field(default_factory=Uav, metadata=REQUIRED)
+    uav: Uav = field(kw_only=True)
     """The UAV."""
-    obstacles: dict[str, Obstacle] = field(default_factory=dict)
+    obstacles: dict[Name, Obstacle] = field(default_factory=dict)
     """The obstacles, by name."""
     safe_distance: SafeDistance = field(default_factory=SafeDistance)
     """Distances to keep."""
@@ -361,11 +398,11 @@ class Scenario:
     """What the UAV proposes, and when."""
     gatekeeper: Gatekeeper = field(default_factory=Gatekeeper)
     """What a UGV makes of proposals."""
-    runs: dict[str, Run] = field(default_factory=dict, metadata=REQUIRED)
+    runs: Annotated[dict[Name, Run], Field(min_length=1)] = field(kw_only=True)
     """The simulations, by name."""
-    claims: dict[str, str] = field(default_factory=dict)
+    claims: Annotated[dict[Words, Words], CLAIMS] = field(default_factory=dict)
     """Claims of one's own, by identifier."""
-    expected: dict[str, str] = field(default_factory=dict)
+    expected: Annotated[dict[Words, Words], expected_of(MODEL_CLAIMS)] = field(default_factory=dict)
     """Expected verdicts of claims about the model, by claim."""
     reproduction: list[Reproduction] = field(default_factory=list)
     """The paper's numbers to compare with."""

@@ -1,65 +1,33 @@
-"""What a well-formed scenario must satisfy to make sense: one small function per rule, all in `CHECKS`.
+"""How the values of a scenario must go together: one small function per rule, all in `CHECKS`.
 
-A check yields its problems as (key, value, allowed); `check` raises the first. What may be named is looked up in
-`registry`; nothing that a scenario names is imported here.
+What each value may be by itself is in `schema.py`. A check yields its problems as (key, value, allowed); `check` raises
+the first. Nothing that a scenario names is imported here.
 """
 
 from __future__ import annotations
 
 import math
-import re
-import unicodedata
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import fields, is_dataclass
+from dataclasses import asdict
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from fractions import Fraction
 from itertools import pairwise, starmap
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial.distance import cdist
 
-from airground_drake.arrays import LARGEST
 from airground_drake.decision.bayes import COMPUTED
 from airground_drake.errors import Fault, ScenarioError
-from airground_drake.intervention.database import RANKINGS
-from airground_drake.nsbc.avoidance import COMPOSITIONS
-from airground_drake.registry import (
-    METHODS,
-    MODEL_CLAIMS,
-    PLUGIN,
-    POLICIES,
-    RETIRED_CLAIMS,
-    RETIRED_ROUTES,
-    ROUTES,
-    RUN_CLAIMS,
-    UAV_TASKS,
-    Registry,
-    is_plugin,
-)
+from airground_drake.registry import MODEL_CLAIMS, RETIRED_CLAIMS, ROUTES, RUN_CLAIMS
 from airground_drake.scenarios.rounding import TOLERANCE_M, Rounding
-from airground_drake.scenarios.schema import MAX_NAME, MAX_SEED, MAX_UGVS, Scenario, Vector
-from airground_drake.statuses import EXPECTATIONS, alternatives
+from airground_drake.scenarios.schema import Scenario, Vector
+from airground_drake.statuses import alternatives
 
-TRIGGERS: tuple[str, ...] = ("automaton", "bare")
-THRESHOLD_RULES: tuple[str, ...] = ("fixed", *COMPUTED)
-SOURCES: tuple[str, ...] = ("calibrated", "ours")
-BUDGETS: tuple[str, ...] = ("counted", "wall_clock")
-RULES: tuple[str, ...] = ("hysteresis", "first_stage")
-
-MAX_STAGES = 1000
-MAX_TEXT = 10_000  # characters
-NAME_PATTERN = "^[A-Za-z_][A-Za-z0-9_]*$"  # of a UGV, an obstacle, a run, a parameter
-CLAIM_PATTERN = f"^[A-Z][A-Z0-9-]{{0,{MAX_NAME - 1}}}$"
 GAINS = ("avoidance_gain_1_s", "motion_gain_1_s", "formation_gain_1_s", "intervention_gain_1_s")
-SMALLEST = 1e-9  # of a positive number
 ARRIVES = "LIVE-GOAL"  # the claim that every UGV ends where it is to end
 TOLERANCE = 1e-9  # m between points; relative between periods
 _SHORT = 1.0 - 1e-5  # of a limit that is printed with six digits, so that what a message allows is allowed
-
-# Unit by the suffix of a key, the longest suffix first.
-_UNITS = {"m_sqrt_s": "m/sqrt(s)", "1_m2_s": "1/(m^2 s)", "m_s": "m/s", "1_s": "1/s", "m": "m", "s": "s"}
 
 Problems = Iterator[tuple[str, object, str]]
 
@@ -79,189 +47,48 @@ def check(scenario: Scenario, source: str) -> None:
             raise ScenarioError(source, key, value, allowed)
 
 
-def unit_of(name: str, before: str = "") -> str:
-    """Unit that the suffix of a key says, with words before it; '' if it says none."""
-    return next((before + unit for suffix, unit in _UNITS.items() if name.endswith(f"_{suffix}")), "")
-
-
-def dotted(key: str, part: str) -> str:
-    """Key of a part of what has this key ('' for the scenario itself)."""
-    return f"{key}.{part}" if key else part
-
-
-def _one_of(key: str, value: str, allowed: Iterable[str], what: str = "one of") -> Problems:
+def _one_of(key: str, value: str, allowed: Iterable[str], what: str) -> Problems:
     options = tuple(allowed)
     if value not in options:
         yield key, value, f"{what} {', '.join(options) or '(none)'}"
 
 
-def _expectation(key: str, expected: str) -> Problems:
-    for status in alternatives(expected):
-        if status not in EXPECTATIONS:
-            allowed = f"one of {', '.join(EXPECTATIONS)}, or several of them, such as: exercised or refuted"
-            yield key, expected, allowed
-
-
-def _registered(key: str, name: str, registry: Registry) -> Problems:
-    if not registry.accepts(name):
-        yield key, name, f"one of {', '.join(registry.allowed)}"
-
-
-def _nodes(value: object, key: str = "", name: str = "") -> Iterator[tuple[str, str, object]]:
-    """(dotted key, name of the field or parameter, value) of a value and of everything in it."""
-    yield key, name, value
-    if is_dataclass(value):
-        children = [(field.name, field.name, getattr(value, field.name)) for field in fields(value)]
-    elif isinstance(value, dict):
-        children = [(entry, name if unit_of(name) else entry, child) for entry, child in value.items()]
-    else:
-        children = [(str(index), name, child) for index, child in enumerate(value if isinstance(value, list) else ())]
-    for part, child_name, child in children:
-        yield from _nodes(child, dotted(key, part), child_name)
-
-
-def _finite(scenario: Scenario) -> Problems:
-    for key, name, value in _nodes(scenario):
-        if isinstance(value, float) and not abs(value) <= LARGEST:
-            yield key, value, f"a finite number{unit_of(name, ' in ')}, at most {LARGEST:g} in size"
-
-
-def _bounds(scenario: Scenario) -> Problems:
-    for key, _, value in _nodes(scenario):
-        for field in fields(value) if is_dataclass(value) else ():
-            least = 0.0 if "from_zero" in field.metadata else SMALLEST
-            if isinstance(field.default, float) and getattr(value, field.name) < least:
-                allowed = f"a number{unit_of(field.name, ' in ')}, not below {least:g}"
-                yield dotted(key, field.name), getattr(value, field.name), allowed
-
-
-def _texts(scenario: Scenario) -> Problems:
-    """No text may take anything else's place where it is shown: no control characters, nothing that turns writing."""
-    for key, _, value in _nodes(scenario):
-        if isinstance(value, str):
-            if hidden := next(filter(_is_hidden, value), None):
-                allowed = "text without control characters and without marks that turn the direction of writing"
-                yield key, hidden, allowed
-            if len(value) > MAX_TEXT:
-                yield key, value, f"at most {MAX_TEXT} characters are allowed"
-
-
-def _is_hidden(character: str) -> bool:
-    """Whether a character shows only by what it does to others; line breaks, tabs and joiners are not meant."""
-    return character not in "\n\t\u200c\u200d" and unicodedata.category(character) in ("Cc", "Cf", "Cs", "Zl", "Zp")
-
-
 def _names(scenario: Scenario) -> Problems:
-    bodies = [(f"ugvs.{name}", name) for name in scenario.ugvs]
-    bodies += [("uav.name", scenario.uav.name), *((f"obstacles.{name}", name) for name in scenario.obstacles)]
-    others = [("name", scenario.name), *((f"runs.{name}", name) for name in scenario.runs)]
-    for index, policy in enumerate(scenario.intervention.policies):
-        others += [(f"intervention.policies.{index}.parameters.{name}", name) for name in policy.parameters]
-    count = Counter(name for _, name in bodies)
-    for key, name in (*bodies, *others):
-        if not re.fullmatch(NAME_PATTERN, name):
-            yield key, name, "a name of letters, digits and underscores that does not begin with a digit"
-        if len(name) > MAX_NAME:
-            yield key, name, f"a name of at most {MAX_NAME} characters"
-        if count[name] > 1:
-            yield key, name, "a name that no other UGV, obstacle or UAV has"
+    keys = [*((f"ugvs.{name}", name) for name in scenario.ugvs), ("uav.name", scenario.uav.name)]
+    keys += [(f"obstacles.{name}", name) for name in scenario.obstacles]
+    count = Counter(name for _, name in keys)
+    yield from ((key, name, "a name that no other UGV, obstacle or UAV has") for key, name in keys if count[name] > 1)
 
 
-RETIRED_KEYS = {"gatekeeper.budget_nodes": "remove it: the search of the route mixed_integer is limited in time only"}
-"""Keys of earlier versions, and what to do about them."""
-
-
-def _counts(scenario: Scenario) -> Problems:
-    if not 0 <= scenario.seed <= MAX_SEED:
-        yield "seed", scenario.seed, f"a whole number from 0 to {MAX_SEED}"
-    if not 1 <= scenario.gatekeeper.stages <= MAX_STAGES:
-        yield "gatekeeper.stages", scenario.gatekeeper.stages, f"a whole number from 1 to {MAX_STAGES}"
-    if not 0 <= scenario.gatekeeper.blocks <= scenario.gatekeeper.stages:
+def _blocks(scenario: Scenario) -> Problems:
+    gatekeeper = scenario.gatekeeper
+    if gatekeeper.blocks > gatekeeper.stages:
         allowed = "a whole number from 1 to gatekeeper.stages, or 0: one accept variable per stage"
-        yield "gatekeeper.blocks", scenario.gatekeeper.blocks, allowed
-    if scenario.gatekeeper.blocks and scenario.gatekeeper.route in (set(ROUTES.own) - {"mixed_integer"}):
-        yield "gatekeeper.blocks", scenario.gatekeeper.blocks, "0: only the route mixed_integer has blocks"
-    for name in ("budget_iterations", "tries"):
-        if not 1 <= getattr(scenario.gatekeeper, name) <= MAX_SEED:
-            yield f"gatekeeper.{name}", getattr(scenario.gatekeeper, name), f"a whole number from 1 to {MAX_SEED}"
-    if scenario.gatekeeper.budget_share > 1.0:
-        yield "gatekeeper.budget_share", scenario.gatekeeper.budget_share, "at most 1, the whole sampling period"
-    if not 1 <= len(scenario.ugvs) <= MAX_UGVS:
-        yield "ugvs", Fault(f"{len(scenario.ugvs)} UGVs"), f"1 to {MAX_UGVS} are allowed"
-    if not scenario.runs:
-        yield "runs", Fault("no run"), "at least one is needed, such as d: {method: d}"
-
-
-def _options(scenario: Scenario) -> Problems:
-    yield from _one_of("intervention.ranking", scenario.intervention.ranking, RANKINGS)
-    if scenario.gatekeeper.route in RETIRED_ROUTES:
-        what = f"no longer a route: use {RETIRED_ROUTES[scenario.gatekeeper.route]}"
-        yield "gatekeeper.route", scenario.gatekeeper.route, what
-    else:
-        yield from _registered("gatekeeper.route", scenario.gatekeeper.route, ROUTES)
-    yield from _registered("uav.task", scenario.uav.task, UAV_TASKS)
-    for index, policy in enumerate(scenario.intervention.policies):
-        yield from _registered(f"intervention.policies.{index}.name", policy.name, POLICIES)
-    yield from _one_of("gatekeeper.rule", scenario.gatekeeper.rule, RULES)
-    yield from _one_of("gatekeeper.budget", scenario.gatekeeper.budget, BUDGETS)
-    yield from _one_of("decision.trigger", scenario.decision.trigger, TRIGGERS)
-    yield from _one_of("decision.threshold.rule", scenario.decision.threshold.rule, THRESHOLD_RULES)
+        yield "gatekeeper.blocks", gatekeeper.blocks, allowed
+    if gatekeeper.blocks and gatekeeper.route in (set(ROUTES.own) - {"mixed_integer"}):
+        yield "gatekeeper.blocks", gatekeeper.blocks, "0: only the route mixed_integer has blocks"
+    if gatekeeper.solver != "daqp" and gatekeeper.route in (set(ROUTES.own) - {"mixed_integer"}):
+        yield "gatekeeper.solver", gatekeeper.solver, "daqp: only the route mixed_integer has other solvers"
 
 
 def _runs(scenario: Scenario) -> Problems:
     for name, run in scenario.runs.items():
-        yield from _one_of(f"runs.{name}.method", run.method, METHODS)
-        yield from _one_of(f"runs.{name}.composition", run.composition, COMPOSITIONS)
-        yield from _one_of(f"runs.{name}.rule", run.rule, ("", *RULES), "'' (gatekeeper.rule) or one of")
         for robot in run.stalls_m:
             yield from _one_of(f"runs.{name}.stalls_m.{robot}", robot, scenario.ugvs, "one of the UGVs")
-        for claim, status in run.expected.items():
-            known = (*RUN_CLAIMS, *scenario.claims)
+        for claim in run.expected:
+            key = f"runs.{name}.expected.{claim}"
             if claim in RETIRED_CLAIMS:
-                yield f"runs.{name}.expected.{claim}", claim, f"no longer a claim, {RETIRED_CLAIMS[claim]}: remove it"
-                continue
-            yield from _one_of(f"runs.{name}.expected.{claim}", claim, known, "one of the claims")
-            yield from _expectation(f"runs.{name}.expected.{claim}", status)
-    for claim, status in scenario.expected.items():
+                yield key, claim, f"no longer a claim, {RETIRED_CLAIMS[claim]}: remove it"
+            known = (*RUN_CLAIMS, *scenario.claims, *(MODEL_CLAIMS if run.set else ()))
+            yield from _one_of(key, claim, known, "one of the claims")
+    for claim in scenario.expected:
         known = (*MODEL_CLAIMS, *scenario.claims)
         yield from _one_of(f"expected.{claim}", claim, known, "one of the claims about the model")
-        yield from _expectation(f"expected.{claim}", status)
-    for claim, place in scenario.claims.items():
-        if claim in (*RUN_CLAIMS, *MODEL_CLAIMS) or not re.fullmatch(CLAIM_PATTERN, claim):
-            what = f"a new identifier of at most {MAX_NAME} capitals, digits and hyphens, such as MY-CLAIM"
-            yield f"claims.{claim}", claim, what
-        if not is_plugin(place):
-            yield f"claims.{claim}", place, PLUGIN
-
-
-def _ugv_points(scenario: Scenario) -> Iterator[tuple[str, Vector]]:
-    for name, ugv in scenario.ugvs.items():
-        yield f"ugvs.{name}.start_m", ugv.start_m
-        yield f"ugvs.{name}.target_m", ugv.target_m
-        for index, point in enumerate(ugv.preset.waypoints_m):
-            yield f"ugvs.{name}.preset.waypoints_m.{index}", point
-    for run_name, run in scenario.runs.items():
-        for name, point in run.stalls_m.items():
-            yield f"runs.{run_name}.stalls_m.{name}", point
-
-
-def _points(scenario: Scenario) -> Problems:
-    others = [("uav.start_m", scenario.uav.start_m), ("uav.target_m", scenario.uav.target_m)]
-    others += [(f"obstacles.{name}.position_m", each.position_m) for name, each in scenario.obstacles.items()]
-    others += [(f"uav.phantoms_m.{index}", point) for index, point in enumerate(scenario.uav.phantoms_m)]
-    for key, point in (*_ugv_points(scenario), *others):
-        if len(point) != 3:
-            yield key, point, "3 numbers in m: [x, y, z]"
-    for key, point in _ugv_points(scenario):
-        if point[2] != 0.0:
-            yield key, point, "z must be 0 m: a UGV moves on the ground"
 
 
 def _presets(scenario: Scenario) -> Problems:
     for name, ugv in scenario.ugvs.items():
         key = f"ugvs.{name}.preset.waypoints_m"
-        if len(ugv.preset.waypoints_m) < 2:
-            yield key, ugv.preset.waypoints_m, "at least 2 waypoints"
         for index, (before, after) in enumerate(pairwise(ugv.preset.waypoints_m), start=1):
             if math.dist(before, after) <= TOLERANCE:
                 yield f"{key}.{index}", after, "a waypoint other than the one before it"
@@ -426,7 +253,10 @@ def _extent(scenario: Scenario) -> Problems:
     speeds = sorted([scenario.uav.max_speed_m_s, *(ugv.max_speed_m_s for ugv in scenario.ugvs.values())])
     speed, closing = speeds[-1], speeds[-2] + speeds[-1]
     loss = Rounding(control.sensing_range_m, closing, control.period_s, control.avoidance_gain_1_s)
-    points = [each for each in _ugv_points(scenario) if each[0].startswith("ugvs.")]
+    points: list[tuple[str, Vector]] = []
+    for name, ugv in scenario.ugvs.items():
+        points += [(f"ugvs.{name}.start_m", ugv.start_m), (f"ugvs.{name}.target_m", ugv.target_m)]
+        points += [(f"ugvs.{name}.preset.waypoints_m.{i}", each) for i, each in enumerate(ugv.preset.waypoints_m)]
     points.append(("uav.start_m", scenario.uav.start_m))
     points += [(f"obstacles.{name}.position_m", each.position_m) for name, each in scenario.obstacles.items()]
     key, point = max(points, key=lambda entry: max(map(abs, entry[1])))
@@ -484,7 +314,8 @@ def _within(these: Sequence[_Round], those: Sequence[_Round], distance: float) -
         (np.reshape([each.point for each in group], (-1, 3)), np.array([each.radius for each in group]))
         for group in (these, those)
     )
-    for i, j in np.argwhere(cdist(points, others) < distance + np.add.outer(radii, other_radii)).tolist():
+    apart = np.linalg.norm(points[:, None] - others, axis=2)
+    for i, j in np.argwhere(apart < distance + np.add.outer(radii, other_radii)).tolist():
         if these is not those or j < i:
             yield these[i], those[j]
 
@@ -495,22 +326,27 @@ def _reproduction(scenario: Scenario) -> Problems:
         key = f"reproduction.{index}"
         if not row.id or count[row.id] > 1:
             yield f"{key}.id", row.id, "an identifier that no other row has"
-        if not row.paper:
-            yield f"{key}.paper", row.paper, "at least one number"
         yield from _one_of(f"{key}.run", row.run, scenario.runs, "one of the runs")
         yield from _one_of(f"{key}.robot", row.robot, (*scenario.ugvs, scenario.uav.name), "one of the robots")
 
 
 def _choices(scenario: Scenario) -> Problems:
-    keys = {key for key, _, _ in _nodes(scenario) if key}
+    keys = set(_keys(asdict(scenario)))
     for index, choice in enumerate(scenario.choices):
         if choice.key not in keys:
             yield f"choices.{index}.key", choice.key, "a key of this scenario, such as control.period_s"
-        yield from _one_of(f"choices.{index}.source", choice.source, SOURCES)
+
+
+def _keys(value: object, above: str = "") -> Iterator[str]:
+    """Dotted keys of all that is in nested dicts and lists."""
+    entries = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    for name, inner in entries:
+        yield f"{above}{name}"
+        yield from _keys(inner, f"{above}{name}.")
 
 
 CHECKS: tuple[Callable[[Scenario], Problems], ...] = (
-    _finite, _bounds, _counts, _texts, _names, _options, _runs, _points, _presets, _ends, _gains, _periods, _release,
-    _distances, _sensing, _extent, _clearances, _reproduction, _choices,
+    _names, _blocks, _runs, _presets, _ends, _gains, _periods, _release, _distances, _sensing, _extent, _clearances,
+    _reproduction, _choices,
 )  # fmt: skip
-"""Every rule; later ones rely on earlier ones (finite numbers, three coordinates)."""
+"""Every rule; later ones rely on earlier ones."""

@@ -30,6 +30,7 @@ from hypothesis.strategies import DrawFn, SearchStrategy
 from airground_drake.decision.bayes import optimal_threshold
 from airground_drake.registry import METHODS, ROUTES
 from airground_drake.scenarios.schema import (
+    TRIGGERS,
     Control,
     Decision,
     Gatekeeper,
@@ -45,7 +46,6 @@ from airground_drake.scenarios.schema import (
     Ugv,
     Vector,
 )
-from airground_drake.scenarios.validate import TRIGGERS
 
 T = TypeVar("T")
 

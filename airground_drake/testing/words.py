@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from airground_drake.scenarios.validate import unit_of
+from airground_drake.scenarios.kinds import unit_of
 from airground_drake.statuses import PASSING
 from airground_drake.verify.claim import Verdict
 

@@ -1,12 +1,11 @@
 """Claims about the model and about runs.
 
-`verify(trace)` judges a run from its trace alone; `verify_model(scenario)` proves, or supports by experiments of
-its own, what holds whatever the run. Checkers of traces share no code with the controllers, the simulator or the
-optimiser whose work they judge; proofs take their constants from the scenario and hold the running objects against
-them, or read a relation off the running code.
+`verify(trace)` judges a run from its trace alone. `verify_model(scenario)` checks the hypotheses of theorems for the
+constants of a scenario, or makes experiments of its own. Claims about a run share no code with the controllers, the
+simulator or the optimiser whose work they judge.
 
-`claim.py` says what a claim is, `registry.py` which there are; `runs/` has those about a trace and `model/` those about
-the model, one claim in one file, named by its identifier; `engines/` computes and knows no claim.
+`claim.py` says what a claim is, `registry.py` which there are. `runs/` has the claims about a trace and `model/` those
+about the model, each in a file that has its identifier as a name. `engines/` computes for them and knows no claim.
 """
 
 from __future__ import annotations
@@ -49,7 +48,7 @@ _INSTANCES = {"MODEL_CLAIMS": "model_claims", "TRACE_CLAIMS": "run_claims"}
 
 
 def __getattr__(name: str) -> Any:
-    """Import on first use, so that the solvers' processes load no Drake."""
+    """Import on first use: a part of this package loads only what it needs."""
     if name in _INSTANCES:
         return tuple(getattr(import_module(f"{__name__}.registry"), _INSTANCES[name])())
     if name not in _HOME:

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from airground_drake.errors import AirgroundError, UnknownNameError
-from airground_drake.progress import Watch, told
+from airground_drake.progress import Progress, progress_bar
 from airground_drake.scenarios import plugins
 from airground_drake.statuses import NOT_EXERCISED, outcome
 from airground_drake.usage import Parser, refuse
@@ -50,8 +50,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     options = parser().parse_args(arguments)
     try:
-        with told(verbose=options.verbose) as watch:
-            verdicts = _judge(options.target, options.claims, watch, allow_plugins=options.allow_plugins)
+        with progress_bar(verbose=options.verbose) as progress:
+            verdicts = _judge(options.target, options.claims, progress, allow_plugins=options.allow_plugins)
     except (AirgroundError, OSError) as error:
         return refuse(error)
     if missing := set(options.claims) - {verdict.claim.id for verdict in verdicts}:
@@ -76,7 +76,7 @@ def _line(verdict: Verdict) -> str:
     return f"{name}: {found}{margin}{of}{tested}{expected}"
 
 
-def _judge(target: str, wanted: Sequence[str], watch: Watch, *, allow_plugins: bool) -> list[Verdict]:
+def _judge(target: str, wanted: Sequence[str], progress: Progress, *, allow_plugins: bool) -> list[Verdict]:
     """Verdicts on the claims wanted (none: all), as far as they say anything about the target.
 
     Of what a saved run names, only claims of others that are wanted are imported, and nothing unless that is allowed.
@@ -92,7 +92,7 @@ def _judge(target: str, wanted: Sequence[str], watch: Watch, *, allow_plugins: b
 
     folder = Path(target)
     run = trace.load(folder) if os.path.lexists(folder / "meta.json") else None
-    scenario = load(target)[0] if run is None else from_data(run.scenario, target)
+    scenario = load(target)[0] if run is None else from_data(run.meta["scenario"], target)
     added = {name: place for name, place in scenario.claims.items() if not wanted or name in wanted}
     imported = None if run is None else [f"claims.{name}" for name in added]
     with plugins.admitted(scenario, target, allow=allow_plugins, keys=imported):
@@ -103,9 +103,9 @@ def _judge(target: str, wanted: Sequence[str], watch: Watch, *, allow_plugins: b
                 raise UnknownNameError("claim", name, known)
         about_run = [name for name in about_run if run is not None and name in (wanted or about_run)]
         about_model = [name for name in about_model if name in (wanted or about_model)]
-        watch.stage("judging", len(about_run) + len(about_model), "claims")
-        verdicts = [] if run is None else verify(run, about_run, watch)
-        return verdicts + verify_model(scenario, claims=about_model, watch=watch)
+        progress.stage("judging", len(about_run) + len(about_model), "claims")
+        verdicts = [] if run is None else verify(run, about_run, progress)
+        return verdicts + verify_model(scenario, claims=about_model, progress=progress)
 
 
 if __name__ == "__main__":

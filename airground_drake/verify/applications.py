@@ -12,7 +12,7 @@ from typing import Any
 
 from airground_drake.trace import Trace
 from airground_drake.verify.finding import Finding
-from airground_drake.verify.model.threshold import thr_choice
+from airground_drake.verify.model import thr_choice
 from airground_drake.verify.runs.followed import followed
 from airground_drake.verify.runs.proposals import accepted_at
 from airground_drake.verify.runs.safe_hyp import guarantees

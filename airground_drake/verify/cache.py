@@ -1,30 +1,26 @@
 """Findings of experiments about the model, kept by content: equal code and inputs, equal finding.
 
 An entry is a file that says what it is about: claim, inputs, digest of the code, versions of the engines, the finding
-and its SHA-256. It is taken if all of that is what is asked for and the finding is well formed, passes and has that
-digest. Anything else is decided anew, so that a damaged entry costs time and no more. An entry that somebody forged
-with its digest is believed: see docs/verification.md.
+and its SHA-256. It is taken if all of that is what is asked for and the finding passes and has that digest. Anything
+else is decided anew, so that a damaged entry costs time and no more. An entry that somebody forged with its digest is
+believed: see docs/verification.md.
 """
 
 from __future__ import annotations
 
 import contextlib
-import inspect
 import json
 import math
 import os
 import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, replace
-from functools import cache, partial
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, NoReturn
-from uuid import uuid4
 
 from airground_drake import files
-from airground_drake.progress import SILENT, Watch
-from airground_drake.side_by_side import side_by_side
 from airground_drake.statuses import PASSING
 from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.finding import Finding
@@ -32,27 +28,20 @@ from airground_drake.verify.finding import Finding
 SCHEMA = "airground_drake.finding/2"
 LARGEST_BYTES = 16_000_000
 """A larger entry is not read."""
-ENGINES = ("numpy", "scipy", "numba", "pyddm")
+KEPT = ("ZENO-REFINE", "THR-DDM")
+"""The claims whose findings are kept: experiments that take seconds."""
+ENGINES = ("numpy", "scipy", "numba")
 """Packages whose versions are part of a finding's key."""
 
 
-def find(
-    claims: Sequence[ModelClaim], inputs: Sequence[dict[str, Any]], *, folder: Path | None = None, watch: Watch = SILENT
-) -> list[Finding]:
-    """The finding of each claim for its inputs.
+def found(claim: ModelClaim, inputs: dict[str, Any], folder: Path | None = None) -> Finding:
+    """The finding of a claim for its inputs.
 
     Args:
-        claims: the claims.
-        inputs: what each is about, strict JSON.
-        folder: where findings are kept; None: computed anew, kept nowhere.
-        watch: is told of each finding.
+        claim: the claim.
+        inputs: what it is about, strict JSON.
+        folder: where findings of `KEPT` are kept; None: computed anew, kept nowhere.
     """
-    pieces = [partial(found, claim, given, folder) for claim, given in zip(claims, inputs, strict=True)]
-    return side_by_side(pieces, names=[claim.id for claim in claims], watch=watch)
-
-
-def found(claim: ModelClaim, inputs: dict[str, Any], folder: Path | None = None) -> Finding:
-    """The finding of one claim for its inputs, see `find`."""
     kept = _read(folder, claim, inputs)
     if kept is not None:
         return kept
@@ -75,21 +64,7 @@ def key(claim: ModelClaim, inputs: Mapping[str, Any]) -> str:
 
 def content(claim: ModelClaim, inputs: Mapping[str, Any]) -> dict[str, Any]:
     """Everything that a finding depends on: the claim, its inputs, our code, the engines' versions."""
-    return {"schema": SCHEMA, "claim": claim.id, "inputs": inputs, "code": _code_of(type(claim)), "engines": _engines()}
-
-
-@cache
-def _code_of(kind: type[ModelClaim]) -> str:
-    """Digest of the package, and of the file that a claim of others is in; without a file, one that is never met again.
-
-    What such a claim imports besides is not looked at.
-    """
-    if kind.__module__.partition(".")[0] == __name__.partition(".")[0]:
-        return _code()
-    try:
-        return f"{_code()} {files.sha256(Path(inspect.getfile(kind)).read_bytes())}"
-    except (OSError, TypeError):
-        return f"{_code()} {uuid4().hex}"
+    return {"schema": SCHEMA, "claim": claim.id, "inputs": inputs, "code": _code(), "engines": _engines()}
 
 
 @cache
@@ -116,7 +91,7 @@ def _engines() -> dict[str, str]:
 
 def _keep(folder: Path | None, claim: ModelClaim, inputs: Mapping[str, Any], finding: Finding) -> None:
     """Write an entry, whole or not at all, of a finding that passes."""
-    if folder is None or not claim.kept or finding.status not in PASSING:
+    if folder is None or claim.id not in KEPT or finding.status not in PASSING:
         return
     made = asdict(finding)
     with contextlib.suppress(OSError):  # a folder that cannot be written keeps nothing
@@ -126,7 +101,7 @@ def _keep(folder: Path | None, claim: ModelClaim, inputs: Mapping[str, Any], fin
 
 def _read(folder: Path | None, claim: ModelClaim, inputs: Mapping[str, Any]) -> Finding | None:
     """The finding that was kept; None if there is none, or none that can be taken."""
-    if folder is None or not claim.kept:
+    if folder is None or claim.id not in KEPT:
         return None
     path = _path(folder, claim, inputs)
     try:
@@ -134,12 +109,12 @@ def _read(folder: Path | None, claim: ModelClaim, inputs: Mapping[str, Any]) -> 
             return None
         entry = json.loads(path.read_text(encoding="utf-8"), parse_constant=_refused, parse_float=_finite)
         made, digest = entry.pop("finding"), entry.pop("sha256")
-        finding = Finding.from_json(made)
+        finding = Finding(**made)
+        sound = digest == _digest(made) and finding.status in PASSING
     except (OSError, ValueError, TypeError, AttributeError, KeyError, RecursionError):
         return None
     about = json.dumps(entry, sort_keys=True) == json.dumps(content(claim, inputs), sort_keys=True)
-    sound = about and digest == _digest(made) and finding.status in PASSING
-    return replace(finding, from_cache=True) if sound else None
+    return replace(finding, from_cache=True) if sound and about else None
 
 
 def _digest(finding: Mapping[str, Any]) -> str:

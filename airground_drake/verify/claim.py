@@ -71,8 +71,6 @@ class ModelClaim(Claim):
     """
 
     expected: Status = "proved"
-    kept: bool = False
-    """Whether findings may be kept: for experiments that take long."""
 
     @abc.abstractmethod
     def inputs(self, scenario: Scenario) -> dict[str, Any]:

@@ -70,8 +70,8 @@ TEAM = (
     Mutant(
         "plants driven by positions",
         "diagram.py",
-        'builder.Connect(team_command.get_output_port(), disturbance.GetInputPort("command"))',
-        'builder.Connect(team_position.get_output_port(), disturbance.GetInputPort("command"))',
+        "builder.Connect(commanded, velocities.get_input_port())",
+        "builder.Connect(team_position.get_output_port(), velocities.get_input_port())",
     ),
     Mutant(
         "sensing range cut",
@@ -196,36 +196,29 @@ KERNELS = (
         runs=("crowd d",),
         tests=WIRING,
     ),
-    Mutant(
-        "speeds up to twice the limit", "nsbc/kernels.py", "if speed > max_speed[i]:", "if speed > 2.0 * max_speed[i]:"
-    ),
+    Mutant("speeds up to twice the limit", "nsbc/kernels.py", "if speed > max_speed:", "if speed > 2.0 * max_speed:"),
     Mutant(
         "of two active inequalities, one is enough",
         "nsbc/kernels.py",
-        "for m in range(j, j + 1 if planar or j == i else count):",
-        "for m in range(j, j + 1 if j == i else j):",
+        "                size += 1\n",
+        "                size = 1\n",
+        tests=(*WIRING, "tests/nsbc/test_projection.py"),
     ),
     Mutant(
-        "three active inequalities are never tried",
+        "active inequalities never leave",
         "nsbc/kernels.py",
-        "for m in range(j, j + 1 if planar or j == i else count):",
-        "for m in range(j, j + 1):",
+        "if pull[m] > 0.0 and",
+        "if pull[m] > 1e300 and",
         runs=("crowd d",),
-        tests=(
-            *WIRING,
-            "tests/nsbc/test_avoidance.py",
-        ),
+        tests=(*WIRING, "tests/nsbc/test_projection.py"),
     ),
     Mutant(
         "contradictions are not looked for",
         "nsbc/kernels.py",
-        "return velocity if shortfall <= CONTRADICTION_M_S else _least_violation(normal, bound)",
+        "return velocity if missed == 0.0 else _least_violation(normal, bound + MARGIN_M_S)",
         "return velocity",
         runs=("crowd b", "crowd d"),
-        tests=(
-            *WIRING,
-            "tests/nsbc/test_avoidance.py",
-        ),
+        tests=(*WIRING, "tests/nsbc/test_projection.py"),
     ),
     Mutant(
         "the recursion starts with the highest priority",
@@ -249,41 +242,46 @@ LAW = (
     Mutant(
         "interventions not filtered under (d)",
         "nsbc/law.py",
-        "            if not self.intervention_on_top:\n                velocity",
-        "            if self.intervention_on_top:\n                velocity",
+        "return task if law.intervention_on_top else avoid_one(task,",
+        "return task if not law.intervention_on_top else avoid_one(task,",
     ),
     Mutant(
         "every intervention filtered with the first UGV's inequalities",
         "nsbc/law.py",
-        "row = slice(i, i + 1)",
-        "row = slice(0, 1)",
+        "positions[i], centre[i], distance[i], share[i],",
+        "positions[i], centre[0 if executing[i] else i], distance[i], share[i],",
     ),
-    Mutant("own task not filtered", "nsbc/law.py", "composite = self.avoidance.apply(own, spaces)", "composite = own"),
+    Mutant(
+        "own task not filtered",
+        "nsbc/law.py",
+        "        return avoid_one(own, normal, bound, law.composition)\n",
+        "        return own\n",
+    ),
     Mutant(
         "intervention away from what was asked",
         "nsbc/law.py",
-        "self.intervention_gain * (wanted - position)",
-        "self.intervention_gain * (position - wanted)",
+        "law.intervention_gain * (asked.wanted[b] - position[b])",
+        "law.intervention_gain * (position[b] - asked.wanted[b])",
     ),
     Mutant(
         "rate of the intervention not fed forward",
         "nsbc/law.py",
-        "asked = mobility * (rate + ",
-        "asked = mobility * (0.0 * rate + ",
+        "mobility[b] * (asked.rate[b] + ",
+        "mobility[b] * (0.0 * asked.rate[b] + ",
     ),
     Mutant(
         "null space of the intervention empty",
         "nsbc/law.py",
-        "return below + chosen @ (asked - below)",
-        "return chosen @ asked",
+        "task = below.copy()",
+        "task = 0.0 * below",
         runs=("crowd d",),
         tests=("tests/verify/runs/test_exec.py",),
     ),
     Mutant(
         "every intervention limited to the first UGV's speed",
         "nsbc/law.py",
-        "velocity = limit_speed(task[None], max_speed[row])",
-        "velocity = limit_speed(task[None], max_speed[:1])",
+        "normal, bound, mobility[i], max_speed[i],",
+        "normal, bound, mobility[i], max_speed[0 if executing[i] else i],",
         runs=("crowd d", "crowd c", "crowd b", "bodies d", "bodies b"),
     ),
     Mutant(
@@ -332,14 +330,14 @@ LAW = (
     Mutant(
         "the UAV's commands not filtered",
         "systems/controllers.py",
-        "velocity: Array = self.avoidance.apply(lower, spaces)[0]",
+        "velocity: Array = avoidance.apply(lower, spaces)[0]",
         "velocity: Array = lower[0]",
     ),
     Mutant(
         "the UAV without a speed limit",
         "systems/controllers.py",
-        "lower = limit_speed(_velocity_of(task, read_only(positions[-1:])), self._max_speed)",
-        "lower = _velocity_of(task, read_only(positions[-1:]))",
+        "lower = limit_speed(self._asked(positions, ugv_commands, gain), self._max_speed)",
+        "lower = self._asked(positions, ugv_commands, gain)",
     ),
     Mutant(
         "UGVs sampled at half the rate",
@@ -362,23 +360,23 @@ LAW = (
     Mutant(
         "executed whatever the answer, the answer recorded",
         "systems/controllers.py",
-        "velocity = self.velocity(context.get_time(), positions, reference, rate, proposals)",
-        "velocity = self.velocity(context.get_time(), positions, reference, rate, self._proposals.Eval(context))",
+        "velocity = self.velocity(context.get_time(), positions, reference, rate, proposals, law)",
+        "velocity = self.velocity(context.get_time(), positions, reference, rate, self._proposals.Eval(context), law)",
     ),
     Mutant(
         "executed as nothing was accepted, the answer recorded",
         "systems/controllers.py",
-        "velocity = self.velocity(context.get_time(), positions, reference, rate, proposals)",
-        "velocity = self.velocity(context.get_time(), positions, reference, rate, [None] * len(proposals))",
+        "velocity = self.velocity(context.get_time(), positions, reference, rate, proposals, law)",
+        "velocity = self.velocity(context.get_time(), positions, reference, rate, [None] * len(proposals), law)",
         runs=("crowd b", "crowd d"),
     ),
     Mutant(
         "presets end with a jump to the target",
-        "nsbc/motion.py",
+        "geometry/motion.py",
         "return self.positions[max(k, 0)], np.zeros(3)",
         "return self.positions[-1], np.zeros(3)",
         runs=("crowd b", "crowd d"),
-        tests=("tests/nsbc/test_motion.py",),
+        tests=("tests/geometry/test_motion.py",),
     ),
 )
 
@@ -422,7 +420,7 @@ DECISION = (
     Mutant(
         "what is above the threshold at the start triggers after the first tick",
         "systems/decision.py",
-        "discrete.set_value(0, _pack([self._trigger.start(t, each) for each in x.tolist()]))",
+        "discrete.set_value(0, _pack([trigger.start(t, each) for each in x.tolist()]))",
         "pass",
         tests=TRIGGER,
     ),
@@ -450,15 +448,15 @@ DECISION = (
     Mutant(
         "extremes at the ends of steps only",
         "systems/decision.py",
-        "return extremes(before, after, np.array([self.value(begin, before), self.value(end, after)]))",
-        "return super().extremes(begin, before, end, after)",
+        "return spans(begun, now)",
+        "return np.sort(np.stack([begun[5::5], now[5::5]]), axis=0)",
         tests=(*ISOLATION, *TRIGGER),
     ),
     Mutant(
         "corners of presets are not looked at",
         "systems/decision.py",
-        "self._corner_times[first] < end:",
-        "self._corner_times[first] < begin:",
+        "self._corner_times[first] < now[0]:",
+        "self._corner_times[first] < begun[0]:",
         tests=(*ISOLATION, *TRIGGER),
     ),
     Mutant(
@@ -470,9 +468,9 @@ DECISION = (
     ),
     Mutant(
         "noise is no part of the decision variable",
-        "systems/decision.py",
-        "math.hypot(x, y, z) + n for",
-        "math.hypot(x, y, z) for",
+        "decision/excursion.py",
+        "signals[3 + 5 * j]) + noise[j]",
+        "signals[3 + 5 * j])",
         tests=TRIGGER,
     ),
     Mutant(
@@ -488,6 +486,7 @@ DECISION = (
         "B=intensity / np.sqrt(period) * eye",
         "B=1.05 * intensity / np.sqrt(period) * eye",
         proofs=("THR-DDM",),
+        tests=("tests/systems/test_noise.py",),
     ),
     Mutant(
         "the noise is exponential",
@@ -509,6 +508,7 @@ DECISION = (
         "integrated_noise(count, given.noise_m_sqrt_s,",
         "integrated_noise(count, 2.0 * given.noise_m_sqrt_s,",
         proofs=("THR-DDM",),
+        tests=("tests/systems/test_noise.py",),
     ),
     Mutant("the noise grows in place of leaking", "components.py", "A=-leak * eye", "A=leak * eye"),
     Mutant(
@@ -530,10 +530,13 @@ INTERVENTION = (
         "if proposal is None:",
         tests=WIRING,
     ),
-    Mutant("silence counts as acceptance", "intervention/messages.py", "== ACCEPT else None", "!= REFUSE else None"),
     Mutant(
-        "a refusal is not noticed", "intervention/planner.py", "answers, i) == REFUSE for i", "answers, i) == 2.0 for i"
+        "silence counts as acceptance",
+        "intervention/messages.py",
+        "answer == ACCEPT and (not",
+        "answer != REFUSE and (not",
     ),
+    Mutant("a refusal is not noticed", "intervention/planner.py", "elif answer == REFUSE:", "elif answer == 3.0:"),
     Mutant(
         "answers are decided on and not sent",
         "systems/gatekeeper.py",
@@ -549,7 +552,7 @@ INTERVENTION = (
     Mutant(
         "proposals are not withdrawn after a release",
         "intervention/planner.py",
-        "            if name not in called and desk.cause not in called:\n",
+        "            if name not in called and talk.cause not in called:\n",
         "            if False:\n",
     ),
     Mutant(
@@ -559,7 +562,28 @@ INTERVENTION = (
         "[mode != 0 for mode in",
     ),
     Mutant(
-        "the UAV learns nothing from refusals",
+        "a part of a joint plan outlives another UGV's refusal",
+        "intervention/planner.py",
+        "(party_refused or answer == DONE",
+        "(answer == DONE",
+        tests=PLANNER,
+    ),
+    Mutant(
+        "a part of a joint plan is executed though another UGV refuses",
+        "intervention/messages.py",
+        "(not p.party or p.joint not in stopped)",
+        "True",
+        tests=PLANNER,
+    ),
+    Mutant(
+        "a party of a joint plan gets no part",
+        "intervention/database.py",
+        "for robot, motion in motions.items():",
+        "for robot, motion in list(motions.items())[:2]:",
+        tests=PLANNER,
+    ),
+    Mutant(
+        "the UAV learns nothing from answers",
         "intervention/planner.py",
         "learnt = memory.learnt + fresh",
         "learnt = memory.learnt",
@@ -568,15 +592,15 @@ INTERVENTION = (
     Mutant(
         "the rest after a refusal ignored",
         "intervention/database.py",
-        "refusals=desk.refusals + 1, retry_at=t + rest,",
-        "refusals=desk.refusals + 1, retry_at=t,",
+        "refusals=held.refusals + 1, retry_at=t + self.retry,",
+        "refusals=held.refusals + 1, retry_at=t,",
         tests=PLANNER,
     ),
     Mutant(
         "the next behaviour is never tried",
         "intervention/database.py",
-        'self.ranking == "predicted" else desk.turn + 1',
-        'self.ranking == "predicted" else desk.turn',
+        'self.ranking == "predicted" else held.turn + 1',
+        'self.ranking == "predicted" else held.turn',
         tests=PLANNER,
     ),
     Mutant(
@@ -588,9 +612,9 @@ INTERVENTION = (
     ),
     Mutant(
         "a proposal outlives its motion",
-        "intervention/database.py",
-        "return t >= (self.proposal.motion.end if self.proposal",
-        "return t >= (self.proposal.motion.end + 1e3 if self.proposal",
+        "intervention/planner.py",
+        "or answer == DONE or t >= proposal.motion.end):",
+        "or answer == DONE):",
         runs=("crowd b", "crowd d", "case_b d"),
         tests=PLANNER,
     ),
@@ -603,7 +627,7 @@ INTERVENTION = (
     ),
     Mutant(
         "no time limit for policies",
-        "intervention/guard.py",
+        "intervention/guest/time_limit.py",
         "signal.setitimer(signal.ITIMER_REAL, min(seconds, outer or _LONGEST_S, _LONGEST_S))",
         "signal.setitimer(signal.ITIMER_REAL, 0.0)",
         tests=PLANNER,
@@ -693,7 +717,7 @@ GATEKEEPER = (
     ),
     Mutant(
         "what a UGV might come near is left out",
-        "gatekeeper/prediction.py",
+        "gatekeeper/problem.py",
         "near = ((gap < 0.0) & ",
         "near = ((gap < -1.0) & ",
     ),
@@ -705,15 +729,15 @@ GATEKEEPER = (
     ),
     Mutant(
         "points are predicted to stand where they are",
-        "gatekeeper/closed_loop.py",
+        "gatekeeper/rollout.py",
         "position, loop.points[k], loop.distances,",
         "position, loop.points[0], loop.distances,",
     ),
     Mutant(
         "the prediction has no avoidance",
-        "gatekeeper/closed_loop.py",
-        "return task if loop.intervention_on_top else avoid_one(task, normal, bound, loop.composition)",
-        "return task",
+        "gatekeeper/rollout.py",
+        "mode == ACCEPTED, Intervention(loop.wanted[k], asked, loop.chosen),\n        normal, bound,",
+        "mode == ACCEPTED, Intervention(loop.wanted[k], asked, loop.chosen),\n        0.0 * normal, 0.0 * bound,",
     ),
     Mutant(
         "a first stage that refuses is accepted",
@@ -758,15 +782,15 @@ GATEKEEPER = (
     Mutant(
         "(b) accepts nothing",
         "systems/gatekeeper.py",
-        "else (ACCEPT, p.number) for p in",
-        "else (SILENT, p.number) for p in",
+        "else [ACCEPT, p.number] for p in",
+        "else [SILENT, p.number] for p in",
         runs=("crowd b",),
     ),
     Mutant(
         "(b) refuses everything",
         "systems/gatekeeper.py",
-        "else (ACCEPT, p.number) for p in",
-        "else (-ACCEPT, p.number) for p in",
+        "else [ACCEPT, p.number] for p in",
+        "else [-ACCEPT, p.number] for p in",
         runs=("crowd b",),
     ),
     Mutant(
@@ -811,21 +835,21 @@ MIX_UPS = (
     Mutant(
         "motions are followed a sample late",
         "systems/controllers.py",
-        "velocity = self.velocity(context.get_time(), positions, reference, rate, proposals)",
-        "velocity = self.velocity(context.get_time() - 0.05, positions, reference, rate, proposals)",
+        "velocity = self.velocity(context.get_time(), positions, reference, rate, proposals, law)",
+        "velocity = self.velocity(context.get_time() - 0.05, positions, reference, rate, proposals, law)",
     ),
     Mutant(
-        "neighbours are sensed a sample late",
+        "positions are sensed a sample late",
         "systems/controllers.py",
-        "        own = positions[: self._count]\n",
-        "        own, now = positions[: self._count], positions\n"
-        "        positions, self._before = getattr(self, '_before', now), now\n",
+        "        asked = [None if p is None else",
+        "        positions, self._before = getattr(self, '_before', positions), positions.copy()\n"
+        "        asked = [None if p is None else",
     ),
     Mutant(
         "the intervention gain has the wrong sign along y",
         "nsbc/law.py",
-        "self.intervention_gain * (wanted - position)",
-        "self.intervention_gain * np.array([1.0, -1.0, 1.0]) * (wanted - position)",
+        "law.intervention_gain * (asked.wanted[b] - position[b])",
+        "law.intervention_gain * (1.0 - 2.0 * (b == 1)) * (asked.wanted[b] - position[b])",
     ),
     Mutant(
         "the UAV takes the UGV that it plans for for a point",
@@ -912,12 +936,6 @@ MIX_UPS = (
         "            if proposal is None or t < proposal.issued + 0.075:\n                answers",
     ),
     Mutant(
-        "progress is compared with the prediction of the next sample",
-        "gatekeeper/outcome_gatekeeper.py",
-        "k = min(round((t - commitment.begun) / self._law.avoidance.period),",
-        "k = min(1 + round((t - commitment.begun) / self._law.avoidance.period),",
-    ),
-    Mutant(
         "a cause that names nobody is a favour",
         "gatekeeper/outcome_gatekeeper.py",
         "favour = proposal.cause in self._team.ugvs and proposal.cause != self._team.ugvs[i]",
@@ -936,16 +954,16 @@ MIX_UPS = (
     Mutant(
         "a replaced proposal does not end its try",
         "gatekeeper/outcome_gatekeeper.py",
-        "if turns[i].executing and standing != ACCEPT:  # withdrawn",
-        "if turns[i].executing and proposal is None:  # withdrawn",
+        "if held[i].executing and standing != ACCEPT:  # withdrawn",
+        "if held[i].executing and proposal is None:  # withdrawn",
         runs=("crowd d",),
         tests=ATTACKS,
     ),
     Mutant(
         "a UGV rests only where nothing is proposed",
         "gatekeeper/outcome_gatekeeper.py",
-        "            turns[i] = self._patience.rested(turns[i], t)\n            if proposal is None:\n",
-        "            if proposal is None:\n                turns[i] = self._patience.rested(turns[i], t)\n",
+        "            held[i] = self._patience.rested(held[i], t)\n            if proposal is None:\n",
+        "            if proposal is None:\n                held[i] = self._patience.rested(held[i], t)\n",
         runs=("crowd d",),
         tests=ATTACKS,
     ),

@@ -97,7 +97,7 @@ def gate_scenario(route: str) -> dict[str, Any]:
     gate = Gatekeeper(route=route, horizon_s=STAGES * STAGE_S, stages=STAGES, slack_weight_1_m2_s=10.0)
     gate.terminal_weight_s = TERMINAL_S
     spec = Scenario(
-        duration_s=0.5, ugvs={"ugv1": ugv(0.0), "ugv2": ugv(-3.0)}, uav=AWAY, gatekeeper=gate,
+        name="decisions", duration_s=0.5, ugvs={"ugv1": ugv(0.0), "ugv2": ugv(-3.0)}, uav=AWAY, gatekeeper=gate,
         obstacles={"rock": Obstacle([1.2, 2.4, 0.0]), "far": Obstacle([30.0, 0.0, 0.0])}, runs={"c": Run("c")},
     )  # fmt: skip
     return asdict(spec)

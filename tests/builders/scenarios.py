@@ -38,8 +38,9 @@ def case_a(changes: dict[str, Any] | None = None) -> dict[str, Any]:
 def lone(start: list[float], target: list[float], preset: Preset, duration_s: float, **more: Any) -> dict[str, Any]:
     """One scripted UGV far from everything else."""
     scenario = Scenario(
-        duration_s=duration_s, ugvs={"ugv1": Ugv(start, target, preset)}, uav=AWAY, runs={"d": Run("d")}, **more
-    )
+        name="lone", duration_s=duration_s, ugvs={"ugv1": Ugv(start, target, preset)}, uav=AWAY, runs={"d": Run("d")},
+        **more,
+    )  # fmt: skip
     return asdict(scenario)
 
 

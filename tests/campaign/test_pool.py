@@ -24,7 +24,7 @@ def test_a_process_that_dies_loses_no_item_and_does_none_twice(tmp_path: Path) -
 
 TIDY = """
 import time
-from loky.backend.queues import Queue
+from joblib.externals.loky.backend.queues import Queue
 from airground_drake import interruption
 from airground_drake.campaign.pool import local
 

@@ -13,7 +13,7 @@ from hypotheses.demands import Demands, limited, nearest, unit
 from airground_drake.arrays import Array
 from airground_drake.nsbc.avoidance import Avoidance, HalfSpaces, Surroundings
 from airground_drake.scenarios.load import load
-from airground_drake.verify.model.avoidance.safe_dist import SafeDist
+from airground_drake.verify.model.safe_dist import SafeDist
 
 TOLERANCE = 1e-9
 STEPS = 250

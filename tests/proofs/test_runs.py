@@ -21,11 +21,12 @@ from airground_drake.proofs.export import demands, distances_file, recorded
 from airground_drake.proofs.readback import ReadbackError, compare
 from airground_drake.proofs.record import closure
 from airground_drake.proofs.runs import Workshop, expects_kept, prove
+from airground_drake.proofs.too_near import too_near
 from airground_drake.testing.plugin import Simulations
 from airground_drake.trace import Trace
 
 UGV, ROCK = "ugv1", "obstacle_1"
-REFUSED = f"Coq computes that it is false of {UGV} and {ROCK}, 2 m; later pairs were not tried"
+REFUSED = f"Coq refuses {UGV} and {ROCK}, 2 m"
 
 
 @pytest.mark.parametrize("name", ["c", "d"])
@@ -42,7 +43,9 @@ def test_case_a_keeps_its_distances_and_obeys_the_law(name: str, run: Simulation
 def test_the_run_of_case_b_that_hits_the_obstacle_is_refused(run: Simulations, workshop: Workshop) -> None:
     distances, law, _ = prove(workshop, run("case_b", "b"))
     assert not distances.proved
-    assert distances.why == "Coq computes that it is false of ugv1 and obstacle_2, 2 m; later pairs were not tried"
+    assert distances.why.startswith(
+        "Coq refuses ugv1 and obstacle_2, 2 m. In exact arithmetic ugv1 and obstacle_2 are "
+    )
     assert (law.proved, law.why) == (False, "not tried: a distance is not kept")
 
 
@@ -70,7 +73,7 @@ def test_a_step_through_an_obstacle_is_refused_though_both_of_its_ends_keep_the_
     through = moved(whole, row, rock - 1.1 * offset)
     assert np.linalg.norm(through.position(UGV) - rock, axis=1).min() >= 2.0
     distances, _, _ = prove(workshop, through)
-    assert distances.why == REFUSED
+    assert distances.why.startswith(f"{REFUSED}. In exact arithmetic ")
 
 
 @pytest.mark.parametrize(("short_m", "kept"), [(6e-14, False), (-6e-14, True)])
@@ -82,9 +85,26 @@ def test_some_rounding_errors_short_is_too_short(
     place = rock + offset * ((2.0 - short_m) / np.linalg.norm(offset))
     distances, law, _ = prove(workshop, moved(whole, row, place))
     assert distances.proved is kept
-    assert distances.why == ("" if kept else REFUSED)
+    assert [(one.demand.lemma, round(one.short_m, 15)) for one in distances.too_near] == (
+        [] if kept else [(f"{UGV}_and_{ROCK}", pytest.approx(short_m, abs=2e-15))]
+    )
     if kept:  # it was farther out before, by less
-        assert law.proved or law.why == REFUSED
+        assert law.proved or law.why == f"{REFUSED}; later pairs were not tried"
+
+
+def test_every_pair_that_comes_too_near_is_named_with_its_distance_and_time(run: Simulations) -> None:
+    few = short(run("case_a", "d"))
+    rocks = [np.array(few.scenario["obstacles"][name]["position_m"]) for name in (ROCK, "obstacle_2")]
+    through = moved(moved(few, 1, rocks[0] - [1.0, 0.0, 0.0]), 2, rocks[0] + [3.0, 0.0, 0.0])  # past it on one line
+    towards = moved(moved(through, 3, rocks[1] + [9.0, 0.0, 0.0]), 4, rocks[1] + [0.5, 0.0, 0.0])
+    found = {one.demand.lemma: one for one in too_near(recorded(towards))}
+    assert {f"{UGV}_and_{ROCK}", f"{UGV}_and_obstacle_2"} <= {*found}
+    nearest = found[f"{UGV}_and_{ROCK}"]
+    assert (nearest.least_m, nearest.short_m) == (0.0, 2.0)
+    assert nearest.t_s == pytest.approx(few.t[1] + (few.t[2] - few.t[1]) / 4.0)
+    at_end = found[f"{UGV}_and_obstacle_2"]
+    assert (at_end.least_m, at_end.short_m, at_end.t_s) == (0.5, 1.5, few.t[4])
+    assert too_near(recorded(few)) == []
 
 
 def short(of: Trace, rows: int = 5) -> Trace:

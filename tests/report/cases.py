@@ -39,7 +39,7 @@ def make_scenario(ugv1: str = "ugv1", **more: Any) -> Scenario:
             ugv1: Ugv([3.3, 0.5, 0.0], [3.3, 13.0, 0.0], Preset([[3.3, 0.0, 0.0], [3.3, 13.0, 0.0]], 0.5606)),
             "ugv2": Ugv([-2.6, 0.5, 0.0], [-2.6, 13.0, 0.0], Preset([[-2.6, 0.0, 0.0], [-2.6, 13.0, 0.0]], 0.5606)),
         },
-        uav=Uav("uav", [0.0, 1.0, 2.0], [0.0, 13.0, 2.0]),
+        uav=Uav(start_m=[0.0, 1.0, 2.0], target_m=[0.0, 13.0, 2.0]),
         obstacles={
             "obstacle_1": Obstacle([1.7, 4.0, 0.0]),
             "obstacle_2": Obstacle([4.0, 7.0, 0.0]),
@@ -56,7 +56,7 @@ def make_scenario(ugv1: str = "ugv1", **more: Any) -> Scenario:
             Reproduction("A5", "triggered at", "trigger_time", "c", ugv1, [14.45], "s", 0.1, True, "speed set"),
             Reproduction("A7", "succeeds", "intervention_succeeds", "c", ugv1, [1.0], "yes/no", why="all of it"),
         ],
-        choices=[Choice(f"ugvs.{ugv1}.preset.speed_m_s", "calibrated", "1 m/s", "the trigger time")],
+        choices=[Choice(f"ugvs.{ugv1}.preset.speed_m_s", "calibrated", "1 m/s", reason="the trigger time")],
         **more,
     )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from scenarios.cases import SMALL, Write, case_a, edit, message
+from scenarios.cases import SMALL, Write, case_a, edit
 
 from airground_drake.scenarios.load import load, resolved, validated
 
@@ -49,6 +49,8 @@ def test_a_mapping_whose_names_are_free_takes_new_ones(write: Write) -> None:
     assert scenario.intervention.policies[0].parameters == {"speed_m_s": 2.85, "clearance_m": 0.2}
     assert [*scenario.obstacles][-1] == "box"
     assert [*scenario.runs][-1] == "again"
+    private = load(write(SMALL), ["obstacles={_box: {position_m: [-9, -9, 0]}}"])[0]
+    assert [*private.obstacles] == ["_box"]  # a name, no template
     assert load(write(SMALL), ["obstacles.box.position_m=[-9, -9, 0]"])[0].obstacles["box"].known_to_uav
 
 
@@ -62,40 +64,3 @@ def test_overrides_apply_in_order_and_leave_aliases_alone(write: Write) -> None:
 def test_the_digest_depends_on_how_overrides_are_split(write: Write) -> None:
     path, splits = write(SMALL), (["title=a", "title=b"], ["title=b"], ["title=atitle=b"])
     assert len({load(path, overrides)[1] for overrides in splits}) == 3
-
-
-@pytest.mark.parametrize(
-    ("override", "fragments"),
-    [
-        ("seed", ["--set seed", "dotted.key=value"]),
-        ("=1", ["--set =1", "dotted.key=value"]),
-        ("contrl.period_s=1", ["contrl: unknown key", "did you mean control?", "obstacles"]),
-        ("control.period=1", ["control.period: unknown key", "did you mean period_s?", "avoidance_gain_1_s"]),
-        ("ugvs.ugv9.max_speed_m_s=1", ["ugvs.ugv9.start_m: missing", "a list in m, as ugvs.ugv9 is new"]),
-        ("ugvs.ugv9.max_sped_m_s=1", ["ugvs.ugv9.max_sped_m_s: unknown key", "did you mean max_speed_m_s?"]),
-        ("runs.d.expected.LIVE-GAOL=refuted", ["runs.d.expected.LIVE-GAOL", "one of the claims"]),
-        ("obstacles.box.x.position_m=[1, 2, 0]", ["obstacles.box.x: unknown key", "position_m"]),
-        ("ugvs..start_m=1", ["ugvs.: unknown key"]),
-        ("intervention.policies.3.name=x", ["intervention.policies.3: unknown key", "allowed: 0"]),
-        ("intervention.policies.0.parameters.=1", ["parameters.: unknown key", "allowed: speed_m_s"]),
-        ("seed.x=1", ["seed.x: unknown key", "allowed: none"]),
-        ("control.period_s=5 km", ["--set", "control.period_s: '5 km'", "a number in s"]),
-        ("control.period_s=", ["--set control.period_s=", "empty"]),
-        ("control.period_s=[", ["--set control.period_s=[", "not YAML"]),
-        (
-            "control.period_s=-1",
-            ["--set control.period_s=-1: control.period_s: -1.0", "a number in s, not below 1e-09"],
-        ),
-        ("seed=1\n2", ["--set seed=1\\n2"]),
-        ("ugvs=null", ["--set ugvs=null: ugvs: no value is given", "a mapping"]),
-    ],
-)
-def test_bad_override(override: str, fragments: list[str]) -> None:
-    text = message("case_a", [override])
-    assert all(fragment in text for fragment in fragments), text
-
-
-def test_of_a_long_override_its_beginning_is_quoted() -> None:
-    text = message("case_a", [f"ugvs={{{', '.join(f'r{k}: {{start_m: [{k}, 0, 0]}}' for k in range(50))}}}"])
-    assert text.startswith("--set ugvs={r0: {start_m: [0, 0, 0]}")
-    assert len(text) < 300

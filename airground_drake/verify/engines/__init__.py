@@ -1,5 +1,5 @@
-"""What computes for claims, and knows none.
+"""Computations that several claims use; no module here knows a claim.
 
-`segments.py` exact geometry of straight motion, `boxes.py` what comes near at all, `shortfalls.py` what pairs miss of
-their inequalities, exactly; `signs.py` signs of (16)-(19) in ball arithmetic.
+`segments.py`: exact geometry of straight motion. `boxes.py`: which pairs come near each other at all. `shortfalls.py`:
+the avoidance inequality, and by how much positions miss it, exactly. `signs.py`: signs of (16)-(19) in ball arithmetic.
 """

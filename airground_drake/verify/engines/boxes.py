@@ -1,7 +1,7 @@
-"""Bounds of distances over a whole run from below, so that only things that come near each other need be looked at.
+"""Lower bounds of the distances of a run, so that exact computations are needed for near pairs only.
 
-Rows are cut into blocks. Between rows a robot moves straight, so that on a block it stays in the box around its rows;
-two things are no nearer to each other than their boxes.
+Rows are cut into blocks. Between rows a robot moves straight, so on a block it stays in the box around its rows. Two
+bodies are at least as far apart as their boxes.
 """
 
 from __future__ import annotations

@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from fractions import Fraction
 from math import inf, isqrt, nextafter
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -25,6 +26,17 @@ SCREEN_M = 1e-9
 """What floats find far, or met, by more than this is so, m: for bodies within 1e5 m they err by less than 1e-10 m."""
 BITS = 160
 """Lengths are enclosed to 2^-160 units."""
+
+
+def demanded(lacking: Any, inside: Any, outside: Any) -> Any:
+    """Rate at which two bodies have to part, or may approach at most: the law's inequality, here and nowhere else.
+
+    Args:
+        lacking: d - D, what is missing of the safe distance: an array of doubles, or one rational number.
+        inside: rate per distance where D <= d: the gain.
+        outside: the same where D > d: one over the period.
+    """
+    return np.where(lacking >= 0, inside, outside) * lacking
 
 
 def shortfalls(first: Array, second: Array, d: float, share: Fraction, gain: Fraction, last: Fraction) -> Array:
@@ -57,7 +69,7 @@ def _doubtful(first: Array, other: Array, d: float, share: float, gain: float, l
     apart = (first - other)[:-1]
     distance = np.linalg.norm(apart, axis=1)
     normal = apart / np.where(distance > 0.0, distance, np.nan)[:, None]
-    bound = np.where(distance <= d, gain, 1.0) * (d - distance)
+    bound = demanded(d - distance, gain, 1.0)
     met, reach = np.ones(len(apart), dtype=np.bool_), np.zeros(len(apart))
     for body, sign, part in ((first, 1.0, share), (other, -1.0, 1.0 - share)):
         step = np.diff(body, axis=0)
@@ -86,7 +98,7 @@ def _shortfall(ends: Array, d: Fraction, share: Fraction, gain: Fraction, lasts:
         return Fraction(0)
     if low == 0:  # whatever n is, a step has no less along it than its length backwards
         return gain * d + reach
-    bound = d - low if low > d else gain * (d - low)  # it decreases with the distance
+    bound = demanded(d - low, gain, Fraction(1))  # it decreases with the distance
     missed = Fraction(0)
     for step, sign, part in zip(steps, (1, -1), (share, 1 - share), strict=True):
         along = Fraction(sign * _dot(apart, step), unit * unit) / lasts

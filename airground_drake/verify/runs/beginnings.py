@@ -11,7 +11,8 @@ from airground_drake.arrays import Array
 from airground_drake.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.segments import corner_times, interpolate, travelled
-from airground_drake.verify.runs.pairs import Pair, pairs_of, radii_of
+from airground_drake.verify.runs.closed_loops import Scene
+from airground_drake.verify.runs.pairs import Pair, around, pairs_of, places_of, preset_of, radii_of, speed_limits
 from airground_drake.verify.runs.proposals import Sent
 
 NONE = np.empty(0), np.empty(0), np.empty(0)
@@ -20,44 +21,30 @@ MOST_CLAIMED = 64
 
 
 class Beginning(NamedTuple):
-    """What a decision's roll-outs begin with; S is the number of periods, K that of points to keep away from.
+    """What the roll-outs of a decision by outcomes begin with; S is the number of periods.
 
     Attributes:
-        here: (3,), m.
-        preset: at the control samples, (S + 1, 3), m.
-        wanted: where the proposed motion is, (S + 1, 3), m.
-        chosen: its directions, (3, 3).
-        limit: speed limit, m/s.
-        periods: for which the proposal is executed.
+        refused, accepted: the closed loops if the proposal is refused and if it is accepted. Obstacles come first
+            among their points.
         settled: periods after which it is over when nothing moves any more.
-        points: if it is refused and if it is accepted, (2, S + 1, K, 3), m.
-        safe: distances to keep, (K,), m.
-        share: of the inequalities, (K,).
-        discs: how many of the points are obstacles: they come first.
+        discs: number of obstacles.
         goal: (3,), m.
     """
 
-    here: Array
-    preset: Array
-    wanted: Array
-    chosen: Array
-    limit: float
-    periods: int
+    refused: Scene
+    accepted: Scene
     settled: int
-    points: Array
-    safe: Array
-    share: Array
     discs: int
     goal: Array
 
     @property
     def known(self) -> tuple[Array, Array]:
         """Centres of the obstacles, (discs, 3), and the distances that are kept from them, (discs,), m."""
-        return self.points[0, 0, : self.discs], self.safe[: self.discs]
+        return self.refused.points[0, : self.discs], self.refused.safe[: self.discs]
 
 
 def beginning(trace: Trace, t: float, number: int, sent: Sequence[Sent]) -> Beginning:
-    """What the roll-outs of a decision begin with, from the recorded signals.
+    """What the roll-outs of a decision by outcomes begin with, from the recorded signals.
 
     Args:
         trace: the run.
@@ -65,11 +52,10 @@ def beginning(trace: Trace, t: float, number: int, sent: Sequence[Sent]) -> Begi
         number: of the proposal that it decides on.
         sent: all proposals.
     """
-    scenario, gate, h = trace.scenario, trace.scenario["gatekeeper"], trace.scenario["control"]["period_s"]
+    gate, h = trace.scenario["gatekeeper"], trace.scenario["control"]["period_s"]
     on = next(one for one in sent if one.number == number)
     robot = on.ugv
-    spec = scenario["ugvs"][robot]
-    corners, speed = np.asarray(spec["preset"]["waypoints_m"], dtype=np.float64), float(spec["preset"]["speed_m_s"])
+    corners, speed = preset_of(trace, robot)
     arrives = float(corner_times(corners, speed)[-1]) if len(corners) > 1 else 0.0
     longest = gate["longest_s"]
     until = min(float(on.times_s[-1]), t + longest)
@@ -78,23 +64,73 @@ def beginning(trace: Trace, t: float, number: int, sent: Sequence[Sent]) -> Begi
     discs, distances = known_discs(trace, robot, t, on)
     pairs = [pair for pair in _among_robots(trace) if robot in (pair.first, pair.second)]
     others = [_other(trace, robot, t, after, pair, sent) for pair in pairs]
-    fixed = np.broadcast_to(discs, (2, len(after), *discs.shape))
-    moving = np.array([each[0] for each in others]).reshape(len(others), 2, len(after), 3)
     settled = max(until, arrives, t + gate["horizon_s"], *(end for _, _, _, end in others))
-    return Beginning(
-        here=interpolate(trace.t, trace.position(robot), t),
-        preset=travelled(corners, speed, t + after),
+    fixed = np.broadcast_to(discs, (len(after), *discs.shape))
+    safe = np.array([*distances, *(each[1] for each in others)])
+    share = np.array([1.0] * len(discs) + [each[2] for each in others])
+
+    def loop(choice: int, periods: int) -> Scene:
+        points = np.concatenate([fixed, *(each[0][choice][:, None] for each in others)], axis=1)
+        return scene(trace, on, t, after, periods, points, safe, share)
+
+    executed = max(0, int(np.ceil((until - t) / h - 1e-9)))
+    settles = round(np.ceil((settled - t) / h - 1e-9))
+    return Beginning(loop(0, 0), loop(1, executed), settles, len(discs), corners[-1])
+
+
+def scene(
+    trace: Trace, on: Sent, t: float, after: Array, periods: int, points: Array, safe: Array, share: Array
+) -> Scene:
+    """The closed loop of the UGV that a proposal is for.
+
+    Args:
+        trace: the run.
+        on: the proposal.
+        t: when it begins, s.
+        after: the control samples, since then, (S + 1,), s.
+        periods: for which the proposal is executed.
+        points: to keep away from, at the samples, (S + 1, K, 3), m.
+        safe: distances to keep, (K,), m.
+        share: of the inequalities, (K,).
+    """
+    return Scene(
+        here=interpolate(trace.t, trace.position(on.ugv), t),
+        preset=travelled(*preset_of(trace, on.ugv), t + after),
         wanted=on.place(t + after),
+        executed=np.arange(len(after) - 1) < periods,
         chosen=on.chosen,
-        limit=float(spec["max_speed_m_s"]),
-        periods=max(0, int(np.ceil((until - t) / h - 1e-9))),
-        settled=round(np.ceil((settled - t) / h - 1e-9)),
-        points=np.concatenate([fixed, np.moveaxis(moving, 0, 2)], axis=2),
-        safe=np.array([*distances, *(each[1] for each in others)]),
-        share=np.array([1.0] * len(discs) + [each[2] for each in others]),
-        discs=len(discs),
-        goal=corners[-1],
+        limit=np.array(speed_limits(trace)[on.ugv]),
+        points=points,
+        safe=safe,
+        share=share,
     )
+
+
+class Sensed(NamedTuple):
+    """What a UGV senses when it decides: the other of a pair, and its places (S, 3), m, if it moves on as it does."""
+
+    name: str
+    pair: Pair
+    places: Array
+
+
+def sensed(trace: Trace, robot: str, t: float, after: Array) -> list[Sensed]:
+    """Obstacles and other robots within sensing range of a robot at a time, with their places at times `after` that."""
+    here, found = interpolate(trace.t, trace.position(robot), t), []
+    for other, pair in around(trace, robot):
+        place, velocity = _moves(trace, other, t)
+        if np.linalg.norm(place - here) <= trace.scenario["control"]["sensing_range_m"]:
+            found.append(Sensed(other, pair, place + after[:, None] * velocity))
+    return found
+
+
+def _moves(trace: Trace, name: str, t: float) -> tuple[Array, Array]:
+    """Where an obstacle or a robot is at a time, (3,), m, and its velocity up to then, (3,), m/s."""
+    place = places_of(trace)[name]
+    if place.ndim == 1:
+        return place, np.zeros(3)
+    row = min(int(np.searchsorted(trace.t, t - TIME_TOLERANCE_S)), len(trace.t) - 1)
+    return interpolate(trace.t, place, t), trace.command(name)[row]
 
 
 def _among_robots(trace: Trace) -> list[Pair]:
@@ -164,8 +200,7 @@ def _other(
     Twice: if the proposal is refused, and if it is accepted. What it has not accepted yet counts in the latter only.
     """
     other = pair.second if pair.first == robot else pair.first
-    row = min(int(np.searchsorted(trace.t, t - TIME_TOLERANCE_S)), len(trace.t) - 1)
-    place, velocity = interpolate(trace.t, trace.position(other), t), trace.command(other)[row]
+    place, velocity = _moves(trace, other, t)
     coasting = place + np.minimum(after, trace.scenario["gatekeeper"]["horizon_s"])[:, None] * velocity
     asked, accepted = asked_of(trace, other, t, sent)
     if asked is None:

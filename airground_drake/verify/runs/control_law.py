@@ -8,8 +8,12 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from airground_drake.arrays import Array
+from airground_drake.trace import Trace
+from airground_drake.verify.engines.shortfalls import demanded
+from airground_drake.verify.runs.pairs import around, places_of
 from airground_drake.verify.runs.projection import closest, least_violation, shortened
 
 PLANE = np.array([1.0, 1.0, 0.0])
@@ -39,7 +43,7 @@ class Asked(NamedTuple):
 def inequalities(
     position: Array, centre: Array, safe: Array, share: Array, control: dict[str, Any], *, planar: bool
 ) -> Inequalities:
-    """Set-based avoidance (7)-(8), (11): n.v >= share A (d - D) where D <= d, else n.v >= -share (D - d) / h.
+    """Set-based avoidance (7)-(8), (11): n.v >= share A (d - D) where D <= d, else n.v >= share (d - D) / h.
 
     Args:
         position: (B, 3).
@@ -52,10 +56,28 @@ def inequalities(
     offset = position[:, None] - centre
     distance = np.sqrt(np.square(offset).sum(axis=2))
     normal = offset / np.where(distance > 0.0, distance, 1.0)[..., None] * (PLANE if planar else 1.0)
-    excess = distance - safe
-    steepness = np.where(excess <= 0.0, control["avoidance_gain_1_s"], 1.0 / control["period_s"])
-    seen = distance <= control["sensing_range_m"]
-    return Inequalities(normal, np.where(seen, -share * steepness * excess, -np.inf))
+    bound = share * demanded(safe - distance, control["avoidance_gain_1_s"], 1.0 / control["period_s"])
+    return Inequalities(normal, np.where(distance <= control["sensing_range_m"], bound, -np.inf))
+
+
+def inequalities_of(trace: Trace, robot: str, samples: npt.NDArray[np.intp]) -> Inequalities:
+    """Those of a robot at rows (B,) of its run, in the order of `around`: what is never in sensing range has none."""
+    places, beside = places_of(trace), around(trace, robot)
+    others = [np.broadcast_to(places[other], (len(trace.t), 3))[samples] for other, _ in beside]
+    return inequalities(
+        places[robot][samples],
+        np.stack(others, axis=1) if others else np.empty((len(samples), 0, 3)),
+        np.array([pair.safe_m for _, pair in beside]),
+        np.array([pair.share for _, pair in beside]),
+        trace.scenario["control"],
+        planar=robot in trace.ugvs,
+    )
+
+
+def spare(given: Inequalities, velocity: Array) -> Array:
+    """What velocities (B, 3) have to spare of each inequality, (B, K), m/s; inf beyond the sensing range."""
+    left: Array = np.einsum("bkd,bd->bk", given.normal, velocity) - given.bound
+    return left
 
 
 def limited(velocity: Array, limit: Array | float) -> Array:
@@ -109,6 +131,36 @@ def intervened(position: Array, below: Array, asked: Asked, gain: float, limit: 
     """(14) above what is below it, (20): v_int + (I - J^+ J) v, within the speed limit."""
     wish = PLANE * (asked.rate + gain * (asked.wanted - position))
     return limited(PLANE * (below + np.einsum("bij,bj->bi", asked.chosen, wish - below)), limit)
+
+
+def commanded(
+    trace: Trace,
+    position: Array,
+    own: Array,
+    given: Inequalities,
+    rows: npt.NDArray[np.intp],
+    asked: Asked,
+    limit: Array,
+) -> Array:
+    """A UGV's commands by the law of a run, (B, 3): avoidance, and the interventions that are executed, (20).
+
+    Args:
+        trace: the run: its method says what has priority.
+        position: (B, 3).
+        own: its own task (6), (B, 3).
+        given: its avoidance inequalities.
+        rows: in which an intervention is executed, (E,).
+        asked: what those ask for, E of them.
+        limit: speed limits, (B,).
+    """
+    composition, gain = trace.meta["composition"], trace.scenario["control"]["intervention_gain_1_s"]
+    if trace.meta["method"] in ON_TOP:
+        velocity = avoiding(own, given, composition, planar=True)
+        velocity[rows] = intervened(position[rows], velocity[rows], asked, gain, limit[rows])
+        return velocity
+    task = own.copy()
+    task[rows] = intervened(position[rows], own[rows], asked, gain, limit[rows])
+    return avoiding(task, given, composition, planar=True)
 
 
 def selected(selection: Array) -> Array:

@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from airground_drake.arrays import Array
+from airground_drake.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.segments import MERGE_S
 
@@ -16,3 +17,13 @@ def control_samples(t: Array, period: float) -> npt.NDArray[np.intp]:
     right = np.searchsorted(t, instants).clip(1, len(t) - 1)
     nearest = right - (instants - t[right - 1] < t[right] - instants)
     return np.asarray(nearest[np.abs(t[nearest] - instants) <= TIME_TOLERANCE_S])
+
+
+def samples_of(trace: Trace) -> npt.NDArray[np.intp]:
+    """Rows of the control samples of a run, (S,)."""
+    return control_samples(trace.t, trace.scenario["control"]["period_s"])
+
+
+def chosen_at(trace: Trace, samples: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
+    """Rows whose commands were chosen at the samples: the command of a row led to it, so it is the row after."""
+    return np.searchsorted(trace.t, trace.t[samples] + MERGE_S)

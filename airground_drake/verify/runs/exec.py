@@ -13,20 +13,20 @@ from airground_drake.arrays import Array
 from airground_drake.errors import TraceError
 from airground_drake.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S, TraceClaim
-from airground_drake.verify.engines.segments import MERGE_S, corner_times, travelled
+from airground_drake.verify.engines.segments import corner_times, travelled
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.control_law import (
-    ON_TOP,
     Asked,
     Inequalities,
     avoiding,
-    inequalities,
-    intervened,
+    commanded,
+    inequalities_of,
     limited,
+    spare,
     tracking,
 )
-from airground_drake.verify.runs.control_samples import control_samples
-from airground_drake.verify.runs.pairs import around, places_of
+from airground_drake.verify.runs.control_samples import chosen_at, samples_of
+from airground_drake.verify.runs.pairs import preset_of
 from airground_drake.verify.runs.proposals import Sent, accepted_at
 
 COMMAND_TOLERANCE_M_S = 1e-6
@@ -122,7 +122,7 @@ class Exec(TraceClaim):
 
     def check(self, trace: Trace) -> Finding:
         """Compare every command with the law; the margin is the tolerance less the largest difference."""
-        samples = control_samples(trace.t, trace.scenario["control"]["period_s"])
+        samples = samples_of(trace)
         judged = [_judge_ugv(trace, ugv, samples) for ugv in trace.ugvs]
         formation = trace.scenario["uav"]["task"] == "formation"
         if formation:
@@ -173,46 +173,27 @@ def _first_wrong(one: Judged) -> dict[str, Any] | None:
     }
 
 
-def _chosen(trace: Trace, samples: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
-    """Rows that have the command chosen at each control sample: the next ones."""
-    return np.asarray(np.searchsorted(trace.t, trace.t[samples] + MERGE_S))
-
-
-def _around(trace: Trace, robot: str, samples: npt.NDArray[np.intp], *, planar: bool) -> Inequalities:
-    """The avoidance inequalities of a robot at the samples; what never comes within sensing range has none."""
-    places, beside = places_of(trace), around(trace, robot)
-    others = [np.broadcast_to(places[other], (len(trace.t), 3))[samples] for other, _ in beside]
-    return inequalities(
-        places[robot][samples],
-        np.stack(others, axis=1) if others else np.empty((len(samples), 0, 3)),
-        np.array([pair.safe_m for _, pair in beside]),
-        np.array([pair.share for _, pair in beside]),
-        trace.scenario["control"],
-        planar=planar,
-    )
-
-
 def _judge_ugv(trace: Trace, ugv: str, samples: npt.NDArray[np.intp]) -> Judged:
     """A UGV's commands against the law, with whatever it has accepted."""
     scenario, control, t = trace.scenario, trace.scenario["control"], trace.t[samples]
-    spec, chosen = scenario["ugvs"][ugv], _chosen(trace, samples)
+    spec, chosen = scenario["ugvs"][ugv], chosen_at(trace, samples)
     position, recorded = trace.position(ugv)[samples], trace.command(ugv)[chosen]
-    given = _around(trace, ugv, samples, planar=True)
+    given, limit = inequalities_of(trace, ugv, samples), np.full(len(samples), spec["max_speed_m_s"])
     accepted = accepted_at(trace, ugv)
-    waypoints = np.asarray(spec["preset"]["waypoints_m"], dtype=np.float64)
-    speed = float(spec["preset"]["speed_m_s"])
+    waypoints, speed = preset_of(trace, ugv)
     preset = travelled(waypoints, speed, t)
     own_rates = _preset_rates(waypoints, speed, t)
     asked = _asked(accepted, t)
+    executing = np.array([sent is not None for sent in accepted], dtype=bool)
+    rows = np.flatnonzero(executing)
     away, law = np.full(len(t), np.inf), np.zeros((len(t), 3))
     # samples at a corner of a motion are evaluated with the rates on both sides of it, and the closer one counts
     for own_rate, wish in product(own_rates, asked):
-        own = tracking(position, preset, own_rate, control["motion_gain_1_s"], spec["max_speed_m_s"])
-        ours = _law(trace, own, position, given, accepted, wish, spec["max_speed_m_s"])
+        own = tracking(position, preset, own_rate, control["motion_gain_1_s"], limit)
+        ours = commanded(trace, position, own, given, rows, wish, limit)
         off = np.linalg.norm(recorded - ours, axis=1)
         closer = ~(off >= away)
         away[closer], law[closer] = off[closer], ours[closer]
-    executing = np.array([sent is not None for sent in accepted], dtype=bool)
     said = _said(trace.column(f"{ugv}.accepted") != 0.0, chosen, executing)
     return Judged(ugv, t, away, law, recorded, executing, said, _binding(given, law))
 
@@ -228,28 +209,6 @@ def _said(
     return said
 
 
-def _law(
-    trace: Trace,
-    own: Array,
-    position: Array,
-    given: Inequalities,
-    accepted: Sequence[Sent | None],
-    asked: Asked,
-    limit: float,
-) -> Array:
-    """Commands by the law, (S, 3), m/s."""
-    composition, gain = trace.meta["composition"], trace.scenario["control"]["intervention_gain_1_s"]
-    velocity = avoiding(own, given, composition, planar=True)
-    rows = np.array([k for k, sent in enumerate(accepted) if sent is not None], dtype=np.intp)
-    if rows.size:
-        on_top = trace.meta["method"] in ON_TOP
-        below = (velocity if on_top else own)[rows]
-        task = intervened(position[rows], below, Asked(*(part[rows] for part in asked)), gain, limit)
-        bounds = Inequalities(given.normal[rows], given.bound[rows])
-        velocity[rows] = task if on_top else avoiding(task, bounds, composition, planar=True)
-    return velocity
-
-
 def _preset_rates(waypoints: Array, speed: float, t: Array) -> list[Array]:
     """Velocity of the preset trajectory, (S, 3), m/s, before and after each instant; they differ at corners only."""
     times = corner_times(waypoints, speed)
@@ -262,20 +221,17 @@ def _preset_rates(waypoints: Array, speed: float, t: Array) -> list[Array]:
 
 
 def _asked(accepted: Sequence[Sent | None], t: Array) -> list[Asked]:
-    """What the accepted proposals ask for at each sample, with the rates before and after each instant."""
-    wanted, chosen = np.zeros((len(t), 3)), np.zeros((len(t), 3, 3))
-    rates = np.zeros((2, len(t), 3))
-    for k, sent in enumerate(accepted):
-        if sent is not None:
-            wanted[k], chosen[k] = sent.place(float(t[k])), sent.chosen
-            both = sent.rates(float(t[k]))
-            rates[0, k], rates[1, k] = both[0], both[-1]
-    return [Asked(wanted, rate, chosen) for rate in rates]
+    """What the proposals that are executed ask for, with the rates before and after each instant, E samples each."""
+    executed = [(sent, now) for sent, now in zip(accepted, t.tolist(), strict=True) if sent is not None]
+    wanted = np.array([sent.place(now) for sent, now in executed]).reshape(-1, 3)
+    chosen = np.array([sent.chosen for sent, _ in executed]).reshape(-1, 3, 3)
+    rates = [sent.rates(now) for sent, now in executed]
+    return [Asked(wanted, np.array([both[side] for both in rates]).reshape(-1, 3), chosen) for side in (0, -1)]
 
 
 def _judge_uav(trace: Trace, samples: npt.NDArray[np.intp]) -> Judged:
     """The UAV's commands against (9)-(11)."""
-    uav, control, chosen = trace.scenario["uav"], trace.scenario["control"], _chosen(trace, samples)
+    uav, control, chosen = trace.scenario["uav"], trace.scenario["control"], chosen_at(trace, samples)
     name = uav["name"]
     if name != trace.robots[-1]:
         raise TraceError(f"the last robot is {trace.robots[-1]}, not the UAV {name}")
@@ -285,7 +241,7 @@ def _judge_uav(trace: Trace, samples: npt.NDArray[np.intp]) -> Judged:
     fed[trace.t[samples] <= TIME_TOLERANCE_S] = 0.0  # nothing was commanded before the first sample
     over = centroid + np.array([0.0, 0.0, uav["altitude_m"]])
     below = limited(fed + control["formation_gain_1_s"] * (over - position), uav["max_speed_m_s"])
-    given = _around(trace, name, samples, planar=False)
+    given = inequalities_of(trace, name, samples)
     law = avoiding(below, given, "augmented", planar=False)
     away = np.linalg.norm(recorded - law, axis=1)
     none = np.zeros(len(samples), dtype=bool)
@@ -293,5 +249,4 @@ def _judge_uav(trace: Trace, samples: npt.NDArray[np.intp]) -> Judged:
 
 
 def _binding(given: Inequalities, velocity: Array) -> npt.NDArray[np.bool_]:
-    spare = np.einsum("bkd,bd->bk", given.normal, velocity) - given.bound
-    return np.asarray((spare <= BINDING_M_S).any(axis=1))
+    return np.asarray((spare(given, velocity) <= BINDING_M_S).any(axis=1))

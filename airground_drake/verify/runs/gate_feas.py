@@ -13,18 +13,18 @@ from airground_drake.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.segments import interpolate, travelled
 from airground_drake.verify.finding import Finding
+from airground_drake.verify.runs.beginnings import sensed
 from airground_drake.verify.runs.control_law import ON_TOP
 from airground_drake.verify.runs.gate_record import (
     POSITION_TOLERANCE_M,
     GateClaim,
     Off,
     Row,
-    bare_row,
     conclude,
     cost_tolerance,
 )
 from airground_drake.verify.runs.interventions import intervening
-from airground_drake.verify.runs.pairs import around
+from airground_drake.verify.runs.pairs import preset_of
 from airground_drake.verify.runs.proposals import proposals_of
 from airground_drake.verify.runs.sum_up_rounding import (
     compare_rounding,
@@ -173,7 +173,7 @@ def compare_proposals(trace: Trace, rows: Sequence[Row]) -> Iterator[Off]:
         replaced = any(other.ugv == one.ugv and one.issued_s < other.issued_s <= until for other in sent)
         if called and not replaced and one.times_s[-1] > until:
             given = dict.fromkeys(("decision", "reason", "status"), "")
-            row = bare_row({"t_s": one.issued_s, "robot": one.ugv, "policy": one.policy, **given})
+            row = Row({"t_s": one.issued_s, "robot": one.ugv, "policy": one.policy, **given})
             yield Off(row, "nothing is decided on a proposal", float(one.number not in decided), 0.0)
 
 
@@ -182,7 +182,6 @@ def compare_situation(trace: Trace, row: Row) -> Iterator[Off]:
     gate = trace.scenario["gatekeeper"]
     t = float(row.given["t_s"])
     robot = str(row.given["robot"])
-    preset = trace.scenario["ugvs"][robot]["preset"]
     after = gate["horizon_s"] / gate["stages"] * np.arange(1.0, gate["stages"] + 1.0)
     yield Off(row, "length of a stage, s", row.dt - after[0], TIME_TOLERANCE_S)
     yield Off(row, "weight of task errors", row.error_weight - gate["error_weight_1_m2_s"], 0.0)
@@ -190,9 +189,9 @@ def compare_situation(trace: Trace, row: Row) -> Iterator[Off]:
     yield Off(row, "weight of the terminal cost", row.terminal_weight - gate["terminal_weight_s"], 0.0)
     own = interpolate(trace.t, trace.position(robot), t)
     yield Off(row, "initial position, m", row["initial_m"] - own, POSITION_TOLERANCE_M, position_m=own.tolist())
-    reference = travelled(np.asarray(preset["waypoints_m"], dtype=np.float64), preset["speed_m_s"], t + after)
+    reference = travelled(*preset_of(trace, robot), t + after)
     yield Off(row, "reference, m", row["reference_m"] - reference, POSITION_TOLERANCE_M)
-    left = _sensed(trace, robot, t, own, after)
+    left = [(one.name, one.places, one.pair.safe_m) for one in sensed(trace, robot, t, after)]
     for j, distance in enumerate(row["distances_m"]):
         differ = [max(np.abs(at - row["centres_m"][:, j]).max(), abs(safe - distance)) for _, at, safe in left]
         nearest = int(np.argmin(differ)) if left else -1
@@ -210,24 +209,6 @@ def compare_situation(trace: Trace, row: Row) -> Iterator[Off]:
         if row.planned:
             lacking = max(lacking, (safe - np.linalg.norm(row["positions_m"] - at, axis=1)).max())
         yield Off(row, f"{name} is left out though within reach, m", max(0.0, lacking), POSITION_TOLERANCE_M)
-
-
-def _sensed(trace: Trace, robot: str, t: float, own: Array, after: Array) -> list[tuple[str, Array, float]]:
-    """Obstacles and other robots within sensing range: name, places (N, 3) at times `after` t, safe distance, m."""
-    scenario = trace.scenario
-    held = min(int(np.searchsorted(trace.t, t - TIME_TOLERANCE_S)), len(trace.t) - 1)
-    things = []
-    for other, pair in around(trace, robot):
-        if other in scenario["obstacles"]:
-            place, velocity = np.array(scenario["obstacles"][other]["position_m"]), np.zeros(3)
-        else:
-            place, velocity = interpolate(trace.t, trace.position(other), t), trace.command(other)[held]
-        things.append((other, place, velocity, pair.safe_m))
-    return [
-        (name, place + after[:, None] * velocity, float(distance))
-        for name, place, velocity, distance in things
-        if np.linalg.norm(place - own) <= scenario["control"]["sensing_range_m"]
-    ]
 
 
 def compare_plan(trace: Trace, row: Row) -> Iterator[Off]:
@@ -280,7 +261,7 @@ def _clear(row: Row, positions: Array, period: float) -> npt.NDArray[np.bool_]:
 def compare_answers(trace: Trace, rows: Sequence[Row]) -> Iterator[Off]:
     """The answers against the rules, decision by decision, and the times of the decisions."""
     gate = trace.scenario["gatekeeper"]
-    literal = (trace.scenario["runs"][trace.run]["rule"] or gate["rule"]) == "first_stage"
+    literal = gate["rule"] == "first_stage"
     yield from compare_times(trace, rows)
     for ugv in trace.ugvs:
         last: Row | None = None

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import abc
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -29,7 +29,7 @@ LEAST_COST = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Row:
-    """One decision and its problem: a row of `Trace.decisions` and of `Trace.problems`, arrays in shape.
+    """One decision, and its problem if it has one: a row of `Trace.decisions` and of `Trace.problems`.
 
     Attributes:
         given: the columns of `Trace.decisions`.
@@ -41,11 +41,11 @@ class Row:
     """
 
     given: dict[str, Any]
-    dt: float
-    error_weight: float
-    slack_weight: float
-    terminal_weight: float
-    data: dict[str, Array | None]
+    dt: float = -1.0
+    error_weight: float = -1.0
+    slack_weight: float = -1.0
+    terminal_weight: float = -1.0
+    data: dict[str, Array | None] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> Array:
         """An array that must be there.
@@ -67,6 +67,11 @@ class Row:
     def planned(self) -> bool:
         """Whether it rests on a plan; otherwise it is a refusal for want of one."""
         return self.data["plan"] is not None
+
+    @property
+    def stages(self) -> int:
+        """N."""
+        return len(self["reference_m"])
 
     def positions(self, omega: Array) -> Array:
         """(23): omega (..., N) to positions at the ends of the stages, (..., N, 3), m."""
@@ -125,63 +130,46 @@ class Row:
 
 
 def rows_of(trace: Trace) -> list[Row]:
-    """All decisions with their problems.
+    """All decisions, with their problems (26); under method (d) there are none.
 
     Raises:
-        TraceError: if the tables do not belong together, decisions are not in order, a shape is wrong or a number is
-            not finite.
+        TraceError: if the tables do not belong together, decisions are not in order, a shape is wrong, a number is
+            not finite, or a decision is not of a UGV.
     """
-    if len(trace.problems) != len(trace.decisions):
-        raise TraceError(f"{len(trace.decisions)} decisions, but {len(trace.problems)} problems")
-    _come_by_time(trace)
-    gate, rows = trace.scenario["gatekeeper"], []
-    for given, problem in zip(trace.decisions.to_dict("records"), trace.problems.to_dict("records"), strict=True):
-        scalars = [float(problem[name]) for name in PROBLEM_SCALARS]
-        flat = {name: np.asarray(problem[name], dtype=np.float64).ravel() for name in PROBLEM_ARRAYS}
-        columns = {str(name): value for name, value in given.items()}
-        row = Row(columns, scalars[0], scalars[1], scalars[2], scalars[3], _shaped(flat, int(gate["stages"])))
-        numbers = [np.array(scalars), np.array([v for v in given.values() if isinstance(v, float)]), *flat.values()]
-        if not all(np.isfinite(values).all() for values in numbers):
-            raise TraceError(f"{row.label}: it or its problem has numbers that are not finite")
-        if given["robot"] not in trace.ugvs or given["route"] != gate["route"]:
-            raise TraceError(f"{row.label}: not of a UGV of the trace, or not by the scenario's route")
-        decided = given["status"] in ("optimal", "budget_spent", "solver_failed")
-        if row.planned != decided or (decided and row.data["positions_m"] is None):
-            raise TraceError(f"{row.label}: a plan without positions, or not what its status {given['status']!r} says")
-        rows.append(row)
-    return rows
-
-
-def _come_by_time(trace: Trace) -> None:
-    """Claims go through the decisions of a UGV as they come: what a decision rests on is before it."""
+    given = [{str(name): value for name, value in row.items()} for row in trace.decisions.to_dict("records")]
+    due = len(given) if trace.meta["method"] in ON_TOP else 0
+    if len(trace.problems) != due:
+        raise TraceError(
+            f"{len(given)} decisions under method ({trace.meta['method']}), but {len(trace.problems)} problems"
+        )
     for ugv, times in trace.decisions.groupby("robot")["t_s"]:
         if not (np.diff(times.to_numpy(dtype=np.float64)) >= 0.0).all():
             raise TraceError(f"the decisions of {ugv} are not in order of their times")
-
-
-def bare_row(given: dict[str, Any]) -> Row:
-    """A decision without a problem."""
-    return Row(given, -1.0, -1.0, -1.0, -1.0, {})
-
-
-def bare_rows_of(trace: Trace) -> list[Row]:
-    """All decisions by outcomes: they have no problem.
-
-    Raises:
-        TraceError: if there is a problem all the same, decisions are not in order, or a number is not finite.
-    """
-    if len(trace.problems):
-        raise TraceError(f"{len(trace.problems)} problems, though outcomes are compared")
-    _come_by_time(trace)
-    rows = []
-    for given in trace.decisions.to_dict("records"):
-        row = bare_row({str(name): value for name, value in given.items()})
-        if not np.isfinite([value for value in given.values() if isinstance(value, float)]).all():
+    problems = trace.problems.to_dict("records")
+    rows = [_solved(trace, *both) for both in zip(given, problems, strict=True)] if due else [Row(one) for one in given]
+    for row in rows:
+        if not np.isfinite([value for value in row.given.values() if isinstance(value, float)]).all():
             raise TraceError(f"{row.label}: it has numbers that are not finite")
-        if given["robot"] not in trace.ugvs:
+        if row.given["robot"] not in trace.ugvs:
             raise TraceError(f"{row.label}: not of a UGV of the trace")
-        rows.append(row)
     return rows
+
+
+def _solved(trace: Trace, given: dict[str, Any], problem: dict[Any, Any]) -> Row:
+    """A decision with its problem, a row of `Trace.problems`."""
+    gate = trace.scenario["gatekeeper"]
+    scalars = [float(problem[name]) for name in PROBLEM_SCALARS]
+    dt, error, slack, terminal = scalars
+    flat = {name: np.asarray(problem[name], dtype=np.float64).ravel() for name in PROBLEM_ARRAYS}
+    row = Row(given, dt, error, slack, terminal, _shaped(flat, int(gate["stages"])))
+    if not all(np.isfinite(values).all() for values in (np.array(scalars), *flat.values())):
+        raise TraceError(f"{row.label}: its problem has numbers that are not finite")
+    if given["route"] != gate["route"]:
+        raise TraceError(f"{row.label}: not by the scenario's route")
+    decided = given["status"] in ("optimal", "budget_spent", "solver_failed")
+    if row.planned != decided or (decided and row.data["positions_m"] is None):
+        raise TraceError(f"{row.label}: a plan without positions, or not what its status {given['status']!r} says")
+    return row
 
 
 def _shaped(flat: dict[str, Array], n: int) -> dict[str, Array | None]:
@@ -202,10 +190,18 @@ def _shaped(flat: dict[str, Array], n: int) -> dict[str, Array | None]:
 
 
 class Off:
-    """How far something is from what it should be, and how far it may be."""
+    """A comparison: how far a recorded value is from what it should be, and how far it may be."""
 
     def __init__(self, row: Row, what: str, by: Any, allowed: float, **more: Any) -> None:
-        """`by`: absolute differences, any shape, of which the largest counts; `more` goes into a counterexample."""
+        """Compare.
+
+        Args:
+            row: the decision.
+            what: is compared.
+            by: differences, of any shape; the largest absolute one counts.
+            allowed: largest difference allowed.
+            more: goes into a counterexample.
+        """
         self.row = row
         self.what = what
         self.allowed = allowed
@@ -214,7 +210,7 @@ class Off:
 
     @property
     def wrong(self) -> bool:
-        """Whether it is too far; also for a comparison that came out as no number."""
+        """Whether the difference is too large, or is not a number."""
         return not self.off <= self.allowed
 
     def to_json(self) -> dict[str, Any]:
@@ -229,7 +225,7 @@ def cost_tolerance(cost: float) -> float:
 
 
 def conclude(finding: Finding, compared: Iterable[Off]) -> Finding:
-    """The finding; refuted if anything is wrong, by what is so first in time."""
+    """The finding, or if a comparison is wrong a refutation by the first such one in time."""
     wrong = [one for one in compared if one.wrong]
     if not wrong:
         return finding
@@ -238,10 +234,10 @@ def conclude(finding: Finding, compared: Iterable[Off]) -> Finding:
 
 
 def without_decisions(trace: Trace) -> list[str]:
-    """UGVs that executed something, or were intervened on for long enough to decide on a proposal, but never decided.
+    """UGVs that had reason to decide, but never did: they executed something, or were intervened on for long enough.
 
-    That is a fault of the UGV only if it got a proposal that stood for long enough (GATE-FEAS) or executed something
-    (EXEC): the UAV's policies may have found nothing to propose. The other UGVs are judged all the same.
+    This is no refutation: the UAV's policies may have found nothing to propose. GATE-FEAS refutes it where a proposal
+    stood for long enough, EXEC where something was executed.
     """
     called = [ugv for ugv in trace.ugvs if (trace.column(f"{ugv}.accepted") != 0.0).any() or talk_is_due(trace, ugv)]
     return [ugv for ugv in called if not (trace.decisions["robot"] == ugv).any()]
@@ -262,7 +258,7 @@ class GateClaim(TraceClaim):
         if without and not len(trace.decisions):
             reason = f"{', '.join(without)} were in mode 'intervening', but the trace has no decision"
             return Finding("not_run", evidence={"reason": reason, "faults": trace.meta["faults"]})
-        rows = trace.derived("rows", lambda: (rows_of if trace.meta["method"] in ON_TOP else bare_rows_of)(trace))
+        rows = trace.derived("rows", lambda: rows_of(trace))
         if not rows:
             reason = "no UGV was intervened on: nothing to decide"
             return Finding("holds", evidence={"decisions": 0, "reason": reason}, exercised=0)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -49,41 +50,13 @@ class LiveGoal(TraceClaim):
 
     def check(self, trace: Trace) -> Finding:
         """Compare each robot's end with what its scenario declares; the least margin is reported."""
-        scenario = trace.scenario
-        stalls: dict[str, Any] = scenario["runs"][trace.run]["stalls_m"]
+        stalls = trace.scenario["runs"][trace.run]["stalls_m"]
         if unknown := set(stalls) - set(trace.ugvs):
             raise TraceError(f"stalls_m names {sorted(unknown)}, which are not UGVs of the trace")
-        final = {robot: trace.position(robot)[-1] for robot in trace.robots}
-        conditions: list[dict[str, Any]] = []
-        away_from_there: list[str] = []
-
-        def within(robot: str, what: str, point: Array, tolerance: float) -> float:
-            distance = float(np.linalg.norm(final[robot] - point))
-            entry = {"robot": robot, "condition": what, "point_m": point.tolist(), "final_m": final[robot].tolist()}
-            conditions.append({**entry, "distance_m": distance, "margin_m": tolerance - distance})
-            if float(np.linalg.norm(trace.position(robot)[0] - point)) > tolerance:
-                away_from_there.append(robot)
-            return distance
-
-        arrival = float(scenario["arrival_tolerance_m"])
-        for ugv in trace.ugvs:
-            target = np.asarray(scenario["ugvs"][ugv]["target_m"], dtype=np.float64)
-            if ugv not in stalls:
-                within(ugv, "at its target", target, arrival)
-                continue
-            within(ugv, "at its stall point", np.asarray(stalls[ugv], dtype=np.float64), scenario["stall_tolerance_m"])
-            moved = _moved_at_the_end(trace, ugv)
-            conditions.append({"robot": ugv, "condition": "stands", "moved_m": moved, "margin_m": AT_REST_M - moved})
-            away = float(np.linalg.norm(final[ugv] - target))
-            conditions.append({"robot": ugv, "condition": "short of its target", "margin_m": away - arrival})
-        uav = scenario["uav"]
-        if stalls:
-            centroid = np.mean([final[ugv] for ugv in trace.ugvs], axis=0) + np.array([0.0, 0.0, uav["altitude_m"]])
-            within(uav["name"], "over the centroid of the UGVs", centroid, arrival)
-        else:
-            within(uav["name"], "at its target", np.asarray(uav["target_m"], dtype=np.float64), arrival)
-        worst = min(conditions, key=lambda entry: float(entry["margin_m"]))
-        live = all(entry["margin_m"] >= 0.0 for entry in conditions)
+        judged = list(_conditions(trace, stalls))
+        conditions, had_a_way = [one.entry for one in judged], [one.entry["robot"] for one in judged if one.had_a_way]
+        worst = min(conditions, key=lambda one: one["margin_m"])
+        live = all(one["margin_m"] >= 0.0 for one in conditions)
         return Finding(
             "holds" if live else "refuted",
             margin=worst["margin_m"],
@@ -91,10 +64,46 @@ class LiveGoal(TraceClaim):
             quantity="tolerance left about where a robot must end",
             where={"robot": worst["robot"], "condition": worst["condition"]},
             counterexample=None if live else worst,
-            evidence={"conditions": conditions, "had_a_way_to_go": away_from_there}
-            | ({"kind": "stuck"} if stalls else {}),
-            exercised=len(away_from_there),
+            evidence={"conditions": conditions, "had_a_way_to_go": had_a_way} | ({"kind": "stuck"} if stalls else {}),
+            exercised=len(had_a_way),
         )
+
+
+class Condition(NamedTuple):
+    """A condition on a robot's end, as evidence, and whether the robot did not begin where it has to end."""
+
+    entry: dict[str, Any]
+    had_a_way: bool = False
+
+
+def _conditions(trace: Trace, stalls: Mapping[str, Sequence[float]]) -> Iterator[Condition]:
+    """What the scenario declares of each robot's end, with the margins, m; `stalls` has the stall points of UGVs, m."""
+    scenario, uav, arrival = trace.scenario, trace.scenario["uav"], float(trace.scenario["arrival_tolerance_m"])
+    for ugv in trace.ugvs:
+        target = scenario["ugvs"][ugv]["target_m"]
+        if ugv not in stalls:
+            yield _within(trace, ugv, "at its target", target, arrival)
+            continue
+        yield _within(trace, ugv, "at its stall point", stalls[ugv], scenario["stall_tolerance_m"])
+        moved = _moved_at_the_end(trace, ugv)
+        yield Condition({"robot": ugv, "condition": "stands", "moved_m": moved, "margin_m": AT_REST_M - moved})
+        away = float(np.linalg.norm(trace.position(ugv)[-1] - target))
+        yield Condition({"robot": ugv, "condition": "short of its target", "margin_m": away - arrival})
+    if stalls:
+        centroid = np.mean([trace.position(ugv)[-1] for ugv in trace.ugvs], axis=0)
+        over = centroid + np.array([0.0, 0.0, uav["altitude_m"]])
+        yield _within(trace, uav["name"], "over the centroid of the UGVs", over, arrival)
+    else:
+        yield _within(trace, uav["name"], "at its target", uav["target_m"], arrival)
+
+
+def _within(trace: Trace, robot: str, condition: str, point: Array | Sequence[float], tolerance_m: float) -> Condition:
+    """That a robot ends no farther from a point, (3,), m, than a tolerance."""
+    there = np.asarray(point, dtype=np.float64)
+    begin, end = trace.position(robot)[[0, -1]]
+    before, after = (float(np.linalg.norm(place - there)) for place in (begin, end))
+    at = {"robot": robot, "condition": condition, "point_m": there.tolist(), "final_m": end.tolist()}
+    return Condition({**at, "distance_m": after, "margin_m": tolerance_m - after}, before > tolerance_m)
 
 
 def _moved_at_the_end(trace: Trace, robot: str) -> float:

@@ -15,10 +15,14 @@ from airground_drake.verify.engines.segments import MERGE_S, interpolate
 
 
 class Pair(NamedTuple):
-    """Two things to keep apart: a robot, and an obstacle or robot; `share` is the part that each robot takes.
+    """A robot, and an obstacle or another robot that it has to keep apart from.
 
-    `safe_m` is the safe distance between centres: that of the kind of pair and both radii. In one control period they
-    come nearer to each other by `reach_m` at most.
+    Attributes:
+        first: the robot.
+        second: the obstacle or other robot.
+        safe_m: safe distance of the centres: that of the kind of pair, and both radii.
+        share: part of the avoidance inequality that each robot takes.
+        reach_m: by how much they can approach each other in one control period, at most.
     """
 
     first: str
@@ -63,10 +67,13 @@ def _apart_of(trace: Trace) -> Array:
 
 
 def least_of(bounds: Array, most: int, value: Callable[[int], float]) -> list[int]:
-    """Numbers, in their order, of so many of the least values, of which bounds (K,) from below are known.
+    """Indices of the `most` least of K values, in increasing order; few values have to be computed.
 
-    As many values as are wanted, of whatever, say how large a wanted one can be: those with larger bounds are not
-    looked at.
+    Args:
+        bounds: lower bounds of the values, (K,).
+        most: how many are wanted.
+        value: computes the k-th value. The wanted ones are at most the largest of any `most` values, so those with
+            larger bounds are not computed.
     """
     if len(bounds) <= most:
         return list(range(len(bounds)))
@@ -114,6 +121,12 @@ def speed_limits(trace: Trace) -> dict[str, float]:
     return {name: float(robot["max_speed_m_s"]) for name, robot in robots.items()}
 
 
+def preset_of(trace: Trace, ugv: str) -> tuple[Array, float]:
+    """Corners of a UGV's preset trajectory, (m, 3), m, and its speed along them, m/s."""
+    preset = trace.scenario["ugvs"][ugv]["preset"]
+    return np.asarray(preset["waypoints_m"], dtype=np.float64), float(preset["speed_m_s"])
+
+
 def places_of(trace: Trace) -> dict[str, Array]:
     """Positions by name, m: (T, 3) of a robot, (3,) of an obstacle, whether the UAV knows it or not."""
 
@@ -142,23 +155,3 @@ def snapshot(trace: Trace, names: Iterable[str], t_s: float) -> dict[str, Any]:
 DISTANCE_TOLERANCE_M = 1e-9
 """A distance may be this much below the safe one, m: the controller steers *onto* the safe distance, and sums of
 some thousand rounded steps err by 1e-12 m. The reported margin does not contain it."""
-
-
-def slack_of(offset: Array, velocity: Array, pair: Pair, control: dict[str, Any], *, planar: bool) -> Array:
-    """n.v minus its bound for one pair at S samples, (S,), m/s; +inf out of sensing range.
-
-    Args:
-        offset: from the other to the robot, (S, 3), m; n is its direction.
-        velocity: of the robot, (S, 3), m/s.
-        pair: safe distance and share.
-        control: gain A, period h and sensing range of the scenario.
-        planar: whether the robot cannot use the z component of n.
-    """
-    distance = np.sqrt((offset**2).sum(axis=1))
-    normal = np.divide(offset, distance[:, None], out=np.zeros_like(offset), where=distance[:, None] > 0.0)
-    if planar:
-        normal[:, 2] = 0.0
-    excess = distance - pair.safe_m
-    bound = -pair.share * np.where(excess <= 0.0, control["avoidance_gain_1_s"], 1.0 / control["period_s"]) * excess
-    slack = (normal * velocity).sum(axis=1) - bound
-    return np.where(distance <= control["sensing_range_m"], slack, np.inf)

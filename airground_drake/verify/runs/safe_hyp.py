@@ -19,19 +19,19 @@ import numpy.typing as npt
 from airground_drake.arrays import Array
 from airground_drake.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S, TraceClaim
-from airground_drake.verify.engines.segments import MERGE_S, interpolate
+from airground_drake.verify.engines.segments import interpolate
 from airground_drake.verify.engines.shortfalls import SCREEN_M, rounded_up, shortage, shortfalls
 from airground_drake.verify.finding import Finding
-from airground_drake.verify.runs.control_samples import control_samples
+from airground_drake.verify.runs.control_law import inequalities_of, spare
+from airground_drake.verify.runs.control_samples import chosen_at, samples_of
 from airground_drake.verify.runs.demands import differences
 from airground_drake.verify.runs.pairs import (
     DISTANCE_TOLERANCE_M,
     Pair,
     apart_of,
-    near_pairs,
+    around,
     pairs_of,
     places_of,
-    slack_of,
     snapshot,
     speed_limits,
 )
@@ -149,25 +149,16 @@ class SafeHyp(TraceClaim):
         broken = [h.at(int(k)) for h in [*others, *_avoidance(trace, kept)] for k in h.broken()[:1]]
         broken += [{"hypothesis": BUILT, "t_s": float(trace.t[0]), **each} for each in different[:1]]
         first = min(broken, key=lambda entry: float(entry["t_s"]), default=None)
-        worst: dict[tuple[str, str], dict[str, Any]] = {}
-        for h in others:
-            entry = h.at(int(np.argmin(h.margin)))
-            key = h.name, str(next(iter(h.about.values()), ""))
-            if entry["margin"] <= worst.get(key, entry)["margin"]:
-                worst[key] = entry
-        listed = [_listed(trace, one) for one in kept[:MOST_LISTED]]
-        least: dict[str, Any] = {"margin": kept[0].margin_m if kept else 0.0, "unit": "m", "hypothesis": AVOIDANCE}
-        least |= {key: listed[0][key] for key in ("first", "second")} if kept else {}
-        name = first["hypothesis"] if first else AVOIDANCE
-        leading = min((w for w in worst.values() if w["hypothesis"] == name), key=lambda w: w["margin"], default=least)
-        leading = first if first and name == BUILT else leading
+        worst, listed = _worst(others), [_listed(trace, one) for one in kept[:MOST_LISTED]]
+        shown = _shown(first, worst, listed, kept)
+        name = shown["hypothesis"]
         in_range, binding = _binding(trace)
         return Finding(
             "refuted" if first else "holds",
-            margin=leading.get("margin"),
-            unit=leading.get("unit", ""),
+            margin=shown.get("margin"),
+            unit=shown.get("unit", ""),
             quantity="distance promised less the safe one" if name == AVOIDANCE else f"least slack of {name!r}",
-            where={key: leading[key] for key in leading if key not in ("margin", "unit")},
+            where={key: shown[key] for key in shown if key not in ("margin", "unit")},
             counterexample=first | snapshot(trace, map(str, first.values()), first["t_s"]) if first else None,
             evidence={
                 "e_m": float(max((one.missed_m.max() for one in kept), default=0.0)),
@@ -175,7 +166,7 @@ class SafeHyp(TraceClaim):
                 "pairs": listed,
                 "pairs_in_reach": len(kept),
                 "different_parameters": different,
-                "worst": list(worst.values()),
+                "worst": worst,
                 "inequalities_in_range": in_range,
                 "inequalities_that_bind": binding,
                 "tolerance_m": DISTANCE_TOLERANCE_M,
@@ -184,17 +175,35 @@ class SafeHyp(TraceClaim):
         )
 
 
+def _worst(hypotheses: Sequence[_Hypothesis]) -> list[dict[str, Any]]:
+    """Where each hypothesis has its least margin, for each robot or pair that it is about."""
+    found: dict[tuple[str, str], dict[str, Any]] = {}
+    for h in hypotheses:
+        entry = h.at(int(np.argmin(h.margin)))
+        key = h.name, str(next(iter(h.about.values()), ""))
+        if entry["margin"] <= found.get(key, entry)["margin"]:
+            found[key] = entry
+    return list(found.values())
+
+
+def _shown(
+    first: dict[str, Any] | None, worst: Sequence[dict[str, Any]], listed: Sequence[Any], kept: Sequence[Guarantee]
+) -> dict[str, Any]:
+    """Whose margin is the finding's: of the hypothesis that was broken first, or else of the inequalities."""
+    if first and first["hypothesis"] == BUILT:
+        return first
+    name = first["hypothesis"] if first else AVOIDANCE
+    least: dict[str, Any] = {"margin": kept[0].margin_m if kept else 0.0, "unit": "m", "hypothesis": AVOIDANCE}
+    least |= {key: listed[0][key] for key in ("first", "second")} if kept else {}
+    return min((one for one in worst if one["hypothesis"] == name), key=lambda one: float(one["margin"]), default=least)
+
+
 def _listed(trace: Trace, one: Guarantee) -> dict[str, Any]:
     """A row of the evidence, with the sample at which the most was missed, if anything was."""
     e, k = float(one.missed_m.max()), int(np.argmax(one.missed_m))
     described = {"first": one.pair.first, "second": one.pair.second, "safe_distance_m": one.pair.safe_m}
-    t = float(trace.t[_samples(trace)[k]]) if e > 0.0 else None
+    t = float(trace.t[samples_of(trace)[k]]) if e > 0.0 else None
     return {**described, "guarantee_m": one.distance_m, "e_m": e, "t_s": t}
-
-
-def _samples(trace: Trace) -> npt.NDArray[np.intp]:
-    """Rows of the control samples."""
-    return control_samples(trace.t, trace.scenario["control"]["period_s"])
 
 
 def _gain(trace: Trace) -> Fraction:
@@ -209,15 +218,15 @@ def _written(number: float) -> Fraction:
 
 
 def guarantees(trace: Trace) -> list[Guarantee]:
-    """What is promised for each pair that comes so near that its steps could break its distance.
+    """The distance that is promised for each pair that comes near.
 
-    Pairs in bounds of whose distance there is room for both robots' longest steps are far at every sample.
+    Other pairs stay so far apart that the longest steps of both could not break their distance.
     """
     return trace.derived("guarantees", lambda: list(_guarantees(trace)))
 
 
 def _guarantees(trace: Trace) -> Iterator[Guarantee]:
-    samples, period = np.append(_samples(trace), len(trace.t) - 1), trace.scenario["control"]["period_s"]
+    samples, period = np.append(samples_of(trace), len(trace.t) - 1), trace.scenario["control"]["period_s"]
     lasting = float(trace.t[samples[-1]] - trace.t[samples[-2]])
     last = Fraction(1) if abs(lasting - period) <= TIME_TOLERANCE_S else Fraction(lasting) / Fraction(period)
     places = {name: p if p.ndim == 1 else p[samples] for name, p in places_of(trace).items()}
@@ -243,7 +252,7 @@ def _longest(places: Array, last: float) -> float:
 
 def _avoidance(trace: Trace, kept: Sequence[Guarantee]) -> Iterator[_Hypothesis]:
     """What is missed of the inequalities at each sample, as what it costs of the distance."""
-    t, gain = trace.t[_samples(trace)], float(_gain(trace))
+    t, gain = trace.t[samples_of(trace)], float(_gain(trace))
     for one in kept:
         lost = one.missed_m / gain if gain else one.missed_m * len(t)
         about = {"first": one.pair.first, "second": one.pair.second}
@@ -255,23 +264,13 @@ def _binding(trace: Trace) -> tuple[int, dict[str, int]]:
     count = {"ugv beside obstacle": 0, "uav beside obstacle": 0}
     count |= {"ugv beside ugv": 0, "ugv beside uav": 0, "uav beside ugv": 0}
     kind = dict.fromkeys(trace.ugvs, "ugv") | {trace.robots[-1]: "uav"}
-    control, samples, in_range = trace.scenario["control"], _samples(trace), 0
-    chosen = _chosen(trace, samples)
-    places = {name: p if p.ndim == 1 else p[samples] for name, p in places_of(trace).items()}
-    velocities = {robot: trace.command(robot)[chosen] for robot in trace.robots}
-    for pair in near_pairs(trace):
-        for robot, other in ((pair.first, pair.second), (pair.second, pair.first)):
-            if robot in velocities:
-                away, planar = places[robot] - places[other], robot in trace.ugvs
-                slack = slack_of(away, velocities[robot], pair, control, planar=planar)
-                in_range += int(np.isfinite(slack).sum())
-                count[f"{kind[robot]} beside {kind.get(other, 'obstacle')}"] += int((slack <= BINDING_M_S).sum())
+    samples, in_range = samples_of(trace), 0
+    for robot in trace.robots:
+        slack = spare(inequalities_of(trace, robot, samples), trace.command(robot)[chosen_at(trace, samples)])
+        in_range += int(np.isfinite(slack).sum())
+        for (other, _), binds in zip(around(trace, robot), (slack <= BINDING_M_S).sum(axis=0).tolist(), strict=True):
+            count[f"{kind[robot]} beside {kind.get(other, 'obstacle')}"] += binds
     return in_range, count
-
-
-def _chosen(trace: Trace, samples: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
-    """Rows with the velocities that were chosen at the samples: a command is that of the next row."""
-    return np.searchsorted(trace.t, trace.t[samples] + MERGE_S)
 
 
 def _static(trace: Trace) -> Iterator[_Hypothesis]:
@@ -282,7 +281,7 @@ def _static(trace: Trace) -> Iterator[_Hypothesis]:
     yield _Hypothesis("gain: A h <= 1", "1", trace.t[:1], stable, 0.0, {})
 
     @cache
-    def spare(safe: float, *speeds: float) -> float:
+    def room(safe: float, *speeds: float) -> float:
         return float(reach - _written(safe) - sum(map(_written, speeds)) * period)
 
     order = {robot: k for k, robot in enumerate(trace.robots)}
@@ -295,13 +294,13 @@ def _static(trace: Trace) -> Iterator[_Hypothesis]:
         start, about = np.full(len(beside), trace.t[0]), {"first": robot}
         excess = np.linalg.norm(away, axis=1) - np.array([pair.safe_m for pair in beside])
         yield _Hypothesis("safe start", "m", start, excess, DISTANCE_TOLERANCE_M, about, others)
-        left = [spare(pair.safe_m, limit[robot], limit.get(pair.second, 0.0)) for pair in beside]
+        left = [room(pair.safe_m, limit[robot], limit.get(pair.second, 0.0)) for pair in beside]
         yield _Hypothesis("sensing range", "m", start, np.array(left), 0.0, about, others)
 
 
 def _sampled(trace: Trace) -> Iterator[_Hypothesis]:
     """Hypotheses at the control samples: their spacing, straight motion between them, speed limits, planar motion."""
-    period, limits, t, samples = trace.scenario["control"]["period_s"], speed_limits(trace), trace.t, _samples(trace)
+    period, limits, t, samples = trace.scenario["control"]["period_s"], speed_limits(trace), trace.t, samples_of(trace)
     spacing = np.diff(np.append(t[samples], t[-1]))
     yield _Hypothesis("sampling", "s", t[samples], period - spacing, TIME_TOLERANCE_S, {})
     ends = np.append(samples, len(t) - 1)

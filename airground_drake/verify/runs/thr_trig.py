@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Iterator
 from itertools import pairwise, zip_longest
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,9 +15,16 @@ from airground_drake.trace import Trace
 from airground_drake.verify.claim import TraceClaim
 from airground_drake.verify.engines.segments import NormSignal
 from airground_drake.verify.finding import Finding
-from airground_drake.verify.runs.decision_noise import noise_conflict
-from airground_drake.verify.runs.trigger_record import Conflict, Transition, column_conflict, recorded_events
-from airground_drake.verify.runs.trigger_replay import decision_variable, recorded_variable, transitions
+from airground_drake.verify.runs.triggers import (
+    Conflict,
+    Transition,
+    column_conflict,
+    decision_variable,
+    noise_conflict,
+    recorded_events,
+    recorded_variable,
+    transitions,
+)
 
 EVENT_TOLERANCE_S = 1e-5
 """Recorded and recomputed events may differ by this, s: ten times the accuracy of the simulator's event isolation."""
@@ -88,44 +95,11 @@ class ThrTrig(TraceClaim):
 
     def check(self, trace: Trace) -> Finding:
         """Compare the events of each UGV with the recomputed ones; the first disagreement is the counterexample."""
-        decision, zeta = trace.scenario["decision"], float(trace.meta["zeta_m"])
-        if decision["threshold"]["rule"] == "fixed" and decision["threshold"]["zeta_m"] != zeta:
-            raise TraceError(f"the threshold in force, {zeta} m, is not the scenario's")
-        if decision["threshold"]["rule"] != "fixed" and not _is_root(decision["threshold"], zeta):
-            raise TraceError(f"the threshold in force, {zeta} m, is not what the scenario's rule computes")
-        block = str(trace.meta.get("decision_block", ""))
-        bare = decision["trigger"] == "bare"
-        release, dwell = (zeta, 0.0) if bare else (decision["release_m"], decision["min_inter_event_s"])
-        wrong: list[Conflict] = [
-            {"robot": str(e["robot"]), "t_s": float(e["t_s"]), "what": f"spurious {e['kind']}: not a UGV"}
-            for e in trace.events
-            if e["kind"] in ("trigger", "release") and e["robot"] not in trace.ugvs
-        ]
-        evidence: list[dict[str, Any]] = []
-        lags: list[tuple[float, str]] = []
-        due: Counter[str] = Counter()
-        for ugv in trace.ugvs:
-            x, against_15, off = _judged(trace, ugv, replaced=bool(block))
-            predicted = list(transitions(x, zeta, release, dwell))
-            due.update(_as_transitions(predicted))
-            recorded = recorded_events(trace, ugv)
-            expected = [(time, EVENT_KINDS[kind]) for time, kind in predicted if kind in EVENT_KINDS]
-            lag, mismatch = _compare(expected, recorded, x)
-            found = (
-                off, mismatch, column_conflict(trace, ugv, recorded), _mode_conflict(trace, ugv, predicted),
-                noise_conflict(trace, ugv),
-            )  # fmt: skip
-            wrong += [{"robot": ugv, **conflict} for conflict in found if conflict is not None]
-            lags += [(lag, ugv)] if expected else []
-            evidence.append(
-                {
-                    "robot": ugv,
-                    "events": [{"t_s": time, "kind": kind} for time, kind in expected],
-                    "worst_time_difference_s": lag,
-                    "largest_decision_variable_m": float(x.x.max()),
-                    "port_against_15": against_15,
-                }
-            )
+        levels = levels_of(trace)
+        judged = [_judged(trace, ugv, levels) for ugv in trace.ugvs]
+        wrong = [*_of_strangers(trace), *(conflict for one in judged for conflict in one.wrong)]
+        due = Counter(kind for one in judged for kind in _as_transitions(one.predicted))
+        lags = [(one.lag_s, one.ugv) for one in judged if one.expected]
         worst = max(lags) if lags and not wrong else None
         return Finding(
             "refuted" if wrong else "holds",
@@ -135,15 +109,96 @@ class ThrTrig(TraceClaim):
             where={"robot": worst[1]} if worst else {},
             counterexample=min(wrong, key=lambda conflict: float(conflict["t_s"])) if wrong else None,
             evidence={
-                "ugvs": evidence,
-                "decision_block": block or "that of (15)",
-                "zeta_m": zeta,
-                "release_m": release,
-                "dwell_s": dwell,
+                "ugvs": [one.to_json() for one in judged],
+                "decision_block": _block(trace) or "that of (15)",
+                **levels._asdict(),
                 "transitions_due": dict(due),
             },
             exercised=due.total(),
         )
+
+
+class Levels(NamedTuple):
+    """Of the trigger in force: threshold and release level, m, and dwell, s."""
+
+    zeta_m: float
+    release_m: float
+    dwell_s: float
+
+
+def levels_of(trace: Trace) -> Levels:
+    """The levels of a run by its scenario.
+
+    Raises:
+        TraceError: if the recorded threshold is not the scenario's, or not what its rule computes.
+    """
+    decision, zeta = trace.scenario["decision"], float(trace.meta["zeta_m"])
+    rule = decision["threshold"]
+    if rule["rule"] == "fixed" and rule["zeta_m"] != zeta:
+        raise TraceError(f"the threshold in force, {zeta} m, is not the scenario's")
+    if rule["rule"] != "fixed" and not _is_root(rule, zeta):
+        raise TraceError(f"the threshold in force, {zeta} m, is not what the scenario's rule computes")
+    if decision["trigger"] == "bare":
+        return Levels(zeta, zeta, 0.0)
+    return Levels(zeta, decision["release_m"], decision["min_inter_event_s"])
+
+
+def _block(trace: Trace) -> str:
+    """Another block than that of (15) which computes the decision variable; '' if there is none."""
+    return str(trace.meta.get("decision_block", ""))
+
+
+def _of_strangers(trace: Trace) -> Iterator[Conflict]:
+    """Triggers and releases of what is not a UGV."""
+    for event in trace.events:
+        if event["kind"] in ("trigger", "release") and event["robot"] not in trace.ugvs:
+            what = f"spurious {event['kind']}: not a UGV"
+            yield {"robot": str(event["robot"]), "t_s": float(event["t_s"]), "what": what}
+
+
+class Judged(NamedTuple):
+    """The trigger of one UGV, run again.
+
+    Attributes:
+        ugv: whose.
+        predicted: the automaton's transitions.
+        expected: the events that the trace has to have.
+        lag_s: largest time difference of the events that agree.
+        largest_m: of the decision variable.
+        against_15: how the recorded variable compares with (15).
+        wrong: what disagrees.
+    """
+
+    ugv: str
+    predicted: list[Transition]
+    expected: list[Transition]
+    lag_s: float
+    largest_m: float
+    against_15: dict[str, Any]
+    wrong: list[Conflict]
+
+    def to_json(self) -> dict[str, Any]:
+        """For the evidence."""
+        return {
+            "robot": self.ugv,
+            "events": [{"t_s": time, "kind": kind} for time, kind in self.expected],
+            "worst_time_difference_s": self.lag_s,
+            "largest_decision_variable_m": self.largest_m,
+            "port_against_15": self.against_15,
+        }
+
+
+def _judged(trace: Trace, ugv: str, levels: Levels) -> Judged:
+    """Run the automaton again for a UGV, and compare everything recorded with that."""
+    x, against_15, off = _variable(trace, ugv)
+    predicted = list(transitions(x, *levels))
+    expected = [(time, EVENT_KINDS[kind]) for time, kind in predicted if kind in EVENT_KINDS]
+    recorded = recorded_events(trace, ugv)
+    lag, mismatch = _compare(expected, recorded, x)
+    columns, modes = column_conflict(trace, ugv, recorded), _mode_conflict(trace, ugv, predicted)
+    found = (off, mismatch, columns, modes, noise_conflict(trace, ugv))
+    wrong = [{"robot": ugv, **conflict} for conflict in found if conflict is not None]
+    return Judged(ugv, predicted, expected, lag, float(x.x.max()), against_15, wrong)
 
 
 def _as_transitions(predicted: list[Transition]) -> Iterator[str]:
@@ -171,16 +226,10 @@ def _compare(expected: list[Transition], recorded: list[Transition], x: NormSign
     return lag, None
 
 
-def _judged(trace: Trace, ugv: str, *, replaced: bool) -> tuple[NormSignal, dict[str, Any], Conflict | None]:
-    """The decision variable that the trigger had, how it compares with (15), and the first row at which it differs.
-
-    Args:
-        trace: the run.
-        ugv: whose.
-        replaced: whether another block than that of (15) computes it.
-    """
+def _variable(trace: Trace, ugv: str) -> tuple[NormSignal, dict[str, Any], Conflict | None]:
+    """The decision variable that the trigger had, how it compares with (15), and the first row at which it differs."""
     recorded = recorded_variable(trace, ugv)
-    if replaced:
+    if _block(trace):
         return recorded, {"status": "not_run", "reason": "another block computes the decision variable"}, None
     rebuilt = decision_variable(trace, ugv)
     value, port = rebuilt.at(trace.t), trace.column(f"{ugv}.decision_variable_m")

@@ -8,7 +8,7 @@ from airground_drake.errors import TraceError
 from airground_drake.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S, TraceClaim
 from airground_drake.verify.finding import Finding
-from airground_drake.verify.runs.trigger_record import column_conflict, recorded_events
+from airground_drake.verify.runs.triggers import column_conflict, recorded_events
 
 
 class ZenoTrace(TraceClaim):

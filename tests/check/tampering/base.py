@@ -259,7 +259,7 @@ def attempt(report: Path, edit: Edit, *, mended: bool = True) -> Outcome:
 def judged(scenario: Scenario, traces: Sequence[Trace]) -> list[Verdict]:
     """As `verify_all`, but what was judged before is not judged again: most tamperings leave most runs as they are."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(judge, "side_by_side", lambda pieces, **_: [_once(_Content(each, _key(each))) for each in pieces])
+        patch.setattr(judge, "run_parallel", lambda pieces, **_: [_once(_Content(each, _key(each))) for each in pieces])
         return verify_all(scenario, traces)
 
 

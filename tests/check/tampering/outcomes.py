@@ -29,7 +29,7 @@ def first_refused(frame: pd.DataFrame) -> Any:
 
 
 def under_way(frame: pd.DataFrame) -> Any:
-    return (frame["decision"] == "accept") & (frame["lag_m"] > 0.0)
+    return (frame["decision"] == "accept") & (frame["reason"] == "kept")
 
 
 @tampering()
@@ -83,16 +83,6 @@ def favour_to_itself(folder: Path) -> None:
 @tampering()
 def tries_understated(folder: Path) -> None:
     change(folder, under_way, tries=0.0)
-
-
-@tampering()
-def lag_understated(folder: Path) -> None:
-    change(folder, under_way, lag_m=lambda value: 0.5 * value)
-
-
-@tampering()
-def lag_predicted_afterwards(folder: Path) -> None:
-    change(folder, under_way, predicted_lag_m=lambda value: value + 0.1)
 
 
 @tampering()

@@ -6,7 +6,7 @@ from typing import Any
 
 from airground_drake.decision.bayes import optimal_threshold
 from airground_drake.scenarios.load import load
-from airground_drake.verify.model.threshold.thr_root import ThrRoot
+from airground_drake.verify.model.thr_root import ThrRoot
 
 TABLE_1: dict[str, Any] = ThrRoot().inputs(load("case_a")[0])
 

@@ -8,9 +8,9 @@ from verify.model.threshold.cases import INPUTS
 
 from airground_drake.scenarios.load import load
 from airground_drake.verify.finding import Finding
-from airground_drake.verify.model.threshold.thr_ddm import ThrDdm
-from airground_drake.verify.model.threshold.thr_opt import ThrOpt
-from airground_drake.verify.model.threshold.thr_root import ThrRoot
+from airground_drake.verify.model.thr_ddm import ThrDdm
+from airground_drake.verify.model.thr_opt import ThrOpt
+from airground_drake.verify.model.thr_root import ThrRoot
 
 
 @pytest.fixture(scope="session")

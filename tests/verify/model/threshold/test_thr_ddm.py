@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-import sys
 from statistics import NormalDist
 
 import pytest
+from verify.model.threshold.cases import TABLE_1
 
 from airground_drake.verify.finding import Finding
-from airground_drake.verify.model.threshold import thr_ddm
-from airground_drake.verify.model.threshold.first_passages import PassageExperiment
+from airground_drake.verify.model import first_passages, thr_ddm
 
 
 def test_formulas_are_supported(simulated: Finding) -> None:
@@ -48,13 +47,20 @@ def test_intervals_can_be_redone_by_hand(simulated: Finding) -> None:
         assert low < row["formula"] < high
 
 
-def test_pyddm_agrees(simulated: Finding) -> None:
-    pytest.importorskip("pyddm")
-    for row in simulated.evidence["comparisons"]:
-        key = "error_rate" if row["quantity"] == "error rate" else "decision_time_s"
-        assert simulated.evidence["pyddm"][row["experiment"]][key] == pytest.approx(row["formula"], rel=1e-4)
-
-
-def test_without_pyddm(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "pyddm", None)
-    assert thr_ddm._pyddm(PassageExperiment("", 1.0, 1.0, 1.0, 0.0, 1, 0)) == "not installed"
+def test_pyddm_agrees_with_the_formulas() -> None:
+    """An independent package, in units of zeta and zeta^2/noise^2."""
+    pyddm = pytest.importorskip("pyddm")
+    for each in first_passages.experiments(TABLE_1):
+        unit = (each.zeta / each.noise) ** 2
+        model = pyddm.gddm(
+            drift=each.drift * unit / each.zeta,
+            noise=1.0,
+            bound=1.0,
+            starting_position=each.deviation / each.zeta,
+            T_dur=20.0,
+            mixture_coef=0.0,
+        )
+        solution = model.solve()
+        density = solution.pdf("correct") + solution.pdf("error")
+        found = float(density @ solution.t_domain) * float(model.dt) * unit, float(solution.prob("error"))
+        assert found == pytest.approx(first_passages.running(each), rel=1e-4)

@@ -8,7 +8,7 @@ from verify.model.threshold.cases import INPUTS, TABLE_1
 
 from airground_drake.decision.bayes import bayes_risk, optimal_threshold
 from airground_drake.verify.finding import Finding
-from airground_drake.verify.model.threshold.thr_opt import ThrOpt
+from airground_drake.verify.model.thr_opt import ThrOpt
 
 
 @pytest.mark.parametrize("name", INPUTS)

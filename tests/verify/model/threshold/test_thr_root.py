@@ -16,9 +16,9 @@ from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.engines.signs import enclose
 from airground_drake.verify.finding import Finding
-from airground_drake.verify.model.threshold import thr_root
-from airground_drake.verify.model.threshold.thr_opt import ThrOpt
-from airground_drake.verify.model.threshold.thr_root import ThrRoot, rule_of
+from airground_drake.verify.model import thr_root
+from airground_drake.verify.model.thr_opt import ThrOpt
+from airground_drake.verify.model.thr_root import ThrRoot, rule_of
 
 
 @pytest.mark.parametrize("name", INPUTS)

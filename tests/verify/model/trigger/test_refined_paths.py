@@ -18,9 +18,9 @@ from airground_drake.components import integrated_noise
 from airground_drake.decision.trigger import Trigger
 from airground_drake.systems.decision import EventTrigger
 from airground_drake.verify.engines.segments import NormSignal
-from airground_drake.verify.model.trigger import refined_paths
-from airground_drake.verify.model.trigger.refined_paths import experiment
-from airground_drake.verify.runs.trigger_replay import transitions
+from airground_drake.verify.model import refined_paths
+from airground_drake.verify.model.refined_paths import experiment
+from airground_drake.verify.runs.triggers import transitions
 
 
 @pytest.mark.parametrize("leak", [0.0, 0.7])

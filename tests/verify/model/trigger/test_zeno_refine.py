@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from itertools import pairwise
 
+import numpy as np
 import pytest
 from verify.judging import Judged
 from verify.model.trigger.cases import REFINE
 
+from airground_drake.arrays import Array
 from airground_drake.decision.trigger import Trigger, TriggerState
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.verify.model.trigger import refined_paths, zeno_refine
-from airground_drake.verify.model.trigger.refined_paths import experiment
-from airground_drake.verify.model.trigger.zeno_refine import ZenoRefine
+from airground_drake.verify.model import refined_paths, zeno_refine
+from airground_drake.verify.model.refined_paths import experiment
+from airground_drake.verify.model.zeno_refine import ZenoRefine
 
 
 def test_the_shipped_trigger_is_supported(judged: Judged, case_a: Scenario) -> None:
@@ -56,9 +59,16 @@ def test_more_triggers_than_the_dwell_admits_are_noticed() -> None:
     assert min(b - a for a, b in pairwise(times)) < 0.5
 
 
-def test_a_bare_threshold_without_noise_does_not_diverge() -> None:
+def test_a_bare_threshold_without_noise_does_not_diverge(monkeypatch: pytest.MonkeyPatch) -> None:
     """On a sine about the threshold the bare count is the same at every step: the experiment can fail."""
-    finding = zeno_refine.judge_experiment(dataclasses.replace(experiment(REFINE), smooth=True))
+
+    def sine(setting: refined_paths.Refinement, index: int) -> list[Array]:
+        phase = 2.0 * np.pi * (index + math.sqrt(0.5)) / refined_paths.PATHS
+        steps = [round(setting.duration_s / dt) for dt in setting.dt_s]
+        return [np.sin(np.linspace(0.0, 20.0 * np.pi, count + 1) + phase) for count in steps]
+
+    monkeypatch.setattr(refined_paths, "path", sine)
+    finding = zeno_refine.judge_experiment(experiment(REFINE))
     assert finding.status == "refuted"
     assert finding.counterexample is not None
     assert "bare" in finding.counterexample["what"]

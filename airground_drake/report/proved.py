@@ -1,0 +1,77 @@
+"""What `airground prove DIR` found, put into the page of that report: a line beside SAFE-TRACE of each run.
+
+The page is written before anything is proved. It has a place for each line, and `write` fills these places.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from markupsafe import Markup
+
+from airground_drake import files
+from airground_drake.errors import ReportError, one_line
+from airground_drake.report.folder import PAGES
+
+CLAIM = "SAFE-TRACE"
+"""The claim that Coq proves of a run: every pair keeps its distance at all times."""
+_PLACE = "<!--Coq on {run}-->{line}<!--end-->"
+_PLACES = re.compile(r"<!--Coq on (\w+)-->.*?<!--end-->", re.DOTALL)
+
+
+def place(claim: Mapping[str, Any], line: str = "") -> Markup:
+    """Where the page says what Coq found about a claim, an entry of report.json; '' if Coq is not asked about it."""
+    return Markup(_PLACE).format(run=claim["run"], line=line) if claim["id"] == CLAIM else Markup("")
+
+
+def write(folder: Path) -> bool:
+    """Bring the page of a report up to date with proofs/proofs.json, and report.json with the page.
+
+    Returns:
+        Whether there is a page; without report.json or without report.html nothing is done.
+
+    Raises:
+        ReportError: if the page or a trace that was proved is not the one that report.json names; nothing is changed.
+        OSError: if a file cannot be read or written.
+    """
+    page, record = folder / PAGES["html"], folder / PAGES["json"]
+    if not (page.exists() and record.exists()):
+        return False
+    found = json.loads(files.read_text(folder / "proofs" / "proofs.json"))
+    report = json.loads(files.read_text(record))
+    text = files.read_text(page)
+    there = {f"trace/{run}/meta.json": entry["meta_sha256"] for run, entry in found["runs"].items()}
+    there[page.name] = files.sha256(text.encode())
+    for name, digest in there.items():
+        if report.get("files", {}).get(name) != digest:
+            raise ReportError(
+                one_line(f"{folder / name} is not the file that report.json names: the page stays as it is")
+            )
+    runs = {run: _line(entry, found["coq"]) for run, entry in found["runs"].items()}
+    text = _PLACES.sub(lambda at: place({"id": CLAIM, "run": at[1]}, runs.get(at[1], Markup())), text)
+    report["files"][page.name] = files.sha256(text.encode())
+    files.write_text(page, text)
+    files.write_json(record, report)
+    return True
+
+
+def _line(entry: Mapping[str, Any], coq: str) -> Markup:
+    """What the page says of a run, an entry of proofs.json."""
+    answer = entry["distances"]
+    near = answer.get("too_near", ())
+    if answer["proved"]:
+        says = f"machine-checked for this run (Coq {coq})"
+    elif near:
+        pairs = (
+            f"pair {one['first']}, {one['second']}: {one['least_m']:.6g} m at {one['t_s']:.6g} s, "
+            f"{one['safe_distance_m']:g} m wanted"
+            for one in near
+        )
+        says = f"Coq refused this run: {'; '.join(pairs)}"
+    else:
+        says = f"Coq did not prove this run: {answer['why']}"
+    return Markup('<br><small><a href="proofs/{}">{}</a></small>').format(answer["file"], says)

@@ -1,0 +1,182 @@
+"""Kinds of values in a scenario file: the annotations of the dataclasses of `schema.py`, as pydantic takes them."""
+
+import math
+import re
+import unicodedata
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Annotated, Any
+
+from pydantic import AfterValidator, BeforeValidator, Field, GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+
+from airground_drake.arrays import LARGEST
+from airground_drake.registry import MODEL_CLAIMS, PLUGIN, PLUGIN_PATTERN, RUN_CLAIMS, Registry, is_plugin
+from airground_drake.scenarios.limits import MAX_NAME, MAX_SEED, MAX_TEXT
+from airground_drake.statuses import EXPECTATIONS, alternatives
+
+SMALLEST = 1e-9  # of a positive number
+NAME_PATTERN = "^[A-Za-z_][A-Za-z0-9_]*$"  # of a UGV, an obstacle, a run, a parameter
+CLAIM_PATTERN = f"^[A-Z][A-Z0-9-]{{0,{MAX_NAME - 1}}}$"
+
+PLUG_IN = {"type": "string", "pattern": PLUGIN_PATTERN}
+EXPECTED = "x-expected"
+"""Word for the registry of claims in the place of JSON Schema's words for their expected verdicts."""
+
+# Unit by the suffix of a key, the longest suffix first.
+_UNITS = {"m_sqrt_s": "m/sqrt(s)", "1_m2_s": "1/(m^2 s)", "m_s": "m/s", "1_s": "1/s", "m": "m", "s": "s"}
+
+
+def unit_of(name: str, before: str = "") -> str:
+    """Unit that the suffix of a key says, with words before it; '' if it says none."""
+    return next((before + unit for suffix, unit in _UNITS.items() if name.endswith(f"_{suffix}")), "")
+
+
+def _refused(value: object, allowed: str, *at: str) -> PydanticCustomError:
+    """The error of a value that breaks a rule, `at` a place within what the rule looks at; `allowed` says the rule."""
+    return PydanticCustomError("rule", "{allowed}", {"value": value, "allowed": allowed, "at": at})
+
+
+def _as_float(value: object) -> object:
+    """A whole number as a floating-point number; infinite if it is too large for one."""
+    if type(value) is not int:
+        return value
+    return float(value) if abs(value) < 1e300 else math.inf
+
+
+def _visible(text: str) -> str:
+    """Refuse text that would take something else's place where it is shown."""
+    if hidden := next(filter(_is_hidden, text), None):
+        raise _refused(hidden, "text without control characters and without marks that turn the direction of writing")
+    return text
+
+
+def _is_hidden(character: str) -> bool:
+    """Whether a character shows only by what it does to others; line breaks, tabs and joiners are not meant."""
+    return character not in "\n\t\u200c\u200d" and unicodedata.category(character) in ("Cc", "Cf", "Cs", "Zl", "Zp")
+
+
+def _on_the_ground(point: list[float]) -> list[float]:
+    if point[2] != 0.0:
+        raise _refused(point, "z must be 0 m: a UGV moves on the ground")
+    return point
+
+
+def _all_or_none(point: list[float]) -> list[float]:
+    if len(point) not in (0, 3):
+        raise _refused(point, "3 numbers in m: [x, y, z]")
+    return point
+
+
+Words = Annotated[str, Field(strict=True, max_length=MAX_TEXT), AfterValidator(_visible)]
+Name = Annotated[str, Field(strict=True, max_length=MAX_NAME, pattern=NAME_PATTERN)]
+YesNo = Annotated[bool, Field(strict=True)]
+Count = Annotated[int, Field(strict=True, ge=1, le=MAX_SEED)]
+CountFromZero = Annotated[int, Field(strict=True, ge=0, le=MAX_SEED)]
+_Number = Annotated[float, Field(strict=True, allow_inf_nan=False, le=LARGEST)]
+Real = Annotated[_Number, Field(ge=-LARGEST), BeforeValidator(_as_float)]
+Positive = Annotated[_Number, Field(ge=SMALLEST), BeforeValidator(_as_float)]
+Share = Annotated[_Number, Field(ge=SMALLEST, le=1.0), BeforeValidator(_as_float)]
+NotNegative = Annotated[_Number, Field(ge=0.0), BeforeValidator(_as_float)]
+Point = Annotated[list[Real], Field(strict=True, min_length=3, max_length=3)]  # no set, which has no order
+GroundPoint = Annotated[Point, AfterValidator(_on_the_ground)]
+
+
+@dataclass(frozen=True)
+class Rule:
+    """A function that returns a value or raises `_refused`, and what JSON Schema says of the rule.
+
+    A registry in what it says stands for its names at the time: `json_schema.py` puts them in.
+    """
+
+    check: Callable[[Any], Any]
+    says: Callable[[], dict[str, Any]]
+
+    def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """Check what the annotations before this one have let pass."""
+        return core_schema.no_info_after_validator_function(self.check, handler(source))
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """What the annotations before this one say, and this."""
+        return {**handler(schema), **self.says()}
+
+
+PointOrNone = Annotated[list[Real], Field(strict=True), Rule(_all_or_none, lambda: {"minItems": 0, "maxItems": 3})]
+
+
+def one_of(options: Iterable[str], place: str = "") -> Rule:
+    """A name out of a collection, or of another at a place, `module:NAME`, which is imported when it is needed."""
+
+    def allowed() -> list[str]:
+        module, _, name = place.partition(":")
+        return [*options, *(getattr(import_module(f"airground_drake.{module}"), name) if place else ())]
+
+    def check(value: str) -> str:
+        if value not in allowed():
+            raise _refused(value, f"one of {', '.join(each or repr(each) for each in allowed())}")
+        return value
+
+    return Rule(check, lambda: {"enum": allowed()})
+
+
+def registered(registry: Registry, retired: Mapping[str, str] | None = None) -> Rule:
+    """A name of a registry, or a plug-in; `retired` says what has taken the place of former names."""
+
+    def check(value: str) -> str:
+        if retired and value in retired:
+            raise _refused(value, f"no longer a {registry.kind}: use {retired[value]}")
+        if not registry.accepts(value):
+            raise _refused(value, f"one of {', '.join(registry.allowed)}")
+        return value
+
+    return Rule(check, lambda: {"anyOf": [{"enum": registry}, PLUG_IN]})
+
+
+def expected_of(claims: Registry) -> Rule:
+    """Expected verdicts by claim; whether there is such a claim depends on the scenario's own, too."""
+
+    def check(value: dict[str, str]) -> dict[str, str]:
+        for claim, expected in value.items():
+            if not set(alternatives(expected)) <= set(EXPECTATIONS):
+                several = "or several of them, such as: exercised or refuted"
+                raise _refused(expected, f"one of {', '.join(EXPECTATIONS)}, {several}", claim)
+        return value
+
+    return Rule(check, lambda: {EXPECTED: claims})
+
+
+def _one_value(value: object) -> object:
+    if not isinstance(value, bool | int | float | str):
+        raise _refused(value, "one value: a number, a text, true or false")
+    return _visible(value) if isinstance(value, str) else value
+
+
+OneValue = Annotated[Any, Rule(_one_value, lambda: {"type": ["number", "string", "boolean"]})]
+
+
+def settings_of(sections: tuple[str, ...]) -> Rule:
+    """Values by dotted keys of some sections of a scenario."""
+
+    def check(value: dict[str, object]) -> dict[str, object]:
+        for key, given in value.items():
+            if key.partition(".")[0] not in sections or "." not in key:
+                allowed = f"a run may set keys of {', '.join(sections)}, such as gatekeeper.rule"
+                raise _refused(given, allowed, key)
+        return value
+
+    return Rule(check, lambda: {"propertyNames": {"pattern": rf"^(({'|'.join(sections)})\..+|<<)$"}})
+
+
+def _claims_of_others(value: dict[str, str]) -> dict[str, str]:
+    """Refuse identifiers that claims of the package have, and what names no class."""
+    for claim, place in value.items():
+        if claim in (*RUN_CLAIMS, *MODEL_CLAIMS) or not re.fullmatch(CLAIM_PATTERN, claim):
+            what = f"a new identifier of at most {MAX_NAME} capitals, digits and hyphens, such as MY-CLAIM"
+            raise _refused(claim, what, claim)
+        if not is_plugin(place):
+            raise _refused(place, PLUGIN, claim)
+    return value
+
+
+CLAIMS = Rule(_claims_of_others, lambda: {"patternProperties": {CLAIM_PATTERN: PLUG_IN}, "additionalProperties": False})

@@ -1,0 +1,4 @@
+"""Limits of names, counts and texts in a scenario file, apart from `kinds.py`, which imports pydantic."""
+
+MAX_UGVS, MAX_SEED, MAX_STAGES = 100, 2**31 - 1, 1000
+MAX_NAME, MAX_TEXT = 64, 10_000  # characters

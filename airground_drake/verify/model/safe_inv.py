@@ -1,0 +1,106 @@
+"""SAFE-INV: whoever obeys the avoidance inequalities and starts at a safe distance keeps it (proofs/Safety.v).
+
+Symbols: D is the distance of a pair, d its safe distance, n the unit vector away from the other body, v a velocity, A
+the gain, h the control period, q the share of an inequality, c the closing speed and R the sensing range.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+from airground_drake.scenarios.schema import Scenario
+from airground_drake.verify.model.pair_kinds import SHARES, constants, kinds_of
+from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim, decimal
+
+
+class SafeInv(TheoremClaim):
+    """SAFE-INV."""
+
+    id = "SAFE-INV"
+    summary = "A robot that obeys the avoidance inequalities and starts at a safe distance keeps it."
+    statement = (
+        "Any number of robots and obstacles whose pairs start at their safe distances keep them at all times, if at "
+        "every sample each pair in sensing range meets its avoidance inequalities and velocities are held until the "
+        "next. Inside a safe distance the deficit shrinks by the factor 1 - A h per period and never grows. Two robots "
+        "take half of an inequality each; a UGV under a UAV has no vertical velocity. Pairs beyond the sensing range "
+        "need no inequality."
+    )
+    formula = (
+        "D >= d, n.v >= -q (D - d)/h (sum over the pair: q = 1) => ||x + s v|| >= d for all s in [0, h]; "
+        "D <= d, n.v >= q A (d - D) => ||x + s v|| >= D and d - ||x + h v|| <= (1 - A h)(d - D); "
+        "D > R, R >= d + c h => ||x + s v|| >= d"
+    )
+    latex = (
+        r"D \ge d, \; n^\top v \ge -q (D - d) / h \; \Rightarrow \; \lVert x + s v \rVert \ge d \quad "
+        r"\text{for all } s \in [0, h]",
+        r"D \le d, \; n^\top v \ge q A (d - D) \; \Rightarrow \; \lVert x + s v \rVert \ge D, \; d - \lVert x "
+        r"+ h v \rVert \le (1 - A h) (d - D)",
+        r"D > R, \; R \ge d + c h \; \Rightarrow \; \lVert x + s v \rVert \ge d",
+        r"q = 1 \text{ in sum over the pair}",
+    )
+    method = (
+        "Theorems in Coq, for all positions, times and numbers of bodies. The hypotheses about the scenario are "
+        "checked here in exact arithmetic; those about a run are SAFE-HYP."
+    )
+    equations = "(7)-(8), (11) in the inequality form of the package (set-based avoidance)"
+    assumptions = (
+        "Positions are integrals of the commands, which are held between samples; all robots are sampled at the same "
+        "instants.",
+        "Obstacles stand still. Robots obey their speed limits; what is out of range counts on that. Distances are of "
+        "centres: a body is a ball, and both radii are part of d.",
+        "A UGV's velocity has no z component.",
+    )
+    does_not_establish = (
+        "That the inequalities hold in a run, with rounding and in the built controllers (SAFE-HYP), or under "
+        "disturbance (SAFE-DIST). Inside two safe distances at once there may be no velocity that meets both "
+        "inequalities. That the program computes these inequalities is for tests and SAFE-HYP to show."
+    )
+
+    theorems = (
+        "Safety.safe_always",
+        "Safety.recovers",
+        "Safety.obstacle",
+        "Safety.unseen",
+        "Safety.standing",
+        "Safety.capped",
+    )
+    margin_of = "sensing range less d + c h"
+
+    def inputs(self, scenario: Scenario) -> dict[str, Any]:
+        """Gain, period, sensing range; safe distances and closing speeds of the pairs."""
+        return constants(scenario)
+
+    def hypotheses(self, inputs: dict[str, Any]) -> list[Hypothesis]:
+        """A h is at most 1, shares add up to 1, the sensing range covers d + c h."""
+        gain, h = decimal(inputs["avoidance_gain_1_s"]), decimal(inputs["period_s"])
+        reach = decimal(inputs["sensing_range_m"])
+        found = stable(gain, h)
+        found += [
+            Hypothesis(
+                "share that is missing to 1",
+                f"{kind}: the shares of both bodies add up to 1",
+                -abs(sum(SHARES[kind], Fraction(-1))),
+            )
+            for kind in dict.fromkeys(each.kind for each in kinds_of(inputs))
+        ]
+        found += [
+            Hypothesis(
+                self.margin_of,
+                f"{each.kind}: the sensing range {float(reach):g} m is at least d + c h = {float(each.safe_m):g} m + "
+                f"{float(each.closing_m_s):g} m/s * {float(h):g} s",
+                reach - each.safe_m - each.closing_m_s * h,
+                "m",
+            )
+            for each in kinds_of(inputs)
+        ]
+        return found
+
+
+def stable(gain: Fraction, h: Fraction) -> list[Hypothesis]:
+    """A h is between 0 and 1."""
+    return [
+        Hypothesis("1 - A h", f"A h = {float(gain * h):g} is at most 1", 1 - gain * h),
+        Hypothesis("A", "the gain A is not negative", gain, "1/s"),
+        Hypothesis("h", "the control period h is above 0", h, "s", strict=True),
+    ]

@@ -1,0 +1,206 @@
+"""ZENO-REFINE: as the noise step is refined, the bare threshold's event count diverges and the automaton's does not.
+
+Paths and counts are those of `refined_paths.py`: the bare count grows like dt^(-1/2) with a relative correction of
+order sqrt(dt). The delay of a level crossing that is seen on a grid, 0.58 s sqrt(dt) (Chernoff 1965, Siegmund 1979),
+makes the correction of the automaton's count one of order sqrt(dt) as well. Both counts are therefore fitted by
+
+    ln(mean count) = intercept + exponent ln(dt) + correction sqrt(dt)        (least squares over the dt)
+
+and the interval of the exponent is the percentile bootstrap over paths, which are independent (resampling weights:
+numpy's default_rng([SEED, PATHS]).multinomial).
+
+Verdict, fixed beforehand: 'supported' as the claim's `method` says (the bias is that of the fit to the theoretical
+counts); 'inconclusive' if an interval is wider than 1/5, or all holds but the bare counts are too far from their
+expectation at some dt; else 'refuted'. Margin: the smallest distance of an interval's end from breaking the rule.
+
+The evidence has the trigger counts by path and dt, from which means, standard errors and fits can be redone; the
+theoretical counts follow from the formula in `refined_paths.py`.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from airground_drake.arrays import Array
+from airground_drake.scenarios.schema import Scenario
+from airground_drake.statuses import Status
+from airground_drake.verify.claim import ModelClaim
+from airground_drake.verify.finding import Finding
+from airground_drake.verify.model.levels import levels_of
+from airground_drake.verify.model.refined_paths import (
+    HALVINGS,
+    PATHS,
+    SEED,
+    Refinement,
+    counts,
+    expected_bare,
+    experiment,
+)
+
+LEVEL = 0.99
+
+RESAMPLES = 4000
+
+DIVERGES_BELOW = -0.25
+
+FLAT_WITHIN = 0.1
+
+STANDARD_ERRORS = 5.0
+
+ROUNDING = 1e-9
+"""Exponents are equal within this: the fit to equal counts gives about 1e-15."""
+
+
+class ZenoRefine(ModelClaim):
+    """ZENO-REFINE."""
+
+    id = "ZENO-REFINE"
+    expected = "supported"
+    summary = "With ever finer noise a bare threshold triggers ever more often; the trigger in use does not."
+    statement = (
+        "As the step of the decision noise is refined, the number of events of the bare threshold grows without bound, "
+        "like one over the square root of the step; that of the trigger in use tends to a limit."
+    )
+    formula = (
+        "E[triggers of x >= zeta] ~ dt^p with p = -1/2; E[triggers of the automaton] ~ dt^0, and never more than "
+        "duration / min_inter_event_s + 1"
+    )
+    latex = (
+        r"\mathbb{E}[N_{\text{bare}}] \sim \Delta t^{p}, \; p = -\frac{1}{2}; \quad "
+        r"\mathbb{E}[N_{\text{automaton}}] \sim \Delta t^{0}, \quad N_{\text{automaton}} \le "
+        r"\frac{T}{\tau_{\min}} + 1",
+    )
+    method = (
+        f"{PATHS} Wiener paths with the task error held at the threshold, each at {HALVINGS + 1} noise steps that "
+        f"differ by a factor of {2**HALVINGS} in all; triggers counted exactly on the piecewise linear paths by the "
+        "running `Trigger`. Exponents by least squares with a term for the finite step, ln(mean) = c + p ln(dt) + "
+        "b sqrt(dt); "
+        "99 % intervals by bootstrap over the paths. Supported if the bare exponent's interval, widened by the known "
+        "bias of the fit, contains -1/2 and is below -1/4, the automaton's contains 0 and is within 1/10 of it, and no "
+        "path exceeds the bound. The bare counts must also be within 5 standard errors of their exact expectation."
+    )
+    equations = "(15), (20)"
+    assumptions = (
+        "Noise is linear between its samples, as in the simulation.",
+        "The task error stays at the threshold, where the noise decides. If the scenario's noise does not cross the "
+        "hysteresis within a dwell, louder noise that does is used; the bare count is the same at any intensity.",
+    )
+    does_not_establish = (
+        "A proof of divergence or of the limit (ZENO-PROOF proves the bound for the automaton), or how many events a "
+        "run of the scenario has: its task error passes the threshold, it does not stay there (ZENO-TRACE counts them)."
+    )
+
+    exercised_by = "simulated paths, each at every noise step"
+
+    def inputs(self, scenario: Scenario) -> dict[str, Any]:
+        """The running trigger, the noise of (15) and its step, the duration."""
+        decision = scenario.decision
+        return {
+            **levels_of(scenario),
+            "noise_m_sqrt_s": float(decision.noise_m_sqrt_s),
+            "leak_1_s": float(decision.leak_1_s),
+            "noise_period_s": float(decision.noise_period_s),
+            "duration_s": float(scenario.duration_s),
+        }
+
+    def check(self, inputs: dict[str, Any]) -> Finding:
+        """Run the experiment for these constants."""
+        return judge_experiment(experiment(inputs))
+
+
+def series(setting: Refinement, found: dict[str, Array]) -> dict[str, Any]:
+    """Everything that the figure needs, from the counts of an experiment: the finding's evidence.
+
+    Returns:
+        `dt_s`: noise steps, s. Under `bare`, `automaton` and `automaton_at_scenario_noise`, one number per dt:
+        `mean` and `largest` number of triggers in a path, `standard_error` of the mean. `expected_bare`: theory of
+        the bare mean, per dt. `counts`: triggers at each dt, by path, a text for each path. `fit`: for `bare` and
+        `automaton`, `exponent`, its `interval`, `intercept` and `correction` (the curve
+        exp(intercept + correction sqrt(dt)) dt^exponent), `at_dt`: that curve per dt. `bias`: of the bare exponent.
+        `most_triggers`: duration/dwell + 1, None without a dwell. `duration_s`,
+        `noise_m_sqrt_s`, `own_noise_m_sqrt_s`, `leak_1_s`, `paths`, `seed`, `level` of the intervals.
+    """
+    dt, dwell = np.array(setting.dt_s), setting.trigger.dwell
+    expected = np.array([expected_bare(setting, step) for step in setting.dt_s])
+    rng = np.random.default_rng([SEED, PATHS])
+    weights = rng.multinomial(PATHS, np.full(PATHS, 1.0 / PATHS), RESAMPLES) / PATHS
+    fits = {}
+    for name in ("bare", "automaton"):
+        intercept, exponent, correction = _fit(dt, found[name].mean(axis=0))
+        resampled = _fit(dt, weights @ found[name])[1]
+        fits[name] = {
+            "exponent": float(exponent),
+            "interval": np.quantile(resampled, [(1.0 - LEVEL) / 2.0, (1.0 + LEVEL) / 2.0]).tolist(),
+            "intercept": float(intercept),
+            "correction": float(correction),
+            "at_dt": (np.exp(intercept + correction * np.sqrt(dt)) * dt**exponent).tolist(),
+        }
+    return {
+        "dt_s": dt.tolist(),
+        **{
+            name: {
+                "mean": values.mean(axis=0).tolist(),
+                "standard_error": (values.std(axis=0, ddof=1) / math.sqrt(PATHS)).tolist(),
+                "largest": values.max(axis=0).tolist(),
+            }
+            for name, values in found.items()
+        },
+        "expected_bare": expected.tolist(),
+        "counts": {name: [" ".join(f"{n:.0f}" for n in row) for row in values] for name, values in found.items()},
+        "fit": fits,
+        "bias": float(_fit(dt, expected)[1]) + 0.5,
+        "most_triggers": int(setting.duration_s / dwell + 1e-9) + 1 if dwell > 0.0 else None,
+        **{name: getattr(setting, name) for name in ("duration_s", "noise_m_sqrt_s", "own_noise_m_sqrt_s", "leak_1_s")},
+        "paths": PATHS,
+        "seed": SEED,
+        "level": LEVEL,
+    }
+
+
+def _fit(dt: Array, mean: Array) -> Array:
+    """Intercept, exponent and correction of the module docstring, (3,) or (3, m) for means (dt,) or (m, dt)."""
+    design = np.column_stack([np.ones_like(dt), np.log(dt), np.sqrt(dt)])
+    return np.linalg.lstsq(design, np.log(mean).T, rcond=None)[0]
+
+
+def judge_experiment(setting: Refinement) -> Finding:
+    """The finding of an experiment by the rule of the module docstring."""
+    found = counts(setting)
+    evidence = series(setting, found)
+    (low, high), (ours_low, ours_high) = (evidence["fit"][name]["interval"] for name in ("bare", "automaton"))
+    bias = abs(evidence["bias"])
+    slack = {
+        "bare exponent: -1/2 is not below its interval": -0.5 - (low - bias),
+        "bare exponent: -1/2 is not above its interval": high + bias + 0.5,
+        "bare exponent: well below 0": DIVERGES_BELOW - high,
+        "automaton's exponent: 0 is not below its interval": -ours_low,
+        "automaton's exponent: 0 is not above its interval": ours_high,
+        "automaton's exponent: close to 0": FLAT_WITHIN - max(-ours_low, ours_high),
+    }
+    condition = min(slack, key=lambda name: slack[name])
+    spread = np.array(evidence["bare"]["standard_error"])
+    off = np.abs(np.array(evidence["bare"]["mean"]) - evidence["expected_bare"])
+    most, largest = evidence["most_triggers"], max(evidence["automaton"]["largest"])
+    status: Status = "supported"
+    broken: dict[str, Any] | None = None
+    if most is not None and largest > most:
+        status = "refuted"
+        i, j = (int(k) for k in np.argwhere(found["automaton"] == largest)[0])
+        what = "more triggers than the dwell admits"
+        broken = {"what": what, "path": i, "dt_s": setting.dt_s[j], "triggers": largest}
+    elif max(high - low, ours_high - ours_low) > 2.0 * FLAT_WITHIN:
+        status = "inconclusive"
+    elif slack[condition] < -ROUNDING:
+        status = "refuted"
+        which = condition.split("'")[0].split(" ")[0]
+        fit = {key: evidence["fit"][which][key] for key in ("exponent", "interval")}
+        broken = {"what": f"not so: {condition}", **fit, "dt_s": evidence["dt_s"], "mean": evidence[which]["mean"]}
+    elif (off > STANDARD_ERRORS * spread).any():
+        status = "inconclusive"
+    quantity = "what the confidence interval of an exponent, or a count, leaves of the condition"
+    return Finding(
+        status, slack[condition], "", {"condition": condition}, broken, evidence, quantity=quantity, exercised=PATHS
+    )

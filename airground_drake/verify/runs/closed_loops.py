@@ -1,0 +1,98 @@
+"""Closed loops of a UGV rolled out again in plain numpy, many side by side: what a decision predicts from.
+
+GATE-MODEL compares with them what was recorded; LIVE-PROG and LIVE-GATE take from them where a UGV was to be.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import NamedTuple, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from airground_drake.arrays import Array
+from airground_drake.trace import Trace
+from airground_drake.verify.runs.control_law import Asked, commanded, inequalities, tracking
+
+AT_ONCE = 5_000_000
+"""Coordinates of points to keep away from that are rolled out side by side: they have to fit into the memory."""
+FAR_M = 1e9
+"""A coordinate beyond every sensing range."""
+T = TypeVar("T")
+
+
+class Scene(NamedTuple):
+    """What a closed loop of S control periods begins with, among K points to keep away from.
+
+    Of R scenes that are stacked, each array has R in front.
+
+    Attributes:
+        here: (3,), m.
+        preset: at the control samples, (S + 1, 3), m.
+        wanted: where the proposed motion is then, (S + 1, 3), m.
+        executed: in which periods the proposal is executed, (S,).
+        chosen: J_int^+ J_int, (3, 3).
+        limit: speed limit, (), m/s.
+        points: at the control samples, (S + 1, K, 3), m.
+        safe: distances to keep, (K,), m.
+        share: of the inequalities, (K,).
+    """
+
+    here: Array
+    preset: Array
+    wanted: Array
+    executed: npt.NDArray[np.bool_]
+    chosen: Array
+    limit: Array
+    points: Array
+    safe: Array
+    share: Array
+
+
+def stacked(scenes: Sequence[Scene]) -> Scene:
+    """Scenes as one, all as long as the longest, with as many points as the one with most.
+
+    One that is shorter stays at the end of its motion, which nobody has to look at; points that it has not are far off.
+    """
+    steps, most = max(len(one.executed) for one in scenes), max(len(one.safe) for one in scenes)
+
+    def padded(one: Scene) -> Scene:
+        later, more = (0, steps - len(one.executed)), (0, most - len(one.safe))
+        return one._replace(
+            preset=np.pad(one.preset, (later, (0, 0)), mode="edge"),
+            wanted=np.pad(one.wanted, (later, (0, 0)), mode="edge"),
+            executed=np.pad(one.executed, later),
+            points=np.pad(one.points, (later, more, (0, 0)), constant_values=FAR_M),
+            safe=np.pad(one.safe, more),
+            share=np.pad(one.share, more),
+        )
+
+    return Scene(*(np.stack(part) for part in zip(*map(padded, scenes), strict=True)))
+
+
+def roll_out(trace: Trace, scenes: Scene) -> Iterator[Array]:
+    """Places of R stacked closed loops after each control period, (R, 3), m, by the law of the run."""
+    control, h, place = trace.scenario["control"], trace.scenario["control"]["period_s"], scenes.here
+    rates, wishes = (np.diff(part, axis=1) / h for part in (scenes.preset, scenes.wanted))
+    for k in range(scenes.executed.shape[1]):
+        given = inequalities(place, scenes.points[:, k], scenes.safe, scenes.share, control, planar=True)
+        own = tracking(place, scenes.preset[:, k], rates[:, k], control["motion_gain_1_s"], scenes.limit)
+        rows = np.flatnonzero(scenes.executed[:, k])
+        asked = Asked(scenes.wanted[rows, k], wishes[rows, k], scenes.chosen[rows])
+        place = place + h * commanded(trace, place, own, given, rows, asked, scenes.limit)
+        yield place
+
+
+def in_batches(items: Iterable[T], scenes_of: Callable[[T], Sequence[Scene]]) -> Iterator[list[T]]:
+    """Items, as many at a time as there is memory for their scenes side by side."""
+    batch, count, largest = list[T](), 0, 0
+    for item in items:
+        scenes = scenes_of(item)
+        batch.append(item)
+        count, largest = count + len(scenes), max(largest, *(one.points.size for one in scenes))
+        if count * largest > AT_ONCE:
+            yield batch
+            batch, count, largest = [], 0, 0
+    if batch:
+        yield batch

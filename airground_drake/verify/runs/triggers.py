@@ -1,0 +1,116 @@
+"""The triggers of a run: what is recorded of them, and the trigger (20) run again on its decision variable.
+
+The decision variable x(t) = ||rho_rd(t) - rho(t)|| + n(t) is, between rows, the norm of a vector that is linear
+in time plus a number that is linear in time, so its turning points and crossings are found exactly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from airground_drake.arrays import Array
+from airground_drake.trace import Trace
+from airground_drake.verify.claim import TIME_TOLERANCE_S
+from airground_drake.verify.engines.segments import NormSignal, corner_times, interpolate, travelled
+from airground_drake.verify.runs.pairs import preset_of
+
+Transition = tuple[float, str]
+"""Time in s, and a key of MODES or kind of event."""
+
+Conflict = dict[str, Any]
+"""What disagrees: `t_s`, `what`, and the values on both sides."""
+
+NOISE_TOLERANCE_M = 1e-8
+"""Noise at a row may differ from what its period's sample makes of the row before by this, m: rows closer than 1e-9 s
+are one, and noise moves by less in that time."""
+LARGEST_SAMPLE = 9.0
+"""In standard deviations: of normal samples one in 1e19 is larger."""
+
+
+def recorded_events(trace: Trace, ugv: str) -> list[Transition]:
+    """Trigger and release events of a UGV by time."""
+    found = [(float(e["t_s"]), str(e["kind"])) for e in trace.events if e["robot"] == ugv]
+    return sorted(event for event in found if event[1] in ("trigger", "release"))
+
+
+def column_conflict(trace: Trace, ugv: str, events: list[Transition]) -> Conflict | None:
+    """First row at which the columns on triggers and releases do not agree with the events before it."""
+    t = trace.t
+    for kind, name in (("trigger", "triggered_at_s"), ("release", "released_at_s")):
+        times = np.array([-1.0, *(time for time, what in events if what == kind)])
+        counts = [np.searchsorted(times[1:], t + shift) for shift in (-TIME_TOLERANCE_S, TIME_TOLERANCE_S)]
+        value = trace.column(f"{ugv}.{name}")
+        wrong = np.all([np.abs(value - times[n]) > TIME_TOLERANCE_S for n in counts], axis=0)
+        if kind == "trigger":
+            wrong |= np.all([trace.column(f"{ugv}.triggers") != n for n in counts], axis=0)
+        if wrong.any():
+            k = int(np.argmax(wrong))
+            return {"robot": ugv, "t_s": float(t[k]), "what": f"column {name} or count disagrees with the events"}
+    return None
+
+
+def decision_variable(trace: Trace, ugv: str) -> NormSignal:
+    """x(t) of (15) from positions and noise of the trace and the preset of its scenario, not the recorded one."""
+    rows, (waypoints, speed) = trace.t, preset_of(trace, ugv)
+    corners = corner_times(waypoints, speed)
+    t = np.union1d(rows, corners[(corners > rows[0]) & (corners < rows[-1])])
+    parts = interpolate(rows, np.column_stack([trace.position(ugv), trace.column(f"{ugv}.noise_m")]), t)
+    parts[:, :3] = travelled(waypoints, speed, t) - parts[:, :3]
+    return NormSignal.of(t, parts)
+
+
+def recorded_variable(trace: Trace, ugv: str) -> NormSignal:
+    """The recorded x(t), the signal that the trigger had, taken to be linear in time between rows."""
+    x = trace.column(f"{ugv}.decision_variable_m")
+    return NormSignal.of(trace.t, np.column_stack([np.zeros((len(x), 3)), x]))
+
+
+def transitions(x: NormSignal, zeta: float, release: float, dwell: float) -> Iterator[Transition]:
+    """Run the trigger automaton on x: levels zeta >= release, m, and dwell, s (release = zeta, dwell = 0: bare)."""
+    released, resume = -np.inf, float(x.t[0])
+    while resume <= x.t[-1]:
+        waited = resume > released  # at the start or the end of a refractory time x may be above already
+        if waited and np.isfinite(released):
+            yield resume, "resume"
+        trigger = resume if waited and x.at(resume) >= zeta else x.reaches(zeta, resume, above=True)
+        if trigger is None:
+            return
+        yield trigger, "trigger"
+        found = x.reaches(release, trigger, above=False)
+        if found is None:
+            return
+        released, resume = found, max(found, trigger + dwell)
+        yield released, "refractory" if resume > released else "release"
+
+
+def noise_conflict(trace: Trace, ugv: str) -> Conflict | None:
+    """First row at which the noise of a UGV is not that of dn = -leak n dt + s dW, by Euler's method over rows.
+
+    It starts at 0. In each of its periods h one sample w, of standard normal size, is held: between rows n moves at the
+    rate s w / sqrt(h) - leak n.
+    """
+    given, t, n = trace.scenario["decision"], trace.t, trace.column(f"{ugv}.noise_m")
+    if abs(n[0]) > NOISE_TOLERANCE_M:
+        return {"t_s": float(t[0]), "what": "noise: does not start at 0", "noise_m": float(n[0])}
+    dt, h = np.diff(t), given["noise_period_s"]
+    moved = np.diff(n) + given["leak_1_s"] * n[:-1] * dt
+    due = dt * _rates(moved, dt, np.floor(0.5 * (t[1:] + t[:-1]) / h))
+    most = LARGEST_SAMPLE * given["noise_m_sqrt_s"] / np.sqrt(h) * dt
+    off = np.maximum(np.abs(moved - due), np.abs(moved) - most)
+    if not (off > NOISE_TOLERANCE_M).any():
+        return None
+    k = int(np.argmax(off > NOISE_TOLERANCE_M))
+    what = "noise: not one sample held over its period, or too large a one"
+    return {"t_s": float(t[k + 1]), "what": what, "noise_m": float(n[k + 1]), "off_m": float(off[k])}
+
+
+def _rates(moved: Array, dt: Array, period: Array) -> Array:
+    """Of each step, moved / dt of the longest step in the same period, (S,)."""
+    _, of = np.unique(period, return_inverse=True)
+    order = np.lexsort((dt, of))
+    longest = order[np.append(np.diff(of[order]) > 0, True)]
+    rates: Array = (moved[longest] / dt[longest])[of]
+    return rates
