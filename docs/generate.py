@@ -17,9 +17,9 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, get_args
 
-from airground_drake import files
+from airground_drake.audit.equations import DEVIATIONS, Kind
+from airground_drake.base import files
 from airground_drake.commands import COMMANDS
-from airground_drake.paper import DEVIATIONS, Kind
 from airground_drake.proofs import THEOREMS
 from airground_drake.registry import (
     METHODS,

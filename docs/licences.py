@@ -6,7 +6,7 @@ import re
 from importlib.metadata import PackageMetadata, metadata
 from pathlib import Path
 
-from airground_drake import files
+from airground_drake.base import files
 
 ROOT = Path(__file__).parent.parent
 PREFIX = "License :: "

@@ -17,8 +17,8 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 
+from airground_drake.run.simulation import simulate
 from airground_drake.scenarios.load import load
-from airground_drake.simulation import simulate
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 OPTIONS = ("-p", "airground_drake.testing.plugin", "-p", "no:cacheprovider", "--hypothesis-profile=ci")

@@ -10,8 +10,8 @@ from importlib import import_module
 from importlib.metadata import version
 from typing import NamedTuple
 
-from airground_drake import interruption
-from airground_drake.usage import Parser, refuse
+from airground_drake.base import interruption
+from airground_drake.base.usage import Parser, refuse
 
 
 class Command(NamedTuple):

@@ -8,7 +8,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.database import BehaviourDatabase, Fault, Negotiation
 from airground_drake.intervention.messages import (

@@ -18,8 +18,8 @@ from typing import Any
 from pydantic import TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
 
-from airground_drake import files
-from airground_drake.errors import Fault, ScenarioError
+from airground_drake.base import files
+from airground_drake.base.errors import Fault, ScenarioError
 from airground_drake.scenarios import json_schema, validate
 from airground_drake.scenarios.document import Document, of_data, put, read, replace, simple, unknown
 from airground_drake.scenarios.schema import RETIRED_KEYS, Scenario, Vector

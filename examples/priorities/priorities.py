@@ -23,10 +23,10 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder, DiscreteValues, LeafSystem
 from pydrake.systems.primitives import LogVectorOutput
 
-from airground_drake.components import first_order_plant
 from airground_drake.nsbc.avoidance import Avoidance, Surroundings, limit_speed
 from airground_drake.nsbc.task import Task, null_space
 from airground_drake.nsbc.tasks import PositionTask
+from airground_drake.systems.components import first_order_plant
 
 Array = NDArray[np.float64]
 

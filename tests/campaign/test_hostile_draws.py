@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from airground_drake.campaign.spec import load_spec
-from airground_drake.simulation import simulate
+from airground_drake.run.simulation import simulate
 from airground_drake.verify import verify
 
 HOSTILE = Path(__file__).parents[2] / "benchmarks" / "campaigns" / "hostile.yaml"

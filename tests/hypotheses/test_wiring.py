@@ -12,8 +12,7 @@ import pytest
 from hypotheses.wiring import differences
 from pydrake.systems.primitives import LinearSystem
 
-from airground_drake import components, diagram
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc import team as team_module
 from airground_drake.nsbc.avoidance import Avoidance, HalfSpaces, Surroundings
@@ -21,7 +20,7 @@ from airground_drake.nsbc.law import UgvLaw
 from airground_drake.nsbc.team import Neighbourhood, Team
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.systems import controllers
+from airground_drake.systems import components, controllers, diagram
 
 Patch = Callable[[pytest.MonkeyPatch], None]
 
@@ -111,7 +110,7 @@ def unlayered(patch: pytest.MonkeyPatch) -> None:
         def __init__(self, team: Team, avoidance: Avoidance, **given: Any) -> None:
             super().__init__(team, replace(avoidance, sensing_range=0.0), **given)
 
-    patch.setattr("airground_drake.diagram.UavController", Blind)
+    patch.setattr("airground_drake.systems.diagram.UavController", Blind)
 
 
 def speeding(patch: pytest.MonkeyPatch) -> None:
@@ -145,7 +144,7 @@ def half_rate(patch: pytest.MonkeyPatch) -> None:
             self.avoidance = law.avoidance
             self.law = law
 
-    patch.setattr("airground_drake.diagram.UgvController", Slow)
+    patch.setattr("airground_drake.systems.diagram.UgvController", Slow)
 
 
 def first_half_space_dropped(patch: pytest.MonkeyPatch) -> None:

@@ -12,10 +12,10 @@ from typing import Any
 
 import pytest
 
+from airground_drake.audit import companions, formulas, readings, thresholds
+from airground_drake.audit.typeset import typeset
 from airground_drake.check.verdicts import FINDINGS
 from airground_drake.decision import bayes
-from airground_drake.report.audit import companions, formulas, readings, thresholds
-from airground_drake.report.audit.typeset import typeset
 from airground_drake.scenarios.load import load
 from airground_drake.verify import Finding, cache_folder, verify_model
 

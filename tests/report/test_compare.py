@@ -12,9 +12,9 @@ from typing import Any
 import pytest
 from report.cases import FINE, GOING_ROUND, SUCCESS, built, make_scenario, make_trace, make_traces, verdict
 
-from airground_drake import trace
 from airground_drake.commands.compare import main
 from airground_drake.report import compare, document
+from airground_drake.run import trace
 
 Json = dict[str, Any]
 
@@ -43,7 +43,7 @@ def test_the_schema_is_the_reports() -> None:
 
 
 def test_every_verdict_has_a_place_in_the_order() -> None:
-    from airground_drake.statuses import NOT_EXERCISED, STATUSES
+    from airground_drake.base.statuses import NOT_EXERCISED, STATUSES
 
     assert sorted(name for alike in compare.ORDER for name in alike) == sorted([*STATUSES, NOT_EXERCISED, "gone"])
 

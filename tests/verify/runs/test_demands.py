@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from airground_drake import components, simulation
-from airground_drake.arrays import Array
-from airground_drake.diagram import Model
+from airground_drake.base.arrays import Array
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.law import UgvLaw
 from airground_drake.nsbc.team import Neighbourhood, Team
+from airground_drake.run import simulation
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import load
-from airground_drake.systems import controllers
-from airground_drake.trace import Trace
+from airground_drake.systems import components, controllers
+from airground_drake.systems.diagram import Model
 from airground_drake.verify import verify
 
 Patch = Callable[[pytest.MonkeyPatch], None]
@@ -54,7 +54,7 @@ def at_half_the_rate(patch: pytest.MonkeyPatch) -> None:
             super().__init__(team, replace(law, avoidance=slow))
             self.law, self.avoidance = law, law.avoidance
 
-    patch.setattr("airground_drake.diagram.UgvController", Slow)
+    patch.setattr("airground_drake.systems.diagram.UgvController", Slow)
 
 
 def without_a_layer(patch: pytest.MonkeyPatch) -> None:
@@ -62,7 +62,7 @@ def without_a_layer(patch: pytest.MonkeyPatch) -> None:
         def __init__(self, team: Team, avoidance: Avoidance, **given: Any) -> None:
             super().__init__(team, replace(avoidance, sensing_range=0.0), **given)
 
-    patch.setattr("airground_drake.diagram.UavController", Blind)
+    patch.setattr("airground_drake.systems.diagram.UavController", Blind)
 
 
 def times(factor: float, which: Callable[[Array], Array]) -> Callable[[Neighbourhood], Neighbourhood]:

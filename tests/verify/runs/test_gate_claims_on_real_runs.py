@@ -27,10 +27,10 @@ from verify.runs.cases import (
     understate_rounding,
 )
 
+from airground_drake.run.simulation import simulate
+from airground_drake.run.trace import Trace, save
+from airground_drake.run.trace import load as load_trace
 from airground_drake.scenarios.load import load
-from airground_drake.simulation import simulate
-from airground_drake.trace import Trace, save
-from airground_drake.trace import load as load_trace
 
 Simulated = Callable[[str, str, str], Trace]
 

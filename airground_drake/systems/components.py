@@ -10,10 +10,10 @@ from pydrake.common import RandomDistribution
 from pydrake.systems.primitives import AffineSystem, LinearSystem, RandomSource
 from pydrake.trajectories import PiecewisePolynomial
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
+from airground_drake.base.errors import ScenarioError
 from airground_drake.decision.bayes import COMPUTED
 from airground_drake.decision.trigger import Trigger
-from airground_drake.errors import ScenarioError
 from airground_drake.gatekeeper.answer import Rules
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.drake_solvers import SOLVERS, lacking

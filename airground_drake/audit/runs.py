@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.report.metrics import closest_obstacle
 from airground_drake.report.reproduction import MEASURES
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Preset, Reproduction, Scenario
-from airground_drake.trace import Trace
 
 PRINTED_SPEED_M_S = 1.0
 """Reference speed of Table 1, [3.3, 1t, 0]."""

@@ -15,11 +15,8 @@ from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorC
 from pydrake.systems.framework import Context, DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput, Multiplexer
 
-from airground_drake.arrays import Array
-from airground_drake.components import GatekeepersFactory, make_gatekeepers
-from airground_drake.diagram import RECORDED, DecisionFactory, Model, build_model
-from airground_drake.errors import SimulationError, UnknownNameError, described
-from airground_drake.events import extract
+from airground_drake.base.arrays import Array
+from airground_drake.base.errors import SimulationError, UnknownNameError, described
 from airground_drake.gatekeeper.answer import Decision, Foreseen, Planned
 from airground_drake.gatekeeper.outcome import Outlook, outcomes
 from airground_drake.gatekeeper.problem import Horizon, predicted_problem
@@ -31,12 +28,8 @@ from airground_drake.nsbc.avoidance import Avoidance, Composition, Surroundings,
 from airground_drake.nsbc.kernels import distances, news_within, within
 from airground_drake.nsbc.law import UgvLaw
 from airground_drake.nsbc.team import Team
-from airground_drake.scenarios.load import own, resolved, validated
-from airground_drake.scenarios.schema import Scenario
-from airground_drake.systems.decision import DecisionVariable
-from airground_drake.systems.lifetime import untie
-from airground_drake.systems.signals import FIELDS, Status
-from airground_drake.trace import (
+from airground_drake.run.events import extract
+from airground_drake.run.trace import (
     DECISION_COLUMNS,
     PROBLEM_ARRAYS,
     PROBLEM_SCALARS,
@@ -44,6 +37,13 @@ from airground_drake.trace import (
     SCHEMA,
     Trace,
 )
+from airground_drake.scenarios.load import own, resolved, validated
+from airground_drake.scenarios.schema import Scenario
+from airground_drake.systems.components import GatekeepersFactory, make_gatekeepers
+from airground_drake.systems.decision import DecisionVariable
+from airground_drake.systems.diagram import RECORDED, DecisionFactory, Model, build_model
+from airground_drake.systems.lifetime import untie
+from airground_drake.systems.signals import FIELDS, Status
 
 if TYPE_CHECKING:
     from pydrake.geometry import Meshcat

@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from airground_drake.report.audit.runs import findings
-from airground_drake.report.audit.typeset import typeset
+from airground_drake.audit.runs import findings
+from airground_drake.audit.typeset import typeset
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.trace import Trace
 from airground_drake.verify import Verdict
 
 __all__ = ["of_runs", "whole"]
@@ -30,10 +30,10 @@ def whole(scenario: Scenario, verdicts: Sequence[Verdict]) -> list[dict[str, Any
         scenario: `case_a`, whose constants are the paper's.
         verdicts: on its model; findings that rest on a proof quote them.
     """
-    from airground_drake.report.audit.companions import companion_findings  # imports Drake
-    from airground_drake.report.audit.formulas import formula_findings
-    from airground_drake.report.audit.readings import reading_findings
-    from airground_drake.report.audit.thresholds import threshold_findings
+    from airground_drake.audit.companions import companion_findings  # imports Drake
+    from airground_drake.audit.formulas import formula_findings
+    from airground_drake.audit.readings import reading_findings
+    from airground_drake.audit.thresholds import threshold_findings
 
     proofs = {verdict.claim.id: verdict.finding for verdict in verdicts if not verdict.run}
     computed = [*threshold_findings(scenario, proofs), *formula_findings(scenario), *reading_findings(scenario)]

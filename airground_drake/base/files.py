@@ -17,7 +17,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
-from airground_drake.errors import FolderError, one_line
+from airground_drake.base.errors import FolderError, one_line
 
 if TYPE_CHECKING:
     import pandas as pd

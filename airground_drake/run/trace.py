@@ -36,13 +36,13 @@ from typing import Any, TypeVar
 import numpy as np
 import pandas as pd
 
-from airground_drake import files
-from airground_drake.arrays import Array, read_only
-from airground_drake.errors import TraceError, one_line
+from airground_drake.base import files
+from airground_drake.base.arrays import Array, read_only
+from airground_drake.base.errors import TraceError, one_line
 
 T = TypeVar("T")
 
-SCHEMA = "airground_drake.trace/7"
+SCHEMA = "airground_drake.run.trace/7"
 
 DECISION_COLUMNS = {
     "t_s": "float64",

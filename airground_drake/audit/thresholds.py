@@ -10,8 +10,8 @@ from scipy.linalg import solve_banded
 from scipy.optimize import brentq, minimize_scalar
 from scipy.stats import norm
 
+from airground_drake.audit.item import Item, item, status
 from airground_drake.decision.bayes import bayes_risk, decision_time, error_rate, optimal_threshold
-from airground_drake.report.audit.item import Item, item, status
 from airground_drake.scenarios.schema import Scenario, Threshold
 from airground_drake.verify import Finding
 

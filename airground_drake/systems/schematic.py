@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from pydrake.systems.framework import Diagram, PortDataType, System
 
-from airground_drake.blocks import FONT_PT, OUTSIDE, PLAIN, UNITS, blocks, wires
+from airground_drake.systems.blocks import FONT_PT, OUTSIDE, PLAIN, UNITS, blocks, wires
 
 LAYERS = {
     "task_planning": "#e7f1e1",

@@ -1,4 +1,4 @@
-"""Graphviz pictures of diagrams: `python -m airground_drake.graphviz` writes those of the shipped scenarios."""
+"""Graphviz pictures of diagrams: `python -m airground_drake.systems.graphviz` writes those of the shipped scenarios."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ from pathlib import Path
 import pygraphviz
 from pydrake.systems.framework import Diagram
 
-from airground_drake import blocks, files, schematic
-from airground_drake.diagram import build_diagram, most_complete
+from airground_drake.base import files
 from airground_drake.scenarios.load import load
+from airground_drake.systems import blocks, schematic
+from airground_drake.systems.diagram import build_diagram, most_complete
 
 _PICTURE = re.compile(r'<svg width="(\d+)pt" height="(\d+)pt".*?>\s*(<g .*</g>)\s*</svg>', re.DOTALL)
 _ID = re.compile(r' id="[^"]*"')
@@ -106,7 +107,7 @@ def pictures() -> dict[str, str]:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Write the pictures, or with --check only compare: exit code 1 if one is not current."""
-    parser = argparse.ArgumentParser(prog="python -m airground_drake.graphviz", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m airground_drake.systems.graphviz", description=__doc__)
     parser.add_argument("-o", "--output", type=Path, default=Path("diagrams"), help="folder (default: %(default)s)")
     parser.add_argument("--check", action="store_true", help="write nothing; fail if a file is not current")
     options = parser.parse_args(arguments)
@@ -119,7 +120,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if not options.check:
             files.write_text(path, content)
     if options.check and stale:
-        print(f"not current: {', '.join(stale)}; run python -m airground_drake.graphviz", file=sys.stderr)
+        print(f"not current: {', '.join(stale)}; run python -m airground_drake.systems.graphviz", file=sys.stderr)
         return 1
     return 0
 

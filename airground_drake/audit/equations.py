@@ -214,7 +214,7 @@ DEVIATIONS: tuple[Deviation, ...] = (
     ),
     Deviation("Figure 1", "geometry of the composition", (), "not realised", "A sketch; see (5)."),
     Deviation(
-        "Figure 2", "framework in three layers", ("diagram:build_diagram",), "faithful",
+        "Figure 2", "framework in three layers", ("systems.diagram:build_diagram",), "faithful",
         "Every block is a Drake system; `airground diagram case_a` draws them.",
     ),
     Deviation(

@@ -21,16 +21,17 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
 
-from airground_drake import files, interruption, trace
-from airground_drake.errors import AirgroundError, PluginError, ScenarioError, SimulationError, described, one_line
+from airground_drake.base import files, interruption
+from airground_drake.base.errors import AirgroundError, PluginError, ScenarioError, SimulationError, described, one_line
+from airground_drake.base.parallel import forks, processors
+from airground_drake.base.progress import SILENT, Progress
 from airground_drake.intervention.guest.process import end_all
 from airground_drake.nsbc import kernels
-from airground_drake.parallel import forks, processors
-from airground_drake.progress import SILENT, Progress
+from airground_drake.run import trace
+from airground_drake.run.simulation import simulate, warm_up
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import validated
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.simulation import simulate, warm_up
-from airground_drake.trace import Trace
 
 FAILURE = "failure.json"
 TOLD_S = 0.2

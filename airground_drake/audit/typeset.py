@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from airground_drake.report.audit.item import CONVERSION, Item
+from airground_drake.audit.item import CONVERSION, Item
 
 FORMULAS: dict[int, tuple[tuple[str, ...], tuple[str, ...]]] = {
     1: (

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import NoReturn
 
-from airground_drake.errors import one_line
+from airground_drake.base.errors import one_line
 
 EXIT_USAGE, EXIT_TOOL = 2, 4
 MOST = 1e15

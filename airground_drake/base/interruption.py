@@ -25,8 +25,8 @@ from pathlib import Path
 from types import FrameType
 from typing import NoReturn
 
-from airground_drake import files
-from airground_drake.usage import EXIT_TOOL, refuse
+from airground_drake.base import files
+from airground_drake.base.usage import EXIT_TOOL, refuse
 
 STOPPING = (signal.SIGINT, signal.SIGTERM)
 ROUNDS = 10

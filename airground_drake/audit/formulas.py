@@ -7,9 +7,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from airground_drake.arrays import Array
+from airground_drake.audit.item import Item, item
+from airground_drake.base.arrays import Array
 from airground_drake.nsbc.tasks import DistanceTask
-from airground_drake.report.audit.item import Item, item
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Scenario
 

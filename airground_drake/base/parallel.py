@@ -17,8 +17,8 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from typing import TypeVar
 
-from airground_drake.errors import AirgroundError
-from airground_drake.progress import SILENT, Progress
+from airground_drake.base.errors import AirgroundError
+from airground_drake.base.progress import SILENT, Progress
 
 T = TypeVar("T")
 

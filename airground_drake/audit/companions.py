@@ -9,22 +9,22 @@ from typing import Any
 import numpy as np
 from pydrake.solvers import ClarabelSolver, MathematicalProgram
 
-from airground_drake.arrays import Array
-from airground_drake.components import make_outlook, make_patience, make_presets, make_team
+from airground_drake.audit.item import Item
+from airground_drake.base.arrays import Array
 from airground_drake.gatekeeper.mpc_gatekeeper import View
 from airground_drake.gatekeeper.outcome import Outcome
 from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.law import UgvLaw
-from airground_drake.report.audit.item import Item
 from airground_drake.report.figures.canvas import thin
 from airground_drake.report.figures.timelines import nearest_distance
 from airground_drake.report.metrics import closest_obstacle
 from airground_drake.report.reproduction import MEASURES
+from airground_drake.run.simulation import Recorder, simulate
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.simulation import Recorder, simulate
-from airground_drake.trace import Trace
+from airground_drake.systems.components import make_outlook, make_patience, make_presets, make_team
 
 PAPERS_ROUTE = "gatekeeper.route=relaxed"
 """The paper's own way to decide, (27)-(29), whatever the default of a scenario."""

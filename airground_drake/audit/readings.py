@@ -7,7 +7,7 @@ from math import dist
 
 import numpy as np
 
-from airground_drake.report.audit.item import Item, item
+from airground_drake.audit.item import Item, item
 from airground_drake.scenarios.schema import Scenario
 
 

@@ -12,9 +12,8 @@ from dataclasses import dataclass
 from pydrake.systems.framework import Diagram, DiagramBuilder, InputPort, OutputPort, System
 from pydrake.systems.primitives import Demultiplexer, Multiplexer, TrajectorySource
 
-from airground_drake import components
-from airground_drake.arrays import Array
-from airground_drake.errors import PluginError, UnknownNameError
+from airground_drake.base.arrays import Array
+from airground_drake.base.errors import PluginError, UnknownNameError
 from airground_drake.geometry.motion import Motion
 from airground_drake.nsbc.avoidance import COMPOSITIONS, Composition
 from airground_drake.nsbc.task import Task
@@ -33,6 +32,7 @@ from airground_drake.systems import (
     UavController,
     UgvController,
     VelocityDisturbance,
+    components,
 )
 
 RECORDED = (
