@@ -15,8 +15,10 @@ import airground_drake
 PACKAGE = Path(airground_drake.__file__).parent
 ALLOWED: dict[str, set[str]] = {
     "engines": {"base.arrays", "base.interruption", "base.statuses", "verify.engines", "verify.finding"},
-    "runs": {"base.arrays", "base.errors", "run.trace", "verify.engines", "verify.runs", "verify.claim", "verify.finding"},
-}
+    "runs": {
+        "base.arrays", "base.errors", "run.trace", "verify.engines", "verify.runs", "verify.claim", "verify.finding",
+    },
+}  # fmt: skip
 """By folder of verify/, beginnings of what its modules may import of this package."""
 JUDGED = {"geometry", "nsbc", "gatekeeper", "systems", "decision", "run.simulation", "intervention"}
 
