@@ -144,7 +144,7 @@ def column_missing(folder: Path) -> None:
 @tampering(mended=False)
 def page_changed(folder: Path) -> None:
     page = folder / "report.html"
-    write(page, page.read_bytes().replace(b"As expected", b"As we wanted"))
+    write(page, page.read_bytes().replace(b"declared", b"wanted"))
 
 
 @tampering(mended=False)
