@@ -194,7 +194,7 @@ KERNELS = (
         "return _scale_back(_closest_feasible(lower, normal, bound), normal, bound)",
         "return _closest_feasible(lower, normal, bound)",
         runs=("crowd d",),
-        tests=WIRING,
+        tests=(*WIRING, "tests/nsbc/test_avoidance.py"),
     ),
     Mutant("speeds up to twice the limit", "nsbc/kernels.py", "if speed > max_speed:", "if speed > 2.0 * max_speed:"),
     Mutant(
