@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-SCHEMA = "airground_drake.run.trace/7"
+SCHEMA = "airground_drake.trace/7"
 
 DECISION_COLUMNS = {
     "t_s": "float64",

@@ -78,7 +78,7 @@ def trace_folder_added(folder: Path) -> None:
 @tampering()
 def trace_of_another_schema(folder: Path) -> None:
     with edited_json(trace(folder) / "meta.json") as meta:
-        meta["schema"] = "airground_drake.run.trace/1"
+        meta["schema"] = "airground_drake.trace/1"
 
 
 @tampering()
