@@ -71,7 +71,8 @@ def write(
                     panel.drawing.savefig(buffer, format=kind, metadata=_undated(kind))
                 files.write_bytes(folder / f"{names[-1]}.{kind}", buffer.getvalue())
                 yield folder / f"{names[-1]}.{kind}"
-        texts.append(_environment(figure, names, WIDTHS[style], report))
+        if names:
+            texts.append(_environment(figure, names, WIDTHS[style], report))
     tables = {"verdicts.tex": latex.verdicts(report)}
     if report["reproduction"]:
         tables["reproduction.tex"] = latex.reproduction(report)
@@ -86,9 +87,12 @@ def _undated(kind: str) -> dict[str, None]:
 
 
 def _environment(figure: Figure, names: Sequence[str], width: str, report: Mapping[str, Any]) -> str:
-    """A figure in LaTeX: its panels one below the other, and a caption that says what is established."""
+    """A figure in LaTeX: its panels, narrow ones side by side, and a caption that says what is established."""
     across, width = ("figure*", r"\textwidth") if figure.look == "wide" else ("figure", width)
-    panels = [rf"  \includegraphics[width={width}]{{{name}}}\\" for name in names]
+    between = r"\\"
+    if figure.look == "narrow" and len(names) > 1:
+        width, between = r"0.49\linewidth", ""
+    panels = [rf"  \includegraphics[width={width}]{{{name}}}{between}" for name in names]
     caption = latex.escaped(" ".join([figure.caption, *_established(SHOWN.get(figure.id, ()), report)]))
     lines = [
         rf"\begin{{{across}}}",

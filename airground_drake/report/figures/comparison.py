@@ -50,6 +50,7 @@ def draw(scenario: Scenario, traces: Mapping[str, Trace]) -> Figure | None:
             heading,
             svg.inline(canvas.svg(drawing), f"recursion-{key}", f"{heading} of {robot}, {' and '.join(runs)}", text),
             series(first, f"{heading} of {robot}, m", columns),
+            drawing=drawing,
         )
         for (key, heading, drawing), columns in zip(drawings, tables, strict=True)
     )
