@@ -17,6 +17,7 @@ from airground_drake.proofs.theories import Checked, differences, write_record
 ASSUMED = "Variable it_is_so : forall n : nat, n = 0.\nTheorem so : 1 = 0.\nProof. apply it_is_so. Qed.\n"
 
 
+@pytest.mark.slow
 def test_all_theorems_are_proved_on_allowed_axioms(compiled: Path, tmp_path: Path) -> None:
     """In one question to Coq; `airground prove`, which CI runs, asks for each theorem alone."""
     folder = tmp_path / "theories"
@@ -59,6 +60,7 @@ def test_comments_may_have_any_word() -> None:
     coq.screen("(* no Axiom (* is Admitted *), no Parameter *)\nDefinition a := 1.\n", "fine.v")
 
 
+@pytest.mark.slow
 def test_what_is_assumed_in_other_words_is_found_among_the_axioms(coq_version: str, tmp_path: Path) -> None:
     (tmp_path / "so.v").write_text(ASSUMED, encoding="utf-8")
     coq.compile_file(tmp_path / "so.v")
@@ -68,6 +70,7 @@ def test_what_is_assumed_in_other_words_is_found_among_the_axioms(coq_version: s
         coq.check_again(["so"], tmp_path)
 
 
+@pytest.mark.slow
 def test_coqchk_accepts_what_rests_on_nothing(coq_version: str, tmp_path: Path) -> None:
     (tmp_path / "fine.v").write_text("Theorem fine : 1 + 1 = 2.\nProof. reflexivity. Qed.\n", encoding="utf-8")
     coq.compile_file(tmp_path / "fine.v")
@@ -83,6 +86,7 @@ WRONG = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("theory", "right", "wrong", "lemma"), WRONG)
 def test_wrong_variants_are_not_proved(
     theory: str, right: str, wrong: str, lemma: str, coq_version: str, tmp_path: Path
