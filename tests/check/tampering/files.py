@@ -8,14 +8,12 @@ from pathlib import Path
 
 import pandas as pd
 from check.tampering.base import (
-    RUN,
     UGV,
     edited_json,
     edited_report,
     edited_table,
     edited_timings,
     middle,
-    read_table,
     refused_as_a_whole,
     seal,
     tampering,
@@ -46,26 +44,6 @@ def parquet_is_garbage(folder: Path) -> None:
 
 
 @tampering()
-def signals_missing(folder: Path) -> None:
-    (trace(folder) / "signals.parquet").unlink()
-
-
-@tampering()
-def problems_missing(folder: Path) -> None:
-    (trace(folder) / "problems.parquet").unlink()
-
-
-@tampering()
-def timings_missing(folder: Path) -> None:
-    (trace(folder) / "timings.json").unlink()
-
-
-@tampering()
-def meta_missing(folder: Path) -> None:
-    (trace(folder) / "meta.json").unlink()
-
-
-@tampering()
 def trace_folder_missing(folder: Path) -> None:
     shutil.rmtree(trace(folder))
 
@@ -79,12 +57,6 @@ def trace_folder_added(folder: Path) -> None:
 def trace_of_another_schema(folder: Path) -> None:
     with edited_json(trace(folder) / "meta.json") as meta:
         meta["schema"] = "airground_drake.trace/1"
-
-
-@tampering()
-def digest_of_a_table_removed(folder: Path) -> None:
-    with edited_json(trace(folder) / "meta.json") as meta:
-        del meta["files"]["problems.parquet"]
 
 
 @tampering()
@@ -130,43 +102,6 @@ def problems_with_labels(folder: Path) -> None:
     path.unlink()
     reversed_rows.to_parquet(path, index=True)
     seal(folder, "c")
-
-
-@tampering()
-def column_missing(folder: Path) -> None:
-    frame = read_table(folder).drop(columns="uav.vz_m_s")
-    path = trace(folder, RUN) / "signals.parquet"
-    path.unlink()
-    frame.to_parquet(path, index=False)
-    seal(folder)
-
-
-@tampering(mended=False)
-def page_changed(folder: Path) -> None:
-    page = folder / "report.html"
-    write(page, page.read_bytes().replace(b"As expected", b"As we wanted"))
-
-
-@tampering(mended=False)
-def junit_changed(folder: Path) -> None:
-    path = folder / "junit.xml"
-    write(path, path.read_bytes().replace(b"<testcase", b"<!-- --><testcase", 1))
-
-
-@tampering(mended=False)
-def diagram_changed(folder: Path) -> None:
-    write(folder / "diagram.svg", b"<svg/>")
-
-
-@tampering(mended=False)
-def meta_changed(folder: Path) -> None:
-    with edited_json(trace(folder) / "meta.json") as meta:
-        meta["note"] = "added"
-
-
-@tampering(mended=False)
-def page_missing(folder: Path) -> None:
-    (folder / "report.html").unlink()
 
 
 @tampering(mended=False)
