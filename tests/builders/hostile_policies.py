@@ -114,19 +114,9 @@ def sys_exit_0(seen: Observation) -> None:
     sys.exit(0)
 
 
-@tame("SystemExit: bye")
-def sys_exit_with_words(seen: Observation) -> None:
-    sys.exit("bye")
-
-
 @kind(ENDED + r"exit code 0\)")
 def os_exit_0(seen: Observation) -> None:
     os._exit(0)
-
-
-@kind(ENDED + r"exit code 7\)")
-def os_exit_7(seen: Observation) -> None:
-    os._exit(7)
 
 
 @kind(ENDED + r"exit code 0\)")
@@ -135,40 +125,15 @@ def os_exit_in_a_thread(seen: Observation) -> None:
     forever()
 
 
-@kind(None)
-def sys_exit_in_a_thread(seen: Observation) -> None:
-    thread = threading.Thread(target=sys.exit)
-    thread.start()
-    thread.join()
-
-
 @kind(KILLED)
 def kills_itself(seen: Observation) -> None:
     os.kill(os.getpid(), signal.SIGKILL)
     forever()
 
 
-@kind(KILLED)
-def kills_its_group(seen: Observation) -> None:
-    os.killpg(0, signal.SIGKILL)
-    forever()
-
-
-@kind(ENDED + "signal 6")
-def aborts(seen: Observation) -> None:
-    os.abort()
-
-
 @kind(ENDED + "signal 11")
 def reads_address_0(seen: Observation) -> None:
     ctypes.string_at(0)
-
-
-@kind(ENDED + "signal 14")
-def lets_an_alarm_ring(seen: Observation) -> None:
-    signal.signal(signal.SIGALRM, signal.SIG_DFL)
-    signal.setitimer(signal.ITIMER_REAL, 0.01)
-    forever()
 
 
 @kind(ENDED)
@@ -193,17 +158,7 @@ def overflows_the_stack(seen: Observation) -> None:
     raise RecursionError("caught by somebody else")
 
 
-@kind(LATE, hangs=True)
-def becomes_another_program(seen: Observation) -> None:
-    os.execv(sys.executable, [sys.executable, "-c", "import time; time.sleep(1000)"])
-
-
 # --- hanging
-
-
-@kind(LATE, hangs=True)
-def sleeps(seen: Observation) -> None:
-    time.sleep(1e6)
 
 
 @kind(LATE, hangs=True)
@@ -216,20 +171,8 @@ def loops_and_swallows_everything(seen: Observation) -> None:
 
 
 @kind(LATE, hangs=True)
-def clears_the_timer(seen: Observation) -> None:
-    signal.setitimer(signal.ITIMER_REAL, 0.0)
-    forever()
-
-
-@kind(LATE, hangs=True)
 def blocks_every_signal(seen: Observation) -> None:
     signal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())
-    forever()
-
-
-@kind(LATE, hangs=True)
-def ignores_the_request_to_end(seen: Observation) -> None:
-    signal.signal(signal.SIGTERM, signal.SIG_IGN)
     forever()
 
 
@@ -242,13 +185,6 @@ def never_returns_to_the_interpreter(seen: Observation) -> None:
 def stops_itself(seen: Observation) -> None:
     os.kill(os.getpid(), signal.SIGSTOP)
     forever()
-
-
-@kind(LATE, hangs=True)
-def waits_for_a_lock(seen: Observation) -> None:
-    lock = threading.Lock()
-    lock.acquire()
-    lock.acquire()
 
 
 @kind(LATE, hangs=True)
@@ -279,11 +215,6 @@ def raises_keyboard_interrupt(seen: Observation) -> None:
     raise KeyboardInterrupt
 
 
-@tame("GeneratorExit")
-def raises_generator_exit(seen: Observation) -> None:
-    raise GeneratorExit
-
-
 class Unusual(BaseException):
     pass
 
@@ -291,15 +222,6 @@ class Unusual(BaseException):
 @tame("Unusual: .*odd")
 def raises_what_is_no_exception(seen: Observation) -> None:
     raise Unusual("odd")
-
-
-@tame("RecursionError")
-def recurses(seen: Observation) -> None:
-    recurses_again()
-
-
-def recurses_again() -> None:
-    recurses_again()
 
 
 class WordyError(Exception):
@@ -314,11 +236,6 @@ def text_raises(seen: Observation) -> None:
     raise WordyError(lambda: 1 / 0)
 
 
-@tame("an exception that cannot be put into words")
-def text_exits(seen: Observation) -> None:
-    raise WordyError(sys.exit)
-
-
 @tame(ENDED + r"exit code 0\)")
 def text_ends_the_process(seen: Observation) -> None:
     raise WordyError(lambda: os._exit(0))
@@ -327,11 +244,6 @@ def text_ends_the_process(seen: Observation) -> None:
 @tame(LATE, hangs=True)
 def text_sleeps(seen: Observation) -> None:
     raise WordyError(forever)
-
-
-@tame("an exception that cannot be put into words")
-def text_is_no_text(seen: Observation) -> None:
-    raise WordyError(lambda: 3)
 
 
 @tame(r"WordyError: \\ud800\\udfff")
@@ -360,11 +272,6 @@ def class_has_no_name(seen: Observation) -> None:
     raise Nameless("Nothing", (Exception,), {})("?")
 
 
-@tame("ExceptionGroup")
-def raises_a_group(seen: Observation) -> None:
-    raise ExceptionGroup("many", [ValueError(str(i)) for i in range(1000)])
-
-
 # --- what is no proposal
 
 
@@ -373,24 +280,9 @@ def returns_text(seen: Observation) -> str:
     return "left"
 
 
-@tame("TypeError: a policy proposes a Motion, .* not int")
-def returns_a_number(seen: Observation) -> int:
-    return 3
-
-
-@tame("TypeError: a policy proposes a Motion, .* not generator")
-def returns_a_generator(seen: Observation) -> Iterator[int]:
-    yield 1
-
-
 @tame("ValueError: a motion needs finite")
 def returns_nan(seen: Observation) -> Motion:
     return Motion(np.array([seen.start]), np.full((1, 3), np.nan))
-
-
-@tame("ValueError: a motion needs finite")
-def returns_infinity(seen: Observation) -> Motion:
-    return Motion(np.array([np.inf]), np.zeros((1, 3)))
 
 
 @tame("FloatingPointError")
@@ -401,21 +293,6 @@ def returns_what_overflows(seen: Observation) -> Motion:
 @tame("ValueError: .* at most 1e[+]09 in size")
 def returns_what_is_too_far(seen: Observation) -> Motion:
     return Motion(np.array([0.0, 1.0]), np.array([[0.0] * 3, [-1e155] * 3]))
-
-
-@tame("ValueError: .* at most 1e[+]09 in size")
-def returns_what_is_too_late(seen: Observation) -> Motion:
-    return Motion(np.array([0.0, 1e10]), np.zeros((2, 3)))
-
-
-@tame("ValueError: a motion needs times")
-def returns_a_wrong_shape(seen: Observation) -> Motion:
-    return Motion(np.arange(3.0), np.zeros((3, 2)))
-
-
-@tame("ValueError: .* must increase")
-def returns_time_backwards(seen: Observation) -> Motion:
-    return Motion(np.array([1.0, 0.0]), np.zeros((2, 3)))
 
 
 @tame("ValueError: a proposal of [0-9]+ characters")
@@ -461,11 +338,6 @@ class Evil:
         return self.does()
 
 
-@tame("SystemExit")
-def array_exits(seen: Observation) -> Motion:
-    return tampered(times=Evil(lambda: sys.exit(0)))
-
-
 @tame(ENDED + r"exit code 0\)")
 def array_ends_the_process(seen: Observation) -> Motion:
     return tampered(positions=Evil(lambda: os._exit(0)))
@@ -505,11 +377,6 @@ def names_somebody_else(seen: Observation) -> dict[str, Motion]:
     return {"ghost": tampered()}
 
 
-@tame("ValueError: a policy proposes to UGVs of the team")
-def names_a_number(seen: Observation) -> dict[int, Motion]:
-    return {7: tampered()}
-
-
 @tame(r"ValueError: .*\\ud800")
 def names_a_surrogate(seen: Observation) -> dict[str, Motion]:
     return {"\ud800": tampered()}
@@ -521,16 +388,6 @@ def names_a_surrogate(seen: Observation) -> dict[str, Motion]:
 @tame("ValueError: assignment destination is read-only")
 def writes_to_the_target(seen: Observation) -> None:
     seen.target[:] = 0.0
-
-
-@tame("ValueError: cannot set WRITEABLE")
-def makes_the_obstacles_writeable(seen: Observation) -> None:
-    seen.obstacles.setflags(write=True)
-
-
-@tame("FrozenInstanceError")
-def assigns_to_the_observation(seen: Observation) -> None:
-    seen.t = 0.0  # type: ignore[misc]
 
 
 @tame(None)
@@ -613,11 +470,6 @@ def sends_a_motion_that_is_no_text(seen: Observation) -> None:
 
 
 @kind(NO_PROPOSAL)
-def sends_a_motion_of_half_a_number(seen: Observation) -> None:
-    answers({"motions": [["a", "AAAA", "AAAA"]]})
-
-
-@kind(NO_PROPOSAL)
 def sends_a_motion_that_is_not_finite(seen: Observation) -> None:
     answers({"motions": [["a", "AAAAAAAA+H8=", "AAAAAAAA+H8AAAAAAAD4fwAAAAAAAPh/"]]})
 
@@ -650,11 +502,6 @@ def patches_the_claims(seen: Observation) -> None:
     from airground_drake.verify.claim import Finding, TraceClaim
 
     TraceClaim.judge = lambda self, trace: Finding("holds", exercised=1)  # type: ignore[method-assign]
-
-
-@kind(None)
-def leaves_a_thread_behind(seen: Observation) -> None:
-    threading.Thread(target=forever).start()
 
 
 @kind(None)
