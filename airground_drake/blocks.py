@@ -1,4 +1,4 @@
-"""Graphviz text of Drake diagrams: a block per system, its ports with their units, data from left to right."""
+"""Systems and wires of Drake diagrams, and Graphviz text with a block per system: its ports with their units."""
 
 from __future__ import annotations
 
@@ -61,34 +61,18 @@ class Wire(NamedTuple):
     target: End
 
 
-def overview(diagram: Diagram, depth: int = 1) -> list[str]:
-    """Graphs of a diagram: first as a whole, then each diagram inside that is a closed block of that graph.
-
-    Args:
-        diagram: what is drawn.
-        depth: levels that the first graph shows.
-    """
-    closed = [system for system in blocks(diagram, depth).values() if isinstance(system, Diagram)]
-    return [graph(diagram, depth), *(graph(each) for each in closed)]
-
-
-def graph(diagram: Diagram, depth: int = 1) -> str:
-    """One graph, with blocks in the order of the diagram; what comes from a later one is told by name, without a wire.
-
-    Args:
-        diagram: what is drawn.
-        depth: levels that it shows.
-    """
-    drawn = blocks(diagram, depth)
+def graph(diagram: Diagram) -> str:
+    """One graph, its blocks in the order of the diagram; what a later one feeds is told by name, without a wire."""
+    drawn = blocks(diagram, 1)
     rank = {block: i for i, block in enumerate(drawn)}
     outside: dict[tuple[str, End], str] = {}
     for i in range(diagram.num_input_ports()):
-        outside |= {("i", end): diagram.get_input_port(i).get_name() for end in _targets(End("", i), diagram, depth)}
+        outside |= {("i", end): diagram.get_input_port(i).get_name() for end in _targets(End("", i), diagram, 1)}
     for i in range(diagram.num_output_ports()):
-        outside["o", _source(End("", i), diagram, depth)] = diagram.get_output_port(i).get_name()
-    order = sorted(wires(diagram, depth), key=lambda wire: [(rank[end.block], end.port) for end in wire])
+        outside["o", _source(End("", i), diagram, 1)] = diagram.get_output_port(i).get_name()
+    order = sorted(wires(diagram, 1), key=lambda wire: [(rank[end.block], end.port) for end in wire])
     back = {target: source for source, target in order if rank[target.block] <= rank[source.block]}
-    told = {target: _told(drawn, source, target) for target, source in back.items()}
+    ports = Ports(outside, {target: _told(drawn, source, target) for target, source in back.items()})
     title = "<BR/>".join([f"<B>{escape(diagram.get_name())}</B>", *LEGEND])
     lines = [
         f'digraph "{diagram.get_name()}" {{',
@@ -96,7 +80,7 @@ def graph(diagram: Diagram, depth: int = 1) -> str:
         f"node [shape=plain, fontname=Helvetica, fontsize={FONT_PT}]",
         f'edge [arrowsize=0.6, color="{PLAIN}"]',
         f"label=<{title}>",
-        *_body(diagram, "", depth, Ports(outside, told)),
+        *(_node(system, block, ports) for block, system in drawn.items()),
     ]
     for source, target in order:
         if target not in back:
@@ -116,7 +100,7 @@ def _told(drawn: Mapping[str, System], source: End, target: End) -> str:
 
 
 def blocks(diagram: Diagram, depth: int, within: str = "") -> dict[str, System]:
-    """The systems of a diagram that are blocks of its graph."""
+    """The systems of a diagram by their names, from the outermost on; diagrams below that depth are closed."""
     found: dict[str, System] = {}
     for system in diagram.GetSystems():
         name = f"{within}/{system.get_name()}"
@@ -125,7 +109,7 @@ def blocks(diagram: Diagram, depth: int, within: str = "") -> dict[str, System]:
 
 
 def wires(diagram: Diagram, depth: int, within: str = "") -> Iterator[Wire]:
-    """The wires between the blocks, each once, in the order of memory addresses."""
+    """The wires between `blocks`, each once, in the order of memory addresses."""
     for (target, i), (source, k) in diagram.connection_map().items():
         start = _source(End(f"{within}/{source.get_name()}", int(k)), source, depth - 1)
         for end in _targets(End(f"{within}/{target.get_name()}", int(i)), target, depth - 1):
@@ -156,23 +140,11 @@ def _targets(end: End, system: System, depth: int) -> Iterator[End]:
         yield from _targets(End(f"{end.block}/{inner.get_name()}", int(i)), inner, depth - 1)
 
 
-def _body(diagram: Diagram, within: str, depth: int, ports: Ports) -> Iterator[str]:
-    """Nodes, those of an opened diagram in a frame."""
-    for system in diagram.GetSystems():
-        block = f"{within}/{system.get_name()}"
-        if _is_open(system, depth - 1):
-            yield f'subgraph "cluster{block}" {{ label=<<B>{escape(system.get_name())}</B>>; color="{PLAIN}"'
-            yield from _body(system, block, depth - 1, ports)
-            yield "}"
-        else:
-            yield _node(system, block, ports)
-
-
 def _node(system: System, block: str, ports: Ports) -> str:
     """A table: name and kind, then the input ports, to the left, and the output ports, to the right."""
     inside = isinstance(system, Diagram)
     kind = f"{len(system.GetSystems())} systems" if inside else type(system).__name__.rstrip("_")
-    shade, link = (f' BGCOLOR="{SHADE}"', f'URL="#{system.get_name()}", ') if inside else ("", "")
+    shade = f' BGCOLOR="{SHADE}"' if inside else ""
     rows = [f"<TR><TD{shade}><B>{escape(system.get_name())}</B><BR/>{escape(kind)}</TD></TR>"]
     rows += [
         _row("i", End(block, i), system.get_input_port(i).get_name(), ports) for i in range(system.num_input_ports())
@@ -181,7 +153,7 @@ def _node(system: System, block: str, ports: Ports) -> str:
         _row("o", End(block, k), system.get_output_port(k).get_name(), ports) for k in range(system.num_output_ports())
     ]
     table = "\n".join(['<TABLE BORDER="0" CELLBORDER="1" CELLSPACING="0" CELLPADDING="2">', *rows, "</TABLE>"])
-    return f'"{block}" [{link}tooltip="{system.get_name()}", label=<{table}>]'
+    return f'"{block}" [tooltip="{system.get_name()}", label=<{table}>]'
 
 
 def _row(side: str, end: End, name: str, ports: Ports) -> str:

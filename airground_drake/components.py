@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from pydrake.common import RandomDistribution
@@ -12,19 +13,21 @@ from pydrake.trajectories import PiecewisePolynomial
 from airground_drake.arrays import Array
 from airground_drake.decision.bayes import COMPUTED
 from airground_drake.decision.trigger import Trigger
+from airground_drake.errors import ScenarioError
 from airground_drake.gatekeeper.answer import Rules
 from airground_drake.gatekeeper.budget import Budget
+from airground_drake.gatekeeper.drake_solvers import SOLVERS, lacking
 from airground_drake.gatekeeper.mpc_gatekeeper import Gatekeepers, Judging, PaperGatekeepers
 from airground_drake.gatekeeper.outcome import Outlook
 from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
 from airground_drake.gatekeeper.patience import Patience
-from airground_drake.gatekeeper.prediction import Horizon
+from airground_drake.gatekeeper.problem import Horizon
 from airground_drake.gatekeeper.routes.route import Route
+from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.database import BehaviourDatabase, make_policy
 from airground_drake.intervention.planner import Planner
 from airground_drake.nsbc.avoidance import Avoidance, Composition
 from airground_drake.nsbc.law import UgvLaw
-from airground_drake.nsbc.motion import Motion
 from airground_drake.nsbc.team import Team
 from airground_drake.registry import ROUTES, Method
 from airground_drake.scenarios.schema import Decision, Scenario
@@ -58,6 +61,7 @@ def make_database(scenario: Scenario, method: Method) -> BehaviourDatabase:
         retry=given.retry_s,
         ranking=given.ranking,  # type: ignore[arg-type]
         budget=given.budget_s,
+        joint=not method.intervention_on_top,  # the paper's UGVs decide each for itself
     )
 
 
@@ -99,9 +103,16 @@ def make_route(scenario: Scenario) -> Route:
 
     Raises:
         UnknownNameError, PluginError: if the scenario names a route that cannot be made.
+        ScenarioError: if it names a solver that cannot be used here; says why, and which can.
     """
-    blocks = scenario.gatekeeper.blocks
-    return ROUTES.make(scenario.gatekeeper.route, of=Route, **({"blocks": blocks} if blocks else {}))
+    gate = scenario.gatekeeper
+    chosen: dict[str, Any] = {"blocks": gate.blocks} if gate.blocks else {}
+    if gate.solver != "daqp":
+        if why := lacking(gate.solver):
+            allowed = ", ".join(["daqp", *(name for name in SOLVERS if not lacking(name))])
+            raise ScenarioError(scenario.name, "gatekeeper.solver", gate.solver, f"{why}; allowed here: {allowed}")
+        chosen["solver"] = gate.solver
+    return ROUTES.make(gate.route, of=Route, **chosen)
 
 
 def first_order_plant(robot: str, start: Array) -> LinearSystem:
@@ -168,7 +179,11 @@ def make_outlook(scenario: Scenario) -> Outlook:
 def make_patience(scenario: Scenario) -> Patience:
     """How long UGVs go along with the UAV."""
     gate = scenario.gatekeeper
-    return Patience(gate.tries, gate.rest_s, gate.longest_s, gate.lag_m, gate.behind_s)
+    return Patience(gate.tries, gate.rest_s, gate.longest_s)
+
+
+GatekeepersFactory = Callable[[Scenario, UgvLaw], Gatekeepers]
+"""Makes what judges proposals, of a scenario and the law of its UGVs."""
 
 
 def make_gatekeepers(scenario: Scenario, law: UgvLaw) -> Gatekeepers:

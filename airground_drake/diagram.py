@@ -1,4 +1,8 @@
-"""From a scenario to a Drake Diagram of four: the decision layer, the world, the UGVs, the UAV; wired by port names."""
+"""From a scenario to a Drake Diagram of the layers of the paper's Figure 2 and the vehicles, wired by port names.
+
+Data flows through `decision_making` (noise, DDM, trigger), `task_planning` (presets, planner, controllers),
+`optimisation` (gatekeeper) and `vehicles` (commands, disturbances, plants), whose positions are fed back.
+"""
 
 from __future__ import annotations
 
@@ -10,10 +14,9 @@ from pydrake.systems.primitives import Demultiplexer, Multiplexer, TrajectorySou
 
 from airground_drake import components
 from airground_drake.arrays import Array
-from airground_drake.decision.trigger import Trigger
 from airground_drake.errors import PluginError, UnknownNameError
+from airground_drake.geometry.motion import Motion
 from airground_drake.nsbc.avoidance import COMPOSITIONS, Composition
-from airground_drake.nsbc.motion import Motion
 from airground_drake.nsbc.task import Task
 from airground_drake.nsbc.team import Team
 from airground_drake.registry import METHODS, UAV_TASKS, Method, method_of
@@ -55,17 +58,21 @@ class Model:
         diagram: the whole system; its exported output ports are RECORDED.
         method: which method's priorities and gatekeeper it has.
         team: names, safe distances, speed limits.
-        zeta: decision threshold in force, m.
+        decision_block: what drives the trigger.
+        trigger: of all UGVs.
         planner: the UAV's planner.
         gatekeeper: of methods (c) and (d), else None.
+        controllers: of the UGVs, and of the UAV.
     """
 
     diagram: Diagram
     method: Method
     team: Team
-    zeta: float
+    decision_block: System
+    trigger: EventTrigger
     planner: InterventionPlanner
     gatekeeper: Gatekeeper | None
+    controllers: tuple[UgvController, UavController]
 
 
 def build_diagram(
@@ -108,32 +115,44 @@ def build_model(
     plants: PlantFactory = components.first_order_plant,
     monitor: Monitor | None = None,
     decision_block: DecisionFactory = DecisionVariable,
+    *,
+    disturbed: bool = True,
+    make_gatekeepers: components.GatekeepersFactory = components.make_gatekeepers,
 ) -> Model:
-    """Build and wire all components of one method of a valid scenario; else as `build_diagram`."""
+    """Build and wire all components of one method of a valid scenario; else as `build_diagram`.
+
+    If it is not to be `disturbed`, the diagram has no inputs for disturbances: commands go straight to the plants.
+    `make_gatekeepers` makes what judges proposals in another way; claims about decisions are about the default.
+    """
     chosen, composition = _chosen(scenario, method, composition)
     team, presets = components.make_team(scenario), components.make_presets(scenario)
     n = len(team.ugvs)
-    zeta = components.threshold(scenario)
     law = components.make_law(scenario, chosen, composition)
     # first, so that the seed of its noise does not depend on what a plant may draw
     block = _checked_block(n, decision_block(n, presets))
-    decision = _decision(scenario, n, block, components.make_trigger(scenario, zeta))
+    trigger = EventTrigger(n, components.make_trigger(scenario, components.threshold(scenario)))
+    decision = _decision_making(scenario, n, block, trigger)
     starts = dict(zip(team.robots, components.make_starts(scenario), strict=True))
-    world = _world(team, {robot: _checked(robot, plants(robot, start)) for robot, start in starts.items()})
+    checked = {robot: _checked(robot, plants(robot, start)) for robot, start in starts.items()}
+    vehicles = _vehicles(team, checked, disturbed=disturbed)
     planner = InterventionPlanner(components.make_planner(scenario, chosen), scenario.control.period_s)
     gatekeeper = None
     if chosen.gated:
-        gatekeepers = components.make_gatekeepers(scenario, law)
+        gatekeepers = make_gatekeepers(scenario, law)
         gatekeeper = Gatekeeper(gatekeepers, n, period=scenario.gatekeeper.period_s, control=scenario.control.period_s)
-    ugvs = _ugvs(presets, UgvController(team, law), gatekeeper if gatekeeper is not None else DirectAcceptance(n))
-    uav = _uav(planner, _uav_controller(scenario, team))
-    parts = {"decision": decision, "uav": uav, "ugvs": ugvs, "world": world}
+    controllers = UgvController(team, law), _uav_controller(scenario, team)
+    parts = {
+        "decision_making": decision,
+        "task_planning": _task_planning(presets, planner, *controllers),
+        "optimisation": _optimisation(gatekeeper if gatekeeper is not None else DirectAcceptance(n)),
+        "vehicles": vehicles,
+    }
     if monitor is not None:
         parts["monitor"] = monitor
     named = {port.get_name(): port for part in parts.values() for port in _outputs(part)}
     exported = [*RECORDED, *(["violation"] if monitor is not None else [])]
     diagram = _assembled(f"{scenario.name}_method_{chosen.id}", parts, named, exported)
-    return Model(diagram, chosen, team, zeta, planner, gatekeeper)
+    return Model(diagram, chosen, team, block, trigger, planner, gatekeeper, controllers)
 
 
 def most_complete(scenario: Scenario) -> str:
@@ -157,10 +176,9 @@ def _chosen(scenario: Scenario, method: str | None, composition: str | None) -> 
     return method_of(method), composition
 
 
-def _decision(scenario: Scenario, n: int, variable: System, trigger: Trigger) -> Diagram:
-    """The decision layer of n UGVs: noise, the block of the decision variables, triggers."""
+def _decision_making(scenario: Scenario, n: int, variable: System, events: EventTrigger) -> Diagram:
+    """The decision-making layer of n UGVs: noise, the block of the decision variables, triggers."""
     source, noise = components.make_noise(n, scenario.decision)
-    events = EventTrigger(n, trigger)
     systems = {
         "noise_source": source, "decision_noise": noise, "decision_variable": variable, "event_trigger": events,
     }  # fmt: skip
@@ -171,34 +189,43 @@ def _decision(scenario: Scenario, n: int, variable: System, trigger: Trigger) ->
         "status": events.GetOutputPort("status"),
     }
     exported = [name for name in named if name != "decision_range"]
-    return _assembled("decision", systems, named, exported, [(source.get_output_port(), noise.get_input_port())])
+    return _assembled("decision_making", systems, named, exported, [(source.get_output_port(), noise.get_input_port())])
 
 
-def _ugvs(presets: Sequence[Motion], controller: UgvController, gatekeeper: Gatekeeper | DirectAcceptance) -> Diagram:
-    """The UGVs: preset trajectories, controllers, gatekeepers."""
+def _task_planning(
+    presets: Sequence[Motion], planner: InterventionPlanner, ugvs: UgvController, uav: UavController
+) -> Diagram:
+    """The task planning layer: preset trajectories, the UAV's proposals, and the tasks that all robots compose."""
     reference = TrajectorySource(components.stack_presets(list(presets)), output_derivative_order=1)
+    systems = {
+        "reference": reference, "intervention_planner": planner, "ugv_controller": ugvs, "uav_controller": uav,
+    }  # fmt: skip
     named = {
         "reference": reference.get_output_port(),
-        "ugv_command": controller.GetOutputPort("command"),
-        "accepted": controller.GetOutputPort("accepted"),
-        "answers": gatekeeper.GetOutputPort("answers"),
-        "reports": gatekeeper.GetOutputPort("reports"),
+        "proposals": planner.GetOutputPort("proposals"),
+        "ugv_command": ugvs.GetOutputPort("command"),
+        "accepted": ugvs.GetOutputPort("accepted"),
+        "uav_command": uav.GetOutputPort("command"),
     }
-    return _assembled("ugvs", {"reference": reference, "gatekeeper": gatekeeper, "ugv_controller": controller}, named)
+    return _assembled("task_planning", systems, named)
 
 
-def _uav(planner: InterventionPlanner, controller: UavController) -> Diagram:
-    """The UAV: planner and controller."""
-    named = {"proposals": planner.GetOutputPort("proposals"), "uav_command": controller.GetOutputPort("command")}
-    return _assembled("uav", {"intervention_planner": planner, "uav_controller": controller}, named)
+def _optimisation(gatekeeper: Gatekeeper | DirectAcceptance) -> Diagram:
+    """The optimisation layer: the UGVs accept or refuse."""
+    named = {name: gatekeeper.GetOutputPort(name) for name in ("answers", "reports")}
+    return _assembled("optimisation", {"gatekeeper": gatekeeper}, named)
 
 
-def _world(team: Team, plants: Mapping[str, System]) -> Diagram:
+def _vehicles(team: Team, plants: Mapping[str, System], *, disturbed: bool) -> Diagram:
     """Where the robots are, and what moves them: commands, disturbances, plants."""
     n = len(team.ugvs)
     builder = DiagramBuilder()
     team_command = builder.AddNamedSystem("team_command", Multiplexer([3 * n, 3]))
-    disturbance = builder.AddNamedSystem("velocity_disturbance", VelocityDisturbance(team.robots))
+    commanded = team_command.get_output_port()
+    if disturbed:
+        disturbance = builder.AddNamedSystem("velocity_disturbance", VelocityDisturbance(team.robots))
+        builder.Connect(commanded, disturbance.GetInputPort("command"))
+        commanded = disturbance.GetOutputPort("velocity")
     velocities = builder.AddNamedSystem("team_velocity", Demultiplexer(3 * (n + 1), 3))
     for robot, plant in plants.items():
         builder.AddNamedSystem(f"{robot}_plant", plant)
@@ -206,15 +233,14 @@ def _world(team: Team, plants: Mapping[str, System]) -> Diagram:
     for i, plant in enumerate(plants.values()):
         builder.Connect(plant.get_output_port(0), team_position.get_input_port(i))
         builder.Connect(velocities.get_output_port(i), plant.get_input_port(0))
-    builder.Connect(team_command.get_output_port(), disturbance.GetInputPort("command"))
-    builder.Connect(disturbance.GetOutputPort("velocity"), velocities.get_input_port())
+    builder.Connect(commanded, velocities.get_input_port())
     for i, robots in enumerate(("ugv", "uav")):
         builder.ExportInput(team_command.get_input_port(i), f"{robots}_command")
-    for robot in team.robots:
+    for robot in team.robots if disturbed else ():
         builder.ExportInput(disturbance.GetInputPort(f"disturbance_{robot}"), f"disturbance_{robot}")
     builder.ExportOutput(team_position.get_output_port(), "team_position")
     builder.ExportOutput(team_command.get_output_port(), "team_command")
-    return _built("world", builder)
+    return _built("vehicles", builder)
 
 
 def _assembled(

@@ -89,6 +89,10 @@ class ReportError(AirgroundError):
     """A report that is not there, or differs from what was written, when it is read back."""
 
 
+class ExportError(AirgroundError):
+    """A run cannot be written as a file of the kind that was asked for."""
+
+
 class ReplayError(AirgroundError):
     """A replay that cannot be made here: no port for Meshcat, no encoder for a video."""
 

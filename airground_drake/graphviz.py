@@ -14,54 +14,46 @@ from pathlib import Path
 import pygraphviz
 from pydrake.systems.framework import Diagram
 
-from airground_drake import blocks, files
-from airground_drake.diagram import build_diagram
+from airground_drake import blocks, files, schematic
+from airground_drake.diagram import build_diagram, most_complete
 from airground_drake.scenarios.load import load
 
-_GAP_PT = 24.0
-"""Between the graphs of a picture."""
-_GRAPH = re.compile(r"^(?=digraph )", re.MULTILINE)
 _PICTURE = re.compile(r'<svg width="(\d+)pt" height="(\d+)pt".*?>\s*(<g .*</g>)\s*</svg>', re.DOTALL)
 _ID = re.compile(r' id="[^"]*"')
 
 
-def dot(diagram: Diagram, depth: int = 1) -> str:
-    """Graphviz text of a diagram: a graph of it to that depth, then one of each diagram that is closed there.
+def dot(diagram: Diagram) -> str:
+    """Graphviz text: of a scenario's diagram the picture of its layers, of any other one its blocks and their ports.
 
     The same diagram always gives the same text.
     """
-    return "".join(blocks.overview(diagram, depth))
+    layered = all(diagram.HasSubsystemNamed(layer) for layer in schematic.LAYERS)
+    return schematic.graph(diagram) if layered else blocks.graph(diagram)
 
 
 def svg(dot_text: str) -> str:
-    """Lay out Graphviz text as SVG, its graphs below each other; a block that has a graph is a link to it.
+    """Lay out Graphviz text as SVG.
 
     The same text gives the same bytes on the same machine; box sizes depend on its fonts. The digest of the text
     is in the picture, so that it can be told whether a picture is current.
     """
-    width, height, groups = 0.0, 0.0, []
-    for text in _GRAPH.split(dot_text)[1:]:
-        found = _PICTURE.search(re.sub(r"<!--.*?-->\n?", "", _laid_out(text, "svg").decode(), flags=re.DOTALL))
-        if found is None:
-            raise ValueError("this version of Graphviz writes SVG of another form")
-        name = re.match(r'digraph "([^"]*)"', text)
-        inner = _ID.sub("", found[3])
-        groups.append(f'<g id="{name[1] if name else ""}" transform="translate(0 {height:g})">\n{inner}\n</g>')
-        width, height = max(width, float(found[1])), height + float(found[2]) + _GAP_PT
-    size = f"{width:g} {height - _GAP_PT:g}"
+    found = _PICTURE.search(re.sub(r"<!--.*?-->\n?", "", _laid_out(dot_text, "svg").decode(), flags=re.DOTALL))
+    if found is None:
+        raise ValueError("this version of Graphviz writes SVG of another form")
+    width, height, inner = found.groups()
     return "\n".join([
         '<?xml version="1.0" encoding="UTF-8" standalone="no"?>',
         f"<!-- {_digest(dot_text)} -->",
         '<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" '
-        f'width="{width:g}pt" height="{height - _GAP_PT:g}pt" viewBox="0 0 {size}">',
-        *groups,
+        f'width="{width}pt" height="{height}pt" viewBox="0 0 {width} {height}">',
+        _ID.sub("", inner),
         "</svg>",
         "",
     ])  # fmt: skip
 
 
 def drawn(dot_text: str, kind: str) -> bytes:
-    """Graphviz text as a file: dot, svg (all graphs), or of the first graph a pdf, png, or what else Graphviz knows."""
+    """Graphviz text as a file: dot, svg, pdf, png, or what else Graphviz knows."""
     if kind == "dot":
         return dot_text.encode()
     return svg(dot_text).encode() if kind == "svg" else _laid_out(dot_text, kind)
@@ -102,10 +94,11 @@ def _silent_stderr() -> Iterator[None]:
 
 
 def pictures() -> dict[str, str]:
-    """File name to content: `.dot` and `.svg` of the paper's two cases under method (d), the most complete."""
+    """File name to content: `.dot` and `.svg` of the paper's two cases, as reports show them."""
     content = {}
     for name in ("case_a", "case_b"):
-        text = dot(build_diagram(load(name)[0], method="d"))
+        scenario = load(name)[0]
+        text = dot(build_diagram(scenario, most_complete(scenario)))
         content[f"{name}.dot"] = text
         content[f"{name}.svg"] = svg(text)
     return content

@@ -50,14 +50,14 @@ DEVIATIONS: tuple[Deviation, ...] = (
     ),
     Deviation(
         "(5)", "composition by null-space projection",
-        ("nsbc.avoidance:Avoidance", "nsbc.composition:recursion", "nsbc.law:UgvLaw"), "changed",
-        "Each task acts in the null space of the stacked Jacobian of all higher tasks (`augmented`). "
+        ("nsbc.avoidance:Avoidance", "nsbc.kernels:avoid_one", "nsbc.law:command"), "changed",
+        "Each task acts in the null space of the stacked Jacobian of all higher tasks (composition `augmented`). "
         "(5) as printed stays selectable: `recursion_nearest`, `recursion_listed`.",
         "(5) as printed is not safe with two obstacles, and does not stall where the paper's UGV1 stalls.", (1, 22),
     ),
     Deviation(
         "(6)", "move to the target",
-        ("nsbc.tasks:PositionTask", "systems.controllers:UgvController", "nsbc.law:UgvLaw"), "changed",
+        ("nsbc.tasks:PositionTask", "systems.controllers:UgvController", "nsbc.law:command"), "changed",
         "The desired value is the moving preset trajectory rho_rd, which ends at the target, not the fixed target. "
         "Its rate is fed forward. The command is shortened to the UGV's speed limit.",
         "(15) and (25) measure the error from the preset trajectory. With the fixed target a UGV would leave it at "
@@ -94,18 +94,18 @@ DEVIATIONS: tuple[Deviation, ...] = (
     ),
     Deviation(
         "(12)", "intervention: desired value",
-        ("nsbc.tasks:InterventionTask", "intervention.policy:Proposal"), "changed",
+        ("intervention.policy:Proposal",), "changed",
         "The desired value is where the UAV wants the UGV at each time: a timed polyline.",
         "As printed it is a function of the UGV's own position, so that the error is 0.", (19,),
     ),
     Deviation(
-        "(13)", "intervention: its rate", ("nsbc.tasks:InterventionTask", "nsbc.law:Intervention"), "changed",
+        "(13)", "intervention: its rate", ("nsbc.law:Intervention",), "changed",
         "The rate is the polyline's velocity. J_int is a constant selection of directions, the identity by default.",
         "As printed the rate is J v_int, which contains the velocity that (14) is to find.", (19,),
     ),
     Deviation(
         "(14)", "intervention: velocity",
-        ("nsbc.tasks:InterventionTask", "nsbc.law:UgvLaw._intervened"), "faithful",
+        ("nsbc.law:command",), "faithful",
         "With (12) and (13) as changed. The paper does not say what J_int is.", "", (16, 19),
     ),
     Deviation(
@@ -134,7 +134,7 @@ DEVIATIONS: tuple[Deviation, ...] = (
     ),
     Deviation(
         "(20)", "event-triggered composition",
-        ("decision.trigger:Trigger", "nsbc.law:UgvLaw", "systems.decision:EventTrigger"), "changed",
+        ("decision.trigger:Trigger", "nsbc.law:command", "systems.decision:EventTrigger"), "changed",
         "The trigger is an automaton with hysteresis and a minimum inter-event time; `decision.trigger: bare` is the "
         "paper's. In methods (b) and (c) the intervention is above avoidance as printed, in (d) below it.",
         "A bare threshold on (15) triggers without bound. An intervention above avoidance is not safe.", (9, 16, 18),
@@ -151,7 +151,7 @@ DEVIATIONS: tuple[Deviation, ...] = (
     ),
     Deviation(
         "(23)", "gatekeeper: predicted motion under both choices",
-        ("gatekeeper.problem:Problem", "gatekeeper.prediction:predicted_problem"), "changed",
+        ("gatekeeper.problem:Problem", "gatekeeper.problem:predicted_problem"), "changed",
         "The two velocities of a stage are taken along two roll-outs of the UGV's closed loop, accepting throughout "
         "and refusing throughout, not at the position that the plan has reached. A stage is one Euler step.",
         "So the motion is linear in omega, as the integer program needs it. It is exact for the two constant plans.",
@@ -194,7 +194,7 @@ DEVIATIONS: tuple[Deviation, ...] = (
         (22, 25),
     ),
     Deviation(
-        "section 3.1.3", "rules (1) to (3) of the task hierarchy", ("nsbc.composition:augmented",), "changed",
+        "section 3.1.3", "rules (1) to (3) of the task hierarchy", ("nsbc.kernels:avoid_one",), "changed",
         "Rules (1) and (2) hold with the augmented projector. Rule (3) is not used.",
         "(5) as printed breaks rule (1). Rule (3) contradicts its own reason.", (1, 15),
     ),

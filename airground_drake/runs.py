@@ -22,8 +22,8 @@ from pathlib import Path
 from typing import Any
 
 from airground_drake import files, interruption, trace
-from airground_drake.errors import AirgroundError, PluginError, SimulationError, described, one_line
-from airground_drake.intervention.process import end_all
+from airground_drake.errors import AirgroundError, PluginError, ScenarioError, SimulationError, described, one_line
+from airground_drake.intervention.guest.process import end_all
 from airground_drake.nsbc import kernels
 from airground_drake.parallel import forks, processors
 from airground_drake.progress import SILENT, Progress
@@ -56,7 +56,7 @@ def simulate_all(
 
     Raises:
         ScenarioError: if the scenario is not valid.
-        PluginError: if it names a policy, route or task that cannot be made.
+        PluginError: if it names a policy, route, task or solver that cannot be made.
         SimulationError: if a simulation stops before its end, or comes no further.
         AirgroundError: if its process dies.
     """
@@ -110,7 +110,7 @@ def _simulate(scenario: Scenario, run: str, folder: Path, clock: Any) -> None:
     except BaseException as error:
         stopped = [error.run, error.t, error.what] if isinstance(error, SimulationError) else None
         plain = str(error) if isinstance(error, AirgroundError) else described(error)
-        refused = isinstance(error, PluginError)
+        refused = isinstance(error, PluginError | ScenarioError)
         with suppress(OSError):  # a full disk; the parent says that this process died
             files.write_json(folder / FAILURE, {"what": plain, "refused": refused, "stopped": stopped})
 

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -17,23 +16,26 @@ from pydrake.systems.framework import Context, DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput, Multiplexer
 
 from airground_drake.arrays import Array
+from airground_drake.components import GatekeepersFactory, make_gatekeepers
 from airground_drake.diagram import RECORDED, DecisionFactory, Model, build_model
 from airground_drake.errors import SimulationError, UnknownNameError, described
 from airground_drake.events import extract
 from airground_drake.gatekeeper.answer import Decision, Foreseen, Planned
 from airground_drake.gatekeeper.outcome import Outlook, outcomes
-from airground_drake.gatekeeper.prediction import Horizon, Scene, predicted_problem
+from airground_drake.gatekeeper.problem import Horizon, predicted_problem
+from airground_drake.gatekeeper.rollout import Scene
 from airground_drake.gatekeeper.routes.mixed_integer import MixedIntegerRoute
+from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance, Composition, Surroundings, limit_speed
 from airground_drake.nsbc.kernels import distances, news_within, within
 from airground_drake.nsbc.law import UgvLaw
-from airground_drake.nsbc.motion import Motion
 from airground_drake.nsbc.team import Team
-from airground_drake.scenarios.load import resolved, validated
-from airground_drake.scenarios.schema import Run, Scenario
-from airground_drake.systems.decision import FIELDS, DecisionVariable
+from airground_drake.scenarios.load import own, resolved, validated
+from airground_drake.scenarios.schema import Scenario
+from airground_drake.systems.decision import DecisionVariable
 from airground_drake.systems.lifetime import untie
+from airground_drake.systems.signals import FIELDS, Status
 from airground_drake.trace import (
     DECISION_COLUMNS,
     PROBLEM_ARRAYS,
@@ -42,6 +44,9 @@ from airground_drake.trace import (
     SCHEMA,
     Trace,
 )
+
+if TYPE_CHECKING:
+    from pydrake.geometry import Meshcat
 
 EVENT_ACCURACY = 1e-6
 """Accuracy of the Context: witness functions are isolated to it (relative to the time scale of 1 s)."""
@@ -53,8 +58,18 @@ MERGE_S = 1e-9
 class Recorder:
     """A model inside a diagram that logs its exported outputs at every step; may be used for several seeds."""
 
-    def __init__(self, scenario: Scenario, name: str, decision_block: DecisionFactory = DecisionVariable) -> None:
-        """Build the model of a run of the scenario and its loggers; `decision_block` as in `build_diagram`.
+    def __init__(
+        self,
+        scenario: Scenario,
+        name: str,
+        decision_block: DecisionFactory = DecisionVariable,
+        meshcat: Meshcat | None = None,
+        *,
+        make_gatekeepers: GatekeepersFactory = make_gatekeepers,
+    ) -> None:
+        """Build the model of a run of the scenario and its loggers; `decision_block` and `meshcat` as in `simulate`.
+
+        `make_gatekeepers` is that of `build_model`.
 
         Raises:
             ScenarioError: if the scenario is not valid.
@@ -67,8 +82,15 @@ class Recorder:
             raise UnknownNameError("run", name, self._scenario.runs)
         self._run = self._scenario.runs[name]
         composition: Composition = self._run.composition  # type: ignore[assignment]
-        scenario = _with_rule(self._scenario, self._run)
-        self._model: Model = build_model(scenario, self._run.method, composition, decision_block=decision_block)
+        self._own = own(self._scenario, name)
+        self._model: Model = build_model(
+            self._own,
+            self._run.method,
+            composition,
+            decision_block=decision_block,
+            disturbed=False,
+            make_gatekeepers=make_gatekeepers,
+        )
         builder = DiagramBuilder()
         builder.AddSystem(self._model.diagram)
         ports = [self._model.diagram.GetOutputPort(name) for name in RECORDED]
@@ -76,13 +98,23 @@ class Recorder:
         for i, port in enumerate(ports):
             builder.Connect(port, together.get_input_port(i))
         self._log = LogVectorOutput(together.get_output_port(), builder)  # one for all: a log costs a step 10 us
+        if meshcat is not None:
+            from airground_drake.view.live_view import LiveView  # half a second of imports
+
+            view = builder.AddNamedSystem("live_view", LiveView(meshcat, self._scenario))
+            for port in (view.get_input_port(i) for i in range(view.num_input_ports())):
+                builder.Connect(self._model.diagram.GetOutputPort(port.get_name()), port)
         self._root = builder.Build()
         self._root.set_name("recorded")
         untie(self._root)
         warm_up()
 
     def simulate(
-        self, seed: int | None = None, duration: float | None = None, watch: Callable[[float], None] | None = None
+        self,
+        seed: int | None = None,
+        duration: float | None = None,
+        watch: Callable[[float], None] | None = None,
+        speed: float = 0.0,
     ) -> Trace:
         """One run from the initial state.
 
@@ -90,6 +122,7 @@ class Recorder:
             seed: of the decision noise; default: the scenario's.
             duration: s; default: the scenario's.
             watch: is told the time, s, at every step.
+            speed: simulated seconds per second at most; 0: as fast as it goes.
 
         Raises:
             SimulationError: if Drake or a system stops; names the run and the time.
@@ -102,6 +135,7 @@ class Recorder:
         period = self._scenario.control.period_s
         config = SimulatorConfig(integration_scheme="explicit_euler", max_step_size=period, use_error_control=False)
         ApplySimulatorConfig(config, simulator)  # velocities are held between samples: Euler's method is exact
+        simulator.set_target_realtime_rate(speed)
         if self._model.gatekeeper is not None:
             self._model.gatekeeper.reset_timing()
         if watch is not None:
@@ -130,7 +164,7 @@ class Recorder:
         gatekeeper = model.gatekeeper
         decided = gatekeeper.decisions(gatekeeper.GetMyContextFromRoot(context)) if gatekeeper is not None else ()
         memory = model.planner.memory(model.planner.GetMyContextFromRoot(context))
-        decisions = _decisions([_decision(r, ugvs[r.robot], self._scenario.gatekeeper.route) for r in decided])
+        decisions = _decisions([_decision(r, ugvs[r.robot], self._own.gatekeeper.route) for r in decided])
         sent = [(ugvs[i], proposal.issued, proposal.policy) for i, proposal in memory.sent]
         meta: dict[str, Any] = {
             "schema": SCHEMA,
@@ -140,37 +174,31 @@ class Recorder:
             "seed": seed,
             "robots": list(robots),
             "ugvs": list(ugvs),
-            "zeta_m": model.zeta,
             "scenario": resolved(self._scenario),
             "events": [],
-            "controllers": _controllers(model),
+            **read_back(model, context),
             "decision_block": _decision_block(model),
             "faults": [{"t_s": f.t, "robot": f.robot, "policy": f.policy, "what": f.what} for f in memory.faults],
         }
         times = list(gatekeeper.decision_times_s) if gatekeeper is not None else []
         timings = {"wall_s": wall, "decision_times_s": times}
-        proposals = _proposals([(ugvs[i], proposal) for i, proposal in memory.sent])
+        proposals = _proposals(ugvs, memory.sent)
         trace = Trace(meta, signals, decisions, timings, _problems(decided), proposals)
         meta["events"] = extract(trace, sent)
         return trace
 
 
-def _with_rule(scenario: Scenario, run: Run) -> Scenario:
-    """The scenario as the run has it: with its own rule of the gatekeeper, if it names one."""
-    return replace(scenario, gatekeeper=replace(scenario.gatekeeper, rule=run.rule)) if run.rule else scenario
-
-
-def _controllers(model: Model) -> dict[str, Any]:
-    """What the controllers in the diagram were built with, by name: see `controllers.read_back`."""
-    ugvs, uav = (model.diagram.GetSubsystemByName(name) for name in ("ugvs", "uav"))
-    systems = (ugvs.GetSubsystemByName("ugv_controller"), uav.GetSubsystemByName("uav_controller"))
-    return {system.get_name(): system.parameters() for system in systems}
+def read_back(model: Model, root: Context) -> dict[str, Any]:
+    """What runs in a Context, for `Trace.meta`: `zeta_m`, and `controllers` by name (see `controllers.read_back`)."""
+    levels = model.trigger.levels(model.trigger.GetMyContextFromRoot(root))
+    ran = {each.get_name(): each.parameters(each.GetMyContextFromRoot(root)) for each in model.controllers}
+    return {"zeta_m": float(levels.zeta_m), "controllers": ran}
 
 
 def _decision_block(model: Model) -> str:
     """Name of the class that computes the decision variables in the diagram; "" for that of (15)."""
-    block = model.diagram.GetSubsystemByName("decision").GetSubsystemByName("decision_variable")
-    return "" if type(block) is DecisionVariable else type(block).__qualname__
+    kind = type(model.decision_block)
+    return "" if kind is DecisionVariable else kind.__qualname__
 
 
 def _decision(decision: Decision, robot: str, route: str) -> dict[str, Any]:
@@ -187,7 +215,7 @@ def _decision(decision: Decision, robot: str, route: str) -> dict[str, Any]:
     }
     grounds = decision.grounds
     if isinstance(grounds, Foreseen):
-        row |= {"lag_m": grounds.lag, "predicted_lag_m": grounds.predicted_lag, "tries": grounds.tries}
+        row |= {"tries": grounds.tries}
         for choice, outcome in (("refuse", grounds.refuse), ("accept", grounds.accept)):
             if outcome is not None:
                 row |= {
@@ -220,17 +248,18 @@ def _decisions(rows: Sequence[dict[str, Any]]) -> pd.DataFrame:
     return pd.DataFrame({name: pd.Series(values, dtype=DECISION_COLUMNS[name]) for name, values in columns.items()})
 
 
-def _proposals(sent: Sequence[tuple[str, Proposal]]) -> pd.DataFrame:
+def _proposals(ugvs: Sequence[str], sent: Sequence[tuple[int, Proposal]]) -> pd.DataFrame:
     """`Trace.proposals` of what was sent to whom."""
     rows = [
         (
-            proposal.number, robot, proposal.policy, float(proposal.issued), proposal.motion.times.tolist(),
+            proposal.number, ugvs[i], proposal.policy, float(proposal.issued), proposal.motion.times.tolist(),
             proposal.motion.positions.ravel().tolist(),
             np.asarray(proposal.selection, dtype=np.float64).ravel().tolist(),
             np.asarray(proposal.mapped, dtype=np.float64).ravel().tolist(),
-            np.broadcast_to(proposal.mapped_radii, len(proposal.mapped)).tolist(), proposal.cause or robot,
+            np.broadcast_to(proposal.mapped_radii, len(proposal.mapped)).tolist(), proposal.cause or ugvs[i],
+            [float(ugvs.index(name)) for name in proposal.party],
         )
-        for robot, proposal in sent
+        for i, proposal in sent
     ]  # fmt: skip
     return pd.DataFrame(rows, columns=list(PROPOSAL_COLUMNS))
 
@@ -268,6 +297,7 @@ def warm_up() -> None:
     team.neighbourhood(slice(0, 1)).around(np.ones((2, 3)))
     scene = Scene(0.0, one[0], motion, one, one, np.ones(1), np.ones(1), 1.0)
     law, horizon = UgvLaw(avoidance, 1.0, 1.0, False), Horizon(2, 1, 1.0, 1.0)
+    law.velocity(np.ones((2, 3)), team.neighbourhood(slice(0, 1)), one, one, [None], one, np.ones(1))
     MixedIntegerRoute().solve(predicted_problem(scene, law, Proposal("", 0.0, motion), horizon))
     outcomes(scene, law, Proposal("", 0.0, motion), one, 1.0, (), Outlook(longest=1.0))
 
@@ -278,6 +308,8 @@ def simulate(
     seed: int | None = None,
     watch: Callable[[float], None] | None = None,
     decision_block: DecisionFactory = DecisionVariable,
+    meshcat: Meshcat | None = None,
+    speed: float = 0.0,
 ) -> Trace:
     """Simulate one run of a scenario.
 
@@ -287,6 +319,8 @@ def simulate(
         seed: of the decision noise, in place of the scenario's.
         watch: is told the time, s, at every step.
         decision_block: makes the block that drives the trigger; see `build_diagram`.
+        meshcat: shows the robots while they move; the run is the same with it and without.
+        speed: simulated seconds per second at most, for those who watch; 0: as fast as it goes.
 
     Raises:
         ScenarioError: if the scenario, or the seed, is not valid.
@@ -296,7 +330,7 @@ def simulate(
     """
     if seed is not None:
         scenario = validated(scenario, {"seed": seed})
-    return Recorder(scenario, run, decision_block).simulate(watch=watch)
+    return Recorder(scenario, run, decision_block, meshcat).simulate(watch=watch, speed=speed)
 
 
 def _distinct(t: Array, command: Array) -> npt.NDArray[np.intp]:
@@ -323,7 +357,7 @@ def _signals(t: Array, data: dict[str, Array], ugvs: tuple[str, ...], robots: tu
             columns[f"{ugv}.ref_{axis}_m"] = data["reference"][3 * i + a]
         columns[f"{ugv}.noise_m"] = data["noise"][i]
         columns[f"{ugv}.decision_variable_m"] = data["decision_variable"][i]
-        for k, name in enumerate(("mode", "triggers", "triggered_at_s", "released_at_s")):
+        for k, name in enumerate(Status.get_fields()):
             columns[f"{ugv}.{name}"] = data["status"][FIELDS * i + k]
         columns[f"{ugv}.accepted"] = data["accepted"][i]
     return pd.DataFrame(columns)

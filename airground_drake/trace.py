@@ -24,10 +24,12 @@ Rows closer than 1e-9 s are one.
 
 from __future__ import annotations
 
+import copy
 import io
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from html import escape
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -40,7 +42,7 @@ from airground_drake.errors import TraceError, one_line
 
 T = TypeVar("T")
 
-SCHEMA = "airground_drake.trace/6"
+SCHEMA = "airground_drake.trace/7"
 
 DECISION_COLUMNS = {
     "t_s": "float64",
@@ -69,15 +71,13 @@ DECISION_COLUMNS = {
     "accept_stalls": "float64",
     "refuse_left_m": "float64",
     "accept_left_m": "float64",
-    "lag_m": "float64",
-    "predicted_lag_m": "float64",
     "tries": "float64",
 }
 """Columns of `Trace.decisions`, one row per robot and gatekeeper call; -1 where a number does not apply. `number` is
 that of the proposal in `Trace.proposals`. Those up to
 `predicted_clearance_m` are of decisions by problem (26), the others of decisions by outcomes: what comes of either
-choice as `gatekeeper.outcome` has it (cost, 1 if it comes to rest short of the goal, way left), how far the UGV is
-behind the proposed motion, and how often it has gone along since it last rested."""
+choice as `gatekeeper.outcome` has it (cost, 1 if it comes to rest short of the goal, way left), and how often the UGV
+has gone along since it last rested."""
 
 PROBLEM_SCALARS = ("dt_s", "error_weight_1_m2_s", "slack_weight_1_m2_s", "terminal_weight_s")
 PROBLEM_ARRAYS = (
@@ -91,13 +91,14 @@ empty where the route has none. Normals are those of the half-planes that `route
 
 PROPOSAL_COLUMNS = (
     "number", "robot", "policy", "issued_s", "times_s", "positions_m", "selection", "mapped_m", "mapped_radius_m",
-    "cause",
+    "cause", "party",
 )  # fmt: skip
 """Columns of `Trace.proposals`, one row per proposal sent: its number, which identifies it and counts from 0 in the
 order of sending; for which UGV, by which policy, when; the vertices of the
 motion that it asks for, times (M) and positions (M x 3, flattened in C order), and J_int of (12)-(14), (m x 3, ditto):
 the directions that it concerns, and the obstacles that the UAV knows, centres (k x 3, ditto) and radii (k); and the UGV
-whose trigger it was sent for: this one, or another one that it is to make way for."""
+whose trigger it was sent for: this one, or another one that it is to make way for; and where all UGVs with a
+part in the same joint plan are in `ugvs`, counted from 0 (empty: the proposal stands alone)."""
 
 
 TABLES = ("signals", "decisions", "problems", "proposals")
@@ -109,7 +110,7 @@ def no_proposals() -> pd.DataFrame:
     return pd.DataFrame(columns=list(PROPOSAL_COLUMNS))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Trace:
     """One run.
 
@@ -157,9 +158,10 @@ class Trace:
 
     @property
     def scenario(self) -> dict[str, Any]:
-        """The resolved scenario, as nested dicts with the keys of the scenario file."""
+        """The resolved scenario as this run has it, as nested dicts with the keys of the scenario file."""
         resolved: dict[str, Any] = self.meta["scenario"]
-        return resolved
+        given = resolved["runs"].get(self.run, {}).get("set")
+        return self.derived("scenario", lambda: _with(resolved, given)) if given else resolved
 
     @property
     def events(self) -> list[dict[str, Any]]:
@@ -213,6 +215,36 @@ class Trace:
     def reference(self, ugv: str) -> Array:
         """Preset trajectory, (T, 3), m."""
         return self.vector(ugv, "ref_")
+
+    def to_pandas(self) -> pd.DataFrame:
+        """The signals as a new table: a row per time, the index `t_s`; columns by robot, then by signal."""
+        table = self.signals.set_index("t_s")
+        parts = [tuple(str(name).split(".", 1)) for name in table]
+        table.columns = pd.MultiIndex.from_tuples(parts, names=["robot", "signal"])
+        return table
+
+    def __repr__(self) -> str:
+        """In one line: which run of which scenario, how many rows and events."""
+        scenario, events = self.meta.get("scenario", {}).get("name"), self.meta.get("events", [])
+        return f"<Trace: run {self.meta.get('run')!r} of {scenario!r}, {len(self.signals)} rows, {len(events)} events>"
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the line of `repr` and a table of the events."""
+        rows = [(f"{event['t_s']:.3f}", event["robot"], event["kind"]) for event in self.events]
+        table = pd.DataFrame(rows, columns=["time, s", "robot", "event"]).to_html(index=False, border=0)
+        return f"<p>{escape(repr(self))}</p>{table}"
+
+
+def _with(resolved: dict[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
+    """A copy of nested dicts and lists with other values at dotted keys."""
+    changed = copy.deepcopy(resolved)
+    for key, value in given.items():
+        *above, last = key.split(".")
+        place: Any = changed
+        for part in above:
+            place = place[int(part) if isinstance(place, list) else part]
+        place[last] = value
+    return changed
 
 
 def save(trace: Trace, folder: Path) -> list[str]:

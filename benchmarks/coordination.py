@@ -19,7 +19,7 @@ import numpy as np
 from airground_drake.arrays import Array
 from airground_drake.intervention.coordinate import warm_up
 from airground_drake.intervention.coordination.joint import plan
-from airground_drake.intervention.coordination.roadmap import Errand, Space
+from airground_drake.intervention.coordination.roadmap import RobotTask, Space
 from airground_drake.intervention.coordination.timed import at_rest, distance, distance_to_point
 
 D = 2.0
@@ -29,7 +29,7 @@ APART = 2.3
 TOLERANCE_M = 1e-6
 
 
-def draw(seed: int, count: int, *, hopeless: bool) -> tuple[Space, list[Errand]]:
+def draw(seed: int, count: int, *, hopeless: bool) -> tuple[Space, list[RobotTask]]:
     """Robots, and half as many obstacles and four, in a square that grows with their number; two of them in a tube."""
     rng = np.random.default_rng([20261122, seed, count])
     obstacles = 4 + count // 2
@@ -39,14 +39,14 @@ def draw(seed: int, count: int, *, hopeless: bool) -> tuple[Space, list[Errand]]
         starts, targets = (_apart(rng, count, side, discs) for _ in range(2))
         if (len(discs), len(starts), len(targets)) == (obstacles, count, count):
             break
-    errands = [Errand(start, np.array([[0.0, *target]])) for start, target in zip(starts, targets, strict=True)]
+    tasks = [RobotTask(start, np.array([[0.0, *target]])) for start, target in zip(starts, targets, strict=True)]
     if hopeless:
         walls = [np.array([x, y]) for x in np.arange(-2.0, 9.1, 1.5) for y in (-8.2, -3.8)]
         discs += [*walls, np.array([-3.0, -6.0]), np.array([10.0, -6.0])]
         left, right = np.array([1.0, -6.0]), np.array([6.0, -6.0])
-        exchange = [Errand(left, np.array([[0.0, *right]])), Errand(right, np.array([[0.0, *left]]))]
-        errands = [*exchange, *errands[2:]]
-    return Space(np.array(discs), np.full(len(discs), D), 0.1, D, 0.2), errands
+        exchange = [RobotTask(left, np.array([[0.0, *right]])), RobotTask(right, np.array([[0.0, *left]]))]
+        tasks = [*exchange, *tasks[2:]]
+    return Space(np.array(discs), np.full(len(discs), D), 0.1, D, 0.2), tasks
 
 
 def _apart(rng: np.random.Generator, count: int, side: float, others: list[Array]) -> list[Array]:
@@ -72,14 +72,14 @@ def main() -> int:
     for count in options.teams:
         times, complete, moved, orders, intervals, apart, clear = [], 0, 0, 0, 0, np.inf, np.inf
         for seed in range(options.number):
-            space, errands = draw(seed, count, hopeless=options.hopeless)
+            space, tasks = draw(seed, count, hopeless=options.hopeless)
             begin = time.process_time()
-            found = plan(space, errands, [1.0] * count)
+            found = plan(space, tasks, [1.0] * count)
             times.append(time.process_time() - begin)
             complete += found.complete
             moved += sum(way is not None for way in found.ways)
             orders, intervals = max(orders, found.orders), max(intervals, found.expansions)
-            motions = [at_rest(e.start) if w is None else w.motion for w, e in zip(found.ways, errands, strict=True)]
+            motions = [at_rest(e.start) if w is None else w.motion for w, e in zip(found.ways, tasks, strict=True)]
             apart = min(apart, *(distance(one, other) for one, other in combinations(motions, 2)))
             clear = min(clear, *(distance_to_point(motion, point) for motion in motions for point in space.centres))
         failed |= min(apart, clear) < D - TOLERANCE_M

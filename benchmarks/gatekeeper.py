@@ -33,19 +33,19 @@ import numpy as np
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.half_planes import normals_along
 from airground_drake.gatekeeper.outcome import Other, Outlook, outcomes
-from airground_drake.gatekeeper.prediction import Horizon, Scene, predicted_problem
-from airground_drake.gatekeeper.problem import Problem
+from airground_drake.gatekeeper.problem import Horizon, Problem, predicted_problem
+from airground_drake.gatekeeper.rollout import Scene
 from airground_drake.gatekeeper.rounding import sum_up_rounding
 from airground_drake.gatekeeper.routes.mixed_integer import MixedIntegerRoute
 from airground_drake.gatekeeper.routes.nonlinear import NonlinearRoute
 from airground_drake.gatekeeper.routes.relaxed import RelaxedRoute
 from airground_drake.gatekeeper.routes.route import Route
 from airground_drake.gatekeeper.solution import ConstantPlans, Solution, cheapest
-from airground_drake.intervention.paths import NoPath, shortest_path
+from airground_drake.geometry.motion import Motion
+from airground_drake.geometry.paths import NoPath, shortest_path
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.law import UgvLaw
-from airground_drake.nsbc.motion import Motion
 from airground_drake.registry import ROUTES
 from airground_drake.scenarios.load import load
 from airground_drake.simulation import Recorder

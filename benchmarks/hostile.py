@@ -30,13 +30,14 @@ from airground_drake import components
 from airground_drake.arrays import Array
 from airground_drake.components import make_planner, make_presets, make_team
 from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
-from airground_drake.gatekeeper.prediction import Horizon, Scene, predicted_problem
+from airground_drake.gatekeeper.problem import Horizon, predicted_problem
+from airground_drake.gatekeeper.rollout import Scene
 from airground_drake.gatekeeper.routes.relaxed import RelaxedRoute
+from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.planner import Planner
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.law import UgvLaw
-from airground_drake.nsbc.motion import Motion
 from airground_drake.registry import Method
 from airground_drake.report.audit.companions import Believing
 from airground_drake.scenarios.load import load
@@ -185,8 +186,7 @@ def told(lie: Lie) -> Told:
     scenario = load("case_a", [f"seed={lie.seed}"])[0]
     gate = scenario.gatekeeper
     gate.tries, gate.longest_s = int(random.integers(1, 5)), float(random.uniform(0.5, 4.0))
-    gate.rest_s, gate.behind_s = float(random.uniform(0.3, 3.0)), float(random.uniform(0.2, 2.0))
-    gate.lag_m, gate.period_s = float(random.uniform(0.05, 1.0)), float(random.choice([0.05, 0.1, 0.15]))
+    gate.rest_s, gate.period_s = float(random.uniform(0.3, 3.0)), float(random.choice([0.05, 0.1, 0.15]))
     scenario.intervention.period_s = float(random.choice([0.05, 0.1]))
     scenario.duration_s = max(20.0, 2.5 * (gate.tries * gate.longest_s + gate.rest_s))
     scenario.obstacles["obstacle_2"].known_to_uav = bool(random.integers(2))

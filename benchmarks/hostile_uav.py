@@ -13,16 +13,17 @@ from typing import Any
 import numpy as np
 
 from airground_drake.arrays import Array
-from airground_drake.intervention.database import Desk
-from airground_drake.intervention.messages import ACCEPT, REFUSE, Reports, answer_to
+from airground_drake.geometry.motion import Motion
+from airground_drake.intervention.database import Negotiation
+from airground_drake.intervention.messages import ACCEPT, DONE, REFUSE, Reports, answer_to
 from airground_drake.intervention.planner import Planner, PlannerMemory
 from airground_drake.intervention.policy import Proposal
-from airground_drake.nsbc.motion import Motion
 
 CHOICES: dict[str, tuple[Any, ...]] = {
     "mapped": ("true", "moved", "nothing", "phantoms", "on the robot", "ahead", "huge"),
     "radii": ("true", "none", "half", "large", "enormous", "no length"),
     "motion": ("hold", "stall", "back and forth", "away", "collide", "shadow", "creep"),
+    "party": ("alone", "all"),
     "cause": ("own", "another", "alternating", "nobody", "itself", "the UAV"),
     "lasts_s": (0.3, 2.0, 10.0, 1e4),
     "renew_s": (0.05, 0.1, 0.5, 3.0, 1e4),
@@ -47,6 +48,7 @@ class Tactic:
             is no length at all.
         motion: where the UGV is asked to be: where it is; on its way to the goal, then at rest short of it; to and fro;
             far away; in what is nearest; always where it happens to be; towards its goal, at a crawl.
+        party: whether the proposal stands alone, or is said to be a part of a joint plan of all.
         cause: whose trigger the proposal is said to be for: the UGV's own, without a word or by its name, that of
             another one, by turns, of nobody, or of the UAV.
         lasts_s: duration of the motion.
@@ -60,6 +62,7 @@ class Tactic:
     mapped: str
     radii: str
     motion: str
+    party: str
     cause: str
     lasts_s: float
     renew_s: float
@@ -87,11 +90,9 @@ class LyingPlanner(Planner):
     tactic: Tactic
     random: np.random.Generator
 
-    def watch(self, memory: PlannerMemory, t: float, positions: Array) -> PlannerMemory:
-        """Speak whether anybody is intervened on or not."""
-        spoken = super().watch(memory, t, positions)
-        silent = not any(spoken.proposals)
-        return self._speak(spoken, t, positions, np.zeros(2 * len(self.ugvs))) if silent else spoken
+    def idle(self, memory: PlannerMemory, intervening: Sequence[bool]) -> bool:
+        """Speaks whether anybody is intervened on or not."""
+        return False
 
     def plan(
         self,
@@ -101,31 +102,33 @@ class LyingPlanner(Planner):
         intervening: Sequence[bool],
         answers: Array,
         reports: Reports,
+        standing: Sequence[bool] = (),
     ) -> PlannerMemory:
-        """Speak again."""
+        """Speak, whoever stands or has said what."""
         return self._speak(memory, t, positions, answers)
 
     def _speak(self, memory: PlannerMemory, t: float, positions: Array, answers: Array) -> PlannerMemory:
-        tactic, desks = self.tactic, list(memory.desks)
-        for i, desk in enumerate(desks):
-            before, answer = desk.proposal, answer_to(desk.proposal, answers, i)
+        tactic, talks = self.tactic, list(memory.talks)
+        for i, talk in enumerate(talks):
+            before, answer = talk.proposal, answer_to(talk.proposal, answers, i)
             if before is not None and before.issued == t:
                 continue
-            over = before is not None and (answer == REFUSE or t >= desk.retry_at)
+            over = before is not None and (answer in (REFUSE, DONE) or t >= talk.retry_at)
             if over and tactic.pause_s > 0.0 and not (tactic.forge and answer == ACCEPT):
-                desks[i] = Desk(retry_at=t + tactic.pause_s)
-            elif over or (before is None and t >= desk.retry_at):
+                talks[i] = Negotiation(retry_at=t + tactic.pause_s)
+            elif over or (before is None and t >= talk.retry_at):
                 forged = before if tactic.forge and answer == ACCEPT else None
-                desks[i] = Desk(self._proposal(i, t, forged, positions), retry_at=t + tactic.renew_s)
+                talks[i] = Negotiation(self._proposal(i, t, forged, positions), retry_at=t + tactic.renew_s)
             elif before is not None and tactic.motion == "shadow" and tactic.forge:
-                desks[i] = replace(desk, proposal=self._proposal(i, t, before, positions))
-        return replace(memory, desks=tuple(desks))
+                talks[i] = replace(talk, proposal=self._proposal(i, t, before, positions))
+        return replace(memory, talks=tuple(talks))
 
     def _proposal(self, i: int, t: float, forged: Proposal | None, positions: Array) -> Proposal:
         """What UGV i is told, under the number and the time of another proposal if one is to be forged."""
         motion, mapped = self._motion(i, t, positions), self._map(i, positions)
         number, issued = (-1, t) if forged is None else (forged.number, forged.issued)
         more = {"mapped": mapped, "mapped_radii": self._radii(mapped), "cause": self._cause(i)}
+        more["party"] = self.ugvs if self.tactic.party == "all" else ()
         return Proposal("lying", issued, motion, number=number, **more)
 
     def _cause(self, i: int) -> str:

@@ -20,8 +20,8 @@ import numpy as np
 
 from airground_drake.components import make_map, make_presets
 from airground_drake.intervention.database import make_policy
+from airground_drake.intervention.guest.process import GuestPolicy
 from airground_drake.intervention.policy import Observation, Policy, Teammate, motions_of
-from airground_drake.intervention.process import GuestPolicy
 from airground_drake.scenarios.load import load
 
 
@@ -59,7 +59,7 @@ def compare(here: Policy, name: str, parameters: dict[str, float], proposals: in
     seen = observation()
     started = time.perf_counter()
     there = make_policy(name, parameters, 60.0)
-    child = there._process._process.pid if isinstance(there, GuestPolicy) and there._process else None
+    child = there._process.pid if isinstance(there, GuestPolicy) else None
     print(f"{name}\n  start {1e3 * (time.perf_counter() - started):.0f} ms", end="")
     print(f", first proposal {elapsed(lambda: there.propose(seen))[0]:.2f} ms")
     calls = (

@@ -23,8 +23,8 @@ import yaml
 from maps import Array, Course
 from numpy.typing import NDArray
 
+from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.policy import Observation, Policy, Teammate
-from airground_drake.nsbc.motion import Motion
 from airground_drake.registry import POLICIES
 from airground_drake.scenarios.load import from_data
 from airground_drake.simulation import simulate
@@ -133,7 +133,6 @@ def scenario_of(number: int) -> dict[str, Any]:
     data["gatekeeper"] = {
         "period_s": float(rng.choice([0.05, 0.1])),
         "longest_s": float(rng.choice([2.0, 10.0])),
-        "behind_s": float(rng.choice([0.3, 1.0])),
         "tries": int(rng.integers(1, 6)),
     }
     return data

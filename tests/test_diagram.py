@@ -13,25 +13,26 @@ import airground_drake
 from airground_drake import graphviz
 from airground_drake.components import stack_presets
 from airground_drake.diagram import RECORDED, build_diagram
-from airground_drake.nsbc.motion import Motion
+from airground_drake.geometry.motion import Motion
 from airground_drake.registry import METHODS
 from airground_drake.scenarios.load import load
 
 PACKAGE = Path(airground_drake.__file__).parent
 LAYERS = (
-    ("arrays", "confinement", "errors", "files", "interruption", "parallel", "progress", "usage", "check"),
+    ("arrays", "errors", "files", "interruption", "parallel", "progress", "usage", "check"),
     ("registry", "statuses"),
+    ("geometry",),
     ("nsbc",),
     ("decision", "intervention"),
     ("gatekeeper",),
     ("scenarios",),
     ("systems",),
     ("components", "trace"),
-    ("diagram", "events", "proofs"),
-    ("simulation", "blocks", "graphviz", "verify"),
+    ("diagram", "events", "proofs", "view"),
+    ("simulation", "blocks", "schematic", "graphviz", "verify"),
     ("runs", "testing"),
     ("report", "replay"),
-    ("campaign",),
+    ("campaign", "export"),
     ("commands", "__main__"),
 )
 """From left to right: a module imports from its own layer or from those before it."""
@@ -41,10 +42,10 @@ def test_every_system_and_port_has_a_name() -> None:
     diagram = build_diagram(load("case_a")[0], "d")
     inside = {part.get_name(): [system.get_name() for system in part.GetSystems()] for part in diagram.GetSystems()}
     assert inside == {
-        "decision": ["noise_source", "decision_noise", "decision_variable", "event_trigger"],
-        "uav": ["intervention_planner", "uav_controller"],
-        "ugvs": ["reference", "gatekeeper", "ugv_controller"],
-        "world": [
+        "decision_making": ["noise_source", "decision_noise", "decision_variable", "event_trigger"],
+        "task_planning": ["reference", "intervention_planner", "ugv_controller", "uav_controller"],
+        "optimisation": ["gatekeeper"],
+        "vehicles": [
             "team_command", "velocity_disturbance", "team_velocity", "ugv1_plant", "ugv2_plant", "uav_plant",
             "team_position",
         ],
@@ -90,6 +91,17 @@ def test_an_outdated_picture_is_noticed() -> None:
     pictures = graphviz.pictures()
     assert not graphviz.is_current("case_a.dot", pictures["case_a.dot"], pictures["case_b.dot"])
     assert not graphviz.is_current("case_a.svg", pictures["case_a.svg"], pictures["case_b.svg"])
+
+
+def test_gatekeepers_know_of_interventions_only_what_is_sent() -> None:
+    """Proposals and messages; neither planner nor policies, and those know no gatekeeper."""
+    found = {
+        node.module
+        for path in (PACKAGE / "gatekeeper").rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("airground_drake.intervention")
+    }
+    assert found == {"airground_drake.intervention.messages", "airground_drake.intervention.policy"}
 
 
 def test_data_flows_one_way() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
 import json
 import os
@@ -17,6 +18,7 @@ import numpy as np
 import pytest
 
 from airground_drake.scenarios.load import load
+from airground_drake.simulation import simulate
 
 pytestmark = pytest.mark.slow
 
@@ -81,6 +83,38 @@ def test_a_plant_of_ones_own_needs_more_room() -> None:
         distances.append(own.nearest_to_the_rock(scenario))
     assert distances[0] < own.NEEDED_M <= distances[1]
     assert distances == pytest.approx([1.867, 2.117], abs=2e-3)
+
+
+def test_a_supervisor_of_priorities_gets_where_a_fixed_order_does_not() -> None:
+    """As its README says; whatever the supervisor, the distance is kept."""
+    own = imported("priorities/priorities")
+    corner, wall = own.SCENES.values()
+    found = {name: (own.run(corner, decide), own.run(wall, decide)) for name, decide in own.supervisors().items()}
+    assert {name: [each.arrived_s for each in both] for name, both in found.items()} == {
+        "fixed order": [None, None],
+        "rule": [pytest.approx(18.15), pytest.approx(20.7)],
+        "table": [pytest.approx(18.05), None],
+    }
+    rng = np.random.default_rng(5)
+    taught_badly = own.run(corner, lambda _: int(rng.integers(3)))
+    every = [taught_badly, *(each for both in found.values() for each in both)]
+    assert min(each.nearest_m for each in every) > 2.0 - 1e-9
+    table = np.array(json.loads(own.TABLE.read_text()))
+    assert table.shape == own.train(episodes=1).shape
+
+
+def test_a_learned_policy_is_trained_and_proposes_ways(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A few generations improve on the first; the weights that are there are better than those."""
+    monkeypatch.syspath_prepend(EXAMPLES)
+    learned = importlib.import_module("learned_policy")
+    _, history = learned.train(generations=12)
+    assert min(history) < 0.8 * history[0]
+    kept = np.array(json.loads(learned.WEIGHTS.read_text()))
+    assert learned.price(kept, *learned.situations(np.random.default_rng(7), 500, 2.0), 2.0) < 0.8 * min(history)
+    scenario = load("minimal", {"intervention.policies": [{"name": "learned_policy:Learned",
+                                                           "parameters": {"speed_m_s": 3.0}}]})[0]  # fmt: skip
+    trace = simulate(scenario, "d")
+    assert [event["t_s"] for event in trace.events if event["kind"] == "arrival" and event["robot"] == "ugv1"]
 
 
 @pytest.mark.parametrize("kind", ["CrossEntropy", "MultiArmedBandit"])

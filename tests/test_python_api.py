@@ -155,7 +155,7 @@ def test_a_simulator_initialised_again_begins_anew_before_its_first_step_and_goe
     simulator = Simulator(diagram)
     context = simulator.get_mutable_context()
     context.SetAccuracy(1e-6)
-    plant = diagram.GetSubsystemByName("world").GetSubsystemByName("ugv1_plant")
+    plant = diagram.GetSubsystemByName("vehicles").GetSubsystemByName("ugv1_plant")
     home = plant.GetMyContextFromRoot(context).get_continuous_state_vector().CopyToVector()
 
     def put(away_m: float) -> None:
@@ -189,7 +189,7 @@ def test_a_simulator_initialised_again_begins_anew_before_its_first_step_and_goe
 )
 def test_what_is_not_asked_for_is_of_the_last_run(case_a: Scenario, asked: Any, built: tuple[str, str]) -> None:
     diagram = build_diagram(case_a, **asked)
-    controller = diagram.GetSubsystemByName("ugvs").GetSubsystemByName("ugv_controller")
+    controller = diagram.GetSubsystemByName("task_planning").GetSubsystemByName("ugv_controller")
     assert (diagram.get_name(), controller.avoidance.composition) == built
 
 
@@ -264,3 +264,14 @@ def test_a_table_that_changed_is_judged_anew(case_a: Scenario) -> None:
     assert verify(trace, claims=["SAFE-TRACE"])[0].finding.status == "holds"
     trace.signals["ugv1.x_m"] += 0.1 * trace.signals["t_s"]  # a robot that does not do what it was told
     assert verify(trace, claims=["SAFE-TRACE"])[0].finding.status == "error"
+
+
+def test_a_trace_as_a_table_and_in_a_notebook() -> None:
+    scenario, _ = load("case_a", {"duration_s": 15.0})
+    trace = simulate(scenario, "b")
+    table = trace.to_pandas()
+    assert table.index.name == "t_s"
+    assert table["ugv1"]["x_m"].tolist() == trace.position("ugv1")[:, 0].tolist()
+    assert set(table.columns.get_level_values("robot")) == set(trace.robots)
+    assert repr(trace) == f"<Trace: run 'b' of 'case_a', {len(trace.t)} rows, {len(trace.events)} events>"
+    assert "<td>trigger</td>" in trace._repr_html_()

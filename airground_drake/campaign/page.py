@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -14,12 +15,22 @@ from matplotlib.figure import Figure
 from airground_drake.arrays import Array
 from airground_drake.campaign.rows import JUDGED
 from airground_drake.report.figures import canvas, svg
-from airground_drake.report.html import number
+from airground_drake.report.html import LOOKS, NAMES, number
+from airground_drake.report.summary import MARKS, Line
 from airground_drake.report.templating import environment_of
 
 BARS = 40
+MOST_TOLD = 8
+"""Sentences about claims on the first screen; the others are folded."""
 SHOWN = ("SAFE-TRACE", "SAFE-HYP", "LIVE-GOAL")
 """Claims whose margins are drawn."""
+
+
+class Drawing(NamedTuple):
+    """A figure and what it shows."""
+
+    title: str
+    svg: Markup
 
 
 def page(found: dict[str, Any], table: pd.DataFrame) -> str:
@@ -29,14 +40,77 @@ def page(found: dict[str, Any], table: pd.DataFrame) -> str:
         found: of `evidence.evidence`, with name, title, spec and stopped (the last draw that counts, or None).
         table: the rows that it is of.
     """
-    return _environment().get_template("campaign.html.j2").render(found=found, figures=_figures(found, table))
+    return (
+        _environment()
+        .get_template("campaign.html.j2")
+        .render(found=found, told=told(found), separated=_separated(found), figures=_figures(found, table))
+    )
 
 
-class Drawing(NamedTuple):
-    """A figure and what it shows."""
+def told(found: Mapping[str, Any]) -> list[Line]:
+    """What was found of each claim, with its bound; violations first, then what is open."""
+    lines = []
+    for claim in found["claims"]:
+        what = f"{claim['claim']} in run {claim['run']}"
+        bounds, confidence = claim["anytime"], f"confidence {found.get('confidence', 0.0):g}"
+        if claim["untested"]:
+            lines.append(Line("open", f"{what}: the scenario expects a test, but no run tested it."))
+        elif claim["refuted"]:
+            bound = f"; probability {number(bounds[0], 2)} to {number(bounds[1], 2)} ({confidence})" if bounds else ""
+            admitted = "" if claim["differs"] else ", which the scenario admits"
+            lines.append(
+                Line("no", f"{what}: refuted in {claim['refuted']} of {claim['tested']} runs{admitted}{bound}.")
+            )
+        elif claim["undecided"]:
+            lines.append(Line("open", f"{what}: undecided in {claim['undecided']} runs."))
+        elif claim["tested"]:
+            bound = f"; probability of a violation at most {number(bounds[1], 2)} ({confidence})" if bounds else ""
+            lines.append(Line("yes", f"{what}: never refuted in {claim['tested']} runs{bound}."))
+        else:
+            lines.append(Line("none", f"{what}: not tested."))
+    return sorted(lines, key=lambda line: ("no", "open", "yes", "none").index(line.mark))
 
-    title: str
-    svg: Markup
+
+class Separation(NamedTuple):
+    """What separates failures from passes: in words, and drawn."""
+
+    words: str
+    drawing: Drawing
+
+
+def _separated(found: Mapping[str, Any]) -> list[Separation]:
+    """One for each claim whose violations depend on what was drawn."""
+    separations = list[Separation]()
+    for claim in found["claims"]:
+        if where := claim["fails_where"]:
+            cells = sorted(where["cells"], key=lambda cell: cell["refuted"] / cell["runs"])
+            most, least = (f"in {c['refuted']} of {c['runs']} runs with {_cell(c)}" for c in (cells[-1], cells[0]))
+            words = f"{claim['claim']} in run {claim['run']} fails {most}, and {least}."
+            title = f"Share of runs in which {claim['claim']} is refuted, run {claim['run']}"
+            text = svg.inline(_shares(cells), f"separated{len(separations)}", title, words)
+            separations.append(Separation(words, Drawing(title, Markup(text))))
+    return separations
+
+
+def _cell(cell: Mapping[str, Any]) -> str:
+    return ", ".join(f"{key} {value}" for key, value in cell["where"].items())
+
+
+def _shares(cells: Sequence[Mapping[str, Any]]) -> str:
+    """A bar for each combination of values, the share of runs that fail, with the counts beside it."""
+    with canvas.style():
+        height_in = 0.6 + 0.22 * len(cells)
+        figure = Figure(figsize=(canvas.FULL_IN, height_in))
+        axes = figure.add_axes((0.5, 0.45 / height_in, 0.4, (height_in - 0.5) / height_in))
+        axes.set_xlim(0.0, 1.0)
+        axes.set_ylim(-0.6, len(cells) - 0.4)
+        for k, cell in enumerate(cells):
+            share = cell["refuted"] / cell["runs"]
+            axes.barh(k, share, color=canvas.ALARM, height=0.6)
+            axes.text(-0.01, k, canvas.short(_cell(cell), 70), ha="right", va="center", fontsize=8.5)
+            axes.text(share + 0.01, k, f"{cell['refuted']} of {cell['runs']}", va="center", fontsize=8.5)
+        canvas.rule(axes, "share of runs refuted", "")
+        return canvas.svg(figure)
 
 
 def _figures(found: dict[str, Any], table: pd.DataFrame) -> list[Drawing]:
@@ -91,4 +165,5 @@ def _histogram(values: Array, title: str, label: str, mark: float | None) -> tup
 def _environment() -> Environment:
     environment = environment_of("airground_drake.campaign", "airground_drake.report")
     environment.filters["num"] = number
+    environment.globals.update(marks=MARKS, kinds=LOOKS, names=NAMES, most_told=MOST_TOLD)
     return environment

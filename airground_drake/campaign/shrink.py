@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from airground_drake.nsbc.motion import Motion
+from airground_drake.geometry.motion import Motion
 from airground_drake.trace import Trace
 
 DIGITS = (0, 1, 2, 3)

@@ -16,7 +16,7 @@ import numpy as np
 from airground_drake.campaign.rows import DIED, INVALID, JUDGED, STOPPED, Row, blank
 from airground_drake.campaign.spec import Spec
 from airground_drake.errors import AirgroundError, ScenarioError, described, one_line
-from airground_drake.intervention.guard import time_limit
+from airground_drake.intervention.guest.time_limit import time_limit
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.estimate import Limits, within
 from airground_drake.scenarios.schema import Scenario

@@ -23,7 +23,7 @@ OF_PROBLEMS = (
 """Columns of decisions that method (c) fills: it solves problem (26)."""
 OF_OUTCOMES = (
     "refuse_outcome_m2_s", "accept_outcome_m2_s", "refuse_stalls", "accept_stalls", "refuse_left_m", "accept_left_m",
-    "lag_m", "predicted_lag_m", "tries",
+    "tries",
 )  # fmt: skip
 """Columns of decisions that method (d) fills: it compares outcomes."""
 

@@ -15,10 +15,10 @@ import pandas as pd
 from .files import Json, canonical, parse_json, parse_table, read_bytes, sha256
 from .nearness import least_apart_m
 from .rules import SMALL, Array, Flags, NotEstablished, at_most, close, holds, same
-from .scenario import Levels, Pair, Preset, levels_of, pairs_of, preset_of, robots_of
+from .scenario import Levels, Pair, Preset, as_run, levels_of, pairs_of, preset_of, robots_of
 
 Rows = npt.NDArray[np.intp]
-SCHEMA = "airground_drake.trace/6"
+SCHEMA = "airground_drake.trace/7"
 TABLES = ("signals.parquet", "decisions.parquet", "problems.parquet", "proposals.parquet")
 SHARED = ("method", "composition", "seed", "zeta_m", "events", "faults")
 """What meta.json and the run's entry in report.json both say."""
@@ -188,7 +188,7 @@ def _run(name: str, scenario_text: str, entry_text: str, contents: tuple[bytes, 
         same("SHA-256 of a table", meta["files"][file], sha256(content), about=file)
         tables.append(parse_table(content, file))
     _is_of_the_run(meta, entry, scenario, name)
-    run = Run(name, scenario, meta["events"], timings["decision_times_s"], timings["wall_s"], *tables)
+    run = Run(name, as_run(scenario, name), meta["events"], timings["decision_times_s"], timings["wall_s"], *tables)
     same("a time for each decision", len(run.decision_times_s), len(run.decisions))
     at_most("times of decisions are not negative", -np.array([*run.decision_times_s, run.wall_s]), 0.0)
     _rows_cover_the_run(run)
@@ -212,7 +212,7 @@ def _is_of_the_run(meta: Json, entry: Json, scenario: Json, name: str) -> None:
     same("seed of the run", meta["seed"], scenario["seed"])
     same("UGVs of the run", meta["ugvs"], list(scenario["ugvs"]))
     same("robots of the run", meta["robots"], list(robots_of(scenario)))
-    close("threshold in force", meta["zeta_m"], levels_of(scenario).zeta_m, within=SMALL)
+    close("threshold in force", meta["zeta_m"], levels_of(as_run(scenario, name)).zeta_m, within=SMALL)
     for key in SHARED:
         same(f"{key} in report.json", entry[key], meta[key])
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
 from itertools import combinations
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -64,6 +65,18 @@ class Preset:
         """At times (K,): (K, 3)."""
         travelled = self.speed_m_s * np.asarray(t_s)
         return np.stack([np.interp(travelled, self.length_m, axis) for axis in self.corners_m.T], axis=-1)
+
+
+def as_run(scenario: Json, name: str) -> Json:
+    """The scenario with the values that a run sets for itself, by dotted key."""
+    changed: Json = json.loads(json.dumps(scenario))
+    for key, value in scenario["runs"][name]["set"].items():
+        *above, last = key.split(".")
+        place: Any = changed
+        for part in above:
+            place = place[int(part) if isinstance(place, list) else part]
+        place[last] = value
+    return changed
 
 
 def robots_of(scenario: Json) -> dict[str, Json]:

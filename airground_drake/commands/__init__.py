@@ -30,6 +30,7 @@ GONE = {"proofs": "airground prove"}
 
 COMMANDS: dict[str, Command] = {
     "report": Command("airground_drake.report.__main__", "simulate a scenario, check its claims, write the report"),
+    "run": Command("airground_drake.commands.run", "simulate one run and print its events, or watch it in Meshcat"),
     "verify": Command("airground_drake.verify.__main__", "judge claims anew, on a saved run or about a model"),
     "check": Command("airground_drake.commands.check", "check a report from its files alone"),
     "judge": Command("airground_drake.commands.judge", "judge sampled positions that come from elsewhere"),
@@ -39,6 +40,8 @@ COMMANDS: dict[str, Command] = {
     "campaign": Command("airground_drake.commands.campaign", "judge many draws of a scenario"),
     "falsify": Command("airground_drake.commands.falsify", "search for a scenario that violates a claim"),
     "replay": Command("airground_drake.commands.replay", "show the runs of a report: a page each, or a video"),
+    "export": Command("airground_drake.commands.export", "write the runs of a report as CSV or MCAP files"),
+    "figures": Command("airground_drake.commands.figures", "write the figures of a report as PDF, with LaTeX tables"),
     "diagram": Command("airground_drake.commands.diagram", "draw the diagram of a scenario"),
     "list": Command("airground_drake.commands.listing", "list scenarios, methods, policies, routes, tasks and claims"),
     "init": Command("airground_drake.commands.init", "write a small scenario to start from"),

@@ -103,6 +103,12 @@ def _page(
     from airground_drake.report import pages
     from airground_drake.report.figures import overlay
 
+    worse = [
+        _line(change).removeprefix("worse: ")
+        for part in (*PARTS[1:], PARTS[0])
+        for change in found[part]
+        if change["worse"]
+    ]
     figures, problems = [], []
     for position, run in enumerate(name for name in after["runs"] if name in before["runs"] and name.isidentifier()):
         try:
@@ -113,5 +119,5 @@ def _page(
             figures.append(overlay.draw(run, position, one, two))
     return pages.render(
         "compare.html.j2", before=before, after=after, found=found, figures=figures, problems=problems, parts=PARTS,
-        places=[str(folder) for folder in folders], most=MOST_ROWS,
+        places=[str(folder) for folder in folders], most=MOST_ROWS, regressions=worse,
     )  # fmt: skip

@@ -10,7 +10,7 @@ from airground_drake import files
 from airground_drake.errors import AirgroundError, UnknownNameError
 from airground_drake.registry import METHODS
 from airground_drake.scenarios import plugins
-from airground_drake.usage import Parser, overridable, refuse, whole
+from airground_drake.usage import Parser, overridable, refuse
 
 FORMATS = ("dot", "svg", "pdf", "png")
 
@@ -20,8 +20,7 @@ def parser() -> argparse.ArgumentParser:
     parser = Parser(prog="airground diagram", description="Draw the diagram of a scenario.")
     parser.add_argument("scenario", help="name of a shipped scenario, or path to a YAML file")
     parser.add_argument("--method", choices=tuple(METHODS), help="default: the most complete of its runs")
-    parser.add_argument("--part", metavar="NAME", help="only the diagram inside it of that name")
-    parser.add_argument("--depth", type=whole(1), default=1, metavar="N", help="levels of the first graph (default: 1)")
+    parser.add_argument("--part", metavar="NAME", help="only the layer of that name, with all ports")
     parser.add_argument("--format", action="append", choices=FORMATS, help="may be repeated (default: dot and svg)")
     parser.add_argument("-o", "--output", type=Path, default=Path(), metavar="DIR", help="default: this folder")
     overridable(parser)
@@ -50,7 +49,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             if options.part not in parts:
                 raise UnknownNameError("part", options.part, parts)
             diagram, name = diagram.GetSubsystemByName(options.part), f"{name}_{options.part}"
-        text = graphviz.dot(diagram, options.depth)
+        text = graphviz.dot(diagram)
         files.make_folder(options.output, "the pictures")
         for kind in options.format or ("dot", "svg"):
             path = options.output / f"{name}.{kind}"

@@ -10,7 +10,7 @@ from urllib.parse import quote
 
 from airground_drake import files
 from airground_drake.errors import AirgroundError, FolderError, ReportError, TraceError
-from airground_drake.report import compare, folder
+from airground_drake.report import compare, folder, summary
 from airground_drake.usage import Parser, refuse
 
 PAGE = "index.html"
@@ -81,7 +81,18 @@ def _entry(report: Path, place: Path, prefix: str) -> dict[str, Any]:
     where = report.relative_to(place).as_posix()
     link = quote(leads_to.relative_to(place).as_posix())
     kept = {part: document[part] for part in ("scenario", "overall", "provenance")}
-    return {**kept, "place": where, "link": link, "thumbnail": _thumbnail(report, document, prefix)}
+    return {
+        **kept, "place": where, "link": link, "headline": _headline(document),
+        "thumbnail": _thumbnail(report, document, prefix),
+    }  # fmt: skip
+
+
+def _headline(document: Mapping[str, Any]) -> summary.Line | None:
+    """The report in a sentence; None if it lacks something that only the first screen reads."""
+    try:
+        return summary.headline(document)
+    except (LookupError, TypeError, ValueError, AttributeError):
+        return None
 
 
 def _thumbnail(report: Path, document: Mapping[str, Any], prefix: str) -> str:

@@ -54,19 +54,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from airground_drake.replay.page import page
 
     try:
-        runs = _runs(options.folder)
+        runs = runs_of(options.folder)
         if options.run not in (None, *runs):
             raise UnknownNameError("run", options.run, runs)
         chosen = [options.run] if options.run else runs
         if options.live:
             live.serve(chosen, lambda name: page(_scene(options.folder, name)))
         elif options.video:
-            _take(options.video.parent, "the video")
+            outside_reports(options.video.parent, "the video")
             video.write(_scene(options.folder, options.run), options.video, options.speed or SPEED)
             print(options.video)
         else:
             for name, path in _paths(options.output or Path(), chosen).items():
-                _take(path.parent, "the pages")
+                outside_reports(path.parent, "the pages")
                 mark = _mark(options.folder, name)
                 if path.exists() and not _has(path, mark):
                     raise FolderError(one_line(f"{path} is not a replay of this run of {options.folder}; {ELSEWHERE}"))
@@ -114,7 +114,7 @@ def _speed(text: str) -> float:
     return speed
 
 
-def _runs(folder: Path) -> list[str]:
+def runs_of(folder: Path) -> list[str]:
     """Names of the runs of a report that have left a trace.
 
     Raises:
@@ -128,7 +128,7 @@ def _runs(folder: Path) -> list[str]:
     return found
 
 
-def _take(folder: Path, what: str) -> None:
+def outside_reports(folder: Path, what: str) -> None:
     """Create a folder for `what`. Reports are left as they are: the checker refuses files that are not theirs.
 
     Raises:
@@ -146,4 +146,4 @@ def _scene(folder: Path, run: str) -> Scene:
     from airground_drake.scenarios.load import from_data
 
     saved = trace.load(folder / "trace" / run)
-    return scene(saved, from_data(saved.scenario, str(folder / "trace" / run)))
+    return scene(saved, from_data(saved.meta["scenario"], str(folder / "trace" / run)))

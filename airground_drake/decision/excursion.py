@@ -51,8 +51,44 @@ def extremes(before: Array, after: Array, ends: Array) -> Array:
 
 
 @njit(cache=True)
+def norm(x: float, y: float, z: float) -> float:
+    """Length of a vector, rounded as by `math.hypot`: squares in twice the precision, one correction of the root."""
+    largest = max(abs(x), abs(y), abs(z))
+    if not 0.0 < largest < np.inf:
+        return largest
+    square, low = 0.0, 0.0
+    for each in (x, y, z):
+        high, rest = _squared(each)
+        both = square + high
+        part = both - square
+        low += rest + ((square - (both - part)) + (high - part))
+        square = both
+    root = np.sqrt(square + low)
+    high, rest = _squared(root)
+    return float(root + (((square - high) - rest) + low) / (2.0 * root))
+
+
+@njit(cache=True)
+def _squared(number: float) -> tuple[float, float]:
+    """A square as the sum of two numbers, exactly (Veltkamp and Dekker)."""
+    square, split = number * number, 134217729.0 * number
+    high = split - (split - number)
+    low = number - high
+    return square, ((high * high - square) + 2.0 * high * low) + low * low
+
+
+@njit(cache=True)
+def variables(parts: Array) -> Array:
+    """x of (15), (n,), m, of task errors and noise, (n, 4), m."""
+    x = np.empty(len(parts))
+    for j in range(len(parts)):
+        x[j] = norm(parts[j, 0], parts[j, 1], parts[j, 2]) + parts[j, 3]
+    return x
+
+
+@njit(cache=True)
 def gathered(t: float, position: Array, reference: Array, noise: Array) -> Array:
-    """Time, s, then task error, m, and noise, m, of each of n UGVs: (1 + 4n,).
+    """Time, s, then task error, m, noise, m, and x of (15), m, of each of n UGVs: (1 + 5n,).
 
     Args:
         t: time, s.
@@ -60,19 +96,27 @@ def gathered(t: float, position: Array, reference: Array, noise: Array) -> Array
         reference: the same of their preset trajectories.
         noise: (n,), m.
     """
-    signals = np.empty(1 + 4 * len(noise))
+    signals = np.empty(1 + 5 * len(noise))
     signals[0] = t
     for j in range(len(noise)):
         for a in range(3):
-            signals[1 + 4 * j + a] = reference[3 * j + a] - position[3 * j + a]
-        signals[4 + 4 * j] = noise[j]
+            signals[1 + 5 * j + a] = reference[3 * j + a] - position[3 * j + a]
+        signals[4 + 5 * j] = noise[j]
+        signals[5 + 5 * j] = norm(signals[1 + 5 * j], signals[2 + 5 * j], signals[3 + 5 * j]) + noise[j]
     return signals
 
 
 @njit(cache=True)
-def transitions_due(
-    status: Array, t: float, least: Array, most: Array, levels: tuple[float, float, float]
-) -> npt.NDArray[np.bool_]:
+def spans(begun: Array, now: Array) -> Array:
+    """Least and largest x of (15) over a step, (2, n), m, of its signals as `gathered` gives them at both ends."""
+    before, after = begun[1:].reshape(-1, 5), now[1:].reshape(-1, 5)
+    ends = np.empty((2, len(before)))
+    ends[0], ends[1] = before[:, 4], after[:, 4]
+    return extremes(before[:, :4], after[:, :4], ends)
+
+
+@njit(cache=True)
+def transitions_due(status: Array, t: float, least: Array, most: Array, levels: Array) -> npt.NDArray[np.bool_]:
     """For which UGVs a transition of the trigger is due, (n,).
 
     Args:
@@ -80,9 +124,9 @@ def transitions_due(
         t: time, s.
         least: smallest x in this step, (n,), m.
         most: largest, (n,), m.
-        levels: zeta, m, release, m, and dwell, s, of the trigger.
+        levels: zeta, m, release, m, and dwell, s, of the trigger, (3,).
     """
-    zeta, release, dwell = levels
+    zeta, release, dwell = levels[0], levels[1], levels[2]
     due = np.zeros(len(least), dtype=np.bool_)
     for j in range(len(least)):
         mode, triggers, triggered_at = status[4 * j], status[4 * j + 1], status[4 * j + 2]
@@ -96,7 +140,7 @@ def transitions_due(
 
 
 @njit(cache=True)
-def anything_due(status: Array, t: float, spans: Array, levels: tuple[float, float, float]) -> bool:
+def anything_due(status: Array, t: float, spans: Array, levels: Array) -> bool:
     """Whether a transition is due for any UGV, see `transitions_due`; `spans`: least x, then largest x, (2n,), m."""
     n = len(spans) // 2
     return bool(transitions_due(status, t, spans[:n], spans[n:], levels).any())

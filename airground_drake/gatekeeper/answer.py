@@ -56,7 +56,7 @@ class Rules:
 Reason = Literal[
     "cheaper", "not_cheaper", "waits", "no_difference", "kept", "dwell", "reversed", "no_plan",
     "first_stage",
-    "stalls", "makes_way", "exhausted", "no_progress", "over",
+    "stalls", "makes_way", "exhausted", "over",
 ]  # fmt: skip
 """Why an answer is what it is: see `settle` for method (c), `outcome_gatekeeper` for method (d)."""
 
@@ -73,7 +73,6 @@ WORDS: dict[Reason, str] = {
     "stalls": "with the proposal the UGV would come to rest short of its goal, no nearer than without",
     "makes_way": "the UGV makes way for the one whose trigger the proposal is for, and gets to its goal all the same",
     "exhausted": "the UGV has gone along as often as it does without a rest on its own",
-    "no_progress": "the UGV is farther behind the proposed motion than predicted, for too long",
     "over": "the time for which the proposal was accepted is over",
 }
 """The same as sentences."""
@@ -101,15 +100,11 @@ class Foreseen:
     Attributes:
         refuse: what comes of refusing; None unless it was looked at.
         accept: what comes of accepting; None unless it was looked at.
-        lag: distance from where the UGV is to be, m; -1 unless it executes the proposal.
-        predicted_lag: the same as predicted at the acceptance, m.
         tries: acceptances since the last rest, with this decision.
     """
 
     refuse: Outcome | None = None
     accept: Outcome | None = None
-    lag: float = -1.0
-    predicted_lag: float = -1.0
     tries: int = 0
 
 
@@ -143,8 +138,6 @@ def in_words(decision: Decision) -> str:
     if decision.reason == "stalls" and isinstance(grounds, Foreseen) and grounds.accept is not None:
         x, y, _ = grounds.accept.end
         words += f": at ({x:.2f}, {y:.2f}) m, {grounds.accept.left:.2f} m short"
-    if decision.reason == "no_progress" and isinstance(grounds, Foreseen):
-        words += f": {grounds.lag:.2f} m behind, predicted {grounds.predicted_lag:.2f} m"
     return words
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -19,14 +20,16 @@ class Budget:
 
     Attributes:
         iterations: of each call of the solver of a relaxation.
-        search_s: time that a search by branch and bound may take, s. It is generous, so that no result depends on it
-            but for problems that are far beyond real time; decisions that meet it are counted in the report.
+        search_iterations: of a search by branch and bound; what a longer one finds is not used. A solver that can only
+            be stopped by the clock is not stopped here: so the same searches count on every machine.
+        search_s: time after which a search is stopped, s: several times what `search_iterations` take.
         deadline_s: time on `clock` at which the solution must stand, s; inf: counted work only.
         clock: what `deadline_s` refers to.
     """
 
     iterations: int = 100
-    search_s: float = 1.0
+    search_iterations: int = 20_000
+    search_s: float = 10.0
     deadline_s: float = math.inf
     clock: Clock = field(default=time.monotonic, compare=False)
 
@@ -36,8 +39,8 @@ class Budget:
         Raises:
             ValueError: if there is no iteration, no time to search, or the deadline is not a number.
         """
-        if self.iterations < 1 or not self.search_s > 0.0 or math.isnan(self.deadline_s):
-            raise ValueError(f"a budget needs iterations >= 1, search_s > 0 and a deadline, got {self}")
+        if min(self.iterations, self.search_iterations) < 1 or not self.search_s > 0.0 or math.isnan(self.deadline_s):
+            raise ValueError(f"a budget needs iterations of 1 or more, search_s > 0 and a deadline, got {self}")
 
     def spent(self) -> bool:
         """Whether the deadline has passed; counted work alone never makes it so."""
@@ -48,5 +51,5 @@ class Budget:
         return math.inf if self.deadline_s == math.inf else max(0.0, self.deadline_s - self.clock())
 
 
-UNLIMITED = Budget(iterations=10_000, search_s=math.inf)
+UNLIMITED = Budget(iterations=10_000, search_iterations=sys.maxsize, search_s=math.inf)
 """Bounded only in principle: for oracles, benchmarks and tests."""

@@ -32,10 +32,12 @@ class Found:
     Attributes:
         omega: values of the accept variables, (B,); None without a solution.
         ended: 'optimal' only with a proof.
+        iterations: of the active-set method over all nodes; 0 if the solver does not say.
     """
 
     omega: Array | None
     ended: Literal["optimal", "budget_spent", "solver_failed"]
+    iterations: int = 0
 
 
 def minimise(
@@ -86,12 +88,12 @@ def minimise(
     if is_soft.any():
         reciprocal = np.concatenate([np.ones(count), largest / weights[stage]])
         solver.soft_weights(rho_l=reciprocal, rho_u=reciprocal)
-    x, _, flag, _ = solver.solve()
+    x, _, flag, info = solver.solve()
     if flag not in _OPTIMAL:
         return Found(None, "budget_spent" if flag in _TIME else "solver_failed")
     omega[live] = np.clip(x[:count] / scale, 0.0, 1.0)
     omega = _with_idle(omega, live)
-    return Found(omega if relaxed else np.round(omega), "optimal")
+    return Found(omega if relaxed else np.round(omega), "optimal", int(info["iterations"]))
 
 
 def _with_idle(omega: Array, live: npt.NDArray[np.intp]) -> Array:

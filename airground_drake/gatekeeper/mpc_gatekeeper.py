@@ -14,32 +14,17 @@ import numpy.typing as npt
 from airground_drake.arrays import Array
 from airground_drake.gatekeeper.answer import Decision, Planned, Rules, costs_throughout, in_words, settle
 from airground_drake.gatekeeper.budget import Budget
-from airground_drake.gatekeeper.history import History
-from airground_drake.gatekeeper.patience import Turn
-from airground_drake.gatekeeper.prediction import Horizon, Scene, predicted_problem
+from airground_drake.gatekeeper.patience import Commitment
+from airground_drake.gatekeeper.problem import Horizon, predicted_problem
+from airground_drake.gatekeeper.rollout import Scene
 from airground_drake.gatekeeper.routes.route import Route
 from airground_drake.gatekeeper.solution import after_failure
+from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT, Disc, Proposals, Report, Reports, answer_to
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.kernels import distances
 from airground_drake.nsbc.law import UgvLaw
-from airground_drake.nsbc.motion import Motion
 from airground_drake.nsbc.team import Team
-
-
-@dataclass(frozen=True, eq=False)
-class Commitment:
-    """What a UGV watches while it executes a proposal.
-
-    Attributes:
-        lags: predicted distances from where it is to be, at the control samples since they were predicted, (S + 1,), m.
-        on_time: when it was last no farther behind than it may be, s.
-        begun: when the lags were predicted: at the acceptance or when it was reconsidered, s.
-    """
-
-    lags: Array
-    on_time: float
-    begun: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,27 +35,23 @@ class Memory:
         answers: in force, (2n,), see `messages`.
         since: when each UGV's answer became what it is, (n,), s.
         reports: what came with them.
-        decisions: every one so far.
-        turns: under method (d), each UGV's patience.
-        commitments: under method (d), what each UGV watches while it executes a proposal.
+        decisions: those of the last sample at which anything was to be judged or remembered.
+        commitments: under method (d), what each UGV has committed itself to.
         sensed: under method (d), which obstacles each UGV has sensed so far, (n, m).
     """
 
     answers: tuple[float, ...]
     since: tuple[float, ...]
     reports: Reports
-    decisions: History[Decision] = field(default_factory=History)
-    turns: tuple[Turn, ...] = ()
-    commitments: tuple[Commitment | None, ...] = ()
+    decisions: tuple[Decision, ...] = ()
+    commitments: tuple[Commitment, ...] = ()
     sensed: npt.NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 0), dtype=bool))
 
     @classmethod
     def empty(cls, count: int) -> Memory:
         """Of `count` UGVs that have answered nothing yet."""
-        return cls(
-            (SILENT, -1.0) * count, (0.0,) * count, (Report(),) * count,
-            turns=(Turn(),) * count, commitments=(None,) * count,
-        )  # fmt: skip
+        held = (Commitment(),) * count
+        return cls((SILENT, -1.0) * count, (0.0,) * count, (Report(),) * count, commitments=held)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
         """Immutable: the copy is the object itself."""
@@ -95,7 +76,7 @@ class Judging:
 
 
 @dataclass(frozen=True, eq=False)
-class Situation:
+class View:
     """What all UGVs see at a sample.
 
     Attributes:
@@ -158,7 +139,7 @@ class Gatekeepers(abc.ABC):
         discs: tuple[Disc, ...] = tuple((x, y, z, radius) for x, y, z, radius in self._discs[near].tolist())
         return Report(discs, decision.reason, in_words(decision))
 
-    def _scene(self, seen: Situation, i: int) -> Scene:
+    def _scene(self, seen: View, i: int) -> Scene:
         """What a UGV has around it: all obstacles and robots, whether within sensing range or not."""
         around = self._neighbourhood
         return Scene(
@@ -183,7 +164,7 @@ class PaperGatekeepers(Gatekeepers):
 
     def sample(self, t: float, proposals: Proposals, positions: Array, velocities: Array, memory: Memory) -> Memory:
         """Judge every proposal in force by (26)."""
-        seen = Situation(t, proposals, positions, velocities, memory)
+        seen = View(t, proposals, positions, velocities, memory)
         answers: list[float] = []
         since: list[float] = []
         reports: list[Report] = []
@@ -203,10 +184,10 @@ class PaperGatekeepers(Gatekeepers):
             reports.append(self._report(positions[i], decision))
         return replace(
             memory, answers=tuple(answers), since=tuple(since), reports=tuple(reports),
-            decisions=memory.decisions.extended(decisions),
+            decisions=tuple(decisions),
         )  # fmt: skip
 
-    def _decide(self, seen: Situation, i: int, proposal: Proposal, budgets: Iterator[Budget]) -> Decision:
+    def _decide(self, seen: View, i: int, proposal: Proposal, budgets: Iterator[Budget]) -> Decision:
         started = thread_time()
         problem = predicted_problem(self._scene(seen, i), self._law, proposal, self._judging.horizon)
         problem = replace(problem, previous=self._rest_of_plan(seen, i, proposal))
@@ -219,12 +200,12 @@ class PaperGatekeepers(Gatekeepers):
         accepted, reason = settle(solution, throughout, standing, stood, self._judging.rules)
         return Decision(seen.t, i, proposal, accepted, reason, Planned(problem, solution, throughout))
 
-    def _rest_of_plan(self, seen: Situation, i: int, proposal: Proposal) -> Array | None:
+    def _rest_of_plan(self, seen: View, i: int, proposal: Proposal) -> Array | None:
         """What the plan that was decided on at the sample before says from now on, (N,); None if there was none.
 
         It ends earlier by a sampling period; its last choice stands for the rest.
         """
-        for decision in reversed(seen.before.decisions[-len(self._team.ugvs) :]):
+        for decision in reversed(seen.before.decisions):
             grounds = decision.grounds
             if decision.robot == i and decision.proposal is proposal and isinstance(grounds, Planned):
                 plan = grounds.solution.plan

@@ -22,12 +22,19 @@ import numpy as np
 from numba import njit
 
 from airground_drake.arrays import Array
-from airground_drake.gatekeeper.closed_loop import ACCEPTED, REFUSED, ClosedLoop, velocity_of, workspace
-from airground_drake.gatekeeper.prediction import Scene, loop_among
-from airground_drake.intervention.paths import NoPath, shortest_path
+from airground_drake.gatekeeper.rollout import (
+    ACCEPTED,
+    REFUSED,
+    ClosedLoop,
+    Scene,
+    loop_among,
+    velocity_of,
+    workspace,
+)
+from airground_drake.geometry.motion import Motion
+from airground_drake.geometry.paths import NoPath, shortest_path
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.law import UgvLaw
-from airground_drake.nsbc.motion import Motion
 
 USELESS = 1e-6
 """Relative gain below which an intervention makes no difference."""
@@ -211,7 +218,7 @@ def _rolled_out(
     It ends when nothing moves any more: after `settled` periods, at the goal or at rest for a second.
     """
     steps = len(loop.preset) - 1
-    second = max(1, round(1.0 / loop.period))
+    second = max(1, round(1.0 / loop.law.period))
     positions = np.empty((steps + 1, 3))
     positions[0] = loop.start
     position, work = loop.start.copy(), workspace(loop)
@@ -220,13 +227,13 @@ def _rolled_out(
         velocity = velocity_of(loop, ACCEPTED if k < accepted else REFUSED, k, position, work)
         squared, left, moved = 0.0, 0.0, 0.0
         for a in range(3):
-            position[a] += loop.period * velocity[a]
+            position[a] += loop.law.period * velocity[a]
             positions[k + 1, a] = position[a]
             squared += (loop.preset[k + 1, a] - position[a]) ** 2
             left += (goal[a] - position[a]) ** 2
             if k + 1 >= second:
                 moved += (position[a] - positions[k + 1 - second, a]) ** 2
-        cost += loop.period * squared
+        cost += loop.law.period * squared
         if k >= settled and (left < near**2 or (k + 1 >= second and moved < (0.1 * still) ** 2)):
             return positions[: k + 2], cost
     return positions, cost

@@ -1,18 +1,17 @@
-"""Method (d)'s gatekeeper: proposals are judged by their outcome, once, and their progress is watched.
+"""Method (d)'s gatekeeper: proposals are judged by their outcome, once.
 
 At the first sample at which a UGV sees a proposal it rolls out what comes of accepting it now and of refusing it for
 ever (`outcome`), and takes the better one. That answer stands: a refusal for good, an acceptance until the proposal is
-withdrawn, its motion is over, or the UGV has been farther behind it than predicted for too long. It is never reversed
-because waiting looks cheaper, nor because the other choice does, with one exception: when the UGV senses an obstacle
-that it did not know at the acceptance, it looks at both outcomes again. That is no new try: how often a UGV goes along
-is bounded (`patience`).
+withdrawn, its motion is over, or it has been executed for as long as it may be. It is never reversed because waiting
+looks cheaper, nor because the other choice does, with one exception: when the UGV senses an obstacle that it did not
+know at the acceptance, it looks at both outcomes again. That is no new try: how often a UGV goes along is bounded
+(`patience`).
 
 Nothing here has a part in safety: whatever is accepted is executed below the avoidance inequalities.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 from time import thread_time
@@ -22,14 +21,14 @@ import numpy.typing as npt
 
 from airground_drake.arrays import Array
 from airground_drake.gatekeeper.answer import Decision, Foreseen, Reason
-from airground_drake.gatekeeper.mpc_gatekeeper import Commitment, Gatekeepers, Memory, Situation
+from airground_drake.gatekeeper.mpc_gatekeeper import Gatekeepers, Memory, View
 from airground_drake.gatekeeper.outcome import Other, Outcome, Outlook, outcomes
-from airground_drake.gatekeeper.patience import Patience, Turn
-from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT, Proposals, Report, answer_to
+from airground_drake.gatekeeper.patience import Commitment, Patience
+from airground_drake.geometry.motion import Motion
+from airground_drake.intervention.messages import ACCEPT, DONE, REFUSE, SILENT, Proposals, Report, answer_to
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.kernels import news_within, within
 from airground_drake.nsbc.law import UgvLaw
-from airground_drake.nsbc.motion import Motion
 from airground_drake.nsbc.team import Team
 
 ACCEPTING: tuple[Reason, ...] = ("cheaper", "makes_way")
@@ -55,18 +54,18 @@ class OutcomeGatekeepers(Gatekeepers):
         return super().idle(proposals, positions, memory) and memory.sensed is self._remembered(positions, memory)
 
     def sample(self, t: float, proposals: Proposals, positions: Array, velocities: Array, memory: Memory) -> Memory:
-        """Judge every proposal in force by its outcome, if it is new, or else by its progress."""
+        """Judge every proposal in force by its outcome if it is new; else keep to what was answered."""
         sensed = self._remembered(positions, memory)
-        seen = Situation(t, proposals, positions, velocities, replace(memory, sensed=sensed))
+        seen = View(t, proposals, positions, velocities, replace(memory, sensed=sensed))
         answers: list[float] = []
         reports: list[Report] = []
-        turns, commitments = list(memory.turns), list(memory.commitments)
+        held = list(memory.commitments)
         decisions: list[Decision] = []
         for i, proposal in enumerate(proposals):
             standing = answer_to(proposal, memory.answers, i)
-            if turns[i].executing and standing != ACCEPT:  # withdrawn
-                turns[i], commitments[i] = self._patience.stop(turns[i], t), None
-            turns[i] = self._patience.rested(turns[i], t)
+            if held[i].executing and standing != ACCEPT:  # withdrawn
+                held[i] = self._patience.stop(held[i], t)
+            held[i] = self._patience.rested(held[i], t)
             if proposal is None:
                 answers += [SILENT, -1.0]
                 reports.append(Report())
@@ -74,19 +73,18 @@ class OutcomeGatekeepers(Gatekeepers):
             started = thread_time()
             if standing == ACCEPT:
                 again = self._discovers(sensed, memory, i, proposal)
-                decision, turns[i], commitments[i] = self._watch(seen, i, proposal, again=again)
-            elif standing == REFUSE:
-                decision = Decision(t, i, proposal, False, "kept", Foreseen(tries=turns[i].tries))
+                decision, held[i] = self._go_on(seen, i, proposal, held[i], again=again)
+            elif standing == SILENT:
+                decision, held[i] = self._judge(seen, i, proposal, held[i])
             else:
-                decision, turns[i], commitments[i] = self._judge(seen, i, proposal, turns[i])
+                decision = Decision(t, i, proposal, False, "kept", Foreseen(tries=held[i].tries))
             self.times_s.append(thread_time() - started)
             decisions.append(decision)
-            answers += [ACCEPT if decision.accepted else REFUSE, proposal.number]
+            answers += [_answer(decision, standing), proposal.number]
             reports.append(self._report(positions[i], decision))
         return replace(
             memory, answers=tuple(answers), reports=tuple(reports),
-            decisions=memory.decisions.extended(decisions), turns=tuple(turns),
-            commitments=tuple(commitments), sensed=sensed,
+            decisions=tuple(decisions), commitments=tuple(held), sensed=sensed,
         )  # fmt: skip
 
     def _remembered(self, positions: Array, memory: Memory) -> np.ndarray:
@@ -106,53 +104,37 @@ class OutcomeGatekeepers(Gatekeepers):
         apart = np.linalg.norm(new[:, None] - proposal.mapped, axis=2)
         return not (apart <= SAME_M).any(axis=1).all()
 
-    def _judge(
-        self, seen: Situation, i: int, proposal: Proposal, turn: Turn
-    ) -> tuple[Decision, Turn, Commitment | None]:
+    def _judge(self, seen: View, i: int, proposal: Proposal, held: Commitment) -> tuple[Decision, Commitment]:
         """The first decision about a proposal."""
-        if self._patience.exhausted(turn):
-            return Decision(seen.t, i, proposal, False, "exhausted", Foreseen(tries=turn.tries)), turn, None
-        reason, grounds, commitment = self._weigh(seen, i, proposal)
-        if commitment is not None:
-            turn = self._patience.accept(turn, seen.t, proposal.motion.end)
-        decision = Decision(seen.t, i, proposal, commitment is not None, reason, replace(grounds, tries=turn.tries))
-        return decision, turn, commitment
+        if self._patience.exhausted(held):
+            return Decision(seen.t, i, proposal, False, "exhausted", Foreseen(tries=held.tries)), held
+        reason, refuse, accept = self._weigh(seen, i, proposal)
+        if reason in ACCEPTING:
+            held = self._patience.accept(held, seen.t, proposal.motion.end)
+        return Decision(seen.t, i, proposal, held.executing, reason, Foreseen(refuse, accept, held.tries)), held
 
-    def _weigh(self, seen: Situation, i: int, proposal: Proposal) -> tuple[Reason, Foreseen, Commitment | None]:
-        """The better outcome: the reason, what it rests on, and what is to be watched if it is to accept."""
+    def _weigh(self, seen: View, i: int, proposal: Proposal) -> tuple[Reason, Outcome, Outcome]:
+        """The reason for the answer, and what comes of refusing and of accepting."""
         refuse, accept = self.foresee(seen, i, proposal)
         favour = proposal.cause in self._team.ugvs and proposal.cause != self._team.ugvs[i]
-        reason = reason_of(refuse, accept, favour=favour)
-        if reason not in ACCEPTING:
-            return reason, Foreseen(refuse, accept), None
-        after = self._law.avoidance.period * np.arange(0.0, len(accept.positions))
-        lags = lags_of(proposal, seen.t + after, accept.positions)
-        return reason, Foreseen(refuse, accept, float(lags[0]), float(lags[0])), Commitment(lags, seen.t, seen.t)
+        return reason_of(refuse, accept, favour=favour), refuse, accept
 
-    def _watch(
-        self, seen: Situation, i: int, proposal: Proposal, *, again: bool
-    ) -> tuple[Decision, Turn, Commitment | None]:
+    def _go_on(
+        self, seen: View, i: int, proposal: Proposal, held: Commitment, *, again: bool
+    ) -> tuple[Decision, Commitment]:
         """A later decision about a proposal that is executed; `again`: look at both outcomes once more."""
-        t, turn, patience = seen.t, seen.before.turns[i], self._patience
-        commitment = seen.before.commitments[i]
-        assert commitment is not None
-        k = min(round((t - commitment.begun) / self._law.avoidance.period), len(commitment.lags) - 1)
-        predicted = float(commitment.lags[k])
-        lag = lag_of(proposal, t, seen.positions[i])
-        on_time = t if lag <= predicted + patience.lag else commitment.on_time
-        grounds = Foreseen(lag=lag, predicted_lag=predicted, tries=turn.tries)
-        late = patience.late(on_time, t)
-        if late or patience.over(turn, t):
-            reason: Reason = "no_progress" if late else "over"
-            return Decision(t, i, proposal, False, reason, grounds), patience.stop(turn, t), None
-        if again:
-            reason, outcomes, renewed = self._weigh(seen, i, proposal)
-            grounds = replace(grounds, refuse=outcomes.refuse, accept=outcomes.accept)
-            stays = renewed is not None
-            return Decision(t, i, proposal, stays, reason, grounds), turn if stays else patience.stop(turn, t), renewed
-        return Decision(t, i, proposal, True, "kept", grounds), turn, replace(commitment, on_time=on_time)
+        reason: Reason = "kept"
+        grounds = Foreseen(tries=held.tries)
+        if self._patience.over(held, seen.t):
+            reason = "over"
+        elif again:
+            reason, refuse, accept = self._weigh(seen, i, proposal)
+            grounds = Foreseen(refuse, accept, held.tries)
+        stays = reason == "kept" or reason in ACCEPTING
+        decision = Decision(seen.t, i, proposal, stays, reason, grounds)
+        return decision, held if stays else self._patience.stop(held, seen.t)
 
-    def foresee(self, seen: Situation, i: int, proposal: Proposal) -> tuple[Outcome, Outcome]:
+    def foresee(self, seen: View, i: int, proposal: Proposal) -> tuple[Outcome, Outcome]:
         """What comes of refusing and of accepting, with what the UGV knows."""
         scene = self._scene(seen, i)
         discs, distances = self._known(seen, i, proposal)
@@ -164,13 +146,13 @@ class OutcomeGatekeepers(Gatekeepers):
             others.append(
                 Other(
                     scene.centres[k], scene.velocities[k],
-                    asked.motion if asked is not None and answer != REFUSE else None, answer == ACCEPT,
+                    asked.motion if asked is not None and answer in (ACCEPT, SILENT) else None, answer == ACCEPT,
                     float(scene.distances[k]), float(scene.shares[k]),
                 )
             )  # fmt: skip
         return outcomes(scene, self._law, proposal, discs, distances, others, self._outlook)
 
-    def _known(self, seen: Situation, i: int, proposal: Proposal) -> tuple[Array, Array]:
+    def _known(self, seen: View, i: int, proposal: Proposal) -> tuple[Array, Array]:
         """Obstacles that a UGV has sensed, and those of the UAV's map that are out of its sight.
 
         Of the latter the `MOST_CLAIMED` that are nearest, so that no map makes a decision take long; none whose radius
@@ -191,6 +173,14 @@ class OutcomeGatekeepers(Gatekeepers):
         return np.concatenate([sensed, claimed[new]]), self._team.distance_to(bodies)[i]
 
 
+def _answer(decision: Decision, standing: float) -> float:
+    """The answer that a decision comes to: what was DONE stays so."""
+    if decision.accepted:
+        return ACCEPT
+    done = decision.reason == "over" and decision.t >= decision.proposal.motion.end
+    return DONE if done or standing == DONE else REFUSE
+
+
 def reason_of(refuse: Outcome, accept: Outcome, *, favour: bool) -> Reason:
     """Why to accept (one of ACCEPTING) or why not, given what comes of either.
 
@@ -205,15 +195,3 @@ def reason_of(refuse: Outcome, accept: Outcome, *, favour: bool) -> Reason:
     if accept.stalls:
         return "stalls"
     return "makes_way" if favour else "not_cheaper"
-
-
-def lags_of(proposal: Proposal, t: Array, positions: Array) -> Array:
-    """Distance of positions (K, 3), m, at times (K,), s, from where the UGV is asked to be, (K,), m."""
-    away = positions - proposal.motion.sample(t)
-    return np.asarray(np.linalg.norm(away @ proposal.chosen.T, axis=1))
-
-
-def lag_of(proposal: Proposal, t: float, position: Array) -> float:
-    """`lags_of` at one time, s, m."""
-    x, y, z = ((position - proposal.motion.at(t)[0])[None] @ proposal.chosen.T)[0].tolist()
-    return math.sqrt(x * x + y * y + z * z)

@@ -1,8 +1,8 @@
-"""How long a UGV goes along with a UAV: the automaton of tries, progress and rest, one per UGV.
+"""How long a UGV goes along with a UAV: the automaton of tries and rests, one per UGV.
 
     ON ITS OWN  -- a proposal is accepted, tries < most -------------> EXECUTING    (a try)
     ON ITS OWN  -- on its own for `rest` s --------------------------> ON ITS OWN   (tries = 0)
-    EXECUTING   -- withdrawn, over, or behind for too long ----------> ON ITS OWN
+    EXECUTING   -- withdrawn, over, or not worth it any more --------> ON ITS OWN
 
 A try lasts no longer than `longest` s. With all tries used the UGV is exhausted: it refuses everything until it has
 been on its own for `rest` s. So between two rests no UAV keeps it from its own task for longer than `most * longest` s
@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 
 
 @dataclass(frozen=True)
-class Turn:
-    """State of the automaton for one UGV.
+class Commitment:
+    """What a UGV has committed itself to: its state of the automaton.
 
     Attributes:
         executing: whether an accepted proposal is executed.
@@ -39,48 +39,40 @@ class Patience:
         most: tries between two rests.
         rest: time on its own after which the tries count anew, s.
         longest: time that a try may last, s.
-        lag: by which the UGV may be farther from where it is to be than predicted, m.
-        behind: time for which it may be more than that, s.
     """
 
     most: int
     rest: float
     longest: float
-    lag: float
-    behind: float
 
     def __post_init__(self) -> None:
         """Check the parameters.
 
         Raises:
-            ValueError: if there is no try, or a time or the lag is not positive.
+            ValueError: if there is no try, or a time is not positive.
         """
-        if not (self.most >= 1 and self.rest > 0.0 and self.longest > 0.0 and self.lag > 0.0 and self.behind > 0.0):
-            raise ValueError(f"patience needs at least one try, and positive times and lag, got {self}")
+        if not (self.most >= 1 and self.rest > 0.0 and self.longest > 0.0):
+            raise ValueError(f"patience needs at least one try, and positive times, got {self}")
 
-    def rested(self, turn: Turn, t: float) -> Turn:
+    def rested(self, now: Commitment, t: float) -> Commitment:
         """At time t, s: the tries count anew after a rest."""
-        if not turn.executing and t >= turn.since + self.rest:
-            return replace(turn, tries=0)
-        return turn
+        if not now.executing and t >= now.since + self.rest:
+            return replace(now, tries=0)
+        return now
 
-    def exhausted(self, turn: Turn) -> bool:
+    def exhausted(self, now: Commitment) -> bool:
         """Whether nothing is accepted before the next rest."""
-        return turn.tries >= self.most
+        return now.tries >= self.most
 
-    def accept(self, turn: Turn, t: float, end: float) -> Turn:
+    def accept(self, now: Commitment, t: float, end: float) -> Commitment:
         """At time t, s: a motion that ends at `end`, s, is accepted, by a UGV on its own that is not exhausted."""
         until = end if end <= t + self.longest else t + self.longest
-        return replace(turn, executing=True, tries=turn.tries + 1, since=t, until=until)
+        return replace(now, executing=True, tries=now.tries + 1, since=t, until=until)
 
-    def stop(self, turn: Turn, t: float) -> Turn:
+    def stop(self, now: Commitment, t: float) -> Commitment:
         """At time t, s: the UGV is on its own again."""
-        return replace(turn, executing=False, since=t)
+        return replace(now, executing=False, since=t)
 
-    def late(self, on_time: float, t: float) -> bool:
-        """Whether a UGV that was last on time then, s, has been behind for too long at time t, s."""
-        return t - on_time > self.behind
-
-    def over(self, turn: Turn, t: float) -> bool:
+    def over(self, now: Commitment, t: float) -> bool:
         """Whether the time of what is executed is over at time t, s."""
-        return t >= turn.until
+        return t >= now.until

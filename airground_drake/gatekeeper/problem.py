@@ -1,4 +1,4 @@
-"""The optimal control problem (21)-(26) of one UGV, discretised."""
+"""The optimal control problem (21)-(26) of one UGV, discretised: mode velocities by rolling out its closed loop."""
 
 from __future__ import annotations
 
@@ -9,8 +9,29 @@ from typing import NamedTuple
 import numpy as np
 
 from airground_drake.arrays import Array
-from airground_drake.gatekeeper.closed_loop import ClosedLoop
 from airground_drake.gatekeeper.cost import Terms, error_weights, half_plane_cost, plan_cost
+from airground_drake.gatekeeper.rollout import ClosedLoop, Scene, closed_loop
+from airground_drake.intervention.policy import Proposal
+from airground_drake.nsbc.law import UgvLaw
+
+
+@dataclass(frozen=True)
+class Horizon:
+    """Discretisation and weights of (25)-(27).
+
+    Attributes:
+        stages: N.
+        substeps: control periods per stage.
+        error_weight: a_i of (25), 1/(m^2 s).
+        slack_weight: b_i of (25), 1/(m^2 s).
+        terminal_weight: of the terminal cost, see `cost.error_weights`, s.
+    """
+
+    stages: int
+    substeps: int
+    error_weight: float
+    slack_weight: float
+    terminal_weight: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +125,7 @@ class Kinematics(NamedTuple):
     Attributes:
         dt: length of a stage, s.
         initial: (3,), m.
-        velocities: of the modes, (2, N, 3), m/s, in the order of `closed_loop.REFUSED` and `ACCEPTED`.
+        velocities: of the modes, (2, N, 3), m/s, in the order of `rollout.REFUSED` and `ACCEPTED`.
     """
 
     dt: float
@@ -120,3 +141,32 @@ class Evaluation:
     positions: Array
     objective: float
     clearance: float
+
+
+def predicted_problem(scene: Scene, law: UgvLaw, proposal: Proposal, horizon: Horizon) -> Problem:
+    """(26) for one UGV: roll out both choices and keep the points that it senses and might come near."""
+    scene = scene.restrict(np.linalg.norm(scene.centres - scene.position, axis=1) <= law.avoidance.sensing_range)
+    loop = closed_loop(scene, law, proposal, horizon.stages, horizon.substeps)
+    accept, refuse = loop.constant_plans()
+    dt = horizon.substeps * law.avoidance.period
+    after = dt * np.arange(1.0, horizon.stages + 1.0)
+    squared = np.maximum(np.square(accept).sum(axis=1), np.square(refuse).sum(axis=1))
+    # a plan that switches may be faster than both constant ones, but for a retreat not above the speed limit
+    reach = dt * np.cumsum(np.sqrt(np.maximum(squared, scene.max_speed**2)))
+    centres = scene.centres + after[:, None, None] * scene.velocities
+    gap = np.linalg.norm(centres - scene.position, axis=2) - scene.distances - reach[:, None]
+    height = np.abs(centres[:, :, 2] - scene.position[2]) - scene.distances
+    near = ((gap < 0.0) & (height < 0.0)).any(axis=0)
+    return Problem(
+        dt=dt,
+        initial=scene.position,
+        accept=accept,
+        refuse=refuse,
+        reference=np.ascontiguousarray(loop.preset[horizon.substeps :: horizon.substeps]),
+        centres=np.ascontiguousarray(centres[:, near]),  # the layout that the kernels are compiled for
+        distances=scene.distances[near],
+        error_weight=horizon.error_weight,
+        slack_weight=horizon.slack_weight,
+        terminal_weight=horizon.terminal_weight,
+        loop=loop,
+    )

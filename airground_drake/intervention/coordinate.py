@@ -1,48 +1,55 @@
-"""The coordinate policy: a joint plan for the robots that are triggered and those in their way."""
+"""The coordinate policy: a joint plan for the triggered UGVs and those in their way."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from functools import cache
+from collections.abc import Callable, Sequence
+from functools import cache, partial
 from itertools import pairwise
 
 import numpy as np
 
 from airground_drake.arrays import Array
+from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.coordination.joint import Effort, Plan, plan
-from airground_drake.intervention.coordination.roadmap import Errand, Space
+from airground_drake.intervention.coordination.roadmap import RobotTask, Space
 from airground_drake.intervention.coordination.single import Body, Way
 from airground_drake.intervention.coordination.timed import at_rest, distance, speed, timed, without_repeats
 from airground_drake.intervention.policy import Observation, Policy, Teammate
-from airground_drake.nsbc.motion import Motion
 
 SHARE = 0.8
-"""Of a UGV's speed limit that a plan uses: the rest is for catching up with it."""
+"""A plan uses this share of a UGV's speed limit; the rest is for catching up."""
 MOST_PLANS = 4
-"""Joint plans that are made at most for one proposal, each for more robots."""
+"""Largest number of joint plans for one proposal, each for more UGVs."""
 NARROWER = (1.0, 0.1, 0.01)
-"""Shares of the clearance that are tried one after the other, while the UGV that is planned for has no way even alone:
-its own task may have taken it through a gap with no room for more."""
+"""Shares of the clearance. The next one is tried while the UGV that is planned for has no way even alone: its own task
+may have taken it through a gap with no room for more."""
 ON_PRESET_M = 0.5
-"""A motion that ends within this of the preset goes on along it."""
+"""A motion that ends no farther than this from the preset, m, is taken to go on along it."""
 BLEND_S = 1.0
-"""Time constant with which a UGV is taken to come back to its preset, s."""
+"""A UGV without a proposal is predicted to approach its preset with this time constant, s."""
+
+SAME_PLACE_M = 1e-3
+"""A UGV that has moved no farther than this is where it was, m."""
+
+Alone = Callable[[int], Way | None]
+"""The way that a UGV of the team, given by its index, would have if there were no others."""
 
 
 class Coordinate(Policy):
-    """Bring every triggered UGV back to its preset by motions that were planned together.
+    """Bring every triggered UGV back to its preset by motions that are planned together.
 
-    First only the triggered UGVs that have no proposal in force are planned for, round obstacles, robots that stand,
-    and the predicted motions of the others. If they find no way, those in their way are planned for, too, if they are
-    willing: a parked one steps aside and comes back. If nothing serves, as many move as can. One plan concerns all: its
-    proposals have the same time of issue. A UGV that would find no way even alone is planned for with less clearance.
+    The first plan is for the triggered UGVs without a proposal in force. They go round obstacles, robots that stand,
+    and the predicted motions of the others. If they find no way, the next plan includes UGVs in their way, if these are
+    willing: a parked one steps aside and comes back. If no plan serves all, as many UGVs move as can. All proposals of
+    a plan have the same time of issue. If the UGV would find no way even alone, less clearance is tried. Where it finds
+    none at all, it is not planned for again until it has moved or the map has changed.
 
     Attributes:
-        speed: largest, m/s; of each UGV no more than SHARE of its limit.
-        clearance: kept from obstacles beyond the safe distance, m.
-        spacing: kept between UGVs beyond their safe distance, m.
-        follow: how long a proposal goes on along the preset after it has been joined, s, and for which it must be free.
+        speed: largest, m/s; no UGV uses more than SHARE of its limit.
+        clearance: distance to keep from obstacles beyond the safe distance, m.
+        spacing: distance to keep between UGVs beyond their safe distance, m.
+        follow: how long a proposal goes on along the preset after joining it, s. The preset must be free for so long.
     """
 
     counted = True
@@ -64,24 +71,42 @@ class Coordinate(Policy):
         self.clearance = clearance_m
         self.spacing = spacing_m
         self.follow = follow_s
+        self._shut_in: dict[str, Observation] = {}
         warm_up()
 
     def propose(self, seen: Observation) -> dict[str, Motion] | None:
         """Motions by UGV; None if no triggered UGV can be helped."""
-        if not seen.team:
+        if not seen.team or self._is_known_to_be_shut_in(seen):
             return None
         own, tried = [mate.name for mate in seen.team].index(seen.robot), []
         for share in NARROWER:
             space = self._space(seen, share * self.clearance)
-            tried.append(self._joint(seen, space))
+            alone = cache(partial(self._alone, seen, space))
+            tried.append(self._joint(seen, space, alone))
             lost = tried[-1][0][0]
-            if not lost or self._alone(seen, space, own) is not None:
+            if not lost or alone(own) is not None:
                 break
+        else:
+            self._shut_in[seen.robot] = seen
         _, group, found = min(tried, key=lambda each: each[0])
         return self._proposals(seen, group, found)
 
-    def _joint(self, seen: Observation, space: Space) -> tuple[tuple[float, ...], list[int], Plan]:
-        """The best plan, its cost and whom it is for."""
+    def _is_known_to_be_shut_in(self, seen: Observation) -> bool:
+        """Whether the UGV found no way here before, even alone, on the same map: later there is none either.
+
+        Time takes away places at which the preset can be joined, and adds none.
+        """
+        before = self._shut_in.get(seen.robot)
+        return (
+            before is not None
+            and before.t <= seen.t
+            and math.dist(before.position, seen.position) <= SAME_PLACE_M
+            and np.array_equal(before.obstacles, seen.obstacles)
+            and np.array_equal(before.obstacle_radii, seen.obstacle_radii)
+        )
+
+    def _joint(self, seen: Observation, space: Space, alone: Alone) -> tuple[tuple[float, ...], list[int], Plan]:
+        """Cost of the best plan, indices of its UGVs, and the plan."""
         everyone = range(len(seen.team))
         group = [i for i in everyone if seen.team[i].name == seen.robot or _waits(seen.team[i], seen.t)]
         best: tuple[list[int], Plan] | None = None
@@ -93,7 +118,7 @@ class Coordinate(Policy):
                 best, least = (group, found), cost
             if cost[0] == 0:
                 break
-            more = self._in_the_way(seen, space, group, found)
+            more = self._in_the_way(seen, space, group, found, alone)
             if not more:
                 break
             group = sorted([*group, *more])
@@ -103,30 +128,35 @@ class Coordinate(Policy):
     def _plan(self, seen: Observation, space: Space, group: Sequence[int]) -> Plan:
         team = seen.team
         fixed = [Body(predicted(mate, seen.start), mate.radius) for i, mate in enumerate(team) if i not in group]
-        errands = [errand(team[i], seen.start) for i in group]
+        tasks = [task_of(team[i], seen.start) for i in group]
         speeds = [min(self.speed, SHARE * team[i].max_speed) for i in group]
-        return plan(space, errands, speeds, fixed, follow=self.follow, effort=Effort())
+        return plan(space, tasks, speeds, fixed, follow=self.follow, effort=Effort())
 
-    def _in_the_way(self, seen: Observation, space: Space, group: Sequence[int], found: Plan) -> list[int]:
-        """Willing UGVs that keep triggered ones of a group, that found no way, from the way they would have alone."""
+    def _in_the_way(
+        self, seen: Observation, space: Space, group: Sequence[int], found: Plan, alone: Alone
+    ) -> list[int]:
+        """Willing UGVs outside a group that are near the ways that its lost triggered UGVs would have alone.
+
+        All willing ones if none is near; nobody if no lost UGV has a way even alone.
+        """
+        lost = [i for i, way in zip(group, found.ways, strict=True) if way is None and seen.team[i].triggered]
+        ways = [(seen.team[i], way) for i in lost if (way := alone(i)) is not None]
+        if not ways:
+            return []
         others = [i for i, mate in enumerate(seen.team) if i not in group and _is_willing(mate, seen.t)]
-        ahead = {i: predicted(seen.team[i], seen.start) for i in others}
-        more = set()
-        for i, way in zip(group, found.ways, strict=True):
-            if way is not None or not seen.team[i].triggered:
-                continue
-            mate, alone = seen.team[i], self._alone(seen, space, i)
-            if alone is None:
-                continue
-            near = {j: self.spacing + space.apart + (mate.radius + seen.team[j].radius) for j in others}
-            more |= {j for j in others if distance(alone.motion, ahead[j]) < near[j]}
-        return sorted(more or others)
+        near = []
+        for j in others:
+            other, ahead = seen.team[j], predicted(seen.team[j], seen.start)
+            apart = self.spacing + space.apart
+            if any(distance(way.motion, ahead) < apart + (mate.radius + other.radius) for mate, way in ways):
+                near.append(j)
+        return near or others
 
     def _alone(self, seen: Observation, space: Space, i: int) -> Way | None:
-        """What a UGV would do if there were no others."""
+        """The way of a UGV if there were no others."""
         mate = seen.team[i]
         pace = min(self.speed, SHARE * mate.max_speed)
-        return plan(space, [errand(mate, seen.start)], [pace], follow=self.follow).ways[0]
+        return plan(space, [task_of(mate, seen.start)], [pace], follow=self.follow).ways[0]
 
     def _proposals(self, seen: Observation, group: Sequence[int], found: Plan) -> dict[str, Motion] | None:
         motions = {}
@@ -139,24 +169,24 @@ class Coordinate(Policy):
         return motions if helped else None
 
     def _space(self, seen: Observation, clearance: float) -> Space:
-        """What UGVs without bodies keep away from in the plane of the one that is planned for."""
+        """Obstacles and distances for a UGV without a body, in the plane of the one that is planned for."""
         radii = seen.safe_distance + np.broadcast_to(seen.obstacle_radii, len(seen.obstacles))
         above = seen.obstacles[:, 2] - float(seen.position[2])
         return Space(seen.obstacles[:, :2], radii, clearance, seen.robot_distance, self.spacing, above)
 
 
-def errand(mate: Teammate, start: float) -> Errand:
-    """From where a UGV is to its preset, from time `start`, s, on."""
+def task_of(mate: Teammate, start: float) -> RobotTask:
+    """The task to bring a UGV from its place to its preset, from time `start`, s, on."""
     preset = mate.preset
     times = np.append(start, preset.times[preset.times > start + 1e-6])
-    return Errand(mate.position[:2].copy(), timed(times - start, preset.sample(times)[:, :2]), mate.radius)
+    return RobotTask(mate.position[:2].copy(), timed(times - start, preset.sample(times)[:, :2]), mate.radius)
 
 
 def predicted(mate: Teammate, start: float) -> Array:
-    """What a UGV is taken to do from time `start`, s, on: a timed motion (M, 3) from t = 0.
+    """Predicted motion of a UGV from time `start`, s, on: timed, (M, 3), from t = 0.
 
-    It goes along the proposal in force unless it has refused it, then along its preset if that ends there. Without one
-    it stays if it stands or is triggered, and otherwise comes back to its preset.
+    It follows the proposal in force unless it has refused it, and then its preset if the proposal ends on it. Without a
+    proposal it stays where it is if it stands or is triggered; otherwise it comes back to its preset.
     """
     here, proposal = mate.position[:2], mate.proposal
     if proposal is not None and mate.answered != "refused":
@@ -190,7 +220,7 @@ def _is_willing(mate: Teammate, t: float) -> bool:
 
 
 def _cost(seen: Observation, group: Sequence[int], found: Plan) -> tuple[float, ...]:
-    """Triggered UGVs of a plan without a way, UGVs that move, sum of the times until they are back on their presets."""
+    """Numbers of triggered UGVs without a way and of UGVs that move; sum of the times until presets are joined, s."""
     ways = list(zip(group, found.ways, strict=True))
     lost = sum(way is None and seen.team[i].triggered for i, way in ways)
     moved = sum(way is not None and speed(way.motion) > 0.0 for _, way in ways)
@@ -198,7 +228,7 @@ def _cost(seen: Observation, group: Sequence[int], found: Plan) -> tuple[float, 
 
 
 def _motion(way: Way, start: float, follow: float, height: float) -> Motion:
-    """A way as a motion in space that ends so long, s, after the preset is joined."""
+    """A way as a motion in space, which ends `follow`, s, after the preset is joined."""
     until = min(way.joined + follow, float(way.motion[-1, 0]))
     rows = way.motion[way.motion[:, 0] < until - 1e-9]
     last = [until, *(np.interp(until, way.motion[:, 0], axis) for axis in way.motion[:, 1:].T)]
@@ -208,8 +238,8 @@ def _motion(way: Way, start: float, follow: float, height: float) -> Motion:
 
 @cache
 def warm_up() -> None:
-    """Load the compiled loops before a plan is asked for, which has little time."""
+    """Load the compiled loops before the first plan is asked for: a plan has little time."""
     room = Space(np.array([[0.0, 1.0]]), np.array([0.1]), 0.1, 1.0, 0.1)
     ends = [np.array([0.0, 0.0]), np.array([3.0, 0.0])]
-    errands = [Errand(a, np.array([[0.0, *b]])) for a, b in pairwise([*ends, ends[0]])]
-    plan(room, errands, [1.0, 1.0], effort=Effort(orders=2))
+    tasks = [RobotTask(a, np.array([[0.0, *b]])) for a, b in pairwise([*ends, ends[0]])]
+    plan(room, tasks, [1.0, 1.0], effort=Effort(orders=2))

@@ -5,25 +5,22 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
-from typing import Literal, get_args
+from typing import Any, Literal, Self, get_args
 
 import numpy as np
 
 from airground_drake.errors import PolicyError, described
-from airground_drake.intervention.guard import OutOfTime, time_limit
+from airground_drake.geometry.motion import Motion
+from airground_drake.intervention.guest.process import GuestPolicy
+from airground_drake.intervention.guest.time_limit import OutOfTime, time_limit
 from airground_drake.intervention.policy import Observation, Policy, Proposal, Teammate, motions_of
-from airground_drake.intervention.process import GuestPolicy
-from airground_drake.nsbc.motion import Motion
 from airground_drake.registry import POLICIES
 
 Ranking = Literal["listed", "predicted"]
 RANKINGS: tuple[Ranking, ...] = get_args(Ranking)
 
-FEW_REFUSALS = 2
-"""After so many a UGV that does not make way is asked as if it had never refused."""
-LEAST_REST_S = 1.0
-"""What is doubled then, if `retry` is less, s."""
-MOST_DOUBLINGS = 6
+MOST_DOUBLINGS = 10
+"""Of the rest while no policy proposes anything: by then it is longer than any run that it began in."""
 PREDICTION_S = 3.0
 INTRUSION = 1000.0
 """Weight of squared intrusion against squared task error, as the gatekeeper's by default."""
@@ -50,47 +47,36 @@ def make_policy(name: str, parameters: Mapping[str, float], budget: float = 2.0)
 
 
 @dataclass(frozen=True)
-class Desk:
-    """What the UAV remembers about one UGV while it intervenes.
+class Negotiation:
+    """Where the UAV stands with one UGV.
 
     Attributes:
         proposal: the one in force, or None.
         turn: index of the policy that made it, or that is to be asked next.
         refusals: refused proposals since the trigger.
+        in_vain: how often in a row no policy had a proposal.
         retry_at: no new proposal before this time, s.
         cause: name of the UGV whose trigger it was last sent a proposal for; empty: its own.
-        party: names of the UGVs of the joint plan that the proposal is part of; empty: it is none.
     """
 
     proposal: Proposal | None = None
     turn: int = 0
     refusals: int = 0
+    in_vain: int = 0
     retry_at: float = -1.0
     cause: str = ""
-    party: tuple[str, ...] = ()
 
     def is_due(self, t: float) -> bool:
-        """Whether nothing is in force at time t, s, and the rest after a refusal is over."""
-        return t >= (self.proposal.motion.end if self.proposal is not None else self.retry_at)
+        """Whether nothing is in force at time t, s, and the rest is over."""
+        return self.proposal is None and t >= self.retry_at
 
-    def __deepcopy__(self, memo: object) -> Desk:
+    def refused_lately(self, t: float) -> bool:
+        """Whether it rests at time t, s, because the UGV has refused: then it gets no part of another's plan either."""
+        return self.proposal is None and t < self.retry_at and not self.in_vain
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
         """Immutable: the copy is the object itself."""
         return self
-
-
-@dataclass(frozen=True)
-class Planned:
-    """What came of asking the policies about one UGV.
-
-    Attributes:
-        desk: of that UGV.
-        asked: desks of the other UGVs that a joint plan has proposals for, by name.
-        faults: of the policies asked.
-    """
-
-    desk: Desk
-    asked: Mapping[str, Desk]
-    faults: list[Fault]
 
 
 @dataclass(frozen=True)
@@ -108,10 +94,11 @@ class BehaviourDatabase:
 
     Attributes:
         policies: (name, policy) pairs; none at all means that the UAV only supervises.
-        retry: rest after a refusal, or after no policy has proposed anything, s.
+        retry: rest after a refusal, s; so, too, when no policy has a proposal, and twice as long each time in a row.
         ranking: 'listed' takes the policies in turn; 'predicted' asks them all and takes the proposal with the
             best predicted outcome on the UAV's own map, after refusals the next best.
         budget: wall-clock time that a policy may take for one proposal, s, unless it counts its effort.
+        joint: whether a joint plan takes effect as a whole or not at all; otherwise each part is a proposal of its own.
     """
 
     def __init__(
@@ -121,12 +108,14 @@ class BehaviourDatabase:
         retry: float = 0.0,
         ranking: Ranking = "listed",
         budget: float = 2.0,
+        joint: bool = True,
     ) -> None:
         """See the attributes."""
         self.policies = tuple(policies)
         self.retry = retry
         self.ranking = ranking
         self.budget = budget
+        self.joint = joint
 
     def close(self) -> None:
         """End the processes of policies that have one."""
@@ -134,57 +123,52 @@ class BehaviourDatabase:
             if isinstance(policy, GuestPolicy):
                 policy.close()
 
-    def after_refusal(self, desk: Desk, t: float, *, learnt: bool = False, favour: bool = False) -> Desk:
-        """Memory of a UGV that has refused its proposal.
+    def after_refusal(self, held: Negotiation, t: float, *, learnt: bool = False) -> Negotiation:
+        """After a UGV has refused its proposal: the next policy's turn, after a rest.
 
         Args:
-            desk: with the proposal.
+            held: with the proposal.
             t: time, s.
             learnt: whether the refusal has put an obstacle on the map: then a ranking starts anew.
-            favour: whether it was asked to make way: from the third refusal on it is left alone twice as long each
-                time, as what it refuses for may pass.
         """
-        turn, rest = 0 if learnt and self.ranking == "predicted" else desk.turn + 1, self.retry
-        if favour and (often := desk.refusals + 1 - FEW_REFUSALS) > 0:
-            rest = max(self.retry, LEAST_REST_S) * 2.0 ** min(often, MOST_DOUBLINGS)
-        return Desk(turn=turn, refusals=desk.refusals + 1, retry_at=t + rest, cause=desk.cause)
+        turn = 0 if learnt and self.ranking == "predicted" else held.turn + 1
+        return Negotiation(turn=turn, refusals=held.refusals + 1, retry_at=t + self.retry, cause=held.cause)
 
-    def plan(self, desk: Desk, seen: Observation) -> Planned:
+    def plan(self, held: Negotiation, seen: Observation) -> tuple[dict[str, Negotiation], list[Fault]]:
         """Next proposal for a UGV that needs one, and those to others that go with it.
 
-        If no policy proposes anything to this UGV, what is in force and has not run out stays so; otherwise the UAV
-        rests.
+        A UGV that gets no proposal rests for `retry`; while no policy has one for anybody, twice as long each time.
 
         Args:
-            desk: memory of this UGV.
+            held: with this UGV.
             seen: what the UAV sees.
+
+        Returns:
+            The negotiations that change, by UGV, and faults of the policies asked.
         """
-        seen = replace(seen, refusals=desk.refusals)
-        candidates, faults = self._ranked(seen, desk.turn) if self.ranking == "predicted" else self._next(seen, desk)
-        if not candidates:
-            return Planned(self._without_help(desk, seen.t), {}, faults)
-        turn, name, motions = candidates[0]
-        party = tuple(motions) if len(motions) > 1 else ()
-        asked = {}
-        for robot, motion in motions.items():
-            before = desk if robot == seen.robot else Desk(refusals=_mate(seen, robot).refusals)
-            cause = robot if robot == seen.robot or _mate(seen, robot).triggered else seen.robot
-            proposal = Proposal(
-                name, seen.t, motion, cause=cause, mapped=seen.obstacles, mapped_radii=seen.obstacle_radii
-            )
-            asked[robot] = replace(before, proposal=proposal, turn=turn, cause=cause, party=party)
-        own = asked.pop(seen.robot, self._without_help(desk, seen.t))
-        return Planned(own, asked, faults)
+        seen = replace(seen, refusals=held.refusals)
+        candidates, faults = self._ranked(seen, held.turn) if self.ranking == "predicted" else self._next(seen, held)
+        in_vain = 0 if candidates else held.in_vain + 1
+        rest = self.retry * 2.0 ** min(max(0, in_vain - 1), MOST_DOUBLINGS)
+        found = {seen.robot: replace(held, in_vain=in_vain, retry_at=seen.t + rest)}
+        for turn, name, motions in candidates[:1]:
+            party = tuple(sorted(motions)) if self.joint and len(motions) > 1 else ()
+            for robot, motion in motions.items():
+                mate = None if robot == seen.robot else _mate(seen, robot)
+                before = held if mate is None else Negotiation(refusals=mate.refusals)
+                cause = robot if mate is None or mate.triggered else seen.robot
+                proposal = Proposal(
+                    name, seen.t, motion, cause=cause, mapped=seen.obstacles, mapped_radii=seen.obstacle_radii,
+                    party=party,
+                )  # fmt: skip
+                found[robot] = replace(before, proposal=proposal, turn=turn, in_vain=0, cause=cause)
+        return found, faults
 
-    def _without_help(self, desk: Desk, t: float) -> Desk:
-        """Desk of a UGV that was planned for in vain: what is in force stays so; otherwise the UAV rests."""
-        return replace(desk, proposal=None, party=(), retry_at=t + self.retry) if desk.is_due(t) else desk
-
-    def _next(self, seen: Observation, desk: Desk) -> tuple[list[Candidate], list[Fault]]:
+    def _next(self, seen: Observation, held: Negotiation) -> tuple[list[Candidate], list[Fault]]:
         """The first policy, from this turn on, that proposes."""
         faults: list[Fault] = []
         for step in range(len(self.policies)):
-            turn = (desk.turn + step) % len(self.policies)
+            turn = (held.turn + step) % len(self.policies)
             motions = self._ask(turn, seen, faults)
             if motions:
                 return [(turn, self.policies[turn][0], motions)], faults

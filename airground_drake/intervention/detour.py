@@ -1,4 +1,4 @@
-"""The detour policy: shortest path round obstacles that the UAV knows and robots that stand, back to the preset."""
+"""The detour policy: the shortest path back to the preset, round known obstacles and standing robots."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ import math
 import numpy as np
 
 from airground_drake.arrays import Array
-from airground_drake.intervention.paths import NoPath, Path, shortest_path
+from airground_drake.geometry.motion import Motion
+from airground_drake.geometry.paths import NoPath, Path, shortest_path
 from airground_drake.intervention.policy import Observation, Policy, Teammate
-from airground_drake.nsbc.motion import Motion
 
 SAMPLE_S = 0.05
 """Spacing of the vertices of the motion, s."""
@@ -17,11 +17,11 @@ SAMPLE_S = 0.05
 RENDEZVOUS_TOLERANCE_S = 1e-3
 
 CHASED = 16
-"""After so many strides the preset counts as running away."""
+"""After so many steps without a rendezvous the steps are doubled: the preset runs away."""
 
 
 LONGEST_FOLLOW_S = 600.0
-"""What is followed has a vertex for each SAMPLE_S."""
+"""Longest time for which a proposal follows the preset, s; it has a vertex for each SAMPLE_S."""
 
 
 class Detour(Policy):
@@ -51,8 +51,8 @@ class Detour(Policy):
     def propose(self, seen: Observation) -> Motion | None:
         """Shortest path to the earliest rendezvous with the preset trajectory, then along it.
 
-        Robots that stand, and have accepted nothing that will move them, are in the way like obstacles. None where no
-        free path to the preset trajectory exists up to its end.
+        Robots that stand, and have accepted no motion, count as obstacles. None if no free path leads to the preset
+        trajectory before its end.
         """
         height = seen.position[2]
         centres, radii = self._in_the_way(seen)
@@ -69,9 +69,9 @@ class Detour(Policy):
     def _rendezvous(self, seen: Observation, centres: Array, radii: Array) -> tuple[float, Path] | None:
         """Time to a rendezvous, s, and the path to it; None if the preset is blocked up to its end.
 
-        The duration only grows: by a sample where the preset is blocked, else to the travel time, so that no
-        rendezvous is passed over but in gaps of a sample. A preset that runs away nearly as fast is met by strides
-        that double, and then by bisection of the last: a rendezvous, not certainly the earliest.
+        The duration only grows: by a sample where the preset is blocked, else to the travel time. So no rendezvous is
+        missed that lasts longer than a sample. If the preset moves away nearly as fast as the UGV, the steps double,
+        and the last one is bisected. That finds a rendezvous, perhaps not the earliest.
         """
         gap = np.linalg.norm(seen.preset.at(seen.start)[0][:2] - seen.position[:2])
         duration = float(gap) / (self.speed + seen.preset.max_speed)  # no rendezvous can be earlier
@@ -99,7 +99,7 @@ class Detour(Policy):
         return duration, path
 
     def _way(self, seen: Observation, duration: float, centres: Array, radii: Array) -> tuple[float, Path | None]:
-        """Travel time, s, to where the preset is after the duration, and the path; None if there is none."""
+        """Travel time, s, to the place of the preset after the duration, s, and the path; None: there is no path."""
         goal = seen.preset.at(seen.start + duration)[0][:2]
         try:
             path = shortest_path(seen.position[:2], goal, centres, radii)
@@ -114,7 +114,7 @@ class Detour(Policy):
         places = np.array([mate.position for mate in robots]).reshape(-1, 3)
         least = np.concatenate([seen.obstacle_distances, [seen.distance_to(mate) for mate in robots]])
         around = np.concatenate([seen.obstacles, places])
-        # what is in the way may be as near to the target as the safe distance allows
+        # an obstacle may be as near to the target as the safe distance allows: then it gets no clearance
         from_target = np.linalg.norm(around - seen.preset.positions[-1], axis=1)
         reach = np.clip(from_target, least, least + self.clearance)
         squared = reach**2 - (around[:, 2] - height) ** 2

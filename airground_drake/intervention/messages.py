@@ -1,8 +1,10 @@
 """The bidirectional channel: proposals from the UAV, answers from the UGVs.
 
-An answer is two numbers per UGV: ACCEPT, REFUSE or SILENT, and the number of the proposal that it
-answers. An answer to another proposal than the one in force means nothing. With it comes a report: the obstacles
-that the UGV sensed when it decided, and why it answers so.
+An answer is two numbers per UGV: ACCEPT, REFUSE, DONE or SILENT, and the number of the proposal that it answers. DONE
+means that the UGV has executed the motion to its end. An answer to another proposal than the one in force means
+nothing. With it comes a report: the obstacles that the UGV sensed when it decided, and why it answers so.
+
+A joint plan takes effect only while all its parts in force are accepted: see `accepted_proposals`.
 """
 
 from __future__ import annotations
@@ -13,7 +15,7 @@ from typing import NamedTuple
 from airground_drake.arrays import Array
 from airground_drake.intervention.policy import Proposal
 
-ACCEPT, SILENT, REFUSE = 1.0, 0.0, -1.0
+ACCEPT, SILENT, REFUSE, DONE = 1.0, 0.0, -1.0, 2.0
 
 Point = tuple[float, float, float]
 """A place, m, world frame."""
@@ -44,12 +46,21 @@ Proposals = tuple[Proposal | None, ...]
 
 
 def answer_to(proposal: Proposal | None, answers: Sequence[float] | Array, robot: int) -> float:
-    """The UGV's answer to this very proposal: ACCEPT, REFUSE or SILENT; answers (2n,) flattened."""
+    """The UGV's answer to this very proposal: ACCEPT, REFUSE, DONE or SILENT; answers (2n,) flattened."""
     if proposal is None or answers[2 * robot + 1] != proposal.number:
         return SILENT
     return float(answers[2 * robot])
 
 
 def accepted_proposals(proposals: Sequence[Proposal | None], answers: Array) -> list[Proposal | None]:
-    """Per UGV, the proposal in force if the UGV has accepted it, else None."""
-    return [p if answer_to(p, answers, i) == ACCEPT else None for i, p in enumerate(proposals)]
+    """Per UGV, the proposal that it executes: the one in force if it has taken effect, else None.
+
+    A proposal takes effect when its UGV accepts it. A part of a joint plan also needs every other part in force to be
+    accepted or done.
+    """
+    said = [answer_to(proposal, answers, i) for i, proposal in enumerate(proposals)]
+    stopped = {p.joint for p, answer in zip(proposals, said, strict=True) if p and answer not in (ACCEPT, DONE)}
+    return [
+        p if p is not None and answer == ACCEPT and (not p.party or p.joint not in stopped) else None
+        for p, answer in zip(proposals, said, strict=True)
+    ]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Self
@@ -10,51 +9,36 @@ from typing import Any, Self
 import numpy as np
 
 from airground_drake.arrays import Array
-from airground_drake.intervention.database import BehaviourDatabase, Desk, Fault
-from airground_drake.intervention.messages import ACCEPT, REFUSE, Disc, Point, Proposals, Reports, answer_to
+from airground_drake.geometry.motion import Motion
+from airground_drake.intervention.database import BehaviourDatabase, Fault, Negotiation
+from airground_drake.intervention.messages import (
+    ACCEPT,
+    DONE,
+    REFUSE,
+    SILENT,
+    Disc,
+    Proposals,
+    Reports,
+    answer_to,
+)
 from airground_drake.intervention.policy import Answered, Observation, Proposal, Teammate
-from airground_drake.nsbc.motion import Motion
-
-OVER = "over"
-"""Why a UGV gives back what it has executed to its end, which is no refusal."""
-STANDS_S = 1.0
-"""A UGV stands once it has kept to one place for this long, s."""
-STANDS_M = 0.1
-"""One place: no farther than this from where it came to a halt, m; for slow UGVs it is less."""
-STANDS_SHARE = 0.1
-"""Of what a UGV can do in `STANDS_S`: one place is no larger than this."""
-
-
-@dataclass(frozen=True)
-class Halt:
-    """Where a UGV has been since when.
-
-    Attributes:
-        place: m, world frame.
-        since: s.
-    """
-
-    place: Point
-    since: float
 
 
 @dataclass(frozen=True)
 class PlannerMemory:
-    """What the UAV remembers: per UGV what is on the desk, what refusals have taught, all sent and gone wrong so far.
+    """What the UAV remembers.
 
     Attributes:
-        desks: one per UGV.
-        learnt: obstacles that came with refusals and were not on the map.
+        talks: where it stands with each UGV.
+        learnt: obstacles that came with answers and were not on the map.
         sent: (UGV, proposal), in order.
         faults: of policies, in order.
-        halts: of the UGVs, one each; none before the first planning instant.
     """
 
-    desks: tuple[Desk, ...]
+    talks: tuple[Negotiation, ...]
     learnt: tuple[Disc, ...] = ()
     sent: tuple[tuple[int, Proposal], ...] = ()
     faults: tuple[Fault, ...] = ()
-    halts: tuple[Halt, ...] = ()
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
         """Immutable: the copy is the object itself."""
@@ -63,11 +47,11 @@ class PlannerMemory:
     @property
     def proposals(self) -> Proposals:
         """In force, one entry per UGV."""
-        return tuple(desk.proposal for desk in self.desks)
+        return tuple(talk.proposal for talk in self.talks)
 
 
 def sent_after(before: PlannerMemory, after: PlannerMemory, t: float) -> PlannerMemory:
-    """Number the proposals that a planning instant has put on the desks, and note them as sent.
+    """Number the proposals that a planning instant has brought, and note them as sent.
 
     Every proposal that was not there before gets the next number and the time, whatever it came with: no planner can
     send another motion under the number that a UGV has answered.
@@ -77,24 +61,23 @@ def sent_after(before: PlannerMemory, after: PlannerMemory, t: float) -> Planner
         after: what the planner has made of it.
         t: time, s.
     """
-    sent, desks = list(before.sent), list(after.desks)
-    for i, (old, desk) in enumerate(zip(before.desks, after.desks, strict=True)):
-        if desk.proposal is not None and desk.proposal is not old.proposal:
-            proposal = replace(desk.proposal, number=len(sent), issued=t)
-            desks[i] = replace(desk, proposal=proposal)
+    sent, talks = list(before.sent), list(after.talks)
+    for i, (old, talk) in enumerate(zip(before.talks, after.talks, strict=True)):
+        if talk.proposal is not None and talk.proposal is not old.proposal:
+            proposal = replace(talk.proposal, number=len(sent), issued=t)
+            talks[i] = replace(talk, proposal=proposal)
             sent.append((i, proposal))
-    return replace(after, desks=tuple(desks), sent=tuple(sent)) if len(sent) > len(before.sent) else after
+    return replace(after, talks=tuple(talks), sent=tuple(sent)) if len(sent) > len(before.sent) else after
 
 
 @dataclass(frozen=True, eq=False)
 class Planner:
     """The UAV's planner, on its own map, which may miss obstacles.
 
-    A refusal moves it to the next behaviour; the obstacles that the UGV senses come with it, and the UAV knows them
-    from then on. Policies are asked for UGVs that are intervened on. What they propose to others, which are to make
-    way, is a proposal like any other, in force as long as the UGV that it is for is intervened on. If one UGV refuses
-    its part of a joint plan, the policies are asked again for the others, whose parts stay in force if nothing better
-    is found.
+    Policies are asked for UGVs that are intervened on. What they propose to others, which are to make way, is a
+    proposal like any other, in force as long as the UGV that it is for is intervened on. A refusal withdraws the
+    proposal, and all other parts of its joint plan; the next behaviour is tried after a rest. The obstacles that the
+    UGV senses come with every answer, and the UAV knows them from then on. See docs/protocol.md.
 
     Attributes:
         ugvs: names.
@@ -129,30 +112,11 @@ class Planner:
 
     def start(self) -> PlannerMemory:
         """What is remembered at the beginning: nothing."""
-        return PlannerMemory((Desk(),) * len(self.ugvs))
+        return PlannerMemory((Negotiation(),) * len(self.ugvs))
 
-    def watch(self, memory: PlannerMemory, t: float, positions: Array) -> PlannerMemory:
-        """Notice which UGVs have moved; to be called at every planning instant.
-
-        Args:
-            memory: before.
-            t: time, s.
-            positions: of all robots, (n + 1, 3), m, world frame.
-
-        Returns:
-            The new memory; the same object if none has left its place.
-        """
-        places: list[Point] = [(x, y, z) for x, y, z in positions[: len(self.ugvs)].tolist()]
-        if not memory.halts:
-            return replace(memory, halts=tuple(Halt(place, t) for place in places))
-        moved = [
-            math.dist(halt.place, place) > min(STANDS_M, STANDS_SHARE * STANDS_S * speed)
-            for halt, place, speed in zip(memory.halts, places, self.max_speed.tolist(), strict=True)
-        ]
-        if not any(moved):
-            return memory
-        halts = [Halt(places[i], t) if moved[i] else halt for i, halt in enumerate(memory.halts)]
-        return replace(memory, halts=tuple(halts))
+    def idle(self, memory: PlannerMemory, intervening: Sequence[bool]) -> bool:
+        """Whether a planning instant changes nothing: nobody is intervened on, and nothing of it is remembered."""
+        return not any(intervening) and memory.talks == self.start().talks
 
     def plan(
         self,
@@ -162,31 +126,30 @@ class Planner:
         intervening: Sequence[bool],
         answers: Array,
         reports: Reports,
+        standing: Sequence[bool] = (),
     ) -> PlannerMemory:
         """One planning period.
 
         Args:
-            memory: before, and watching up to now.
+            memory: before.
             t: time, s.
             positions: of all robots, (n + 1, 3), m, world frame.
             intervening: per UGV, whether the trigger has it in mode INTERVENING.
             answers: of the UGVs, (2n,), see `messages`.
             reports: what they sensed, see `messages`.
+            standing: per UGV, whether it stands, see `halts`; default: none does.
         """
-        no = [answer_to(desk.proposal, answers, i) == REFUSE for i, desk in enumerate(memory.desks)]
-        reported = {disc for i, report in enumerate(reports) if no[i] for disc in report.sensed}
-        refused = [no[i] and not (desk.is_due(t) and reports[i].reason == OVER) for i, desk in enumerate(memory.desks)]
+        said = [answer_to(talk.proposal, answers, i) for i, talk in enumerate(memory.talks)]
+        heard = [report for report, answer in zip(reports, said, strict=True) if answer != SILENT]
+        reported = {disc for report in heard for disc in report.sensed}
         mapped = np.column_stack([self.mapped, np.broadcast_to(self.mapped_radii, len(self.mapped))])
         fresh = tuple(sorted(reported - set(memory.learnt) - set(map(tuple, mapped.tolist()))))
         learnt = memory.learnt + fresh
         discs = np.concatenate([mapped, np.array(learnt).reshape(-1, 4)])
-        let_down = self._let_down(memory.desks, refused)
-        desks = self._after_answers(memory.desks, t, intervening, refused, learnt=bool(fresh))
+        talks = self._after_answers(memory.talks, t, intervening, said, learnt=bool(fresh))
         faults = list(memory.faults)
         for i, robot in enumerate(self.ugvs):
-            in_force = desks[i].proposal
-            just_sent = in_force is not None and in_force.issued == t
-            if not intervening[i] or just_sent or not (desks[i].is_due(t) or robot in let_down):
+            if not (intervening[i] and talks[i].is_due(t)):
                 continue
             seen = Observation(
                 t=t,
@@ -199,45 +162,41 @@ class Planner:
                 mapped=self.mapped,
                 others=np.delete(positions, i, axis=0),
                 safe_distance=self.safe_distance,
-                refusals=desks[i].refusals,
-                team=self._team(t, positions, intervening, answers, desks, memory.halts),
+                refusals=talks[i].refusals,
+                team=self._team(t, positions, intervening, answers, talks, standing),
                 robot_distance=self.robot_distance,
                 radius=float(self.radii[i]),
                 obstacle_radii=discs[:, 3],
                 mapped_radii=mapped[:, 3],
             )
-            planned = self.database.plan(desks[i], seen)
-            faults += planned.faults
-            for j, name in enumerate(self.ugvs):
-                desks[j] = planned.desk if j == i else planned.asked.get(name, desks[j])
-        return replace(memory, desks=tuple(desks), learnt=learnt, faults=tuple(faults))
+            changed, wrong = self.database.plan(talks[i], seen)
+            faults += wrong
+            talks = [changed.get(name, talk) for name, talk in zip(self.ugvs, talks, strict=True)]
+        return replace(memory, talks=tuple(talks), learnt=learnt, faults=tuple(faults))
 
     def _after_answers(
-        self, desks: Sequence[Desk], t: float, intervening: Sequence[bool], refused: Sequence[bool], *, learnt: bool
-    ) -> list[Desk]:
-        """Desks without what is over: refused, run out, or for a UGV that is not intervened on any more."""
+        self,
+        talks: Sequence[Negotiation],
+        t: float,
+        intervening: Sequence[bool],
+        said: Sequence[float],
+        *,
+        learnt: bool,
+    ) -> list[Negotiation]:
+        """Negotiations without what is withdrawn: refused in any part, run out, or for a UGV without a trigger now."""
         called = {name for name, one in zip(self.ugvs, intervening, strict=True) if one}
+        refused = {talk.proposal.joint for talk, no in zip(talks, said, strict=True) if talk.proposal and no == REFUSE}
         found = []
-        for name, desk, no in zip(self.ugvs, desks, refused, strict=True):
-            if name not in called and desk.cause not in called:
-                desk = Desk()
-            elif no:
-                desk = self.database.after_refusal(desk, t, learnt=learnt, favour=name not in called)
-            elif name not in called and desk.proposal is not None and desk.is_due(t):
-                desk = replace(desk, proposal=None, party=())
-            found.append(desk)
-        return found
-
-    def _let_down(self, desks: Sequence[Desk], refused: Sequence[bool]) -> set[str]:
-        """Names of the UGVs with proposals of joint plans of which another UGV has refused its part."""
-        found = set()
-        for desk, no in zip(desks, refused, strict=True):
-            if no and desk.proposal is not None:
-                issued = desk.proposal.issued
-                for name, other, also in zip(self.ugvs, desks, refused, strict=True):
-                    same = other.proposal is not None and other.proposal.issued == issued
-                    if name in desk.party and same and not also:
-                        found.add(name)
+        for name, talk, answer in zip(self.ugvs, talks, said, strict=True):
+            proposal = talk.proposal
+            party_refused = proposal is not None and bool(proposal.party) and proposal.joint in refused
+            if name not in called and talk.cause not in called:
+                talk = Negotiation()
+            elif answer == REFUSE:
+                talk = self.database.after_refusal(talk, t, learnt=learnt)
+            elif proposal is not None and (party_refused or answer == DONE or t >= proposal.motion.end):
+                talk = replace(talk, proposal=None)
+            found.append(talk)
         return found
 
     def _team(
@@ -246,8 +205,8 @@ class Planner:
         positions: Array,
         intervening: Sequence[bool],
         answers: Array,
-        desks: Sequence[Desk],
-        halts: Sequence[Halt],
+        talks: Sequence[Negotiation],
+        standing: Sequence[bool],
     ) -> tuple[Teammate, ...]:
         """Every UGV as it is now."""
         return tuple(
@@ -258,11 +217,11 @@ class Planner:
                 preset=self.presets[i],
                 max_speed=float(self.max_speed[i]),
                 triggered=bool(intervening[i]),
-                standing=t - halts[i].since >= STANDS_S if halts else False,
-                proposal=desks[i].proposal,
-                answered=_answered(desks[i].proposal, answers, i),
-                refusals=desks[i].refusals,
-                resting=desks[i].proposal is None and t < desks[i].retry_at,
+                standing=standing[i] if standing else False,
+                proposal=talks[i].proposal,
+                answered=_answered(talks[i].proposal, answers, i),
+                refusals=talks[i].refusals,
+                resting=talks[i].refused_lately(t),
                 radius=float(self.radii[i]),
             )
             for i, name in enumerate(self.ugvs)

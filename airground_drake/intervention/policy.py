@@ -11,7 +11,7 @@ from typing import Any, ClassVar, Literal, Self
 import numpy as np
 
 from airground_drake.arrays import LARGEST, Array, read_only
-from airground_drake.nsbc.motion import Motion
+from airground_drake.geometry.motion import Motion
 from airground_drake.nsbc.task import pseudoinverse
 
 Answered = Literal["silent", "accepted", "refused"]
@@ -29,7 +29,7 @@ class Teammate:
         preset: its preset trajectory.
         max_speed: m/s.
         triggered: whether its trigger has it in mode INTERVENING.
-        standing: whether it has stood where it is for a while (`planner.STANDS_S`).
+        standing: whether it has stood where it is for a while (`halts.STANDS_S`).
         proposal: the one in force, or None.
         answered: what the UGV says to it.
         refusals: proposals that it has refused since its trigger, or since that of the UGV that it was asked for.
@@ -62,7 +62,7 @@ class Observation:
         position: its position, (3,), m, world frame.
         target: its target, (3,), m.
         preset: its preset trajectory.
-        obstacles: centres of the obstacles that the UAV knows: its own map, and what refusals have taught it,
+        obstacles: centres of the obstacles that the UAV knows: its own map, and what answers have taught it,
             (m, 3), m.
         mapped: those of its own map alone, (k, 3), m.
         others: positions of the other robots, (n, 3), m.
@@ -120,6 +120,7 @@ class Proposal:
         cause: name of the UGV whose trigger it is sent for: another one's, if this UGV is asked to make way for it;
             empty: its own.
         mapped_radii: of the obstacles that the UAV knows, (k,), m, or one for all.
+        party: names of all UGVs with a part in the same joint plan; empty: the proposal stands alone.
         number: identifies the proposal in the UGV's answer. It is given when the proposal is sent, see
             `planner.sent_after`; before that it is -1.
     """
@@ -131,7 +132,13 @@ class Proposal:
     mapped: Array = field(default_factory=lambda: np.empty((0, 3)))
     cause: str = ""
     mapped_radii: Array | float = 0.0
+    party: tuple[str, ...] = ()
     number: int = -1
+
+    @property
+    def joint(self) -> tuple[float, tuple[str, ...]]:
+        """What all parts of a joint plan have in common, and nothing else: time of sending, s, and party."""
+        return self.issued, self.party
 
     @cached_property
     def chosen(self) -> Array:

@@ -1,4 +1,4 @@
-"""Wrong interventions: what a UAV may propose under occlusion, noise, a stale map or malice."""
+"""Wrong interventions: proposals of a UAV under occlusion, noise, a stale map or malice."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 
 from airground_drake.arrays import Array
+from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.detour import Detour
 from airground_drake.intervention.policy import SHORTEST_LEG_S, Observation, Policy
-from airground_drake.nsbc.motion import Motion
 
 
 class Towards(Policy):
-    """Straight to a fixed point, and stay there: the paper's wrong intervention of case B."""
+    """Go straight to a fixed point and stay there: the paper's wrong intervention of case B."""
 
     def __init__(self, *, x_m: float, y_m: float, speed_m_s: float) -> None:
         """Set the point, m, and the speed, m/s; raises ValueError unless the speed is positive."""
@@ -21,12 +21,12 @@ class Towards(Policy):
         self.speed = _positive("towards", speed_m_s)
 
     def propose(self, seen: Observation) -> Motion | None:
-        """The straight way from here, whatever stands there."""
+        """The straight way from here, through any obstacle."""
         return _straight(seen, np.append(self.point, seen.position[2]), self.speed)
 
 
 class StaleMap(Detour):
-    """The detour on the map as it was at the start: what refusals have taught is ignored."""
+    """The detour on the map of the start: obstacles learnt from refusals are ignored."""
 
     def propose(self, seen: Observation) -> Motion | None:
         """The detour round the obstacles of the original map."""
@@ -57,14 +57,14 @@ class Noisy(Detour):
 
 
 class Hostile(Policy):
-    """As dangerous as a speed bound allows: straight into the nearest obstacle or robot, anew at each proposal."""
+    """As dangerous as the speed limit allows: straight into the nearest obstacle or robot, chosen at each proposal."""
 
     def __init__(self, *, speed_m_s: float) -> None:
         """Set the speed, m/s; raises ValueError unless it is positive."""
         self.speed = _positive("hostile", speed_m_s)
 
     def propose(self, seen: Observation) -> Motion | None:
-        """The straight way to the centre of what is nearest."""
+        """The straight way to the centre of the nearest obstacle or robot."""
         around = np.concatenate([seen.obstacles, seen.others])
         if not len(around):
             return None
@@ -81,7 +81,7 @@ def _straight(seen: Observation, goal: Array, speed: float) -> Motion:
 
 
 HOLD_S = 1e4
-"""How long a wrong intervention holds its goal, s: in effect, until it is refused."""
+"""A wrong intervention holds its goal for this time, s: in effect, until it is refused."""
 
 
 def _positive(policy: str, speed: float) -> float:

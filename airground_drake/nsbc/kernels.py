@@ -13,16 +13,19 @@ from numba import njit
 from airground_drake.arrays import Array
 
 MARGIN_M_S = 1e-12
-"""Added to every bound in the projection, so that rounding leaves the bound itself satisfied, m/s."""
+"""Added to every bound in the projection, m/s. Without it the velocity of a robot in contact misses the bound, which is
+0 there, by rounding every other time, and `_scale_back` stops a robot that should slide along."""
 CONTRADICTION_M_S = 1e-9
-"""Constraints that every trial misses by more contradict each other; by less, it is rounding, m/s."""
+"""Constraints contradict each other if one is missed by more where the others are met, m/s; by less, it is rounding."""
 ABOVE_LEAST = 1e-9
 """A violation larger than the least by this, relatively, is as good: no speed is spent on what is rounding."""
 ABOVE_LEAST_M_S = 1e-11
 """So is one that is larger by this, m/s: between two points in opposite directions but for rounding, a velocity along
 both boundaries, as fast as the nearest far obstacle allows, would be better by what rounding makes of that speed."""
 DEPENDENT = 1e-20
-"""Square of the sine of the angle between normals of which one says what the others say: 1e-10 rad."""
+"""Square of the sine of the angle below which opposite normals leave no way between their boundaries: 1e-10 rad."""
+ROUNDING = 1e-15
+"""A constraint is met if it is missed by this, relative to the terms of its sum."""
 
 AUGMENTED, RECURSION_NEAREST, RECURSION_LISTED = 0, 1, 2
 
@@ -91,7 +94,7 @@ def news_within(points: Array, positions: Array, reach: float, known: npt.NDArra
 
 @njit(cache=True)
 def avoid_one(lower: Array, normal: Array, bound: Array, composition: int) -> Array:
-    """Velocity of one robot, (3,) m/s: the avoidance tasks above `lower`; see `avoid`.
+    """Velocity of one robot, (3,) m/s: the avoidance tasks above `lower`, composed by (5) or as `Avoidance` says.
 
     A `lower` that is not finite asks for nothing.
     """
@@ -177,11 +180,17 @@ def limit_speed(velocity: Array, max_speed: Array) -> Array:
     """Velocities (n, 3) scaled down to at most max_speed (n,), m/s, keeping their direction."""
     limited = velocity.copy()
     for i in range(len(velocity)):
-        speed = np.sqrt(_dot(velocity[i], velocity[i]))
-        if speed > max_speed[i]:
-            for a in range(3):
-                limited[i, a] *= max_speed[i] / speed
+        limit_one(limited[i], max_speed[i])
     return limited
+
+
+@njit(cache=True)
+def limit_one(velocity: Array, max_speed: float) -> None:
+    """Scale a velocity (3,) down to a speed limit, m/s, in place."""
+    speed = np.sqrt(_dot(velocity, velocity))
+    if speed > max_speed:
+        for a in range(3):
+            velocity[a] *= max_speed / speed
 
 
 @njit(cache=True)
@@ -192,8 +201,8 @@ def _dot(a: Array, b: Array) -> float:
 @njit(cache=True)
 def _closest_feasible(lower: Array, normal: Array, bound: Array) -> Array:
     """Closest velocity to `lower` under all constraints; where none meets them, see `_least_violation`."""
-    velocity, shortfall = _closest(lower, normal, bound, False, False)
-    return velocity if shortfall <= CONTRADICTION_M_S else _least_violation(normal, bound)
+    velocity, missed = _closest(lower, normal, bound + MARGIN_M_S, CONTRADICTION_M_S)
+    return velocity if missed == 0.0 else _least_violation(normal, bound + MARGIN_M_S)
 
 
 @njit(cache=True)
@@ -201,133 +210,136 @@ def _least_violation(normal: Array, bound: Array) -> Array:
     """Slowest velocity among those whose largest violation is least, but for `ABOVE_LEAST` of it and `ABOVE_LEAST_M_S`.
 
     Constraints contradict each other only where a robot is inside several safe distances at once. What the
-    lower priorities ask for then has no say: they might be hostile.
+    lower priorities ask for then has no say: they might be hostile. The least violation is found from below: each
+    contradiction proves that every velocity misses a constraint by so much, and the bounds are lowered by that.
     """
-    low, high = 0.0, 0.0
-    for k in range(len(bound)):
-        high = max(high, bound[k] + MARGIN_M_S)  # standing still violates nothing by more
-    still, in_conflict = np.zeros(3), np.arange(len(bound))  # which are enough to rule `low` out
-    while high - low > 1e-13 * high:
-        middle = 0.5 * (low + high)
-        if middle <= low or middle >= high:
+    still = np.zeros(normal.shape[1])
+    least, more = 0.0, np.inf
+    while more > 1e-14 * least:
+        more = _closest(still, normal, bound - least, 0.0)[1]
+        least += more
+    return _closest(still, normal, bound - ((1.0 + ABOVE_LEAST) * least + ABOVE_LEAST_M_S), CONTRADICTION_M_S)[0]
+
+
+@njit(cache=True)
+def _closest(lower: Array, normal: Array, bound: Array, contradiction: float) -> tuple[Array, float]:
+    """Closest velocity to `lower` (d,) with normal (K, d) . v >= bound (K,), and the violation that is certain, m/s.
+
+    The dual active-set method of Goldfarb and Idnani (Mathematical Programming 27, 1983) in any number of dimensions
+    d. The velocity is always the closest one under the active constraints, each of which pushes with a force >= 0. The
+    constraint that is missed most joins them; one whose force falls to 0 on the way leaves.
+
+    A constraint that the active ones contradict is left out if it is missed by no more than `contradiction`, m/s.
+    Otherwise the certain violation is above 0: every velocity misses a constraint by as much, and the velocity returned
+    means nothing.
+    """
+    count, d = normal.shape
+    velocity, settled = lower.copy(), np.zeros(count, dtype=np.bool_)  # active or left out
+    active, force, pull = np.empty(d, dtype=np.int64), np.empty(d + 1), np.empty(d)
+    across, share = np.empty((d + 1, d)), np.empty((d + 1, d))
+    size = 0
+    for _ in range(10 * (count + d)):  # more than ever needed: a bound in case that rounding makes it go in circles
+        p = _most_missed(velocity, normal, bound, settled)
+        if p < 0:
             break
-        found, missed = _closest(still, normal[in_conflict], bound[in_conflict] - middle, True, True)
-        if missed == 0.0 and len(in_conflict) < len(bound):
-            found, missed = _closest(still, normal, bound - middle, True, True)
-        if missed == 0.0:
-            high = middle
-        else:
-            low = middle
-            lacking = bound - middle - normal @ found
-            in_conflict = np.flatnonzero(lacking >= -CONTRADICTION_M_S)
-    return _closest(still, normal, bound - ((1.0 + ABOVE_LEAST) * high + ABOVE_LEAST_M_S), True, False)[0]
+        settled[p] = True
+        force[size] = 0.0
+        while True:
+            _split(normal[p], across, share, size)
+            across_squared, squared, missed = 0.0, 0.0, bound[p]
+            for a in range(d):
+                across_squared += across[size, a] ** 2
+                squared += normal[p, a] ** 2
+                missed -= normal[p, a] * velocity[a]
+            step, leaving = np.inf, -1
+            pull[:size] = share[size, :size]
+            for m in range(size - 1, -1, -1):  # normal[p] = across[size] + sum over m of pull[m] * normal[active[m]]
+                for n in range(m):
+                    pull[n] -= pull[m] * share[m, n]
+                if pull[m] > 0.0 and force[m] < step * pull[m]:
+                    step, leaving = max(force[m], 0.0) / pull[m], m
+            if leaving < 0 and (across_squared <= DEPENDENT * squared or squared < 1e-18):
+                if missed <= contradiction:
+                    break
+                weight, total = 1.0, bound[p]  # no velocity changes this sum of what is missed
+                for m in range(size):
+                    weight -= pull[m]
+                    total -= pull[m] * bound[active[m]]
+                return velocity, total / weight
+            joins = missed < step * across_squared
+            if joins:
+                step = missed / across_squared
+            for a in range(d):
+                velocity[a] += step * across[size, a]
+            for m in range(size):
+                force[m] -= step * pull[m]
+            force[size] += step
+            if joins:
+                active[size] = p
+                size += 1
+                _meet(velocity, normal, bound, active[:size], across)
+                break
+            settled[active[leaving]] = False
+            for m in range(leaving, size):
+                force[m] = force[m + 1]
+            size -= 1
+            for m in range(leaving, size):
+                active[m] = active[m + 1]
+                _split(normal[active[m]], across, share, m)
+    return velocity, 0.0
 
 
 @njit(cache=True)
-def _closest(lower: Array, normal: Array, bound: Array, every: bool, any_one: bool) -> tuple[Array, float]:
-    """Closest velocity to `lower` under all constraints, and by how much it misses one, m/s (0: rounding at most).
-
-    By enumeration of active sets of at most three, none among them: a projection in R^3 needs no larger one (a planar
-    robot: two), so this is exact. Each trial is lower + J^+ (b - J lower), the augmented composition over that active
-    set. Of those that meet all constraints the closest one is taken, else the one that misses least. Where standing
-    still meets all constraints, no projection is longer than `lower`, and those that nothing of its size can reach are
-    left out, unless `every` one is asked for. Then nothing is allowed for the rounding of fast velocities either, which
-    would make them look better than slow ones. With `any_one`, the first that meets all is as good as the closest.
-    """
-    rounding = 0.0 if every else 1e-15
-    worst = 0.0
+def _most_missed(velocity: Array, normal: Array, bound: Array, settled: npt.NDArray[np.bool_]) -> int:
+    """Index of the constraint that is missed most, by more than rounding, among those not settled; -1 if none is."""
+    found, worst = -1, 0.0
     for k in range(len(bound)):
-        worst = max(worst, bound[k])
-    every = every or worst > CONTRADICTION_M_S
-    reach = np.sqrt(_dot(lower, lower)) + 2.0 * worst + 1e-9
-    row, level = np.empty((len(bound), 3)), np.empty(len(bound))
-    count = 0
-    planar = True
-    for k in range(len(bound)):
-        if bound[k] > -reach or (every and bound[k] > -np.inf):
-            for a in range(3):
-                row[count, a] = normal[k, a]
-            level[count] = bound[k] + MARGIN_M_S
-            planar = planar and normal[k, 2] == 0.0
-            count += 1
-    tolerance = 0.5 * MARGIN_M_S + 1e-14 * reach
-    best, trial, best_cost = lower.copy(), np.empty(3), 0.0
-    best_shortfall = _shortfall(row, level, count, best, tolerance, rounding, np.inf)
-    active, across = np.empty(3, dtype=np.int64), np.empty((3, 3))
-    independent = np.ones(4, dtype=np.bool_)  # the first 0, 1, 2, 3 of the active ones
-    for i in range(count):
-        for j in range(i, count):
-            for m in range(j, j + 1 if planar or j == i else count):
-                active[0], active[1], active[2] = i, j, m
-                size = 1 if j == i else 2 if m == j else 3
-                independent[size] = independent[size - 1] and _across(row, active[:size], across)
-                if not independent[size]:
-                    continue
-                for a in range(3):
-                    trial[a] = lower[a]
-                _meet(row, level, active[:size], across, trial)
-                shortfall = _shortfall(row, level, count, trial, tolerance, rounding, best_shortfall)
-                cost = 0.0
-                for a in range(3):
-                    cost += (trial[a] - lower[a]) ** 2
-                if shortfall < best_shortfall or (shortfall == best_shortfall and cost < best_cost):
-                    best_shortfall, best_cost = shortfall, cost
-                    for a in range(3):
-                        best[a] = trial[a]
-                    if any_one and shortfall == 0.0:
-                        return best, shortfall
-    return best, best_shortfall
+        missed = bound[k]
+        for a in range(len(velocity)):
+            missed -= normal[k, a] * velocity[a]
+        if missed > worst and not settled[k]:
+            terms = abs(bound[k])
+            for a in range(len(velocity)):
+                terms += abs(normal[k, a] * velocity[a])
+            if missed > ROUNDING * terms:
+                found, worst = k, missed
+    return found
 
 
 @njit(cache=True)
-def _shortfall(
-    row: Array, level: Array, count: int, velocity: Array, tolerance: float, rounding: float, enough: float
-) -> float:
-    """By how much a velocity misses one of the constraints, m/s; 0 if by no more than tolerance and rounding.
+def _split(vector: Array, across: Array, share: Array, k: int) -> None:
+    """Write the part of a vector that is orthogonal to across[:k] into across[k], and into share[k, :k] its shares.
 
-    Of one that misses by more than `enough` it is not found how much more.
+    Gram-Schmidt, twice: once leaves, of nearly parallel ones, a part along the others that is as large as the rest.
     """
-    allowed = tolerance + rounding * np.sqrt(_dot(velocity, velocity))
-    found = 0.0
-    for k in range(count):
-        found = max(found, level[k] - _dot(row[k], velocity))
-        if found > allowed and found > enough:
-            return found
-    return found if found > allowed else 0.0
+    across[k] = vector
+    share[k, :k] = 0.0
+    for _ in range(2):
+        for m in range(k):
+            along, squared = 0.0, 0.0
+            for a in range(len(vector)):
+                along += across[m, a] * across[k, a]
+                squared += across[m, a] ** 2
+            share[k, m] += along / squared
+            for a in range(len(vector)):
+                across[k, a] -= along / squared * across[m, a]
 
 
 @njit(cache=True)
-def _across(row: Array, active: npt.NDArray[np.int64], across: Array) -> bool:
-    """Of the last active constraint the part of its normal that is orthogonal to those before it, by Gram-Schmidt.
-
-    Written into `across`, where those of the ones before it stand; False where its normal depends on theirs but for
-    rounding, so that a smaller set says the same.
-    """
-    k = len(active) - 1
-    for a in range(3):
-        across[k, a] = row[active[k], a]
-    for _ in range(2):  # once leaves a part of the normals before, by rounding, as large as what is orthogonal
-        for n in range(k):
-            share = _dot(across[n], across[k]) / _dot(across[n], across[n])
-            for a in range(3):
-                across[k, a] -= share * across[n, a]
-    squared = _dot(row[active[k]], row[active[k]])
-    return squared >= 1e-18 and _dot(across[k], across[k]) > DEPENDENT * squared
-
-
-@njit(cache=True)
-def _meet(row: Array, level: Array, active: npt.NDArray[np.int64], across: Array, velocity: Array) -> None:
+def _meet(velocity: Array, normal: Array, bound: Array, active: npt.NDArray[np.int64], across: Array) -> None:
     """Take a velocity, in place, the shortest way to where the active constraints hold with equality.
 
     Twice: of nearly parallel ones the first pass leaves rounding, divided by the sine of their angle, which is more
     than what counts as met; the second one starts beside the goal, and what it leaves is rounding again.
     """
     for _ in range(2):
-        for k in range(len(active)):
-            normal = row[active[k]]
-            share = (level[active[k]] - _dot(normal, velocity)) / _dot(across[k], normal)
-            for a in range(3):
-                velocity[a] += share * across[k, a]
+        for m in range(len(active)):
+            missed, along = bound[active[m]], 0.0
+            for a in range(len(velocity)):
+                missed -= normal[active[m], a] * velocity[a]
+                along += normal[active[m], a] * across[m, a]
+            for a in range(len(velocity)):
+                velocity[a] += missed / along * across[m, a]
 
 
 @njit(cache=True)

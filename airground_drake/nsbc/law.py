@@ -1,16 +1,24 @@
-"""The UGVs' control law: avoidance (7)-(8), tracking (6) and intervention (14), composed as (5) or (20)."""
+"""The UGVs' control law: avoidance (7)-(8), tracking (6) and intervention (14), composed as (5) or (20).
+
+Compiled, and written once: the controllers command by it (`UgvLaw.velocity`), and the gatekeeper rolls it out
+(`command`, called in `gatekeeper/rollout.py`).
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache, cached_property
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
+from numba import njit
 
 from airground_drake.arrays import Array
-from airground_drake.nsbc.avoidance import Avoidance, HalfSpaces, limit_speed
-from airground_drake.nsbc.tasks import PositionTask
+from airground_drake.nsbc.avoidance import Avoidance
+from airground_drake.nsbc.kernels import avoid_one, fill_half_spaces, gather, limit_one
+from airground_drake.nsbc.team import Neighbourhood
 
 
 class Intervention(NamedTuple):
@@ -25,6 +33,18 @@ class Intervention(NamedTuple):
     wanted: Array
     rate: Array
     chosen: Array
+
+
+class Numbers(NamedTuple):
+    """The numbers of `UgvLaw`, as numba takes them; `composition` is `Avoidance.code`."""
+
+    motion_gain: float
+    intervention_gain: float
+    intervention_on_top: bool
+    avoidance_gain: float
+    period: float
+    sensing_range: float
+    composition: int
 
 
 @dataclass(frozen=True)
@@ -43,47 +63,132 @@ class UgvLaw:
     intervention_gain: float
     intervention_on_top: bool
 
+    @cached_property
+    def numbers(self) -> Numbers:
+        """For compiled code."""
+        layer = self.avoidance
+        return Numbers(
+            float(self.motion_gain), float(self.intervention_gain), self.intervention_on_top,
+            float(layer.gain), float(layer.period), float(layer.sensing_range), layer.code,
+        )  # fmt: skip
+
     def velocity(
         self,
-        position: Array,
-        target: PositionTask,
+        positions: Array,
+        near: Neighbourhood,
+        target: Array,
+        rate: Array,
         asked: Sequence[Intervention | None],
-        spaces: HalfSpaces,
         mobility: Array,
         max_speed: Array,
     ) -> Array:
-        """Commands of n UGVs, (n, 3), m/s.
-
-        Without an accepted intervention: tracking below avoidance. With one: `intervention_on_top` puts it above
-        that composite, as (20) does; otherwise it is the task below avoidance, and tracking fills its null space, so
-        that no intervention can break an avoidance inequality.
+        """Commands of n UGVs, (n, 3), m/s: `command` for each.
 
         Args:
-            position: (n, 3), m, world frame.
-            target: the UGVs' own task (6).
+            positions: of all robots, the UGVs first, (N, 3), m, world frame.
+            near: obstacles and robots around the UGVs.
+            target: of the UGVs' own task (6), (n, 3), m.
+            rate: velocity of the target, (n, 3), m/s.
             asked: per UGV, what the accepted intervention asks for, or None.
-            spaces: avoidance inequalities at these positions.
             mobility: (n, 3), 1 where a robot can move, else 0.
             max_speed: (n,), m/s.
         """
-        own = limit_speed(target.velocity(position) * mobility, max_speed)
-        composite = self.avoidance.apply(own, spaces)
-        for i, intervention in enumerate(asked):
-            if intervention is None:
-                continue
-            row = slice(i, i + 1)
-            below = composite[i] if self.intervention_on_top else own[i]
-            task = mobility[i] * self._intervened(intervention, position[i], below, mobility[i])
-            if not np.isfinite(task).all():  # the planner sends no such thing; nothing to follow then
-                continue
-            velocity = limit_speed(task[None], max_speed[row])
-            if not self.intervention_on_top:
-                velocity = self.avoidance.apply(velocity, HalfSpaces(spaces.normal[row], spaces.bound[row]))
-            composite[i] = velocity[0]
-        return composite
+        executing, together = _nothing_asked(len(target))
+        if any(one is not None for one in asked):
+            executing, together = executing.copy(), Intervention(*(array.copy() for array in together))
+            for i, one in enumerate(asked):
+                if one is not None:
+                    executing[i] = True
+                    together.wanted[i], together.rate[i], together.chosen[i] = one
+        return _commands(
+            self.numbers, positions, near.obstacles, near.others, near.distance, near.share, target, rate,
+            executing, together, mobility, max_speed,
+        )  # fmt: skip
 
-    def _intervened(self, intervention: Intervention, position: Array, below: Array, mobility: Array) -> Array:
-        """Eq (20): v_int + (I - J_int^+ J_int) v, with v_int of (14), for one UGV; (3,), m/s."""
-        wanted, rate, chosen = intervention
-        asked = mobility * (rate + self.intervention_gain * (wanted - position))
-        return below + chosen @ (asked - below)
+
+@cache
+def _nothing_asked(count: int) -> tuple[npt.NDArray[np.bool_], Intervention]:
+    """Nobody executes anything: flags (n,), and arrays that are not looked at then; not written to."""
+    zero = np.zeros((count, 3))
+    return np.zeros(count, dtype=np.bool_), Intervention(zero, zero, np.zeros((count, 3, 3)))
+
+
+@njit(cache=True)
+def command(
+    law: Numbers,
+    position: Array,
+    target: Array,
+    rate: Array,
+    executing: bool,
+    asked: Intervention,
+    normal: Array,
+    bound: Array,
+    mobility: Array,
+    max_speed: float,
+) -> Array:
+    """Command of one UGV, (3,), m/s.
+
+    Without an accepted intervention: tracking below avoidance. With one: `intervention_on_top` puts it above that
+    composite, as (20) does; otherwise it is the task below avoidance, and tracking fills its null space, so that no
+    intervention can break an avoidance inequality.
+
+    Args:
+        law: its numbers.
+        position: (3,), m, world frame.
+        target: of its own task (6), (3,), m.
+        rate: velocity of the target, (3,), m/s.
+        executing: whether an intervention is accepted.
+        asked: what it asks for; not looked at without one.
+        normal: of the avoidance inequalities at this position, (K, 3).
+        bound: of the avoidance inequalities, (K,), m/s.
+        mobility: (3,), 1 where it can move, else 0.
+        max_speed: m/s.
+    """
+    own = np.empty(3)
+    for a in range(3):
+        own[a] = mobility[a] * (rate[a] + law.motion_gain * (target[a] - position[a]))
+    limit_one(own, max_speed)
+    if not executing:
+        return avoid_one(own, normal, bound, law.composition)
+    below = avoid_one(own, normal, bound, law.composition) if law.intervention_on_top else own
+    task = below.copy()  # (20): v_int + (I - J_int^+ J_int) v, with v_int of (14)
+    for b in range(3):
+        wish = mobility[b] * (asked.rate[b] + law.intervention_gain * (asked.wanted[b] - position[b]))
+        for a in range(3):
+            task[a] += asked.chosen[a, b] * (wish - below[b])
+    for a in range(3):
+        task[a] *= mobility[a]
+    if not np.isfinite(task).all():  # the planner sends no such thing; nothing to follow then
+        task = below
+    limit_one(task, max_speed)
+    return task if law.intervention_on_top else avoid_one(task, normal, bound, law.composition)
+
+
+@njit(cache=True)
+def _commands(
+    law: Numbers,
+    positions: Array,
+    obstacles: Array,
+    others: npt.NDArray[np.intp],
+    distance: Array,
+    share: Array,
+    target: Array,
+    rate: Array,
+    executing: npt.NDArray[np.bool_],
+    asked: Intervention,
+    mobility: Array,
+    max_speed: Array,
+) -> Array:
+    """`command` for n UGVs, (n, 3), m/s: arrays as in `UgvLaw.velocity` and `Neighbourhood`."""
+    velocity, centre = np.empty(target.shape), gather(positions, obstacles, others)
+    normal, bound = np.empty(centre.shape[1:]), np.empty(centre.shape[1])
+    for i in range(len(target)):
+        fill_half_spaces(
+            positions[i], centre[i], distance[i], share[i], law.avoidance_gain, law.period, mobility[i],
+            law.sensing_range, normal, bound,
+        )  # fmt: skip
+        velocity[i] = command(
+            law, positions[i], target[i], rate[i], executing[i],
+            Intervention(asked.wanted[i], asked.rate[i], asked.chosen[i]), normal, bound, mobility[i], max_speed[i],
+        )  # fmt: skip
+    return velocity

@@ -60,8 +60,3 @@ def pseudoinverse(jacobian: Array) -> Array:
     so that no velocity is asked for in a direction in which the task cannot move.
     """
     return np.asarray(np.linalg.pinv(jacobian, rcond=1e-12), dtype=np.float64)
-
-
-def null_space(jacobian: Array) -> Array:
-    """Projector N = I - J^+ J of (5) onto the null space of J: (..., m, 3) to (..., 3, 3)."""
-    return np.eye(jacobian.shape[-1]) - pseudoinverse(jacobian) @ jacobian

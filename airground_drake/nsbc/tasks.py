@@ -1,14 +1,17 @@
-"""The tasks of the paper: move to target or track, keep a distance, stay over the centroid, intervene.
+"""The tasks of the paper: move to target or track, keep a distance, stay over the centroid.
 
-The controllers run `DistanceTask` as inequalities (`avoidance.py`) and `InterventionTask` in the closed form that
-a constant Jacobian allows; tests hold those against the tasks as stated here.
+The UAV's controller runs the task it is given, by default `FormationTask`. The UGVs' law is compiled: it has
+`DistanceTask` as inequalities (`avoidance.py`), and `PositionTask` and the intervention (14) in closed form (`law.py`).
+Tests hold it against the tasks.
 """
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
-from airground_drake.arrays import Array
+from airground_drake.arrays import Array, read_only
 from airground_drake.nsbc.task import Task
 
 
@@ -82,35 +85,11 @@ class FormationTask(PositionTask):
 
     def __init__(self, ugv_positions: Array, ugv_velocities: Array, altitude: float, gain: float) -> None:
         """Fly `altitude` m over the centroid of UGVs at (n, 3) m moving at (n, 3) m/s."""
-        share = np.full((1, len(ugv_positions)), 1.0 / len(ugv_positions))
+        share = _share(len(ugv_positions))
         super().__init__(share @ ugv_positions + np.array([0.0, 0.0, altitude]), share @ ugv_velocities, gain)
 
 
-class InterventionTask(Task):
-    """The UAV's intervention on UGVs, eqs (12)-(14): sigma_int = S rho (gain Lambda).
-
-    Attributes:
-        target: intervened positions, (n, 3), m.
-        rate: their velocities, (n, 3), m/s.
-        selection: constant task Jacobian J_int = S, (m, 3): the directions in which the UAV intervenes
-            (the identity: all of them, so that nothing is left for the UGV's own tasks).
-    """
-
-    def __init__(self, target: Array, rate: Array, gain: float, selection: Array) -> None:
-        """Steer `selection @ rho` to `selection @ target`; raises ValueError on a bad gain."""
-        super().__init__(gain)
-        self.target = target
-        self.rate = rate
-        self.selection = selection
-
-    def value(self, position: Array) -> Array:
-        """S rho, (n, m), m."""
-        return position @ self.selection.T
-
-    def jacobian(self, position: Array) -> Array:
-        """S for every robot, (n, m, 3)."""
-        return np.broadcast_to(self.selection, (len(position), *self.selection.shape))
-
-    def desired(self) -> tuple[Array, Array]:
-        """S target in m and S rate in m/s, each (n, m)."""
-        return self.target @ self.selection.T, self.rate @ self.selection.T
+@cache
+def _share(count: int) -> Array:
+    """What each of `count` robots has in their centroid, (1, count)."""
+    return read_only(np.full((1, count), 1.0 / count))

@@ -1,5 +1,5 @@
-(** What the layer of avoidance may do to a command, and what that does to an intervention: SAFE-GATE, LIVE-GATE,
-    SAFE-DIST. Velocities are vectors; the inequality [i] of a body is [b i <= dot (n i) v]. *)
+(** What the layer of avoidance may do to a command, and what that does to an intervention: SAFE-GATE, SAFE-DIST.
+    Velocities are vectors; the inequality [i] of a body is [b i <= dot (n i) v]. *)
 Require Import Reals Lra Psatz Safety.
 Local Open Scope R_scope.
 
@@ -34,36 +34,6 @@ Lemma norm_scale s a : 0 <= s -> norm (scale s a) = s * norm a.
 Proof.
   intros H; unfold norm; replace (dot (scale s a) (scale s a)) with (Rsqr s * dot a a) by (unfold Rsqr; vectors; ring).
   rewrite sqrt_mult_alt by apply Rle_0_sqr; rewrite sqrt_Rsqr by exact H; reflexivity.
-Qed.
-
-(** ** A tracking error that contracts stays within [r], if its disturbance is at most [g r]: any number of samples. *)
-Theorem tracking_contracts (g h r : R) (e w : nat -> vec) : 0 <= g -> 0 <= h -> g * h <= 1 ->
-  (forall k, e (S k) = add (scale (1 - g * h) (e k)) (scale h (w k))) -> (forall k, norm (w k) <= g * r) ->
-  norm (e 0%nat) <= r -> forall k, norm (e k) <= r.
-Proof.
-  intros G H C S W E0 k; induction k as [| k IH]; [exact E0 |]; rewrite S.
-  eapply Rle_trans; [apply triangle |]; rewrite !norm_scale by lra; specialize (W k); nra.
-Qed.
-
-(** ** Whatever the disturbance is, the error stays within the bound [b] that adds up what is left of it. *)
-Theorem tracking_bounded (g h : R) (e w : nat -> vec) (b : nat -> R) : 0 <= h -> g * h <= 1 ->
-  (forall k, e (S k) = add (scale (1 - g * h) (e k)) (scale h (w k))) ->
-  (forall k, b (S k) = (1 - g * h) * b k + h * norm (w k)) -> norm (e 0%nat) <= b 0%nat ->
-  forall k, norm (e k) <= b k.
-Proof.
-  intros H C S B E0 k; induction k as [| k IH]; [exact E0 |]; rewrite S, B.
-  eapply Rle_trans; [apply triangle |]; rewrite !norm_scale by lra; nra.
-Qed.
-
-(** ** With enough room no inequality restricts the command [v]: [D >= d + v h] beside an obstacle (share [q] = 1),
-    [D >= d + 2 v h] beside a robot ([q] = 1/2). *)
-Theorem room h d D q n v : 0 < h -> norm n = 1 -> 0 < q -> d + norm v * h / q <= D ->
-  - q * (D - d) / h <= dot n v.
-Proof.
-  intros H N Q R; pose proof (dot_le n v) as C; rewrite N in C.
-  apply Rmult_le_reg_r with h; [exact H |]; replace (- q * (D - d) / h * h) with (- (q * (D - d))) by (field; lra).
-  assert (q * (norm v * h / q) <= q * (D - d)) by (apply Rmult_le_compat_l; lra).
-  replace (q * (norm v * h / q)) with (norm v * h) in * by (field; lra); nra.
 Qed.
 
 (** * SAFE-DIST *)

@@ -9,7 +9,12 @@ from typing import Any
 from jinja2 import Template
 
 from airground_drake.errors import ReplayError
-from airground_drake.replay.looks import (
+from airground_drake.replay.recording import recorded
+from airground_drake.replay.scene import FRAMES_PER_S, MAX_NAMED_OBSTACLES, Scene
+from airground_drake.report.html import digest
+from airground_drake.report.templating import environment_of
+from airground_drake.view.draw import obstacle_path, robot_path
+from airground_drake.view.looks import (
     OBSTACLE_COLOR,
     OUTCOME_COLORS,
     STATE_COLORS,
@@ -17,10 +22,7 @@ from airground_drake.replay.looks import (
     UAV_COLOR,
     UNSEEN_COLOR,
 )
-from airground_drake.replay.recording import obstacle_path, recorded, robot_path
-from airground_drake.replay.scene import FRAMES_PER_S, MAX_NAMED_OBSTACLES, STATES, Scene
-from airground_drake.report.html import digest
-from airground_drake.report.templating import environment_of
+from airground_drake.view.stage import STATES
 
 MAX_EVENTS = 300
 """Events that are listed."""

@@ -14,7 +14,10 @@ from matplotlib.patches import Circle
 
 from airground_drake import files
 from airground_drake.errors import ReplayError
-from airground_drake.replay.looks import (
+from airground_drake.replay.proposals import Sent
+from airground_drake.replay.scene import MAX_NAMED_OBSTACLES, Body, Scene
+from airground_drake.report.figures import canvas
+from airground_drake.view.looks import (
     OBSTACLE_COLOR,
     OUTCOME_COLORS,
     PATH_COLOR,
@@ -24,9 +27,7 @@ from airground_drake.replay.looks import (
     UAV_COLOR,
     UNSEEN_COLOR,
 )
-from airground_drake.replay.proposals import Sent
-from airground_drake.replay.scene import MAX_NAMED_OBSTACLES, Body, Pillar, Scene
-from airground_drake.report.figures import canvas
+from airground_drake.view.stage import Pillar
 
 PICTURES_PER_S = 15
 """Pictures in a second of the video."""

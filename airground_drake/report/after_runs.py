@@ -105,13 +105,15 @@ def write(
 
 def _refinement(verdicts: Sequence[Verdict], audited: bool) -> list[Figure]:
     """The figure of ZENO-REFINE, if there is such a verdict: beside finding 9, where that is in the report."""
-    drawn = [zeno_refine.draw(verdict.finding.evidence) for verdict in verdicts if verdict.claim.id == "ZENO-REFINE"]
+    drawn = [
+        zeno_refine.draw(each.finding.evidence) for each in verdicts if (each.claim.id, each.run) == ("ZENO-REFINE", "")
+    ]
     return [replace(figure, beside="audit-9") if audited else figure for figure in drawn if figure is not None]
 
 
 def _threshold(verdicts: Sequence[Verdict]) -> list[Figure]:
-    """The figure of THR-CHOICE, if there is such a verdict."""
-    chosen = [verdict for verdict in verdicts if verdict.claim.id == "THR-CHOICE"]
+    """The figure of THR-CHOICE, if there is such a verdict about the model of all runs."""
+    chosen = [verdict for verdict in verdicts if (verdict.claim.id, verdict.run) == ("THR-CHOICE", "")]
     drawn = [threshold.draw(verdict.inputs, verdict.finding.evidence) for verdict in chosen]
     return [figure for figure in drawn if figure is not None]
 
@@ -140,8 +142,10 @@ def provenance(scenario: Scenario, started: datetime, command: str) -> dict[str,
 
 def _solver(scenario: Scenario, daqp: str) -> str:
     """What solves (26) under method (c)."""
-    route = scenario.gatekeeper.route
-    return f"DAQP {daqp}, one thread" if route == "mixed_integer" else f"that of the route {route}"
+    route, solver = scenario.gatekeeper.route, scenario.gatekeeper.solver
+    if route != "mixed_integer":
+        return f"that of the route {route}"
+    return f"DAQP {daqp}, one thread" if solver == "daqp" else f"{solver}, through Drake, one thread"
 
 
 def _git() -> str:

@@ -130,11 +130,6 @@ def _refused(run: Mapping[str, Any], robot: str) -> str:
 
 
 def _of_the_paper(document: Mapping[str, Any]) -> Iterator[Item]:
-    for row in document["reproduction"]:
-        if row["status"] == "not_reproduced":
-            yield Item(
-                "not_reproduced", f"{row['id']}, {row['quantity']}: {row['why']}", run=row["run"], anchor="reproduction"
-            )
     for number in document["overall"]["undemonstrated"]:
         yield Item("not_demonstrated", f"finding {number} about the paper", anchor="audit")
 
@@ -158,9 +153,11 @@ def _of_faults(runs: Mapping[str, Mapping[str, Any]]) -> Iterator[Item]:
         for kind in kinds[:MAX_FAULTS]:
             count, first = kind["count"], f"first at {kind['first_s']:.2f} s"
             often = f"{count} times, {first}" if count > 1 else f"once, at {kind['first_s']:.2f} s"
-            yield Item("error", f"{kind['what']} ({often})", run=name, about=f"policy {kind['policy']}", anchor="runs")
+            yield Item(
+                "error", f"{kind['what']} ({often})", run=name, about=f"policy {kind['policy']}", anchor="happened"
+            )
         if len(kinds) > MAX_FAULTS:
-            yield Item("error", f"{len(kinds) - MAX_FAULTS} more kinds of faults", run=name, anchor="runs")
+            yield Item("error", f"{len(kinds) - MAX_FAULTS} more kinds of faults", run=name, anchor="happened")
 
 
 def faults_together(faults: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:

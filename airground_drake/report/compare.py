@@ -17,6 +17,7 @@ from typing import Any
 from airground_drake import files
 from airground_drake.errors import ReportError, one_line
 from airground_drake.report.folder import PAGES
+from airground_drake.report.rebuild import WITHIN
 from airground_drake.statuses import UNDECIDED, outcome
 
 SCHEMA = "airground_drake.comparison/1"
@@ -124,6 +125,13 @@ def compared(before: Document, after: Document) -> dict[str, Any]:
     for change in (changes := [change for part in found.values() for change in part]):
         change.setdefault("worse", False)
     return {"regressions": sum(change["worse"] for change in changes), **found}
+
+
+def is_rounding(change: Change) -> bool:
+    """Whether a number changed by no more than versions of numpy, scipy and solvers round differently."""
+    was, now = change["before"], change["after"]
+    both = all(isinstance(side, int | float) and not isinstance(side, bool) for side in (was, now))
+    return both and not change["worse"] and abs(now - was) <= WITHIN * (1.0 + abs(now))
 
 
 def _overall(before: Document, after: Document) -> Iterator[Change]:

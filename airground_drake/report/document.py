@@ -53,7 +53,8 @@ def build(
     Returns:
         Strict JSON; numbers that are not finite have become None.
     """
-    some_run = next(iter(traces), "")
+    of_all = [name for name in traces if not scenario.runs[name].set]
+    some_run = next(iter(of_all or traces), "")
     claims = [
         {
             **verdict.to_json(),
@@ -181,6 +182,7 @@ def _run(scenario: Scenario, trace: Trace) -> dict[str, Any]:
         "method": run.method,
         "method_name": method_of(run.method).says,
         "composition": run.composition,
+        "set": run.set,
         "seed": trace.meta.get("seed"),
         "zeta_m": trace.meta["zeta_m"],
         "events": trace.events,

@@ -18,7 +18,7 @@ from jinja2 import Environment
 from markupsafe import Markup
 
 from airground_drake.errors import one_line
-from airground_drake.report import attention, evidence
+from airground_drake.report import attention, evidence, summary
 from airground_drake.report.figures import svg
 from airground_drake.report.figures.canvas import DARK
 from airground_drake.report.figures.panels import Figure, Table
@@ -26,7 +26,7 @@ from airground_drake.report.mathml import mathml
 from airground_drake.report.proved import place
 from airground_drake.report.reproduction import YES_NO
 from airground_drake.report.templating import environment_of
-from airground_drake.statuses import NOT_EXERCISED, PASSING, outcome
+from airground_drake.statuses import PASSING, outcome
 
 STYLE, SCRIPTS = "report.css", ("report.js", "scrubber.js")
 """The style sheet and the scripts of the page, among the templates."""
@@ -41,13 +41,32 @@ MAX_DISTANCE_ROWS = 120
 MAX_FAULTS = 40
 """Different ones of a run that are listed."""
 
+SECTIONS = {
+    "happened": "What happened",
+    "safe": "Is it safe?",
+    "intervened": "When did the UAV step in?",
+    "reproduction": "Compared with the paper",
+    "choices": "What we changed",
+    "audit": "Errors in the paper",
+    "diagram": "How it is wired",
+    "claims": "All checks",
+    "provenance": "How to run it again",
+}
+"""Sections of the page, in order, by their identifiers; what has nothing to say is left out."""
+PLACES = {"distances": "safe", **dict.fromkeys(("decision", "events", "gaps", "threshold-choice"), "intervened")}
+"""Sections of the figures; the others are maps of what happened."""
+LOOKS = {"yes": "good", "partly": "tuned", "no": "bad", "open": "open", "none": "idle"}
+"""Class of each mark of the first screen, which sets its colour: never by colour alone."""
+NAMES = {"yes": "yes", "partly": "in part", "no": "no", "open": "not known", "none": "neither"}
+"""What a screen reader says for each mark."""
+
 CHIPS = {
-    "as_expected": ("✓", "as expected", "good"),
-    "not_as_expected": ("✗", "not as expected", "bad"),
+    "as_expected": ("✓", "as declared", "good"),
+    "not_as_expected": ("✗", "not as declared", "bad"),
     "proved": ("✓", "proved", "good"),
     "holds": ("✓", "holds", "good"),
     "supported": ("✓", "supported", "good"),
-    "not_exercised": ("∅", "holds, nothing to check", "idle"),
+    "not_exercised": ("∅", "not tested", "idle"),
     "declared": ("≈", "declared", "tuned"),
     "stuck": ("■", "stuck, as declared", "tuned"),
     "refuted": ("✗", "refuted", "bad"),
@@ -75,16 +94,36 @@ def render(document: Mapping[str, Any], figures: Sequence[Figure], diagram_svg: 
     """
     distances = _distances(document["runs"])
     claims = document["claims"]
+    plates: dict[str, list[Figure]] = {}
+    for figure in figures:
+        if not figure.beside:
+            plates.setdefault(PLACES.get(figure.id, "happened"), []).append(figure)
+    diagram = _diagram(diagram_svg, str(document["scenario"]["name"]))
+    shown = {
+        "happened": bool(document["runs"]),
+        "safe": bool(distances),
+        "intervened": "intervened" in plates or any(r["metrics"]["gatekeeper"] for r in document["runs"].values()),
+        "reproduction": bool(document["reproduction"]),
+        "choices": bool(document["choices"]),
+        "audit": bool(document["audit"]),
+        "diagram": bool(diagram),
+    }
     return _environment().get_template("report.html.j2").render(
         report=document,
-        figures=[figure for figure in figures if not figure.beside],
+        headline=summary.headline(document),
+        answers=summary.answers(document),
+        methods=summary.methods(document),
+        required=summary.required_m(document),
+        beware=summary.do_not_conclude(document),
+        declared=summary.as_declared(document),
+        sections=[(name, title) for name, title in SECTIONS.items() if shown.get(name, True)],
+        plates=plates,
         beside=_beside(figures),
-        diagram=_diagram(diagram_svg, str(document["scenario"]["name"])),
+        diagram=diagram,
         groups=_by_claim(claims),
         outcomes=list(dict.fromkeys(map(_shown, claims))),
         attention=attention.items(document),
         assumptions=_assumptions(claims),
-        tightest=_tightest(distances),
         distances=sorted(distances, key=_margin)[:MAX_DISTANCE_ROWS],
         left_out=max(0, len(distances) - MAX_DISTANCE_ROWS),
     )  # fmt: skip
@@ -101,6 +140,7 @@ def _environment() -> Environment:
     )  # fmt: skip
     environment.globals.update(
         chips=CHIPS, shown=_shown, refused=attention.REFUSED, max_faults=MAX_FAULTS,
+        marks=summary.MARKS, kinds=LOOKS, names=NAMES,
         policy=Markup(security_policy(style, scripts)), style=Markup(style), scripts=list(map(Markup, scripts)),
     )  # fmt: skip
     return environment
@@ -237,11 +277,21 @@ def _by_claim(claims: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
             "id": name,
             "claims": members,
             "fine": all(claim["as_expected"] for claim in members),
-            "idle": all(outcome(claim["status"], claim["exercised"]) == NOT_EXERCISED for claim in members),
+            "verdicts": _together(members, sum(bool(claim["run"]) for claim in members)),
         }
         for name, members in groups.items()
     ]
     return sorted(grouped, key=lambda group: bool(group["fine"]))
+
+
+def _together(members: Sequence[Mapping[str, Any]], runs: int) -> list[tuple[Mapping[str, Any], str]]:
+    """Verdicts of a claim that are shown alike, each with its runs; all of them are several."""
+    alike: dict[tuple[str, bool, str], tuple[Mapping[str, Any], list[str]]] = {}
+    for claim in members:
+        fine = bool(claim["as_expected"])
+        key = _shown(claim), fine, "" if fine else str(claim["expected"])
+        alike.setdefault(key, (claim, []))[1].extend(filter(None, [claim["run"]]))
+    return [(claim, f"all {runs}" if len(names) == runs > 1 else ", ".join(names)) for claim, names in alike.values()]
 
 
 def _assumptions(claims: Sequence[Mapping[str, Any]]) -> dict[str, list[str]]:
@@ -264,16 +314,6 @@ def _distances(runs: Mapping[str, Mapping[str, Any]]) -> list[dict[str, Any]]:
         for robot, others in entry["metrics"][kind].items()
         for other, found in others.items()
     ]
-
-
-def _tightest(distances: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """The row of least margin of each robot in each run."""
-    rows: dict[tuple[str, str], dict[str, Any]] = {}
-    for row in distances:
-        known = rows.setdefault((row["run"], row["robot"]), row)
-        if row["margin"] < known["margin"]:
-            rows[row["run"], row["robot"]] = row
-    return list(rows.values())[:MAX_DISTANCE_ROWS]
 
 
 def _margin(row: Mapping[str, Any]) -> float:

@@ -15,7 +15,11 @@ from airground_drake.verify.engines.segments import Approach, closest_approach
 from airground_drake.verify.runs.pairs import apart_of, least_of, pairs_of
 
 MOST_OBSTACLES = 20
-"""Of which the distances of a robot are in the metrics at most."""
+"""Maximum number of obstacles listed per robot."""
+
+
+NEAR_OBSTACLES, NEAR_ROBOTS = 3, 1
+"""Numbers of obstacles and robots that count as close by."""
 
 
 class Closest(NamedTuple):
@@ -24,6 +28,15 @@ class Closest(NamedTuple):
     value: float
     t_s: float
     other: str
+
+
+class Nearby(NamedTuple):
+    """The same, and the distance of surfaces that is required, m."""
+
+    value: float
+    t_s: float
+    other: str
+    required_m: float
 
 
 def of_run(trace: Trace) -> dict[str, Any]:
@@ -140,9 +153,25 @@ def _closest_call(trace: Trace) -> dict[str, Any] | None:
 
 def closest_obstacle(trace: Trace, robot: str) -> Closest | None:
     """Smallest distance of a robot to any obstacle over continuous time, exact; None without obstacles."""
-    found = _to_obstacles(trace, robot)
-    closest = (Closest(at["value"] - radii_m(trace, robot, name), at["t_s"], name) for name, at in found.items())
-    return min(closest, default=None)
+    near = _surfaces(trace, robot, _to_obstacles(trace, robot))
+    return min((Closest(*found[:3]) for found in near), default=None)
+
+
+def close_by(trace: Trace, robot: str) -> list[Nearby]:
+    """Smallest distances of a robot to its nearest obstacles and robots, exact, those of least margin first."""
+    robots = [other for other in trace.robots if other != robot]
+    found = _distances(trace, robot, list(trace.scenario["obstacles"]), NEAR_OBSTACLES)
+    found |= _distances(trace, robot, robots, NEAR_ROBOTS)
+    return sorted(_surfaces(trace, robot, found), key=lambda at: at.value - at.required_m)
+
+
+def _surfaces(trace: Trace, robot: str, found: dict[str, dict[str, float]]) -> list[Nearby]:
+    """The same distances, of surfaces."""
+    return [
+        Nearby(at["value"] - radii, at["t_s"], other, at["safe_distance_m"] - radii)
+        for other, at in found.items()
+        for radii in [radii_m(trace, robot, other)]
+    ]
 
 
 def gap_m(trace: Trace, robot: str, other: str) -> Array:

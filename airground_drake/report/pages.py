@@ -8,6 +8,7 @@ from typing import Any
 from jinja2 import Environment
 from markupsafe import Markup
 
+from airground_drake.report.compare import is_rounding
 from airground_drake.report.html import CHIPS, number, security_policy, stylesheet
 from airground_drake.report.templating import environment_of
 
@@ -21,6 +22,7 @@ def render(template: str, **content: Any) -> str:
 def _environment() -> Environment:
     environment = environment_of("airground_drake.report")
     environment.filters.update(num=number, inline=Markup, shown=shown)
+    environment.tests["rounding"] = is_rounding
     style = stylesheet()
     environment.globals.update(chips=CHIPS, style=Markup(style), policy=Markup(security_policy(style)))
     return environment

@@ -48,7 +48,7 @@ def lines(folder: Path, judge: Judge | None = None) -> Iterator[dict[str, Any]]:
     third_party, own = scenario.claims, replace(scenario, claims={})
     traces = {name: trace.load(folder / "trace" / name) for name in scenario.runs}
     judged = [
-        replace(each, meta={**each.meta, "scenario": {**each.scenario, "claims": {}}}) for each in traces.values()
+        replace(each, meta=each.meta | {"scenario": each.meta["scenario"] | {"claims": {}}}) for each in traces.values()
     ]
     again = document.build(
         scenario,

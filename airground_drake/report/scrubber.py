@@ -12,9 +12,9 @@ import numpy as np
 from matplotlib.figure import Figure as Drawing
 
 from airground_drake.arrays import Array
-from airground_drake.replay.scene import states
 from airground_drake.report.figures.canvas import UAV_LOOK, look
 from airground_drake.trace import Trace
+from airground_drake.view.stage import states
 
 SAMPLES = 121
 """Times at which a robot's place is in the page, evenly spread over the run; in between it is interpolated."""

@@ -220,8 +220,19 @@ def replace(document: Document, override: str) -> None:
     key, equals, text = override.partition("=")
     if not equals or not key.strip():
         raise ScenarioError(source, "", override, "wanted: dotted.key=value, such as control.period_s=0.05")
-    at, data = tuple(key.strip().split(".")), document.data
-    new = parsed(text, source, at).data
+    at = tuple(key.strip().split("."))
+    if at[::2][:2] == ("runs", "set"):  # whose keys have dots
+        at = at[:3] + (".".join(at[3:]),) * (len(at) > 3)
+    put(document, at, parsed(text, source, at).data, source)
+
+
+def put(document: Document, at: tuple[str, ...], new: Any, source: str) -> None:
+    """Put another value at a place of a document, which is changed.
+
+    Raises:
+        ScenarioError: if it leads to no such item of a list.
+    """
+    data = document.data
     for place in [each for each in document.places if each[: len(at)] == at]:
         del document.places[place]
     for depth, name in enumerate(at, start=1):

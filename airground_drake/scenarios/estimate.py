@@ -94,7 +94,9 @@ class Estimate(NamedTuple):
 
 def estimate(scenario: Scenario) -> Estimate:
     """What all runs of a validated scenario ask for, from its numbers alone; takes no time whatever they are."""
-    of_runs = [_of_run(scenario, run) for run in scenario.runs.values()]
+    from airground_drake.scenarios.load import own
+
+    of_runs = [_of_run(own(scenario, name), run) for name, run in scenario.runs.items()]
     rows, steps, decisions, predicted, memory = (sum(column) for column in zip(*of_runs, strict=True))
     return Estimate(rows, steps, decisions, predicted, PROGRAM + memory + _planning(scenario))
 

@@ -146,6 +146,28 @@ def expected_of(claims: Registry) -> Rule:
     return Rule(check, lambda: {EXPECTED: claims})
 
 
+def _one_value(value: object) -> object:
+    if not isinstance(value, bool | int | float | str):
+        raise _refused(value, "one value: a number, a text, true or false")
+    return _visible(value) if isinstance(value, str) else value
+
+
+OneValue = Annotated[Any, Rule(_one_value, lambda: {"type": ["number", "string", "boolean"]})]
+
+
+def settings_of(sections: tuple[str, ...]) -> Rule:
+    """Values by dotted keys of some sections of a scenario."""
+
+    def check(value: dict[str, object]) -> dict[str, object]:
+        for key, given in value.items():
+            if key.partition(".")[0] not in sections or "." not in key:
+                allowed = f"a run may set keys of {', '.join(sections)}, such as gatekeeper.rule"
+                raise _refused(given, allowed, key)
+        return value
+
+    return Rule(check, lambda: {"propertyNames": {"pattern": rf"^(({'|'.join(sections)})\..+|<<)$"}})
+
+
 def _claims_of_others(value: dict[str, str]) -> dict[str, str]:
     """Refuse identifiers that claims of the package have, and what names no class."""
     for claim, place in value.items():

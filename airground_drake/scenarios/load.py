@@ -6,6 +6,7 @@ data against the dataclasses of `schema.py` and builds them. `validate.py` check
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import functools
 import json
@@ -20,11 +21,11 @@ from pydantic_core import ErrorDetails
 from airground_drake import files
 from airground_drake.errors import Fault, ScenarioError
 from airground_drake.scenarios import json_schema, validate
-from airground_drake.scenarios.document import Document, of_data, read, replace, simple, unknown
+from airground_drake.scenarios.document import Document, of_data, put, read, replace, simple, unknown
 from airground_drake.scenarios.schema import RETIRED_KEYS, Scenario, Vector
 from airground_drake.scenarios.shipped import shipped
 
-__all__ = ["from_data", "load", "resolved", "shipped", "validated"]
+__all__ = ["from_data", "load", "own", "resolved", "shipped", "validated"]
 
 Overrides = Sequence[str] | Mapping[str, Any]
 """`dotted.key=value` with the value in YAML, or values by dotted key."""
@@ -100,6 +101,42 @@ def _build(document: Document, overrides: Sequence[str]) -> Scenario:
     """The scenario of a document with overrides, checked."""
     for override in overrides:
         replace(document, override)
+    scenario = _checked(document)
+    for name, run in scenario.runs.items():
+        if run.set:
+            _as_set(document, name, run.set)
+    return scenario
+
+
+def own(scenario: Scenario, run: str) -> Scenario:
+    """The scenario as a run of it has it: with the values that the run sets.
+
+    Args:
+        scenario: validated.
+        run: name of one of its runs.
+    """
+    settings = scenario.runs[run].set
+    return _as_set(of_data(resolved(scenario), scenario.name), run, settings) if settings else scenario
+
+
+def _as_set(document: Document, run: str, settings: Mapping[str, Any]) -> Scenario:
+    """The scenario of a document with the values that a run sets.
+
+    Raises:
+        ScenarioError: if it is not valid; names the run, too.
+    """
+    changed = Document(copy.deepcopy(document.data), document.source, dict(document.places))
+    try:
+        for key, value in settings.items():
+            put(changed, tuple(key.split(".")), value, document.where("runs", run, "set", key))
+        return _checked(changed)
+    except ScenarioError as error:
+        allowed = f"{error.allowed} (as run {run} sets it)"
+        raise ScenarioError(error.source, error.key, error.value, allowed) from None
+
+
+def _checked(document: Document) -> Scenario:
+    """The scenario of a document, whatever its runs set."""
     try:
         scenario = _adapter().validate_python(document.data)
     except ValidationError as error:

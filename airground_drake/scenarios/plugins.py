@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import re
 import sys
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
@@ -18,6 +19,7 @@ if TYPE_CHECKING:  # pydantic, which the schema imports, would delay `report --l
 
 OPTION = "--allow-plugins"
 HELP = "import and run what is named as module:Class or file.py:Class; looked for beside the scenario or spec, too"
+_POLICY = re.compile(r"intervention\.policies\.\d+\.name")
 WANTED = f"code of others is imported and run only with {OPTION}"
 
 
@@ -29,6 +31,10 @@ def plugins(scenario: Scenario) -> dict[str, str]:
     ]
     for index, policy in enumerate(scenario.intervention.policies):
         named.append((f"intervention.policies.{index}.name", policy.name, POLICIES))
+    for run, spec in scenario.runs.items():
+        chosen = {key: str(value) for key, value in spec.set.items()}
+        named += [(f"runs.{run}.set.{key}", chosen[key], ROUTES) for key in chosen if key == "gatekeeper.route"]
+        named += [(f"runs.{run}.set.{key}", chosen[key], POLICIES) for key in chosen if _POLICY.fullmatch(key)]
     found = {key: name for key, name, registry in named if name not in registry and is_plugin(name)}
     return found | {f"claims.{claim}": place for claim, place in scenario.claims.items()}
 
@@ -90,6 +96,7 @@ def without(scenario: Scenario) -> Scenario:
         scenario,
         uav=replace(scenario.uav, task="formation"),
         intervention=replace(scenario.intervention, policies=[]),
-        gatekeeper=replace(scenario.gatekeeper, route="mixed_integer", blocks=0),
+        gatekeeper=replace(scenario.gatekeeper, route="mixed_integer", blocks=0, solver="daqp"),
+        runs={name: replace(run, set={}) for name, run in scenario.runs.items()},
         choices=[],
     )

@@ -19,6 +19,7 @@ from airground_drake.scenarios.kinds import (
     GroundPoint,
     Name,
     NotNegative,
+    OneValue,
     Point,
     PointOrNone,
     Positive,
@@ -29,6 +30,7 @@ from airground_drake.scenarios.kinds import (
     expected_of,
     one_of,
     registered,
+    settings_of,
 )
 from airground_drake.scenarios.limits import MAX_STAGES, MAX_UGVS
 
@@ -38,8 +40,17 @@ TRIGGERS: tuple[str, ...] = ("automaton", "bare")
 SOURCES: tuple[str, ...] = ("calibrated", "ours")
 BUDGETS: tuple[str, ...] = ("counted", "wall_clock")
 RULES: tuple[str, ...] = ("hysteresis", "first_stage")
+SOLVERS: tuple[str, ...] = ("daqp", "gurobi", "mosek")
+SETTABLE: tuple[str, ...] = ("decision", "gatekeeper", "intervention")
+"""Sections that a run may change for itself. Bodies, distances and controllers are those of all runs: a report draws
+them once, and proves safety once."""
 
-RETIRED_KEYS = {"gatekeeper.budget_nodes": "remove it: the search of the route mixed_integer is limited in time only"}
+_NO_LAG = "remove it: longest_s, tries and rest_s bound how long a UGV goes along"
+RETIRED_KEYS = {
+    "gatekeeper.budget_nodes": "remove it: the search of the route mixed_integer is limited in time only",
+    "gatekeeper.lag_m": _NO_LAG,
+    "gatekeeper.behind_s": _NO_LAG,
+}
 """Keys of earlier versions, and what to do about them."""
 
 
@@ -206,7 +217,7 @@ class Intervention:
     period_s: Positive = 0.05
     """How often the UAV plans; a multiple of the control period."""
     retry_s: NotNegative = 1.0
-    """How long it rests after a refusal, or when no policy has proposed anything."""
+    """How long it rests after a refusal; when no policy has a proposal, twice as long each time in a row."""
     ranking: Annotated[Words, one_of((), "intervention.database:RANKINGS")] = "predicted"
     """Which policy is asked first."""
     budget_s: Positive = 2.0
@@ -222,15 +233,14 @@ class Gatekeeper:
     Under method (c) a decision on a proposal is reversed only for a plan that is cheaper by the (relative) switching
     margin, and not before `min_dwell_s` have passed. That is ours: by the paper's own rule, `first_stage`, the first
     stage of each plan is executed, whatever was answered before. A decision may take `budget_iterations` of the solver
-    of a relaxation and a second of the search of `mixed_integer` (budget 'counted': a run is the same on every machine
-    unless a search meets that limit, which the report counts), or besides the share `budget_share` of the sampling
-    period by the clock (budget 'wall_clock': for real time). `terminal_weight_s` is the
-    w of a terminal cost w a ||rho_rd - rho_N||^2 besides (25); the paper has none.
+    of a relaxation and 20,000 iterations of the search of `mixed_integer` (budget 'counted': a run is the same on every
+    machine on which these take less than 10 s, ten times what they take), or besides the share `budget_share` of the
+    sampling period by the clock (budget 'wall_clock': for real time). `terminal_weight_s` is the w of a terminal cost
+    w a ||rho_rd - rho_N||^2 besides (25); the paper has none.
 
     Under method (d) outcomes are compared instead, `settling_s` past the end of motion and preset trajectory. An
-    accepted proposal is executed for `longest_s` at most, and given back when the UGV has been farther behind it than
-    predicted, by more than `lag_m`, for `behind_s`. A UGV accepts `tries` proposals, and then none until it has been
-    on its own for `rest_s`.
+    accepted proposal is executed for `longest_s` at most. A UGV accepts `tries` proposals, and then none until it has
+    been on its own for `rest_s`.
     """
 
     route: Annotated[Words, registered(ROUTES, RETIRED_ROUTES)] = "mixed_integer"
@@ -243,6 +253,8 @@ class Gatekeeper:
     """Stages of (26): horizon_s / stages is a multiple of the control period."""
     blocks: CountFromZero = 0
     """Accept variables of (26), each for a block of stages, for route mixed_integer; 0: one per stage."""
+    solver: Annotated[Words, one_of(SOLVERS)] = "daqp"
+    """What searches for the optimum of route mixed_integer; the others need a Drake that has them, and a licence."""
     error_weight_1_m2_s: Positive = 1.0
     """a of (25): weight of the distance to the preset trajectory."""
     slack_weight_1_m2_s: NotNegative = 1000.0
@@ -269,10 +281,6 @@ class Gatekeeper:
     """Acceptances until a rest."""
     rest_s: Positive = 5.0
     """How long a UGV is then on its own."""
-    lag_m: Positive = 0.5
-    """How much farther behind than predicted is tolerated."""
-    behind_s: Positive = 2.0
-    """For how long."""
 
 
 @dataclass(slots=True)
@@ -282,14 +290,16 @@ class Run:
     `stalls_m` names the UGVs that must end (to within `stall_tolerance_m`) at that point short of their
     target. `expected` maps claim identifiers to the expected verdict; a claim not named must hold. Where
     there is no guarantee, "holds or refuted" admits either. `exercised` is "holds, and something put it to the test".
+    `set: {decision.threshold.zeta_m: 2.0}` gives this run a value of its own, as `--set` gives one to all runs. Claims
+    about the model whose constants it changes are judged for this run, too; `expected` may name them.
     """
 
     method: Annotated[Words, one_of(METHODS)]
     """How UAV and UGVs are coupled."""
     composition: Annotated[Words, one_of((), "nsbc.avoidance:COMPOSITIONS")] = "augmented"
     """How avoidance is composed with the tasks below: 'augmented' or a reading of recursion (5)."""
-    rule: Annotated[Words, one_of(("", *RULES))] = ""
-    """Instead of `gatekeeper.rule`, in this run; '': that one."""
+    set: Annotated[dict[Words, OneValue], settings_of(SETTABLE)] = field(default_factory=dict)
+    """Other values in this run, by dotted key of `decision`, `gatekeeper` or `intervention`."""
     stalls_m: dict[Name, GroundPoint] = field(default_factory=dict)
     """Where UGVs must end short of their target, by UGV."""
     expected: Annotated[dict[Words, Words], expected_of(RUN_CLAIMS)] = field(default_factory=dict)

@@ -67,6 +67,8 @@ def _blocks(scenario: Scenario) -> Problems:
         yield "gatekeeper.blocks", gatekeeper.blocks, allowed
     if gatekeeper.blocks and gatekeeper.route in (set(ROUTES.own) - {"mixed_integer"}):
         yield "gatekeeper.blocks", gatekeeper.blocks, "0: only the route mixed_integer has blocks"
+    if gatekeeper.solver != "daqp" and gatekeeper.route in (set(ROUTES.own) - {"mixed_integer"}):
+        yield "gatekeeper.solver", gatekeeper.solver, "daqp: only the route mixed_integer has other solvers"
 
 
 def _runs(scenario: Scenario) -> Problems:
@@ -77,7 +79,8 @@ def _runs(scenario: Scenario) -> Problems:
             key = f"runs.{name}.expected.{claim}"
             if claim in RETIRED_CLAIMS:
                 yield key, claim, f"no longer a claim, {RETIRED_CLAIMS[claim]}: remove it"
-            yield from _one_of(key, claim, (*RUN_CLAIMS, *scenario.claims), "one of the claims")
+            known = (*RUN_CLAIMS, *scenario.claims, *(MODEL_CLAIMS if run.set else ()))
+            yield from _one_of(key, claim, known, "one of the claims")
     for claim in scenario.expected:
         known = (*MODEL_CLAIMS, *scenario.claims)
         yield from _one_of(f"expected.{claim}", claim, known, "one of the claims about the model")

@@ -1,14 +1,28 @@
-"""Sampled NSBC controllers of the UGVs and of the UAV."""
+"""Sampled NSBC controllers of the UGVs and of the UAV.
+
+Both act on what planner and gatekeeper decide at the same instant, because Drake makes all unrestricted updates of an
+instant before the discrete ones: these systems' updates must stay discrete, and those of the others unrestricted.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from itertools import groupby
 from typing import Any
 
 import numpy as np
-from pydrake.common.value import Value
-from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
+from pydrake.common.value import AbstractValue, Value
+from pydrake.systems.framework import (
+    BasicVector,
+    CacheIndex,
+    Context,
+    DiscreteValues,
+    LeafSystem,
+    NumericParameterIndex,
+    ValueProducer,
+)
 
 from airground_drake.arrays import Array, read_only
 from airground_drake.errors import PluginError, short
@@ -17,9 +31,10 @@ from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance, limit_speed
 from airground_drake.nsbc.law import Intervention, UgvLaw
 from airground_drake.nsbc.task import Task
-from airground_drake.nsbc.tasks import FormationTask, PositionTask
+from airground_drake.nsbc.tasks import FormationTask
 from airground_drake.nsbc.team import Neighbourhood, Team
 from airground_drake.systems.lifetime import weakly
+from airground_drake.systems.signals import UavGains, UgvGains, no_proposals
 
 
 class UgvController(LeafSystem):
@@ -29,10 +44,11 @@ class UgvController(LeafSystem):
         in  `team_position` (3(n+1)) m; `reference` (6n): preset positions m, then velocities m/s;
             `proposals` abstract, n of Proposal or None; `answers` (2n), see `messages`.
         out `command` (3n) m/s; `accepted` (n), 1 while an intervention is executed. Both held.
+    Parameters: `UgvGains`; by default those of the law.
     Rate: one update per control period, from t = 0.
 
     Attributes:
-        law: the control law.
+        law: the control law, with the default gains.
         avoidance: its avoidance layer.
     """
 
@@ -40,36 +56,64 @@ class UgvController(LeafSystem):
         """Declare ports, state and the periodic update."""
         super().__init__()
         n = len(team.ugvs)
-        self._count = n
         self.law, self.avoidance = law, law.avoidance
         self._neighbourhood = team.neighbourhood(slice(0, n))
         self._mobility = team.mobility[:n]
         self._max_speed = team.max_speed[:n]
         self._position = self.DeclareVectorInputPort("team_position", 3 * (n + 1))
         self._reference = self.DeclareVectorInputPort("reference", 6 * n)
-        self._proposals = self.DeclareAbstractInputPort("proposals", Value(object()))
+        self._proposals = self.DeclareAbstractInputPort("proposals", no_proposals(n))
         self._answers = self.DeclareVectorInputPort("answers", 2 * n)
         command = self.DeclareDiscreteState(3 * n)
         accepted = self.DeclareDiscreteState(n)
         self.DeclareStateOutputPort("command", command)
         self.DeclareStateOutputPort("accepted", accepted)
+        gains = [law.avoidance.gain, law.motion_gain, law.intervention_gain]
+        self._gains = self.DeclareNumericParameter(BasicVector(gains))
+        self._law = _cached(self, "law", weakly(self._calc_law), self._gains)
         self.DeclarePeriodicDiscreteUpdateEvent(law.avoidance.period, 0.0, weakly(self._update))
 
-    def parameters(self) -> dict[str, Any]:
-        """What it was built with, see `read_back`, and whether it puts interventions on top of avoidance."""
-        found = read_back(self, self.avoidance, self._neighbourhood, self._mobility, self._max_speed)
-        return {**found, "composition": self.avoidance.composition, "intervention_on_top": self.law.intervention_on_top}
+    def gains(self, context: Context) -> Any:
+        """The gains in force, a `UgvGains`."""
+        return UgvGains(context.get_numeric_parameter(self._gains).value())
+
+    def mutable_gains(self, context: Context) -> Any:
+        """The same, to be assigned to: changes the gains in this Context."""
+        return UgvGains(context.get_mutable_numeric_parameter(self._gains).get_mutable_value())
+
+    def law_in(self, context: Context) -> UgvLaw:
+        """The law with the gains in force."""
+        law: UgvLaw = self.get_cache_entry(self._law).Eval(context)
+        return law
+
+    def parameters(self, context: Context) -> dict[str, Any]:
+        """What it runs with, see `read_back`, and whether it puts interventions on top of avoidance."""
+        law = self.law_in(context)
+        found = read_back(self, law.avoidance, self._neighbourhood, self._mobility, self._max_speed)
+        return {**found, "composition": law.avoidance.composition, "intervention_on_top": law.intervention_on_top}
+
+    def _calc_law(self, context: Context, output: AbstractValue) -> None:
+        avoidance, motion, intervention = context.get_numeric_parameter(self._gains).value().tolist()
+        layer = replace(self.law.avoidance, gain=avoidance)
+        output.set_value(replace(self.law, avoidance=layer, motion_gain=motion, intervention_gain=intervention))
 
     def _update(self, context: Context, discrete: DiscreteValues) -> None:
         positions = _finite(self._position.Eval(context)).reshape(-1, 3)
         reference, rate = self._reference.Eval(context).reshape(2, -1, 3)
         proposals = accepted_proposals(self._proposals.Eval(context), self._answers.Eval(context))
-        velocity = self.velocity(context.get_time(), positions, reference, rate, proposals)
+        law = self.get_cache_entry(self._law).Eval(context)
+        velocity = self.velocity(context.get_time(), positions, reference, rate, proposals, law)
         discrete.set_value(0, velocity.ravel())
         discrete.set_value(1, [float(proposal is not None) for proposal in proposals])
 
     def velocity(
-        self, t: float, positions: Array, reference: Array, rate: Array, accepted: Sequence[Proposal | None]
+        self,
+        t: float,
+        positions: Array,
+        reference: Array,
+        rate: Array,
+        accepted: Sequence[Proposal | None],
+        law: UgvLaw | None = None,
     ) -> Array:
         """What the law commands.
 
@@ -79,19 +123,14 @@ class UgvController(LeafSystem):
             reference: preset positions, (n, 3), m.
             rate: preset velocities, (n, 3), m/s.
             accepted: per UGV, the accepted proposal or None.
+            law: default: the one with the default gains.
 
         Returns:
             Commands, (n, 3), m/s.
         """
-        own = positions[: self._count]
-        return self.law.velocity(
-            own,
-            PositionTask(reference, rate, self.law.motion_gain),
-            [None if p is None else Intervention(*p.motion.at(t), p.chosen) for p in accepted],
-            self.avoidance.half_spaces(own, self._mobility, self._neighbourhood.around(positions)),
-            self._mobility,
-            self._max_speed,
-        )
+        law = self.law if law is None else law
+        asked = [None if p is None else Intervention(*p.motion.at(t), p.chosen) for p in accepted]
+        return law.velocity(positions, self._neighbourhood, reference, rate, asked, self._mobility, self._max_speed)
 
 
 class UavController(LeafSystem):
@@ -100,7 +139,11 @@ class UavController(LeafSystem):
     Ports (n UGVs, world frame):
         in  `team_position` (3(n+1)) m; `ugv_command` (3n) m/s, fed forward as the centroid's rate.
         out `command` (3) m/s, held.
+    Parameters: `UavGains`.
     Rate: one update per control period, from t = 0.
+
+    Attributes:
+        avoidance: the set-based layer, with the default gain.
     """
 
     def __init__(
@@ -117,7 +160,7 @@ class UavController(LeafSystem):
         Args:
             team: names, safe distances, speed limits.
             avoidance: the set-based layer.
-            gain: of the task, 1/s.
+            gain: of the task, 1/s, by default.
             altitude: m.
             task: made at each sample from positions (n, 3), m, and velocities (n, 3), m/s, of the UGVs, altitude and
                 gain; asked for the velocity of one robot, (1, 3), m/s.
@@ -135,38 +178,73 @@ class UavController(LeafSystem):
         self._ugv_command = self.DeclareVectorInputPort("ugv_command", 3 * n)
         command = self.DeclareDiscreteState(3)
         self.DeclareStateOutputPort("command", command)
+        self._gains = self.DeclareNumericParameter(BasicVector([avoidance.gain, gain]))
+        self._layer = _cached(self, "avoidance", weakly(self._calc_layer), self._gains)
         self.DeclarePeriodicDiscreteUpdateEvent(avoidance.period, 0.0, weakly(self._update))
 
-    def parameters(self) -> dict[str, Any]:
-        """What it was built with, see `read_back`."""
-        return read_back(self, self.avoidance, self._neighbourhood, self._mobility, self._max_speed)
+    def gains(self, context: Context) -> Any:
+        """The gains in force, a `UavGains`."""
+        return UavGains(context.get_numeric_parameter(self._gains).value())
+
+    def mutable_gains(self, context: Context) -> Any:
+        """The same, to be assigned to: changes the gains in this Context."""
+        return UavGains(context.get_mutable_numeric_parameter(self._gains).get_mutable_value())
+
+    def parameters(self, context: Context) -> dict[str, Any]:
+        """What it runs with, see `read_back`."""
+        layer, _ = self.get_cache_entry(self._layer).Eval(context)
+        return read_back(self, layer, self._neighbourhood, self._mobility, self._max_speed)
+
+    def _calc_layer(self, context: Context, output: AbstractValue) -> None:
+        avoidance, formation = context.get_numeric_parameter(self._gains).value().tolist()
+        output.set_value((replace(self.avoidance, gain=avoidance), formation))
 
     def _update(self, context: Context, discrete: DiscreteValues) -> None:
         positions = _finite(self._position.Eval(context)).reshape(-1, 3)
         commands = self._ugv_command.Eval(context).reshape(-1, 3)
-        discrete.set_value(0, self.velocity(positions, commands))
+        discrete.set_value(0, self.velocity(positions, commands, *self.get_cache_entry(self._layer).Eval(context)))
 
-    def velocity(self, positions: Array, ugv_commands: Array) -> Array:
+    def velocity(
+        self, positions: Array, ugv_commands: Array, avoidance: Avoidance | None = None, gain: float | None = None
+    ) -> Array:
         """What the law commands, (3,), m/s.
 
         Args:
             positions: of all robots, (n + 1, 3), m.
             ugv_commands: of the UGVs, at the sample before, (n, 3), m/s.
+            avoidance: the set-based layer; default: with the default gain.
+            gain: of the task, 1/s; default: as it was built.
 
         Raises:
             PluginError: if the task asks for what is no velocity.
         """
-        task = self._task(read_only(positions[:-1]), read_only(ugv_commands), self._altitude, self._gain)
-        lower = limit_speed(_velocity_of(task, read_only(positions[-1:])), self._max_speed)
-        spaces = self.avoidance.half_spaces(positions[-1:], self._mobility, self._neighbourhood.around(positions))
-        velocity: Array = self.avoidance.apply(lower, spaces)[0]
+        avoidance = self.avoidance if avoidance is None else avoidance
+        gain = self._gain if gain is None else gain
+        lower = limit_speed(self._asked(positions, ugv_commands, gain), self._max_speed)
+        spaces = avoidance.half_spaces(positions[-1:], self._mobility, self._neighbourhood.around(positions))
+        velocity: Array = avoidance.apply(lower, spaces)[0]
         return velocity
+
+    def _asked(self, positions: Array, ugv_commands: Array, gain: float) -> Array:
+        """What the task asks for, (1, 3), m/s; another one than the package's own is watched."""
+        if self._task is FormationTask:
+            return FormationTask(positions[:-1], ugv_commands, self._altitude, gain).velocity(positions[-1:])
+        task = self._task(read_only(positions[:-1]), read_only(ugv_commands), self._altitude, gain)
+        return _velocity_of(task, read_only(positions[-1:]))
+
+
+def _cached(system: LeafSystem, name: str, calc: Callable[..., None], gains: int) -> CacheIndex:
+    """What follows from the gains of a Context, worked out when they change."""
+    producer = ValueProducer(allocate=lambda: Value(None), calc=calc)
+    return system.DeclareCacheEntry(
+        name, producer, {system.numeric_parameter_ticket(NumericParameterIndex(gains))}
+    ).cache_index()
 
 
 def read_back(
     system: LeafSystem, avoidance: Avoidance, neighbourhood: Neighbourhood, mobility: Array, max_speed: Array
 ) -> dict[str, Any]:
-    """The parameters of a controller's avoidance as it runs, in strict JSON, for the trace.
+    """The parameters of a controller's avoidance as it runs in a Context, in strict JSON, for the trace.
 
     Returns:
         Of its k robots: `members`, their indices in team order; `obstacles_m`, centres (m, 3); `others`, indices of the
@@ -197,7 +275,7 @@ def _in_runs(array: Array) -> list[list[float]]:
 
 def _finite(positions: Array) -> Array:
     """Positions, as they come from the plants; what is nowhere is avoided by nobody."""
-    if not np.isfinite(positions).all():
+    if not math.isfinite(positions @ positions) and not np.isfinite(positions).all():  # quickly, then exactly
         raise PluginError(f"positions are not finite, from a plant or a disturbance: {short(repr(positions.tolist()))}")
     return positions
 

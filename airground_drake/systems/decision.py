@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
+from pydrake.common.value import AbstractValue, Value
 from pydrake.systems.framework import (
     BasicVector,
     Context,
@@ -15,18 +16,17 @@ from pydrake.systems.framework import (
     EventStatus,
     LeafSystem,
     State,
+    ValueProducer,
     WitnessFunction,
     WitnessFunctionDirection,
 )
 
 from airground_drake.arrays import Array
-from airground_drake.decision.excursion import anything_due, extremes, gathered, transitions_due
+from airground_drake.decision.excursion import anything_due, extremes, gathered, spans, transitions_due, variables
 from airground_drake.decision.trigger import Mode, Trigger, TriggerState
-from airground_drake.nsbc.motion import Motion
+from airground_drake.geometry.motion import Motion
 from airground_drake.systems.lifetime import weakly
-
-FIELDS = 4
-"""Numbers of the trigger's state per UGV: mode, triggers, triggered_at, released_at."""
+from airground_drake.systems.signals import FIELDS, Status, TriggerLevels, laid_out, of_ugv
 
 NOT_BEGUN = -1.0
 """Beginning of the run and of the step, s, before there is one."""
@@ -48,7 +48,7 @@ class DecisionBlock(LeafSystem):
         in  `team_position` (3(n+1)) m; `reference` (6n), positions first; `noise` (n) m.
         out `decision_variable` (n) m, x now; `decision_range` (2n) m, the least x since the step began, then the
             largest one. Both are continuous in time.
-    State (1 + 4n): of the beginning of the step, time, s, and task error and noise of every UGV, m.
+    State (1 + 5n): of the beginning of the step, time, s; then of every UGV task error (3), noise and x, m.
     Rate: one update per step of the simulator.
     """
 
@@ -61,8 +61,10 @@ class DecisionBlock(LeafSystem):
         self._position = self.DeclareVectorInputPort("team_position", 3 * (count + 1))
         self._reference = self.DeclareVectorInputPort("reference", 6 * count)
         self._noise = self.DeclareVectorInputPort("noise", count)
-        self.DeclareDiscreteState(np.array([NOT_BEGUN, *([0.0] * 4 * count)]))
+        self.DeclareDiscreteState(np.array([NOT_BEGUN, *([0.0] * 5 * count)]))
         given = {self._position.ticket(), self._reference.ticket(), self._noise.ticket(), self.time_ticket()}
+        producer = ValueProducer(allocate=lambda: Value(np.zeros(0)), calc=weakly(self._calc_signals))
+        self._signals = self.DeclareCacheEntry("signals", producer, given).cache_index()
         self.DeclareVectorOutputPort(
             "decision_variable", count, weakly(self._calc_variable), prerequisites_of_calc=given
         )
@@ -81,7 +83,7 @@ class DecisionBlock(LeafSystem):
         """
         raise NotImplementedError(f"{type(self).__name__} does not define `value`")
 
-    def extremes(self, begin: float, before: Array, end: float, after: Array) -> Array:
+    def extremes(self, begin: float, before: Array, end: float, after: Array, ends: Array) -> Array:
         """Least and largest x, (2, n), m, while task errors and noise are linear in time: here those at the ends.
 
         Args:
@@ -89,53 +91,70 @@ class DecisionBlock(LeafSystem):
             before: task error and noise at that time, (n, 4), m.
             end: time, s.
             after: task error and noise at that time.
+            ends: x at both times, (2, n), m.
         """
-        return np.sort([self.value(begin, before), self.value(end, after)], axis=0)
+        return np.sort(ends, axis=0)
 
-    def _signals(self, context: Context) -> Array:
-        """Time, s, and task error and noise of every UGV now, m, (1 + 4n,)."""
+    def _calc_signals(self, context: Context, output: AbstractValue) -> None:
+        """What the state keeps of an instant, as it is now."""
         position, reference = self._position.Eval(context), self._reference.Eval(context)
-        return gathered(context.get_time(), position, reference, self._noise.Eval(context))
+        output.set_value(
+            self._with_variable(gathered(context.get_time(), position, reference, self._noise.Eval(context)))
+        )
+
+    def _with_variable(self, signals: Array) -> Array:
+        """Signals with this block's x in place of that of (15)."""
+        rows = signals[1:].reshape(-1, 5)
+        rows[:, 4] = self.value(signals[0], rows[:, :4].copy())
+        return signals
 
     def _calc_variable(self, context: Context, output: BasicVector) -> None:
-        now = self._signals(context)
-        output.SetFromVector(self.value(now[0], now[1:].reshape(-1, 4)))
+        output.SetFromVector(self.get_cache_entry(self._signals).Eval(context)[5::5])
 
     def _calc_range(self, context: Context, output: BasicVector) -> None:
-        begun, now = context.get_discrete_state(0).value(), self._signals(context)
+        begun, now = context.get_discrete_state(0).value(), self.get_cache_entry(self._signals).Eval(context)
         if begun[0] == NOT_BEGUN:
             begun = now
-        begin, end, before, after = begun[0], now[0], begun[1:].reshape(-1, 4), now[1:].reshape(-1, 4)
-        found = self.extremes(begin, before, end, after)
-        first = bisect_right(self._corner_times, begin)
-        if first < len(self._corners) and self._corner_times[first] < end:
-            last = bisect_left(self._corner_times, end)
-            times = np.array([begin, *self._corner_times[first:last], end])
-            self._look_into_corners(found, times, {j for _, j in self._corners[first:last]}, before, after)
+        found = self._spans(begun, now)
+        first = bisect_right(self._corner_times, begun[0])
+        if first < len(self._corners) and self._corner_times[first] < now[0]:
+            corners = self._corners[first : bisect_left(self._corner_times, now[0])]
+            self._look_into_corners(found, corners, begun, now)
         output.SetFromVector(found.ravel())
 
-    def _look_into_corners(self, found: Array, times: Array, bent: set[int], before: Array, after: Array) -> None:
+    def _spans(self, begun: Array, now: Array) -> Array:
+        """Least and largest x over a step without corners, (2, n), m, of the signals at its ends."""
+        before, after = begun[1:].reshape(-1, 5), now[1:].reshape(-1, 5)
+        return self.extremes(begun[0], before[:, :4], now[0], after[:, :4], np.stack([before[:, 4], after[:, 4]]))
+
+    def _look_into_corners(self, found: Array, corners: Sequence[tuple[float, int]], begun: Array, now: Array) -> None:
         """Replace least and largest x of the UGVs whose references bend within a step.
 
         Args:
             found: what is replaced, (2, n), m.
-            times: beginning of the step, corners within, end of the step, s.
-            bent: indices of these UGVs.
-            before: task error and noise at the beginning, (n, 4), m.
-            after: the same at the end.
+            corners: times, s, of bends within the step, and indices of the UGVs.
+            begun: signals at the beginning of the step.
+            now: signals at its end.
         """
+        bent = {j for _, j in corners}
+        times = np.array([begun[0], *(t for t, _ in corners), now[0]])
         shares = (times - times[0]) / (times[-1] - times[0])
+        before, after = begun[1:].reshape(-1, 5)[:, :4], now[1:].reshape(-1, 5)[:, :4]
         parts = before + shares[:, None, None] * (after - before)
         for j in bent:
             reference = self._presets[j].sample(times)
             parts[:, j, :3] += reference - reference[0] - shares[:, None] * (reference[-1] - reference[0])
-        ranges = np.array([self.extremes(*one, *other) for one, other in pairwise(zip(times, parts, strict=True))])
+        x = [self.value(t, part) for t, part in zip(times, parts, strict=True)]
+        stretches = pairwise(zip(times, parts, x, strict=True))
+        ranges = np.array(
+            [self.extremes(t0, p0, t1, p1, np.array([x0, x1])) for (t0, p0, x0), (t1, p1, x1) in stretches]
+        )
         for j in bent:
             found[:, j] = ranges[:, 0, j].min(), ranges[:, 1, j].max()
 
     def _begin_step(self, context: Context, discrete: DiscreteValues) -> EventStatus:
         """Keep the signals of this instant: a step ends here, or a simulator begins."""
-        discrete.set_value(0, self._signals(context))
+        discrete.set_value(0, self.get_cache_entry(self._signals).Eval(context))
         return EventStatus.Succeeded()
 
 
@@ -145,13 +164,22 @@ class DecisionVariable(DecisionBlock):
     Ports, state and rate: see `DecisionBlock`.
     """
 
-    def value(self, t: float, parts: Array) -> list[float]:
+    def value(self, t: float, parts: Array) -> Array:
         """The norms of the task errors plus the noise, (n,), m."""
-        return [math.hypot(x, y, z) + n for x, y, z, n in parts.tolist()]
+        return variables(parts)
 
-    def extremes(self, begin: float, before: Array, end: float, after: Array) -> Array:
+    def extremes(self, begin: float, before: Array, end: float, after: Array, ends: Array) -> Array:
         """Exact: see `decision.excursion`."""
-        return extremes(before, after, np.array([self.value(begin, before), self.value(end, after)]))
+        return extremes(before, after, ends)
+
+    def _with_variable(self, signals: Array) -> Array:
+        """They have it already, unless a subclass has another one."""
+        return signals if type(self).value is DecisionVariable.value else super()._with_variable(signals)
+
+    def _spans(self, begun: Array, now: Array) -> Array:
+        if type(self).extremes is DecisionVariable.extremes:
+            return spans(begun, now)
+        return super()._spans(begun, now)
 
 
 class EventTrigger(LeafSystem):
@@ -170,18 +198,17 @@ class EventTrigger(LeafSystem):
 
     Ports (n UGVs):
         in  `decision_variable` (n) m; `decision_range` (2n) m, the least since the step began, then the largest.
-        out `status` (4n): per UGV mode (see Mode), number of triggers, time of the last trigger, s, and of
-            the last release, s (-1 before the first).
+        out `status` (4n): a `Status` per UGV.
     State: the status; the beginning of the step and of the run, s.
+    Parameters: `TriggerLevels`; by default those of the trigger.
     Rate: one update per step of the simulator.
     """
 
     def __init__(self, count: int, trigger: Trigger) -> None:
         """Declare ports, state and events for `count` UGVs."""
         super().__init__()
-        self._trigger = trigger
-        self._levels = (float(trigger.zeta), float(trigger.release), float(trigger.dwell))
         self._count = count
+        self.DeclareNumericParameter(BasicVector([trigger.zeta, trigger.release, trigger.dwell]))
         self._variable = self.DeclareVectorInputPort("decision_variable", count)
         self._range = self.DeclareVectorInputPort("decision_range", 2 * count)
         status = self.DeclareDiscreteState(_pack([TriggerState()] * count))
@@ -193,6 +220,22 @@ class EventTrigger(LeafSystem):
         direction = WitnessFunctionDirection.kPositiveThenNonPositive
         self._witness = self.MakeWitnessFunction("a transition is due", direction, weakly(self.nothing_due))
 
+    def levels(self, context: Context) -> Any:
+        """The levels in force, a `TriggerLevels`."""
+        return TriggerLevels(context.get_numeric_parameter(0).value())
+
+    def mutable_levels(self, context: Context) -> Any:
+        """The same, to be assigned to: changes the levels in this Context."""
+        return TriggerLevels(context.get_mutable_numeric_parameter(0).get_mutable_value())
+
+    def trigger(self, context: Context) -> Trigger:
+        """The automaton with the levels in force.
+
+        Raises:
+            ValueError: if there is no such automaton.
+        """
+        return Trigger(*context.get_numeric_parameter(0).value().tolist())
+
     def DoGetWitnessFunctions(self, context: Context) -> list[WitnessFunction]:
         """The one witness."""
         return [self._witness]
@@ -201,9 +244,10 @@ class EventTrigger(LeafSystem):
         discrete, t, x = state.get_mutable_discrete_state(), context.get_time(), self._variable.Eval(context)
         before, begun, run_begun = (discrete.value(k) for k in range(3))
         if run_begun[0] < begun[0] <= t:  # another simulator goes on with a run
-            discrete.set_value(0, self._after(before, t, x, x, x))
+            discrete.set_value(0, self._after(context, before, x, x, x))
         else:
-            discrete.set_value(0, _pack([self._trigger.start(t, each) for each in x.tolist()]))
+            trigger = self.trigger(context)
+            discrete.set_value(0, _pack([trigger.start(t, each) for each in x.tolist()]))
             discrete.set_value(2, [t])
         discrete.set_value(1, [t])
         return EventStatus.Succeeded()
@@ -213,37 +257,46 @@ class EventTrigger(LeafSystem):
         t = context.get_time()
         if t - context.get_discrete_state(1)[0] < SHORTEST_S:
             return 1.0
-        status = context.get_discrete_state(0).value()
-        return -1.0 if anything_due(status, t, self._range.Eval(context), self._levels) else 1.0
+        status, levels = (
+            context.get_discrete_state(0).value(),
+            context.get_numeric_parameter(0).value(),
+        )
+        return -1.0 if anything_due(status, t, self._range.Eval(context), levels) else 1.0
 
     def update(self, context: Context, discrete: DiscreteValues) -> EventStatus:
         """Make the transitions that have become due in the step that ends, and begin another: the per-step update."""
         t, spans = context.get_time(), self._range.Eval(context)
-        before = context.get_discrete_state(0).value()
-        if anything_due(before, t, spans, self._levels):
+        before, levels = (
+            context.get_discrete_state(0).value(),
+            context.get_numeric_parameter(0).value(),
+        )
+        if anything_due(before, t, spans, levels):
             least, most = spans[: self._count], spans[self._count :]
-            discrete.set_value(0, self._after(before, t, self._variable.Eval(context), least, most))
+            discrete.set_value(0, self._after(context, before, self._variable.Eval(context), least, most))
         discrete.set_value(1, [t])
         return EventStatus.Succeeded()
 
-    def _after(self, before: Array, t: float, x: Array, least: Array, most: Array) -> Array:
+    def _after(self, context: Context, before: Array, x: Array, least: Array, most: Array) -> Array:
         """Status once the transitions that became due in a step are made."""
-        status = before.reshape(-1, FIELDS).copy()
-        for j in np.flatnonzero(transitions_due(before, t, least, most, self._levels)):
-            status[j] = _pack([self._moved(_unpack(status[j]), t, float(x[j]), float(least[j]), float(most[j]))])
+        t, trigger, status = context.get_time(), self.trigger(context), before.reshape(-1, FIELDS).copy()
+        levels = context.get_numeric_parameter(0).value()
+        for j in np.flatnonzero(transitions_due(before, t, least, most, levels)):
+            state, lowest, highest = _unpack(before, int(j)), float(least[j]), float(most[j])
+            status[j] = _pack([_moved(trigger, state, t, float(x[j]), lowest, highest)])
         return status.ravel()
 
-    def _moved(self, before: TriggerState, t: float, x: float, least: float, most: float) -> TriggerState:
-        """State at the end of a step in which a transition became due: x now, and how far it went, m."""
-        seen = {Mode.SUPERVISING: most, Mode.INTERVENING: least, Mode.REFRACTORY: x}[before.mode]
-        after = self._trigger.step(before, t, seen)
-        return after if after.mode is before.mode else self._trigger.step(after, t, x)  # x may have come back already
+
+def _moved(trigger: Trigger, before: TriggerState, t: float, x: float, least: float, most: float) -> TriggerState:
+    """State at the end of a step in which a transition became due: x now, and how far it went, m."""
+    seen = {Mode.SUPERVISING: most, Mode.INTERVENING: least, Mode.REFRACTORY: x}[before.mode]
+    after = trigger.step(before, t, seen)
+    return after if after.mode is before.mode else trigger.step(after, t, x)  # x may have come back already
 
 
 def _pack(states: Sequence[TriggerState]) -> Array:
-    return np.array([[s.mode, s.triggers, s.triggered_at, s.released_at] for s in states], dtype=float).ravel()
+    return laid_out(Status, [[s.mode, s.triggers, s.triggered_at, s.released_at] for s in states])
 
 
-def _unpack(values: Array) -> TriggerState:
-    mode, triggers, triggered_at, released_at = values.tolist()
-    return TriggerState(Mode(int(mode)), int(triggers), triggered_at, released_at)
+def _unpack(status: Array, index: int) -> TriggerState:
+    one = of_ugv(Status, status, index)
+    return TriggerState(Mode(int(one.mode)), int(one.triggers), float(one.triggered_at_s), float(one.released_at_s))

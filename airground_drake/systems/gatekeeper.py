@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from typing import Any, Self
 
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
-from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSystem, State
+from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSystem, State, ValueProducer
 
 from airground_drake.gatekeeper.answer import Decision
 from airground_drake.gatekeeper.mpc_gatekeeper import Gatekeepers, Memory
 from airground_drake.intervention.messages import ACCEPT, SILENT, Report
 from airground_drake.systems.lifetime import weakly
+from airground_drake.systems.signals import Answer, laid_out, no_proposals, no_reports
 from airground_drake.systems.ticks import Ticks
+
+
+class DecisionLog(list[Decision]):
+    """Decisions by time, for the trace."""
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        """Of a copied Context: a log of its own, with the same decisions."""
+        return type(self)(self)
 
 
 class Gatekeeper(LeafSystem):
@@ -26,9 +35,10 @@ class Gatekeeper(LeafSystem):
     Ports (n UGVs):
         in  `team_position` (3(n+1)) m; `ugv_command` (3n) and `uav_command` (3) m/s, for the predicted motion
             of the other robots; `proposals` abstract, n of Proposal or None.
-        out `answers` (2n) and `reports` (abstract), see `messages`; held.
+        out `answers` (2n), an `Answer` per UGV, and `reports` (abstract), see `messages`; held.
     State: abstract, a `Memory`.
-    Rate: one update per gatekeeper period, from t = 0.
+    Rate: one update per gatekeeper period, from t = 0. What it decides there is published at the end of the
+    simulator's step: put into a log that the Context holds, as Drake's loggers do. The log decides nothing.
     """
 
     def __init__(self, gatekeepers: Gatekeepers, count: int, *, period: float, control: float) -> None:
@@ -39,16 +49,24 @@ class Gatekeeper(LeafSystem):
         self._position = self.DeclareVectorInputPort("team_position", 3 * (n + 1))
         self._ugv_command = self.DeclareVectorInputPort("ugv_command", 3 * n)
         self._uav_command = self.DeclareVectorInputPort("uav_command", 3)
-        self._proposals = self.DeclareAbstractInputPort("proposals", Value(object()))
+        self._proposals = self.DeclareAbstractInputPort("proposals", no_proposals(n))
         state = self.DeclareAbstractState(Value(Memory.empty(n)))
         self._state = int(state)
         held = {self.abstract_state_ticket(state)}
         self.DeclareVectorOutputPort("answers", 2 * n, weakly(self._calc_answers), prerequisites_of_calc=held)
         self.DeclareAbstractOutputPort(
-            "reports", lambda: Value(object()), weakly(self._calc_reports), prerequisites_of_calc=held
+            "reports", lambda: no_reports(n), weakly(self._calc_reports), prerequisites_of_calc=held
         )
+        empty = ValueProducer(allocate=lambda: Value(DecisionLog()), calc=ValueProducer.NoopCalc)
+        self._log = self.DeclareCacheEntry("decisions", empty, {self.nothing_ticket()}).cache_index()
+        self.DeclarePerStepPublishEvent(weakly(self._publish))
         self._ticks = Ticks(period, control)
         self.DeclarePeriodicUnrestrictedUpdateEvent(self._ticks.period, 0.0, weakly(self._update))
+
+    @property
+    def judges(self) -> str:
+        """Name of the class that judges the proposals."""
+        return type(self._gatekeepers).__name__
 
     @property
     def decision_times_s(self) -> list[float]:
@@ -62,9 +80,11 @@ class Gatekeeper(LeafSystem):
         """Forget the measured decision times."""
         self._gatekeepers.times_s = []
 
-    def decisions(self, context: Context) -> Sequence[Decision]:
-        """Every decision up to the context's time."""
-        return self._memory(context).decisions
+    def decisions(self, context: Context) -> DecisionLog:
+        """Every decision that was published in a simulation of this Context."""
+        entry = self.get_cache_entry(self._log)  # kept by its index: Python's object would keep the system
+        log: DecisionLog = entry.get_mutable_cache_entry_value(context).GetMutableValueOrThrow()
+        return log
 
     def _memory(self, context: Context) -> Memory:
         memory: Memory = context.get_abstract_state(self._state).get_value()
@@ -75,6 +95,13 @@ class Gatekeeper(LeafSystem):
 
     def _calc_reports(self, context: Context, output: AbstractValue) -> None:
         output.set_value(self._memory(context).reports)
+
+    def _publish(self, context: Context) -> EventStatus:
+        made, log = self._memory(context).decisions, self.decisions(context)
+        if not made or (log and log[-1] is made[-1]):
+            return EventStatus.DidNothing()
+        log.extend(made)
+        return EventStatus.Succeeded()
 
     def _update(self, context: Context, state: State) -> EventStatus:
         if not self._ticks.due(context.get_time()):
@@ -99,17 +126,17 @@ class DirectAcceptance(LeafSystem):
     def __init__(self, count: int) -> None:
         """Declare ports for `count` UGVs."""
         super().__init__()
-        self._proposals = self.DeclareAbstractInputPort("proposals", Value(object()))
+        self._proposals = self.DeclareAbstractInputPort("proposals", no_proposals(count))
         self.DeclareVectorOutputPort(
             "answers", 2 * count, weakly(self._calc_answers), prerequisites_of_calc={self._proposals.ticket()}
         )
         self.DeclareAbstractOutputPort(
             "reports",
-            lambda: Value(object()),
+            lambda: no_reports(count),
             lambda context, output: output.set_value((Report(),) * count),
             prerequisites_of_calc={self.nothing_ticket()},
         )
 
     def _calc_answers(self, context: Context, output: BasicVector) -> None:
-        answers = [(SILENT, -1.0) if p is None else (ACCEPT, p.number) for p in self._proposals.Eval(context)]
-        output.SetFromVector(np.array(answers).ravel())
+        answers = [[SILENT, -1.0] if p is None else [ACCEPT, p.number] for p in self._proposals.Eval(context)]
+        output.SetFromVector(laid_out(Answer, answers))

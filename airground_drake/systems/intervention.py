@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import numpy as np
 from pydrake.common.value import AbstractValue, Value
-from pydrake.systems.framework import Context, EventStatus, LeafSystem, State
+from pydrake.systems.framework import Context, DiscreteValues, EventStatus, LeafSystem, State
 
+from airground_drake.arrays import Array
 from airground_drake.decision.excursion import INTERVENING
+from airground_drake.intervention.halts import NOT_WATCHED, room, standing, watched
 from airground_drake.intervention.planner import Planner, PlannerMemory, sent_after
-from airground_drake.systems.decision import FIELDS
 from airground_drake.systems.lifetime import weakly
+from airground_drake.systems.signals import FIELDS, no_proposals, no_reports
 from airground_drake.systems.ticks import Ticks
 
 
@@ -21,6 +24,7 @@ class InterventionPlanner(LeafSystem):
         in  `team_position` (3(n+1)) m; `status` (4n) from EventTrigger; `answers` (2n) and `reports`
             (abstract), see `messages`.
         out `proposals` abstract, n of Proposal or None.
+    State: where each UGV has been since when, see `halts`; abstract, a `PlannerMemory`.
     Rate: one update per planning period, from t = 0. A proposal can act one period after it is made.
     """
 
@@ -32,16 +36,19 @@ class InterventionPlanner(LeafSystem):
         self._position = self.DeclareVectorInputPort("team_position", 3 * (n + 1))
         self._status = self.DeclareVectorInputPort("status", FIELDS * n)
         self._answers = self.DeclareVectorInputPort("answers", 2 * n)
-        self._reports = self.DeclareAbstractInputPort("reports", Value(object()))
+        self._reports = self.DeclareAbstractInputPort("reports", no_reports(n))
         held = self.DeclareAbstractState(Value(planner.start()))
         self._memory = int(held)
         self.DeclareAbstractOutputPort(
             "proposals",
-            lambda: Value(object()),
+            lambda: no_proposals(n),
             weakly(self._calc_proposals),
             prerequisites_of_calc={self.abstract_state_ticket(held)},
         )
         self._ticks = Ticks(planner.period, planner.period if control_period is None else control_period)
+        self._room = room(planner.max_speed)
+        self.DeclareDiscreteState(np.tile([0.0, 0.0, 0.0, NOT_WATCHED], n))
+        self.DeclarePeriodicDiscreteUpdateEvent(self._ticks.period, 0.0, weakly(self._watch))
         self.DeclarePeriodicUnrestrictedUpdateEvent(self._ticks.period, 0.0, weakly(self._update))
 
     def memory(self, context: Context) -> PlannerMemory:
@@ -56,17 +63,27 @@ class InterventionPlanner(LeafSystem):
     def _calc_proposals(self, context: Context, output: AbstractValue) -> None:
         output.set_value(self.memory(context).proposals)
 
-    def _update(self, context: Context, state: State) -> EventStatus:
+    def _watch(self, context: Context, discrete: DiscreteValues) -> EventStatus:
         if not self._ticks.due(context.get_time()):
             return EventStatus.DidNothing()
-        before, positions = self.memory(context), self._position.Eval(context).reshape(-1, 3)
-        memory = self._planner.watch(before, context.get_time(), positions)
-        intervening = [mode == INTERVENING for mode in self._status.Eval(context)[::FIELDS].tolist()]
-        if any(intervening) or any(memory.proposals):
-            answers, reports = self._answers.Eval(context), self._reports.Eval(context)
-            memory = self._planner.plan(memory, context.get_time(), positions, intervening, answers, reports)
-        if memory is before:
+        discrete.set_value(0, self._halts(context))
+        return EventStatus.Succeeded()
+
+    def _halts(self, context: Context) -> Array:
+        before = context.get_discrete_state(0).value()
+        return watched(before, context.get_time(), self._position.Eval(context), self._room)
+
+    def _update(self, context: Context, state: State) -> EventStatus:
+        t = context.get_time()
+        if not self._ticks.due(t):
             return EventStatus.DidNothing()
-        memory = sent_after(before, memory, context.get_time())
-        state.get_mutable_abstract_state(self._memory).set_value(memory)
+        before = self.memory(context)
+        intervening = [mode == INTERVENING for mode in self._status.Eval(context)[::FIELDS].tolist()]
+        if self._planner.idle(before, intervening):
+            return EventStatus.DidNothing()
+        positions = self._position.Eval(context).reshape(-1, 3)
+        answers, reports = self._answers.Eval(context), self._reports.Eval(context)
+        stands = standing(self._halts(context), t).tolist()  # of this instant: the state is updated after this
+        memory = self._planner.plan(before, t, positions, intervening, answers, reports, stands)
+        state.get_mutable_abstract_state(self._memory).set_value(sent_after(before, memory, t))
         return EventStatus.Succeeded()

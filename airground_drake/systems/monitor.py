@@ -17,6 +17,7 @@ from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.team import Team
 from airground_drake.systems.lifetime import weakly
+from airground_drake.systems.signals import no_proposals
 
 INEQUALITY_TOLERANCE_M_S = 1e-9
 """By this much a velocity may miss an inequality or a limit, m/s, as in SAFE-HYP: rounding errs by 1e-13 m/s."""
@@ -121,7 +122,7 @@ class Monitor(LeafSystem):
         self._position = self.DeclareVectorInputPort("team_position", 3 * (n + 1))
         self._command = self.DeclareVectorInputPort("team_command", 3 * (n + 1))
         self._reference = self.DeclareVectorInputPort("reference", 6 * n)
-        self._proposals = self.DeclareAbstractInputPort("proposals", Value(object()))
+        self._proposals = self.DeclareAbstractInputPort("proposals", no_proposals(n))
         self._answers = self.DeclareVectorInputPort("answers", 2 * n)
         self._memory = self.DeclareAbstractState(Value(Memory()))
         self.DeclareVectorOutputPort(

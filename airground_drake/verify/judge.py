@@ -6,10 +6,11 @@ from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from airground_drake.parallel import run_parallel
 from airground_drake.progress import SILENT, Progress
+from airground_drake.scenarios.load import own
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.trace import Trace
 from airground_drake.verify.applications import Count, counts, measured, with_counts, with_runs
@@ -71,17 +72,16 @@ def verify_model(
 
     Returns:
         One verdict per claim, run '', with the status that the scenario expects ('proved' or 'supported' unless
-        it says otherwise).
+        it says otherwise); and one more for each run whose `set` gives the claim other constants.
 
     Raises:
         UnknownNameError: if an identifier is not that of a claim about the model.
         PluginError: if a claim of the scenario cannot be made.
     """
-    chosen = model_claims(claims, scenario.claims)
-    inputs = [claim.judge_inputs(scenario) for claim in chosen]
-    pieces = [partial(found, claim, given, kept) for claim, given in zip(chosen, inputs, strict=True)]
-    findings = run_parallel(pieces, names=[claim.id for claim in chosen], progress=progress)
-    return _model_verdicts(scenario, chosen, inputs, findings)
+    asked = _asked(scenario, claims)
+    pieces = [partial(found, each.claim, each.inputs, kept) for each in asked]
+    findings = run_parallel(pieces, names=[each.name for each in asked], progress=progress)
+    return [each.verdict(scenario, finding) for each, finding in zip(asked, findings, strict=True)]
 
 
 def verify_all(
@@ -101,39 +101,60 @@ def verify_all(
         PluginError: if a claim of the scenario cannot be made.
         AirgroundError: if a process dies.
     """
-    chosen = model_claims(added=scenario.claims)
-    inputs = [claim.judge_inputs(scenario) for claim in chosen]
+    asked = _asked(scenario)
     of_runs = [(replace(trace), _applicable(trace)) for trace in traces]  # as in `verify`
-    pieces: list[Callable[[], Any]] = [
-        partial(found, claim, given, kept) for claim, given in zip(chosen, inputs, strict=True)
-    ]
+    pieces: list[Callable[[], Any]] = [partial(found, each.claim, each.inputs, kept) for each in asked]
     pieces += [partial(_judged, trace, claims) for trace, claims in of_runs]
-    names = [*(claim.id for claim in chosen), *(f"claims about run {trace.run}" for trace, _ in of_runs)]
+    names = [*(each.name for each in asked), *(f"claims about run {trace.run}" for trace, _ in of_runs)]
     progress.stage("judging", len(pieces), "claims about the model or a run")
     done = run_parallel(pieces, names=names, progress=progress)
-    about_the_model, about_runs = done[: len(chosen)], done[len(chosen) :]
+    about_the_model, about_runs = done[: len(asked)], done[len(asked) :]
     verdicts = [
         verdict
         for (trace, claims), (findings, *_) in zip(of_runs, about_runs, strict=True)
         for verdict in _verdicts(trace, claims, findings)
     ]
-    counted, shown = [each for _, each, _ in about_runs], [each for _, _, each in about_runs]
-    findings = [
-        with_runs(claim.id, with_counts(claim.id, each, counted), shown)
-        for claim, each in zip(chosen, about_the_model, strict=True)
+    apart = {(each.claim.id, each.run) for each in asked if each.run}
+    for each, finding in zip(asked, about_the_model, strict=True):
+        name, concerned = each.claim.id, []
+        for (trace, _), about in zip(of_runs, about_runs, strict=True):
+            if each.run == (trace.run if (each.claim.id, trace.run) in apart else ""):
+                concerned.append(about)
+        counted = with_counts(name, finding, [met for _, met, _ in concerned])
+        verdicts.append(each.verdict(scenario, with_runs(name, counted, [shown for *_, shown in concerned])))
+    return verdicts
+
+
+class _Asked(NamedTuple):
+    """A claim about the model, of which run ('': all of them), and its constants."""
+
+    claim: ModelClaim
+    run: str
+    inputs: dict[str, Any]
+
+    @property
+    def name(self) -> str:
+        """For whoever waits for it."""
+        return f"{self.claim.id} {self.run}".strip()
+
+    def verdict(self, scenario: Scenario, finding: Finding) -> Verdict:
+        """With what the scenario expects."""
+        expected = scenario.runs[self.run].expected if self.run else scenario.expected
+        return Verdict(self.claim, self.run, finding, expected.get(self.claim.id, self.claim.expected), self.inputs)
+
+
+def _asked(scenario: Scenario, claims: Collection[str] | None = None) -> list[_Asked]:
+    """The claims about the model, and again for each run whose `set` gives one of them other constants."""
+    asked = [_Asked(claim, "", claim.judge_inputs(scenario)) for claim in model_claims(claims, scenario.claims)]
+    changed = {name: own(scenario, name) for name, run in scenario.runs.items() if run.set}
+    return asked + [
+        _Asked(each.claim, name, inputs)
+        for name, its_own in changed.items()
+        for each in asked
+        if (inputs := each.claim.judge_inputs(its_own)) != each.inputs
     ]
-    return verdicts + _model_verdicts(scenario, chosen, inputs, findings)
 
 
 def _judged(trace: Trace, claims: Sequence[TraceClaim]) -> tuple[list[Finding], dict[str, Count], dict[str, Any]]:
     """What the claims found about a run, how often it met the premises of the theorems, and what it shows of itself."""
     return [claim.judge(trace) for claim in claims], counts(trace), measured(trace)
-
-
-def _model_verdicts(
-    scenario: Scenario, claims: Sequence[ModelClaim], inputs: Sequence[dict[str, Any]], findings: Sequence[Finding]
-) -> list[Verdict]:
-    return [
-        Verdict(claim, "", finding, scenario.expected.get(claim.id, claim.expected), given)
-        for claim, given, finding in zip(claims, inputs, findings, strict=True)
-    ]

@@ -19,7 +19,7 @@ from mutation.mutant import PACKAGE, Mutant
 
 RUNNING = (
     "arrays.py", "components.py", "diagram.py", "events.py", "simulation.py",
-    "decision", "gatekeeper", "intervention", "nsbc", "systems",
+    "decision", "gatekeeper", "geometry", "intervention", "nsbc", "systems",
 )  # fmt: skip
 """Files and folders of what produces a run."""
 PROBES = ("crowd d", "crowd c", "bodies d", "case_b d", "soft_gate c", "crowd b")
@@ -224,6 +224,8 @@ def mutant(root: Path, path: str, text: str, edit: Edit) -> Mutant:
     was = " ".join(text[edit.start : edit.end].split())
     ours = next((names for beginning, names in HYPOTHESES.items() if path.startswith(beginning)), ())
     folder, name = Path("tests", path).parent, Path(path).name
+    while not (root / folder).exists():  # tests of a nested folder may lie one above
+        folder = folder.parent
     tests = [str(folder / f"test_{name}")] if (root / folder / f"test_{name}").exists() else [str(folder)]
     if folder == Path("tests"):
         tests = ["tests/test_simulation.py", "tests/test_diagram.py"]

@@ -1,7 +1,7 @@
 import numpy as np
 
+from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.policy import Observation, Policy
-from airground_drake.nsbc.motion import Motion
 
 
 class Sidestep(Policy):

@@ -6,13 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from airground_drake.gatekeeper.closed_loop import ClosedLoop
-from airground_drake.gatekeeper.prediction import Horizon, Scene, closed_loop, predicted_problem
-from airground_drake.gatekeeper.problem import Problem
+from airground_drake.gatekeeper.problem import Horizon, Problem, predicted_problem
+from airground_drake.gatekeeper.rollout import ClosedLoop, Scene, closed_loop
+from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.law import UgvLaw
-from airground_drake.nsbc.motion import Motion
 from airground_drake.nsbc.team import Team
 from airground_drake.systems.controllers import UgvController
 

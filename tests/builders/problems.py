@@ -9,13 +9,13 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from airground_drake.components import make_presets, make_team
-from airground_drake.gatekeeper.prediction import Horizon, Scene, predicted_problem
-from airground_drake.gatekeeper.problem import Problem
+from airground_drake.gatekeeper.problem import Horizon, Problem, predicted_problem
+from airground_drake.gatekeeper.rollout import Scene
+from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.detour import Detour
 from airground_drake.intervention.policy import Observation, Proposal
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.law import UgvLaw
-from airground_drake.nsbc.motion import Motion
 from airground_drake.scenarios.load import load
 
 LAW = UgvLaw(Avoidance(3.0, 0.05, 4.0), 2.0, 1.5, intervention_on_top=False)

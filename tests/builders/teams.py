@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from airground_drake.intervention.coordination.joint import Plan
-from airground_drake.intervention.coordination.roadmap import Errand, Space
+from airground_drake.intervention.coordination.roadmap import RobotTask, Space
 from airground_drake.intervention.coordination.timed import at_rest
 
 Array = npt.NDArray[np.float64]
@@ -23,12 +23,12 @@ def space(obstacles: Sequence[Sequence[float]] | Array = ()) -> Space:
     return Space(centres, np.full(len(centres), APART), 0.1, APART, 0.2)
 
 
-def errand(start: Sequence[float] | Array, target: Sequence[float] | Array) -> Errand:
+def task(start: Sequence[float] | Array, target: Sequence[float] | Array) -> RobotTask:
     """From a place to a target, where the preset has arrived already."""
-    return Errand(np.asarray(start, dtype=np.float64), np.array([[0.0, *target]]))
+    return RobotTask(np.asarray(start, dtype=np.float64), np.array([[0.0, *target]]))
 
 
-def random_team(seed: int, count: int, obstacles: int, extent: float) -> tuple[Space, list[Errand]]:
+def random_team(seed: int, count: int, obstacles: int, extent: float) -> tuple[Space, list[RobotTask]]:
     """Robots and discs at random in a square."""
     rng = np.random.default_rng([seed, count])
 
@@ -42,9 +42,9 @@ def random_team(seed: int, count: int, obstacles: int, extent: float) -> tuple[S
 
     discs = apart(obstacles, [], 1.0)
     starts, targets = apart(count, discs, 2.15), apart(count, discs, 2.15)
-    return space(discs), [errand(start, target) for start, target in zip(starts, targets, strict=True)]
+    return space(discs), [task(start, target) for start, target in zip(starts, targets, strict=True)]
 
 
-def motions(plan: Plan, errands: Sequence[Errand]) -> list[Array]:
+def motions(plan: Plan, tasks: Sequence[RobotTask]) -> list[Array]:
     """What every robot does, those that stay included."""
-    return [at_rest(e.start) if way is None else way.motion for way, e in zip(plan.ways, errands, strict=True)]
+    return [at_rest(e.start) if way is None else way.motion for way, e in zip(plan.ways, tasks, strict=True)]

@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 from airground_drake.campaign.evidence import evidence, strict
-from airground_drake.campaign.page import page
+from airground_drake.campaign.page import page, told
 from airground_drake.campaign.rows import COLUMNS, DIED, INVALID, JUDGED, STOPPED, Row, blank
 from airground_drake.campaign.statistics import clopper_pearson, confidence_sequence
 from airground_drake.campaign.stopping import InOrder, Stopping
@@ -87,7 +87,7 @@ def shown(found: dict[str, Any]) -> str:
 def word(found: dict[str, Any]) -> tuple[str, str]:
     """How the banner of the page looks, and what it says."""
     text = shown(found)
-    banner = re.search(r'<section class="banner (\w+)".*?<p class="word">(.*?)</p>', text, re.DOTALL)
+    banner = re.search(r'<p class="headline (\w+)">(.*?)</p>', text, re.DOTALL)
     assert banner is not None
     return banner[1], " ".join(re.sub(r"<[^>]*>", " ", banner[2]).split())
 
@@ -95,11 +95,11 @@ def word(found: dict[str, Any]) -> tuple[str, str]:
 @pytest.mark.parametrize(
     ("rows", "looks"),
     [
-        ([row(0)], ("good", "✓ Every claim as expected")),
-        ([row(0, exercised=0.0, as_expected=False)], ("open", "? 1 of 1 claims never put to the test")),
-        ([row(0), row(1, exercised=0.0, as_expected=False)], ("good", "✓ Every claim as expected")),
-        ([row(0, "refuted")], ("bad", "✗ 1 of 1 claims not as expected")),
-        ([row(0, "refuted", as_expected=True)], ("good", "✓ Every claim as expected")),
+        ([row(0)], ("good", "✓ Every claim as declared")),
+        ([row(0, exercised=0.0, as_expected=False)], ("open", "? 1 of 1 claims never tested")),
+        ([row(0), row(1, exercised=0.0, as_expected=False)], ("good", "✓ Every claim as declared")),
+        ([row(0, "refuted")], ("bad", "✗ 1 of 1 claims not as declared")),
+        ([row(0, "refuted", as_expected=True)], ("tuned", "≈ 1 of 1 claims refuted, as the scenario admits")),
         ([row(0, "inconclusive")], ("open", "? 1 of 1 claims undecided in some draws")),
         (died(0), ("open", "? 1 of 1 draws were not finished")),
         ([row(0), *died(1)], ("open", "? 1 of 1 claims undecided in some draws")),
@@ -109,7 +109,7 @@ def word(found: dict[str, Any]) -> tuple[str, str]:
 def test_the_page_says_what_the_exit_code_says(rows: list[Row], looks: tuple[str, str]) -> None:
     found = conclude(rows)
     assert word(found) == looks
-    assert _code(found) == {"good": 0, "bad": 1, "open": 3}[looks[0]]
+    assert _code(found) == {"good": 0, "tuned": 0, "bad": 1, "open": 3}[looks[0]]
     assert ("  undecided: " in _summary(found | {"name": "x"}, looked=False)) == (looks[0] == "open")
 
 
@@ -164,6 +164,21 @@ def test_it_finds_the_keys_by_which_a_claim_fails() -> None:
     assert where["by_chance"] < 1e-6
     assert sum(cell["runs"] for cell in where["cells"]) == 400
     assert sum(cell["refuted"] for cell in where["cells"]) == claim["refuted"]
+
+
+def test_the_page_says_first_what_was_found_and_what_separates_failures() -> None:
+    rows = [row(i, "refuted" if i % 4 == 1 else "holds", drawn=json.dumps({"gain": i % 4})) for i in range(80)]
+    found = conclude([*rows, *(row(i, run="b") for i in range(80))])
+    says = [tuple(line) for line in told(found)]
+    assert says[0][0] == "no"
+    assert says[0][1].startswith("SAFE-TRACE in run d: refuted in 20 of 80 runs; probability 0.1")
+    assert says[1][0] == "yes"
+    assert says[1][1].startswith("SAFE-TRACE in run b: never refuted in 80 runs; probability of a violation at most 0.")
+    text = shown(found)
+    assert "SAFE-TRACE in run d fails in 20 of 20 runs with gain 1, and in 0 of 20 runs with gain" in text
+    assert (
+        text.index("refuted in 20 of 80") < text.index("What separates failures") < text.index("How likely a violation")
+    )
 
 
 def test_neither_a_seed_nor_chance_explains_where_a_claim_fails() -> None:

@@ -159,16 +159,18 @@ def test_diagram_writes_what_was_asked_for(tmp_path: Path, capsys: pytest.Captur
     assert (tmp_path / "minimal.dot").read_text(encoding="utf-8").startswith("digraph")
     assert (tmp_path / "minimal.png").read_bytes().startswith(b"\x89PNG")
     assert "minimal_method_b" in (tmp_path / "minimal.dot").read_text(encoding="utf-8")
-    assert main(["diagram", "minimal", "--part", "ugvs", "--format", "svg", "-o", str(tmp_path)]) == 0
-    assert "ugv_controller" in (tmp_path / "minimal_ugvs.svg").read_text(encoding="utf-8")
+    assert main(["diagram", "minimal", "--part", "task_planning", "--format", "svg", "-o", str(tmp_path)]) == 0
+    assert "ugv_controller" in (tmp_path / "minimal_task_planning.svg").read_text(encoding="utf-8")
     preset = "{waypoints_m: [[9, 9, 0], [9, 8, 0]], speed_m_s: 1}"
     extra = f"ugvs.ugv2={{start_m: [9, 9, 0], target_m: [9, 8, 0], preset: {preset}}}"
-    assert main(["diagram", "minimal", "--set", extra, "--part", "world", "--format", "dot", "-o", str(tmp_path)]) == 0
-    assert "ugv2_plant" in (tmp_path / "minimal_world.dot").read_text(encoding="utf-8")
+    assert (
+        main(["diagram", "minimal", "--set", extra, "--part", "vehicles", "--format", "dot", "-o", str(tmp_path)]) == 0
+    )
+    assert "ugv2_plant" in (tmp_path / "minimal_vehicles.dot").read_text(encoding="utf-8")
     assert main(["diagram", "minimal", "--set", "duration_s=-1", "-o", str(tmp_path)]) == 2
     assert "error: --set duration_s=-1: duration_s: -1" in capsys.readouterr().err
     assert main(["diagram", "minimal", "--part", "nothing", "-o", str(tmp_path)]) == 2
-    assert "allowed: decision, uav, ugvs, world" in capsys.readouterr().err
+    assert "allowed: decision_making, task_planning, optimisation, vehicles" in capsys.readouterr().err
     assert main(["diagram", "minimal", "-o", str(tmp_path / "minimal.dot")]) == 2
     assert "minimal.dot cannot be written: File exists; wanted: a folder for the pictures" in capsys.readouterr().err
     assert main(["diagram", "nowhere.yaml"]) == 2
@@ -196,7 +198,6 @@ verify
 compare one
 proofs
 campaign
-diagram minimal --depth -1
 completion fish
 """
 

@@ -39,7 +39,10 @@ def test_every_report_is_there_with_its_verdict_a_link_and_a_picture(
     page = (tmp_path / PAGE).read_text()
     assert 'href="plain/report.html"' in page
     assert 'href="a%20b/100%25/report.json"' in page
-    assert page.count("as expected</span>") == 2
+    assert page.count("as declared</span>") == 2
+    assert (
+        page.count("<strong>No method brings everyone home safely. Under (a) and (c), ugv1 comes to 1.99999 m of") == 2
+    )
     assert page.count("<svg") == 1
     assert "no trace" in page
     assert "<script" not in page

@@ -2,28 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 from pathlib import Path
 
 import pytest
-from report.cases import GOING_ROUND, SUCCESS, make_scenario, make_trace
 
-from airground_drake import trace
 from airground_drake.commands import main
-from airground_drake.scenarios.load import resolved
-
-
-@pytest.fixture
-def folder(tmp_path: Path) -> Path:
-    """As much of a report as a replay looks at."""
-    made = make_trace(make_scenario(), "c", GOING_ROUND, SUCCESS)
-    made.meta["scenario"] = resolved(make_scenario())
-    made.meta["schema"] = trace.SCHEMA
-    for run in ("c", "d"):
-        trace.save(made, tmp_path / "report" / "trace" / run)
-    (tmp_path / "report" / "report.json").write_text(json.dumps({"schema": "airground_drake.report/2"}))
-    return tmp_path / "report"
 
 
 def test_a_page_for_each_run(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

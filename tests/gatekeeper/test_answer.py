@@ -11,12 +11,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from airground_drake.gatekeeper.answer import Decision, Planned, Rules, in_words, settle
-from airground_drake.gatekeeper.prediction import predicted_problem
+from airground_drake.gatekeeper.problem import predicted_problem
 from airground_drake.gatekeeper.routes.relaxed import RelaxedRoute
 from airground_drake.gatekeeper.solution import Solution
+from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT
 from airground_drake.intervention.policy import Proposal
-from airground_drake.nsbc.motion import Motion
 
 RULES = Rules(switching_margin=0.1, min_dwell=0.2)
 

@@ -10,9 +10,10 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from airground_drake.gatekeeper.half_planes import normals_along
-from airground_drake.gatekeeper.prediction import Horizon, Scene, predicted_problem
+from airground_drake.gatekeeper.problem import Horizon, predicted_problem
+from airground_drake.gatekeeper.rollout import Scene
+from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.policy import Proposal
-from airground_drake.nsbc.motion import Motion
 
 
 @given(st.integers(0, 10**6), arrays(np.float64, 20, elements=st.floats(0.0, 1.0)))

@@ -8,21 +8,21 @@ import numpy as np
 
 from airground_drake.gatekeeper.answer import Decision, Foreseen, Rules
 from airground_drake.gatekeeper.budget import Budget
-from airground_drake.gatekeeper.mpc_gatekeeper import Judging, Memory, PaperGatekeepers, Situation
-from airground_drake.gatekeeper.prediction import Horizon
+from airground_drake.gatekeeper.mpc_gatekeeper import Judging, Memory, PaperGatekeepers, View
+from airground_drake.gatekeeper.problem import Horizon
 from airground_drake.gatekeeper.routes.relaxed import RelaxedRoute
+from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.messages import ACCEPT
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.law import UgvLaw
-from airground_drake.nsbc.motion import Motion
 from airground_drake.nsbc.team import Team
 
 
 class Agreeing(PaperGatekeepers):
     """Accepts everything."""
 
-    def _decide(self, seen: Situation, i: int, proposal: Proposal, budgets: Iterator[Budget]) -> Decision:
+    def _decide(self, seen: View, i: int, proposal: Proposal, budgets: Iterator[Budget]) -> Decision:
         return Decision(seen.t, i, proposal, True, "cheaper", Foreseen())
 
 

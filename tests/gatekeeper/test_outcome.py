@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from airground_drake.gatekeeper.outcome import Other, Outcome, Outlook, outcomes, way_left
-from airground_drake.gatekeeper.prediction import Scene
+from airground_drake.gatekeeper.rollout import Scene
+from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.law import UgvLaw
-from airground_drake.nsbc.motion import Motion
 
 LAW = UgvLaw(Avoidance(3.0, 0.05, 4.0), 2.0, 1.5, intervention_on_top=False)
 LOOK = Outlook(longest=20.0)

@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from airground_drake.gatekeeper.mpc_gatekeeper import Memory, Situation
+from airground_drake.gatekeeper.mpc_gatekeeper import Memory, View
 from airground_drake.gatekeeper.outcome import Outcome, Outlook
 from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers, reason_of
-from airground_drake.gatekeeper.patience import Patience, Turn
+from airground_drake.gatekeeper.patience import Commitment, Patience
+from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.law import UgvLaw
-from airground_drake.nsbc.motion import Motion
 from airground_drake.nsbc.team import Team
 
 ROCK = np.array([[3.0, 0.0, 0.0]])
@@ -24,7 +24,7 @@ def gatekeepers(*ugvs: str, rocks: np.ndarray = ROCK) -> OutcomeGatekeepers:
     """Of UGVs that are to be at (20, 0), with a rock on the way and a sensing range of 4 m."""
     team = Team(ugvs, "uav", rocks, 2.0, 2.0, 1.0, np.full(len(ugvs) + 1, 3.0))
     law = UgvLaw(Avoidance(3.0, 0.05, 4.0), 2.0, 1.5, intervention_on_top=False)
-    patience = Patience(most=2, rest=1.0, longest=5.0, lag=0.5, behind=1.0)
+    patience = Patience(most=2, rest=1.0, longest=5.0)
     preset = Motion(np.zeros(1), np.array([[20.0, 0.0, 0.0]]))
     return OutcomeGatekeepers(team, law, [preset] * len(ugvs), Outlook(5.0), patience)
 
@@ -40,7 +40,7 @@ def test_an_obstacle_that_was_in_sight_is_known_when_it_is_out_of_it(passed: boo
     memory = sampled(gate, 0.0, 0.0 if passed else 20.0, None, Memory.empty(1))
     memory = sampled(gate, 0.05, 20.0, None, memory)
     places = np.array([[20.0, 0.0, 0.0], [20.0, 0.0, 2.0]])
-    discs, _ = gate._known(Situation(0.1, (proposal,), places, np.zeros((2, 3)), memory), 0, proposal)
+    discs, _ = gate._known(View(0.1, (proposal,), places, np.zeros((2, 3)), memory), 0, proposal)
     assert discs.tolist() == ROCK[:known].tolist()
 
 
@@ -79,11 +79,13 @@ def test_an_obstacle_that_nobody_knew_is_a_reason_to_look_again_and_costs_no_try
     for mapped, looked in ((rocks[:1], [True, False, True, False]), (rocks, [True, False, False, False])):
         gate, memory = gatekeepers("ugv", rocks=rocks), Memory.empty(1)
         proposal = Proposal("way", 0.0, way, mapped=mapped, mapped_radii=np.zeros(len(mapped)), number=0)
+        decisions = []
         for k, x in enumerate((0.0, 0.1, 3.5, 3.6)):
             memory = sampled(gate, 0.05 * k, x, proposal, memory)
-        assert [decision.grounds.accept is not None for decision in memory.decisions] == looked
-        assert [decision.grounds.tries for decision in memory.decisions] == [1, 1, 1, 1]
-        assert memory.turns[0].tries == 1
+            decisions += memory.decisions
+        assert [decision.grounds.accept is not None for decision in decisions] == looked
+        assert [decision.grounds.tries for decision in decisions] == [1, 1, 1, 1]
+        assert memory.commitments[0].tries == 1
 
 
 def test_a_favour_is_done_unless_it_strands_the_ugv() -> None:
@@ -116,11 +118,11 @@ class Pair:
         self.places = np.array([[20.0, 0.0, 0.0], [0.0, 9.0, 0.0], [20.0, 0.0, 9.0]])
         self.memory, self.t = Memory.empty(2), 0.0
 
-    def sees(self, proposal: Proposal | None) -> Turn:
+    def sees(self, proposal: Proposal | None) -> Commitment:
         self.t += 0.05
         if not self.gate.idle((proposal, None), self.places, self.memory):
             self.memory = self.gate.sample(self.t, (proposal, None), self.places, np.zeros((3, 3)), self.memory)
-        return self.memory.turns[0]
+        return self.memory.commitments[0]
 
 
 def test_a_withdrawal_is_noticed_when_nothing_else_is_proposed() -> None:
@@ -130,7 +132,6 @@ def test_a_withdrawal_is_noticed_when_nothing_else_is_proposed() -> None:
     assert not turn.executing
     assert turn.since == pair.t
     assert pair.memory.answers[:2] == (SILENT, -1.0)
-    assert pair.memory.commitments[0] is None
 
 
 def test_a_replaced_proposal_ends_its_try_whatever_becomes_of_the_next() -> None:
@@ -139,7 +140,6 @@ def test_a_replaced_proposal_ends_its_try_whatever_becomes_of_the_next() -> None
     turn = pair.sees(making_way(0.05, cause="ugv"))
     assert pair.memory.answers[0] == REFUSE
     assert (turn.executing, turn.tries, turn.since) == (False, 1, pair.t)
-    assert pair.memory.commitments[0] is None
 
 
 def test_a_ugv_rests_while_proposals_keep_coming() -> None:

@@ -1,4 +1,4 @@
-"""The automaton of tries, progress and rest."""
+"""The automaton of tries and rests."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from properties import examples
 
-from airground_drake.gatekeeper.patience import Patience, Turn
+from airground_drake.gatekeeper.patience import Commitment, Patience
 
-PATIENCE = Patience(most=2, rest=5.0, longest=10.0, lag=0.5, behind=2.0)
+PATIENCE = Patience(most=2, rest=5.0, longest=10.0)
 
 
 def test_tries_are_used_up_and_come_back_with_a_rest() -> None:
-    turn = Turn()
+    turn = Commitment()
     for t in (0.0, 20.0):
         turn = PATIENCE.accept(turn, t, t + 3.0)
         assert turn.until == t + 3.0
@@ -26,16 +26,14 @@ def test_tries_are_used_up_and_come_back_with_a_rest() -> None:
 
 
 def test_a_try_lasts_no_longer_than_it_may() -> None:
-    turn = PATIENCE.accept(Turn(), 1.0, 1e9)
+    turn = PATIENCE.accept(Commitment(), 1.0, 1e9)
     assert turn.until == 11.0
     assert not PATIENCE.over(turn, 10.9)
     assert PATIENCE.over(turn, 11.0)
     assert PATIENCE.rested(turn, 100.0).tries == 1  # nobody rests while executing
 
 
-@pytest.mark.parametrize(
-    "broken", [{"most": 0}, {"rest": 0.0}, {"longest": 0.0}, {"lag": 0.0}, {"behind": float("nan")}]
-)
+@pytest.mark.parametrize("broken", [{"most": 0}, {"rest": 0.0}, {"longest": 0.0}, {"longest": float("nan")}])
 def test_impossible_parameters_are_refused(broken: dict[str, float]) -> None:
     with pytest.raises(ValueError, match="patience needs"):
         replace(PATIENCE, **broken)
@@ -45,7 +43,7 @@ def test_impossible_parameters_are_refused(broken: dict[str, float]) -> None:
 @given(st.lists(st.tuples(st.booleans(), st.booleans(), st.integers(1, 400)), max_size=300))
 def test_between_two_rests_no_more_than_all_tries_to_the_end(events: list[tuple[bool, bool, int]]) -> None:
     """A UAV that proposes and withdraws at will, at samples 0.1 s apart."""
-    turn, stolen, period = Turn(), 0.0, 0.1
+    turn, stolen, period = Commitment(), 0.0, 0.1
     for k, (proposes, withdraws, length) in enumerate(events):
         t = period * k
         if turn.executing:

@@ -12,7 +12,8 @@ import pytest
 from airground_drake.arrays import Array
 from airground_drake.decision.excursion import extremes
 from airground_drake.decision.trigger import Mode, Trigger
-from airground_drake.systems.decision import FIELDS, DecisionBlock, DecisionVariable, EventTrigger
+from airground_drake.systems.decision import DecisionBlock, DecisionVariable, EventTrigger
+from airground_drake.systems.signals import FIELDS
 
 UGVS = 400
 """Steps compared at a time."""
@@ -84,7 +85,8 @@ def _running(
     count, step = len(modes), 0.1
     source = variable.CreateDefaultContext()
     source.SetTime(1.0 + step)
-    source.SetDiscreteState(0, np.concatenate([[1.0], before.ravel()]))
+    begun = np.column_stack([before, variable.value(1.0, np.ascontiguousarray(before))])
+    source.SetDiscreteState(0, np.concatenate([[1.0], begun.ravel()]))
     variable.GetInputPort("team_position").FixValue(source, np.zeros(3 * count + 3))
     variable.GetInputPort("reference").FixValue(source, np.concatenate([after[:, :3].ravel(), np.zeros(3 * count)]))
     variable.GetInputPort("noise").FixValue(source, after[:, 3])

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from airground_drake.decision.trigger import Mode, Trigger, TriggerState
-from airground_drake.gatekeeper.patience import Patience, Turn
+from airground_drake.gatekeeper.patience import Commitment, Patience
 
 SUPERVISING, INTERVENING, REFRACTORY = Mode.SUPERVISING, Mode.INTERVENING, Mode.REFRACTORY
 LEVELS = [(3.0, 1.5, 0.5), (3.0, 3.0, 0.0), (3.0, 3.0, 0.5), (1.5, -0.5, 2.0)]
@@ -97,33 +97,30 @@ def test_a_trigger_that_differs_is_noticed(kind: type[Trigger]) -> None:
     assert differing(kind)
 
 
-TIMES = (2, 5.0, 3.0, 0.5, 1.0)
-"""Tries, rest, longest try, lag and time behind."""
+TIMES = (2, 5.0, 3.0)
+"""Tries, rest and longest try."""
 
 
 def impatient(kind: type[Patience]) -> list[str]:
     """What of a patience differs from Patience.v."""
-    most, rest, longest, _, behind = TIMES
+    most, rest, longest = TIMES
     patience, found = kind(*TIMES), set[str]()
     for executing, tries, t in itertools.product((False, True), (0, 1, 2, 3), around(10.0, 10.0 + rest)):
-        turn = Turn(executing, tries, 10.0, 12.0)
+        turn = Commitment(executing, tries, 10.0, 12.0)
         over = not executing and 10.0 + rest <= t
-        if patience.rested(turn, t) != (Turn(executing, 0, 10.0, 12.0) if over else turn):
+        if patience.rested(turn, t) != (Commitment(executing, 0, 10.0, 12.0) if over else turn):
             found.add("rested")
         if patience.exhausted(turn) != (not tries < most):
             found.add("exhausted")
         for end in around(t, t + longest):
             until = end if end <= t + longest else t + longest
-            if patience.accept(turn, t, end) != Turn(True, tries + 1, t, until):
+            if patience.accept(turn, t, end) != Commitment(True, tries + 1, t, until):
                 found.add("accept")
-        if patience.stop(turn, t) != Turn(False, tries, t, 12.0):
+        if patience.stop(turn, t) != Commitment(False, tries, t, 12.0):
             found.add("stop")
     for t in around(12.0):
-        if patience.over(Turn(True, 1, 10.0, 12.0), t) != (t >= 12.0):
+        if patience.over(Commitment(True, 1, 10.0, 12.0), t) != (t >= 12.0):
             found.add("over")
-    for t in around(10.0 + behind):
-        if patience.late(10.0, t) != (t - 10.0 > behind):
-            found.add("late")
     return sorted(found)
 
 
@@ -132,34 +129,28 @@ def test_patience_makes_the_transitions_of_the_theorem() -> None:
 
 
 class NeverExhausted(Patience):
-    def exhausted(self, turn: Turn) -> bool:
+    def exhausted(self, now: Commitment) -> bool:
         return False
 
 
 class RestsAtOnce(Patience):
-    def rested(self, turn: Turn, t: float) -> Turn:
-        return Turn(turn.executing, 0, turn.since, turn.until)
+    def rested(self, now: Commitment, t: float) -> Commitment:
+        return Commitment(now.executing, 0, now.since, now.until)
 
 
 class Endless(Patience):
-    def accept(self, turn: Turn, t: float, end: float) -> Turn:
-        return Turn(True, turn.tries + 1, t, end)
+    def accept(self, now: Commitment, t: float, end: float) -> Commitment:
+        return Commitment(True, now.tries + 1, t, end)
 
 
 class DoesNotCount(Patience):
-    def accept(self, turn: Turn, t: float, end: float) -> Turn:
-        return Turn(True, turn.tries, t, min(end, t + self.longest))
-
-
-class NeverLate(Patience):
-    def late(self, on_time: float, t: float) -> bool:
-        return False
+    def accept(self, now: Commitment, t: float, end: float) -> Commitment:
+        return Commitment(True, now.tries, t, min(end, t + self.longest))
 
 
 @pytest.mark.parametrize(
     ("kind", "what"),
-    [(NeverExhausted, "exhausted"), (RestsAtOnce, "rested"), (Endless, "accept"), (DoesNotCount, "accept"),
-     (NeverLate, "late")],
+    [(NeverExhausted, "exhausted"), (RestsAtOnce, "rested"), (Endless, "accept"), (DoesNotCount, "accept")],
 )  # fmt: skip
 def test_a_patience_that_differs_is_noticed(kind: type[Patience], what: str) -> None:
     assert impatient(kind) == [what]

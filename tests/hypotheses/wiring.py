@@ -17,8 +17,8 @@ from pydrake.common.value import Value
 
 from airground_drake.arrays import Array
 from airground_drake.diagram import build_model
+from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.policy import Proposal
-from airground_drake.nsbc.motion import Motion
 from airground_drake.scenarios.schema import Scenario
 
 ANSWERS = {"none": 1.0, "accepted": 1.0, "refused": -1.0, "silent": 0.0, "answered another": 1.0}
@@ -81,10 +81,10 @@ class Probe:
         diagram = build(scenario, "d").diagram
         self._root = diagram.CreateDefaultContext()
         self._root.SetTime(TIME_S)
-        world, ugvs, uav = (diagram.GetSubsystemByName(each) for each in ("world", "ugvs", "uav"))
-        plants = [world.GetSubsystemByName(f"{robot}_plant") for robot in demands.robots]
+        vehicles, tasks = (diagram.GetSubsystemByName(each) for each in ("vehicles", "task_planning"))
+        plants = [vehicles.GetSubsystemByName(f"{robot}_plant") for robot in demands.robots]
         self._plants = [(plant, plant.GetMyMutableContextFromRoot(self._root)) for plant in plants]
-        self._systems = ugvs.GetSubsystemByName("ugv_controller"), uav.GetSubsystemByName("uav_controller")
+        self._systems = tasks.GetSubsystemByName("ugv_controller"), tasks.GetSubsystemByName("uav_controller")
 
     def sampled_otherwise(self) -> list[str]:
         """Controllers whose updates do not come every control period from t = 0."""

@@ -13,9 +13,10 @@ from builders.observations import mate, seen
 from timeline import times
 from verify.judging import judge
 
-from airground_drake.intervention.coordinate import Coordinate, predicted
+from airground_drake.geometry.motion import Motion
+from airground_drake.intervention.coordinate import NARROWER, Coordinate, predicted
+from airground_drake.intervention.coordination.joint import Plan, plan
 from airground_drake.intervention.policy import Observation, Proposal
-from airground_drake.nsbc.motion import Motion
 from airground_drake.scenarios.schema import (
     Control,
     Decision,
@@ -82,6 +83,35 @@ def test_a_robot_that_went_through_a_narrow_gap_is_led_back_through_it() -> None
     assert found.positions[-1].tolist() == [20.0, 0.0, 0.0]
     ways = found.sample(np.linspace(found.times[0], found.end, 5000))[:, None, :2] - np.array(TRAP)
     assert np.linalg.norm(ways, axis=2).min() >= 2.0 - 1e-6
+
+
+def test_a_robot_that_is_shut_in_is_planned_for_again_only_elsewhere_or_on_another_map(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    plans = 0
+
+    def counted(*arguments: Any, **options: Any) -> Plan:
+        nonlocal plans
+        plans += 1
+        return plan(*arguments, **options)
+
+    def plans_for(what: Observation) -> int:
+        before = plans
+        assert policy.propose(what) is None
+        return plans - before
+
+    monkeypatch.setattr("airground_drake.intervention.coordinate.plan", counted)
+    policy, ring = Coordinate(), [(2.2 * math.cos(k), 2.2 * math.sin(k)) for k in range(7)]
+    shut_in, other = mate("comes", [0.0, 0.0], [12.0, 0.0]), mate("other", [9.0, 0.0], [9.0, 0.0], triggered=False)
+    there = seen([shut_in, other], ring)
+    first = plans_for(there)
+    assert 0 < first <= 2 * len(NARROWER)  # nobody is asked to make way for it
+    later = replace(there, t=20.0, start=20.05)
+    assert plans_for(later) == 0
+    assert plans_for(replace(later, position=later.position + 1e-9)) == 0
+    moved = replace(shut_in, position=np.array([0.05, 0.0, 0.0]))
+    assert plans_for(replace(seen([moved, other], ring), t=20.0)) > 0
+    assert policy.propose(replace(seen([shut_in, other], ring[:4]), t=21.0)) is not None
 
 
 @pytest.mark.parametrize(

@@ -9,17 +9,14 @@ import numpy as np
 import pytest
 from builders.observations import mate, seen
 
-from airground_drake.components import make_planner
+from airground_drake.geometry.motion import Motion
+from airground_drake.geometry.paths import Path, shortest_path
 from airground_drake.intervention import detour
 from airground_drake.intervention.database import predicted_cost
 from airground_drake.intervention.detour import Detour
-from airground_drake.intervention.paths import Path, shortest_path
-from airground_drake.intervention.planner import STANDS_S, PlannerMemory
+from airground_drake.intervention.halts import NOT_WATCHED, STANDS_S, room, standing, watched
 from airground_drake.intervention.policy import Observation, Proposal
 from airground_drake.intervention.wrong import StaleMap
-from airground_drake.nsbc.motion import Motion
-from airground_drake.registry import METHODS
-from airground_drake.scenarios.load import load
 
 DETOUR = Detour(speed_m_s=1.0)
 
@@ -65,20 +62,19 @@ def test_what_is_followed_is_no_longer_than_it_may_be() -> None:
 
 
 def test_who_keeps_to_one_place_stands() -> None:
-    planner = make_planner(load("case_a")[0], METHODS["d"])
-    places = np.zeros((3, 3))
-    memory = planner.watch(PlannerMemory(()), 0.0, places)
-    assert planner.watch(memory, 0.5, places + 0.05) is memory
-    later = planner.watch(memory, STANDS_S, places + np.array([[0.0], [1.0], [0.0]]))
-    assert [halt.since for halt in later.halts] == [0.0, STANDS_S]
+    one_place, places = room(np.full(2, 5.0)), np.zeros((3, 3))
+    halts = watched(np.tile([0.0, 0.0, 0.0, NOT_WATCHED], 2), 0.0, places.ravel(), one_place)
+    assert (watched(halts, 0.5, places.ravel() + 0.05, one_place) == halts).all()
+    later = watched(halts, STANDS_S, (places + np.array([[0.0], [1.0], [0.0]])).ravel(), one_place)
+    assert later.reshape(2, 4).tolist() == [[0.0, 0.0, 0.0, 0.0], [1.0, 1.0, 1.0, STANDS_S]]
+    assert standing(later, STANDS_S).tolist() == [True, False]
 
 
 def test_who_is_slow_does_not_stand_as_long_as_it_goes_on() -> None:
-    planner = replace(make_planner(load("case_a")[0], METHODS["d"]), max_speed=np.array([0.02, 0.02]))
-    places = np.zeros((3, 3))
-    memory = planner.watch(PlannerMemory(()), 0.0, places)
-    later = planner.watch(memory, STANDS_S, places + np.array([[0.02], [0.0], [0.0]]) / np.sqrt(3.0))
-    assert [halt.since for halt in later.halts] == [STANDS_S, 0.0]
+    one_place, places = room(np.array([0.02, 0.02])), np.zeros((3, 3))
+    halts = watched(np.tile([0.0, 0.0, 0.0, NOT_WATCHED], 2), 0.0, places.ravel(), one_place)
+    moved = (places + np.array([[0.02], [0.0], [0.0]]) / np.sqrt(3.0)).ravel()
+    assert watched(halts, STANDS_S, moved, one_place)[3::4].tolist() == [STANDS_S, 0.0]
 
 
 def test_bodies_are_gone_round_by_both_radii() -> None:

@@ -12,11 +12,11 @@ import pytest
 from airground_drake import components, load, simulate
 from airground_drake.arrays import Array
 from airground_drake.components import make_planner
+from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.database import BehaviourDatabase
-from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT, Report, answer_to
+from airground_drake.intervention.messages import ACCEPT, DONE, REFUSE, SILENT, Report, accepted_proposals, answer_to
 from airground_drake.intervention.planner import Planner, PlannerMemory, sent_after
 from airground_drake.intervention.policy import Observation, Policy
-from airground_drake.nsbc.motion import Motion
 from airground_drake.registry import METHODS
 from airground_drake.verify import verify
 
@@ -57,12 +57,11 @@ def step(
 ) -> PlannerMemory:
     """One planning instant; who is intervened on, and answers to the proposals in force, by name."""
     given = []
-    for name, desk in zip(UGVS, memory.desks, strict=True):
-        number = desk.proposal.number if desk.proposal else -1
+    for name, talk in zip(UGVS, memory.talks, strict=True):
+        number = talk.proposal.number if talk.proposal else -1
         given += [(answers or {}).get(name, SILENT), number]
     called = [name in intervening.split() for name in UGVS]
-    watched = uav.watch(memory, t, PLACES)
-    return sent_after(memory, uav.plan(watched, t, PLACES, called, np.array(given), (report,) * 3), t)
+    return sent_after(memory, uav.plan(memory, t, PLACES, called, np.array(given), (report,) * 3), t)
 
 
 def in_force(memory: PlannerMemory) -> dict[str, tuple[float, str]]:
@@ -97,33 +96,61 @@ def test_a_motion_that_has_run_out_is_over() -> None:
     assert in_force(step(uav, memory, 2.0, "one")) == {"one": (1.0, "one")}
 
 
-def test_when_one_refuses_the_others_are_planned_for_again() -> None:
-    policy = Scripted({"one": wait(9.0), "two": wait(9.0), "three": wait(9.0)}, {"one": wait(8.0), "three": wait(8.0)})
+def test_one_refusal_withdraws_a_joint_plan_for_all() -> None:
+    policy = Scripted({"one": wait(9.0), "two": wait(9.0), "three": wait(9.0)})
     uav = planner(policy)
     memory = step(uav, uav.start(), 1.0, "one three")
-    memory = step(uav, memory, 1.1, "one three", {"one": ACCEPT, "two": REFUSE})
-    assert in_force(memory) == {"one": (1.1, "one"), "three": (1.1, "three")}
-    one, two, three = policy.seen[-1].team
+    assert [sent.party for _, sent in memory.sent] == [("one", "three", "two")] * 3
+    memory = step(uav, memory, 1.1, "one three", {"one": ACCEPT, "two": REFUSE, "three": ACCEPT})
+    assert in_force(memory) == {}
+    one, two, three = policy.seen[1].team  # the policies are asked at once for those that did not refuse
     assert (two.proposal, two.refusals, two.resting) == (None, 1, True)
-    assert (one.answered, three.answered) == ("accepted", "silent")
-    assert not step(uav, memory, 2.2, "one three").desks[1].proposal  # nobody asks it for itself
+    assert (one.proposal, one.resting, three.proposal, three.resting) == (None, False, None, False)
+    assert not step(uav, memory, 2.2, "one three").talks[1].proposal  # nobody asks it for itself
 
 
-def test_without_a_better_plan_the_others_keep_their_parts() -> None:
-    uav = planner(Scripted({"one": wait(9.0), "two": wait(9.0)}))
+def test_another_plan_stays_in_force_when_a_joint_plan_is_refused() -> None:
+    uav = planner(Scripted({"three": wait(9.0)}, {"one": wait(9.0), "two": wait(9.0)}))
+    memory = step(uav, uav.start(), 1.0, "three")
+    memory = step(uav, memory, 1.0, "one three")
+    memory = step(uav, memory, 1.1, "one three", {"two": REFUSE, "three": ACCEPT})
+    assert in_force(memory) == {"three": (1.0, "three")}
+
+
+def test_a_part_that_is_done_leaves_the_others_in_force() -> None:
+    uav = planner(Scripted({"one": wait(9.0), "two": wait(2.0)}))
     memory = step(uav, uav.start(), 1.0, "one")
-    memory = step(uav, memory, 1.1, "one", {"two": REFUSE})
+    memory = step(uav, memory, 1.9, "one", {"one": ACCEPT, "two": DONE})
     assert in_force(memory) == {"one": (1.0, "one")}
 
 
-def test_a_plan_for_others_leaves_an_accepted_motion_in_force() -> None:
-    """The policies are asked about `one`, whose partner has refused, and help `three` only."""
-    uav = planner(Scripted({"one": wait(9.0), "two": wait(9.0)}, {"three": wait(8.0)}))
-    memory = step(uav, uav.start(), 1.0, "one")
-    accepted = memory.proposals[0]
-    memory = step(uav, memory, 1.1, "one three", {"one": ACCEPT, "two": REFUSE})
-    assert in_force(memory) == {"one": (1.0, "one"), "three": (1.1, "three")}
-    assert memory.proposals[0] is accepted
+@pytest.mark.parametrize(
+    ("answers", "executed"),
+    [
+        ((ACCEPT, ACCEPT, ACCEPT), "one two three"),
+        ((ACCEPT, SILENT, ACCEPT), "three"),
+        ((ACCEPT, REFUSE, SILENT), ""),
+        ((ACCEPT, DONE, SILENT), "one"),
+        ((REFUSE, ACCEPT, ACCEPT), "three"),
+    ],
+)
+def test_a_joint_plan_takes_effect_if_all_accept(answers: tuple[float, ...], executed: str) -> None:
+    """`one` and `two` have parts of a joint plan; `three` has a proposal of its own, sent at the same instant."""
+    uav = planner(Scripted({"one": wait(9.0), "two": wait(9.0)}, {"three": wait(9.0)}))
+    proposals = step(uav, uav.start(), 1.0, "one three").proposals
+    given = np.array([number for p, said in zip(proposals, answers, strict=True) for number in (said, p.number)])
+    found = accepted_proposals(proposals, given)
+    assert [name for name, proposal in zip(UGVS, found, strict=True) if proposal] == executed.split()
+
+
+def test_a_part_that_was_withdrawn_does_not_hold_up_the_others() -> None:
+    uav = planner(Scripted({"one": wait(9.0), "two": wait(9.0)}))
+    one, two, _ = step(uav, uav.start(), 1.0, "one").proposals
+    assert one is not None
+    assert two is not None
+    answers = np.array([ACCEPT, one.number, REFUSE, two.number, SILENT, -1.0])
+    assert accepted_proposals((one, two, None), answers) == [None] * 3
+    assert accepted_proposals((one, None, None), answers) == [one, None, None]
 
 
 def test_proposals_are_numbered_as_they_are_sent() -> None:
@@ -144,8 +171,8 @@ def test_a_motion_that_changes_is_a_new_proposal() -> None:
     assert accepted is not None
     answers = np.array([ACCEPT, accepted.number, SILENT, -1.0, SILENT, -1.0])
     assert answer_to(accepted, answers, 0) == ACCEPT
-    desk = replace(before.desks[0], proposal=replace(accepted, motion=wait(5.0)))
-    after = sent_after(before, replace(before, desks=(desk, *before.desks[1:])), 2.0)
+    talk = replace(before.talks[0], proposal=replace(accepted, motion=wait(5.0)))
+    after = sent_after(before, replace(before, talks=(talk, *before.talks[1:])), 2.0)
     changed = after.proposals[0]
     assert changed is not None
     assert (changed.number, changed.issued) == (1, 2.0)
@@ -158,12 +185,12 @@ class Swaps(Planner):
 
     def plan(self, memory: PlannerMemory, t: float, positions: Array, *given: Any) -> PlannerMemory:
         planned = super().plan(memory, t, positions, *given)
-        desks = list(planned.desks)
-        for i, desk in enumerate(desks):
-            if desk.proposal is not None and answer_to(desk.proposal, given[1], i) == ACCEPT:
-                motion = Motion(desk.proposal.motion.times, desk.proposal.motion.positions + np.array([0.0, 0.2, 0.0]))
-                desks[i] = replace(desk, proposal=replace(desk.proposal, motion=motion))
-        return replace(planned, desks=tuple(desks))
+        talks = list(planned.talks)
+        for i, talk in enumerate(talks):
+            if talk.proposal is not None and answer_to(talk.proposal, given[1], i) == ACCEPT:
+                motion = Motion(talk.proposal.motion.times, talk.proposal.motion.positions + np.array([0.0, 0.2, 0.0]))
+                talks[i] = replace(talk, proposal=replace(talk.proposal, motion=motion))
+        return replace(planned, talks=tuple(talks))
 
 
 def test_no_motion_is_executed_that_was_not_decided_on(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -189,19 +216,32 @@ def test_who_refuses_its_own_rests_before_the_next() -> None:
     assert policy.seen[-1].refusals == 1
 
 
-def test_who_refuses_to_make_way_is_asked_again_after_longer_and_longer_rests() -> None:
+def test_who_refuses_to_make_way_is_asked_again_after_a_rest() -> None:
     class Asks(Policy):
         def propose(self, seen: Observation) -> Mapping[str, Motion] | None:
-            return None if seen.team[1].resting else {"one": wait(0.05), "two": wait(1e4)}
+            return None if seen.team[1].resting else {"two": wait(1e4)}
 
     uav = planner(Asks())
-    memory, asked = uav.start(), list[float]()
-    for k in range(10, 900):
+    memory = uav.start()
+    for k in range(10, 100):
         memory = step(uav, memory, 0.1 * k, "one", {"two": REFUSE})
-        two = memory.desks[1].proposal
-        if two is not None and two.issued not in asked:
-            asked.append(two.issued)
-    assert np.diff(asked)[:6] == pytest.approx([1.1, 1.1, 2.1, 4.1, 8.1, 16.1], abs=1.0)
+    asked = [sent.issued for _, sent in memory.sent]
+    assert len(asked) > 3
+    assert memory.talks[1].refusals == len(asked)
+
+
+def test_the_rest_doubles_while_no_policy_has_a_proposal() -> None:
+    policy = Scripted(*[None] * 5, {"one": wait(60.0)}, None)
+    uav, asked = planner(policy), list[float]()
+    memory = uav.start()
+    for k in range(10, 800):
+        before = len(policy.seen)
+        memory = step(uav, memory, 0.1 * k, "one")
+        asked += [0.1 * k] * (len(policy.seen) - before)
+    assert np.diff(asked) == pytest.approx([1.0, 2.0, 4.0, 8.0, 16.0, 28.0, 1.0, 2.0, 4.0, 8.0], abs=0.11)
+    assert not any(
+        mate.resting for seen in policy.seen for mate in seen.team
+    )  # others may still be planned for with it
 
 
 def test_a_motion_that_was_executed_to_its_end_was_not_refused() -> None:
@@ -209,9 +249,9 @@ def test_a_motion_that_was_executed_to_its_end_was_not_refused() -> None:
     uav = planner(Scripted({"one": wait(3.0)}, {"one": wait(9.0)}))
     memory = step(uav, uav.start(), 1.0, "one")
     memory = step(uav, memory, 1.1, "one", {"one": ACCEPT})
-    memory = step(uav, memory, 3.1, "one", {"one": REFUSE}, Report(reason="over"))
+    memory = step(uav, memory, 3.1, "one", {"one": DONE}, Report(reason="over"))
     assert in_force(memory) == {"one": (3.1, "one")}
-    assert memory.desks[0].refusals == 0
+    assert memory.talks[0].refusals == 0
 
 
 def test_after_nothing_the_uav_rests() -> None:
@@ -272,9 +312,8 @@ def test_a_policy_sees_each_robot_as_it_is() -> None:
     policy = Scripted()
     uav = replace(planner(policy), max_speed=np.array([1.0, 2.0, 3.0]))
     moved = PLACES + np.array([[0.0], [1.0], [0.0], [0.0]])
-    memory = uav.watch(uav.start(), 0.0, PLACES)
-    memory = uav.watch(memory, 1.0, moved)
-    uav.plan(memory, 1.0, moved, [True, True, True], np.array([SILENT, -1.0] * 3), NOBODY)
+    standing = [True, False, True]
+    uav.plan(uav.start(), 1.0, moved, [True, True, True], np.array([SILENT, -1.0] * 3), NOBODY, standing)
     assert [seen.robot for seen in policy.seen] == list(UGVS)
     for i, seen in enumerate(policy.seen):
         np.testing.assert_array_equal(seen.position, moved[i])

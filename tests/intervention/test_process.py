@@ -18,13 +18,14 @@ from builders.hostile_policies import KILLS_OTHERS, KINDS
 from builders.observations import mate, seen
 
 from airground_drake.errors import FAULT_WIDTH, PluginError, PolicyError
-from airground_drake.intervention import process
-from airground_drake.intervention.codec import packed, packed_motions, unpacked, unpacked_motions
-from airground_drake.intervention.database import BehaviourDatabase, Desk, make_policy
+from airground_drake.geometry.motion import Motion
+from airground_drake.intervention.database import BehaviourDatabase, Negotiation, make_policy
+from airground_drake.intervention.guest import process
+from airground_drake.intervention.guest.codec import KINDS as CLASSES
+from airground_drake.intervention.guest.codec import decoded, encoded
+from airground_drake.intervention.guest.process import LIVES, GuestPolicy
 from airground_drake.intervention.policy import Observation, Policy, Proposal
-from airground_drake.intervention.process import LIVES, GuestPolicy
 from airground_drake.nsbc.avoidance import Avoidance
-from airground_drake.nsbc.motion import Motion
 from airground_drake.registry import POLICIES
 from airground_drake.scenarios.load import load
 from airground_drake.simulation import simulate
@@ -56,20 +57,19 @@ def test_whatever_a_policy_does_counts_as_no_intervention(name: str, guests: dic
     kind, before = KINDS[name], (Avoidance.apply, TraceClaim.judge, os.getcwd())
     guest = guests[kind.hangs]
     database = BehaviourDatabase([("hostile", guest)], ranking="predicted")
-    planned = database.plan(Desk(refusals=doing(name).refusals), TEAM)
+    found, faults = database.plan(Negotiation(refusals=doing(name).refusals), TEAM)
     if kind.reported is None:
-        assert not planned.faults
+        assert not faults
     else:
         # one that answers in the worker's place does so from the next question on
-        planned = planned if planned.faults else database.plan(Desk(), TEAM)
-        (fault,) = planned.faults
+        found, faults = (found, faults) if faults else database.plan(Negotiation(), TEAM)
+        (fault,) = faults
         assert re.search(kind.reported, fault.what), fault.what
         assert fault.what.isprintable()
         assert len(fault.what) <= 600
-    assert planned.desk.proposal is None
-    assert not planned.asked
+    assert [talk.proposal for talk in found.values()] == [None]
     assert (Avoidance.apply, TraceClaim.judge, os.getcwd()) == before
-    if not kind.tame or guest._process is None:
+    if not kind.tame or not guest._end.alive:
         guest.close()  # the next kind gets a new process
 
 
@@ -92,8 +92,7 @@ def test_what_a_policy_has_started_ends_with_it(guests: dict[bool, GuestPolicy])
     guest = guests[False]
     guest.close()
     guest.propose(doing("leaves_a_child_behind"))
-    assert guest._process is not None
-    group = guest._process._process.pid
+    group = guest._process.pid
     os.killpg(group, 0)
     guest.close()
     _gone(group)
@@ -115,7 +114,7 @@ def test_a_fault_begins_with_the_line_of_the_policy_that_it_came_from(
     (tmp_path / "boom.py").write_text(BOOM)
     guest = kind == "in a process of its own"
     policy = GuestPolicy("boom.py:It", {}, LONG_S) if guest else POLICIES.make("boom.py:It", Policy)
-    (fault,) = BehaviourDatabase([("boom", policy)], ranking="listed").plan(Desk(), TEAM).faults
+    _, (fault,) = BehaviourDatabase([("boom", policy)], ranking="listed").plan(Negotiation(), TEAM)
     if isinstance(policy, GuestPolicy):
         policy.close()
     assert fault.what.startswith("boom.py:5 ValueError: invalid literal for int()")
@@ -127,11 +126,11 @@ import time, threading
 from dataclasses import replace
 from builders.hostile_policies import KINDS
 from builders.observations import mate, seen
-from airground_drake.intervention.process import GuestPolicy
+from airground_drake.intervention.guest.process import GuestPolicy
 
 def hang():
     guest = GuestPolicy("builders.hostile_policies:Hostile", {}, 1000.0)
-    print(guest._process._process.pid, flush=True)
+    print(guest._process.pid, flush=True)
     team = seen([mate("a", (0, 0), (10, 0))], [])
     guest.propose(replace(team, refusals=[*KINDS].index("loops_and_swallows_everything")))
 
@@ -181,7 +180,7 @@ def _gone(group: int) -> None:
 
 MODULES = {
     "import sys; sys.exit(0)": "cannot be imported: SystemExit: 0",
-    "import os; os._exit(0)": r"its process ended \(exit code 0",
+    "import os; os._exit(0)": r"its process ended or closed its channel \(exit code 0",
     "raise RuntimeError('not today')": "cannot be imported: RuntimeError: not today",
     "raise BaseException": "cannot be imported: BaseException",
     "class E(Exception):\n    def __str__(self): raise E\nraise E": "an exception that cannot be put into words",
@@ -192,7 +191,7 @@ MODULES = {
     "from airground_drake.intervention.policy import Policy as It": "abstract",
     "It = 3": "is not a subclass",
     "It.__init__ = lambda self: __import__('sys').exit(0)": "SystemExit: 0",
-    "It.__init__ = lambda self: __import__('os')._exit(0)": r"its process ended \(exit code 0",
+    "It.__init__ = lambda self: __import__('os')._exit(0)": r"its process ended or closed its channel \(exit code 0",
     "It.__init__ = lambda self: None.thing": "AttributeError",
     "It.__init__ = lambda self, speed: None": "speed",
 }
@@ -223,21 +222,18 @@ def test_all_that_is_seen_and_proposed_arrives_to_the_bit() -> None:
     motion = Motion(np.cumsum(draw.random(50)), draw.normal(size=(50, 3)) * 10.0 ** draw.integers(-300, 300, (50, 1)))
     proposal = Proposal("x", 0.1 + 0.2, motion, mapped=draw.normal(size=(4, 3)), cause="b")
     given = seen([mate("a", (0.1, 0), (1 / 3, 0), preset=motion, proposal=proposal, answered="accepted"), TEAM.team[1]])
-    there = unpacked(packed(given))
-    assert _bits(there) == _bits(given) == _bits(given.fresh())
+    there = decoded(encoded(given), CLASSES)
+    assert encoded(there) == encoded(given) == encoded(given.fresh())
     for copy in (there, given.fresh()):
         assert not copy.position.flags.writeable
         assert not np.shares_memory(copy.target, given.target)
         assert not np.shares_memory(copy.team[0].proposal.mapped, proposal.mapped)
         assert not np.shares_memory(copy.preset.positions, motion.positions)
-    back = unpacked_motions(packed_motions({"a": motion}))["a"]
+    assert isinstance(there.team, tuple)
+    [[name, back]] = decoded(encoded([["a", motion]]), (Motion,))
+    assert name == "a"
     assert back.times.tobytes() == motion.times.tobytes()
     assert back.positions.tobytes() == motion.positions.tobytes()
-
-
-def _bits(value: object) -> object:
-    """An observation as something that can be compared to the bit."""
-    return str(packed(value))
 
 
 def test_a_run_with_a_policy_in_another_process_is_the_same_to_the_bit() -> None:
@@ -255,11 +251,11 @@ def test_a_run_with_a_policy_in_another_process_is_the_same_to_the_bit() -> None
 
 
 def test_the_process_loads_what_a_policy_needs_and_no_more() -> None:
-    program = "import sys, airground_drake.intervention.worker; print(*sys.modules)"
+    program = "import sys, airground_drake.intervention.guest.worker; print(*sys.modules)"
     loaded = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout.split()
     assert not {"pydrake", "numba", "pandas", "scipy"} & set(loaded)
 
 
 def _landlock() -> bool:
-    program = "from airground_drake.confinement import restrict_signals; print(restrict_signals())"
+    program = "from airground_drake.intervention.guest.confinement import restrict_signals; print(restrict_signals())"
     return "True" in subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout

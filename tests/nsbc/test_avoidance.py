@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from nsbc.composition import augmented
 from properties import examples
 from scipy.optimize import linprog
 
 from airground_drake.nsbc.avoidance import Avoidance, HalfSpaces, Surroundings, limit_speed
-from airground_drake.nsbc.composition import augmented
 from airground_drake.nsbc.team import Team
 
 D = 2.0

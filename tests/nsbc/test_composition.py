@@ -7,10 +7,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from nsbc.cases import COORDINATE, POSITIONS
+from nsbc.composition import InterventionTask, augmented, null_space, recursion
 
-from airground_drake.nsbc.composition import augmented, recursion
-from airground_drake.nsbc.task import null_space, pseudoinverse
-from airground_drake.nsbc.tasks import InterventionTask
+from airground_drake.nsbc import law
+from airground_drake.nsbc.avoidance import Avoidance
+from airground_drake.nsbc.task import pseudoinverse
+from airground_drake.nsbc.team import Neighbourhood
 
 
 @given(arrays(np.float64, (3, 2, 1, 3), elements=COORDINATE), arrays(np.float64, (3, 2, 3), elements=COORDINATE))
@@ -25,18 +27,27 @@ def test_compositions_follow_their_formulas(jacobians: np.ndarray, wishes: np.nd
 
 
 @given(POSITIONS, st.sampled_from([np.eye(3), np.array([[0.6, 0.8, 0.0]]), np.array([[1.0, 0, 0], [0, 1.0, 0]])]))
-def test_the_controllers_form_of_20_is_the_composition_of_tasks(position: np.ndarray, selection: np.ndarray) -> None:
-    """v + J^+ J (rate + gain * error - v) is the intervention task (14) above v, for a constant Jacobian."""
-    below = np.cos(position)
-    task = InterventionTask(np.full(position.shape, 2.0), np.full(position.shape, 0.3), 1.5, selection)
+def test_the_law_has_20_as_the_composition_of_tasks(position: np.ndarray, selection: np.ndarray) -> None:
+    """The intervention task (14) above the UGV's own task (6), in a plane, with nothing near and no speed limit."""
+    plane = np.array([1.0, 1.0, 0.0])
+    position = position * plane
+    target, rate = np.cos(position) * plane, np.sin(position) * plane
+    below = rate + 0.7 * (target - position)
+    task = InterventionTask(np.full(position.shape, 2.0) * plane, np.full(position.shape, 0.3) * plane, 1.5, selection)
     layers = [
         (task.velocity(position), task.jacobian(position)),
         (below, np.broadcast_to(np.eye(3), (len(below), 3, 3))),
     ]
     composed = augmented(layers)
     chosen = pseudoinverse(selection) @ selection
-    asked = task.rate + 1.5 * (task.target - position)
-    np.testing.assert_allclose(below + (asked - below) @ chosen.T, composed, atol=1e-9)
+    count = len(position)
+    none = np.zeros((count, 0))
+    commanded = law.UgvLaw(Avoidance(1.0, 0.1), 0.7, 1.5, intervention_on_top=True).velocity(
+        position, Neighbourhood(np.arange(count), none.astype(np.intp), np.zeros((0, 3)), none, none), target, rate,
+        [law.Intervention(*asked, chosen) for asked in zip(task.target, task.rate, strict=True)],
+        np.tile(plane, (count, 1)), np.full(count, 1e9),
+    )  # fmt: skip
+    np.testing.assert_allclose(commanded, composed, rtol=1e-9, atol=1e-9)
 
 
 def test_only_the_augmented_projector_leaves_all_higher_tasks_alone() -> None:

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from nsbc.cases import POSITIONS, VECTOR
+from nsbc.composition import InterventionTask
 
 from airground_drake.nsbc.task import Task
-from airground_drake.nsbc.tasks import DistanceTask, FormationTask, InterventionTask, PositionTask
+from airground_drake.nsbc.tasks import DistanceTask, FormationTask, PositionTask
 
 
 def every_task(n: int, centre: np.ndarray) -> list[Task]:

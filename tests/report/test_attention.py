@@ -67,16 +67,14 @@ def test_why_a_robot_was_not_helped(scenario: Scenario, traces: dict[str, Trace]
     )
 
 
-def test_what_is_missing_faulty_or_not_the_paper_s(scenario: Scenario, traces: dict[str, Trace]) -> None:
+def test_what_is_missing_or_faulty(scenario: Scenario, traces: dict[str, Trace]) -> None:
     report = built(scenario, traces, FINE[:2])
     report["runs"]["c"]["faults"] = [fault("boom.py:5 ValueError: no", 6.05)] * 14 + [fault("late", 9.0)]
-    report["reproduction"][0] |= {"status": "not_reproduced", "why": "differs by 3 m"}
     report["overall"] |= {"undemonstrated": [7]}
     assert [(item.words, item.anchor) for item in attention.items(report)] == [
-        ("boom.py:5 ValueError: no (14 times, first at 6.05 s)", "runs"),
-        ("late (once, at 9.00 s)", "runs"),
+        ("boom.py:5 ValueError: no (14 times, first at 6.05 s)", "happened"),
+        ("late (once, at 9.00 s)", "happened"),
         ("no claim was checked on the run", "claims"),
-        ("A1, stalls at: differs by 3 m", "reproduction"),
         ("finding 7 about the paper", "audit"),
     ]
     report["runs"]["c"]["faults"] = [fault(f"ValueError: {k}", 1.0) for k in range(100)]

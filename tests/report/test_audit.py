@@ -51,6 +51,12 @@ def companion_items() -> dict[int, dict[str, Any]]:
     return {item["id"]: item for item in companions.companion_findings()}
 
 
+def test_the_paper_s_rule_is_the_one_that_a_run_can_have(companion_items: dict[int, dict[str, Any]]) -> None:
+    """No finding replaces a part of the gatekeeper that others import."""
+    assert companion_items[25]["evidence"]["runs"].startswith("c_literal and c of")
+    assert "mock" not in Path(companions.__file__).read_text(encoding="utf-8")
+
+
 @pytest.mark.parametrize("number", FORMULAS)
 def test_what_follows_from_the_formulas_is_demonstrated(items: dict[int, dict[str, Any]], number: int) -> None:
     assert set(items) == set(FORMULAS)

@@ -80,9 +80,6 @@ OTHER: dict[str, Callable[[Json], object]] = {
     "a value": lambda found: found["reproduction"][0].update(ours=[3.31, 5.1]),
 }
 
-ALWAYS_SHOWN = {"verdicts", "margins", "exercised", "events"}
-"""Parts of the page that say so where nothing changed."""
-
 
 @pytest.mark.parametrize(("change", "code"), [*((each, 1) for each in WORSE), *((each, 0) for each in OTHER)])
 def test_only_what_is_worse_is_a_regression(
@@ -111,10 +108,22 @@ def test_every_kind_of_change_has_a_page(change: str, before: Json, tmp_path: Pa
     text = page.read_text(encoding="utf-8")
     found = compare.compared(before, after)
     for part in set(found) - {"regressions", "overall"}:
-        assert text.count(f'<h2 id="{part}">') == (bool(found[part]) or part in ALWAYS_SHOWN)
+        assert text.count(f'<h2 id="{part}">') == bool(found[part])
         for each in found[part]:
             about = str(each.get("claim") or each.get("id") or each["robot"])
             assert f'<th scope="row">{about}' in text or f"<td>{about}</td>" in text
+
+
+def test_the_page_names_the_regression_first_and_folds_what_is_rounding(before: Json, tmp_path: Path) -> None:
+    after = copy.deepcopy(before)
+    claim(after, "a").update(status="refuted", as_expected=False)
+    claim(after, "")["margin"] += 1e-12
+    folders = [str(save(tmp_path / "before", before)), str(save(tmp_path / "after", after))]
+    assert main([*folders, "--html", str(tmp_path / "compare.html")]) == 1
+    text = (tmp_path / "compare.html").read_text(encoding="utf-8")
+    headline = text[text.index('class="headline bad"') :].partition("</p>")[0]
+    assert "SAFE-TRACE a: holds -&gt; refuted (not as expected)" in headline
+    assert "<summary>1 changed by no more than rounding</summary>" in text
 
 
 def test_a_change_that_is_too_large_for_a_number_is_none(before: Json) -> None:

@@ -170,46 +170,60 @@ def test_accessible(text: str) -> None:
         assert page.parents.count((tag, "svg")) == len(drawings)
 
 
-def test_a_pass_says_so(page: str) -> None:
-    assert "All 3 checks gave the verdict" in page
+def first(text: str) -> str:
+    """The first screen, without tags and white space."""
+    found = text[text.index('<section class="first"') : text.index("<nav")]
+    return " ".join(re.sub("<[^>]*>", " ", found).split())
+
+
+def test_the_first_screen_answers_and_is_in_the_title(page: str) -> None:
     assert "What needs attention" not in page
-    assert "refuted, as expected" in page
+    assert first(page).startswith(
+        "✗ No method brings everyone home safely. Under (a) and (c), ugv1 comes to 1.99999 m of"
+    )
+    assert "3 checks as declared: 1 deliberate failure." in first(page)
+    assert page.index("Do not conclude") < page.index('id="happened"') < page.index('id="claims"')
+    assert "refuted, as declared" in page
+    assert "<title>case_a: No method brings everyone home safely." in page
 
 
-def test_an_unexpected_refutation_is_in_the_banner(
+def test_an_unexpected_refutation_is_on_the_first_screen(
     scenario: Scenario, traces: dict[str, Trace], drawn: list[Figure]
 ) -> None:
     failed = verdict("c", "refuted", margin=-0.25, unit="m", where={"robot": "ugv1"}, counterexample={"t_s": 4.25})
     report = built(scenario, traces, [FINE[0], failed, FINE[2]])
     assert report["overall"]["exit_code"] == 1
     text = html.render(report, drawn)
-    banner = text[text.index('class="banner') : text.index("</section>")]
-    assert 'class="banner bad"' in text
-    assert "Not as expected" in banner
-    assert "SAFE-TRACE on run c (refuted, expected holds)" in banner
-    attention = text[text.index("What needs attention") : text.index('aria-label="Contents"')]
+    assert 'class="headline bad"' in text
+    assert "SAFE-TRACE on run c (refuted, expected holds)" in first(text)
+    attention = text[text.index("What needs attention") : text.index('id="happened"')]
     assert '<a href="#claim-SAFE-TRACE">ugv1: margin missed by 0.25 m, 4.250 s</a>' in attention
 
 
-def test_what_had_nothing_to_check_has_a_chip_of_its_own_that_needs_no_colour(
+def test_what_was_not_tested_has_a_chip_of_its_own_that_needs_no_colour(
     scenario: Scenario, traces: dict[str, Trace], page: str
 ) -> None:
     text = html.render(built(scenario, traces, [*FINE, verdict("c", exercised=0), verdict("c", exercised=12)]), [])
-    table = text[text.index("Claims about runs, on every run") : text.index('<p id="tools"')]
-    assert table.count("holds, nothing to check") == 1
-    assert "\N{EMPTY SET}" in table
-    banner = text[text.index('class="banner') : text.index("</section>")]
-    assert "1 holds, nothing to check" in banner
-    assert "1 of them had nothing to check: SAFE-TRACE on run c." in banner
+    summary = text[text.index('<span class="verdicts">') : text.index('<span class="plain">')]
+    assert summary.count("not tested") == 1
+    assert "\N{EMPTY SET}" in summary
+    assert "1 not tested" in first(text)
     assert '<td data-label="Exercised">12</td>' in text
     assert "<dt>Exercised by</dt><dd>pairs</dd>" in text
-    assert "1 holds, nothing to check" not in page
+    assert "not tested" not in first(page)
+
+
+def test_sections_that_would_say_nothing_are_absent(scenario: Scenario, traces: dict[str, Trace]) -> None:
+    bare = replace(scenario, name="mine", reproduction=[], choices=[], runs={"a": scenario.runs["a"]})
+    text = html.render(built(bare, {"a": traces["a"]}, FINE[:1]), [])
+    headings = re.findall(r'<h2 id="(\w+)">', text)
+    assert headings == ["happened", "safe", "claims", "provenance"]
 
 
 def test_a_row_that_is_not_reproduced_shows(scenario: Scenario, traces: dict[str, Trace]) -> None:
     changed = replace(scenario.reproduction[1], id="A5", paper=[10.6])
     text = html.render(built(replace(scenario, reproduction=[changed]), traces, FINE), [])
-    assert "not reproduced: A5" in text
+    assert "not reproduced: A5" in first(text)
     assert "differs by 3.9 s, 0.1 s are allowed; speed set" in text
 
 
@@ -233,7 +247,7 @@ def test_the_reason_that_decided_is_shown_with_its_cost_and_so_is_a_failing_solv
 def test_an_empty_report_renders(scenario: Scenario) -> None:
     empty = replace(scenario, runs={}, reproduction=[], choices=[])
     text = html.render(document.build(empty, "", {}, [], {}), [], "no svg")
-    assert "Inconclusive" in text
+    assert "Nothing was run." in first(text)
     assert Page(text).unbalanced == []
 
 

@@ -102,6 +102,8 @@ EDITS: list[tuple[str, object]] = [
     ("gatekeeper.route", "branch_and_bound"),
     ("gatekeeper.route", "rollout"),
     ("gatekeeper.budget_nodes", 15000),
+    ("gatekeeper.lag_m", 0.5),
+    ("gatekeeper.behind_s", 2.0),
     ("gatekeeper.blocks", 61),
     ("gatekeeper", {"route": "relaxed", "blocks": 10}),
     ("gatekeeper.route", "exact"),

@@ -22,10 +22,11 @@ from airground_drake.components import integrated_noise
 from airground_drake.decision.trigger import Trigger
 from airground_drake.diagram import build_diagram
 from airground_drake.errors import PluginError
-from airground_drake.nsbc.motion import Motion
+from airground_drake.geometry.motion import Motion
 from airground_drake.scenarios.load import load
 from airground_drake.simulation import simulate
-from airground_drake.systems.decision import FIELDS, DecisionBlock, DecisionVariable, EventTrigger
+from airground_drake.systems.decision import DecisionBlock, DecisionVariable, EventTrigger
+from airground_drake.systems.signals import FIELDS
 from airground_drake.trace import Trace
 from airground_drake.verify.engines.segments import NormSignal
 from airground_drake.verify.runs.triggers import transitions
@@ -216,6 +217,16 @@ def test_a_decision_block_that_returns_0_triggers_nothing() -> None:
     assert finding.status == "holds"
     assert finding.exercised == 0
     assert finding.evidence["ugvs"][0]["port_against_15"]["status"] == "not_run"
+
+
+def test_a_subclass_of_the_built_in_block_has_its_own_say() -> None:
+    class Nothing(DecisionVariable):
+        def value(self, t: float, parts: Array) -> Array:
+            return np.zeros(len(parts))
+
+    trace = simulate(load("case_a", {"duration_s": 15.0})[0], "b", decision_block=Nothing)
+    assert of_kind(trace, "trigger") == []
+    assert not trace.column("ugv1.decision_variable_m").any()
 
 
 def test_another_norm_triggers_when_it_reaches_the_threshold() -> None:

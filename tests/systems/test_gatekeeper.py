@@ -169,7 +169,7 @@ def test_in_simulation_a_decision_has_counts_and_no_deadline(case_a: Scenario, m
     case_a.gatekeeper.budget_iterations = 7
     budgets = recorded_budgets(case_a, monkeypatch, None)
     assert budgets
-    assert {(b.iterations, b.search_s, b.deadline_s) for b in budgets} == {(7, 1.0, math.inf)}
+    assert {(b.iterations, b.search_s, b.deadline_s) for b in budgets} == {(7, 10.0, math.inf)}
     assert not any(b.spent() for b in budgets)
 
 

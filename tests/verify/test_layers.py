@@ -18,7 +18,7 @@ ALLOWED: dict[str, set[str]] = {
     "runs": {"arrays", "errors", "trace", "verify.engines", "verify.runs", "verify.claim", "verify.finding"},
 }
 """By folder of verify/, beginnings of what its modules may import of this package."""
-JUDGED = {"nsbc", "gatekeeper", "systems", "decision", "diagram", "simulation", "intervention"}
+JUDGED = {"geometry", "nsbc", "gatekeeper", "systems", "decision", "diagram", "simulation", "intervention"}
 
 
 def imported(path: Path) -> Iterator[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import numpy.typing as npt
@@ -12,7 +13,8 @@ from airground_drake.arrays import Array
 from airground_drake.gatekeeper.binary_program import BinaryProgram, Size
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.cost import Terms, half_plane_cost
-from airground_drake.gatekeeper.daqp_solver import minimise
+from airground_drake.gatekeeper.daqp_solver import Found, minimise
+from airground_drake.gatekeeper.drake_solvers import DrakeSearch
 from airground_drake.gatekeeper.dual_bound import dual_bound, multipliers_at
 from airground_drake.gatekeeper.half_planes import normals_along
 from airground_drake.gatekeeper.problem import Kinematics, Problem
@@ -28,31 +30,34 @@ class MixedIntegerRoute:
     """Mixed-integer quadratic program with one binary per stage, or per block of stages, and a proof of optimality.
 
     The program (`BinaryProgram`) is one `MathematicalProgram` with the half-planes of `RelaxedRoute`. DAQP takes its
-    numbers and searches by branch and bound. First its relaxation is solved, and the best of sum-up rounding, the
-    constant plans and what is left of the previous plan is improved by changing one choice at a time. The cost of that
-    plan, the incumbent, cuts the search.
+    numbers and searches by branch and bound; Gurobi and Mosek can do so in its place, where Drake has them. First the
+    relaxation is solved, and the best of sum-up rounding, the constant plans and what is left of the previous plan is
+    improved by changing one choice at a time. The cost of that plan, the incumbent, cuts the search.
 
     The plan returned is the cheapest by exact distances of the optimum, the incumbent, what that was chosen from, and
     each of these with the other first choice. `route_bound` is the optimum along the half-planes; the gap is 0.
 
-    Budget: the search has a limit in time, `search_s`, because DAQP counts no nodes. At that limit, and when the
-    solver fails, the incumbent decides, which does not depend on the clock; its bound is that of the relaxation.
+    Budget: DAQP can be stopped by the clock only (its limit of iterations is one for each node), but it says how many
+    iterations it took. If they are more than `search_iterations`, or the time `search_s` was up, or the solver fails,
+    the incumbent decides, which does not depend on the clock; its bound is that of the relaxation.
 
     The program is built once for a number of stages and blocks, then only its coefficients change.
     """
 
-    def __init__(self, blocks: int | None = None) -> None:
+    def __init__(self, blocks: int | None = None, solver: str = "daqp") -> None:
         """Start without any program.
 
         Args:
             blocks: binaries, each for a block of stages; they need not divide the stages. None: one per stage.
+            solver: of the search; 'daqp' or one of `drake_solvers.SOLVERS`. Relaxations are DAQP's.
 
         Raises:
-            ValueError: if there is less than one block.
+            ValueError: if there is less than one block, or the solver cannot be used here.
         """
         if blocks is not None and blocks < 1:
             raise ValueError(f"blocks: {blocks}, allowed: 1 or more")
         self._blocks = blocks
+        self._search: Callable[..., Found] = minimise if solver == "daqp" else DrakeSearch(solver).minimise
         self._programs: dict[Size, BinaryProgram] = {}
 
     def solve(self, problem: Problem, budget: Budget = Budget()) -> Solution:  # noqa: B008 (immutable)
@@ -68,10 +73,10 @@ class MixedIntegerRoute:
         start = known_plans[int(np.argmin(costs))]
         incumbent = _improved(problem.kinematics, problem.terms, normals, binary.block, start)
         known = problem.evaluate_half_planes(problem.positions(incumbent), normals)
-        found = minimise(binary, known=known, seconds=min(budget.search_s, budget.left_s()))
-        status: Status = found.ended
+        found = self._search(binary, known=known, seconds=min(budget.search_s, budget.left_s()))
+        status: Status = found.ended if found.iterations <= budget.search_iterations else "budget_spent"
         plans = [incumbent, *known_plans]
-        if found.omega is not None:
+        if found.omega is not None and status == "optimal":
             optimum = binary.plan(found.omega)
             cost = problem.evaluate_half_planes(problem.positions(optimum), normals)
             if abs(cost - known) <= _AGREE * known or cost < known:

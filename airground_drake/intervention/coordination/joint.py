@@ -1,4 +1,4 @@
-"""Joint plans: robots one after the other, in many orders (prioritised planning), as far as a budget goes."""
+"""Joint plans: robots are planned for one after the other, in many orders (prioritised planning), within a budget."""
 
 from __future__ import annotations
 
@@ -8,28 +8,28 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from airground_drake.intervention.coordination.roadmap import Errand, Space, weave
+from airground_drake.intervention.coordination.roadmap import RobotTask, Space, build_roadmap
 from airground_drake.intervention.coordination.single import Body, Mover, Way, find
 from airground_drake.intervention.coordination.smoothing import smooth
 from airground_drake.intervention.coordination.timed import at_rest
 
 MOST_ORDERS = 30
-"""Orders of the robots that are tried at most."""
+"""Largest number of orders of the robots."""
 MOST_SEARCHES = 240
-"""Ways of single robots that are looked for at most: fewer orders of a large team."""
+"""Largest number of searches for single robots: a large team gets fewer orders."""
 LEAVING = 2.0
-"""A robot may need its place for as long as it travels this many times the distance that robots keep."""
+"""A robot may need its place for the time in which it travels this many times the distance that robots keep."""
 LATER_ORDERS = 3
-"""Orders that are tried after one in which every robot finds a way, for a better one."""
+"""After the first order in which every robot finds a way, so many more are tried for a better plan."""
 
 
 @dataclass(frozen=True)
 class Effort:
-    """What a plan may cost, in counts, so that it is the same on every machine.
+    """Limits of the work on a plan, in counts, so that the plan is the same on every machine.
 
     Attributes:
         orders: of the robots.
-        searches: of single robots, in all orders together.
+        searches: for single robots, in all orders together.
         expansions: of safe intervals, in all searches together; a quarter of them is kept for a partial plan.
     """
 
@@ -44,8 +44,8 @@ class Plan:
 
     Attributes:
         ways: one per robot; None: it stays where it is.
-        orders: that were tried.
-        expansions: that were made.
+        orders: how many were tried.
+        expansions: of safe intervals.
     """
 
     ways: tuple[Way | None, ...]
@@ -60,59 +60,60 @@ class Plan:
 
 def plan(
     space: Space,
-    errands: Sequence[Errand],
+    tasks: Sequence[RobotTask],
     speeds: Sequence[float],
     fixed: Sequence[Body] = (),
     *,
     follow: float = math.inf,
     effort: Effort | None = None,
 ) -> Plan:
-    """Ways for some robots that keep away from discs, from each other, and from others whose motions are fixed.
+    """Plan ways for some robots that keep away from discs, from each other, and from others with fixed motions.
 
-    Each robot is planned for among those before it. Where one finds no way, those before it are made to leave the
-    later ones' places alone until these can have left them; then the one that found none comes first in the next
-    order, and where that has been tried, the orders are drawn (always the same ones). If no order serves, the robots
-    that find none stay where they are, and the others go round them.
+    Each robot is planned for among those before it. If one finds no way, the order is tried again, and those before it
+    leave the places of later ones alone until these can have left them. If that fails, too, the robot without a way
+    comes first in the next order. Where that order has been tried, orders are drawn (always the same ones). If no
+    order serves, robots without a way stay where they are, and the others go round them.
 
     Args:
         space: what a robot without a body keeps away from.
-        errands: one per robot.
+        tasks: one per robot.
         speeds: m/s, one per robot.
         fixed: others, with their motions from t = 0 on.
         follow: for how long a robot must be able to follow its preset after it has joined it, s.
         effort: None: the default.
     """
     effort = effort or Effort()
-    spaces = [space.of(errand.body) for errand in errands]
-    roadmap = weave(spaces, errands, [other.motion[0, 1:] for other in fixed])
+    spaces = [space.of(task.body) for task in tasks]
+    roadmap = build_roadmap(spaces, tasks, [other.motion[0, 1:] for other in fixed])
     least = min(each.apart for each in spaces)
     movers = [
-        Mover.on(roadmap if each.apart == least else roadmap.within(each, own), each, errand, speed, own)
-        for each, errand, speed, own in zip(spaces, errands, speeds, roadmap.woven, strict=True)
+        Mover.on(roadmap if each.apart == least else roadmap.within(each, own), each, task, speed, own)
+        for each, task, speed, own in zip(spaces, tasks, speeds, roadmap.robots, strict=True)
     ]
-    task = _Search(movers, tuple(fixed), follow, effort)
-    ways = task.in_orders()
+    search = _Search(movers, tuple(fixed), follow, effort)
+    ways = search.in_orders()
     if ways is None:
-        ways = task.partly()
-    return Plan(tuple(smooth(spaces, ways, [_resting(e) for e in errands], fixed)), task.orders, task.spent)
+        ways = search.partly()
+    return Plan(tuple(smooth(spaces, ways, [_resting(task) for task in tasks], fixed)), search.orders, search.spent)
 
 
-def _resting(errand: Errand) -> Body:
+def _resting(task: RobotTask) -> Body:
     """A robot that stays where it is."""
-    return Body(at_rest(errand.start), errand.body)
+    return Body(at_rest(task.start), task.body)
 
 
 class _Search:
-    """One call of `plan`: what it is about, and what it has spent."""
+    """One call of `plan`: its robots, its limits, and the work done so far."""
 
     def __init__(self, movers: list[Mover], fixed: tuple[Body, ...], follow: float, effort: Effort) -> None:
         self._movers, self._fixed, self._follow, self._effort = movers, fixed, follow, effort
         self.orders, self.searches, self.spent = 0, 0, 0
         self._limit = effort.expansions
+        self._without_way: list[int] = []
 
     def in_orders(self) -> list[Way | None] | None:
-        """The best of the complete plans found; None without any."""
-        if any(math.isinf(mover.to_go[mover.woven.start]) for mover in self._movers):
+        """The best complete plan; None without any."""
+        if any(math.isinf(mover.to_go[mover.own.start]) for mover in self._movers):
             return None
         best: list[Way | None] | None = None
         least, left = math.inf, self._effort.orders
@@ -125,6 +126,9 @@ class _Search:
             self.orders += 1
             left -= 1
             ways, failed = self._in_order(order)
+            if failed == order[0]:  # it has no way even if the others of the plan are left out
+                self._without_way.append(failed)
+                return None
             if failed is not None:
                 ways, failed = self._in_order(order, considerate=True)
             if failed is None:
@@ -139,9 +143,9 @@ class _Search:
         return best
 
     def _drawn(self) -> Iterator[tuple[int, ...]]:
-        """Orders: those with the longest way first, then drawn ones."""
+        """Orders: first by length of way, the longest first, then drawn ones."""
         count = len(self._movers)
-        by_length = sorted(range(count), key=lambda i: (-self._movers[i].to_go[self._movers[i].woven.start], i))
+        by_length = sorted(range(count), key=lambda i: (-self._movers[i].to_go[self._movers[i].own.start], i))
         yield tuple(by_length)
         random = np.random.default_rng(0)
         for _ in range(20 * self._effort.orders):
@@ -150,9 +154,15 @@ class _Search:
     def _in_order(
         self, order: Sequence[int], staying: Sequence[int] = (), *, considerate: bool = False
     ) -> tuple[list[Way | None], int | None]:
-        """Ways of the robots, planned for in this order, and the first that has none."""
+        """Ways of the robots, planned for in this order, and the first robot without one (None: all have one).
+
+        Args:
+            order: of the robots.
+            staying: robots that stay where they are.
+            considerate: whether robots keep clear of the places of later ones until these can have left.
+        """
         ways: list[Way | None] = [None] * len(self._movers)
-        taken = [*self._fixed, *(_resting(self._movers[i].errand) for i in staying)]
+        taken = [*self._fixed, *(_resting(self._movers[i].task) for i in staying)]
         for k, i in enumerate(order):
             brief = [self._leaving(j) for j in order[k + 1 :]] if considerate else []
             budget = self._limit - self.spent
@@ -162,19 +172,19 @@ class _Search:
             if way is None:
                 return ways, i
             ways[i] = way
-            taken.append(Body(way.motion, self._movers[i].errand.body))
+            taken.append(Body(way.motion, self._movers[i].task.body))
         return ways, None
 
     def _leaving(self, robot: int) -> Body:
-        """A robot at its place, until when it may need it."""
+        """A robot at its place, for as long as it may need it."""
         mover = self._movers[robot]
         until = LEAVING * (mover.space.apart + mover.space.spacing) / mover.speed
-        return _resting(mover.errand)._replace(until=until)
+        return _resting(mover.task)._replace(until=until)
 
     def partly(self) -> list[Way | None]:
-        """Ways of as many robots as find one while the others stay, dropped one by one."""
+        """A plan in which some robots stay: each one that finds no way is dropped, and the others are planned anew."""
         self._limit = self._effort.expansions
-        staying: list[int] = []
+        staying = self._without_way
         order = next(self._drawn())
         for _ in self._movers:
             ways, failed = self._in_order([i for i in order if i not in staying], staying)

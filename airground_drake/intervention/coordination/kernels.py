@@ -1,12 +1,13 @@
 """Compiled inner loops of joint planning (numba): blocked times, safe intervals, search, closest approaches.
 
-A timed motion is an array (M, 3) of times, s, and places, m: straight between its rows, at rest at the last place from
-then on. No fast-math: results are those of IEEE arithmetic in the order written.
+A timed motion is an array (M, 3) of times, s, and places, m. It is straight between its rows, and rests at the last
+place. There is no fast-math: results are those of IEEE arithmetic in the order written.
 """
 
 from __future__ import annotations
 
 from heapq import heappop, heappush
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +16,52 @@ from numba import njit
 from airground_drake.arrays import Array
 
 Indices = npt.NDArray[np.int64]
+
+
+class Grid(NamedTuple):
+    """Nodes of a roadmap, sorted into square cells to find them by place.
+
+    Attributes:
+        nodes: (N, 2), m.
+        first: first member of each cell, column by column, (cells + 1,).
+        members: nodes by cell, (N,).
+        corner: lowest corner of the grid, (2,), m.
+        size: of a cell, m.
+        shape: number of columns and rows, (2,).
+    """
+
+    nodes: Array
+    first: Indices
+    members: Indices
+    corner: Array
+    size: float
+    shape: Indices
+
+
+class Edges(NamedTuple):
+    """Edges of a roadmap for one robot, each in both directions.
+
+    Attributes:
+        first: first edge of each node, (N + 1,).
+        heads: where edges lead, (E,).
+        durations: of travel along them, (E,), s.
+    """
+
+    first: Indices
+    heads: Indices
+    durations: Array
+
+
+class Intervals(NamedTuple):
+    """Safe intervals: when nobody is too near to a node.
+
+    Attributes:
+        first: first interval of each node, (N + 1,).
+        times: begin and end of each, (K, 2), s; the end may be infinite.
+    """
+
+    first: Indices
+    times: Array
 
 
 @njit(cache=True)
@@ -29,7 +76,7 @@ def approach(x: float, y: float, vx: float, vy: float, duration: float) -> float
 
 @njit(cache=True)
 def place(motion: Array, t: float, hint: int) -> tuple[float, float, int]:
-    """Where a timed motion is at time t, and the row before it, searched from row `hint` on."""
+    """Place of a timed motion at time t, s, and the row before it; the search begins at row `hint`."""
     k = hint
     while k + 1 < len(motion) and motion[k + 1, 0] <= t:
         k += 1
@@ -65,138 +112,174 @@ def closest(one: Array, other: Array, begin: float, end: float) -> float:
 
 
 @njit(cache=True)
+def time_within(x: float, y: float, vx: float, vy: float, radius: float, duration: float) -> tuple[float, float]:
+    """When a point is nearer to the origin than a radius: begin and end, s; the begin is not before the end: never.
+
+    Args:
+        x: place at t = 0, m.
+        y: the same.
+        vx: velocity, m/s.
+        vy: the same.
+        radius: m.
+        duration: of the motion, s; may be infinite.
+    """
+    c = x * x + y * y - radius * radius
+    squared = vx * vx + vy * vy
+    if squared == 0.0:
+        return (0.0, duration) if c < 0.0 else (0.0, 0.0)
+    b = x * vx + y * vy
+    root = b * b - squared * c
+    if root <= 0.0:
+        return 0.0, 0.0
+    root = np.sqrt(root)
+    return max((-b - root) / squared, 0.0), min((-b + root) / squared, duration)
+
+
+@njit(cache=True)
+def cells_between(low: float, high: float, corner: float, size: float, count: int) -> tuple[int, int]:
+    """First cell of a row of cells that an interval meets, and the one after the last.
+
+    Args:
+        low: begin of the interval, m.
+        high: its end, m.
+        corner: begin of the row, m.
+        size: of a cell, m.
+        count: of cells.
+    """
+    first = min(max(int(np.floor((low - corner) / size)), 0), count)
+    return first, max(min(int(np.floor((high - corner) / size)) + 1, count), first)
+
+
+@njit(cache=True)
 def blocked_times(
-    motion: Array,
-    nodes: Array,
-    cells: Indices,
-    members: Indices,
-    corner: Array,
-    size: float,
-    shape: Indices,
-    radius: float,
-    special: Indices,
-    radii: Array,
+    motion: Array, grid: Grid, radius: float, special: Indices, special_radii: Array
 ) -> tuple[Indices, Array]:
     """When a timed motion is nearer to nodes than a radius.
 
     Args:
         motion: (M, 3).
-        nodes: (N, 2), m.
-        cells: first member of each cell of a grid over the nodes, (cells + 1,).
-        members: nodes by cell, (N,).
-        corner: lowest corner of the grid, (2,), m.
-        size: of a cell, m.
-        shape: number of cells along x and y, (2,).
+        grid: the nodes.
         radius: m.
         special: nodes that have a radius of their own, (S,).
-        radii: the same, (S,), m; not above `radius`.
+        special_radii: the same, (S,), m; only what is below `radius` counts.
 
     Returns:
         Nodes (B,) and begin and end of each blocked time, (B, 2), s.
     """
-    capacity = 1024
-    found, times = np.empty(capacity, np.int64), np.empty((capacity, 2))
-    count = 0
+    found, times, count = np.empty(1024, np.int64), np.empty((1024, 2)), 0
     for k in range(len(motion)):
-        begin = motion[k, 0]
-        last = k + 1 == len(motion)
-        duration = np.inf if last else motion[k + 1, 0] - begin
-        px, py = motion[k, 1], motion[k, 2]
-        qx, qy = (px, py) if last else (motion[k + 1, 1], motion[k + 1, 2])
-        vx, vy = (0.0, 0.0) if last else ((qx - px) / duration, (qy - py) / duration)
-        squared = vx * vx + vy * vy
-        left = max(int(np.floor((min(px, qx) - radius - corner[0]) / size)), 0)
-        right = min(int(np.floor((max(px, qx) + radius - corner[0]) / size)), shape[0] - 1)
-        low = max(int(np.floor((min(py, qy) - radius - corner[1]) / size)), 0)
-        high = min(int(np.floor((max(py, qy) + radius - corner[1]) / size)), shape[1] - 1)
-        for column in range(left, right + 1):
-            for row in range(low, high + 1):
-                cell = column * shape[1] + row
-                for n in members[cells[cell] : cells[cell + 1]]:
-                    keep = radius
-                    for s in range(len(special)):
-                        if special[s] == n:
-                            keep = min(keep, radii[s])
-                    x, y = px - nodes[n, 0], py - nodes[n, 1]
-                    c = x * x + y * y - keep * keep
-                    b = x * vx + y * vy
-                    entry, leave = 0.0, duration
-                    if squared > 0.0:
-                        root = b * b - squared * c
-                        if root <= 0.0:
-                            continue
-                        root = np.sqrt(root)
-                        entry, leave = max((-b - root) / squared, 0.0), min((-b + root) / squared, duration)
-                        if entry >= leave:
-                            continue
-                    elif c >= 0.0:
-                        continue
-                    if count == capacity:
-                        capacity *= 2
-                        more, longer = np.empty(capacity, np.int64), np.empty((capacity, 2))
-                        more[:count], longer[:count] = found, times
-                        found, times = more, longer
-                    found[count], times[count, 0], times[count, 1] = n, begin + entry, begin + leave
-                    count += 1
+        begin, px, py = motion[k, 0], motion[k, 1], motion[k, 2]
+        duration, qx, qy, vx, vy = np.inf, px, py, 0.0, 0.0
+        if k + 1 < len(motion):
+            duration, qx, qy = motion[k + 1, 0] - begin, motion[k + 1, 1], motion[k + 1, 2]
+            vx, vy = (qx - px) / duration, (qy - py) / duration
+        x, y = grid.corner
+        columns, rows = grid.shape
+        left, right = cells_between(min(px, qx) - radius, max(px, qx) + radius, x, grid.size, columns)
+        low, high = cells_between(min(py, qy) - radius, max(py, qy) + radius, y, grid.size, rows)
+        for column in range(left, right):
+            # the cells of a column lie one behind the other
+            for n in grid.members[grid.first[column * rows + low] : grid.first[column * rows + high]]:
+                keep = radius
+                for s in range(len(special)):
+                    if special[s] == n:
+                        keep = min(keep, special_radii[s])
+                entry, leave = time_within(px - grid.nodes[n, 0], py - grid.nodes[n, 1], vx, vy, keep, duration)
+                if entry >= leave:
+                    continue
+                if count == len(found):
+                    found, times = np.append(found, found), np.concatenate((times, times))
+                found[count], times[count, 0], times[count, 1] = n, begin + entry, begin + leave
+                count += 1
     return found[:count], times[:count]
 
 
 @njit(cache=True)
-def safe_intervals(count: int, blocked: Indices, times: Array) -> tuple[Indices, Array]:
+def times_by_node(count: int, nodes: Indices, times: Array) -> tuple[Indices, Array]:
+    """Sort blocked times by node, and those of a node by their begin.
+
+    Args:
+        count: of nodes, N.
+        nodes: (B,).
+        times: begin and end of each blocked time, (B, 2), s.
+
+    Returns:
+        First time of each node, (N + 1,), and the sorted times, (B, 2), s.
+    """
+    first = np.zeros(count + 1, np.int64)
+    for n in nodes:
+        first[n + 1] += 1
+    for n in range(count):
+        first[n + 1] += first[n]
+    end, by_node = first[:-1].copy(), np.empty_like(times)
+    for k in range(len(nodes)):
+        i = end[nodes[k]]
+        end[nodes[k]] += 1
+        while i > first[nodes[k]] and by_node[i - 1, 0] > times[k, 0]:
+            by_node[i] = by_node[i - 1]
+            i -= 1
+        by_node[i] = times[k]
+    return first, by_node
+
+
+@njit(cache=True)
+def safe_intervals(count: int, nodes: Indices, times: Array) -> Intervals:
     """Times at which nodes are free, from t = 0 on.
 
     Args:
         count: of nodes, N.
-        blocked: nodes, (B,), sorted, and within a node by the begin of the time.
+        nodes: blocked ones, (B,).
         times: begin and end of each blocked time, (B, 2), s.
-
-    Returns:
-        First interval of each node, (N + 1,), and begin and end of the intervals, (K, 2), s.
     """
+    first_blocked, blocked = times_by_node(count, nodes, times)
     first = np.zeros(count + 1, np.int64)
     intervals = np.empty((count + len(blocked), 2))
-    total, k = 0, 0
+    total = 0
     for n in range(count):
         first[n] = total
         free = 0.0
-        while k < len(blocked) and blocked[k] == n:
-            if times[k, 0] > free:
-                intervals[total, 0], intervals[total, 1] = free, times[k, 0]
+        for k in range(first_blocked[n], first_blocked[n + 1]):
+            if blocked[k, 0] > free:
+                intervals[total, 0], intervals[total, 1] = free, blocked[k, 0]
                 total += 1
-            free = max(free, times[k, 1])
-            k += 1
+            free = max(free, blocked[k, 1])
         if free < np.inf:
             intervals[total, 0], intervals[total, 1] = free, np.inf
             total += 1
     first[count] = total
-    return first, intervals[:total]
+    return Intervals(first, intervals[:total])
+
+
+@njit(cache=True)
+def join_time(arrival: float, end: float, first: float, last: float) -> float:
+    """Earliest time at which a robot that waits at a node can leave the roadmap for its preset, s; infinite: never.
+
+    Args:
+        arrival: of the robot at the node, s.
+        end: of the safe interval in which it waits, s.
+        first: time at which the preset can be joined there, s.
+        last: the same; infinite: the robot stays at the node for good, which the whole interval must allow.
+    """
+    joined = max(arrival, first)
+    if joined > min(last, end) or (last == np.inf and end < np.inf):
+        return np.inf
+    return joined
 
 
 @njit(cache=True)
 def search(
-    first_edge: Indices,
-    heads: Indices,
-    durations: Array,
-    first: Indices,
-    intervals: Array,
-    start: int,
-    joins: Array,
-    to_go: Array,
-    budget: int,
+    edges: Edges, intervals: Intervals, start: int, joins: Array, to_go: Array, budget: int
 ) -> tuple[Indices, Array, float, int]:
     """Safe-interval search: the way from a node to the earliest join.
 
     A robot may wait at a node during a safe interval of it, and travels an edge only while both ends are safe.
 
     Args:
-        first_edge: first edge of each node, (N + 1,).
-        heads: where edges lead, (E,).
-        durations: of edges, (E,), s.
-        first: first safe interval of each node, (N + 1,).
-        intervals: (K, 2), s.
+        edges: of the roadmap.
+        intervals: safe ones.
         start: node at t = 0.
-        joins: times at which a robot that waits at a node can leave the roadmap, first and last, (N, 2), s; the last
-            before the first: never; infinite: it stays there.
+        joins: times at which a robot that waits at a node can leave the roadmap, first and last, (N, 2), s; see
+            `join_time`.
         to_go: lower bound of the time from a node to any join, (N,), s.
         budget: of expanded intervals.
 
@@ -204,60 +287,153 @@ def search(
         Nodes (L,) in order, arrival at each (L,), s, the time of the join (infinite: there is none; then L = 0), and
         the number of expanded intervals.
     """
-    count = len(intervals)
-    arrival, before, owner = np.full(count, np.inf), np.full(count, -1, np.int64), np.zeros(count, np.int64)
-    closed = np.zeros(count, np.bool_)
+    first, times = intervals
+    arrival, before = np.full(len(times), np.inf), np.full(len(times), -1, np.int64)
+    closed, node_of = np.zeros(len(times), np.bool_), np.empty(len(times), np.int64)
     for n in range(len(first) - 1):
-        owner[first[n] : first[n + 1]] = n
-    heap = [(np.inf, -1)]
+        node_of[first[n] : first[n + 1]] = n
+    heap: list[tuple[float, int]] = [(np.inf, -1)]
     heap.pop()
-    if first[start] < first[start + 1] and intervals[first[start], 0] == 0.0 and to_go[start] < np.inf:
+    if first[start] < first[start + 1] and times[first[start], 0] == 0.0 and to_go[start] < np.inf:
         arrival[first[start]] = 0.0
-        heappush(heap, (to_go[start], first[start]))
+        heappush(heap, (to_go[start], int(first[start])))
     best, last, expanded = np.inf, -1, 0
-    while len(heap) > 0:
-        key, i = heappop(heap)
-        if key >= best or expanded >= budget:
+    while len(heap) > 0 and expanded < budget:
+        bound, i = heappop(heap)
+        if bound >= best:
             break
         if closed[i]:
             continue
         closed[i] = True
         expanded += 1
-        n, t, end = owner[i], arrival[i], intervals[i, 1]
-        joined = max(t, joins[n, 0])
-        stays = joins[n, 1] == np.inf
-        if joined <= joins[n, 1] and joined <= end and not (stays and end < np.inf) and joined < best:
+        n = int(node_of[i])
+        joined = join_time(arrival[i], times[i, 1], joins[n, 0], joins[n, 1])
+        if joined < best:
             best, last = joined, i
-        for e in range(first_edge[n], first_edge[n + 1]):
-            head, duration = heads[e], durations[e]
-            if to_go[head] == np.inf or t + duration > end:
-                continue
-            for j in range(first[head], first[head + 1]):
-                if intervals[j, 0] + duration > end:
-                    break
-                there = max(t, intervals[j, 0]) + duration
-                if there > intervals[j, 1] or there > end or there >= arrival[j]:
-                    continue
+        reach_neighbours(edges, intervals, n, i, to_go, arrival, before, heap)
+    nodes, arrivals = traced_back(last, before, node_of, arrival)
+    return nodes, arrivals, best, expanded
+
+
+@njit(cache=True)
+def reach_neighbours(
+    edges: Edges,
+    intervals: Intervals,
+    node: int,
+    i: int,
+    to_go: Array,
+    arrival: Array,
+    before: Indices,
+    heap: list[tuple[float, int]],
+) -> None:
+    """Note earlier arrivals at the neighbours of a node, and put their intervals on the heap.
+
+    Args:
+        edges: see `search`.
+        intervals: see `search`.
+        node: where the robot is.
+        i: the safe interval of the node, in which it may wait.
+        to_go: see `search`.
+        arrival: earliest one found in each interval, (K,), s; written to.
+        before: interval from which it is reached, (K,); written to.
+        heap: of lower bounds of join times, s, and intervals; written to.
+    """
+    first, times = intervals
+    end = times[i, 1]
+    for e in range(edges.first[node], edges.first[node + 1]):
+        head, duration = edges.heads[e], edges.durations[e]
+        if to_go[head] == np.inf or arrival[i] + duration > end:
+            continue
+        for j in range(first[head], first[head + 1]):
+            if times[j, 0] + duration > end:
+                break
+            there = max(arrival[i], times[j, 0]) + duration
+            if there <= min(times[j, 1], end) and there < arrival[j]:
                 arrival[j], before[j] = there, i
                 heappush(heap, (there + to_go[head], j))
+
+
+@njit(cache=True)
+def traced_back(last: int, before: Indices, node_of: Indices, arrival: Array) -> tuple[Indices, Array]:
+    """Nodes and arrivals, (L,), on the way to an interval; L = 0 for the interval -1."""
     length, i = 0, last
     while i >= 0:
         length += 1
         i = before[i]
-    nodes, times = np.empty(length, np.int64), np.empty(length)
+    nodes, arrivals = np.empty(length, np.int64), np.empty(length)
     i = last
     for k in range(length - 1, -1, -1):
-        nodes[k], times[k] = owner[i], arrival[i]
+        nodes[k], arrivals[k] = node_of[i], arrival[i]
         i = before[i]
-    return nodes, times, best, expanded
+    return nodes, arrivals
+
+
+@njit(cache=True)
+def free_pieces(preset: Array, other: Array, apart: float) -> npt.NDArray[np.bool_]:
+    """Which pieces between the rows of a timed motion (K, 3) stay so far, m, from another one; shape (K - 1,)."""
+    free = np.empty(len(preset) - 1, np.bool_)
+    for k in range(len(free)):
+        free[k] = closest(preset[k : k + 2], other, preset[k, 0], preset[k + 1, 0]) >= apart
+    return free
+
+
+@njit(cache=True)
+def free_points(points: Array, discs: Array) -> npt.NDArray[np.bool_]:
+    """Which points (K, 2), m, are outside all discs (m, 3) of centre and radius, m."""
+    free = np.ones(len(points), np.bool_)
+    for k in range(len(points)):
+        for m in range(len(discs)):
+            x, y = points[k, 0] - discs[m, 0], points[k, 1] - discs[m, 1]
+            if np.sqrt(x * x + y * y) < discs[m, 2]:
+                free[k] = False
+                break
+    return free
+
+
+@njit(cache=True)
+def free_segments(begin: Array, end: Array, discs: Array, slack: float) -> npt.NDArray[np.bool_]:
+    """Which segments (K, 2)-(K, 2), m, come nearer to no disc than its radius or than one of their ends is.
+
+    Args:
+        begin: (K, 2), m.
+        end: (K, 2), m.
+        discs: (m, 3) of centre and radius, m.
+        slack: distances may fall short by this, m.
+    """
+    free = np.ones(len(begin), np.bool_)
+    for k in range(len(begin)):
+        sx, sy = end[k, 0] - begin[k, 0], end[k, 1] - begin[k, 1]
+        squared = max(sx * sx + sy * sy, 1e-300)
+        reach = 1.001 * np.sqrt(squared)
+        for m in range(len(discs)):
+            ax, ay = begin[k, 0] - discs[m, 0], begin[k, 1] - discs[m, 1]
+            to_begin = np.sqrt(ax * ax + ay * ay)
+            if to_begin > discs[m, 2] + reach:
+                continue
+            bx, by = end[k, 0] - discs[m, 0], end[k, 1] - discs[m, 1]
+            share = min(max(-(ax * sx + ay * sy) / squared, 0.0), 1.0)
+            x, y = ax + share * sx, ay + share * sy
+            allowed = min(discs[m, 2], to_begin, np.sqrt(bx * bx + by * by))
+            if np.sqrt(x * x + y * y) < allowed - slack:
+                free[k] = False
+                break
+    return free
 
 
 @njit(cache=True)
 def straight_is_free(motion: Array, i: int, j: int, discs: Array, others: Array, begins: Indices, apart: Array) -> bool:
     """Whether a timed motion may go straight from row i to row j.
 
-    Nothing may come nearer than it has to be, or than it is at one of the two rows: discs (m, 3) of centre and radius,
-    and other timed motions, stacked, with `begins` their first rows and the number of all, to the distances `apart`.
+    It may come no nearer to anything than the allowed distance, or than it is at one of the two rows.
+
+    Args:
+        motion: (M, 3).
+        i: row at which the straight piece begins.
+        j: row at which it ends.
+        discs: (m, 3) of centre and radius, m.
+        others: other timed motions, stacked, (R, 3).
+        begins: first row of each of the others, and R, (B + 1,).
+        apart: distances to keep from the others, (B,), m.
     """
     t, x, y = motion[i, 0], motion[i, 1], motion[i, 2]
     until, u, v = motion[j, 0], motion[j, 1], motion[j, 2]
@@ -281,10 +457,11 @@ def straight_is_free(motion: Array, i: int, j: int, discs: Array, others: Array,
 
 @njit(cache=True)
 def straightened(motion: Array, upto: int, discs: Array, others: Array, begins: Indices, apart: Array) -> Array:
-    """The same timed motion with every detour between its first `upto` rows left out that is not needed.
+    """The timed motion without needless detours between its first `upto` rows.
 
-    From each row kept it goes straight, at constant speed, to the last row that `straight_is_free` allows, found by
-    trying the farthest first and then half of the way again and again. Times of the rows kept stay what they are.
+    From each row that is kept the motion goes straight, at constant speed, to a later row that `straight_is_free`
+    allows: it tries the farthest row first, then three quarters of the way, again and again. Times of rows stay as
+    they are. The other arguments are those of `straight_is_free`.
     """
     kept = np.empty(len(motion), np.int64)
     kept[0], count, i = 0, 1, 0

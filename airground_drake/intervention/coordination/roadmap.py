@@ -1,4 +1,4 @@
-"""Where robots can be: a lattice between the discs, with starts, targets, presets and shortest paths woven in."""
+"""The graph on which robots move: a lattice between the discs, and starts, targets, presets and shortest paths."""
 
 from __future__ import annotations
 
@@ -13,24 +13,26 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
 from airground_drake.arrays import Array
-from airground_drake.intervention.paths import NoPath, shortest_path
+from airground_drake.geometry.paths import NoPath, shortest_path
+from airground_drake.intervention.coordination import kernels
 
-Indices = npt.NDArray[np.int64]
+Indices = kernels.Indices
 
 PITCH = 0.2
 """Spacing of the lattice as a share of the distance that robots keep."""
 REACH = 1.75
-"""Nodes that are no part of the lattice are connected to all nodes within this many spacings."""
+"""Nodes outside the lattice are connected to all nodes within this many spacings."""
 FAR = 0.95
-"""Share of the longest edges from starts and to targets that are used, see `single.find`."""
+"""Edges from starts and to targets are no longer than this share of what `single.find` allows."""
 RINGS, RAYS = 3, 16
-"""Nodes round a start: robots that block each other leave little room between what they must keep away from."""
+"""Extra nodes round a start, in rings: robots that block each other have little room."""
 MOST_NODES = 30_000
-"""Of the lattice: a larger area gets a wider spacing."""
-MOST_WOVEN = 2_000
-"""Of a path woven in: a longer one gets wider gaps (and is connected through the lattice)."""
+"""Largest number of nodes of the lattice: a larger area gets a wider spacing."""
+MOST_PATH_NODES = 2_000
+"""Largest number of nodes of a preset or shortest path: a longer one gets wider gaps, and is connected through the
+lattice."""
 CHORDS = 0.5
-"""Share of the clearance that edges keep: chords of the arcs of shortest paths, which keep more, dip into it."""
+"""Share of the clearance that edges keep. Chords of the arcs of shortest paths come nearer to discs than the arcs."""
 ARCS = 0.75
 """Share of the clearance that shortest paths keep."""
 ROUNDING_M = 1e-9
@@ -38,15 +40,15 @@ ROUNDING_M = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Space:
-    """What a robot has to keep away from: one without a body, until it is made for a radius (`of`).
+    """Discs and distances that a robot has to keep. `Space.of` makes it for a robot with a body.
 
     Attributes:
         centres: of the obstacles, (m, 2), m.
         radii: distance to keep from them, (m,), m.
-        clearance: wished for beyond that, m; nodes keep it all (where they can), edges half of it.
+        clearance: to keep beyond that, m; nodes of the lattice keep it all, edges half of it.
         apart: distance that the robot's centre has to keep from the surfaces of others, m.
-        spacing: wished for beyond that, m; not 0.
-        above: how far the obstacles are from the robot's plane, (m,), m; `radii` are those of balls then.
+        spacing: to keep beyond that where possible, m; not 0.
+        above: distance of the obstacles from the robot's plane, (m,), m; `radii` are those of balls then.
     """
 
     centres: Array
@@ -57,61 +59,53 @@ class Space:
     above: Array | float = 0.0
 
     def of(self, body: float) -> Space:
-        """The same in the plane, for the centre of a robot of such a radius, m."""
+        """The same in the plane, for the centre of a robot whose body has this radius, m."""
         squared = np.square(self.radii + body) - np.square(self.above)
         near = squared > 0.0
         return Space(self.centres[near], np.sqrt(squared[near]), self.clearance, self.apart + body, self.spacing)
 
     def wide(self, longest: float, body: float = 0.0) -> float:
-        """Distance of a robot from both ends of an edge, m, that keeps it as far from the edge as is wished.
+        """Distance of another robot from both ends of an edge, m, that keeps it `apart + spacing` from the whole edge.
 
         The squared distance to a point of an edge of length L is a mean of those to the ends less s (1 - s) L^2.
 
         Args:
-            longest: edge, m.
-            body: radius of that robot, m.
+            longest: length of the longest edge, m.
+            body: radius of the other robot, m.
         """
         return math.sqrt((self.apart + body + self.spacing) ** 2 + longest**2 / 4.0)
 
     @property
     def discs(self) -> Array:
-        """Centres, and the distances that motions keep but near their ends, (m, 3), m."""
-        return np.column_stack([self.centres, self.radii + CHORDS * self.clearance])
+        """Centres, and the distances that motions keep except near their ends, (m, 3), m."""
+        return self._discs(CHORDS * self.clearance)
+
+    def _discs(self, clearance: float) -> Array:
+        """Centres, and distances to keep with a clearance, (m, 3), m."""
+        return np.column_stack([self.centres, self.radii + clearance])
 
     def segments_are_free(self, begin: Array, end: Array) -> npt.NDArray[np.bool_]:
-        """Which of the segments (K, 2)-(K, 2), m, come no nearer to a disc than they have to or than their ends are.
+        """Which of the segments (K, 2)-(K, 2), m, come nearer to no disc than allowed, or than one of their ends is.
 
         So a segment that begins too near to a disc is free if it only leads away.
         """
-        free = np.ones(len(begin), dtype=bool)
-        step = end - begin
-        squared = np.maximum(np.square(step).sum(axis=1), 1e-300)
-        for centre, radius in zip(self.centres, self.radii, strict=True):
-            offset = begin - centre
-            share = np.clip(-(offset * step).sum(axis=1) / squared, 0.0, 1.0)
-            nearest = np.linalg.norm(offset + share[:, None] * step, axis=1)
-            ends = np.minimum(np.linalg.norm(offset, axis=1), np.linalg.norm(end - centre, axis=1))
-            free &= nearest >= np.minimum(radius + CHORDS * self.clearance, ends) - ROUNDING_M
-        return free
+        return kernels.free_segments(begin, end, self.discs, ROUNDING_M)
 
     def points_are_free(self, points: Array, clearance: float) -> npt.NDArray[np.bool_]:
-        """Which of the points (K, 2), m, keep every distance, and so much more, m."""
-        if not len(self.centres):
-            return np.ones(len(points), dtype=bool)
-        gaps = np.linalg.norm(points[:, None] - self.centres, axis=2) - self.radii
-        return np.asarray((gaps >= clearance - ROUNDING_M).all(axis=1))
+        """Which of the points (K, 2), m, keep every distance, and this clearance, m, beyond it."""
+        return kernels.free_points(points, self._discs(clearance - ROUNDING_M))
 
 
 @dataclass(frozen=True, eq=False)
-class Woven:
+class RobotNodes:
     """The nodes of one robot.
 
     Attributes:
         start: node.
         target: node.
         preset: nodes along the rest of its preset, (K,); the last is the target.
-        preset_times: when it is there, (K,), s.
-        usable: which of them keep every distance, (K,); no edge leads to the others.
+        preset_times: times at these nodes, (K,), s.
+        usable: whether they keep every distance, (K,); no edge leads to the others.
     """
 
     start: int
@@ -123,38 +117,37 @@ class Woven:
 
 @dataclass(frozen=True, eq=False)
 class Roadmap:
-    """A graph in the plane with a grid over it to find nodes by place; every edge is in it in both directions.
+    """A graph in the plane, with a grid to find nodes by place. Every edge is in it in both directions.
 
     Attributes:
-        nodes: (N, 2), m.
-        first_edge: of each node, (N + 1,).
+        grid: of the nodes.
+        first_edge: first edge of each node, (N + 1,).
         heads: where edges lead, (E,).
         lengths: of edges, (E,), m.
-        longest: edge between nodes that are no start and no target, m.
-        woven: one entry per robot.
-        cells, members, corner, size, shape: see `kernels.blocked_times`.
+        longest: bound of the length of edges, except those at starts and targets, m.
+        robots: one entry per robot.
     """
 
-    nodes: Array
+    grid: kernels.Grid
     first_edge: Indices
     heads: Indices
     lengths: Array
     longest: float
-    woven: tuple[Woven, ...]
-    cells: Indices
-    members: Indices
-    corner: Array
-    size: float
-    shape: Indices
+    robots: tuple[RobotNodes, ...]
+
+    @property
+    def nodes(self) -> Array:
+        """Places of the nodes, (N, 2), m."""
+        return self.grid.nodes
 
     def distances_to(self, targets: Indices) -> Array:
-        """Length of the shortest way from every node to the nearest of some nodes, (N,), m; infinite without any."""
+        """Length of the shortest way from every node to the nearest target node, (N,), m; infinite: there is no way."""
         graph = csr_array((self.lengths, self.heads, self.first_edge), shape=(len(self.nodes),) * 2)
         found: Array = dijkstra(graph, indices=targets, min_only=True)
         return found
 
-    def within(self, space: Space, own: Woven) -> Roadmap:
-        """The same with the edges alone that a larger robot can use: one that has to keep away from more."""
+    def within(self, space: Space, own: RobotNodes) -> Roadmap:
+        """The same with only those edges that a larger robot can use, which has to keep larger distances."""
         tails = np.repeat(np.arange(len(self.nodes)), np.diff(self.first_edge))
         free = space.points_are_free(self.nodes, CHORDS * space.clearance)
         free[np.append(own.preset[own.usable], own.start)] = True
@@ -164,7 +157,7 @@ class Roadmap:
 
 
 @dataclass(frozen=True, eq=False)
-class Errand:
+class RobotTask:
     """Where a robot is and where it is to go.
 
     Attributes:
@@ -178,54 +171,67 @@ class Errand:
     body: float = 0.0
 
 
-def weave(spaces: Sequence[Space], errands: Sequence[Errand], others: Sequence[Array] = ()) -> Roadmap:
-    """The roadmap of some robots. Its lattice and edges are those of the smallest: see `Roadmap.within`.
+def build_roadmap(spaces: Sequence[Space], tasks: Sequence[RobotTask], others: Sequence[Array] = ()) -> Roadmap:
+    """The roadmap of some robots. Its lattice and edges are those of the smallest robot: see `Roadmap.within`.
 
     Args:
-        spaces: what each has to keep away from.
-        errands: where they are and where they are to go.
-        others: places of robots that are to be gone round, (2,) each, m: they only widen the area.
+        spaces: discs and distances that each robot has to keep.
+        tasks: one per robot.
+        others: places of other robots, (2,) each, m: they only widen the area.
     """
     by_size = sorted(spaces, key=lambda each: each.apart)
     space = by_size[0]
-    pitch = PITCH * space.apart
-    low, high = _area(by_size[-1], errands, others)
-    extent = high - low
-    pitch = max(pitch, math.sqrt(float(np.prod(extent)) / MOST_NODES))
-    columns, rows = (math.ceil(length / pitch) + 1 for length in extent)
-    x, y = np.meshgrid(np.arange(columns), np.arange(rows), indexing="ij")
-    lattice = low + pitch * np.column_stack([x.ravel(), y.ravel()])
-    free = space.points_are_free(lattice, space.clearance)
-    number = np.where(free, np.cumsum(free) - 1, -1).reshape(columns, rows)
-    nodes: list[Array] = [lattice[free]]
+    low, high = _area(by_size[-1], tasks, others)
+    pitch = max(PITCH * space.apart, math.sqrt(float(np.prod(high - low)) / MOST_NODES))
     reach = REACH * pitch
     far = FAR * math.sqrt(space.wide(reach) ** 2 - space.apart**2)
-    count, woven = int(free.sum()), []
-    for own, errand in zip(spaces, errands, strict=True):
-        preset, times = _preset_nodes(errand.preset, pitch)
-        path = np.concatenate([_path_nodes(own, errand.start, preset[-1], pitch), _fan(own, errand.start, far)])
-        nodes += [errand.start[None], preset, path]
-        along = np.arange(count + 1, count + 1 + len(preset))
-        woven.append(Woven(count, int(along[-1]), along, times, own.points_are_free(preset, 0.0)))
-        count += 1 + len(preset) + len(path)
+    lattice, pairs = _lattice(space, low, high, pitch)
+    nodes, robots = [lattice], []
+    for own, task in zip(spaces, tasks, strict=True):
+        found, robot = _robot_nodes(own, task, sum(map(len, nodes)), pitch, far)
+        nodes.append(found)
+        robots.append(robot)
     points = np.concatenate(nodes)
-    radii = np.full(len(points) - int(free.sum()), reach)
-    for each in woven:
-        radii[np.array([each.start, each.target]) - int(free.sum())] = max(far, reach)
-    pairs = np.concatenate([_lattice_edges(number), _other_edges(points, radii)])
-    pairs = pairs[~_is_short_cut(points, pairs, woven)]
-    shut = np.concatenate([each.preset[~each.usable] for each in woven])
+    radii = np.full(len(points) - len(lattice), reach)
+    radii[np.array([[each.start, each.target] for each in robots]) - len(lattice)] = max(far, reach)
+    pairs = np.concatenate([pairs, _other_edges(points, radii)])
+    pairs = pairs[~_is_short_cut(points, pairs, robots)]
+    shut = np.concatenate([each.preset[~each.usable] for each in robots])
     pairs = pairs[~np.isin(pairs, shut).any(axis=1)]
     pairs = pairs[space.segments_are_free(points[pairs[:, 0]], points[pairs[:, 1]])]
-    first, heads, lengths = _in_rows(points, pairs)
-    cells, members, shape = _buckets(points, low, reach)
-    return Roadmap(points, first, heads, lengths, reach, tuple(woven), cells, members, low, reach, shape)
+    return Roadmap(_grid(points, low, reach), *_in_rows(points, pairs), reach, tuple(robots))
 
 
-def _area(space: Space, errands: Sequence[Errand], others: Sequence[Array]) -> tuple[Array, Array]:
-    """Corners of a box round everything near, with room to go round it."""
+def _lattice(space: Space, low: Array, high: Array, pitch: float) -> tuple[Array, Indices]:
+    """Free nodes of a square lattice in a box, (N, 2), m, and pairs of neighbours, (E, 2)."""
+    columns, rows = (math.ceil(length / pitch) + 1 for length in high - low)
+    x, y = np.meshgrid(np.arange(columns), np.arange(rows), indexing="ij")
+    points = low + pitch * np.column_stack([x.ravel(), y.ravel()])
+    free = space.points_are_free(points, space.clearance)
+    return points[free], _lattice_edges(np.where(free, np.cumsum(free) - 1, -1).reshape(columns, rows))
+
+
+def _robot_nodes(space: Space, task: RobotTask, first: int, pitch: float, far: float) -> tuple[Array, RobotNodes]:
+    """Nodes of a robot: start, preset, shortest path to the target, and a fan round the start.
+
+    Args:
+        space: discs and distances that the robot has to keep.
+        task: of the robot.
+        first: number of the first of its nodes.
+        pitch: gap between nodes, m.
+        far: radius of the fan, m.
+    """
+    preset, times = _preset_nodes(task.preset, pitch)
+    path = _path_nodes(space, task.start, preset[-1], pitch)
+    points = np.concatenate([task.start[None], preset, path, _fan(space, task.start, far)])
+    along = np.arange(first + 1, first + 1 + len(preset))
+    return points, RobotNodes(first, int(along[-1]), along, times, space.points_are_free(preset, 0.0))
+
+
+def _area(space: Space, tasks: Sequence[RobotTask], others: Sequence[Array]) -> tuple[Array, Array]:
+    """Corners of a box that contains all robots, presets and the discs near them, with room to go round these."""
     points = np.concatenate(
-        [*(errand.start[None] for errand in errands), *(errand.preset[:, 1:] for errand in errands),
+        [*(task.start[None] for task in tasks), *(task.preset[:, 1:] for task in tasks),
          np.array(others).reshape(-1, 2)]
     )  # fmt: skip
     widest = float(max(space.apart, *space.radii, 0.0)) if len(space.radii) else space.apart
@@ -239,9 +245,9 @@ def _area(space: Space, errands: Sequence[Errand], others: Sequence[Array]) -> t
 
 
 def _preset_nodes(preset: Array, pitch: float) -> tuple[Array, Array]:
-    """Places along a timed motion, (K, 2), m, at most so far from each other, and times, (K,), s."""
+    """Places along a timed motion, (K, 2), m, about `pitch` apart, m, and the times there, (K,), s."""
     legs = np.hypot(*np.diff(preset[:, 1:], axis=0).T)
-    gap = max(pitch, float(legs.sum()) / MOST_WOVEN)
+    gap = max(pitch, float(legs.sum()) / MOST_PATH_NODES)
     pieces = np.maximum(1, np.ceil(legs / gap)).astype(int)
     times = _spread(preset[:, 0], pieces)
     places = np.column_stack([np.interp(times, preset[:, 0], axis) for axis in preset[:, 1:].T])
@@ -249,27 +255,27 @@ def _preset_nodes(preset: Array, pitch: float) -> tuple[Array, Array]:
 
 
 def _spread(times: Array, pieces: Indices) -> Array:
-    """Times with every gap cut into so many pieces of equal length."""
+    """Times (K,) with each gap between neighbours divided into equal pieces, `pieces` (K - 1,)."""
     parts = [np.linspace(times[k], times[k + 1], int(n), endpoint=False) for k, n in enumerate(pieces)]
     return np.concatenate([*parts, times[-1:]])
 
 
 def _path_nodes(space: Space, start: Array, target: Array, pitch: float) -> Array:
-    """Places along the shortest path to the target, (K, 2), m, the ends of its pieces among them; none without any."""
+    """Places along the shortest path to the target, (K, 2), m, with the ends of its pieces; K = 0: there is none."""
     try:
         path = shortest_path(start, target, space.centres, space.radii + ARCS * space.clearance)
     except NoPath:
         return np.zeros((0, 2))
     sagitta = (ARCS - CHORDS) * space.clearance
     flat = 0.9 * math.sqrt(8.0 * sagitta * float(space.radii.min(initial=1.0)))
-    gap = max(min(pitch, flat), path.length_m / MOST_WOVEN)
+    gap = max(min(pitch, flat), path.length_m / MOST_PATH_NODES)
     ends = np.concatenate([[0.0], np.cumsum(path.pieces[:, 5])])
     along = _spread(ends, np.maximum(1, np.ceil(np.diff(ends) / gap)).astype(np.int64))
     return np.array([path.at(s)[0] for s in along[1:]]).reshape(-1, 2)
 
 
 def _lattice_edges(number: npt.NDArray[np.intp]) -> Indices:
-    """Pairs of neighbouring nodes, (E, 2), of a lattice whose nodes have these numbers; -1: there is none."""
+    """Pairs of neighbouring nodes, (E, 2), of a lattice whose nodes have these numbers; -1: no node."""
     found = []
     for dx, dy in ((1, 0), (0, 1), (1, 1), (1, -1)):
         tail = number[: len(number) - dx, max(0, -dy) : number.shape[1] - max(0, dy)]
@@ -280,26 +286,31 @@ def _lattice_edges(number: npt.NDArray[np.intp]) -> Indices:
 
 
 def _other_edges(points: Array, radii: Array) -> Indices:
-    """Pairs of nodes, (E, 2), of which the second is one of the last ones and has the first within its radius, m."""
+    """Pairs of nodes, (E, 2), with the second outside the lattice and the first within the radius of the second.
+
+    Args:
+        points: all nodes, (N, 2), m, those outside the lattice last.
+        radii: of those outside the lattice, (R,), m.
+    """
     others = np.arange(len(points) - len(radii), len(points))
     near = cKDTree(points).query_ball_point(points[others], radii, return_sorted=True)
     tails = np.concatenate([np.zeros(0, dtype=np.int64), *(np.array(found, dtype=np.int64) for found in near)])
     heads = np.repeat(others, [len(found) for found in near])
-    pairs = np.column_stack([np.minimum(tails, heads), np.maximum(tails, heads)])[tails != heads]
-    return np.unique(pairs, axis=0)
+    keys = (np.minimum(tails, heads) * len(points) + np.maximum(tails, heads))[tails != heads]
+    return np.column_stack(np.divmod(np.unique(keys), len(points)))
 
 
-def _is_short_cut(points: Array, pairs: Indices, woven: Sequence[Woven]) -> npt.NDArray[np.bool_]:
-    """Which edges lead from a robot's start to its target: others may be nearer to both than to any other node."""
+def _is_short_cut(points: Array, pairs: Indices, robots: Sequence[RobotNodes]) -> npt.NDArray[np.bool_]:
+    """Which edges lead from a robot's start to its target: at both ends others may be too near."""
     found = np.zeros(len(pairs), dtype=bool)
-    for own in woven:
+    for own in robots:
         if np.hypot(*(points[own.start] - points[own.target])) > ROUNDING_M:
             found |= np.isin(pairs, [own.start, own.target]).all(axis=1)
     return found
 
 
 def _fan(space: Space, start: Array, far: float) -> Array:
-    """Places round a start, (K, 2), m, up to a distance, m, in rings."""
+    """Free places round a start, (K, 2), m, on rings up to the radius `far`, m."""
     angles = 2.0 * np.pi * np.arange(RAYS) / RAYS
     rays = np.column_stack([np.cos(angles), np.sin(angles)])
     places = np.concatenate([start + far * (ring + 1.0) / RINGS * rays for ring in range(RINGS)])
@@ -309,18 +320,17 @@ def _fan(space: Space, start: Array, far: float) -> Array:
 def _in_rows(points: Array, pairs: Indices) -> tuple[Indices, Indices, Array]:
     """Edges in both directions, sorted by tail and head: first edge of each node, heads, lengths."""
     tails, heads = np.concatenate([pairs, pairs[:, ::-1]]).T
-    order = np.lexsort((heads, tails))
-    tails, heads = tails[order], heads[order]
+    tails, heads = np.divmod(np.sort(tails * len(points) + heads), len(points))
     first = np.searchsorted(tails, np.arange(len(points) + 1)).astype(np.int64)
     lengths = np.maximum(np.linalg.norm(points[heads] - points[tails], axis=1), ROUNDING_M)
     return first, np.ascontiguousarray(heads), lengths
 
 
-def _buckets(points: Array, low: Array, size: float) -> tuple[Indices, Indices, Indices]:
-    """A grid of cells over the nodes: first member of each cell, members, shape."""
+def _grid(points: Array, low: Array, size: float) -> kernels.Grid:
+    """A grid over the nodes (N, 2), m, with its lowest corner, (2,), m, and the size of a cell, m."""
     at = np.maximum(np.floor((points - low) / size).astype(np.int64), 0)
     shape = at.max(axis=0) + 1
     cell = at[:, 0] * shape[1] + at[:, 1]
     members = np.argsort(cell, kind="stable").astype(np.int64)
-    cells = np.searchsorted(cell[members], np.arange(int(np.prod(shape)) + 1)).astype(np.int64)
-    return cells, members, shape
+    first = np.searchsorted(cell[members], np.arange(int(np.prod(shape)) + 1)).astype(np.int64)
+    return kernels.Grid(points, first, members, low, size, shape)

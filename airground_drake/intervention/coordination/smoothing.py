@@ -1,4 +1,4 @@
-"""Straighter ways: what a roadmap makes a robot go round for nothing is left out, and every distance is kept."""
+"""Straighten ways: remove detours that come from the roadmap alone, and keep every distance."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ ROUNDS = 2
 def smooth(
     spaces: Sequence[Space], ways: Sequence[Way | None], rests: Sequence[Body], fixed: Sequence[Body]
 ) -> list[Way | None]:
-    """The same ways with straight pieces where they are free; times at which presets are joined stay what they are.
+    """The same ways with straight pieces where these are free. The times at which presets are joined do not change.
 
     Args:
-        spaces: what each robot has to keep away from.
+        spaces: discs and distances that each robot has to keep.
         ways: one per robot; None: it stays where it is.
-        rests: the robots if they stay.
-        fixed: others.
+        rests: the robots at rest where they are.
+        fixed: other robots.
     """
     found = list(ways)
     for _ in range(ROUNDS):

@@ -35,7 +35,7 @@ def speed(motion: Array) -> float:
 
 
 def without_repeats(motion: Array) -> Array:
-    """The same timed motion without rows at the time of the row before, or on the straight line through neighbours."""
+    """The same timed motion without redundant rows: at the time of the row before, or between neighbours on a line."""
     motion = motion[np.append(True, np.diff(motion[:, 0]) > 1e-9)]
     if len(motion) < 3:
         return motion

@@ -5,26 +5,25 @@ from __future__ import annotations
 from collections.abc import Mapping
 from itertools import pairwise
 from typing import Any
-from unittest import mock
 
 import numpy as np
 from pydrake.solvers import ClarabelSolver, MathematicalProgram
 
 from airground_drake.arrays import Array
-from airground_drake.gatekeeper import mpc_gatekeeper
-from airground_drake.gatekeeper.answer import Reason
-from airground_drake.gatekeeper.mpc_gatekeeper import Situation
+from airground_drake.components import make_outlook, make_patience, make_presets, make_team
+from airground_drake.gatekeeper.mpc_gatekeeper import View
 from airground_drake.gatekeeper.outcome import Outcome
 from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
-from airground_drake.gatekeeper.solution import Solution
 from airground_drake.intervention.policy import Proposal
+from airground_drake.nsbc.law import UgvLaw
 from airground_drake.report.audit.item import Item
 from airground_drake.report.figures.canvas import thin
 from airground_drake.report.figures.timelines import nearest_distance
 from airground_drake.report.metrics import closest_obstacle
 from airground_drake.report.reproduction import MEASURES
 from airground_drake.scenarios.load import load
-from airground_drake.simulation import simulate
+from airground_drake.scenarios.schema import Scenario
+from airground_drake.simulation import Recorder, simulate
 from airground_drake.trace import Trace
 
 PAPERS_ROUTE = "gatekeeper.route=relaxed"
@@ -36,13 +35,18 @@ LIGHT = "c, error weight 1"
 
 
 class Believing(OutcomeGatekeepers):
-    """Takes every proposal for useful, followed without any lag."""
+    """Takes every proposal for useful."""
 
-    def foresee(self, seen: Situation, i: int, proposal: Proposal) -> tuple[Outcome, Outcome]:
+    def foresee(self, seen: View, i: int, proposal: Proposal) -> tuple[Outcome, Outcome]:
         """Refusing stalls, accepting does not."""
         steps = np.arange(0.0, 2.0, self._law.avoidance.period)
         follows = proposal.motion.sample(seen.t + steps)
         return Outcome(follows, True, 1.0, 1.0), Outcome(follows, False, 0.0, 0.0)
+
+    @classmethod
+    def of(cls, scenario: Scenario, law: UgvLaw) -> Believing:
+        """In place of the gatekeepers of a scenario."""
+        return cls(make_team(scenario), law, make_presets(scenario), make_outlook(scenario), make_patience(scenario))
 
 
 def companion_findings() -> list[Item]:
@@ -56,12 +60,6 @@ def companion_findings() -> list[Item]:
 
 def _run(name: str, run: str, changes: tuple[str, ...] = ()) -> Trace:
     return simulate(load(name, changes)[0], run)
-
-
-def _accepting(name: str, run: str) -> Trace:
-    """A run of method (d) whose gatekeeper takes every proposal for useful."""
-    with mock.patch.object(OutcomeGatekeepers, "foresee", Believing.foresee):
-        return _run(name, run)
 
 
 def _sign() -> Item:
@@ -97,7 +95,7 @@ def _soft_gate() -> Item:
     """Item 10: an intervention that (c) accepts with a predicted distance below d, and (d) renders harmless."""
     evidence: dict[str, Any] = {}
     traces = {name: _run("soft_gate", name, (PAPERS_ROUTE,)) for name in ("c", "d")} | {
-        EVERYTHING: _accepting("soft_gate", "d")
+        EVERYTHING: Recorder(load("soft_gate")[0], "d", make_gatekeepers=Believing.of).simulate()
     }
     light = _run("soft_gate", "c", (PAPERS_ROUTE, "gatekeeper.error_weight_1_m2_s=1"))
     for name, trace in (*traces.items(), (LIGHT, light)):
@@ -233,22 +231,13 @@ def _proper_tasks(direct: Trace) -> Item:
     }
 
 
-def first_stage(solution: Solution, *_: Any) -> tuple[bool, Reason]:
-    """The paper's rule to the letter, in place of `settle`: the first stage of the rounded plan, at every sample."""
-    if solution.rounded is None or not len(solution.rounded):
-        return False, "no_plan"
-    return (True, "cheaper") if solution.rounded[0] == 1.0 else (False, "not_cheaper")
-
-
 def _literal_rule() -> Item:
     """Item 25: executing the first stage of each rounded plan gives no lasting acceptance."""
     answers: dict[str, dict[str, list[Any]]] = {}
     for name, duration_s in (("case_a", 18), ("case_b", 16)):
         changes = f"duration_s={duration_s}.0", "reproduction=[]", PAPERS_ROUTE
-        with mock.patch.object(mpc_gatekeeper, "settle", first_stage):
-            literal = _run(name, "c", changes)
         answers[name] = {
-            rule: _answers(trace) for rule, trace in (("literal", literal), ("ours", _run(name, "c", changes)))
+            kind: _answers(_run(name, run, changes)) for kind, run in (("literal", "c_literal"), ("ours", "c"))
         }
     reversals = {
         rule: [
@@ -269,8 +258,12 @@ def _literal_rule() -> Item:
         "ours": {"acceptances_taken_back": reversals["ours"]},
         "unit": "",
         "demonstrated": min(reversals["literal"]) > 0 and max(reversals["ours"]) == 0,
-        "evidence": {"answers": answers, "runs": "c of case_a (18 s) and case_b (16 s)", "figures": "by reading"},
-    }
+        "evidence": {
+            "answers": answers,
+            "runs": "c_literal and c of case_a (18 s) and case_b (16 s)",
+            "figures": "by reading",
+        },
+    }  # fmt: skip
 
 
 def _answers(trace: Trace) -> list[tuple[float, str]]:

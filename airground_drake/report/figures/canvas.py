@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, NamedTuple
 
@@ -80,6 +80,7 @@ DARK = {
     "#303030": "#d0d0d0", "#666666": "#a8a8a8",
     "black": "#e8e8e8", "white": "#16181c", "lightgrey": "#4a4e57", "grey": "#a8a8a8", "green": "#8fe3a1",
     "blue": "#8ec5ff", "#444444": "#b0b4bb", "#dfe8f1": "#20303f",
+    "#e1ebf6": "#1c2c3e", "#e7f1e1": "#1f3323", "#fbefdc": "#3d3020", "#ececec": "#2c2f36",
 }  # fmt: skip
 """What each colour of a drawing, and of the block diagram, becomes on a dark page."""
 
@@ -96,11 +97,11 @@ def short(name: str, limit: int = 18) -> str:
 
 
 @contextmanager
-def style() -> Iterator[None]:
-    """The settings of all figures, whatever the user's own, for as long as the context lasts."""
+def style(settings: Mapping[Any, Any] | None = None) -> Iterator[None]:
+    """The settings of all figures, whatever the user's own, for as long as the context lasts; `settings` besides."""
     with matplotlib.rc_context():
         matplotlib.rcdefaults()
-        matplotlib.rcParams.update(_RC)
+        matplotlib.rcParams.update({**_RC, **(settings or {})})
         yield
 
 

@@ -1,61 +1,71 @@
-"""The figures of a report: the paper's Figures 3-6 (case B: 7-10) redrawn, and recursion (5) against augmented.
+"""The figures of a report: maps, distances, decision variables, events, gaps between triggers; a team in histograms.
 
-Each figure is a row of panels, one per run: separate drawings, so that a page can stack them on a phone. Each
-panel comes with a table of its data.
+Each figure is a row of panels: separate drawings, so that a page can stack them on a phone. Runs with identical paths
+share a panel. Each panel comes with a table of its data.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
 
-from airground_drake.arrays import Array
-from airground_drake.report.figures import canvas, comparison, maps, timelines
-from airground_drake.report.figures.panels import MAX_TABLE_ROWS, Figure, Table, per_run, series
-from airground_drake.report.metrics import closest_obstacle, events_of, gap_m, radius_m
+import numpy as np
+from matplotlib.figure import Figure as Drawing
+
+from airground_drake.registry import METHODS
+from airground_drake.report.figures import canvas, comparison, maps, svg, timelines
+from airground_drake.report.figures.panels import MAX_TABLE_ROWS, Figure, Panel, Table, series
+from airground_drake.report.metrics import Nearby, close_by, events_of, gap_m, radius_m
 from airground_drake.report.reproduction import MEASURES
 from airground_drake.report.scrubber import tracks
+from airground_drake.report.summary import SLACK_M, distance
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.trace import Trace
 
-MAX_RUNS, MAX_UGVS, MAX_TEAM, MAX_OBSTACLES = 6, 3, 12, 4
-"""What a figure shows at most; the rest is in the trace, and the caption says so. A map, or lines in one panel, of full
-width have room for a team."""
+MAX_RUNS, MAX_UGVS, MAX_TEAM = 6, 4, 6
+"""What a figure shows at most: runs, UGVs with distances of their own, UGVs by name. A larger team is in histograms."""
+ALIKE_M = 1e-9
+"""Paths are identical if they differ by no more than rounding."""
+FARTHEST = 5.0
+"""Distances are drawn up to so many required ones."""
+LISTED = 3
+"""Happenings that a caption lists of each run."""
 
 _PAPER = {"case_a": (3, 4, 5, 6), "case_b": (7, 8, 9, 10)}
 """Numbers of the paper's figures, by the beginning of a scenario's name."""
-FARTHEST = 10.0
-"""Distances are drawn up to so many safe distances: nobody looks for what is on the other side of a fleet's field."""
-_HAPPENINGS = ("trigger", "release", "proposal", "accept", "refuse", "collision")
+_NUMBERED = ("trajectories", "decision", "distances", "events")
 
 
 @dataclass(frozen=True)
 class _Selection:
-    """What the figures show."""
+    """What the figures show.
+
+    Attributes:
+        runs: all of them.
+        shown: one of each kind of paths, by what heads its panels.
+        team: UGVs with names and looks.
+        ugvs: those of them with distances of their own.
+    """
 
     runs: dict[str, Trace]
+    shown: dict[str, Trace]
     team: list[str]
     ugvs: list[str]
-    obstacles: list[str]
-    wide: bool
 
     @property
-    def width_in(self) -> float:
-        """Width of a panel over time."""
-        return canvas.FULL_IN if self.wide else canvas.WIDE_IN
-
-    @property
-    def scale(self) -> float:
-        """CSS pixels per point, 0 where the page decides."""
-        return canvas.SCALE if self.wide else 0.0
+    def first(self) -> Trace:
+        return next(iter(self.runs.values()))
 
 
-def draw(scenario: Scenario, traces: Mapping[str, Trace]) -> list[Figure]:
+def draw(scenario: Scenario, traces: Mapping[str, Trace], settings: Mapping[str, Any] | None = None) -> list[Figure]:
     """All figures of a report; none without traces.
 
     Args:
         scenario: names the runs.
         traces: by run.
+        settings: of matplotlib (rcParams), in place of a report's.
 
     Raises:
         TraceError: if a trace lacks a column or holds numbers that are not finite.
@@ -63,203 +73,288 @@ def draw(scenario: Scenario, traces: Mapping[str, Trace]) -> list[Figure]:
     if not traces:
         return []
     numbers = next((paper for name, paper in _PAPER.items() if scenario.name.startswith(name)), ())
-    with canvas.style():
-        chosen = _select(scenario, traces, wide=not scenario.reproduction)
-        drawn = [_trajectories(chosen), _decision(chosen)]
-        drawn += [_distances(chosen)] if chosen.obstacles else []
-        drawn += [_events(chosen)]
+    with canvas.style(settings):
+        chosen = _select(scenario, traces)
+        drawn = [_trajectories(chosen), _distances(chosen), _decision(chosen), _events(chosen), _gaps(chosen)]
+        drawn += [_team(chosen)] if len(chosen.first.ugvs) > MAX_TEAM else []
         compared = comparison.draw(scenario, traces)
-    order = {"trajectories": 0, "decision": 1, "distances": 2, "events": 3}
-    numbered = [
-        replace(
-            f, title=f"{f.title} (the paper's Figure {numbers[order[f.id]]})" if numbers else f.title, wide=chosen.wide
-        )
-        for f in drawn
+    counterpart = dict(zip(_NUMBERED, numbers, strict=False))
+    return [
+        replace(each, title=f"{each.title} (the paper's Figure {counterpart[each.id]})")
+        if each.id in counterpart
+        else each
+        for each in [*drawn, compared]
+        if each is not None
     ]
-    return numbered + ([compared] if compared else [])
 
 
-def _select(scenario: Scenario, traces: Mapping[str, Trace], *, wide: bool) -> _Selection:
+def _select(scenario: Scenario, traces: Mapping[str, Trace]) -> _Selection:
     plain = {name: trace for name, trace in traces.items() if scenario.runs[name].composition == "augmented"}
     runs = dict(list((plain or dict(traces)).items())[:MAX_RUNS])
+    groups: list[list[str]] = []
+    for name, trace in runs.items():
+        known = next((group for group in groups if _alike(runs[group[0]], trace)), None)
+        groups.append([name]) if known is None else known.append(name)
     first = next(iter(runs.values()))
-    busy = [name for name in first.ugvs if any(events_of(trace, name, *_HAPPENINGS) for trace in runs.values())]
-    ranked = [*busy, *(name for name in first.ugvs if name not in busy)]
-    team, ugvs = ranked[: MAX_TEAM if wide else MAX_UGVS], ranked[:MAX_UGVS]
-    gap = {
-        name: min(gap_m(trace, ugv, name).min() for trace in runs.values() for ugv in ugvs)
-        for name in first.scenario["obstacles"]
-    }
-    near = sorted(gap, key=gap.__getitem__)[:MAX_OBSTACLES]
-    return _Selection(
-        runs,
-        [name for name in first.ugvs if name in team],
-        [name for name in first.ugvs if name in ugvs],
-        [name for name in first.scenario["obstacles"] if name in near],
-        wide,
+
+    def rank(ugv: str) -> tuple[bool, bool, int]:
+        near = [close_by(trace, ugv)[:1] for trace in runs.values()]
+        kept = all(found.value >= found.required_m - SLACK_M for each in near for found in each)
+        called = any(events_of(trace, ugv, "trigger") for trace in runs.values())
+        return kept, not called, first.ugvs.index(ugv)
+
+    ranked = sorted(first.ugvs, key=rank)
+    few = MAX_TEAM if len(ranked) <= MAX_TEAM else MAX_UGVS
+    team, ugvs = ([name for name in first.ugvs if name in ranked[:most]] for most in (few, MAX_UGVS))
+    return _Selection(runs, {_heading(group, runs): runs[group[0]] for group in groups}, team, ugvs)
+
+
+def _alike(one: Trace, other: Trace) -> bool:
+    """Whether all robots take the same paths at the same times."""
+    return all(
+        len(a.t) > 0
+        and a.t[-1] == b.t[-1]
+        and bool((np.abs(np.interp(a.t, b.t, b.position(robot)[:, k]) - a.position(robot)[:, k]) <= ALIKE_M).all())
+        for a, b in ((one, other), (other, one))
+        for robot in one.robots
+        for k in range(3)
     )
+
+
+def _heading(group: list[str], runs: Mapping[str, Trace]) -> str:
+    if len(group) > 1:
+        return f"Runs {' = '.join(group)}: identical paths"
+    method = str(runs[group[0]].meta["method"])
+    return f"Run {group[0]}: method ({method}), {METHODS[method].says}"
+
+
+def _runs(heading: str) -> str:
+    """A heading without what it says about its runs."""
+    return heading.partition(":")[0]
 
 
 def _trajectories(chosen: _Selection) -> Figure:
-    first = next(iter(chosen.runs.values()))
+    first = chosen.first
     frame = maps.frame_of(list(chosen.runs.values()), first.robots)
-    width_in = frame.width_in(canvas.FULL_IN, canvas.TALLEST_IN) if chosen.wide else canvas.MAP_IN
-    stalls = list(filter(None, (_standing(name, trace, chosen.team) for name, trace in chosen.runs.items())))
-    reach = first.scenario["safe_distance"]["obstacle_m"]
-    circles = "their safe circles"
-    if _has_bodies(chosen):
-        circles = "dark discs as large as they are (robots: at their starts and ends), with safe circles round them"
+    roomy = len(first.ugvs) > 2
+    width_in = frame.width_in(canvas.WIDE_IN if roomy else canvas.MAP_IN, canvas.TALLEST_IN)
+    circles = "safe circle dashed"
+    if any(radius_m(first, name) > 0.0 for name in (*first.robots, *first.scenario["obstacles"])):
+        circles = "dark disc as large as it is, safe circle dashed"
+    hidden = len(first.ugvs) - len(chosen.team)
+    thin = f" Thin grey lines, which end in dots: {hidden} more UGVs." if hidden else ""
     caption = (
-        f"{_sentence('; '.join(stalls)) if stalls else 'No UGV shown stands still short of its target. '}"
-        "○ start, \N{MULTIPLICATION SIGN} target, ▲ trigger, □ stands still, ✖ collision. Hexagons are obstacles "
-        f"(hollow: not on the UAV's map) in {circles} of {reach:g} m. The thin dashed line is the UAV's path, "
-        f"projected onto the ground. Equal scales, in m.{_thin(chosen)}"
+        f"{_ends(chosen)}○ start, \N{MULTIPLICATION SIGN} target, ▲ trigger, □ stands still, ✖ collision. Hexagon: "
+        f"obstacle (hollow: not on the UAV's map), {circles}. Thin dashed line: the UAV.{thin}"
     )
     robots = [*chosen.team, first.robots[-1]]
-    panels = per_run(
-        "trajectories",
-        chosen.runs,
-        lambda trace: maps.plane(trace, chosen.team, frame, width_in),
-        lambda trace: f"Paths of {', '.join(robots)} in the ground plane; final positions: {_finals(trace, robots)}.",
-        lambda trace: series(
-            trace, "Positions, m", {f"{r} {a}": trace.position(r)[:, k] for r in robots for k, a in enumerate("xy")}
-        ),
-        chosen.scale,
-        lambda drawing, trace: tracks(drawing, trace, chosen.team),
+    panels = []
+    for position, (heading, trace) in enumerate(chosen.shown.items()):
+        drawing = maps.plane(trace, chosen.team, frame, width_in)
+        columns = {f"{r} {a}": trace.position(r)[:, k] for r in robots for k, a in enumerate("xy")}
+        finals = ", ".join(f"{r} ({x:.2f}, {y:.2f}) m" for r in robots for x, y, _ in [trace.position(r)[-1]])
+        says = f"Paths of {', '.join(robots)} in the ground plane; final positions: {finals}."
+        table, ways = series(trace, "Positions, m", columns), tracks(drawing, trace, chosen.team)
+        panels.append(_panel(drawing, f"trajectories-{position}", f"Map of {heading}", says, heading, table, ways))
+    return Figure("trajectories", "Maps", caption, tuple(panels), look="" if roomy else "narrow")
+
+
+def _distances(chosen: _Selection) -> Figure | None:
+    near = {(heading, ugv): close_by(trace, ugv) for heading, trace in chosen.shown.items() for ugv in chosen.ugvs}
+    required = [found.required_m for each in near.values() for found in each]
+    if not required:
+        return None
+    top = FARTHEST * max(required)
+    world = [*chosen.first.scenario["obstacles"], *chosen.first.robots]
+    met = {ugv: {at.other for (_, each), those in near.items() if each == ugv for at in those} for ugv in chosen.ugvs}
+    looks = {ugv: {other: k for k, other in enumerate(filter(met[ugv].__contains__, world))} for ugv in chosen.ugvs}
+    half = (len(chosen.ugvs) + 1) // 2  # a single run takes both columns of the page
+    columns = [chosen.ugvs] if len(chosen.shown) > 1 else [chosen.ugvs[:half], chosen.ugvs[half:]]
+    panels = list[Panel]()
+    for heading, trace, ugvs in [(*run, ugvs) for run in chosen.shown.items() for ugvs in columns if ugvs]:
+        of_ugvs = {ugv: near[heading, ugv] for ugv in ugvs}
+        gaps = {f"{ugv} to {at.other}": gap_m(trace, ugv, at.other) for ugv, each in of_ugvs.items() for at in each}
+        smallest = "; ".join(f"{ugv} {_told(each[0])}" for ugv, each in of_ugvs.items() if each)
+        drawing = timelines.distances(trace, of_ugvs, looks, top)
+        table, says = series(trace, "Distances, m", gaps), f"Smallest distances: {smallest}."
+        name = f"distances-{len(panels)}"
+        panels.append(_panel(drawing, name, f"Distances, {heading}", says, _runs(heading), table))
+    pairs = [(*each[0], ugv, heading) for (heading, ugv), each in near.items() if each]
+    value, t_s, other, needed, ugv, heading = min(pairs, key=lambda pair: pair[0] - pair[3])
+    least = "Too close" if value < needed - SLACK_M else "Closest"
+    least += f": {ugv} comes to {distance(value, needed)} of {other} at {t_s:.2f} s, {needed:g} m required"
+    caption = (
+        f"{least} ({_runs(heading).lower()}). No line may enter the hatched band. "
+        f"Circle: the smallest distance, exact; red: too small.{_left_out(chosen, chosen.ugvs)}"
     )
-    return Figure("trajectories", "Trajectories", caption, panels)
+    return Figure("distances", "Distances to the nearest obstacles and robot", caption, tuple(panels))
 
 
-def _has_bodies(chosen: _Selection) -> bool:
-    """Whether a robot or an obstacle is more than a point."""
-    first = next(iter(chosen.runs.values()))
-    return any(radius_m(first, name) > 0.0 for name in (*first.robots, *first.scenario["obstacles"]))
+def _told(at: Nearby) -> str:
+    return f"{distance(at.value, at.required_m)} to {at.other} at {at.t_s:.2f} s"
 
 
 def _decision(chosen: _Selection) -> Figure:
     columns = {
-        name: {ugv: trace.column(f"{ugv}.decision_variable_m") for ugv in chosen.team}
-        for name, trace in chosen.runs.items()
+        heading: {ugv: trace.column(f"{ugv}.decision_variable_m") for ugv in chosen.team}
+        for heading, trace in chosen.shown.items()
     }
-    first = next(iter(chosen.runs.values()))
     highest = max(float(x.max()) for each in columns.values() for x in each.values())
-    top = 1.08 * max(highest, float(first.meta["zeta_m"]) * 1.1)
+    top = 1.08 * max(highest, float(chosen.first.meta["zeta_m"]) * 1.1)
+    panels = []
+    for position, (heading, trace) in enumerate(chosen.shown.items()):
+        largest = ", ".join(f"{ugv} {x.max():.2f} m" for ugv, x in columns[heading].items())
+        drawing = timelines.decision(trace, chosen.team, top)
+        table = series(trace, "Decision variables, m", columns[heading])
+        says = f"Largest values: {largest}; threshold {float(trace.meta['zeta_m']):.3g} m."
+        name = f"decision-{position}"
+        panels.append(_panel(drawing, name, f"Decision variables, {heading}", says, _runs(heading), table))
     caption = (
-        "A UGV that stands still falls behind its moving reference, so its decision variable grows; ▲ marks where it "
-        "reaches the threshold (solid line) and an intervention is triggered. A helped UGV falls below it again, and "
-        "the intervention ends at the release level (dotted)." + _left_out(chosen, chosen.team)
+        f"{_first_triggers(chosen)} A UGV that stands still falls behind its reference and "
+        f"triggers (▲) at the threshold.{_left_out(chosen, chosen.team)}"
     )
-    panels = per_run(
-        "decision",
-        chosen.runs,
-        lambda trace: timelines.decision(trace, chosen.team, top, chosen.width_in),
-        lambda trace: (
-            "Decision variable over time; largest values: "
-            + ", ".join(f"{ugv} {x.max():.2f} m" for ugv, x in columns[trace.run].items())
-            + f"; threshold {float(trace.meta['zeta_m']):.3g} m."
-        ),
-        lambda trace: series(trace, "Decision variables, m", columns[trace.run]),
-        chosen.scale,
-    )
-    return Figure("decision", "Decision variables", caption, panels)
+    return Figure("decision", "Decision variables", caption, tuple(panels))
 
 
-def _distances(chosen: _Selection) -> Figure:
-    gaps: dict[str, dict[str, Array]] = {
-        run: {f"{ugv} to {name}": gap_m(trace, ugv, name) for ugv in chosen.ugvs for name in chosen.obstacles}
-        for run, trace in chosen.runs.items()
-    }
-    largest = max(float(gap.max()) for each in gaps.values() for gap in each.values())
-    first = next(iter(chosen.runs.values()))
-    far = FARTHEST * float(first.scenario["safe_distance"]["obstacle_m"])
-    top = 1.05 * min(largest, far)
+def _events(chosen: _Selection) -> Figure | None:
+    rows = [
+        (trace, ugv) for trace in chosen.runs.values() for ugv in trace.ugvs if events_of(trace, ugv, *timelines.MARKS)
+    ]
+    if not rows:
+        return None
+    drawn = rows[: timelines.MAX_ROWS]
+    listed = [(trace.run, e) for trace, ugv in rows for e in events_of(trace, ugv, *timelines.MARKS)]
+    cells = tuple(
+        (run, f"{e['t_s']:.3f}", e["robot"], e["kind"], ", ".join(f"{x:.3f}" for x in e["position_m"]))
+        for run, e in listed[:MAX_TABLE_ROWS]
+    )
+    some = "" if len(listed) <= MAX_TABLE_ROWS else f", the first {MAX_TABLE_ROWS} of {len(listed)}"
+    table = Table(f"Events{some}", ("run", "t, s", "robot", "event", "position x, y, z, m"), cells)
+    words = "; ".join(f"run {trace.run}, {ugv}: {timelines.told(trace, ugv)}" for trace, ugv in drawn)
+    panel = _panel(timelines.events(drawn), "events-0", "Events over time", f"{words}.", "", table, scale=canvas.SCALE)
+    more = f" {len(rows) - len(drawn)} more rows are in the trace." if len(rows) > len(drawn) else ""
     caption = (
-        "No line may enter the hatched band below the safe distance d. The circle marks the smallest distance, which "
-        "is exact in continuous time: robots move on straight lines between samples."
-        f"{' Distances are of surfaces.' if _has_bodies(chosen) else ''}{_left_out(chosen, chosen.ugvs)}"
-        f"{f' What is farther away than {far:g} m is not drawn.' if largest > far else ''}"
+        f"{_accepted(chosen)} ▲ trigger, ▼ release; grey bar: the UAV is called. "
+        f"◆ proposal, ● accepted, ✖ refused; hatched bar: the UGV follows the UAV.{more}"
     )
+    return Figure("events", "Triggers, proposals, decisions", caption, (panel,), look="wide")
 
-    def describe(trace: Trace) -> str:
-        minima = [(ugv, closest_obstacle(trace, ugv)) for ugv in chosen.ugvs]
-        return "Distance to each obstacle over time; smallest: " + ", ".join(
-            f"{ugv} {at.value:.3f} m to {at.other} at {at.t_s:.2f} s" for ugv, at in minima if at
-        )
 
-    panels = per_run(
-        "distances",
-        chosen.runs,
-        lambda trace: timelines.distances(trace, chosen.ugvs, chosen.obstacles, top, chosen.width_in),
-        describe,
-        lambda trace: series(trace, "Distances, m", gaps[trace.run]),
-        chosen.scale,
+def _gaps(chosen: _Selection) -> Figure | None:
+    """Times between consecutive triggers of a UGV, where one was triggered twice."""
+    gaps: dict[str, list[tuple[float, float]]] = {}
+    for name, trace in chosen.runs.items():
+        for ugv in trace.ugvs:
+            times = [float(event["t_s"]) for event in events_of(trace, ugv, "trigger")]
+            gaps.setdefault(name, []).extend((late, late - early) for early, late in pairwise(times))
+    gaps = {name: sorted(found) for name, found in gaps.items() if found}
+    if not gaps:
+        return None
+    bound = float(chosen.first.scenario["decision"]["min_inter_event_s"])
+    least = min(gap for found in gaps.values() for _, gap in found)
+    caption = (
+        f"Smallest gap {least:.3f} s; the minimum inter-event time is {bound:g} s (line). Each mark is a trigger, "
+        "at the time since the one before of the same UGV."
     )
-    return Figure("distances", "Distances to the obstacles", caption, panels)
+    rows = [(name, f"{t:.3f}", f"{gap:.4f}") for name, found in gaps.items() for t, gap in found]
+    table = Table("Gaps between triggers", ("run", "t, s", "gap, s"), tuple(rows[:MAX_TABLE_ROWS]))
+    drawing, title = timelines.gaps(gaps, bound, chosen.first), "Gaps between triggers"
+    return Figure("gaps", title, caption, (_panel(drawing, "gaps-0", title, caption, "", table),))
 
 
-def _events(chosen: _Selection) -> Figure:
-    def busy(trace: Trace) -> list[str]:
-        return [ugv for ugv in chosen.ugvs if events_of(trace, ugv, *_HAPPENINGS)]
-
-    def table(trace: Trace) -> Table:
-        listed = [event for event in trace.events if event["robot"] in chosen.ugvs]
-        cells = tuple(
-            (f"{e['t_s']:.3f}", e["robot"], e["kind"], ", ".join(f"{x:.3f}" for x in e["position_m"]))
-            for e in listed[:MAX_TABLE_ROWS]
+def _team(chosen: _Selection) -> Figure:
+    """Histograms over the UGVs of a large team."""
+    ugvs = chosen.first.ugvs
+    quantities: dict[str, dict[str, list[float]]] = {
+        "distance left to the required one, m": {}, "time of arrival, s": {}, "largest decision variable, m": {},
+    }  # fmt: skip
+    for name, trace in chosen.runs.items():
+        found = (
+            [min((at.value - at.required_m for at in close_by(trace, ugv)), default=np.nan) for ugv in ugvs],
+            [float(event["t_s"]) for ugv in ugvs for event in events_of(trace, ugv, "arrival")[-1:]],
+            [float(trace.column(f"{ugv}.decision_variable_m").max()) for ugv in ugvs],
         )
-        shown = "" if len(listed) <= MAX_TABLE_ROWS else f", the first {MAX_TABLE_ROWS} of {len(listed)}"
-        return Table(f"Run {trace.run}: events{shown}", ("t, s", "robot", "event", "position x, y, z, m"), cells)
+        for quantity, values in zip(quantities.values(), found, strict=True):
+            quantity[name] = [value for value in values if np.isfinite(value)]
+    panels = []
+    for position, (what, of_runs) in enumerate(quantities.items()):
+        if not any(of_runs.values()):
+            continue
+        rows = tuple(
+            (name, str(len(values)), *(f"{stat(values):.3f}" for stat in (np.min, np.median, np.max)))
+            for name, values in of_runs.items()
+            if values
+        )
+        table = Table(f"{what}, over the UGVs", ("run", "UGVs", "least", "median", "largest"), rows)
+        says = "; ".join(
+            f"run {name}: {least} to {largest}, median {middle}" for name, _, least, middle, largest in rows
+        )
+        drawing, heading = timelines.histogram(what, of_runs), f"UGVs by {what.partition(',')[0]}"
+        panels.append(_panel(drawing, f"team-{position}", f"UGVs by {what}", says, heading, table))
+    there = []
+    for name, of in quantities["time of arrival, s"].items():
+        called = sum(bool(events_of(chosen.runs[name], ugv, "trigger")) for ugv in ugvs)
+        there.append(f"Run {name}: {len(of)} of {len(ugvs)} UGVs arrive, {called} triggered.")
+    return Figure("team", "The whole team", f"{' '.join(there)} Each bar counts UGVs.", tuple(panels))
 
-    def describe(trace: Trace) -> str:
-        listed = [
-            f"{e['kind']} of {e['robot']} at {e['t_s']:.2f} s"
-            for u in busy(trace)
-            for e in events_of(trace, u, *_HAPPENINGS)
+
+def _panel(
+    drawing: Drawing,
+    name: str,
+    title: str,
+    says: str,
+    heading: str,
+    table: Table,
+    ways: Mapping[str, Any] | None = None,
+    scale: float = 0.0,
+) -> Panel:
+    """A panel of a drawing; `name` is unique in the page, `title` and `says` are for those who cannot see it."""
+    return Panel(heading, svg.inline(canvas.svg(drawing), name, title, says, scale=scale), table, ways, drawing)
+
+
+def _ends(chosen: _Selection) -> str:
+    """How each run ended: collisions, UGVs that stand still, arrivals."""
+    told: dict[str, list[str]] = {}
+    for heading, trace in chosen.shown.items():
+        hits = [event for ugv in trace.ugvs for event in events_of(trace, ugv, "collision")[:1]]
+        words = [f"{hit['robot']} collides at {hit['t_s']:.2f} s" for hit in hits]
+        words += [
+            f"{ugv} stands still at ({at[0]:.2f}, {at[1]:.2f}) m"
+            for ugv in trace.ugvs
+            if ugv not in [hit["robot"] for hit in hits] and (at := MEASURES["stall_position"](trace, ugv))
         ]
-        return "Events over time: " + ("; ".join(listed[:12]) or "none") + "."
-
-    caption = (
-        "▲ trigger and ▼ release, with the grey bar between them: the UAV is called upon (under method (a) it does not "
-        "come). ◆ proposal of the UAV. ● accepted and ✖ refused by the UGV's gatekeeper (method (b) has none). The "
-        "hatched bar: the UGV carries out an intervention." + _left_out(chosen, chosen.ugvs)
-    )
-    panels = per_run(
-        "events",
-        chosen.runs,
-        lambda trace: (
-            timelines.events(trace, busy(trace), chosen.width_in)
-            if busy(trace)
-            else timelines.nothing_happened(trace, chosen.width_in)
-        ),
-        describe,
-        table,
-        chosen.scale,
-    )
-    return Figure("events", "Triggers, proposals and decisions", caption, panels)
+        if len(words) > LISTED:
+            words = [*words[:LISTED], f"{len(words) - LISTED} more do not arrive"]
+        if not words and all(MEASURES["arrives"](trace, ugv)[0] for ugv in trace.ugvs):
+            words = ["all UGVs arrive"]
+        told.setdefault(", ".join(words) or "not all UGVs arrive", []).append(_runs(heading).partition(" ")[2])
+    return "".join(f"Run{'s' * (len(runs) > 1)} {', '.join(runs)}: {what}. " for what, runs in told.items())
 
 
-def _standing(run: str, trace: Trace, ugvs: Sequence[str]) -> str:
-    """Which UGVs stand still short of their targets, and where, if they are few."""
-    found = {ugv: at for ugv in ugvs if (at := MEASURES["stall_position"](trace, ugv))}
-    listed = ", ".join(f"{ugv} stands still at ({at[0]:.2f}, {at[1]:.2f}) m" for ugv, at in found.items())
-    many = f"{len(found)} UGVs stand still"
-    return f"in run {run} {listed if len(found) <= MAX_UGVS else many}" if found else ""
+def _first_triggers(chosen: _Selection) -> str:
+    """When the UGVs of each run reach the threshold, the first ones."""
+    told: dict[str, list[str]] = {}
+    for name, trace in chosen.runs.items():
+        early = sorted((event["t_s"], event["robot"]) for event in trace.events if event["kind"] == "trigger")[:LISTED]
+        times = {ugv: ", ".join(f"{t:.3f}" for t, other in early if other == ugv) for _, ugv in early}
+        what = ", ".join(f"{ugv} at {listed} s" for ugv, listed in times.items())
+        told.setdefault(f"triggers {what}" if what else "no trigger", []).append(name)
+    return " ".join(f"Run{'s' * (len(names) > 1)} {', '.join(names)}: {what}." for what, names in told.items())
 
 
-def _finals(trace: Trace, robots: Iterable[str]) -> str:
-    return ", ".join(f"{robot} ({x:.2f}, {y:.2f}) m" for robot in robots for x, y, _ in [trace.position(robot)[-1]])
+def _accepted(chosen: _Selection) -> str:
+    told = []
+    for name, trace in chosen.runs.items():
+        kinds = [event["kind"] for event in trace.events]
+        counts = [
+            f"{kinds.count(k)} {said}" for k, said in (("accept", "accepted"), ("refuse", "refused")) if k in kinds
+        ]
+        if counts:
+            told.append(f"run {name}: {', '.join(counts)}")
+    text = "; ".join(told) or "no gatekeeper decided"
+    return f"{text[0].upper()}{text[1:]}."
 
 
-def _sentence(text: str) -> str:
-    return f"{text[0].upper()}{text[1:]}. "
-
-
-def _thin(chosen: _Selection) -> str:
-    hidden = len(next(iter(chosen.runs.values())).ugvs) - len(chosen.team)
-    return f" The thin grey lines, which end in dots, are the paths of {hidden} more UGVs." if hidden else ""
-
-
-def _left_out(chosen: _Selection, drawn: Sequence[str]) -> str:
-    first = next(iter(chosen.runs.values()))
-    hidden = [name for name in first.ugvs if name not in drawn]
-    return f" {len(hidden)} more UGVs are not drawn; their data are in the trace." if hidden else ""
+def _left_out(chosen: _Selection, drawn: list[str]) -> str:
+    hidden = len(chosen.first.ugvs) - len(drawn)
+    return f" {hidden} more UGVs are not drawn; their data are in the trace." if hidden else ""

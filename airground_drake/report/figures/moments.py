@@ -86,7 +86,8 @@ def _map(trace: Trace, at: Mapping[str, Array], t_s: float) -> Drawing:
         )
         axes.plot(*places[:2].T, color=canvas.ALARM, linewidth=1.2, zorder=3)
     for name, (x, y) in zip(names, places, strict=False):
-        inwards = 1.0 if y <= middle[1] else -1.0
+        level = 0.02 * half if name == names[0] else -0.02 * half  # two bodies at one place: one above the other
+        inwards = 1.0 if y - middle[1] < level else -1.0
         axes.annotate(
             canvas.short(name, 14), (x, y), (0.0, -9.0 * inwards), textcoords="offset points", ha="center",
             va="top" if inwards > 0 else "bottom", fontsize=8, zorder=5,

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
 from airground_drake.arrays import Array
-from airground_drake.registry import METHODS
-from airground_drake.report.figures import canvas, svg
 from airground_drake.trace import Trace
 
 MAX_TABLE_ROWS = 31
@@ -36,6 +34,8 @@ class Panel:
     table: Table
     tracks: Mapping[str, Any] | None = None
     """Of a drawing of the ground plane: where the robots are in it, see `report.scrubber`."""
+    drawing: Drawing | None = field(default=None, compare=False, repr=False)
+    """What the SVG was made of, for files of other formats."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Figure:
         panels: its drawings.
         beside: what it is shown beside, a claim's identifier, `audit-<item>` or `attention-<item>`; '' for the
             section of figures.
-        wide: whether each panel takes the whole width.
+        look: "wide" if a panel takes the whole width, "narrow" if several stand beside each other.
     """
 
     id: str
@@ -57,28 +57,7 @@ class Figure:
     caption: str
     panels: tuple[Panel, ...]
     beside: str = ""
-    wide: bool = False
-
-
-def per_run(
-    kind: str,
-    runs: Mapping[str, Trace],
-    drawing: Callable[[Trace], Drawing],
-    describe: Callable[[Trace], str],
-    table: Callable[[Trace], Table],
-    scale: float = 0.0,
-    tracks: Callable[[Drawing, Trace], Mapping[str, Any]] | None = None,
-) -> tuple[Panel, ...]:
-    """One panel per run; `scale` as of `svg.inline`."""
-    panels = []
-    for position, (name, trace) in enumerate(runs.items()):
-        method = str(trace.meta["method"])
-        heading = f"Run {name}: method ({method}), {METHODS[method].says}"
-        title = f"{kind} of run {name}"
-        picture = drawing(trace)
-        text = svg.inline(canvas.svg(picture), f"{kind}-{position}", title, describe(trace), scale=scale)
-        panels.append(Panel(heading, text, table(trace), tracks(picture, trace) if tracks else None))
-    return tuple(panels)
+    look: str = ""
 
 
 def series(trace: Trace, caption: str, columns: Mapping[str, Array]) -> Table:

@@ -34,13 +34,11 @@ def draw(inputs: Mapping[str, Any], evidence: Mapping[str, Any]) -> Figure | Non
         {name: (each, bayes_risk(each, *constants)) for name, each in places.items()},
     )  # fmt: skip
     caption = (
-        f"For the assumed drift of {constants[0]:g} m/s and noise of {constants[1]:g} m/√s, c1 = {constants[2]:g} 1/s, "
-        f"c2 = {constants[3]:g}. The threshold in force is {evidence['kind']}: {places['in force']:.4g} m; optimal is "
-        f"{places['optimal']:.4g} m, (19) as printed gives {places['(19) as printed']:.4g} m. Extra risk of the "
-        f"threshold in force: {evidence['extra_risk']:.3g}.{_as_it_was(evidence.get('runs', {}))}"
+        f"The threshold in force, {places['in force']:.4g} m, is {evidence['kind']}. "
+        f"Assumed: drift {constants[0]:g} m/s, noise {constants[1]:g} m/√s.{_as_it_was(evidence.get('runs', {}))}"
     )
     with canvas.style():
-        return shown.plate("threshold-choice", "Risk for the scenario's own numbers", caption, beside="THR-CHOICE")
+        return shown.plate("threshold-choice", "", caption)
 
 
 def _as_it_was(runs: Mapping[str, Mapping[str, Any]]) -> str:
@@ -52,7 +50,7 @@ def _as_it_was(runs: Mapping[str, Mapping[str, Any]]) -> str:
         }
         best = [f"{zeta:.3g} m with {noise}" for noise, zeta in optima.items() if zeta is not None]
         return (
-            f" In run {name.replace(' ', ', ')}, the drift really was {row['drift_m_s']:.4g} m/s and the noise "
-            f"{row['noise_m_sqrt_s']:g} m/√s: optimal for this drift would be {' and '.join(best) or 'no threshold'}."
+            f" In run {name.replace(' ', ', ')}, the drift really was {row['drift_m_s']:.4g} m/s, the noise "
+            f"{row['noise_m_sqrt_s']:g} m/√s; optimal for this drift: {' and '.join(best) or 'no threshold'}."
         )
     return " No run triggered, so that none shows a drift."

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from matplotlib.figure import Figure
 from airground_drake.arrays import Array
 from airground_drake.report.figures.canvas import (
     ALARM,
+    FULL_IN,
     INK,
     MUTED,
     WIDE_IN,
@@ -24,95 +26,151 @@ from airground_drake.report.figures.canvas import (
     size_in,
     time_line,
 )
-from airground_drake.report.metrics import closest_obstacle, events_of, gap_m
+from airground_drake.report.metrics import Nearby, closest_obstacle, events_of, gap_m
+from airground_drake.report.summary import SLACK_M, distance
 from airground_drake.trace import Trace
 
-_MARKS = {"trigger": "^", "release": "v", "proposal": "D", "accept": "o", "refuse": "X"}
+MARKS = {"trigger": "^", "release": "v", "proposal": "D", "accept": "o", "refuse": "X"}
+"""Marks of events, by kind."""
+MAX_ROWS, MAX_TOLD, TOLD_CHARS = 16, 7, 58
+"""Rows of the event figure; events that a row lists with their times, in lines of so many characters."""
 _FORBIDDEN: dict[str, Any] = {
     "facecolor": "#eeeeee", "hatch": "///", "edgecolor": "#d4d4d4", "linewidth": 0.0, "zorder": 0,
 }  # fmt: skip
 """Look of the band below the safe distance."""
 
 
-def decision(trace: Trace, ugvs: Sequence[str], top: float, width_in: float) -> Figure:
+def decision(trace: Trace, ugvs: Sequence[str], top: float) -> Figure:
     """Decision variables of a run with the threshold and the release level."""
-    figure, (axes,) = _time_axes(1, 2.5, trace, width_in, above_in=0.08)
+    figure, (axes,) = _time_axes(1, 2.5, trace, above_in=0.08)
     zeta, release = float(trace.meta["zeta_m"]), float(trace.scenario["decision"]["release_m"])
     labels = [(zeta, f"threshold {zeta:.3g}", INK)]
     level(axes, zeta, "-")
     if trace.scenario["decision"]["trigger"] == "automaton":
         level(axes, release, (0, (1, 1.5)))
         labels.append((release, f"release {release:.3g}", INK))
+    axes.set_ylim(0.0, top)
     for position, ugv in enumerate(ugvs):
         x = trace.column(f"{ugv}.decision_variable_m")
         time_line(axes, trace.t, x, look(position))
-        labels.append((float(x[-1]), short(ugv, 12), look(position).color))
-        for event in events_of(trace, ugv, "trigger"):
-            at = float(np.interp(event["t_s"], trace.t, x))
-            axes.plot(event["t_s"], at, marker="^", markersize=8, color=look(position).color, markeredgecolor="white")
-    axes.set_ylim(0.0, top)
+        times = [event["t_s"] for event in events_of(trace, ugv, "trigger")]
+        color = look(position).color
+        axes.plot(times, np.interp(times, trace.t, x), "^", markersize=8, color=color, markeredgecolor="white")
+        labels.append((float(x[-1]), short(ugv, 12) + (f" ▲ {times[0]:.2f} s" if times else ""), color))
     rule(axes, "time, s", "decision variable, m")
     label_right(axes, labels)
     return figure
 
 
-def distances(trace: Trace, ugvs: Sequence[str], obstacles: Sequence[str], top: float, width_in: float) -> Figure:
-    """Distances of each UGV to the obstacles, of surfaces, the safe distance d, and the exact minimum."""
-    d = float(trace.scenario["safe_distance"]["obstacle_m"])
-    figure, every = _time_axes(len(ugvs), 0.5 + 1.75 * len(ugvs), trace, width_in)
-    for axes, ugv in zip(every, ugvs, strict=True):
-        level(axes, d, "-")
-        axes.axhspan(0.0, d, **_FORBIDDEN)
-        labels = [(d, f"d = {d:g}", INK)]
-        for position, name in enumerate(obstacles):
-            gap = gap_m(trace, ugv, name)
-            if gap.min() > top:
-                continue
-            time_line(axes, trace.t, gap, look(position))
-            labels.append((float(gap[-1]), short(name, 12), look(position).color))
-        axes.set_ylim(0.0, top)
+def distances(
+    trace: Trace, near: Mapping[str, Sequence[Nearby]], looks: Mapping[str, Mapping[str, int]], top: float
+) -> Figure:
+    """Distances of each UGV to what is near it, of surfaces, the required ones, and the exact minimum."""
+    figure, every = _time_axes(len(near), 0.5 + 1.75 * len(near), trace)
+    required = sorted({found.required_m for each in near.values() for found in each})
+    for axes, (ugv, those) in zip(every, near.items(), strict=True):
+        axes.axhspan(0.0, required[0], **_FORBIDDEN)
+        labels = [(d, f"required {d:.3g}", INK) for d in required]
+        for d in required:
+            level(axes, d, "-")
+        highest = required[-1]
+        for found in those:
+            gap, appearance = gap_m(trace, ugv, found.other), look(looks[ugv][found.other])
+            time_line(axes, trace.t, gap, appearance)
+            labels.append((min(float(gap[-1]), top), short(found.other, 12), appearance.color))
+            highest = max(highest, float(gap.max()))
+        axes.set_ylim(0.0, min(1.05 * highest, top))
         rule(axes, "time, s" if axes is every[-1] else "", "distance, m")
         label_right(axes, labels)
-        nearest = closest_obstacle(trace, ugv)
-        if nearest is None:
+        if not those:
             axes.set_title(short(ugv))
             continue
-        below = nearest.value < d - 1e-9
+        least = those[0]
+        below = least.value < least.required_m - SLACK_M
         axes.plot(
-            nearest.t_s, nearest.value, marker="o", markersize=9, markerfacecolor="none", markeredgewidth=1.6,
-            color=ALARM if below else INK, zorder=5,
+            least.t_s, least.value, marker="o", markersize=9, markerfacecolor="none", markeredgewidth=1.6,
+            color=ALARM if below else INK, zorder=5, clip_on=False,
         )  # fmt: skip
-        note = f"{short(ugv)}: minimum {nearest.value:.3f} m ({short(nearest.other, 14)}, {nearest.t_s:.1f} s)"
-        axes.set_title(f"{note} < d" if below else note, color=ALARM if below else INK)
+        value = distance(least.value, least.required_m)
+        note = f"{short(ugv)}: minimum {value} to {short(least.other, 14)}, {least.t_s:.2f} s"
+        note += f", required {least.required_m:g} m" if below else ""
+        axes.set_title(note, color=ALARM if below else INK)
     return figure
 
 
-def events(trace: Trace, ugvs: Sequence[str], width_in: float) -> Figure:
-    """Triggers, proposals and decisions over time, a row each per UGV."""
-    rows = [(ugv, row) for ugv in ugvs for row in ("trigger", "proposal", "decision")]
-    figure, (axes,) = _time_axes(1, 0.55 + 0.33 * len(rows), trace, width_in, left_in=1.4, right_in=0.15, above_in=0.05)
+def events(rows: Sequence[tuple[Trace, str]]) -> Figure:
+    """Triggers, proposals and decisions over time, a row for each UGV in each run, with the times written beside."""
+    longest = max((trace for trace, _ in rows), key=lambda trace: float(trace.t[-1]))
+    figure, (axes,) = _time_axes(1, 0.6 + 0.5 * len(rows), longest, FULL_IN, left_in=1.3, right_in=4.3, above_in=0.05)
     axes.set_ylim(len(rows) - 0.4, -0.6)
     rule(axes, "time, s", "")
-    for y, (ugv, row) in enumerate(rows):
-        name = f"{short(ugv, 9)} {row}"
-        axes.text(-0.1 / size_in(axes)[0], y, name, transform=axes.get_yaxis_transform(), ha="right", va="center")
-        if row == "trigger":
-            _bars(axes, trace, trace.column(f"{ugv}.mode") == 1, y, facecolor="#dddddd")
-        if row == "decision":
-            _bars(axes, trace, trace.column(f"{ugv}.accepted") == 1, y, facecolor="#cfe6dc", hatch="////")
-        kinds = {"trigger": ("trigger", "release"), "decision": ("accept", "refuse")}.get(row, (row,))
-        for kind in kinds:
+    for y, (trace, ugv) in enumerate(rows):
+        across = axes.get_yaxis_transform()
+        name = f"run {short(trace.run, 9)}, {short(ugv, 9)}"
+        axes.text(-0.1 / size_in(axes)[0], y, name, transform=across, ha="right", va="center")
+        axes.text(1.0 + 0.1 / size_in(axes)[0], y, told(trace, ugv), transform=across, va="center", fontsize=8.5)
+        _bars(axes, trace, trace.column(f"{ugv}.mode") == 1, y - 0.17, facecolor="#dddddd")
+        _bars(axes, trace, trace.column(f"{ugv}.accepted") == 1, y + 0.17, facecolor="#cfe6dc", hatch="////")
+        for kind, marker in MARKS.items():
             times = [event["t_s"] for event in events_of(trace, ugv, kind)]
             color = {"refuse": ALARM, "release": MUTED}.get(kind, "#0060a8")
-            axes.plot(times, [y] * len(times), linestyle="none", marker=_MARKS[kind], markersize=7, color=color)
+            level_y = y + (-0.17 if kind in ("trigger", "release") else 0.17)
+            axes.plot(times, [level_y] * len(times), linestyle="none", marker=marker, markersize=6, color=color)
     return figure
 
 
-def nothing_happened(trace: Trace, width_in: float) -> Figure:
-    """The event panel of a run without events."""
-    figure, (axes,) = _time_axes(1, 0.9, trace, width_in, left_in=1.4, right_in=0.15, above_in=0.05)
-    rule(axes, "time, s", "")
-    axes.text(0.5, 0.5, "no trigger, no proposal, no decision", transform=axes.transAxes, ha="center", va="center")
+def told(trace: Trace, ugv: str) -> str:
+    """The events of a UGV with their times, or, if they are many, how many there are of each kind."""
+    found = events_of(trace, ugv, *MARKS)
+    if len(found) <= MAX_TOLD:
+        return _wrapped(f"{event['kind']} {event['t_s']:.2f}" for event in found)
+    counts = {kind: [event["t_s"] for event in found if event["kind"] == kind] for kind in MARKS}
+    many = (
+        f"{len(t)} \N{MULTIPLICATION SIGN} {kind} from {t[0]:.2f}" if len(t) > 1 else f"{kind} {t[0]:.2f}"
+        for kind, t in counts.items()
+        if t
+    )
+    return _wrapped(many)
+
+
+def _wrapped(words: Iterable[str]) -> str:
+    return fill(f"{', '.join(words)}\N{NO-BREAK SPACE}s", TOLD_CHARS)
+
+
+def gaps(of_runs: Mapping[str, Sequence[tuple[float, float]]], bound_s: float, trace: Trace) -> Figure:
+    """Times since the trigger before, at the times of the triggers, and the least that is allowed."""
+    figure, (axes,) = _time_axes(1, 2.5, trace, above_in=0.08)
+    labels = [(bound_s, f"at least {bound_s:g}", INK)]
+    axes.set_ylim(0.0, 1.1 * max(bound_s, *(gap for found in of_runs.values() for _, gap in found)))
+    axes.axhspan(0.0, bound_s, **_FORBIDDEN)
+    level(axes, bound_s, "-")
+    for position, (name, found) in enumerate(of_runs.items()):
+        color, _, marker = look(position)
+        size = 5.0 + 3.0 * position  # hollow and of different sizes: runs may trigger at the same times
+        axes.plot(*zip(*found, strict=True), marker, markersize=size, color=color, markerfacecolor="none")
+        labels.append((found[-1][1], f"run {short(name, 8)}", color))
+    rule(axes, "time of the trigger, s", "time since the last, s")
+    label_right(axes, labels)
+    return figure
+
+
+def histogram(quantity: str, of_runs: Mapping[str, Sequence[float]]) -> Figure:
+    """How many UGVs there are of each size of a quantity, a line for each run."""
+    figure = Figure(figsize=(WIDE_IN, 2.0))
+    axes = figure.add_axes((0.13, 0.24, 0.6, 0.7))
+    every = np.concatenate([np.asarray(values) for values in of_runs.values()])
+    edges = np.histogram_bin_edges(every, bins=min(20, max(4, len(every) // 3)))
+    top, labels = 1.0, []
+    for position, (name, values) in enumerate(of_runs.items()):
+        counts, _ = np.histogram(values, edges)
+        color, dash, _ = look(position)
+        axes.stairs(counts, edges, color=color, linestyle=dash, fill=len(of_runs) == 1, linewidth=1.6)
+        labels.append((float(counts[-1]), f"run {short(name, 10)}", color))
+        top = max(top, float(counts.max()))
+    axes.set_xlim(float(edges[0]), float(edges[-1]))
+    axes.set_ylim(0.0, 1.1 * top)
+    rule(axes, quantity, "UGVs")
+    label_right(axes, labels)
     return figure
 
 
@@ -182,4 +240,4 @@ def _bars(axes: Axes, trace: Trace, active: npt.NDArray[np.bool_], y: float, **o
     edges = np.flatnonzero(np.diff(np.concatenate([[False], active, [False]]).astype(np.int8)))
     begins, ends = trace.t[np.maximum(edges[::2] - 1, 0)], trace.t[edges[1::2] - 1]
     spans = [(float(begin), float(end - begin)) for begin, end in zip(begins, ends, strict=True)]
-    axes.broken_barh(spans, (y - 0.3, 0.6), edgecolor=MUTED, linewidth=0.7, **options)
+    axes.broken_barh(spans, (y - 0.14, 0.28), edgecolor=MUTED, linewidth=0.7, **options)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Iterator
+from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from airground_drake.arrays import Array
 from airground_drake.errors import TraceError
@@ -15,6 +15,15 @@ from airground_drake.verify.claim import TIME_TOLERANCE_S, TraceClaim
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.interventions import GATED_METHODS, intervening, talk_is_due
 from airground_drake.verify.runs.standing import map_conflicts, standing_conflicts
+
+KINDS = ("proposal", "decision")
+
+
+class Message(NamedTuple):
+    """A proposal or a decision: when, s, and the UGV for whose trigger the proposal was sent."""
+
+    t_s: float
+    cause: str
 
 
 class Comm(TraceClaim):
@@ -25,16 +34,17 @@ class Comm(TraceClaim):
     statement = (
         "Messages and gatekeeper solves were spent only while the UGV concerned, or the one that it was asked to make "
         "way for, was being intervened on, and no more of them than an always-on scheme would have spent. "
-        "No proposal was decided on once it was taken back, or replaced while it was in force but by or in a joint "
-        "plan, or while another UGV was intervened on, too; what it said of obstacles was what the UAV knew: its own "
-        "map, and what UGVs sensed when they refused."
+        "All parts of a joint plan were sent together, and one refusal withdrew them all. No proposal was decided on "
+        "once it was taken back. None in force was replaced but by a part of a joint plan, or while another UGV was "
+        "intervened on, too. What it said of obstacles was what the UAV knew: its own map, and what UGVs sensed when "
+        "they answered."
     )
     formula = (
         "every proposal and decision in [trigger, release + intervention period + gatekeeper period]; "
         "proposals <= n ceil(duration / intervention period), decisions <= n ceil(duration / gatekeeper period); "
-        "no decision on a proposal that is withdrawn, none in force replaced but by or in a joint plan or while "
-        "another UGV is intervened on; "
-        "map of a proposal = known and phantom obstacles, then all sensed by UGVs at refusals that the UAV has noticed"
+        "all parts of a joint plan sent; no decision on a proposal that is withdrawn; none in force replaced but by a "
+        "part of a joint plan or while another UGV is intervened on; "
+        "map of a proposal = known and phantom obstacles, then all sensed by UGVs at answers that the UAV has read"
     )
     latex = (
         r"t_{\text{message}} \in [t_{\text{trigger}}, t_{\text{release}} + h_{\text{UAV}} + h_{\text{gate}}]",
@@ -46,7 +56,7 @@ class Comm(TraceClaim):
         "in which the mode column of the UGV, or of the one whose trigger is the proposal's cause, says "
         "'intervening'. After a release the UAV withdraws its proposal at its next "
         "planning instant and the gatekeeper notices at its next sample: hence the allowance of one period each. What "
-        "UGVs sensed at refusals follows from their positions; the UAV notices a refusal at the next planning instant, "
+        "UGVs sensed at answers follows from their positions; the UAV reads an answer at the next planning instant, "
         "if the proposal is in force until then. When a proposal is withdrawn follows as for EXEC."
     )
     equations = "(20), (26)"
@@ -68,58 +78,22 @@ class Comm(TraceClaim):
 
     def check(self, trace: Trace) -> Finding:
         """Count, look for strays, compare with always-on; the margin is the fraction saved of what saves least."""
-        scenario = trace.scenario
-        planning = scenario["intervention"]["period_s"]
-        gating = scenario["gatekeeper"]["period_s"]
-        gated = trace.meta["method"] in GATED_METHODS
-        named = {e["robot"] for e in trace.events if e["kind"] == "proposal"} | set(trace.decisions["robot"])
-        if strangers := named - set(trace.ugvs):
-            raise TraceError(f"proposals or decisions for {sorted(strangers)}, which are not UGVs of the trace")
-        rows = trace.proposals.to_dict("records")
-        by_time = {(row["robot"], row["issued_s"]): str(row["cause"]) for row in rows}
-        by_number = {row["number"]: str(row["cause"]) for row in rows}
-        strays: list[dict[str, Any]] = []
-        per_ugv: dict[str, dict[str, Any]] = {}
-        silent: dict[str, list[str]] = {"proposal": [], "decision": []}
-        for ugv in trace.ugvs:
-            intervals = intervening(trace, ugv)
-            sent = {
-                "proposal": np.array(
-                    [float(e["t_s"]) for e in trace.events if (e["kind"], e["robot"]) == ("proposal", ugv)]
-                ),
-                "decision": _decisions(trace, ugv, "t_s"),
-            }
-            numbers = _decisions(trace, ugv, "number").tolist()
-            if np.setdiff1d(_decisions(trace, ugv, "issued_s"), sent["proposal"]).size:
-                raise TraceError(f"{ugv}: a decision is about a proposal that is not among the events")
-            causes = {
-                "proposal": [by_time.get((ugv, t), ugv) for t in sent["proposal"].tolist()],
-                "decision": [by_number.get(number, ugv) for number in numbers],
-            }
-            for kind, times in sent.items():
-                late = _outside(times, intervals, planning + gating)
-                for other in {*causes[kind]} - {ugv}:
-                    asked = np.array([cause == other for cause in causes[kind]], bool)
-                    late &= ~asked | _outside(times, intervening(trace, other), planning + gating)
-                strays += [{"robot": ugv, "kind": kind, "t_s": float(time)} for time in times[late]]
-                if not times.size and (kind == "proposal" or gated) and talk_is_due(trace, ugv):
-                    silent[kind].append(ugv)
-            per_ugv[ugv] = {kind: len(times) for kind, times in sent.items()} | {"intervals_s": intervals.tolist()}
-        n, before = len(trace.ugvs), scenario["duration_s"] - TIME_TOLERANCE_S  # the first instant is at 0
-        most = {
-            "proposal": n * math.ceil(before / planning),
-            "decision": n * math.ceil(before / gating) if gated else 0,
-        }
-        spent = {kind: sum(int(entry[kind]) for entry in per_ugv.values()) for kind in most}
+        by_ugv = {ugv: _messages(trace, ugv) for ugv in trace.ugvs}
+        spent = {kind: sum(len(each[kind]) for each in by_ugv.values()) for kind in KINDS}
+        most = _always_on(trace)
+        silent = {kind: [u for u in trace.ugvs if not by_ugv[u][kind] and _is_due(trace, u, kind)] for kind in KINDS}
         for kind, ugvs in silent.items():
             if ugvs and not spent[kind]:
                 reason = f"{', '.join(ugvs)} were in mode 'intervening', but the trace has no {kind}"
                 return Finding("not_run", evidence={"reason": reason, "faults": trace.meta["faults"]})
-        saved = {kind: 1.0 - spent[kind] / most[kind] for kind in most if most[kind]}
-        misused = list[dict[str, Any]]()
-        if not strays and len(trace.proposals):
-            misused = [*map_conflicts(trace), *standing_conflicts(trace)]
-        over = None if all(spent[kind] <= most[kind] for kind in most) else {"spent": spent, "always_on": most}
+        strays = [stray for ugv, sent in by_ugv.items() for stray in _strays(trace, ugv, sent)]
+        misused = [*map_conflicts(trace), *standing_conflicts(trace)] if len(trace.proposals) and not strays else []
+        over = {"spent": spent, "always_on": most} if any(spent[kind] > most[kind] for kind in KINDS) else None
+        saved = {kind: 1.0 - spent[kind] / most[kind] for kind in KINDS if most[kind]}
+        per_ugv = {
+            ugv: {kind: len(sent[kind]) for kind in KINDS} | {"intervals_s": intervening(trace, ugv).tolist()}
+            for ugv, sent in by_ugv.items()
+        }
         return Finding(
             "refuted" if strays or over or misused else "holds",
             margin=None if strays or misused else min(saved.values(), default=None),
@@ -138,17 +112,63 @@ class Comm(TraceClaim):
         )
 
 
+def _messages(trace: Trace, ugv: str) -> dict[str, list[Message]]:
+    """What was sent to a UGV, and what it decided, by kind.
+
+    Raises:
+        TraceError: if a proposal or a decision is for no UGV, or a decision at no time or about no proposal.
+    """
+    named = {e["robot"] for e in trace.events if e["kind"] == "proposal"} | set(trace.decisions["robot"])
+    if strangers := named - set(trace.ugvs):
+        raise TraceError(f"proposals or decisions for {sorted(strangers)}, which are not UGVs of the trace")
+    rows = trace.proposals.to_dict("records")
+    by_time = {(row["robot"], row["issued_s"]): str(row["cause"]) for row in rows}
+    by_number = {row["number"]: str(row["cause"]) for row in rows}
+    times = [float(e["t_s"]) for e in trace.events if (e["kind"], e["robot"]) == ("proposal", ugv)]
+    if np.setdiff1d(_decisions(trace, ugv, "issued_s"), times).size:
+        raise TraceError(f"{ugv}: a decision is about a proposal that is not among the events")
+    decided = zip(_decisions(trace, ugv, "t_s").tolist(), _decisions(trace, ugv, "number").tolist(), strict=True)
+    return {
+        "proposal": [Message(t, by_time.get((ugv, t), ugv)) for t in times],
+        "decision": [Message(t, by_number.get(number, ugv)) for t, number in decided],
+    }
+
+
+def _strays(trace: Trace, ugv: str, sent: dict[str, list[Message]]) -> Iterator[dict[str, Any]]:
+    """Messages while neither the UGV nor the one that it was to make way for was being intervened on."""
+    for kind, messages in sent.items():
+        for message in messages:
+            if not any(_is_called(trace, name, message.t_s) for name in {ugv, message.cause}):
+                yield {"robot": ugv, "kind": kind, "t_s": message.t_s}
+
+
+def _is_called(trace: Trace, ugv: str, t: float) -> bool:
+    """Whether a UGV was intervened on at a time, s, or so shortly before that the messages may not have ended yet."""
+    allowance = trace.scenario["intervention"]["period_s"] + trace.scenario["gatekeeper"]["period_s"]
+    intervals = intervening(trace, ugv)
+    begins, ends = intervals[:, 0] - TIME_TOLERANCE_S, intervals[:, 1] + allowance + TIME_TOLERANCE_S
+    return bool(((t >= begins) & (t <= ends)).any())
+
+
+def _is_due(trace: Trace, ugv: str, kind: str) -> bool:
+    """Whether a UGV was intervened on for long enough for a message of a kind."""
+    return (kind == "proposal" or trace.meta["method"] in GATED_METHODS) and talk_is_due(trace, ugv)
+
+
+def _always_on(trace: Trace) -> dict[str, int]:
+    """What a scheme without a trigger would have spent."""
+    scenario, n = trace.scenario, len(trace.ugvs)
+    before = scenario["duration_s"] - TIME_TOLERANCE_S  # the first instant is at 0
+    gated = trace.meta["method"] in GATED_METHODS
+    return {
+        "proposal": n * math.ceil(before / scenario["intervention"]["period_s"]),
+        "decision": n * math.ceil(before / scenario["gatekeeper"]["period_s"]) if gated else 0,
+    }
+
+
 def _decisions(trace: Trace, ugv: str, column: str) -> Array:
     table = trace.decisions
     values = table.loc[table["robot"] == ugv, column].to_numpy(dtype=np.float64)
     if not np.isfinite(values).all():
         raise TraceError(f"decisions of {ugv}: column {column!r} has values that are not finite")
     return values
-
-
-def _outside(times: Array, intervals: Array, allowance: float) -> npt.NDArray[np.bool_]:
-    """Which of the times (M,) are in none of the intervals (K, 2) extended by the allowance: (M,) bool."""
-    begins = intervals[:, 0] - TIME_TOLERANCE_S
-    ends = intervals[:, 1] + allowance + TIME_TOLERANCE_S
-    inside = (times[:, None] >= begins) & (times[:, None] <= ends)
-    return np.asarray(~inside.any(axis=1))

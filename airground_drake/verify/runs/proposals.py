@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,8 +16,24 @@ from airground_drake.verify.runs.control_law import selected
 from airground_drake.verify.runs.control_samples import control_samples
 from airground_drake.verify.runs.interventions import GATED_METHODS
 
-Answer = tuple[float, int, bool]
-"""Time of a decision, s, number of the proposal that it is on, and whether it accepts."""
+
+class Answer(NamedTuple):
+    """A decision about a proposal.
+
+    Attributes:
+        t_s: when.
+        accepted: whether it accepts.
+        done: whether it ends the proposal because that has been executed to the end of its motion.
+    """
+
+    t_s: float
+    accepted: bool
+    done: bool
+
+    @property
+    def refused(self) -> bool:
+        """Whether it withdraws the proposal, and all other parts of its joint plan."""
+        return not (self.accepted or self.done)
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +51,7 @@ class Sent:
         mapped_m: obstacles that the UAV says it knows, (k, 3).
         mapped_radius_m: their radii, (k,).
         cause: UGV whose trigger it is for: this one, or another one that it is to make way for.
+        party: UGVs with a part in the same joint plan; empty: it stands alone.
     """
 
     number: int
@@ -47,6 +64,7 @@ class Sent:
     mapped_m: Array
     mapped_radius_m: Array
     cause: str
+    party: tuple[str, ...]
 
     def place(self, t: float | Array) -> Array:
         """Where the UGV is to be at times: (3,) or (K, 3), m; at rest before the first vertex and after the last."""
@@ -92,10 +110,14 @@ def _proposals_of(trace: Trace) -> list[Sent]:
             raise TraceError(f"{label}: no motion of a UGV of the trace")
         if row["cause"] not in trace.ugvs or not _is_cause(trace, row["robot"], row["cause"], row["issued_s"]):
             raise TraceError(f"{label}: its cause {row['cause']!r} is no UGV whose trigger it can have been sent for")
+        party = tuple(ugv for i, ugv in enumerate(trace.ugvs) if i in row["party"])
+        if len(party) != len(row["party"]) or (party and row["robot"] not in party):
+            raise TraceError(f"{label}: it is no part of a joint plan of the UGVs {list(row['party'])}")
         found.append(
             Sent(
                 int(row["number"]), str(row["robot"]), str(row["policy"]), float(row["issued_s"]), times,
                 places.reshape(-1, 3), selected(selection), mapped.reshape(-1, 3), radii, str(row["cause"]),
+                party,
             )
         )  # fmt: skip
     recorded = sorted((s.ugv, s.issued_s, s.policy) for s in found)
@@ -122,66 +144,108 @@ def _is_cause(trace: Trace, ugv: str, cause: str, issued_s: float) -> bool:
     return bool(called[cause].any()) and (cause == ugv or not called[ugv].all())
 
 
-def accepted_at(trace: Trace, ugv: str) -> list[Sent | None]:
-    """The proposal that a UGV has accepted, at each control sample of the run, or None.
+def parts_of(trace: Trace, sent: Sent) -> list[Sent]:
+    """The other parts of the joint plan that a proposal is part of."""
+    if not sent.party:
+        return []
+    same = (sent.issued_s, sent.party)
+    return [one for one in proposals_of(trace) if (one.issued_s, one.party) == same and one.number != sent.number]
 
-    A proposal is in force from when it is sent until, at a planning instant, neither the UGV nor the one that it is to
-    make way for is being intervened on, the motion has run out, the UGV's last answer was a refusal, or another one is
-    sent. Under method (b) it is accepted all the while; under (c) and (d) while the decision of the last sample of the
-    gatekeeper accepts it.
+
+def accepted_at(trace: Trace, ugv: str) -> list[Sent | None]:
+    """The proposal that a UGV executes, at each control sample of the run, or None.
+
+    It is in force from when it is sent until it is withdrawn (`withdrawn_s`). Under method (b) it is accepted all the
+    while; under (c) and (d) while the decision of the last sample of the gatekeeper accepts it. A part of a joint plan
+    is executed only while every other part in force is accepted or done.
     """
     return trace.derived(("accepted", ugv), lambda: _accepted_at(trace, ugv))
 
 
 def _accepted_at(trace: Trace, ugv: str) -> list[Sent | None]:
-    t = trace.t[control_samples(trace.t, trace.scenario["control"]["period_s"])]
     mine = [sent for sent in proposals_of(trace) if sent.ugv == ugv]
-    if not mine:
-        return [None] * len(t)
-    gated = trace.meta["method"] in GATED_METHODS
-    answers = answers_of(trace, ugv)
-    times = np.array([answer[0] for answer in answers])
-    gate_s = trace.scenario["gatekeeper"]["period_s"]
-    plan_s = trace.scenario["intervention"]["period_s"]
-    ends = [withdrawn_s(trace, ugv, sent, mine, answers) for sent in mine]
+    samples = trace.t[control_samples(trace.t, trace.scenario["control"]["period_s"])]
     found: list[Sent | None] = []
-    for now in t:
-        planned = plan_s * np.floor(now / plan_s + 1e-6)
-        here = [
-            sent
-            for sent, end in zip(mine, ends, strict=True)
-            if sent.issued_s <= planned + TIME_TOLERANCE_S and end > planned + TIME_TOLERANCE_S
-        ]
-        if here and gated:
-            asked = gate_s * np.floor(now / gate_s + 1e-6)
-            k = int(np.searchsorted(times, asked - TIME_TOLERANCE_S))
-            given = answers[k] if k < len(answers) and abs(times[k] - asked) <= TIME_TOLERANCE_S else None
-            here = [sent for sent in here if given is not None and given[2] and given[1] == sent.number]
+    for now in samples.tolist():
+        here = [sent for sent in mine if _in_force(trace, sent, now) and _is_executed(trace, sent, now)]
         found.append(here[-1] if here else None)
     return found
 
 
-def answers_of(trace: Trace, ugv: str) -> list[Answer]:
-    """Every decision of a UGV, by time."""
-    table = trace.decisions[trace.decisions["robot"] == ugv]
-    columns = (table[name].tolist() for name in ("t_s", "number", "decision"))
-    return sorted((float(t_s), int(number), answer == "accept") for t_s, number, answer in zip(*columns, strict=True))
-
-
-def withdrawn_s(trace: Trace, ugv: str, sent: Sent, mine: Sequence[Sent], answers: Sequence[Answer]) -> float:
-    """The planning instant at which a proposal is taken back, s; infinite if it never is."""
+def _in_force(trace: Trace, sent: Sent, now: float) -> bool:
+    """Whether a proposal was in force after the last planning instant up to `now`, s."""
     period = trace.scenario["intervention"]["period_s"]
-    called = (trace.column(f"{ugv}.mode") == 1.0) | (trace.column(f"{sent.cause}.mode") == 1.0)
-    t = trace.t
-    later = [other.issued_s for other in mine if other.issued_s > sent.issued_s]
-    refused = [(when, yes) for when, number, yes in answers if number == sent.number]
-    first = round(sent.issued_s / period) + 1
-    for k in range(first, int(t[-1] / period + 1e-6) + 1):
+    planned = period * np.floor(now / period + 1e-6) + TIME_TOLERANCE_S
+    return bool(sent.issued_s <= planned < withdrawn_s(trace, sent))
+
+
+def _is_executed(trace: Trace, sent: Sent, now: float) -> bool:
+    """Whether a proposal in force is accepted at `now`, s, and all other parts in force are accepted or done."""
+    if trace.meta["method"] not in GATED_METHODS:
+        return True
+    own = _answer_at(trace, sent, now)
+    if own is None or not own.accepted:
+        return False
+    others = [_answer_at(trace, part, now) for part in parts_of(trace, sent) if _in_force(trace, part, now)]
+    return not any(answer is None or answer.refused for answer in others)
+
+
+def _answer_at(trace: Trace, sent: Sent, now: float) -> Answer | None:
+    """What the last sample of the gatekeeper up to `now`, s, decided about a proposal, if anything."""
+    period = trace.scenario["gatekeeper"]["period_s"]
+    asked = period * np.floor(now / period + 1e-6)
+    answers = answers_to(trace, sent)
+    k = int(np.searchsorted([answer.t_s for answer in answers], asked - TIME_TOLERANCE_S))
+    return answers[k] if k < len(answers) and abs(answers[k].t_s - asked) <= TIME_TOLERANCE_S else None
+
+
+def answers_to(trace: Trace, sent: Sent) -> list[Answer]:
+    """Every decision about a proposal, by time."""
+    return trace.derived("answers_to", lambda: _answers(trace)).get(sent.number, [])
+
+
+def _answers(trace: Trace) -> dict[int, list[Answer]]:
+    ends = {sent.number: float(sent.times_s[-1]) for sent in proposals_of(trace)}
+    table = trace.decisions.sort_values("t_s", kind="stable")
+    found: dict[int, list[Answer]] = {}
+    for t, number, said, reason in zip(
+        *(table[c].tolist() for c in ("t_s", "number", "decision", "reason")), strict=True
+    ):
+        before = found.setdefault(int(number), [])
+        ran_out = t >= ends.get(int(number), np.inf) - TIME_TOLERANCE_S
+        done = said != "accept" and ran_out and (reason == "over" or bool(before and before[-1].done))
+        before.append(Answer(float(t), said == "accept", done))
+    return found
+
+
+def withdrawn_s(trace: Trace, sent: Sent, *, unless_replaced: bool = False) -> float:
+    """The planning instant at which a proposal is taken back, s; infinite if it never is.
+
+    That is the first at which neither the UGV nor the one that it is to make way for is being intervened on, the
+    motion has run out, another proposal is sent to the UGV (not counted with `unless_replaced`), or the UAV has a
+    refusal of it or of another part of its joint plan.
+    """
+
+    def first() -> float:
+        alone = _over(trace, sent, unless_replaced)[0]
+        return min([alone, *(t for t, refused in (_over(trace, part) for part in parts_of(trace, sent)) if refused)])
+
+    return trace.derived(("withdrawn", sent.number, unless_replaced), first)
+
+
+def _over(trace: Trace, sent: Sent, unless_replaced: bool = False) -> tuple[float, bool]:
+    """When a proposal is taken back whatever becomes of other parts, s, and whether the UAV has its refusal then."""
+    t, period = trace.t, trace.scenario["intervention"]["period_s"]
+    called = (trace.column(f"{sent.ugv}.mode") == 1.0) | (trace.column(f"{sent.cause}.mode") == 1.0)
+    later = [one.issued_s for one in proposals_of(trace) if one.ugv == sent.ugv and one.issued_s > sent.issued_s]
+    replaced = np.inf if unless_replaced else min(later, default=np.inf)
+    for k in range(round(sent.issued_s / period) + 1, int(t[-1] / period + 1e-6) + 1):
         now = k * period
         row = min(int(np.searchsorted(t, now - TIME_TOLERANCE_S)), len(t) - 1)
-        before = [yes for when, yes in refused if when < now - TIME_TOLERANCE_S]
+        before = [answer for answer in answers_to(trace, sent) if answer.t_s < now - TIME_TOLERANCE_S]
+        refused = bool(before) and before[-1].refused
         # whether a motion that ends at this very instant has run out is a matter of the clock's own rounding
-        out = not called[row] or t[row] >= sent.times_s[-1] or (before and not before[-1])
-        if out or (later and later[0] <= now + TIME_TOLERANCE_S):
-            return now
-    return np.inf
+        ended = t[row] >= sent.times_s[-1] or (bool(before) and before[-1].done)
+        if not called[row] or ended or refused or replaced <= now + TIME_TOLERANCE_S:
+            return now, refused
+    return np.inf, False

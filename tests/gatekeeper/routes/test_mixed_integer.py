@@ -17,7 +17,8 @@ from pydrake.solvers import MathematicalProgram
 from airground_drake.gatekeeper import daqp_solver
 from airground_drake.gatekeeper.binary_program import BinaryProgram, Size
 from airground_drake.gatekeeper.blocks import block_of_stage
-from airground_drake.gatekeeper.budget import UNLIMITED
+from airground_drake.gatekeeper.budget import UNLIMITED, Budget
+from airground_drake.gatekeeper.daqp_solver import minimise
 from airground_drake.gatekeeper.half_planes import normals_along
 from airground_drake.gatekeeper.problem import Problem
 from airground_drake.gatekeeper.routes.mixed_integer import MixedIntegerRoute
@@ -145,6 +146,18 @@ def test_without_a_proof_the_incumbent_decides(
     assert solution.gap >= 0.0
     again = MixedIntegerRoute().solve(problem)
     assert (again.objective, again.route_bound) == (solution.objective, solution.route_bound)
+
+
+def test_a_search_of_too_many_iterations_is_not_used() -> None:
+    """So it does not matter which machine came to its end."""
+    problem = rolled_out(1)
+    binary = BinaryProgram(Size(problem.stages, problem.stages))
+    binary.update(problem, normals_along(problem, ConstantPlans.of(problem).better.positions))
+    count = minimise(binary).iterations
+    assert count > 1
+    solutions = [MixedIntegerRoute().solve(problem, Budget(search_iterations=most)) for most in (1, count)]
+    assert [solution.status for solution in solutions] == ["budget_spent", "optimal"]
+    assert solutions[0].objective >= solutions[1].objective
 
 
 def test_an_optimum_that_a_known_plan_beats_is_a_failure(monkeypatch: pytest.MonkeyPatch) -> None:

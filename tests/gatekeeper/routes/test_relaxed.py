@@ -17,8 +17,7 @@ from pydrake.solvers import SolutionResult
 
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.half_planes import normals_along
-from airground_drake.gatekeeper.prediction import predicted_problem
-from airground_drake.gatekeeper.problem import Problem
+from airground_drake.gatekeeper.problem import Problem, predicted_problem
 from airground_drake.gatekeeper.routes.relaxed import RelaxedRoute
 from airground_drake.gatekeeper.solution import Solution
 

@@ -8,13 +8,13 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from builders.teams import APART, Array, errand, motions, random_team, space
+from builders.teams import APART, Array, motions, random_team, space, task
 from hypothesis import given
 from hypothesis import strategies as st
 from properties import examples
 
 from airground_drake.intervention.coordination.joint import Effort, Plan, plan
-from airground_drake.intervention.coordination.roadmap import Errand, Space
+from airground_drake.intervention.coordination.roadmap import RobotTask, Space
 from airground_drake.intervention.coordination.single import Body
 
 CORRIDOR = [(x, y) for x in np.arange(-6.0, 6.1, 1.5) for y in (-2.3, 2.3)]
@@ -35,10 +35,10 @@ def distances(one: Array, other: Array) -> Array:
     return np.sqrt(np.append(inner, np.square(offset[-1]).sum()))
 
 
-def assert_keeps_distances(room: Space, errands: list[Errand], found: Plan, speed: float, fixed: list[Body]) -> None:
+def assert_keeps_distances(room: Space, tasks: list[RobotTask], found: Plan, speed: float, fixed: list[Body]) -> None:
     """From obstacles and from each other, radii included; less only where they begin or, of robots, end nearer."""
-    ways = motions(found, errands)
-    for way, one in zip(ways, errands, strict=True):
+    ways = motions(found, tasks)
+    for way, one in zip(ways, tasks, strict=True):
         assert way[0].tolist() == [0.0, *one.start]
         assert (np.diff(way[:, 0]) > 0.0).all()
         legs = np.diff(way, axis=0)
@@ -46,7 +46,7 @@ def assert_keeps_distances(room: Space, errands: list[Errand], found: Plan, spee
         for centre, radius in zip(room.centres, room.radii, strict=True):
             least = min(radius + one.body, float(np.hypot(*(one.start - centre))))
             assert distances(way, np.array([[0.0, *centre]])).min() >= least - 2e-9
-    bodies = [Body(way, one.body) for way, one in zip(ways, errands, strict=True)]
+    bodies = [Body(way, one.body) for way, one in zip(ways, tasks, strict=True)]
     moved = [body for body, way in zip(bodies, found.ways, strict=True) if way is not None]  # others may be run into
     for one, other in [*combinations(bodies, 2), *((body, each) for body in moved for each in fixed)]:
         ends = [float(np.hypot(*(one.motion[k, 1:] - other.motion[k, 1:]))) for k in (0, -1)]
@@ -62,13 +62,13 @@ def assert_keeps_distances(room: Space, errands: list[Errand], found: Plan, spee
 def test_every_distance_is_kept_at_all_times(
     seed: int, count: int, obstacles: int, extent: float, bodies: tuple[float, ...]
 ) -> None:
-    room, errands = random_team(seed, min(count, 1 + int(extent / 4.0)), min(obstacles, int(extent / 3.0)), extent)
-    errands = [replace(one, body=bodies[k % len(bodies)]) for k, one in enumerate(errands)]
+    room, tasks = random_team(seed, min(count, 1 + int(extent / 4.0)), min(obstacles, int(extent / 3.0)), extent)
+    tasks = [replace(one, body=bodies[k % len(bodies)]) for k, one in enumerate(tasks)]
     room = replace(room, radii=room.radii + np.arange(len(room.radii)) % 2 * bodies[-1])
     fixed = [Body(np.array([[0.0, -30.0, extent / 2.0], [30.0, 2.0 * extent, extent / 2.0]]), bodies[-1])]
-    found = plan(room, errands, [1.0] * len(errands), fixed, effort=Effort(orders=6))
-    assert_keeps_distances(room, errands, found, 1.0, fixed)
-    for way, one in zip(found.ways, errands, strict=True):
+    found = plan(room, tasks, [1.0] * len(tasks), fixed, effort=Effort(orders=6))
+    assert_keeps_distances(room, tasks, found, 1.0, fixed)
+    for way, one in zip(found.ways, tasks, strict=True):
         assert way is None or way.motion[-1, 1:].tolist() == one.preset[-1, 1:].tolist()
 
 
@@ -87,38 +87,38 @@ def test_every_distance_is_kept_at_all_times(
 def test_deadlocks_are_resolved(
     obstacles: list[tuple[float, float]], ways: list[tuple[tuple[float, float], tuple[float, float]]]
 ) -> None:
-    room, errands = space(obstacles), [errand(*way) for way in ways]
-    found = plan(room, errands, [1.0] * len(errands))
+    room, tasks = space(obstacles), [task(*way) for way in ways]
+    found = plan(room, tasks, [1.0] * len(tasks))
     assert found.complete
-    assert_keeps_distances(room, errands, found, 1.0, [])
+    assert_keeps_distances(room, tasks, found, 1.0, [])
 
 
 def test_a_parked_robot_steps_aside_and_comes_back() -> None:
     walls = [(x, y) for x in np.arange(-14.0, 14.1, 1.4) for y in (-2.2, 2.2) if not (y > 0.0 and 3.0 < x < 8.0)]
     room = space([*walls, *((x, 7.0) for x in (2.0, 4.0, 6.0, 8.0)), (1.0, 5.0), (9.5, 5.0)])
-    errands = [errand((-6.0, 0.0), (12.0, 0.0)), errand((2.0, 0.0), (2.0, 0.0))]
-    found = plan(room, errands, [1.0, 1.0])
+    tasks = [task((-6.0, 0.0), (12.0, 0.0)), task((2.0, 0.0), (2.0, 0.0))]
+    found = plan(room, tasks, [1.0, 1.0])
     assert found.complete
-    assert_keeps_distances(room, errands, found, 1.0, [])
-    aside = motions(found, errands)[1]
+    assert_keeps_distances(room, tasks, found, 1.0, [])
+    aside = motions(found, tasks)[1]
     assert np.abs(aside[:, 1:] - [2.0, 0.0]).max() > APART
     assert aside[-1, 1:].tolist() == [2.0, 0.0]
 
 
 def test_who_finds_no_way_stays_and_is_gone_round() -> None:
     cage = [(-8.0 + 2.5 * math.cos(a), 2.5 * math.sin(a)) for a in np.linspace(0.0, 2.0 * math.pi, 9)[:-1]]
-    errands = [errand((-8.0, 0.0), (8.0, 0.0)), errand((4.0, 0.0), (-2.0, 0.0))]
+    tasks = [task((-8.0, 0.0), (8.0, 0.0)), task((4.0, 0.0), (-2.0, 0.0))]
     room = space(cage)
-    found = plan(room, errands, [1.0, 1.0])
+    found = plan(room, tasks, [1.0, 1.0])
     assert found.ways[0] is None
     assert found.ways[1] is not None
-    assert_keeps_distances(room, errands, found, 1.0, [])
+    assert_keeps_distances(room, tasks, found, 1.0, [])
 
 
 def test_the_preset_is_joined_where_it_is_free_again() -> None:
     """A preset through a disc, at half of the robot's speed."""
     preset = np.array([[0.0, 0.0, 0.0], [20.0, 10.0, 0.0]])
-    stuck = Errand(np.array([-1.0, 0.0]), preset)
+    stuck = RobotTask(np.array([-1.0, 0.0]), preset)
     (way,) = plan(space([(3.0, 0.3)]), [stuck], [1.0], follow=5.0).ways
     assert way is not None
     assert 10.0 < way.joined < 12.0  # 5 m along the preset the disc is over
@@ -127,28 +127,28 @@ def test_the_preset_is_joined_where_it_is_free_again() -> None:
 
 
 def test_the_same_plan_each_time() -> None:
-    room, errands = random_team(3, 5, 4, 14.0)
-    one, two = (plan(room, errands, [1.0] * 5) for _ in range(2))
+    room, tasks = random_team(3, 5, 4, 14.0)
+    one, two = (plan(room, tasks, [1.0] * 5) for _ in range(2))
     assert [way.motion.tolist() for way in one.ways if way] == [way.motion.tolist() for way in two.ways if way]
     assert (one.orders, one.expansions) == (two.orders, two.expansions)
 
 
 def test_an_effort_bounds_what_is_spent() -> None:
-    room, errands = random_team(3, 5, 4, 14.0)
-    found = plan(room, errands, [1.0] * 5, effort=Effort(orders=1, expansions=50))
+    room, tasks = random_team(3, 5, 4, 14.0)
+    found = plan(room, tasks, [1.0] * 5, effort=Effort(orders=1, expansions=50))
     assert found.orders <= 1
     assert found.expansions <= 50
-    assert_keeps_distances(room, errands, found, 1.0, [])
+    assert_keeps_distances(room, tasks, found, 1.0, [])
 
 
 def test_a_small_robot_goes_where_a_large_one_cannot() -> None:
     """A wall with a gap of 4.6 m between centres, and nothing else to get through by."""
     wall = [(0.0, y) for y in (2.3, 4.0, 5.7, -2.3, -4.0, -5.7)]
-    errands = [errand((-4.0, 0.0), (4.0, 0.0)), replace(errand((-4.0, 4.0), (4.0, 4.0)), body=0.5)]
-    found = plan(space(wall), errands, [1.0, 1.0])
+    tasks = [task((-4.0, 0.0), (4.0, 0.0)), replace(task((-4.0, 4.0), (4.0, 4.0)), body=0.5)]
+    found = plan(space(wall), tasks, [1.0, 1.0])
     assert found.complete
-    assert_keeps_distances(space(wall), errands, found, 1.0, [])
-    small, large = motions(found, errands)
+    assert_keeps_distances(space(wall), tasks, found, 1.0, [])
+    small, large = motions(found, tasks)
     assert np.abs(small[:, 2]).max() < 1.0
     assert np.abs(large[:, 2]).max() > 8.0
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from airground_drake.intervention.coordination.kernels import free_pieces
 from airground_drake.intervention.coordination.roadmap import Space
-from airground_drake.intervention.coordination.single import Body, _apart
+from airground_drake.intervention.coordination.single import Body, _wished
 
 
 @pytest.mark.parametrize(("radius", "beside", "free"), [(0.0, 0.5, True), (1.0, 0.5, False), (1.0, 1.1, True)])
@@ -15,4 +16,4 @@ def test_a_body_in_the_way_of_a_preset(radius: float, beside: float, free: bool)
     room = Space(np.empty((0, 2)), np.empty(0), clearance=0.05, apart=2.0, spacing=0.1)
     preset = np.array([[0.0, -9.0, 0.0], [4.0, -5.0, 0.0], [14.0, 5.0, 0.0], [18.0, 9.0, 0.0]])
     other = Body(np.array([[0.0, 0.0, room.apart + room.spacing + beside]]), radius)
-    assert _apart(room, preset, other).tolist() == [True, free, True]
+    assert free_pieces(preset, other.motion, _wished(room, other)).tolist() == [True, free, True]

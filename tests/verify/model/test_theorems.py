@@ -73,10 +73,9 @@ BROKEN: list[tuple[str, dict[str, Any]]] = [
     ("SAFE-GATE", {"intervention_on_top": True}),
     ("SAFE-DIST", {"avoidance_gain_1_s": 0.0}),
     ("SAFE-DIST", {"disturbance_m_s": 3.0}),
-    ("LIVE-GATE", {"intervention_gain_1_s": 20.1}),
-    ("LIVE-GATE", {"lag_m": 0.0}),
+    ("LIVE-GATE", {"longest_s": 0.0}),
     ("LIVE-WAIT", {"longest_s": 0.0}),
-    ("LIVE-WAIT", {"behind_s": -1.0}),
+    ("LIVE-WAIT", {"period_s": 0.0}),
     ("THR-ISO", {"noise_period_s": 0.06}),
     ("THR-ISO", {"noise_period_s": 0.0}),
 ]

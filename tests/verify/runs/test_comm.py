@@ -132,3 +132,18 @@ def test_a_ugv_that_no_policy_helps_does_not_keep_the_others_from_being_judged()
     assert finding.status == "holds"
     assert (finding.evidence["without_proposals"], finding.evidence["without_decisions"]) == (["ugv2"], ["ugv2"])
     assert judge("COMM", proposals(trace, 5.0)).status == "refuted"
+
+
+def test_a_joint_plan_of_which_a_part_was_not_sent_is_refuted(run: Callable[[str, str], Trace]) -> None:
+    trace = run("doorway", "d")
+    assert judge("COMM", trace).status == "holds"
+    parties = [len(party) for party in trace.proposals["party"]]
+    lost = int(np.argmax(parties))
+    assert parties[lost] > 1
+    gone = trace.proposals.iloc[lost]
+    kept = trace.proposals[trace.proposals["number"] != gone["number"]].reset_index(drop=True)
+    decisions = trace.decisions[trace.decisions["number"] != gone["number"]].reset_index(drop=True)
+    sent = (gone["robot"], float(gone["issued_s"]))
+    events = [e for e in trace.events if not (e["kind"] == "proposal" and (e["robot"], float(e["t_s"])) == sent)]
+    partial = with_meta(replace(trace, proposals=kept, decisions=decisions), events=events)
+    assert counterexample("COMM", partial)["kind"] == "part of a joint plan not sent"

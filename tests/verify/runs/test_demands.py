@@ -150,7 +150,7 @@ def test_they_are_read_from_the_controllers_in_the_diagram(monkeypatch: pytest.M
 
     def wrong(*args: Any, **more: Any) -> Model:
         model = right(*args, **more)
-        controller = model.diagram.GetSubsystemByName("ugvs").GetSubsystemByName("ugv_controller")
+        controller = model.diagram.GetSubsystemByName("task_planning").GetSubsystemByName("ugv_controller")
         controller._max_speed = 2.0 * controller._max_speed
         return model
 

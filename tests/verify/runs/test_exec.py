@@ -18,7 +18,7 @@ from airground_drake.intervention import database
 from airground_drake.intervention.messages import accepted_proposals
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc import law
-from airground_drake.nsbc.avoidance import HalfSpaces
+from airground_drake.nsbc.team import Neighbourhood
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Obstacle, Policy, Scenario
 from airground_drake.simulation import simulate
@@ -82,8 +82,10 @@ def executed_whatever_the_answer(monkeypatch: pytest.MonkeyPatch) -> None:
     """The answer is recorded as it was given."""
     honest = controllers.UgvController.velocity
 
-    def velocity(self: Any, t: float, positions: Array, reference: Array, rate: Array, accepted: Any) -> Array:
-        return honest(self, t, positions, reference, rate, WAITING[:] or accepted)
+    def velocity(
+        self: Any, t: float, positions: Array, reference: Array, rate: Array, accepted: Any, *law: Any
+    ) -> Array:
+        return honest(self, t, positions, reference, rate, WAITING[:] or accepted, *law)
 
     def accepted(proposals: Sequence[Proposal | None], answers: Array) -> list[Proposal | None]:
         WAITING[:] = proposals
@@ -121,16 +123,17 @@ def executed_after_it_is_over(monkeypatch: pytest.MonkeyPatch) -> None:
 def no_avoidance_of_one_ugv(monkeypatch: pytest.MonkeyPatch) -> None:
     honest = law.UgvLaw.velocity
 
-    def velocity(self: Any, position: Array, target: Any, asked: Any, spaces: HalfSpaces, *rest: Any) -> Array:
-        bound = spaces.bound.copy()
-        bound[1] = -np.inf
-        return honest(self, position, target, asked, HalfSpaces(spaces.normal, bound), *rest)
+    def velocity(self: Any, positions: Array, near: Neighbourhood, *rest: Any) -> Array:
+        distance = near.distance.copy()
+        distance[1] = -1e6
+        return honest(self, positions, replace(near, distance=distance), *rest)
 
     monkeypatch.setattr(law.UgvLaw, "velocity", velocity)
 
 
 def no_speed_limit(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(law, "limit_speed", lambda velocity, limit: velocity)
+    honest = law.UgvLaw.velocity
+    monkeypatch.setattr(law.UgvLaw, "velocity", lambda *given: honest(*given[:-1], 1e9 * given[-1]))
 
 
 def no_speed_limit_of_the_uav(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -145,12 +148,13 @@ def one_direction_only(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def selection_ignored(monkeypatch: pytest.MonkeyPatch) -> None:
     one_direction_only(monkeypatch)
-    honest = law.UgvLaw._intervened
+    honest = law.UgvLaw.velocity
 
-    def intervened(self: Any, asked: law.Intervention, *rest: Any) -> Array:
-        return honest(self, asked._replace(chosen=np.eye(3)), *rest)
+    def velocity(self: Any, positions: Array, near: Any, target: Array, rate: Array, asked: Any, *rest: Any) -> Array:
+        everywhere = [None if one is None else one._replace(chosen=np.eye(3)) for one in asked]
+        return honest(self, positions, near, target, rate, everywhere, *rest)
 
-    monkeypatch.setattr(law.UgvLaw, "_intervened", intervened)
+    monkeypatch.setattr(law.UgvLaw, "velocity", velocity)
 
 
 def avoidance_gain_of_the_controller(monkeypatch: pytest.MonkeyPatch) -> None:

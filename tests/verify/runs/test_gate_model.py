@@ -10,8 +10,8 @@ import pytest
 from builders.edits import with_decision, with_scenario
 from verify.judging import judge
 
-from airground_drake.gatekeeper import outcome, outcome_gatekeeper, prediction
-from airground_drake.gatekeeper.closed_loop import ClosedLoop
+from airground_drake.gatekeeper import outcome, outcome_gatekeeper, problem
+from airground_drake.gatekeeper.rollout import ClosedLoop
 from airground_drake.scenarios.load import from_data, load, resolved
 from airground_drake.scenarios.schema import Policy
 from airground_drake.simulation import simulate
@@ -49,9 +49,9 @@ def test_a_queue_along_an_axis_is_squeezed_and_holds(queue: Trace, claim: str) -
 
 @pytest.fixture(scope="module")
 def queue() -> Trace:
-    """Seven UGVs behind each other, before a gap between two obstacles that is as wide as a point."""
+    """Seven UGVs behind each other but for 1e-9 m, before a gap between two obstacles that is as wide as a point."""
     data = resolved(load("minimal")[0])
-    ends = [([-6.0 - 3.0 * i, 0.0, 0.0], [14.0 - 3.0 * i, 0.0, 0.0]) for i in range(7)]
+    ends = [([-6.0 - 3.0 * i, 1e-9 * (-1) ** i, 0.0], [14.0 - 3.0 * i, 0.0, 0.0]) for i in range(7)]
     data["ugvs"] = {
         f"u{i}": {
             "start_m": start, "target_m": end, "max_speed_m_s": 3.0, "preset": {"waypoints_m": [start, end]},
@@ -89,46 +89,52 @@ def test_of_a_map_without_end_the_nearest_obstacles_count() -> None:
 
 def gain(name: str) -> Patch:
     def patch(monkeypatch: pytest.MonkeyPatch) -> None:
-        made = prediction.closed_loop
+        made = problem.closed_loop
 
         def wrong(*arguments: Any) -> ClosedLoop:
             loop = made(*arguments)
-            return loop._replace(**{name: 1.1 * getattr(loop, name)})
+            if name in loop._fields:
+                return loop._replace(**{name: 1.1 * getattr(loop, name)})
+            return loop._replace(law=loop.law._replace(**{name: 1.1 * getattr(loop.law, name)}))
 
-        monkeypatch.setattr(prediction, "closed_loop", wrong)
+        monkeypatch.setattr(problem, "closed_loop", wrong)
 
     return patch
 
 
 def blind(monkeypatch: pytest.MonkeyPatch) -> None:
     """The prediction knows no obstacles."""
-    made = prediction.closed_loop
+    made = problem.closed_loop
     monkeypatch.setattr(
-        prediction,
+        problem,
         "closed_loop",
         lambda *a: (loop := made(*a))._replace(distances=0.0 * loop.distances, shares=0.0 * loop.shares),
     )
 
 
+def other_priorities(loop: ClosedLoop) -> ClosedLoop:
+    return loop._replace(law=loop.law._replace(intervention_on_top=not loop.law.intervention_on_top))
+
+
 def on_top(monkeypatch: pytest.MonkeyPatch) -> None:
     """The prediction has the other method's priorities."""
-    made = prediction.closed_loop
+    made = problem.closed_loop
     monkeypatch.setattr(
-        prediction,
+        problem,
         "closed_loop",
-        lambda *a: (loop := made(*a))._replace(intervention_on_top=not loop.intervention_on_top),
+        lambda *a: other_priorities(made(*a)),
     )
 
 
 def late(monkeypatch: pytest.MonkeyPatch) -> None:
     """The proposed motion is predicted a period late."""
-    made = prediction.closed_loop
+    made = problem.closed_loop
 
     def wrong(*arguments: Any) -> ClosedLoop:
         loop = made(*arguments)
         return loop._replace(wanted=np.concatenate([loop.wanted[:1], loop.wanted[:-1]]))
 
-    monkeypatch.setattr(prediction, "closed_loop", wrong)
+    monkeypatch.setattr(problem, "closed_loop", wrong)
 
 
 def swapped(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -161,7 +167,7 @@ def test_a_wrong_prediction_model_is_refuted(name: str, monkeypatch: pytest.Monk
 
 WRONG: dict[str, Callable[[ClosedLoop], ClosedLoop]] = {
     "speed limit": lambda loop: loop._replace(max_speed=0.5 * loop.max_speed),
-    "priorities": lambda loop: loop._replace(intervention_on_top=True),
+    "priorities": other_priorities,
     "no obstacles": lambda loop: loop._replace(shares=0.0 * loop.shares, distances=0.0 * loop.distances),
     "late": lambda loop: loop._replace(wanted=np.concatenate([loop.wanted[:1], loop.wanted[:-1]])),
 }

@@ -11,6 +11,8 @@ import pandas as pd
 import pytest
 from verify.judging import CLAIMS
 
+from airground_drake import components
+from airground_drake.gatekeeper.patience import Commitment, Patience
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Obstacle
 from airground_drake.simulation import simulate
@@ -42,7 +44,7 @@ def refused(table: pd.DataFrame) -> Any:
 
 
 def executing(table: pd.DataFrame) -> Any:
-    return (table["lag_m"] > 0.0) & (table["decision"] == "accept")
+    return (table["reason"] == "kept") & (table["decision"] == "accept")
 
 
 @pytest.mark.parametrize("claim", ["LIVE-PROG", "GATE-MODEL", "GATE-FEAS"])
@@ -65,9 +67,8 @@ def test_the_run_itself_passes(decided: Trace, claim: str) -> None:
         ("LIVE-PROG", accepted, {"reason": "makes_way"}, "answer or reason"),
         ("LIVE-PROG", accepted, {"reason": "kept"}, "answer or reason"),
         ("LIVE-PROG", accepted, {"tries": 0.0}, "tries"),
-        ("LIVE-PROG", executing, {"lag_m": lambda v: v + 1e-3}, "lag"),
-        ("LIVE-PROG", executing, {"predicted_lag_m": lambda v: v + 1e-3}, "predicted lag"),
-        ("LIVE-PROG", executing, {"decision": "refuse", "reason": "no_progress"}, "answer or reason"),
+        ("LIVE-PROG", executing, {"decision": "refuse", "reason": "over"}, "answer or reason"),
+        ("LIVE-PROG", executing, {"tries": 2.0}, "tries"),
     ],
 )
 def test_an_edited_decision_is_refuted(
@@ -79,17 +80,6 @@ def test_an_edited_decision_is_refuted(
     assert what in finding.counterexample["what"]
 
 
-def test_what_leaves_a_direction_to_the_own_task_is_counted(decided: Trace) -> None:
-    """LIVE-GATE assumes that none does."""
-
-    def count(trace: Trace) -> Any:
-        return CLAIMS["LIVE-PROG"].judge(trace).evidence["leave_a_direction"]
-
-    along_x = decided.proposals.assign(selection=[[1.0, 0.0, 0.0]] * len(decided.proposals))
-    assert count(decided) == 0
-    assert count(replace(decided, proposals=along_x)) == 1
-
-
 def test_a_map_that_was_not_sent_is_noticed(decided: Trace) -> None:
     """The outcome of the detour rests on the map in its message: with another one it is another."""
     proposals = decided.proposals.copy()
@@ -99,19 +89,52 @@ def test_a_map_that_was_not_sent_is_noticed(decided: Trace) -> None:
     assert CLAIMS["GATE-MODEL"].judge(replace(decided, proposals=proposals)).status == "refuted"
 
 
-def test_a_ugv_that_is_held_up_gives_the_intervention_back_and_the_claims_hold() -> None:
-    """The tolerance is so small that the delay of an answer counts as being behind."""
-    scenario, _ = load("case_b", ["gatekeeper.lag_m=0.01", "gatekeeper.behind_s=0.3", "gatekeeper.tries=1"])
-    trace = simulate(scenario, "d")
-    reasons = list(dict.fromkeys(trace.decisions["reason"]))
-    assert "no_progress" in reasons
-    assert "exhausted" in reasons
-    for claim in ("LIVE-PROG", "GATE-MODEL", "GATE-FEAS", "EXEC", "SAFE-TRACE"):
-        assert CLAIMS[claim].judge(trace).status == "holds", claim
-    given_back = trace.decisions[trace.decisions["reason"] == "no_progress"].iloc[0]
-    late = replace(trace, decisions=trace.decisions.replace({"reason": {"no_progress": "over"}}))
-    assert CLAIMS["LIVE-PROG"].judge(late).status == "refuted"
-    assert given_back["lag_m"] > given_back["predicted_lag_m"] + 0.01
+def test_an_accepted_intervention_that_just_ends_is_refuted(decided: Trace) -> None:
+    """Its decisions stop while the proposal is in force."""
+    last = int(np.flatnonzero(executing(decided.decisions))[-1])
+    stopped = replace(decided, decisions=decided.decisions.drop(index=range(last - 3, len(decided.decisions))))
+    finding = CLAIMS["LIVE-PROG"].judge(stopped)
+    assert finding.counterexample is not None
+    assert finding.counterexample["what"] == "end of an accepted intervention"
+
+
+IMPATIENT = ["gatekeeper.tries=1", "gatekeeper.longest_s=1.0", "gatekeeper.rest_s=3.0", "intervention.retry_s=0.5"]
+
+
+@pytest.fixture(scope="module")
+def impatient() -> Trace:
+    """Case B with a UGV that goes along once, for 1 s, and then not before it has been on its own for 3 s."""
+    return simulate(load("case_b", IMPATIENT)[0], "d")
+
+
+def test_a_ugv_goes_along_as_often_and_as_long_as_it_may(impatient: Trace) -> None:
+    reasons = list(dict.fromkeys(impatient.decisions["reason"]))
+    assert {"over", "exhausted"} <= set(reasons)
+    for claim in ("LIVE-PROG", "GATE-MODEL", "GATE-FEAS", "EXEC", "COMM", "SAFE-TRACE"):
+        assert CLAIMS[claim].judge(impatient).status == "holds", claim
+    evidence = CLAIMS["LIVE-PROG"].judge(impatient).evidence
+    assert evidence["accepted_interventions_ended"]["over"] >= 1
+
+
+class NoRest(Patience):
+    """The tries count anew at once."""
+
+    def rested(self, now: Commitment, t: float) -> Commitment:
+        return now if now.executing else replace(now, tries=0)
+
+
+class LateByASample(Patience):
+    """A try is over one sample too late."""
+
+    def over(self, now: Commitment, t: float) -> bool:
+        return t >= now.until + 0.05
+
+
+@pytest.mark.parametrize("kind", [NoRest, LateByASample])
+def test_a_patience_that_is_wired_wrongly_is_refuted(kind: type[Patience], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(components, "Patience", kind)
+    finding = CLAIMS["LIVE-PROG"].judge(simulate(load("case_b", IMPATIENT)[0], "d"))
+    assert finding.status == "refuted"
 
 
 @pytest.mark.parametrize(("hidden", "answer"), [((6.5, 9.0), "refuse"), ((4.5, 10.0), "accept")])

@@ -41,8 +41,8 @@ class Lines(NamedTuple):
         name = f"audit-{number}"
         return self.plate(name, f"Finding {number}", self._marked() and f"{self._marked()}.", beside=name)
 
-    def plate(self, name: str, heading: str, caption: str, beside: str) -> Figure:
-        """The figure with this identifier, heading and caption, beside a claim or finding; inside `canvas.style`."""
+    def plate(self, name: str, heading: str, caption: str, beside: str = "") -> Figure:
+        """The figure with this identifier, heading and caption, beside a finding; inside `canvas.style`."""
         text = f"Up: {self.y}. Across: {self.x}. {self._marked()}".rstrip()
         rows = []
         for line, (x, y) in self.lines.items():

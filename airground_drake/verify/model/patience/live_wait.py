@@ -19,13 +19,9 @@ class LiveWait(TheoremClaim):
         "withdraws, says of its map or names as its cause: after so long the UGV is on its own until it has rested."
     )
     formula = (
-        "between two rests of rest_s on its own: time executed <= tries (longest_s + h), h the period of the "
-        "gatekeeper; without progress: given back by (last on time) + behind_s + h"
+        "between two rests of rest_s on its own: time executed <= tries (longest_s + h), h the period of the gatekeeper"
     )
-    latex = (
-        r"\text{time executed between two rests} \le N (\tau_{\text{longest}} + h)",
-        r"\text{without progress: given back by } t_{\text{on time}} + \tau_{\text{behind}} + h",
-    )
+    latex = (r"\text{time executed between two rests} \le N (\tau_{\text{longest}} + h)",)
     method = (
         "Theorems in Coq, by induction over any messages at any samples; the bounds follow from the scenario. Tests "
         "compare the transitions of the running `Patience` with the theorem's, and attack running gatekeepers that "
@@ -41,7 +37,7 @@ class LiveWait(TheoremClaim):
         "nothing but messages. Safety is SAFE-GATE."
     )
 
-    theorems = ("Patience.bounded", "Patience.given_back")
+    theorems = ("Patience.bounded",)
     margin_of = "longest intervention allowed"
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
@@ -51,22 +47,18 @@ class LiveWait(TheoremClaim):
             "tries": int(gate.tries),
             "rest_s": float(gate.rest_s),
             "longest_s": float(gate.longest_s),
-            "lag_m": float(gate.lag_m),
-            "behind_s": float(gate.behind_s),
             "period_s": float(gate.period_s),
         }
 
     def hypotheses(self, inputs: dict[str, Any]) -> list[Hypothesis]:
         """Times are positive."""
-        longest, behind, period = (decimal(inputs[name]) for name in ("longest_s", "behind_s", "period_s"))
+        longest, period = decimal(inputs["longest_s"]), decimal(inputs["period_s"])
         return [
             Hypothesis(self.margin_of, "the longest intervention takes more than 0 s", longest, "s", strict=True),
             Hypothesis("gatekeeper's period", "the gatekeeper's period is above 0", period, "s", strict=True),
-            Hypothesis("time behind", "the time for which a UGV may be behind is not negative", behind, "s"),
         ]
 
     def numbers(self, inputs: dict[str, Any]) -> dict[str, Any]:
-        """The bounds, s."""
-        longest, behind, period = (decimal(inputs[name]) for name in ("longest_s", "behind_s", "period_s"))
-        bound: Fraction = inputs["tries"] * (longest + period)
-        return {"bound_s": float(bound), "given_back_after_s": float(behind + period)}
+        """The bound, s."""
+        bound: Fraction = inputs["tries"] * (decimal(inputs["longest_s"]) + decimal(inputs["period_s"]))
+        return {"bound_s": float(bound)}

@@ -7,7 +7,8 @@ from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorC
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
 from pydrake.systems.primitives import ConstantVectorSource, Integrator, LogVectorOutput, ZeroOrderHold
 
-from airground_drake.systems.decision import FIELDS, DecisionVariable, EventTrigger
+from airground_drake.systems.decision import DecisionVariable, EventTrigger
+from airground_drake.systems.signals import FIELDS
 
 NOISE = {"noise_m_sqrt_s": 0.004, "leak_1_s": 0.0, "noise_period_s": 0.05, "duration_s": 30.0}
 

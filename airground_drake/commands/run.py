@@ -1,0 +1,91 @@
+"""`airground run SCENARIO`: simulate one run and print its events; with `--meshcat`, watch it while it runs."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from threading import Event
+from typing import TYPE_CHECKING
+
+from airground_drake import files
+from airground_drake.errors import AirgroundError, SimulationError, UnknownNameError
+from airground_drake.registry import METHODS
+from airground_drake.scenarios import plugins
+from airground_drake.usage import EXIT_TOOL, Parser, overridable, positive, refuse
+
+if TYPE_CHECKING:
+    from airground_drake.trace import Trace
+
+SPEED = 1.0
+"""Simulated seconds per second in Meshcat, unless the command line says otherwise."""
+
+
+def parser() -> argparse.ArgumentParser:
+    """What the command line takes."""
+    parser = Parser(prog="airground run", description="Simulate one run of a scenario and print its events.")
+    parser.add_argument("scenario", help="name of a shipped scenario, or path to a YAML file")
+    parser.add_argument("run", nargs="?", metavar="RUN", help="default: the run with the most complete method")
+    parser.add_argument("--meshcat", action="store_true", help="show the robots in a browser while they move")
+    parser.add_argument("--speed", type=positive, metavar="X", help=f"of what --meshcat shows (default: {SPEED:g})")
+    parser.add_argument("-o", "--output", type=Path, metavar="DIR", help="save the trace in this folder, too")
+    overridable(parser)
+    parser.add_argument("--seed", type=int, metavar="N", help="seed of the decision noise")
+    parser.add_argument(plugins.OPTION, action="store_true", help=plugins.HELP)
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Simulate, and print.
+
+    Returns:
+        Exit code: 0, 2 if the scenario, the run or the folder cannot be used, 4 if the simulation stops.
+    """
+    of_command = parser()
+    options = of_command.parse_args(arguments)
+    if options.speed and not options.meshcat:
+        of_command.error("--speed is of what --meshcat shows: give --meshcat, too")
+    from airground_drake.scenarios.load import load
+
+    overrides = [*options.set, *([] if options.seed is None else [f"seed={options.seed}"])]
+    try:
+        scenario, _ = load(options.scenario, overrides)
+        methods = {name: run.method for name, run in scenario.runs.items()}
+        name = options.run or max(methods, key=lambda run: list(METHODS).index(methods[run]))
+        if name not in methods:
+            raise UnknownNameError("run", name, methods)
+        if options.output is not None:
+            files.make_folder(options.output, "the trace")
+        from airground_drake import trace as traces
+        from airground_drake.simulation import simulate
+
+        with plugins.admitted(scenario, options.scenario, allow=options.allow_plugins):
+            if options.meshcat:
+                from airground_drake.view.draw import served
+
+                meshcat = served()
+                print(f"{meshcat.web_url()}  (Ctrl-C ends it)", flush=True)
+                meshcat.StartRecording()
+                trace = simulate(scenario, name, meshcat=meshcat, speed=options.speed or SPEED)
+                meshcat.PublishRecording()
+            else:
+                trace = simulate(scenario, name)
+        if options.output is not None:
+            traces.save(trace, options.output)
+        print("\n".join(_said(trace)), flush=True)
+        if options.meshcat:
+            Event().wait()  # the page stays until the process is interrupted
+    except SimulationError as error:
+        return refuse(error, EXIT_TOOL)
+    except (AirgroundError, OSError) as error:
+        return refuse(error)
+    return 0
+
+
+def _said(trace: Trace) -> Iterator[str]:
+    """A line for the run, then one for each event."""
+    method = str(trace.meta["method"])
+    yield f"{trace.scenario['name']}, run {trace.run}: method ({method}), {METHODS[method].says}; {trace.t[-1]:g} s"
+    for event in trace.events:
+        x, y, _ = event["position_m"]
+        yield f"{event['t_s']:9.3f} s  {event['robot']:12} {event['kind']:10} at ({x:.2f}, {y:.2f}) m"

@@ -1,0 +1,180 @@
+"""A run as an MCAP file for Foxglove and other programs that read it: robots, obstacles, signals and events."""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from airground_drake.errors import ExportError
+from airground_drake.scenarios.schema import Scenario
+from airground_drake.trace import Trace
+from airground_drake.view.looks import OBSTACLE_COLOR, SAFE_COLOR, STATE_COLORS, UAV_COLOR, UNSEEN_COLOR
+from airground_drake.view.stage import Robot, Stage, stage, states
+
+if TYPE_CHECKING:
+    from mcap.writer import Writer
+
+FRAME = "world"
+LEVELS = {"collision": 4, "refuse": 3}
+"""Levels of `foxglove.Log` for kinds of events: 4 is an error, 3 a warning; every other event is information, 2."""
+
+_NUMBER, _TEXT = {"type": "number"}, {"type": "string"}
+
+
+def _object(**properties: Any) -> dict[str, Any]:
+    return {"type": "object", "properties": properties}
+
+
+def _array(items: Mapping[str, Any]) -> dict[str, Any]:
+    return {"type": "array", "items": items}
+
+
+_TIME = _object(sec={"type": "integer"}, nsec={"type": "integer"})
+_VECTOR = _object(x=_NUMBER, y=_NUMBER, z=_NUMBER)
+_POSE = _object(position=_VECTOR, orientation=_object(x=_NUMBER, y=_NUMBER, z=_NUMBER, w=_NUMBER))
+_COLOR = _object(r=_NUMBER, g=_NUMBER, b=_NUMBER, a=_NUMBER)
+_CYLINDER = _object(pose=_POSE, size=_VECTOR, bottom_scale=_NUMBER, top_scale=_NUMBER, color=_COLOR)
+_SPHERE = _object(pose=_POSE, size=_VECTOR, color=_COLOR)
+_ENTITY = _object(
+    timestamp=_TIME, frame_id=_TEXT, id=_TEXT, lifetime=_TIME, frame_locked={"type": "boolean"},
+    cylinders=_array(_CYLINDER), spheres=_array(_SPHERE),
+)  # fmt: skip
+_SCENE = _object(deletions=_array(_object()), entities=_array(_ENTITY))
+_LOG = _object(timestamp=_TIME, level={"type": "integer"}, message=_TEXT, name=_TEXT)
+_SIGNALS = _object(
+    position_m=_VECTOR, command_m_s=_VECTOR, decision_variable_m=_NUMBER, noise_m=_NUMBER, mode=_NUMBER,
+    accepted=_NUMBER,
+)  # fmt: skip
+
+
+class Message(NamedTuple):
+    """What is written at a time, s, on a topic."""
+
+    t_s: float
+    topic: str
+    schema: str
+    data: Mapping[str, Any]
+
+
+SCHEMAS = {"foxglove.SceneUpdate": _SCENE, "foxglove.Log": _LOG, "airground_drake.Signals": _SIGNALS}
+"""JSON Schemas by name; the first two are those of Foxglove, with the fields that are used here."""
+
+
+def recorded(trace: Trace, scenario: Scenario) -> bytes:
+    """The MCAP file of a run of a scenario: the topics `/scene`, `/events` and, for each robot, `/robots/NAME`.
+
+    Raises:
+        ExportError: if the package mcap is not installed.
+        TraceError: if the trace lacks a column or holds numbers that are not finite.
+    """
+    try:
+        from mcap.writer import Writer
+    except ImportError as error:
+        raise ExportError("MCAP files need the package mcap: pip install 'airground_drake[mcap]'") from error
+    buffer = io.BytesIO()
+    writer = Writer(buffer)
+    writer.start(profile="", library="airground_drake")
+    about = {"scenario": scenario.name, "run": trace.run, "method": str(trace.meta["method"])}
+    writer.add_metadata("airground_drake", about)
+    _write(writer, sorted(_messages(trace, scenario), key=lambda message: message.t_s))
+    writer.finish()  # type: ignore[no-untyped-call]
+    return buffer.getvalue()
+
+
+def _write(writer: Writer, messages: list[Message]) -> None:
+    schemas = {
+        name: writer.register_schema(name, "jsonschema", json.dumps(schema).encode())
+        for name, schema in SCHEMAS.items()
+    }
+    channels: dict[str, int] = {}
+    for number, message in enumerate(messages):
+        if message.topic not in channels:
+            channels[message.topic] = writer.register_channel(message.topic, "json", schemas[message.schema])
+        at = round(message.t_s * 1e9)
+        writer.add_message(channels[message.topic], at, json.dumps(message.data).encode(), at, number)
+
+
+def _messages(trace: Trace, scenario: Scenario) -> Iterator[Message]:
+    """All messages of a run."""
+    standing = stage(scenario, np.concatenate([trace.position(robot) for robot in trace.robots]))
+    yield Message(0.0, "/scene", "foxglove.SceneUpdate", {"deletions": [], "entities": list(_obstacles(standing))})
+    looks = {robot: states(trace, robot, trace.t) for robot in trace.ugvs}
+    for k, t in enumerate(trace.t.tolist()):
+        entities = []
+        for robot in standing.robots:
+            color = STATE_COLORS[looks[robot.name][k]] if robot.name in looks else UAV_COLOR
+            entities.append(_robot(robot, t, trace.position(robot.name)[k].tolist(), color))
+            yield Message(t, f"/robots/{robot.name}", "airground_drake.Signals", _signals(trace, robot.name, k))
+        yield Message(t, "/scene", "foxglove.SceneUpdate", {"deletions": [], "entities": entities})
+    for event in trace.events:
+        t, kind, name = float(event["t_s"]), str(event["kind"]), str(event["robot"])
+        log = {"timestamp": _time(t), "level": LEVELS.get(kind, 2), "message": f"{name}: {kind}", "name": name}
+        yield Message(t, "/events", "foxglove.Log", log)
+
+
+def _signals(trace: Trace, robot: str, k: int) -> dict[str, Any]:
+    """Signals of a robot in row k of the trace."""
+    found: dict[str, Any] = {
+        "position_m": _vector(trace.position(robot)[k].tolist()),
+        "command_m_s": _vector(trace.command(robot)[k].tolist()),
+    }
+    if robot in trace.ugvs:
+        for name in ("decision_variable_m", "noise_m", "mode", "accepted"):
+            found[name] = float(trace.column(f"{robot}.{name}")[k])
+    return found
+
+
+def _obstacles(standing: Stage) -> Iterator[dict[str, Any]]:
+    """Each obstacle as a cylinder in the transparent cylinder that UGVs must stay out of; phantoms as cylinders."""
+    low = standing.mark_m
+    for obstacle in standing.obstacles:
+        color = OBSTACLE_COLOR if obstacle.known_to_uav else UNSEEN_COLOR
+        centre = obstacle.centre_m.tolist()
+        cylinders = [_cylinder(centre, obstacle.radius_m, 2.0 * low, color)]
+        cylinders.append(_cylinder(centre, obstacle.safe_m, low, SAFE_COLOR, 0.2))
+        yield _entity(f"obstacle {obstacle.name}", 0.0, cylinders=cylinders)
+    for k, phantom in enumerate(standing.phantoms_m.tolist()):
+        yield _entity(f"phantom {k + 1}", 0.0, cylinders=[_cylinder(phantom, low, low, UNSEEN_COLOR, 0.5)])
+
+
+def _robot(robot: Robot, t: float, position: list[float], color: str) -> dict[str, Any]:
+    """A UGV as a low cylinder, the UAV as a ball."""
+    r = robot.radius_m
+    if robot.kind == "UGV":
+        return _entity(f"robot {robot.name}", t, cylinders=[_cylinder(position, r, r, color)])
+    ball = {"pose": _pose(position), "size": {"x": 2.0 * r, "y": 2.0 * r, "z": 2.0 * r}, "color": _rgba(color)}
+    return _entity(f"robot {robot.name}", t, spheres=[ball])
+
+
+def _entity(name: str, t: float, **shapes: list[dict[str, Any]]) -> dict[str, Any]:
+    """A scene entity that stays until one of its name replaces it."""
+    stays = {"sec": 0, "nsec": 0}
+    return {"timestamp": _time(t), "frame_id": FRAME, "id": name, "lifetime": stays, "frame_locked": False, **shapes}
+
+
+def _cylinder(foot: list[float], radius: float, height: float, color: str, alpha: float = 1.0) -> dict[str, Any]:
+    x, y, z = foot
+    size = {"x": 2.0 * radius, "y": 2.0 * radius, "z": height}
+    pose = _pose([x, y, z + height / 2.0])
+    return {"pose": pose, "size": size, "bottom_scale": 1.0, "top_scale": 1.0, "color": _rgba(color, alpha)}
+
+
+def _pose(position: list[float]) -> dict[str, Any]:
+    return {"position": _vector(position), "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}}
+
+
+def _vector(values: list[float]) -> dict[str, float]:
+    return dict(zip("xyz", values, strict=True))
+
+
+def _rgba(color: str, alpha: float = 1.0) -> dict[str, float]:
+    return {**{name: int(color[i : i + 2], 16) / 255.0 for name, i in zip("rgb", (1, 3, 5), strict=True)}, "a": alpha}
+
+
+def _time(t_s: float) -> dict[str, int]:
+    sec, nsec = divmod(round(t_s * 1e9), 10**9)
+    return {"sec": sec, "nsec": nsec}

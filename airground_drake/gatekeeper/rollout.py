@@ -1,0 +1,225 @@
+"""The closed loop of one UGV from what it knows, rolled out under switching answers by the law that commands it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from airground_drake.arrays import Array
+from airground_drake.geometry.motion import Motion
+from airground_drake.intervention.policy import Proposal
+from airground_drake.nsbc.kernels import fill_half_spaces
+from airground_drake.nsbc.law import Intervention, Numbers, UgvLaw, command
+
+REFUSED, ACCEPTED = 0, 1
+"""Modes of a control period: whether the proposal is in force."""
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """What a UGV senses when it decides.
+
+    Attributes:
+        t: time, s.
+        position: own position, (3,), m.
+        preset: own preset trajectory.
+        centres: obstacles and other robots, (K, 3), m.
+        velocities: their velocities, taken as constant, (K, 3), m/s.
+        distances: safe distances to them, (K,), m.
+        shares: share of each avoidance inequality, (K,).
+        max_speed: own speed limit, m/s.
+    """
+
+    t: float
+    position: Array
+    preset: Motion
+    centres: Array
+    velocities: Array
+    distances: Array
+    shares: Array
+    max_speed: float
+
+    def restrict(self, sensed: npt.NDArray[np.bool_]) -> Scene:
+        """The same scene with only the points (K,) that are marked as sensed."""
+        return replace(
+            self,
+            centres=self.centres[sensed],
+            velocities=self.velocities[sensed],
+            distances=self.distances[sensed],
+            shares=self.shares[sensed],
+        )
+
+
+class ClosedLoop(NamedTuple):
+    """All that the motion of one UGV over the horizon depends on, besides the answers to the proposal.
+
+    N stages of `substeps` control periods each, S = N * substeps in all. A named tuple because that is what
+    numba takes as one argument; the arrays are never written to.
+
+    Attributes:
+        law: the numbers of its control law.
+        start: position at the beginning, (3,), m, world frame.
+        preset: own preset trajectory at the control samples, (S + 1, 3), m.
+        wanted: the proposed motion at the control samples, (S + 1, 3), m.
+        chosen: J_int^+ J_int, projector onto the directions in which the UAV intervenes, (3, 3).
+        points: where the points to keep away from are at the control samples, (S + 1, K, 3), m.
+        distances: safe distances to them, (K,), m.
+        shares: share of each avoidance inequality, (K,).
+        max_speed: own speed limit, m/s.
+        substeps: control periods per stage.
+    """
+
+    law: Numbers
+    start: Array
+    preset: Array
+    wanted: Array
+    chosen: Array
+    points: Array
+    distances: Array
+    shares: Array
+    max_speed: float
+    substeps: int
+
+    @property
+    def stages(self) -> int:
+        """N."""
+        return (len(self.preset) - 1) // self.substeps
+
+    def is_finite(self) -> bool:
+        """Whether all arrays hold finite numbers."""
+        arrays = (self.start, self.preset, self.wanted, self.chosen, self.points, self.distances, self.shares)
+        return all(bool(np.isfinite(array).all()) for array in arrays)
+
+    def positions(self, omega: Array) -> Array:
+        """Positions at the ends of the stages, (N, 3), m, when stage k runs with the answer omega[k].
+
+        Args:
+            omega: (N,), 1 where the proposal is accepted, 0 where it is refused.
+
+        Raises:
+            ValueError: if there are not N answers or one is neither 0 nor 1.
+        """
+        answers = np.asarray(omega)
+        if answers.shape != (self.stages,) or not np.isin(answers, (REFUSED, ACCEPTED)).all():
+            raise ValueError(f"a plan needs {self.stages} answers that are 0 or 1, got {omega!r}")
+        return _follow(self, answers.astype(np.int64))[0]
+
+    def constant_plans(self) -> tuple[Array, Array]:
+        """Mean velocity of each stage, (N, 3) m/s, accepted throughout and refused throughout."""
+        every = np.ones(self.stages, dtype=np.int64)
+        return _follow(self, ACCEPTED * every)[1], _follow(self, REFUSED * every)[1]
+
+
+def closed_loop(scene: Scene, law: UgvLaw, proposal: Proposal, stages: int, substeps: int) -> ClosedLoop:
+    """The UGV's closed loop over `stages` of `substeps` control periods each.
+
+    Args:
+        scene: what the UGV senses now.
+        law: its control law.
+        proposal: the intervention in question.
+        stages: N.
+        substeps: control periods per stage.
+    """
+    after = law.avoidance.period * np.arange(0.0, stages * substeps + 1.0)
+    points = scene.centres + after[:, None, None] * scene.velocities
+    return loop_among(scene, law, proposal, after, points, substeps)
+
+
+def loop_among(
+    scene: Scene, law: UgvLaw, proposal: Proposal, after: Array, points: Array, substeps: int = 1
+) -> ClosedLoop:
+    """The UGV's closed loop among points that move in any way.
+
+    Args:
+        scene: what the UGV knows; its `centres` and `velocities` are not looked at.
+        law: its control law.
+        proposal: the intervention in question.
+        after: control samples from now on, (S + 1,), s.
+        points: where the points are at these, (S + 1, K, 3), m.
+        substeps: control periods per stage.
+    """
+    t = scene.t + after
+    return ClosedLoop(
+        law=law.numbers,
+        start=scene.position,
+        preset=scene.preset.sample(t),
+        wanted=proposal.motion.sample(t),
+        chosen=proposal.chosen,
+        points=points,
+        distances=scene.distances,
+        shares=scene.shares,
+        max_speed=float(scene.max_speed),
+        substeps=substeps,
+    )
+
+
+class Workspace(NamedTuple):
+    """Arrays that one control period writes to.
+
+    Attributes:
+        mobility: (3,), 1 where the UGV can move, 0 where it cannot; not written to.
+        normal: of the avoidance inequalities, (K, 3).
+        bound: of the avoidance inequalities, (K,), m/s.
+        rate: velocity of the preset trajectory, (3,), m/s.
+        asked: velocity of the proposed motion, (3,), m/s.
+    """
+
+    mobility: Array
+    normal: Array
+    bound: Array
+    rate: Array
+    asked: Array
+
+
+@njit(cache=True)
+def workspace(loop: ClosedLoop) -> Workspace:
+    """Uninitialised arrays for `velocity_of`."""
+    count = len(loop.distances)
+    plane = np.array([1.0, 1.0, 0.0])
+    return Workspace(plane, np.empty((count, 3)), np.empty(count), np.empty(3), np.empty(3))
+
+
+@njit(cache=True)
+def velocity_of(loop: ClosedLoop, mode: int, k: int, position: Array, work: Workspace) -> Array:
+    """Velocity (3,), m/s, that the law commands in control period k; rates are of the sampled motions.
+
+    Args:
+        loop: the closed loop.
+        mode: REFUSED or ACCEPTED.
+        k: control period, from 0.
+        position: of the UGV at its beginning, (3,), m.
+        work: overwritten.
+    """
+    mobility, normal, bound, rate, asked = work
+    law = loop.law
+    fill_half_spaces(
+        position, loop.points[k], loop.distances, loop.shares, law.avoidance_gain, law.period, mobility,
+        law.sensing_range, normal, bound,
+    )  # fmt: skip
+    for a in range(3):
+        rate[a] = (loop.preset[k + 1, a] - loop.preset[k, a]) / law.period
+        asked[a] = (loop.wanted[k + 1, a] - loop.wanted[k, a]) / law.period
+    return command(
+        law, position, loop.preset[k], rate, mode == ACCEPTED, Intervention(loop.wanted[k], asked, loop.chosen),
+        normal, bound, mobility, loop.max_speed,
+    )  # fmt: skip
+
+
+@njit(cache=True)
+def _follow(loop: ClosedLoop, answers: npt.NDArray[np.int64]) -> tuple[Array, Array]:
+    """Positions at the ends of the stages, (N, 3), m, and mean velocities of the stages, (N, 3), m/s."""
+    stages = len(answers)
+    positions, mean = np.empty((stages, 3)), np.zeros((stages, 3))
+    position, work = loop.start.copy(), workspace(loop)
+    for stage in range(stages):
+        for k in range(stage * loop.substeps, (stage + 1) * loop.substeps):
+            velocity = velocity_of(loop, answers[stage], k, position, work)
+            for a in range(3):
+                position[a] += loop.law.period * velocity[a]
+                mean[stage, a] += velocity[a] / loop.substeps
+        positions[stage] = position
+    return positions, mean

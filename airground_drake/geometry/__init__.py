@@ -1,0 +1,1 @@
+"""Motions along polylines and shortest paths round discs: pure maths, without Drake."""

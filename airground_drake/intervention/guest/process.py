@@ -1,0 +1,207 @@
+"""A third-party policy in a process of its own. It is killed when it takes too long, and cannot touch the run.
+
+The process is a fresh interpreter (`worker.py`), started once and kept. It sends JSON of bounded length, which is
+decoded and checked here. It shares no memory with the simulation.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import weakref
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from multiprocessing import Pipe
+from multiprocessing.connection import Connection
+from typing import Any
+
+from airground_drake.errors import FAULT_WIDTH, PluginError, PolicyError, one_line
+from airground_drake.geometry.motion import Motion
+from airground_drake.interruption import ended_how
+from airground_drake.intervention.guest.codec import LONGEST, decoded, encoded
+from airground_drake.intervention.policy import Observation, Policy
+
+START_S = 30.0
+"""Time for the interpreter, the policy's imports and its construction, s."""
+COUNTED_S = 60.0
+"""Least time for a proposal of a policy that says that it bounds its effort by counts, s: it may be wrong."""
+LIVES = 3
+"""A policy's process is started at most this many times in a run; then the policy is not asked any more."""
+MEMORY = 4 * 2**30
+"""Address space of the process, bytes."""
+
+_PROGRAM = (
+    "import json, sys; sys.path[:] = json.loads(sys.argv[1]); "
+    "from airground_drake.intervention.guest.confinement import confine; confine(int(sys.argv[3]), int(sys.argv[4])); "
+    "from airground_drake.intervention.guest.worker import main; main(int(sys.argv[2]))"
+)
+_ENVIRONMENT = {"PYTHONHASHSEED": "0", "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+"""With a fixed hash seed, a proposal that depends on the order of a set is the same in every run. Without threads of
+libraries, their memory is not needed."""
+
+
+class GuestPolicy(Policy):
+    """Stands in for a policy that runs in a process of its own.
+
+    A fault of the policy is raised as `PolicyError`. After its process has ended or been killed, a new one is asked for
+    the next proposal. It knows nothing of what was before. After `LIVES` processes nothing is proposed any more.
+    """
+
+    counted = True  # its time is limited here, by the life of its process
+
+    def __init__(self, name: str, parameters: Mapping[str, float], budget: float) -> None:
+        """Start the process.
+
+        Args:
+            name: of an installed entry point, `module:Class` or `file.py:Class`.
+            parameters: of the policy.
+            budget: wall-clock time for a proposal, s.
+
+        Raises:
+            PluginError: if the policy cannot be imported, is not a Policy, or does not take these parameters.
+        """
+        self._order = {"name": name, "parameters": list(parameters.items())}
+        self._budget, self._used = budget, 0
+        try:
+            self._start()
+        except PolicyError as fault:
+            raise PluginError(f"policy {name!r}: {fault}") from None
+
+    def propose(self, seen: Observation) -> dict[str, Motion] | None:
+        """What the policy proposes; names and numbers are not checked yet, see `motions_of`.
+
+        Raises:
+            PolicyError: if the policy fails or sends no proposal.
+        """
+        if not self._end.alive and self._used >= LIVES:
+            return None
+        try:
+            if not self._end.alive:
+                self._start()
+            answer = self._ask(seen, self._limit)
+            if "fault" not in answer:
+                return dict(answer["motions"])
+        except (PolicyError, PluginError, KeyError, TypeError, ValueError) as error:
+            self._end()
+            what = str(error) if isinstance(error, PolicyError | PluginError) else "its process sent no proposal"
+            last = f"; its process was started {LIVES} times: not asked again in this run"
+            raise PolicyError(what + last * (self._used >= LIVES)) from None
+        raise PolicyError(_words(answer["fault"]))
+
+    def close(self) -> None:
+        """End the process, and all others in its process group. A later proposal belongs to a new run."""
+        self._end()
+        self._used = 0
+
+    def _start(self) -> None:
+        """Start a process and let it make the policy.
+
+        It has a session of its own, and nothing open but its ends of the channel and of a pipe. Only this process has
+        the other end of the pipe: when it ends, the policy's process is killed.
+
+        Raises:
+            PluginError: if the policy cannot be made.
+            PolicyError: if the process ends, sends nonsense, or is late.
+        """
+        self._used += 1
+        self._channel, theirs = Pipe()
+        reader, writer = Pipe(duplex=False)
+        path = json.dumps([each for each in sys.path if isinstance(each, str)])
+        handles = [theirs.fileno(), reader.fileno()]
+        with theirs, reader:
+            self._process = subprocess.Popen(
+                [sys.executable, "-P", "-c", _PROGRAM, path, *map(str, handles), str(MEMORY)],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                pass_fds=handles,
+                start_new_session=True,
+                env={**_ENVIRONMENT, **os.environ},
+            )
+        self._end = weakref.finalize(self, _kill, self._process, self._channel, writer, os.getpid())
+        _GUESTS.add(self)
+        answer = self._ask(self._order, START_S)
+        if "fault" in answer:
+            self._end()
+            raise PluginError(_words(answer["fault"]))
+        self._limit = max(self._budget, COUNTED_S) if answer.get("counted") is True else self._budget
+
+    def _ask(self, question: object, limit_s: float) -> dict[str, Any]:
+        """The process's answer. Without a well-formed one in time, s, the process has been ended.
+
+        Raises:
+            PolicyError: if there is none.
+        """
+        fault = ""
+        try:
+            with _hung_up_after(limit_s, self._channel) as late:
+                self._channel.send_bytes(encoded(question))
+                data = self._channel.recv_bytes(LONGEST)
+            answer = decoded(data, (Motion,))
+            if isinstance(answer, dict) and not late.is_set():
+                return answer
+            fault = "its process sent no message: not an object"
+        except (EOFError, ConnectionError):
+            pass
+        except Exception as error:  # the sender is not trusted
+            fault = one_line(f"its process sent no message: {error}"[:FAULT_WIDTH])
+        except BaseException:
+            self._end()
+            raise
+        self._end()
+        if late.is_set():
+            raise PolicyError(f"OutOfTime: not done after {limit_s:g} s")
+        raise PolicyError(fault or f"its process ended or closed its channel ({ended_how(self._process.returncode)})")
+
+
+_GUESTS: weakref.WeakSet[GuestPolicy] = weakref.WeakSet()
+
+
+def end_all() -> None:
+    """End the processes of all policies that this process has started."""
+    for guest in list(_GUESTS):
+        guest.close()
+
+
+@contextmanager
+def _hung_up_after(seconds: float, channel: Connection) -> Iterator[threading.Event]:
+    """Shut a channel after so many seconds, so that nobody waits for it any more, not even for half a message.
+
+    The event tells whether this has happened.
+    """
+    late = threading.Event()
+
+    def hang_up() -> None:
+        late.set()
+        with socket.socket(fileno=os.dup(channel.fileno())) as ours, suppress(OSError):
+            ours.shutdown(socket.SHUT_RDWR)
+
+    timer = threading.Timer(seconds, hang_up)
+    timer.daemon = True
+    timer.start()
+    try:
+        yield late
+    finally:
+        timer.cancel()
+        timer.join()
+
+
+def _kill(process: subprocess.Popen[bytes], channel: Connection, alive: Connection, owner: int) -> None:
+    """End a process and its group, and wait for it."""
+    channel.close()
+    alive.close()
+    if os.getpid() != owner:  # this is a fork of the process that started it
+        return
+    with suppress(ProcessLookupError, PermissionError):
+        os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+
+
+def _words(fault: object) -> str:
+    """A fault in the policy's words, as one printable line."""
+    return one_line(fault[:FAULT_WIDTH]) if isinstance(fault, str) else "its process does not say what went wrong"

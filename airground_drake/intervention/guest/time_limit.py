@@ -1,0 +1,46 @@
+"""A time limit for code in this process."""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+_LONGEST_S = 1e9
+"""Thirty years; the system's timer takes at most three hundred."""
+_AT_ONCE_S = 1e-6
+"""Shortest time that a timer is set to, s; 0 would turn it off."""
+
+
+class OutOfTime(BaseException):
+    """Raised inside code that exceeds its time limit; not an Exception, so that `except Exception` lets it pass."""
+
+
+@contextmanager
+def time_limit(seconds: float, error: type[BaseException] = OutOfTime) -> Iterator[None]:
+    """Raise an error in the body after so many seconds of wall-clock time.
+
+    This needs the main thread and a system with interval timers; elsewhere there is no limit. Code that does not return
+    to the Python interpreter is interrupted only when it does. Limits can be nested: an inner limit is no longer than
+    the rest of the outer one, which raises its own error as soon as the inner has ended.
+    """
+    if threading.current_thread() is not threading.main_thread() or not hasattr(signal, "setitimer"):
+        yield
+        return
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        raise error(f"not done after {seconds:g} s")
+
+    outer, started = signal.getitimer(signal.ITIMER_REAL)[0], time.monotonic()
+    before = signal.signal(signal.SIGALRM, interrupt)
+    signal.setitimer(signal.ITIMER_REAL, min(seconds, outer or _LONGEST_S, _LONGEST_S))
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+        if outer:
+            signal.setitimer(signal.ITIMER_REAL, max(outer - (time.monotonic() - started), _AT_ONCE_S))

@@ -1,0 +1,45 @@
+"""The process in which a third-party policy runs: it receives observations and sends motions.
+
+`process.py` starts it in a fresh interpreter and ends it. Whatever the policy does to this module or this process, the
+other side accepts nothing but a well-formed message in time.
+"""
+
+from __future__ import annotations
+
+import os
+from contextlib import suppress
+from multiprocessing.connection import Connection
+from typing import Any
+
+from airground_drake.errors import AirgroundError, described
+from airground_drake.intervention.guest.codec import KINDS, LONGEST, decoded, encoded
+from airground_drake.intervention.policy import Policy, motions_of
+from airground_drake.registry import POLICIES
+
+
+def main(channel: int) -> None:
+    """Serve one policy over the `Connection` with this descriptor until it is closed."""
+    with suppress(EOFError, OSError):
+        connection: Connection[bytes, bytes] = Connection(channel)
+        order = decoded(connection.recv_bytes(), ())
+        try:
+            policy = POLICIES.make(order["name"], of=Policy, **dict(order["parameters"]))
+        except AirgroundError as error:
+            connection.send_bytes(encoded({"fault": str(error)}))
+            os._exit(0)
+        connection.send_bytes(encoded({"counted": policy.counted is True}))
+        while True:
+            connection.send_bytes(encoded(answer(policy, connection.recv_bytes())))
+    os._exit(0)  # also if the policy has started threads that still run
+
+
+def answer(policy: Policy, data: bytes) -> dict[str, Any]:
+    """What the policy proposes on an encoded observation: `motions`, a list of names and motions, or a `fault`."""
+    try:
+        seen = decoded(data, KINDS)
+        found = {"motions": list(motions_of(policy.propose(seen), seen).items())}
+        if (size := len(encoded(found))) > LONGEST:
+            raise ValueError(f"a proposal of {size} bytes; at most {LONGEST} are allowed")
+    except BaseException as error:  # whatever the policy does, it counts as no intervention
+        return {"fault": described(error, type(policy).propose)}
+    return found

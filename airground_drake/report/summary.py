@@ -1,0 +1,590 @@
+"""What the first screen of a report says, from report.json alone: headline, five answers, what not to conclude.
+
+Marks follow what happened in the runs. Whether the scenario declared it so is a statement of its own, `as_declared`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+from airground_drake.errors import one_line
+from airground_drake.registry import METHODS
+from airground_drake.statuses import NOT_EXERCISED, PASSING, UNDECIDED, admits_either, outcome
+
+MARKS = {"yes": "✓", "partly": "≈", "no": "✗", "open": "?", "none": "\N{EN DASH}", "": " "}
+"""Marks of a line and their icons; '' continues the line before."""
+MAX_NAMES = 3
+"""Robots that a line names."""
+SLACK_M = 1e-9
+"""Distances that fall short of the required one by less are kept, as in SAFE-TRACE."""
+WORDS_OF_REFUSALS = {
+    "waits": "waiting looked cheaper",
+    "first_stage": "waiting looked cheaper",
+    "not_cheaper": "its own task looked as good",
+    "no_difference": "it would have changed nothing",
+    "no_plan": "no outcome could be computed",
+    "stalls": "it would have stalled on the way",
+    "exhausted": "it had gone along as often as it does",
+}
+"""Why a proposal was refused, in a few words."""
+
+Document = Mapping[str, Any]
+
+
+class Line(NamedTuple):
+    """A sentence and its mark, a key of `MARKS`."""
+
+    mark: str
+    text: str
+
+
+class Answer(NamedTuple):
+    """A question of the reader and its answer."""
+
+    question: str
+    lines: list[Line]
+
+
+class Row(NamedTuple):
+    """What came of a run, for the table of methods."""
+
+    run: str
+    method: str
+    safe: Line
+    arrived: Line
+    interventions: str
+
+
+class Near(NamedTuple):
+    """The smallest distance of a pair, of centres."""
+
+    margin_m: float
+    robot: str
+    other: str
+    value_m: float
+    required_m: float
+    t_s: float
+
+    def told(self) -> str:
+        """The distance and from whom."""
+        return f"{distance(self.value_m, self.required_m)} ({self.robot} to {self.other})"
+
+
+@dataclass
+class Course:
+    """What came of a run.
+
+    Attributes:
+        name: of the run.
+        method: its identifier.
+        plain: whether priorities are composed as the package does it; False: by a recursion that is only compared.
+        near: pairs, those of least margin first.
+        safe: whether every pair kept its distance; None: nobody knows.
+        why: why nobody knows, or what the claim says where the distances do not.
+        tested: whether any pair came near enough to be kept apart.
+        collisions: events.
+        away: robots that did not end at their targets, and where they did.
+        stuck: those of them that stand where the scenario says that they stall.
+        last_s: when the last robot arrived, s.
+        there: how many UGVs ended at their targets.
+    """
+
+    name: str
+    method: str
+    plain: bool
+    near: list[Near] = field(default_factory=list)
+    safe: bool | None = None
+    why: str = "it was not run"
+    tested: bool = False
+    collisions: list[Mapping[str, Any]] = field(default_factory=list)
+    away: dict[str, Sequence[float]] | None = None
+    stuck: set[str] = field(default_factory=set)
+    last_s: float = 0.0
+    there: int = 0
+
+    @property
+    def helped(self) -> bool:
+        """Whether the UAV intervenes."""
+        return METHODS[self.method].intervenes if self.method in METHODS else True
+
+    @property
+    def fine(self) -> bool:
+        """Whether every distance was kept and every robot arrived."""
+        return self.safe is True and self.away == {}
+
+    @property
+    def crashed(self) -> bool:
+        """Whether a robot collided."""
+        return bool(self.collisions)
+
+
+def headline(document: Document) -> Line:
+    """The report in a sentence."""
+    every = courses(document)
+    main = [course for course in every if course.plain] or every
+    unknown = [course.name for course in main if course.safe is None or course.away is None]
+    unsafe = [course for course in main if course.safe is False]
+    fine = [course for course in main if course.fine]
+    helped, alone = ([course for course in main if course.helped is way] for way in (True, False))
+    if not main:
+        return Line("open", "Nothing was run.")
+    if unknown and not unsafe:
+        return Line("open", f"Not decided: {_of_runs(unknown)} could not be judged.")
+    if len(fine) == len(main):
+        told = "With and without help, all arrive safely." if helped and alone else "All arrive safely."
+        return _unless_one_crashed(every, told)
+    short = [course for course in main if course.away and course not in unsafe]
+    if helped and all(course.fine for course in helped):
+        return _unless_one_crashed(every, f"With help, all arrive safely. Without it, {_trouble(alone)}.")
+    if fine:
+        of = _methods(fine)
+        told = f"Only {of} {'is' if len({course.method for course in fine}) == 1 else 'are'} safe and "
+        told += "brings everyone home." if len({course.method for course in fine}) == 1 else "bring everyone home."
+        return Line("partly", f"{told} {_capital(_failures(unsafe, short))}")
+    if unsafe:
+        rest = "No method brings everyone home safely." if len(main) > 1 else "Not safe."
+        return Line("no", f"{rest} {_capital(_failures(unsafe, []))}")
+    return Line("no", f"Safe, but not all arrive: {_trouble(short)}.")
+
+
+def answers(document: Document) -> list[Answer]:
+    """The five questions, as far as the report has something to say about each."""
+    every = courses(document)
+    asked = [Answer("Safe?", list(_safe(document, every))), Answer("Arrived?", list(_arrived(document, every)))]
+    asked = [] if methods(document) else asked
+    rest = [("Zeno-free?", _zeno(document)), ("Threshold?", _threshold(document)), ("Paper?", _paper(document))]
+    return [answer for answer in [*asked, *(Answer(name, list(lines)) for name, lines in rest)] if answer.lines]
+
+
+def methods(document: Document) -> list[Row]:
+    """A row for each run of a scenario that has no counterpart in the paper; none with a single run."""
+    every = courses(document)
+    if document["reproduction"] or len(every) < 2:
+        return []
+    return [_row(document, course) for course in every]
+
+
+def required_m(document: Document) -> str:
+    """The distances that pairs must keep, m."""
+    required = sorted({near.required_m for course in courses(document) for near in course.near})
+    return f"{required[0]:g} m" if len(required) == 1 else f"{required[0]:g} to {required[-1]:g} m" if required else ""
+
+
+def do_not_conclude(document: Document) -> list[str]:
+    """What a reader might wrongly take away, each in a few words."""
+    every = courses(document)
+    said = ["that real vehicles are safe: the model is first-order, its sensing perfect"]
+    seen = [course for course in every if course.safe and not (course.method == "d" and _proved_for_d(document, every))]
+    if seen:
+        said.append(f"that {_methods(seen)} {'is' if _one(seen) else 'are'} safe elsewhere: seen in these runs only")
+    if any(course.away == {} for course in every):
+        said.append("that all arrive from other starts or with other seeds: arrival is seen, not proved")
+    if document["runs"] and not _triggers(document):
+        said.append("that the UAV helps: it was never called")
+    if any(course.safe is None for course in every):
+        said.append("that what could not be judged is fine")
+    return said
+
+
+def as_declared(document: Document) -> Line:
+    """Whether the verdicts are those that the scenario declares: a statement about the scenario, not about safety."""
+    overall, claims = document["overall"], document["claims"]
+    if overall["status"] != "as_expected":
+        return Line("no" if overall["status"] == "not_as_expected" else "open", str(overall["why"]))
+    failed = sum(claim["status"] == "refuted" and not admits_either(claim["expected"]) for claim in claims)
+    idle = sum(outcome(claim["status"], claim["exercised"]) == NOT_EXERCISED for claim in claims)
+    parts = [
+        f"{failed} deliberate failure{'s' * (failed != 1)}" if failed else "",
+        f"{idle} not tested" if idle else "",
+        f"{len(overall['either'])} allowed either way" if overall["either"] else "",
+    ]
+    told = ", ".join(filter(None, parts))
+    return Line("yes", f"{len(claims)} checks as declared{': ' if told else ''}{told}.")
+
+
+def text(document: Document) -> str:
+    """The first screen for a terminal."""
+    rows = methods(document)
+    mark, says = headline(document)
+    lines = [f"[{MARKS[mark]}] {says}"]
+    lines += [
+        f"    {row.run}: [{MARKS[row.safe.mark]}] {row.safe.text}; [{MARKS[row.arrived.mark]}] {row.arrived.text}; "
+        f"interventions: {row.interventions}"
+        for row in rows
+    ]
+    for question, answered in answers(document):
+        for k, (mark, says) in enumerate(answered):
+            lines.append(f"{'' if k else question:<11} [{MARKS[mark]}] {says}" if mark else f"{'':<15} {says}")
+    lines.append(f"Do not conclude: {'; '.join(do_not_conclude(document))}.")
+    return "\n".join(map(one_line, lines))
+
+
+def courses(document: Document) -> list[Course]:
+    """What came of every run that the scenario names, in its order."""
+    resolved = document["scenario"]["resolved"]
+    return [
+        _course(document, name, run)
+        if name in document["runs"]
+        else Course(name, str(run["method"]), run["composition"] == "augmented")
+        for name, run in resolved["runs"].items()
+    ]
+
+
+def _course(document: Document, name: str, spec: Mapping[str, Any]) -> Course:
+    resolved, run = document["scenario"]["resolved"], document["runs"][name]
+    metrics, uav = run["metrics"], resolved["uav"]
+    pairs: dict[frozenset[str], Near] = {}
+    for kind in ("min_distance_m", "min_robot_distance_m"):
+        for robot, others in metrics[kind].items():
+            for other, found in others.items():
+                value, required = found["value"], found["safe_distance_m"]
+                pair = Near(value - required, robot, other, value, required, found["t_s"])
+                pairs.setdefault(frozenset((robot, other)), pair)
+    near = sorted(pairs.values())
+    hits = [event for event in run["events"] if event["kind"] == "collision"]
+    claim = next((each for each in document["claims"] if (each["id"], each["run"]) == ("SAFE-TRACE", name)), None)
+    safe, why = _judged(claim, bool(hits) or bool(near and near[0].margin_m < -SLACK_M))
+    targets = {**{ugv: each["target_m"] for ugv, each in resolved["ugvs"].items()}, uav["name"]: uav["target_m"]}
+    ends = metrics["final_position_m"]
+    off = {
+        robot: ends[robot]
+        for robot, target in targets.items()
+        if robot not in ends or _apart(ends[robot], target) > resolved["arrival_tolerance_m"]
+    }
+    if len(off) > 1:
+        off.pop(uav["name"], None)  # it follows the UGVs: where they are not home, neither is it
+    goal = next((each for each in document["claims"] if (each["id"], each["run"]) == ("LIVE-GOAL", name)), None)
+    conditions = goal["evidence"].get("conditions", []) if goal else []
+    stuck = {
+        each["robot"] for each in conditions if each.get("condition") == "stands" and each["margin_m"] >= 0.0
+    } & off.keys()
+    arrivals = [event["t_s"] for event in run["events"] if event["kind"] == "arrival"]
+    there = len(resolved["ugvs"].keys() - off.keys())
+    tested = claim is not None and claim["exercised"] != 0
+    method, plain = str(run["method"]), spec["composition"] == "augmented"
+    return Course(name, method, plain, near, safe, why, tested, hits, off, stuck, max(arrivals, default=0.0), there)
+
+
+def _judged(claim: Mapping[str, Any] | None, short: bool) -> tuple[bool | None, str]:
+    """Whether a run was safe, by its distances and by SAFE-TRACE, and what the claim says if that decides."""
+    if short:
+        return False, ""
+    if claim is None:
+        return None, "SAFE-TRACE was not checked"
+    if claim["status"] == "refuted":
+        return False, "SAFE-TRACE is refuted"
+    if claim["status"] in UNDECIDED:
+        return None, f"SAFE-TRACE: {claim['status'].replace('_', ' ')}"
+    return True, ""
+
+
+def _safe(document: Document, every: Sequence[Course]) -> Iterator[Line]:
+    bad = [course for course in every if course.safe is False]
+    for course in bad:
+        if course.plain or course.crashed:
+            yield Line("no", f"{course.name}: {_intrusion(course)}{_declared(document, course)}.")
+    for why in dict.fromkeys(course.why for course in every if course.safe is None):
+        alike = [course.name for course in every if course.safe is None and course.why == why]
+        yield Line("open", f"{', '.join(alike)}: not known, {why}.")
+    kept = [course for course in every if course.safe]
+    pairs = [course.near[0] for course in kept if course.near]
+    if pairs:
+        tested, least = any(course.tested for course in kept), min(pairs)
+        untested = "" if tested else "; nothing came near, so this was not tested"
+        told = f"minimum distance {least.told()}, required {least.required_m:g} m{untested}"
+        yield Line("yes" if tested else "none", f"{', '.join(course.name for course in kept)}: {told}.")
+    if any(course.method == "d" for course in every):
+        yield _proof(document, every)
+    printed = [course for course in bad if not course.plain and not course.crashed]
+    if printed:
+        worst = min(printed, key=lambda course: course.near[:1])
+        declared = "".join(dict.fromkeys(_declared(document, course) for course in printed))
+        yield Line("no", f"Recursion (5) as printed: {_intrusion(worst)}{declared}.")
+
+
+def _proof(document: Document, every: Sequence[Course]) -> Line:
+    if _proved_for_d(document, every):
+        return Line("", "Proved for (d), whatever the UAV asks for.")
+    theorems = _statuses(document, ("SAFE-INV", "SAFE-GATE"))
+    if theorems and set(theorems) == {"proved"}:
+        return Line("no", "The proof for (d) does not apply: a run did not meet its conditions (SAFE-HYP).")
+    return Line("open", "Not proved for (d).")
+
+
+def _proved_for_d(document: Document, every: Sequence[Course]) -> bool:
+    theorems = _statuses(document, ("SAFE-INV", "SAFE-GATE"))
+    runs = [course.name for course in every if course.method == "d"]
+    met = [c for c in document["claims"] if c["id"] == "SAFE-HYP" and c["run"] in runs]
+    return (
+        len(theorems) == 2
+        and set(theorems) == {"proved"}
+        and len(met) == len(runs) > 0
+        and all(claim["status"] in PASSING and claim["exercised"] for claim in met)
+    )
+
+
+def _statuses(document: Document, names: Sequence[str]) -> list[str]:
+    return [str(claim["status"]) for claim in document["claims"] if claim["id"] in names and not claim["run"]]
+
+
+def _arrived(document: Document, every: Sequence[Course]) -> Iterator[Line]:
+    home = [course for course in every if course.away == {} and course.plain]
+    if home:
+        last = max(course.last_s for course in home)
+        yield Line("yes", f"{', '.join(course.name for course in home)}: all{f', by {last:.1f} s' if last else ''}.")
+    told: dict[tuple[str, str], list[str]] = {}
+    for course in every:
+        if course.away is None:
+            told.setdefault(("open", f"not known, {course.why}"), []).append(course.name)
+        elif course.away:
+            mark = "no" if course.helped or course.crashed else "none"
+            told.setdefault((mark, _whereabouts(document, course)), []).append(course.name)
+    for (mark, says), names in told.items():
+        yield Line(mark, f"{', '.join(names)}: {says}.")
+
+
+def _whereabouts(document: Document, course: Course) -> str:
+    """Who did not arrive, and where each is."""
+    ends = []
+    uav = document["scenario"]["resolved"]["uav"]["name"]
+    for robot, at in list((course.away or {}).items())[:MAX_NAMES]:
+        place = ", ".join(f"{round(x, 2) + 0.0:.2f}" for x in (at if robot == uav else at[:2]))
+        as_printed = any(
+            (row["run"], row["robot"]) == (course.name, robot)
+            and row["measure"] in ("stall_position", "collision_position")
+            and row["status"] in ("reproduced", "calibrated")
+            for row in document["reproduction"]
+        )
+        hit = any(event["robot"] == robot for event in course.collisions)
+        how = "collided, ended" if hit else "stuck" if robot in course.stuck else "ended short of its target,"
+        ends.append(f"{robot} {how} at ({place}) m{', as in the paper' * as_printed}")
+    more = len(course.away or {}) - MAX_NAMES
+    ugvs = document["scenario"]["resolved"]["ugvs"]
+    count = f"{course.there} of {len(ugvs)} UGVs; " if len(ugvs) > 2 else ""
+    return f"{count}{'; '.join(ends)}{f'; {more} more' if more > 0 else ''}"
+
+
+def _zeno(document: Document) -> Iterator[Line]:
+    decision = document["scenario"]["resolved"]["decision"]
+    bound = decision["min_inter_event_s"]
+    for status in _statuses(document, ["ZENO-PROOF"]):
+        if status == "proved":
+            yield Line("yes", f"Proved: triggers are at least {bound:g} s apart.")
+        else:
+            bare = ", as the trigger is the bare threshold" if decision["trigger"] == "bare" else ""
+            mark = "no" if status == "refuted" else "open"
+            yield Line(mark, f"Not proved{bare} (ZENO-PROOF: {status.replace('_', ' ')}).")
+    claims = [claim for claim in document["claims"] if claim["id"] == "ZENO-TRACE"]
+    bad = [claim for claim in claims if claim["status"] == "refuted"]
+    for claim in bad:
+        gap = (claim["counterexample"] or {}).get("gap_s")
+        yield Line("no", f"{claim['run']}: two triggers {f'{gap:.3g} s' if gap is not None else 'too close'} apart.")
+    seen = [claim for claim in claims if claim["status"] in PASSING and claim["exercised"]]
+    if seen:
+        gaps = [c["evidence"].get("smallest_gap", {}).get("gap_s") for c in seen]
+        least = min((gap for gap in gaps if gap is not None), default=None)
+        smallest = f"; the smallest is {least:.3f} s" if least is not None else ""
+        yield Line("", f"Seen: {sum(claim['exercised'] for claim in seen)} gaps between triggers{smallest}.")
+    elif claims and not bad:
+        most = "at most one trigger per UGV and run" if _triggers(document) else "nothing triggered"
+        yield Line("", f"Not tested here: {most} (see scenario dwell).")
+
+
+def _threshold(document: Document) -> Iterator[Line]:
+    claims = [claim for claim in document["claims"] if claim["id"] == "THR-TRIG"]
+    bad = [claim for claim in claims if claim["status"] == "refuted"]
+    unknown = [str(claim["run"]) for claim in claims if claim["status"] in UNDECIDED]
+    fired = _triggers(document)
+    zeta = " or ".join(f"{zeta:.4g}" for zeta in dict.fromkeys(run["zeta_m"] for run in document["runs"].values()))
+    for claim in bad:
+        yield Line("no", f"{claim['run']}: a trigger is missed, spurious or at the wrong time (THR-TRIG).")
+    if unknown:
+        yield Line("open", f"{', '.join(unknown)}: not known whether triggers are missed (THR-TRIG).")
+    if not fired and document["runs"]:
+        yield Line("none", f"Not tested here: nothing reached the {zeta} m.")
+    elif claims and not bad and not unknown:
+        times = sorted({round(event["t_s"], 3) for event in fired})
+        runs = f" in {len(document['runs'])} runs" if len(document["runs"]) > 1 else ""
+        when = f"at {times[0]:.3f} s" if len(times) == 1 else f"{len(fired)} times{runs}, first at {times[0]:.3f} s"
+        yield Line("yes", f"Fired at {zeta} m, {when}; none missed, none spurious.")
+    for claim in document["claims"]:
+        found = claim["evidence"]
+        if claim["id"] == "THR-CHOICE" and "optimal_threshold_m" in found:
+            best, cost = found["optimal_threshold_m"], found["extra_risk"]
+            mine = f"{found['threshold_in_force_m']:.4g} m"
+            if found["kind"] != "declared":
+                yield Line("yes", f"{mine} is the Bayes optimum for the assumed drift and noise.")
+            else:
+                told = f"{mine} is declared; the Bayes optimum for the assumed drift and noise is {best:.4g} m"
+                yield Line("partly", f"{told} (extra risk {cost:.2g}){_for_the_drift(found.get('runs', {}))}.")
+
+
+def _for_the_drift(runs: Mapping[str, Mapping[str, Any]]) -> str:
+    """The optimum for the drift of the first robot that triggered."""
+    for name, row in runs.items():
+        run, _, robot = name.partition(" ")
+        best = row.get("optimum_for_this_drift_m")
+        return f"; for the drift that {robot} had in run {run}, {best:.2g} m" if best is not None else ""
+    return ""
+
+
+def _paper(document: Document) -> Iterator[Line]:
+    rows = document["reproduction"]
+    words = {
+        "reproduced": "without tuning", "calibrated": "after calibration", "by_construction": "by construction",
+        "ambiguous": "ambiguous", "not_reproduced": "not reproduced",
+    }  # fmt: skip
+    by = {status: [row["id"] for row in rows if row["status"] == status] for status in words}
+    matched = sum(len(by[status]) for status in ("reproduced", "calibrated"))
+    mark = "yes" if len(by["reproduced"]) == len(rows) else "partly" if matched else "no"
+    told = [f"{len(by[status])} {words[status]}" for status in ("reproduced", "calibrated") if by[status]]
+    rest = [
+        f"{words[status]}: {', '.join(by[status])}"
+        for status in ("by_construction", "ambiguous", "not_reproduced")
+        if by[status]
+    ]
+    if rows:
+        yield Line(mark, f"{matched} of {len(rows)} results match{_listed(': ', told)}{_listed('; ', rest, '; ')}.")
+
+
+def _row(document: Document, course: Course) -> Row:
+    says = METHODS[course.method].says if course.method in METHODS else course.method
+    own = document["scenario"]["resolved"]["runs"][course.name].get("set", {})
+    says += "".join(f", {key}: {value}" for key, value in own.items())
+    proved = ", proved" if course.method == "d" and _proved_for_d(document, [course]) else ""
+    if course.safe is None:
+        safe = Line("open", f"not known, {course.why}")
+    elif not course.safe:
+        near = course.near[0] if course.near else None
+        safe = Line("no", f"{distance(near.value_m, near.required_m)}, {near.other}" if near else course.why)
+    elif course.near:
+        told = f"{distance(course.near[0].value_m, course.near[0].required_m)}{proved or ', not proved'}"
+        safe = Line("yes" if course.tested else "none", told if course.tested else f"{told}; not tested")
+    else:
+        safe = Line("none", "nothing near")
+    if course.away is None:
+        return Row(course.name, says, safe, Line("open", "not known"), "not run")
+    count = len(document["scenario"]["resolved"]["ugvs"])
+    home = "yes" if not course.away else "no"
+    uav = "; not the UAV" if course.away and course.there == count else ""
+    return Row(course.name, says, safe, Line(home, f"{course.there} of {count}{uav}"), _interventions(document, course))
+
+
+def _interventions(document: Document, course: Course) -> str:
+    run = document["runs"][course.name]
+    kinds = [event["kind"] for event in run["events"]]
+    proposed, accepted, refused = (kinds.count(kind) for kind in ("proposal", "accept", "refuse"))
+    if not proposed:
+        return "none"
+    if course.method in METHODS and not METHODS[course.method].gated:
+        return f"{proposed} obeyed"
+    told = ", ".join(f"{n} {what}" for n, what in ((accepted, "accepted"), (refused, "refused")) if n) or "no answer"
+    reasons: dict[str, int] = {}
+    for found in (run["metrics"]["gatekeeper"] or {}).get("refusals", {}).values():
+        for reason, count in found.items():
+            words = WORDS_OF_REFUSALS.get(reason, reason.replace("_", " "))
+            reasons[words] = reasons.get(words, 0) + count
+    return told + (f": {max(reasons, key=reasons.__getitem__)}" if refused and reasons else "")
+
+
+def distance(value_m: float, required_m: float) -> str:
+    """A distance, with as many decimals as it takes to tell it from the required one that it falls short of."""
+    decimals = 3
+    while value_m < required_m - SLACK_M and float(f"{value_m:.{decimals}f}") >= required_m and decimals < 9:
+        decimals += 1
+    return f"{value_m:.{decimals}f} m"
+
+
+def _intrusion(course: Course, *, brief: bool = False) -> str:
+    if not course.near or course.near[0].margin_m >= -SLACK_M:
+        hit = course.collisions[0] if course.collisions else None
+        return f"{hit['robot']} collides at {hit['t_s']:.2f} s" if hit else course.why
+    least = course.near[0]
+    short = sum(near.margin_m < -SLACK_M for near in course.near) - 1
+    told = f"{least.robot} comes to {distance(least.value_m, least.required_m)} of {least.other}"
+    if brief:
+        return told
+    told += f" at {least.t_s:.2f} s, required {least.required_m:g} m"
+    told += f"; {short} more pair{'s' * (short > 1)} too close" if short else ""
+    return f"{_colliding(course)}: {told}" if course.collisions else told
+
+
+def _colliding(course: Course) -> str:
+    names = list(dict.fromkeys(event["robot"] for event in course.collisions))
+    return f"{_some(names)} collide{'s' * (len(names) == 1)}"
+
+
+def _declared(document: Document, course: Course) -> str:
+    """Whether the scenario declares that a run is not safe."""
+    claim = next(
+        c for c in [*document["claims"], None] if c is None or (c["id"], c["run"]) == ("SAFE-TRACE", course.name)
+    )
+    return " (as declared)" if claim and claim["as_expected"] and claim["status"] == "refuted" else ""
+
+
+def _failures(unsafe: Sequence[Course], short: Sequence[Course]) -> str:
+    """What went wrong under the other methods: the worst first."""
+    told: dict[str, list[Course]] = {}
+    for course in [*unsafe, *short]:
+        told.setdefault(_trouble([course]), []).append(course)
+    return "; ".join(f"under {_methods(those, '')}, {what}" for what, those in told.items()) + "."
+
+
+def _trouble(those: Sequence[Course]) -> str:
+    """What became of those who did not arrive, or came too near."""
+    unsafe = next((course for course in those if course.safe is False), None)
+    if unsafe is not None:
+        return _colliding(unsafe) if unsafe.crashed else _intrusion(unsafe, brief=True)
+    away = list(dict.fromkeys(robot for course in those for robot in course.away or {}))
+    stuck = all(robot in course.stuck for course in those for robot in course.away or {})
+    if stuck:
+        return f"{_some(away)} {'is' if len(away) == 1 else 'are'} stuck"
+    return f"{_some(away)} {'does' if len(away) == 1 else 'do'} not arrive"
+
+
+def _unless_one_crashed(every: Iterable[Course], told: str) -> Line:
+    """Good news, unless a robot collided in any run at all."""
+    crashed = [course for course in every if course.crashed]
+    if not crashed:
+        return Line("yes", told)
+    hits = "; ".join(f"in run {course.name}, {_colliding(course)}" for course in crashed if course.plain is False)
+    return Line("partly", f"{told} {_capital(hits)}." if hits else told)
+
+
+def _triggers(document: Document) -> list[Mapping[str, Any]]:
+    return [event for run in document["runs"].values() for event in run["events"] if event["kind"] == "trigger"]
+
+
+def _one(those: Sequence[Course]) -> bool:
+    return len({course.method for course in those}) == 1
+
+
+def _methods(those: Sequence[Course], noun: str = "method") -> str:
+    names = list(dict.fromkeys(f"({course.method})" for course in those))
+    listed = names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+    return f"{noun}{'s' * (len(names) > 1)} {listed}" if noun else listed
+
+
+def _of_runs(names: Sequence[str]) -> str:
+    return f"run{'s' * (len(names) > 1)} {', '.join(names)}"
+
+
+def _some(names: Sequence[str]) -> str:
+    shown = list(names[:MAX_NAMES])
+    if len(names) > MAX_NAMES:
+        return f"{len(names)} robots"
+    return shown[0] if len(shown) == 1 else f"{', '.join(shown[:-1])} and {shown[-1]}"
+
+
+def _listed(before: str, words: Sequence[str], between: str = ", ") -> str:
+    return before + between.join(words) if words else ""
+
+
+def _capital(says: str) -> str:
+    return says[:1].upper() + says[1:]
+
+
+def _apart(one: Sequence[float], other: Sequence[float]) -> float:
+    return float(sum((a - b) ** 2 for a, b in zip(one, other, strict=True)) ** 0.5)

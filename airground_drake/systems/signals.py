@@ -1,0 +1,48 @@
+"""What flows through ports and what Contexts hold: named vectors per UGV and per system, and types of messages."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from pydrake.common.containers import namedview
+from pydrake.common.value import AbstractValue, Value
+
+from airground_drake.arrays import Array
+from airground_drake.intervention.messages import Report
+
+Status = namedview("Status", ["mode", "triggers", "triggered_at_s", "released_at_s"])
+"""Of one UGV, from the trigger: its `decision.trigger.Mode`, how often it triggered, when it last did and was released
+(-1 before)."""
+Answer = namedview("Answer", ["answer", "number"])
+"""Of one UGV, from the gatekeeper: ACCEPT, REFUSE or SILENT of `messages`, and the number of the proposal."""
+UgvGains = namedview("UgvGains", ["avoidance_gain_1_s", "motion_gain_1_s", "intervention_gain_1_s"])
+"""Parameters of `UgvController`: A of (8), B of (6), Lambda of (14)."""
+UavGains = namedview("UavGains", ["avoidance_gain_1_s", "formation_gain_1_s"])
+"""Parameters of `UavController`: A of (11), C of (10)."""
+TriggerLevels = namedview("TriggerLevels", ["zeta_m", "release_m", "dwell_s"])
+"""Parameters of `EventTrigger`: see `decision.trigger.Trigger`."""
+
+FIELDS = len(Status.get_fields())
+"""Numbers of the trigger's status per UGV."""
+
+
+def of_ugv(view: Any, values: Array, index: int) -> Any:
+    """The named vector of one UGV in those of all."""
+    size = len(view.get_fields())
+    return view(values[size * index : size * (index + 1)])
+
+
+def laid_out(view: Any, rows: list[list[float]]) -> Array:
+    """Named vectors of all UGVs, one row each, as a port has them."""
+    return np.array(rows, dtype=np.float64).reshape(-1, len(view.get_fields())).ravel()
+
+
+def no_proposals(count: int) -> AbstractValue:
+    """Type of the messages `proposals`: a tuple with a `Proposal` or None for each of `count` UGVs."""
+    return Value((None,) * count)
+
+
+def no_reports(count: int) -> AbstractValue:
+    """Type of the messages `reports`: a tuple with a `Report` for each of `count` UGVs."""
+    return Value((Report(),) * count)

@@ -1,0 +1,150 @@
+"""Draw what stands in a scenario in Meshcat."""
+
+from __future__ import annotations
+
+import logging
+
+import numpy as np
+from pydrake.geometry import Box, Cylinder, Meshcat, MeshcatCone, MeshcatParams, Rgba
+from pydrake.math import RigidTransform, RollPitchYaw
+
+from airground_drake.arrays import Array
+from airground_drake.errors import ReplayError
+from airground_drake.view.geometry import camera, grid
+from airground_drake.view.looks import (
+    OBSTACLE_COLOR,
+    PATH_COLOR,
+    SAFE_COLOR,
+    STATE_COLORS,
+    UAV_COLOR,
+    UNSEEN_COLOR,
+)
+from airground_drake.view.stage import STATES, TRIGGERED, Pillar, Robot, Stage
+
+ELEVATION = np.radians(58.0)
+OPENING_DEG, MARGIN_DEG = 46.0, 7.0
+"""Angle of the camera, and how much of it is left to the panels."""
+
+
+def served() -> Meshcat:
+    """A new Meshcat, which serves itself on this machine as long as it lives.
+
+    Raises:
+        ReplayError: if there is no port that it may listen on.
+    """
+    logging.getLogger("drake").setLevel(logging.WARNING)  # it tells its address, which says nothing about the file
+    try:
+        return Meshcat(MeshcatParams(host="localhost", show_stats_plot=False))
+    except RuntimeError as error:
+        raise ReplayError(f"Meshcat cannot listen on any port of this machine: {error}") from error
+
+
+def draw(meshcat: Meshcat, stage: Stage) -> None:
+    """Draw what stands in a scenario; robots are drawn at the origin, each UGV once in every state."""
+    _ground(meshcat, stage)
+    for k, obstacle in enumerate(stage.obstacles):
+        _pillar(meshcat, obstacle_path(k), obstacle, stage.mark_m * (1.0 + k / len(stage.obstacles)))
+    for k, phantom in enumerate(stage.phantoms_m):
+        _cylinder(meshcat, f"/phantoms/{k}", stage.mark_m, stage.mark_m, phantom, UNSEEN_COLOR, 0.5)
+    for k, robot in enumerate(stage.robots):
+        _robot(meshcat, k, robot)
+
+
+def robot_path(k: int) -> str:
+    """Where robot k is in Meshcat's tree; below it is one child per state.
+
+    The tree has numbers, no names: its nodes are JavaScript objects, in which `__proto__` or `constructor` is no
+    child's name.
+    """
+    return f"/robots/{k}"
+
+
+def state_path(k: int, state: int) -> str:
+    """Where UGV k is drawn as it looks in a state, an index of STATES."""
+    return f"{robot_path(k)}/{state}"
+
+
+def shadow_path(k: int) -> str:
+    """Where the shadow of robot k is in Meshcat's tree."""
+    return f"/shadows/{k}"
+
+
+def obstacle_path(k: int) -> str:
+    """Where obstacle k is in Meshcat's tree."""
+    return f"/obstacles/{k}"
+
+
+def rgba(color: str, alpha: float = 1.0) -> Rgba:
+    """The colour that #rrggbb names."""
+    return Rgba(*(int(color[i : i + 2], 16) / 255.0 for i in (1, 3, 5)), alpha)
+
+
+def _cylinder(
+    meshcat: Meshcat, path: str, radius: float, height: float, foot: Array, color: str, alpha: float = 1.0
+) -> None:
+    meshcat.SetObject(path, Cylinder(radius, height), rgba(color, alpha))
+    meshcat.SetTransform(path, RigidTransform(foot + np.array([0.0, 0.0, height / 2.0])))
+
+
+def _ground(meshcat: Meshcat, stage: Stage) -> None:
+    """Ground and camera."""
+    for path in ("/Grid", "/Axes"):
+        meshcat.SetProperty(path, "visible", False)
+    for edge, shade in (("top_color", [0.93, 0.95, 0.97]), ("bottom_color", [0.98, 0.98, 0.98])):
+        meshcat.SetProperty("/Background/<object>", edge, shade)
+    start, end = grid(stage.low_m[:2], stage.high_m[:2])
+    meshcat.SetLineSegments("/ground", start, end, 1.0, rgba("#c4ccd4"))
+    for light in ("SpotLight", "PointLightNegativeX", "PointLightPositiveX"):  # these fade away from the origin
+        meshcat.SetProperty(f"/Lights/{light}/<object>", "visible", False)
+    meshcat.SetProperty("/Lights/AmbientLight/<object>", "intensity", 2.4)
+    meshcat.SetProperty("/Lights/FillLight/<object>", "intensity", 1.2)
+    place, target = camera(stage.low_m, stage.high_m, ELEVATION, np.radians(OPENING_DEG - MARGIN_DEG))
+    distance = float(np.linalg.norm(place - target))
+    meshcat.SetCamera(Meshcat.PerspectiveCamera(fov=OPENING_DEG, aspect=1.6, near=0.01 * distance, far=10.0 * distance))
+    meshcat.SetCameraPose(place, target)
+
+
+def _pillar(meshcat: Meshcat, path: str, obstacle: Pillar, height: float) -> None:
+    """An obstacle in its safe cylinder; no two of the same height, so that each is seen where they overlap."""
+    color = OBSTACLE_COLOR if obstacle.known_to_uav else UNSEEN_COLOR
+    _cylinder(meshcat, f"{path}/body", obstacle.radius_m, 2.0 * height, obstacle.centre_m, color)
+    _cylinder(meshcat, f"{path}/safe", obstacle.safe_m, height, obstacle.centre_m, SAFE_COLOR, 0.2)
+    angle = np.linspace(0.0, 2.0 * np.pi, 73)
+    rim = np.array([obstacle.safe_m * np.cos(angle), obstacle.safe_m * np.sin(angle), np.full_like(angle, height)])
+    meshcat.SetLine(f"{path}/rim", rim + obstacle.centre_m[:, None], 1.0, rgba(SAFE_COLOR))
+
+
+def _robot(meshcat: Meshcat, k: int, robot: Robot) -> None:
+    r = robot.radius_m
+    if robot.kind == "UAV":
+        _uav(meshcat, robot_path(k), r)
+        _cylinder(meshcat, f"{shadow_path(k)}/disc", r, 0.02 * r, np.zeros(3), "#000000", 0.25)
+        return
+    for state in range(len(STATES)):
+        _ugv(meshcat, state_path(k, state), r, state)
+    for turn in (45.0, -45.0):
+        bar = f"/targets/{k}/{turn:g}"
+        meshcat.SetObject(bar, Box(2.4 * r, 0.35 * r, 0.05 * r), rgba(PATH_COLOR))
+        meshcat.SetTransform(bar, RigidTransform(RollPitchYaw(0.0, 0.0, np.radians(turn)), robot.target_m))
+
+
+def _ugv(meshcat: Meshcat, path: str, r: float, state: int) -> None:
+    """A low cylinder in the colour of its state: with a cone over it if triggered, a ring round it if intervened."""
+    color = STATE_COLORS[state]
+    _cylinder(meshcat, f"{path}/body", r, r, np.zeros(3), color)
+    if state == TRIGGERED:
+        meshcat.SetObject(f"{path}/mark", MeshcatCone(1.4 * r, 0.7 * r, 0.7 * r), rgba(color))
+        meshcat.SetTransform(f"{path}/mark", RigidTransform([0.0, 0.0, 1.3 * r]))
+    elif state > TRIGGERED:
+        _cylinder(meshcat, f"{path}/mark", 1.7 * r, 0.2 * r, np.zeros(3), color, 0.5)
+
+
+def _uav(meshcat: Meshcat, path: str, r: float) -> None:
+    """Two crossed arms with a rotor at each end."""
+    for turn in (45.0, 135.0):
+        arm = f"{path}/arm{turn:g}"
+        meshcat.SetObject(arm, Box(2.4 * r, 0.2 * r, 0.2 * r), rgba(UAV_COLOR))
+        meshcat.SetTransform(arm, RigidTransform(RollPitchYaw(0.0, 0.0, np.radians(turn)), np.zeros(3)))
+    for x in (-0.85, 0.85):
+        for y in (-0.85, 0.85):
+            _cylinder(meshcat, f"{path}/rotor{x:g}{y:g}", 0.6 * r, 0.08 * r, r * np.array([x, y, 0.12]), UAV_COLOR, 0.6)

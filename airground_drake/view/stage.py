@@ -1,0 +1,107 @@
+"""What stands in a scenario, and how large it is drawn: from the scenario alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from airground_drake.arrays import Array
+from airground_drake.scenarios.schema import Obstacle, Scenario, Uav, Ugv
+from airground_drake.trace import Trace
+
+STATES = ("own task", "triggered", "intervened")
+"""What a robot does: follow its own task; the same, with its trigger set; carry out a proposal. By index."""
+OWN, TRIGGERED, INTERVENED = range(3)
+
+SMALLEST, LARGEST = 0.006, 0.018
+"""Radius of what is a point, as a share of the larger side of the scene: between these."""
+OF_SAFE_DISTANCE = 0.4
+"""Its share of the least safe distance on the ground: two points that keep it are drawn apart."""
+
+
+@dataclass(frozen=True)
+class Robot:
+    """A robot as it is drawn, with `radius_m`; `kind` is UGV or UAV; it is to arrive at `target_m` (3,)."""
+
+    name: str
+    kind: str
+    radius_m: float
+    target_m: Array
+
+
+@dataclass(frozen=True)
+class Pillar:
+    """An obstacle: `radius_m` as drawn; UGVs have to stay `safe_m` away from its centre, with their whole bodies."""
+
+    name: str
+    centre_m: Array
+    radius_m: float
+    safe_m: float
+    known_to_uav: bool
+
+
+@dataclass(frozen=True)
+class Stage:
+    """What stands in a scenario before anything moves.
+
+    `low_m` and `high_m` (3,) bound what is shown. `mark_m` is the radius with which a point is drawn. `phantoms_m`
+    (P, 3) are the obstacles that only the UAV's map has.
+    """
+
+    robots: tuple[Robot, ...]
+    obstacles: tuple[Pillar, ...]
+    phantoms_m: Array
+    low_m: Array
+    high_m: Array
+    mark_m: float
+
+
+def stage(scenario: Scenario, visited_m: Array | None = None) -> Stage:
+    """The stage of a scenario; it is large enough for all positions in `visited_m` (M, 3), m, if that is given."""
+    specs: dict[str, Ugv | Uav] = {**scenario.ugvs, scenario.uav.name: scenario.uav}
+    if visited_m is None:
+        visited_m = np.array([spec.start_m for spec in specs.values()])
+    low, high = _bounds(scenario, visited_m)
+    extent = float((high - low)[:2].max())
+    apart = min(scenario.safe_distance.obstacle_m, scenario.safe_distance.ugv_m)
+    mark = min(max(SMALLEST * extent, OF_SAFE_DISTANCE * apart), LARGEST * extent)
+    robots = tuple(
+        Robot(name, "UGV" if name in scenario.ugvs else "UAV", max(mark, radius_m(spec)), np.array(spec.target_m))
+        for name, spec in specs.items()
+    )
+    obstacles = tuple(
+        Pillar(
+            name, np.array(spec.position_m), max(mark, radius_m(spec)), safe_m(scenario, spec), spec.known_to_uav
+        )
+        for name, spec in scenario.obstacles.items()
+    )  # fmt: skip
+    return Stage(robots, obstacles, np.reshape(scenario.uav.phantoms_m, (-1, 3)), low, high, mark)
+
+
+def radius_m(spec: object) -> float:
+    """Radius of a robot or an obstacle, m; 0 for a point."""
+    return float(getattr(spec, "radius_m", 0.0))
+
+
+def safe_m(scenario: Scenario, obstacle: Obstacle) -> float:
+    """How far UGVs have to stay from the centre of an obstacle, with their whole bodies, m: d and its radius."""
+    return scenario.safe_distance.obstacle_m + radius_m(obstacle)
+
+
+def states(trace: Trace, ugv: str, times: Array) -> npt.NDArray[np.intp]:
+    """Indices of STATES (F,) at times (F,), s: what was in force just before each."""
+    rows = np.minimum(np.searchsorted(trace.t, times - 1e-9), len(trace.t) - 1)
+    accepted, mode = trace.column(f"{ugv}.accepted")[rows], trace.column(f"{ugv}.mode")[rows]
+    return np.where(accepted > 0, INTERVENED, np.where(mode == 1, TRIGGERED, OWN))
+
+
+def _bounds(scenario: Scenario, visited_m: Array) -> tuple[Array, Array]:
+    """Corners (3,), m, of a box with the positions (M, 3), m, the targets, and the obstacles' safe cylinders in it."""
+    points = [visited_m, np.array([spec.target_m for spec in scenario.ugvs.values()])]
+    for spec in scenario.obstacles.values():
+        reach = np.array([1.0, 1.0, 0.0]) * safe_m(scenario, spec)
+        points.append(np.array([spec.position_m]) + np.outer([-1.0, 1.0], reach))
+    every = np.concatenate([*points, visited_m[:1] * [1.0, 1.0, 0.0]])
+    return every.min(axis=0), np.maximum(every.max(axis=0), every.min(axis=0) + 1.0)

@@ -1,0 +1,201 @@
+"""The closest allowed velocity against its optimality conditions, solved in rational numbers without rounding."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from nsbc.test_avoidance import scene
+from properties import examples
+
+from airground_drake.arrays import Array
+from airground_drake.nsbc import kernels
+from airground_drake.nsbc.avoidance import Avoidance
+
+SEEDS = st.integers(0, 2**32 - 1)
+Row = list[Fraction]
+
+
+def rational(numbers: Array) -> Row:
+    return [Fraction(float(x)) for x in numbers]
+
+
+def dot(a: Sequence[Fraction], b: Sequence[Fraction]) -> Fraction:
+    return sum((x * y for x, y in zip(a, b, strict=True)), Fraction(0))
+
+
+def solved(matrix: Sequence[Row], right: Row) -> Row | None:
+    """The solution of linear equations by elimination; None unless there is exactly one."""
+    rows = [[*row, value] for row, value in zip(matrix, right, strict=True)]
+    count = len(rows[0]) - 1
+    for i in range(count):
+        pivot = next((k for k in range(i, len(rows)) if rows[k][i]), None)
+        if pivot is None:
+            return None
+        rows[i], rows[pivot] = rows[pivot], rows[i]
+        rows[i] = [x / rows[i][i] for x in rows[i]]
+        for k in range(len(rows)):
+            if k != i and rows[k][i]:
+                rows[k] = [x - rows[k][i] * y for x, y in zip(rows[k], rows[i], strict=True)]
+    return None if any(row[-1] for row in rows[count:]) else [row[-1] for row in rows[:count]]
+
+
+def closest(lower: Array, normal: Array, bound: Sequence[Fraction]) -> Array | None:
+    """Of all active sets the one whose forces are >= 0 and whose velocity meets all constraints; None if none does."""
+    wish, normals = rational(lower), [rational(n) for n in normal]
+    for size in range(len(wish) + 1):
+        for active in itertools.combinations(range(len(normals)), size):
+            gram = [[dot(normals[i], normals[j]) for j in active] for i in active]
+            force = solved(gram, [bound[i] - dot(normals[i], wish) for i in active]) if size else []
+            if force is None or any(f < 0 for f in force):
+                continue
+            push = [dot(force, [normals[i][a] for i in active]) for a in range(len(wish))]
+            velocity = [a + b for a, b in zip(wish, push, strict=True)]
+            if all(dot(n, velocity) >= b for n, b in zip(normals, bound, strict=True)):
+                return np.array([float(x) for x in velocity])
+    return None
+
+
+def least_violation(normal: Array, bound: Sequence[Fraction]) -> Fraction:
+    """min over v of max_k bound_k - normal_k . v: the largest weighted sum of bounds whose normals cancel out."""
+    normals, axes = [rational(n) for n in normal], normal.shape[1]
+    least = Fraction(0)
+    for size in range(1, axes + 2):
+        for some in itertools.combinations(range(len(normals)), size):
+            rows = [[normals[i][a] for i in some] for a in range(axes)]
+            weight = solved([*rows, [Fraction(1)] * size], [Fraction(0)] * axes + [Fraction(1)])
+            if weight is not None and all(w >= 0 for w in weight):
+                least = max(least, dot(weight, [bound[i] for i in some]))
+    return least
+
+
+def law(lower: Array, normal: Array, bound: Array) -> Array | None:
+    """The control law: the closest velocity that meets every constraint by the margin."""
+    seen = np.isfinite(bound)
+    return closest(lower, normal[seen], rational(bound[seen] + kernels.MARGIN_M_S))
+
+
+@examples(60, fuzz=1000)
+@given(SEEDS)
+def test_the_command_of_any_team_is_the_closest_allowed_velocity(seed: int) -> None:
+    """UGVs and a UAV, many of them in contact with obstacles or each other."""
+    team, positions = scene(seed, robots=3, obstacles=4)
+    rng = np.random.default_rng(seed)
+    positions[1, :2] = positions[0, :2] + rng.normal(size=2)  # inside each other's safe distance at times
+    avoidance = Avoidance(3.0, 0.05)
+    spaces = avoidance.half_spaces(positions, team.mobility, team.neighbourhood(slice(None)).around(positions))
+    lower = rng.normal(size=positions.shape) * 10.0 ** rng.uniform(-2.0, 1.0) * team.mobility
+    velocity = avoidance.apply(lower, spaces)
+    for v, wish, normal, bound in zip(velocity, lower, spaces.normal, spaces.bound, strict=True):
+        missed = bool((normal @ wish < bound).any())
+        expected = law(wish, normal, bound) if missed else wish
+        if expected is not None:
+            np.testing.assert_allclose(v, expected, atol=1e-9)
+
+
+@examples(150, fuzz=3000)
+@given(SEEDS, st.sampled_from(["parallel", "antiparallel", "equal", "coplanar"]), st.booleans())
+def test_normals_that_depend_on_each_other(seed: int, kind: str, planar: bool) -> None:
+    """Two, or three in one plane, but for an angle of 1e-9 to 1e-1 rad; bounds of contact, off by 1e-12 m/s."""
+    rng = np.random.default_rng(seed)
+    axes = 2 if planar else 3
+    normal = np.zeros((5, 3))
+    normal[:, :axes] = rng.normal(size=(5, axes))
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    angle = 0.0 if kind == "equal" else 10.0 ** rng.uniform(-8.5, -1.0)
+    aside = angle * rng.normal(size=3) * ([1.0, 1.0, 0.0] if planar else 1.0)
+    normal[1] = {"antiparallel": -normal[0], "coplanar": rng.normal() * normal[0] + normal[2]}.get(kind, normal[0])
+    normal[1] = (normal[1] + aside) / np.linalg.norm(normal[1] + aside)
+    dependent = normal[: 3 if kind == "coplanar" and not planar else 2, :axes]
+    assume(kind == "equal" or np.linalg.svd(dependent, compute_uv=False)[-1] > 1e-9)  # any flatter counts as parallel
+    bound = rng.choice([0.0, 1e-15, -1e-15, -1e-13, -1e-12], 5)
+    bound[3:] = -rng.uniform(0.0, 50.0, 2)
+    lower = 2.0 * rng.normal(size=3) * ([1.0, 1.0, 0.0] if planar else 1.0)
+    expected = law(lower, normal, bound)
+    if expected is not None:
+        np.testing.assert_allclose(kernels._closest_feasible(lower, normal, bound), expected, atol=1e-6)
+
+
+def between_two(count: int) -> list[tuple[Array, Array, Array]]:
+    """A robot in contact with two others on opposite sides, but for 1e-9.5 to 0.1 rad, and a far obstacle."""
+    rng, found = np.random.default_rng(0), []
+    for _ in range(count):
+        angle = rng.uniform(0.0, 2.0 * np.pi) + np.array([0.0, np.pi, rng.uniform(0.5, 2.5)])
+        angle[1] += 10.0 ** rng.uniform(-9.5, -1.0) * rng.choice([-1.0, 1.0])
+        normal = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(3)])
+        bound = np.array([*rng.choice([0.0, 1e-15, -1e-15, -1e-16], 2), -50.0])
+        found.append((2.0 * rng.normal(size=3) * [1.0, 1.0, 0.0], normal, bound))
+    return found
+
+
+def test_between_two_opposite_contacts_the_margin_decides_where_the_corner_is() -> None:
+    """Without the margin the corner would be elsewhere by up to 2e-12 m/s over the angle: another law."""
+    apart = []
+    for lower, normal, bound in between_two(400):
+        expected = law(lower, normal, bound)
+        assert expected is not None
+        np.testing.assert_allclose(kernels._closest_feasible(lower, normal, bound), expected, atol=1e-6)
+        without, missed = kernels._closest(lower, normal, bound, kernels.CONTRADICTION_M_S)
+        assert missed == 0.0
+        np.testing.assert_allclose(without, closest(lower, normal, rational(bound)), atol=1e-6)
+        apart.append(np.abs(without - expected).max())
+    assert max(apart) > 1e-3
+
+
+def test_without_the_margin_rounding_would_stop_robots_that_slide_along() -> None:
+    """At exactly the safe distance the bound is 0, and a velocity that misses it by 1e-17 m/s is scaled back to 0."""
+    rng, stopped = np.random.default_rng(1), 0
+    for _ in range(200):
+        angle = rng.uniform(0.0, 2.0 * np.pi)
+        normal, bound = np.array([[np.cos(angle), np.sin(angle), 0.0]]), np.zeros(1)
+        lower = 2.0 * (np.array([-normal[0, 1], normal[0, 0], 0.0]) - normal[0])
+        assert kernels.avoid_one(lower, normal, bound, kernels.AUGMENTED) @ lower == pytest.approx(4.0, abs=1e-9)
+        bare, _ = kernels._closest(lower, normal, bound, kernels.CONTRADICTION_M_S)
+        stopped += not kernels._scale_back(bare, normal, bound).any()
+    assert stopped
+
+
+@examples(80, fuzz=2000)
+@given(SEEDS, st.booleans(), st.sampled_from([0.0, 1e-6, 1e-4, 1e-2]), st.sampled_from([1e-6, 1e-3, 1.0]))
+def test_contradicting_constraints_are_missed_as_little_and_as_slowly_as_can_be(
+    seed: int, planar: bool, angle: float, demand: float
+) -> None:
+    """Between two that push against each other, among up to four more."""
+    rng = np.random.default_rng(seed)
+    axes, count = 2 if planar else 3, int(rng.integers(2, 7))
+    normal = rng.normal(size=(count, axes))
+    normal[1] = -normal[0] + angle * rng.normal(size=axes)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    if angle == 0.0:
+        normal[1] = -normal[0]
+    bound = demand * rng.uniform(-0.5, 2.0, count)
+    bound[:2] = demand * rng.uniform(0.1, 2.0, 2)
+    lower = 100.0 * rng.normal(size=3) * [1.0, 1.0, float(not planar)]
+    padded = np.pad(normal, ((0, 0), (0, 3 - axes)))
+    found = kernels._closest_feasible(lower, padded, bound)[:axes]
+    level = rational(bound + kernels.MARGIN_M_S)
+    least = least_violation(normal, level)
+    if least <= kernels.CONTRADICTION_M_S:
+        return
+    worst = max(float(b - dot(n, rational(found))) for b, n in zip(level, map(rational, normal), strict=True))
+    enough = Fraction(kernels.ABOVE_LEAST) * least + Fraction(kernels.ABOVE_LEAST_M_S) + least
+    assert worst <= float(enough) + 1e-13 * demand
+    slowest = closest(np.zeros(axes), normal, [b - enough for b in level])
+    assert slowest is not None
+    scale = max(1.0, float(np.linalg.norm(slowest)))
+    np.testing.assert_allclose(found, slowest, atol=1e-6 * scale)
+
+
+@given(SEEDS, st.integers(1, 5))
+def test_any_number_of_dimensions(seed: int, axes: int) -> None:
+    rng = np.random.default_rng(seed)
+    normal, lower = rng.normal(size=(int(rng.integers(1, 6)), axes)), rng.normal(size=axes)
+    bound = -np.abs(rng.normal(size=len(normal)))
+    found, missed = kernels._closest(lower, normal, bound, 0.0)
+    assert missed == 0.0
+    np.testing.assert_allclose(found, closest(lower, normal, rational(bound)), atol=1e-9)

@@ -1,0 +1,103 @@
+"""What decides a run is in its Context: copies of it, and other simulators, go on identically."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from pydrake.common import RandomGenerator
+from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
+from pydrake.systems.framework import Context, Diagram
+
+from airground_drake.diagram import RECORDED, Model, build_model
+from airground_drake.intervention.messages import ACCEPT, SILENT
+from airground_drake.scenarios.load import load
+from airground_drake.simulation import EVENT_ACCURACY, simulate
+
+HALF_S, END_S = 15.0, 18.0
+"""Case A triggers at 14.48 s: at half time a proposal is being executed and watched."""
+
+
+def begun(diagram: Diagram, seed: int) -> Context:
+    context = diagram.CreateDefaultContext()
+    diagram.SetRandomContext(context, RandomGenerator(seed))
+    context.SetAccuracy(EVENT_ACCURACY)
+    return context
+
+
+def advanced(diagram: Diagram, context: Context, until: float) -> Simulator:
+    simulator = Simulator(diagram, context)
+    euler = SimulatorConfig(integration_scheme="explicit_euler", max_step_size=0.05, use_error_control=False)
+    euler.start_time = context.get_time()  # else the Context is set to 0 s
+    ApplySimulatorConfig(euler, simulator)
+    simulator.Initialize()
+    simulator.AdvanceTo(until)
+    return simulator
+
+
+def ends(model: Model, context: Context) -> list[Any]:
+    """All recorded signals and all decisions."""
+    signals = [model.diagram.GetOutputPort(name).Eval(context).tolist() for name in RECORDED]
+    gatekeeper = model.gatekeeper
+    assert gatekeeper is not None
+    decided = gatekeeper.decisions(gatekeeper.GetMyContextFromRoot(context))
+    return [*signals, [(d.t, d.robot, d.accepted, d.reason, d.proposal.number) for d in decided]]
+
+
+@pytest.mark.parametrize("method", ["c", "d"])
+def test_a_cloned_context_goes_on_identically(method: str) -> None:
+    scenario = load("case_a")[0]
+    model = build_model(scenario, method)
+    simulator = advanced(model.diagram, begun(model.diagram, scenario.seed), HALF_S)
+    clone = simulator.get_context().Clone()
+    simulator.AdvanceTo(END_S)
+    first = ends(model, simulator.get_context())
+    assert len(first[-1]) > 10
+    second = advanced(model.diagram, clone, END_S)
+    assert ends(model, second.get_context()) == first
+
+
+def test_two_simulators_of_one_diagram_do_not_disturb_each_other() -> None:
+    scenario = load("case_a")[0]
+    model = build_model(scenario, "d")
+    simulators = [advanced(model.diagram, begun(model.diagram, seed), HALF_S) for seed in (scenario.seed, 7)]
+    for until in (16.0, 17.0, END_S):
+        for simulator in simulators:
+            simulator.AdvanceTo(until)
+    for simulator, seed in zip(simulators, (scenario.seed, 7), strict=True):
+        alone = build_model(scenario, "d")
+        expected = ends(alone, advanced(alone.diagram, begun(alone.diagram, seed), END_S).get_context())
+        assert ends(model, simulator.get_context()) == expected
+
+
+def test_decisions_are_published_at_the_end_of_the_step_and_are_those_of_the_trace() -> None:
+    scenario = load("case_a")[0]
+    model = build_model(scenario, "d")
+    assert model.gatekeeper is not None
+    simulator = advanced(model.diagram, begun(model.diagram, scenario.seed), scenario.duration_s)
+    decided = model.gatekeeper.decisions(model.gatekeeper.GetMyContextFromRoot(simulator.get_context()))
+    recorded = simulate(scenario, "d").decisions
+    assert [d.t for d in decided] == recorded["t_s"].tolist()
+    assert [d.reason for d in decided] == recorded["reason"].tolist()
+    assert np.diff([d.t for d in decided]).min() >= 0.0
+
+
+def test_controllers_act_on_answers_of_the_same_instant_and_the_gatekeeper_on_proposals_of_the_one_before() -> None:
+    """Drake makes all unrestricted updates of an instant before the discrete ones."""
+    scenario = load("case_a")[0]
+    model = build_model(scenario, "d")
+    assert model.gatekeeper is not None
+    proposed = float(simulate(scenario, "d").proposals["issued_s"].min())
+    answered = proposed + scenario.gatekeeper.period_s
+    simulator = advanced(model.diagram, begun(model.diagram, scenario.seed), answered)
+    root = simulator.get_context()
+    answers = model.gatekeeper.GetOutputPort("answers")
+    accepted = model.diagram.GetOutputPort("accepted")
+    assert any(model.planner.GetOutputPort("proposals").Eval(model.planner.GetMyContextFromRoot(root)))
+    assert answers.Eval(model.gatekeeper.GetMyContextFromRoot(root))[::2].tolist() == [SILENT, SILENT]
+    assert accepted.Eval(root).tolist() == [0.0, 0.0]
+    simulator.AdvancePendingEvents()
+    said = answers.Eval(model.gatekeeper.GetMyContextFromRoot(root))[::2].tolist()
+    assert ACCEPT in said
+    assert accepted.Eval(root).tolist() == [float(each == ACCEPT) for each in said]
