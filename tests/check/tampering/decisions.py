@@ -151,3 +151,9 @@ def last_predicted_velocity_changed(folder: Path) -> None:
 @tampering()
 def decisions_on_a_proposal_that_is_not_in_the_table(folder: Path) -> None:
     write_table(folder, read_table(folder, "proposals").iloc[1:], "proposals")
+
+
+@tampering()
+def executed_directions_fewer(folder: Path) -> None:
+    with base.edited_table(folder, "proposals") as frame:
+        frame["selection"] = [value[:3] for value in frame["selection"]]
