@@ -66,6 +66,7 @@ def test_a_local_optimum_bounds_nothing(record_of: Simulated) -> None:
     assert FEAS.judge(trace).evidence["rounded_plans"] > 0
 
 
+@pytest.mark.slow
 def test_a_real_run_saved_and_broken(record_of: Simulated, tmp_path: Any) -> None:
     trace = record_of("case_b", "c", "relaxed")
     save(trace, tmp_path)
