@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from check.tampering import TAMPERINGS, attempt
 from check.tampering.base import copy, edited_entries, edited_report, edited_table, mend, read_table, write, write_table
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from properties import examples
 
@@ -116,6 +116,7 @@ def test_any_value_of_a_run_that_is_changed_in_both_its_places_is_refused(report
 
 @examples(20, fuzz=500)
 @given(run=st.sampled_from("bcd"), table=st.sampled_from(TABLES), column=SHARE, row=SHARE, all_rows=st.booleans())
+@example(run="b", table="proposals", column=0.0, row=0.0, all_rows=False)  # its number, which no decision refers to
 def test_any_changed_cell_or_column_of_a_trace_is_refused(
     report: Path, run: str, table: str, column: float, row: float, all_rows: bool
 ) -> None:
