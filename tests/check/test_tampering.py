@@ -68,7 +68,7 @@ SHARE = st.floats(0.0, 1.0, exclude_max=True)
 """Which of several, as a share of their number."""
 
 
-@examples(60, fuzz=2000)
+@examples(40, fuzz=2000)
 @given(place=SHARE)
 def test_any_changed_value_of_the_report_is_refused(report: Path, place: float) -> None:
     def edit(folder: Path) -> None:
@@ -81,7 +81,8 @@ def test_any_changed_value_of_the_report_is_refused(report: Path, place: float) 
     assert attempt(report, edit).code
 
 
-@examples(20, fuzz=1000)
+@pytest.mark.slow
+@examples(15, fuzz=1000)
 @given(place=SHARE, twice=st.booleans())
 def test_any_item_of_the_report_that_is_left_out_or_doubled_is_refused(report: Path, place: float, twice: bool) -> None:
     def edit(folder: Path) -> None:
@@ -97,7 +98,8 @@ def test_any_item_of_the_report_that_is_left_out_or_doubled_is_refused(report: P
     assert attempt(report, edit).code
 
 
-@examples(20, fuzz=1000)
+@pytest.mark.slow
+@examples(15, fuzz=1000)
 @given(run=st.sampled_from("bcd"), place=SHARE)
 def test_any_value_of_a_run_that_is_changed_in_both_its_places_is_refused(report: Path, run: str, place: float) -> None:
     """In meta.json, and where report.json says the same."""
@@ -114,7 +116,7 @@ def test_any_value_of_a_run_that_is_changed_in_both_its_places_is_refused(report
     assert attempt(report, edit).code
 
 
-@examples(20, fuzz=500)
+@examples(30, fuzz=500)
 @given(run=st.sampled_from("bcd"), table=st.sampled_from(TABLES), column=SHARE, row=SHARE, all_rows=st.booleans())
 @example(run="b", table="proposals", column=0.0, row=0.0, all_rows=False)  # its number, which no decision refers to
 def test_any_changed_cell_or_column_of_a_trace_is_refused(
@@ -135,7 +137,8 @@ def test_any_changed_cell_or_column_of_a_trace_is_refused(
     assert attempt(report, edit).code
 
 
-@examples(12, fuzz=500)
+@pytest.mark.slow
+@examples(15, fuzz=500)
 @given(run=st.sampled_from("bcd"), table=st.sampled_from(TABLES), row=SHARE, how=st.sampled_from("-+xz"))
 def test_any_row_of_a_trace_that_is_missing_or_elsewhere_is_refused(
     report: Path, run: str, table: str, row: float, how: str
@@ -152,7 +155,7 @@ def test_any_row_of_a_trace_that_is_missing_or_elsewhere_is_refused(
     assert attempt(report, lambda folder: write_table(folder, frame.iloc[rows], table, run)).code
 
 
-@examples(12, fuzz=500)
+@examples(8, fuzz=500)
 @given(file=SHARE, missing=st.booleans())
 def test_any_file_that_is_missing_or_has_other_bytes_is_refused(report: Path, file: float, missing: bool) -> None:
     """The list of files has what was there; of a file of a run that is missing, it is made right."""

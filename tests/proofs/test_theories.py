@@ -60,7 +60,6 @@ def test_comments_may_have_any_word() -> None:
     coq.screen("(* no Axiom (* is Admitted *), no Parameter *)\nDefinition a := 1.\n", "fine.v")
 
 
-@pytest.mark.slow
 def test_what_is_assumed_in_other_words_is_found_among_the_axioms(coq_version: str, tmp_path: Path) -> None:
     (tmp_path / "so.v").write_text(ASSUMED, encoding="utf-8")
     coq.compile_file(tmp_path / "so.v")
@@ -70,7 +69,6 @@ def test_what_is_assumed_in_other_words_is_found_among_the_axioms(coq_version: s
         coq.check_again(["so"], tmp_path)
 
 
-@pytest.mark.slow
 def test_coqchk_accepts_what_rests_on_nothing(coq_version: str, tmp_path: Path) -> None:
     (tmp_path / "fine.v").write_text("Theorem fine : 1 + 1 = 2.\nProof. reflexivity. Qed.\n", encoding="utf-8")
     coq.compile_file(tmp_path / "fine.v")
