@@ -15,8 +15,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from airground_drake.diagram import build_diagram
-    from airground_drake.errors import (
+    from airground_drake.base.errors import (
         AirgroundError,
         PluginError,
         ScenarioError,
@@ -24,10 +23,11 @@ if TYPE_CHECKING:
         TraceError,
         UnknownNameError,
     )
+    from airground_drake.run.simulation import simulate
+    from airground_drake.run.trace import Trace
     from airground_drake.scenarios.load import load
     from airground_drake.scenarios.schema import Scenario
-    from airground_drake.simulation import simulate
-    from airground_drake.trace import Trace
+    from airground_drake.systems.diagram import build_diagram
 
 __all__ = [
     "AirgroundError",
@@ -44,17 +44,17 @@ __all__ = [
 ]
 
 _HOME = {
-    "AirgroundError": "errors",
-    "PluginError": "errors",
+    "AirgroundError": "base.errors",
+    "PluginError": "base.errors",
     "Scenario": "scenarios.schema",
-    "ScenarioError": "errors",
-    "SimulationError": "errors",
-    "Trace": "trace",
-    "TraceError": "errors",
-    "UnknownNameError": "errors",
-    "build_diagram": "diagram",
+    "ScenarioError": "base.errors",
+    "SimulationError": "base.errors",
+    "Trace": "run.trace",
+    "TraceError": "base.errors",
+    "UnknownNameError": "base.errors",
+    "build_diagram": "systems.diagram",
     "load": "scenarios.load",
-    "simulate": "simulation",
+    "simulate": "run.simulation",
 }
 
 

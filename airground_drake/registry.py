@@ -26,8 +26,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, TypeVar
 
-from airground_drake.errors import PluginError, UnknownNameError, described
-from airground_drake.files import sha256
+from airground_drake.base.errors import PluginError, UnknownNameError, described
+from airground_drake.base.files import sha256
 
 T = TypeVar("T")
 

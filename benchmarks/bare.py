@@ -23,14 +23,13 @@ import numpy as np
 import pandas as pd
 from scipy.integrate import solve_ivp
 
-from airground_drake import components
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.registry import method_of
+from airground_drake.run.simulation import Recorder
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.simulation import Recorder
-from airground_drake.systems import UavController, UgvController
+from airground_drake.systems import UavController, UgvController, components
 
 Way = tuple[Array, float]
 """Positions of all robots at the control samples, (K + 1, n + 1, 3), m, and the first time that x reaches zeta, s."""
@@ -178,7 +177,7 @@ def main() -> None:
     for table in tables.values():
         print(table.to_string(index=False, float_format="%.4g") + "\n")
     if options.json:
-        from airground_drake.files import write_json
+        from airground_drake.base.files import write_json
 
         write_json(options.json, {name: table.to_dict("records") for name, table in tables.items()})
 

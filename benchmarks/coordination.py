@@ -16,7 +16,7 @@ from itertools import combinations
 
 import numpy as np
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.intervention.coordinate import warm_up
 from airground_drake.intervention.coordination.joint import plan
 from airground_drake.intervention.coordination.roadmap import RobotTask, Space

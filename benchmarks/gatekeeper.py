@@ -47,8 +47,8 @@ from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.law import UgvLaw
 from airground_drake.registry import ROUTES
+from airground_drake.run.simulation import Recorder
 from airground_drake.scenarios.load import load
-from airground_drake.simulation import Recorder
 
 LAW = UgvLaw(Avoidance(3.0, 0.05, 4.0), 2.0, 1.5, intervention_on_top=False)
 

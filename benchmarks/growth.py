@@ -20,15 +20,16 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from airground_drake import files, trace
+from airground_drake.base import files
 from airground_drake.campaign.course import Course
 from airground_drake.check.report import check_report
 from airground_drake.report import document, html
 from airground_drake.report.after_runs import provenance
 from airground_drake.report.figures.draw import draw
+from airground_drake.run import trace
+from airground_drake.run.simulation import simulate
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.simulation import simulate
 from airground_drake.verify import verify
 
 AXES: dict[str, tuple[float, ...]] = {

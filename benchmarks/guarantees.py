@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import argparse
 
+from airground_drake.run.simulation import simulate
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.shipped import shipped
-from airground_drake.simulation import simulate
 from airground_drake.verify import verify
 from airground_drake.verify.runs.followed import followed
 

@@ -26,9 +26,8 @@ from unittest import mock
 import numpy as np
 from hostile_uav import CHOICES, LyingPlanner, Tactic, drawn, mutated
 
-from airground_drake import components
-from airground_drake.arrays import Array
-from airground_drake.components import make_planner, make_presets, make_team
+from airground_drake.audit.companions import Believing
+from airground_drake.base.arrays import Array
 from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
 from airground_drake.gatekeeper.problem import Horizon, predicted_problem
 from airground_drake.gatekeeper.rollout import Scene
@@ -39,12 +38,13 @@ from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.law import UgvLaw
 from airground_drake.registry import Method
-from airground_drake.report.audit.companions import Believing
+from airground_drake.run.simulation import Recorder
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Policy, Run, Scenario
-from airground_drake.simulation import Recorder
+from airground_drake.systems import components
+from airground_drake.systems.components import make_planner, make_presets, make_team
 from airground_drake.systems.controllers import UgvController
-from airground_drake.trace import Trace
 from airground_drake.verify.runs.safe_trace import SafeTrace
 
 STEPS = 30

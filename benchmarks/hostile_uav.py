@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.database import Negotiation
 from airground_drake.intervention.messages import ACCEPT, DONE, REFUSE, Reports, answer_to

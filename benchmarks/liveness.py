@@ -32,12 +32,12 @@ import yaml
 from feasible import joint_plan, shortest_length
 from maps import Array, Course
 
-from airground_drake.errors import AirgroundError
+from airground_drake.base.errors import AirgroundError
 from airground_drake.registry import POLICIES
+from airground_drake.run.simulation import simulate
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import from_data
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.simulation import simulate
-from airground_drake.trace import Trace
 from airground_drake.verify import verify
 from airground_drake.verify.engines.segments import closest_approach
 

@@ -1,11 +1,11 @@
-"""Every mutant, and what catches it: `python benchmarks/mutants.py [--only WORD] [--jobs 1] [--json FILE] [--page P]`.
+"""Every mutant, and what catches it: `python benchmarks/mutants.py [--only WORD] [--jobs 1] [--json FILE]`.
 
 A mutant is one edit of the package (`benchmarks/mutation/of_*.py`), made in a temporary copy; one that does not apply
 is an error. On each copy short runs are simulated; those that go another way than on the package as it is are judged by
 their claims and by the independent checker, until one says something else; only if none does, the proofs that are about
 the edited code, tampered reports (for the checker), and at last the tests that concern the file. Prints a line for
-each. `--json` keeps the results in a file, to which a later call adds; `--page` writes them as a page of the
-documentation (docs/mutants.md). Exit code 1 if a mutant survives that is not known to be equivalent.
+each. `--json` keeps the results in a file, to which a later call adds. Exit code 1 if a mutant survives that is not
+known to be equivalent.
 
 `--drawn N --seed S` judges N mutants that nobody has written, drawn at random from the code that produces a run
 (`benchmarks/mutation/drawn.py`), in place of the list. What survives is for a person to look at: most of it is
@@ -34,7 +34,6 @@ from typing import Any
 
 from mutation import drawn, of_checkers, of_code
 from mutation.mutant import PACKAGE, Mutant
-from mutation.page import page
 
 ROOT = Path(__file__).resolve().parents[1]
 COPIED = (PACKAGE, "tests", "benchmarks", "docs", "pyproject.toml", "README.md")
@@ -261,7 +260,6 @@ def main() -> int:
     parser.add_argument("--drawn", type=int, metavar="N", help="N mutants drawn at random; --only: words in paths")
     parser.add_argument("--seed", type=int, default=0, help="of the drawing (default: 0)")
     parser.add_argument("--report", type=Path, help="a report of case B to tamper with (default: made)")
-    parser.add_argument("--page", type=Path, help="page of the documentation, of all results in the file of --json")
     options = parser.parse_args()
     mutants = MUTANTS if options.drawn is None else drawn.draw(ROOT, options.drawn, options.seed, options.only)
     kept: dict[str, Any] = {}
@@ -286,9 +284,6 @@ def main() -> int:
                     if options.json:
                         options.json.write_text(json.dumps([*kept.values()], indent=1), encoding="utf-8")
     results = [kept[mutant.name] for mutant in mutants if mutant.name in kept]
-    if options.page:
-        others = [mutant.name for mutant in mutants if mutant.name not in kept]
-        options.page.write_text(page(results, others), encoding="utf-8")
     print(dict(Counter(each["stage"] for each in results)))
     return int(any(each["stage"] == "nothing" and not each["equivalent"] for each in results))
 

@@ -18,11 +18,11 @@ from pathlib import Path
 
 import numpy as np
 
-from airground_drake.components import make_map, make_presets
 from airground_drake.intervention.database import make_policy
 from airground_drake.intervention.guest.process import GuestPolicy
 from airground_drake.intervention.policy import Observation, Policy, Teammate, motions_of
 from airground_drake.scenarios.load import load
+from airground_drake.systems.components import make_map, make_presets
 
 
 def observation() -> Observation:

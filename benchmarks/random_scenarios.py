@@ -32,16 +32,17 @@ from typing import Any
 import numpy as np
 import yaml
 
-from airground_drake import files, trace
+from airground_drake.base import files
+from airground_drake.base.errors import AirgroundError, ScenarioError
 from airground_drake.check.report import AGREES, check_report
 from airground_drake.decision.bayes import optimal_threshold
-from airground_drake.errors import AirgroundError, ScenarioError
 from airground_drake.registry import METHODS, ROUTES
 from airground_drake.report import document
+from airground_drake.run import trace
+from airground_drake.run.simulation import simulate
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import from_data, resolved
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.simulation import simulate
-from airground_drake.trace import Trace
 from airground_drake.verify import Verdict, verify
 
 ALWAYS = ("ZENO-TRACE", "THR-TRIG", "EXEC")

@@ -13,10 +13,10 @@ import argparse
 
 import numpy as np
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
+from airground_drake.run.simulation import simulate
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import load
-from airground_drake.simulation import simulate
-from airground_drake.trace import Trace
 from airground_drake.verify.runs.closed_loops import roll_out, stacked
 from airground_drake.verify.runs.gate_model import scene_of
 from airground_drake.verify.runs.gate_record import Row, rows_of

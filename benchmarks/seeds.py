@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from airground_drake.report.reproduction import rows
+from airground_drake.run.simulation import Recorder
 from airground_drake.scenarios.load import load
-from airground_drake.simulation import Recorder
 from airground_drake.verify import verify
 
 CLAIMS = ("SAFE-TRACE", "SAFE-HYP", "LIVE-GOAL", "GATE-OPT")

@@ -26,8 +26,8 @@ from numpy.typing import NDArray
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.policy import Observation, Policy, Teammate
 from airground_drake.registry import POLICIES
+from airground_drake.run.simulation import simulate
 from airground_drake.scenarios.load import from_data
-from airground_drake.simulation import simulate
 from airground_drake.verify import verify
 
 CLAIMS = ("SAFE-TRACE", "SAFE-HYP", "EXEC", "THR-TRIG", "GATE-FEAS", "COMM")

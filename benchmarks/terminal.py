@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import argparse
 
+from airground_drake.run.simulation import simulate
 from airground_drake.scenarios.load import load
-from airground_drake.simulation import simulate
 
 
 def row(name: str, weight_s: float) -> str:

@@ -113,7 +113,7 @@ def main() -> None:
     if found["rates"]:
         print("\n" + pd.DataFrame(found["rates"]).to_string(index=False, float_format="%.3g"))
     if options.json:
-        from airground_drake.files import write_json
+        from airground_drake.base.files import write_json
 
         write_json(options.json, found)
 

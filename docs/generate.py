@@ -1,4 +1,7 @@
-"""`python docs/generate.py`: the parts of the documentation that follow from the code; a test holds them to it."""
+"""The parts of the documentation that follow from the code.
+
+`python docs/generate.py` writes what is committed; `docs/site.py` puts the rest into the site.
+"""
 
 from __future__ import annotations
 
@@ -9,14 +12,14 @@ import json
 import re
 import textwrap
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from importlib import import_module
 from pathlib import Path
 from typing import Any, get_args
 
-from airground_drake import files
+from airground_drake.audit.equations import DEVIATIONS, Kind
+from airground_drake.base import files
 from airground_drake.commands import COMMANDS
-from airground_drake.paper import DEVIATIONS, Kind
 from airground_drake.proofs import THEOREMS
 from airground_drake.registry import (
     METHODS,
@@ -46,23 +49,23 @@ _NUMBER = re.compile(r"(?<!` )(?<![\w\]])\((\d{1,2})[a-e]?\)(?:-\((\d{1,2})[a-e]
 
 
 def main() -> None:
-    """Write every generated page."""
+    """Write what is committed and follows from the code."""
     for name, text in pages().items():
         files.write_text(DOCS / name, text)
 
 
 def pages() -> dict[str, str]:
-    """Generated pages by file name."""
+    """Committed files that follow from the code, by name."""
+    schema = json_schema.text(installed=False)
+    return {"extending.md": extending(), "../airground_drake/scenarios/scenario.schema.json": schema}
+
+
+def parts() -> dict[str, Callable[[], str]]:
+    """What the site puts in the place of marks such as `<!-- claims: made when the site is built -->`, by name."""
     return {
-        "equations.md": equations(),
-        "claims.md": claims(),
-        "names.md": names(),
-        "commands.md": commands(),
-        "scenario.md": scenario(),
-        "extending.md": extending(),
-        "proofs.md": proofs(),
-        "../airground_drake/scenarios/scenario.schema.json": json_schema.text(installed=False),
-    }
+        "claims": claims, "commands": commands, "equations": equations, "keys": scenario, "names": names,
+        "theorems": theorems,
+    }  # fmt: skip
 
 
 def extending() -> str:
@@ -75,9 +78,8 @@ def extending() -> str:
     return _RECIPE.sub(as_it_is, (DOCS / "extending.md").read_text(encoding="utf-8"))
 
 
-def proofs() -> str:
-    """The page as it is up to its mark, and the theorems after it."""
-    mark = "<!-- theorems: made by python docs/generate.py -->\n"
+def theorems() -> str:
+    """Each theorem: what it says, what it takes, and which claim checks that."""
     lines, file = [], ""
     for name, theorem in THEOREMS.items():
         if file != (file := name.partition(".")[0]):
@@ -85,9 +87,8 @@ def proofs() -> str:
         takes = f" *Takes:* {' '.join(theorem.hypotheses)}" if theorem.hypotheses else ""
         where = f" *Checked by:* {', '.join(theorem.checked_where)}." if theorem.checked_where else ""
         about = "" if theorem.equation == "ours" else f", {theorem.equation}"
-        line = f"- **`{name}`**{about}: {theorem.statement}{takes}{where}"
-        lines += textwrap.wrap(line, WIDTH, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
-    return (DOCS / "proofs.md").read_text(encoding="utf-8").partition(mark)[0] + mark + "\n".join(lines) + "\n"
+        lines.append(f"- **`{name}`**{about}: {theorem.statement}{takes}{where}")
+    return "\n".join(lines)
 
 
 def equations() -> str:
@@ -101,22 +102,16 @@ def equations() -> str:
         places = "; ".join(row.place for row in DEVIATIONS if row.kind == kind)
         lines += [f"- **{kind}**: {places}."]
     for row in DEVIATIONS:
-        lines += ["", f"## {row.place}: {row.says}", "", f"**{row.kind.capitalize()}.** {row.here}".rstrip()]
+        lines += ["", f"### {row.place}: {row.says}", "", f"**{row.kind.capitalize()}.** {row.here}".rstrip()]
         lines += ["", f"*Why:* {row.why}"] * bool(row.why)
         entries = {
             "code": [f"`{place.replace(':', '.')}`" for place in row.realised_in],
-            "findings": [f"[{number}](audit.md)" for number in row.findings],
+            "findings": [f"[{number}](#findings)" for number in row.findings],
             "claims": claimed[row.place],
         }
         told = [f"- {what}: {', '.join(found)}" for what, found in entries.items() if found]
         lines += ["", *told] if told else []
-    return _page(
-        "From the paper to the code, and where they differ",
-        "Every equation, table, figure and remark of the paper: what realises it here, whether faithfully or changed, "
-        "and why. Made of the table in `airground_drake/paper.py`, whose names a test imports. Findings are those of "
-        "[the audit](audit.md).",
-        lines,
-    )
+    return "\n".join(lines)
 
 
 def _numbers(text: str) -> list[str]:
@@ -159,7 +154,7 @@ def claims() -> str:
             f"*Does not establish:* {claim.does_not_establish}",
             "",
         ]
-    return _page("Claims", "What each claim says of itself, as in every report.", lines)
+    return "\n".join(lines)
 
 
 def commands() -> str:
@@ -167,7 +162,7 @@ def commands() -> str:
     lines = []
     for name, command in COMMANDS.items():
         parser = import_module(command.module).parser()
-        lines += [f"## {name}", "", f"`{parser.prog}`: {parser.description}", ""]
+        lines += [f"### {name}", "", f"`{parser.prog}`: {parser.description}", ""]
         for action in parser._actions:  # argparse gives them in no other way, but as text as wide as the terminal
             if not isinstance(action, argparse._HelpAction):
                 lines.append(f"- {_argument(action)}: {html.escape((action.help or '') % vars(action), quote=False)}.")
@@ -177,15 +172,7 @@ def commands() -> str:
         else:
             said = ["Its help goes on:", "", *(f"    {line}" for line in said)] if said else []
         lines += ["", *said, ""] if said else [""]
-    return _page(
-        "Commands",
-        "`airground COMMAND --help` says the same. `report`, `verify` and `check` are `python -m "
-        "airground_drake.report`, `.verify` and `.check`, too, which import from the current folder first. Exit codes "
-        "are, of every command: 0 done; 2 usage, or a file or folder that cannot be used, with one line on standard "
-        "error; 4 a fault of the tool, or of code of others that it runs; 130 and 143 interrupted by SIGINT and "
-        "SIGTERM; 141 whoever read the output has gone. Other codes are a command's own.",
-        lines,
-    )
+    return "\n".join(lines)
 
 
 def _argument(action: argparse.Action) -> str:
@@ -200,17 +187,11 @@ def _argument(action: argparse.Action) -> str:
 
 def names() -> str:
     """Everything that a scenario may name."""
-    lines = ["## Methods", "", *(f"- `{method.id}`: {method.says}" for method in METHODS.values())]
+    lines = ["### Methods", "", *(f"- `{method.id}`: {method.says}" for method in METHODS.values())]
     for title, registry in (("Policies", POLICIES), ("Routes", ROUTES), ("Tasks of the UAV", UAV_TASKS)):
-        lines += ["", f"## {title}", "", *(_entry(registry, name) for name in registry.own)]
-    lines += ["", "## Samplers, of `airground falsify`", "", *(_entry(SAMPLERS, name) for name in SAMPLERS.own)]
-    return _page(
-        "What can be named",
-        "In a scenario, and samplers on a command line. Besides these: what installed packages register (see "
-        "[extending](extending.md)), and `module:Class` or `file.py:Class` for whatever can be imported, also from "
-        "beside the scenario file.",
-        lines,
-    )
+        lines += ["", f"### {title}", "", *(_entry(registry, name) for name in registry.own)]
+    lines += ["", "### Samplers, of `airground falsify`", "", *(_entry(SAMPLERS, name) for name in SAMPLERS.own)]
+    return "\n".join(lines)
 
 
 def _entry(registry: Registry, name: str) -> str:
@@ -226,16 +207,8 @@ def scenario() -> str:
     lines: list[str] = []
     for path, part in _parts(SCENARIO, ""):
         entries = [f"- `{key}` ({_allowed(key, part)}): {says['description']}" for key, says in _keys(part)]
-        lines += [f"## {path}" if path else "## The file", "", part["description"], "", *entries, ""]
-    return _page(
-        "Keys of a scenario file",
-        "Section by section: key, what may stand there and its default, meaning, [unit]. NAME is a name of your own, N "
-        "the number of an item. What a policy takes as `parameters` is in [names](names.md). Keys of the file itself "
-        "that begin with an underscore are templates, for anchors and aliases. The same as JSON Schema, for editors: "
-        "`airground list --schema`. Values must also go together: a scenario in which they do not is refused with one "
-        "line that says how.",
-        lines,
-    )
+        lines += [f"### {path}" if path else "### The file", "", part["description"], "", *entries, ""]
+    return "\n".join(lines)
 
 
 def _keys(part: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:
@@ -285,19 +258,6 @@ def _kind(says: dict[str, Any]) -> str:
     return {"number": "a number", "integer": "a whole number", "boolean": "true or false", "string": "text"}[
         says["type"]
     ]
-
-
-def _page(title: str, says: str, lines: list[str]) -> str:
-    """A page; lines that may be wrapped are."""
-    wrapped: list[str] = []
-    wrapper = textwrap.TextWrapper(WIDTH, break_long_words=False, break_on_hyphens=False)
-    for line in ["<!-- Made by: python docs/generate.py -->", f"# {title}", "", says, "", *lines]:
-        if len(line) <= WIDTH:
-            wrapped.append(line)
-        else:
-            wrapper.subsequent_indent = "  " if line.startswith("- ") else ""
-            wrapped += wrapper.wrap(line)
-    return "\n".join(wrapped).rstrip() + "\n"
 
 
 if __name__ == "__main__":

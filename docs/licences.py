@@ -6,25 +6,22 @@ import re
 from importlib.metadata import PackageMetadata, metadata
 from pathlib import Path
 
-from airground_drake import files
+from airground_drake.base import files
 
 ROOT = Path(__file__).parent.parent
 PREFIX = "License :: "
 
 
 def main() -> None:
-    """Write the page; the pinned packages must be installed."""
+    """Write the file; the pinned packages must be installed."""
     lines = [
-        "<!-- Made by: python docs/licences.py -->",
-        "# Licences of what is installed besides",
+        "Made by: python docs/licences.py",
         "",
-        "As the packages declare them, of the versions in `constraints.txt`; the package itself is BSD-3-Clause.",
+        "Licences of the packages in constraints.txt, as they declare them; airground_drake itself is BSD-3-Clause.",
         "",
-        "| Package | Version | Licence |",
-        "| --- | --- | --- |",
+        *(f"{name}  {version}  {licence(metadata(name))}" for name, version in pinned()),
     ]
-    lines += [f"| {name} | {version} | {licence(metadata(name))} |" for name, version in pinned()]
-    files.write_text(Path(__file__).with_name("licences.md"), "\n".join(lines) + "\n")
+    files.write_text(Path(__file__).with_name("licences.txt"), "\n".join(lines) + "\n")
 
 
 def pinned() -> list[tuple[str, str]]:

@@ -1,5 +1,7 @@
 """What the site has besides the pages here: a hook of `mkdocs build`.
 
+Marks such as `<!-- claims: made when the site is built -->` are replaced by what `generate.py` makes of the code.
+
 Pages link to files of the repository as they would be found there. Each file that is linked to, and is none of these
 pages, becomes a page under `repository/`; links are turned accordingly. Formulas become MathML, which needs neither a
 script nor a network. With AIRGROUND_SAMPLES=1 the reports of all shipped scenarios are made (some minutes) and shown;
@@ -11,6 +13,7 @@ from __future__ import annotations
 import os
 import posixpath
 import re
+import runpy
 import subprocess
 import sys
 import tempfile
@@ -31,6 +34,9 @@ ALWAYS = ("CHANGELOG.md", "SECURITY.md", "examples/README.md")
 LANGUAGES = {".py": "python", ".yaml": "yaml", ".toml": "toml", ".sh": "bash"}
 SAMPLES = os.environ.get("AIRGROUND_SAMPLES", "")
 
+PARTS = runpy.run_path(str(Path(__file__).with_name("generate.py")))["parts"]()
+
+_MARK = re.compile(r"<!-- (\w+): made when the site is built.*?-->")
 _LINK = re.compile(r"(?<=\]\()(?!https?:|#|mailto:)([^)#\s]+)(#[^)\s]*)?(?=\))")
 _FORMULA = re.compile(r'<(span|div) class="arithmatex">(?:\\\(|\\\[)(.*?)(?:\\\)|\\\])</\1>', re.DOTALL)
 
@@ -73,7 +79,8 @@ def shown(path: Path) -> str:
 
 
 def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
-    """Turn links to files of the repository into links to their pages."""
+    """Fill marks, and turn links to files of the repository into links to their pages."""
+    markdown = _MARK.sub(lambda mark: PARTS[mark[1]](), markdown)
     uri = page.file.src_uri
     place = uri.removeprefix(f"{OUTSIDE}/") if uri.startswith(f"{OUTSIDE}/") else f"docs/{uri}"
     beside = posixpath.dirname(

@@ -1,7 +1,7 @@
 import numpy as np
 
+from airground_drake.run.simulation import simulate
 from airground_drake.scenarios.load import load
-from airground_drake.simulation import simulate
 from airground_drake.systems import DecisionBlock
 
 

@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from airground_drake.nsbc.motion import Motion
 
 from airground_drake.campaign.search import CmaEs
+from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.policy import Observation, Policy
 
 WEIGHTS = Path(__file__).with_suffix(".json")

@@ -1,7 +1,7 @@
 from pydrake.systems.analysis import Simulator
 
-from airground_drake.diagram import build_diagram, make_monitor
 from airground_drake.scenarios.load import load
+from airground_drake.systems.diagram import build_diagram, make_monitor
 
 wanted, built = load("case_a")[0], load("case_a")[0]
 built.control.motion_gain_1_s *= 0.9  # a mistake

@@ -10,12 +10,11 @@ import pytest
 from pydrake.systems.framework import Diagram, DiagramBuilder, PortDataType, System
 from pydrake.systems.primitives import Adder, ConstantVectorSource, Gain, PassThrough
 
-from airground_drake import blocks, graphviz, schematic
-from airground_drake.diagram import build_diagram, make_monitor
 from airground_drake.geometry.motion import Motion
 from airground_drake.registry import METHODS
 from airground_drake.scenarios.load import load, shipped
-from airground_drake.systems import DecisionBlock
+from airground_drake.systems import DecisionBlock, blocks, graphviz, schematic
+from airground_drake.systems.diagram import build_diagram, make_monitor
 
 PAGE_PT = 785
 """Width of a landscape page of A4 with margins of 1 cm."""

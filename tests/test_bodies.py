@@ -10,15 +10,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from airground_drake import components, events
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
 from airground_drake.nsbc.team import Team
 from airground_drake.report import metrics
+from airground_drake.run import events
+from airground_drake.run.simulation import simulate
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import load, validated
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.simulation import simulate
-from airground_drake.trace import Trace
+from airground_drake.systems import components
 from airground_drake.verify import verify
 
 ROCK, OWN, FLIER = 0.5, 0.25, 0.25

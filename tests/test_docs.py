@@ -68,9 +68,13 @@ def test_the_readme_shows_the_scenario_that_init_writes() -> None:
 
 
 def test_what_follows_from_the_code_is_current() -> None:
-    pages = runpy.run_path(str(ROOT / "docs" / "generate.py"))["pages"]()
-    for name, text in pages.items():
+    generate = runpy.run_path(str(ROOT / "docs" / "generate.py"))
+    for name, text in generate["pages"]().items():
         assert (ROOT / "docs" / name).read_text(encoding="utf-8") == text, "run python docs/generate.py"
+    marks = [mark for page in PAGES for mark in re.findall(r"<!-- (\w+): made", page.read_text(encoding="utf-8"))]
+    assert sorted(marks) == sorted(generate["parts"]())
+    for part in generate["parts"]().values():
+        assert len(part().splitlines()) > 20
 
 
 @pytest.mark.slow
@@ -95,7 +99,8 @@ def test_the_tutorial_from_an_empty_folder(tmp_path: Path) -> None:
 
 
 def test_everything_in_my_robots_is_explained() -> None:
-    shown = re.findall(r"^# file: (my_robots/\S+)$", (ROOT / "docs" / "extending.md").read_text(encoding="utf-8"), re.M)
+    page = (ROOT / "docs" / "extending.md").read_text(encoding="utf-8")
+    shown = re.findall(r"(?:^# file: |\(../examples/)(my_robots/[\w.]+)", page, re.MULTILINE)
     assert sorted(shown) == sorted(f"my_robots/{path.name}" for path in (EXAMPLES / "my_robots").glob("*.py"))
 
 
@@ -125,7 +130,7 @@ def test_a_sampler_of_ones_own_looks_for_violations(tmp_path: Path, capsys: pyte
 
 
 def test_the_spec_that_is_shown_makes_draws(tmp_path: Path) -> None:
-    (text,) = blocks(ROOT / "docs" / "campaigns.md", "yaml")
+    (text,) = blocks(ROOT / "docs" / "commands.md", "yaml")
     (tmp_path / "speeds.yaml").write_text(text, encoding="utf-8")
     spec = load_spec(tmp_path / "speeds.yaml")
     assert spec.draw(3).ugvs["ugv1"].preset.speed_m_s == spec.values(3)["ugvs.ugv1.preset.speed_m_s"]

@@ -14,9 +14,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from properties import examples
 
-from airground_drake import check, events
+from airground_drake import check
 from airground_drake.report.__main__ import main as write
-from airground_drake.trace import Trace, load
+from airground_drake.run import events
+from airground_drake.run.trace import Trace, load
 
 PLACES = st.lists(st.tuples(*[st.integers(-4, 4)] * 2), min_size=1, max_size=12)
 

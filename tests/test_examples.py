@@ -17,8 +17,8 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 
+from airground_drake.run.simulation import simulate
 from airground_drake.scenarios.load import load
-from airground_drake.simulation import simulate
 
 pytestmark = pytest.mark.slow
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from airground_drake import files
+from airground_drake.base import files
 
 
 def test_a_file_replaces_another_and_leaves_nothing_beside_it(tmp_path: Path) -> None:

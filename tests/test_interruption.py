@@ -15,7 +15,8 @@ pytestmark = pytest.mark.slow
 PROGRAM = """
 import multiprocessing, os, subprocess, sys, time
 from pathlib import Path
-from airground_drake import files, interruption
+from airground_drake.base import files
+from airground_drake.base import interruption
 
 def sleep(done): done.set(); time.sleep(600)
 
@@ -26,7 +27,7 @@ def parent(done):
 
 interruption.end_on_signals()
 if sys.argv[1] == "exec":
-    helper = "import sys, time; from airground_drake.interruption import end_with_parent as end; end(); print(); "
+    helper = "import sys, time; from airground_drake.base.interruption import end_with_parent as end; end(); print(); "
     command = [sys.executable, "-c", helper + "sys.stdout.close(); time.sleep(600)"]
     subprocess.Popen(command, stdout=subprocess.PIPE, close_fds=False).stdout.readline()
     if sys.argv[2] != "SIGKILL":  # what knows nothing of this outlives a parent that is killed
@@ -64,7 +65,7 @@ def test_nobody_and_nothing_is_left(children: str, name: str, code: int, tmp_pat
 
 
 def test_work_that_is_done_ends_at_once_with_its_code_and_its_output() -> None:
-    program = "import threading, time; from airground_drake.interruption import leave; print('done'); "
+    program = "import threading, time; from airground_drake.base.interruption import leave; print('done'); "
     program += "threading.Thread(target=time.sleep, args=(600,)).start(); leave(3)"
     ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
     assert (ended.returncode, ended.stdout, ended.stderr) == (3, "done\n", "")
@@ -74,7 +75,8 @@ BEGUN = """
 import os, signal, subprocess, sys, time
 from collections import deque
 from itertools import repeat
-from airground_drake import files, interruption
+from airground_drake.base import files
+from airground_drake.base import interruption
 
 interruption.begin()
 with files.temporary_folder():
@@ -116,7 +118,7 @@ def test_whichever_process_of_a_command_is_killed_nothing_is_left(end: str, tmp_
 
 
 def test_a_command_leaves_with_its_own_code_and_lets_others_go_on() -> None:
-    program = "import subprocess; from airground_drake.interruption import begin, leave; begin(); print('done'); "
+    program = "import subprocess; from airground_drake.base.interruption import begin, leave; begin(); print('done'); "
     program += "left = subprocess.Popen(['sleep', '600'], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL); "
     program += "print(left.pid); leave(3)"
     ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)

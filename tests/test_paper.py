@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
+from airground_drake.audit.equations import DEVIATIONS, Deviation
 from airground_drake.check.verdicts import FINDINGS
-from airground_drake.paper import DEVIATIONS, Deviation
 
 EQUATIONS = [row for row in DEVIATIONS if row.place.startswith("(")]
 

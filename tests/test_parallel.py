@@ -7,8 +7,8 @@ from functools import partial
 
 import pytest
 
-from airground_drake.errors import AirgroundError, TraceError
-from airground_drake.parallel import processors, run_parallel, start_in_process
+from airground_drake.base.errors import AirgroundError, TraceError
+from airground_drake.base.parallel import processors, run_parallel, start_in_process
 
 
 def test_what_is_returned_is_in_order_and_comes_from_other_processes() -> None:
@@ -55,12 +55,12 @@ def test_what_was_begun_is_done_elsewhere_and_waited_for() -> None:
 
 
 def test_what_was_begun_and_dies_is_an_error_when_it_is_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("airground_drake.parallel.processors", lambda: 2)
+    monkeypatch.setattr("airground_drake.base.parallel.processors", lambda: 2)
     returned = start_in_process(partial(os._exit, 3))
     with pytest.raises(AirgroundError, match=r"died .*\(exit code 3\)"):
         returned()
 
 
 def test_on_one_processor_it_is_done_here(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("airground_drake.parallel.processors", lambda: 1)
+    monkeypatch.setattr("airground_drake.base.parallel.processors", lambda: 1)
     assert start_in_process(os.getpid)() == os.getpid()

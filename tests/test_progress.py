@@ -8,7 +8,7 @@ import threading
 
 import pytest
 
-from airground_drake.progress import progress_bar
+from airground_drake.base.progress import progress_bar
 
 
 class Terminal(io.StringIO):

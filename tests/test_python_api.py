@@ -13,12 +13,12 @@ from pydrake.systems.primitives import ConstantVectorSource, Integrator, LinearS
 
 import airground_drake
 from airground_drake import ScenarioError, UnknownNameError, build_diagram, load, simulate
-from airground_drake.components import first_order_plant
-from airground_drake.errors import PluginError
+from airground_drake.base.errors import PluginError
 from airground_drake.nsbc.task import Array
 from airground_drake.nsbc.tasks import PositionTask
 from airground_drake.scenarios.load import resolved, validated
 from airground_drake.scenarios.schema import Scenario
+from airground_drake.systems.components import first_order_plant
 from airground_drake.verify import verify
 
 Edit = Callable[[Scenario], Any]

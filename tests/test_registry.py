@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from airground_drake import registry
-from airground_drake.errors import PluginError, UnknownNameError
+from airground_drake.base.errors import PluginError, UnknownNameError
 from airground_drake.intervention.policy import Policy
 from airground_drake.registry import METHODS, MODEL_CLAIMS, POLICIES, ROUTES, RUN_CLAIMS, SAMPLERS, UAV_TASKS, Registry
 

@@ -14,10 +14,10 @@ from typing import Any
 
 import pytest
 
-from airground_drake import runs
-from airground_drake.errors import AirgroundError, PluginError, ScenarioError, SimulationError
+from airground_drake.base.errors import AirgroundError, PluginError, ScenarioError, SimulationError
 from airground_drake.registry import UAV_TASKS
-from airground_drake.runs import simulate_all
+from airground_drake.run import runs
+from airground_drake.run.runs import simulate_all
 from airground_drake.scenarios.schema import Scenario
 
 
@@ -98,7 +98,7 @@ import multiprocessing, os, sys, time
 from collections import deque
 from itertools import repeat
 from pathlib import Path
-from airground_drake import runs
+from airground_drake.run import runs
 
 def spins(*_, **__):
     os.write(int(sys.argv[2]), b"%d" % os.getpid())

@@ -13,15 +13,15 @@ from scenarios.cases import DEADLOCKS
 from scipy.stats import kstest
 from timeline import kinds, times
 
-from airground_drake import runs, trace
-from airground_drake.errors import TraceError
-from airground_drake.progress import Progress
+from airground_drake.base.errors import TraceError
+from airground_drake.base.progress import Progress
 from airground_drake.report.reproduction import MEASURES
-from airground_drake.runs import simulate_all
+from airground_drake.run import runs, trace
+from airground_drake.run.runs import simulate_all
+from airground_drake.run.simulation import Recorder, simulate
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import load, shipped
 from airground_drake.scenarios.schema import Obstacle, Preset, Run, Scenario, Uav, Ugv
-from airground_drake.simulation import Recorder, simulate
-from airground_drake.trace import Trace
 from airground_drake.verify import verify
 
 Runs = Callable[[str, str], Trace]
@@ -118,7 +118,7 @@ def test_runs_in_several_processes_are_those_in_one(
 
 
 WARM_UP = """
-from airground_drake import simulation
+from airground_drake.run import simulation
 from airground_drake.gatekeeper import cost, dual_bound, outcome, reachable_box, rollout
 from airground_drake.nsbc import kernels, law
 from airground_drake.scenarios.load import load

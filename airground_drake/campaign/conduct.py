@@ -9,7 +9,9 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from airground_drake import files
+from airground_drake.base import files
+from airground_drake.base.errors import FolderError, LimitError, one_line
+from airground_drake.base.progress import SILENT, Progress
 from airground_drake.campaign.evidence import evidence, strict
 from airground_drake.campaign.page import page
 from airground_drake.campaign.pool import Pool
@@ -18,8 +20,6 @@ from airground_drake.campaign.spec import Spec
 from airground_drake.campaign.stopping import InOrder, Stopping
 from airground_drake.campaign.store import Store
 from airground_drake.campaign.work import died, rows_of
-from airground_drake.errors import FolderError, LimitError, one_line
-from airground_drake.progress import SILENT, Progress
 from airground_drake.registry import RUN_CLAIMS
 from airground_drake.scenarios.estimate import DEFAULT_LIMITS, MOST_ROWS, Limits
 

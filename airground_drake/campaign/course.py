@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 
 TRIES = 10_000
 """Places that are tried before a field counts as full."""

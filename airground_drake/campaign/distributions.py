@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import qmc, truncnorm
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.scenarios.limits import MAX_SEED
 
 

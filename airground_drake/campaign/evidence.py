@@ -13,10 +13,10 @@ import pandas as pd
 from pandas.api.types import is_numeric_dtype
 from scipy.stats import chi2_contingency, qmc
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
+from airground_drake.base.statuses import UNDECIDED
 from airground_drake.campaign.rows import JUDGED, TIMES, UNFINISHED, is_tested
 from airground_drake.campaign.statistics import CONFIDENCE, clopper_pearson, confidence_sequence
-from airground_drake.statuses import UNDECIDED
 
 WORST = 5
 """Runs of least margin that are listed for each claim."""

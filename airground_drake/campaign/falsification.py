@@ -10,7 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
+from airground_drake.base.errors import PluginError, ScenarioError, described, one_line
+from airground_drake.base.progress import SILENT, Progress
 from airground_drake.campaign.distributions import dimensions, values_at
 from airground_drake.campaign.objective import Objective
 from airground_drake.campaign.pool import Pool
@@ -18,11 +20,9 @@ from airground_drake.campaign.rows import Row
 from airground_drake.campaign.search import Sampler
 from airground_drake.campaign.spec import Spec
 from airground_drake.campaign.work import rows_at, rows_of_scenario, trace_of
-from airground_drake.errors import PluginError, ScenarioError, described, one_line
-from airground_drake.progress import SILENT, Progress
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.estimate import Limits
 from airground_drake.scenarios.load import from_data
-from airground_drake.trace import Trace
 
 
 @dataclass(frozen=True)

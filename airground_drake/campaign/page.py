@@ -12,7 +12,7 @@ from jinja2 import Environment
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.campaign.rows import JUDGED
 from airground_drake.report.figures import canvas, svg
 from airground_drake.report.html import LOOKS, NAMES, number

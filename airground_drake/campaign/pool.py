@@ -13,8 +13,8 @@ from contextlib import contextmanager
 from functools import partial
 from typing import Any, Protocol, TypeVar
 
-from airground_drake.errors import AirgroundError, one_line
-from airground_drake.interruption import end_with_parent
+from airground_drake.base.errors import AirgroundError, one_line
+from airground_drake.base.interruption import end_with_parent
 
 DEATHS = 2
 """An item in whose presence so many processes have died is given up."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from airground_drake.statuses import NOT_EXERCISED, outcome
+from airground_drake.base.statuses import NOT_EXERCISED, outcome
 
 COLUMNS: dict[str, str] = {
     "index": "int64", "run": "str", "method": "str", "ended": "str", "what": "str", "claim": "str", "status": "str",

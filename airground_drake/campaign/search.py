@@ -9,7 +9,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from scipy.stats import qmc
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 
 BATCH = 16
 """Points at a time, of samplers that learn nothing from one to the next."""

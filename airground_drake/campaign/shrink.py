@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from airground_drake.geometry.motion import Motion
-from airground_drake.trace import Trace
+from airground_drake.run.trace import Trace
 
 DIGITS = (0, 1, 2, 3)
 """Decimals that numbers are rounded to, the fewest first."""

@@ -22,11 +22,11 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from airground_drake.arrays import LARGEST
+from airground_drake.base.arrays import LARGEST
+from airground_drake.base.errors import Fault, ScenarioError
 from airground_drake.campaign.course import REPLACES, Course
 from airground_drake.campaign.distributions import KINDS, RANDOM, Choice, Key, combinations, made, stream, values_of
 from airground_drake.campaign.rows import TIMES
-from airground_drake.errors import Fault, ScenarioError
 from airground_drake.registry import RUN_CLAIMS
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.document import read_data

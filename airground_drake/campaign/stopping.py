@@ -7,11 +7,11 @@ from collections import Counter
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 
+from airground_drake.base.errors import UnknownNameError
+from airground_drake.base.statuses import UNDECIDED
 from airground_drake.campaign.rows import UNFINISHED, Row, is_tested
 from airground_drake.campaign.statistics import confidence_sequence
-from airground_drake.errors import UnknownNameError
 from airground_drake.registry import RUN_CLAIMS
-from airground_drake.statuses import UNDECIDED
 
 _RULE = re.compile(r"\s*(?P<claim>[A-Za-z0-9_.-]+)\s*(?P<sign>[<>])\s*(?P<value>[0-9.eE+-]+)\s*")
 

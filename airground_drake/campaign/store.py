@@ -23,9 +23,9 @@ from typing import Any
 
 import pandas as pd
 
-from airground_drake import files
+from airground_drake.base import files
+from airground_drake.base.errors import FolderError, one_line
 from airground_drake.campaign.rows import COLUMNS, Row
-from airground_drake.errors import FolderError, one_line
 
 SCHEMA = "airground_drake.campaign/2"
 MANIFEST, JOURNAL, PARTS = "campaign.json", "journal.jsonl", "parts"

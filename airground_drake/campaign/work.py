@@ -13,15 +13,15 @@ from typing import Any
 
 import numpy as np
 
+from airground_drake.base.errors import AirgroundError, ScenarioError, described, one_line
 from airground_drake.campaign.rows import DIED, INVALID, JUDGED, STOPPED, Row, blank
 from airground_drake.campaign.spec import Spec
-from airground_drake.errors import AirgroundError, ScenarioError, described, one_line
 from airground_drake.intervention.guest.time_limit import time_limit
+from airground_drake.run.simulation import simulate
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.estimate import Limits, within
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.simulation import simulate
-from airground_drake.trace import Trace
 from airground_drake.verify import Verdict, verify
 
 

@@ -84,7 +84,7 @@ def _is_shaped_like_a_report(report: Any) -> None:
     if not isinstance(report, dict):
         raise NotEstablished("it is a report", f"it is a {type(report).__name__}", "report.json")
     if "mutants" in report or report.get("schema") in EARLIER:
-        why = "it is by an earlier version: make the report again (docs/migration.md)"
+        why = "it is by an earlier version: make the report again (CHANGELOG.md)"
         raise NotEstablished("it is a report of this version", why, "report.json")
     for key in ("scenario", "provenance", "overall", "runs", "files"):
         if not isinstance(report.get(key), dict):

@@ -18,7 +18,7 @@ from .rules import SMALL, Array, Flags, NotEstablished, at_most, close, holds, s
 from .scenario import Levels, Pair, Preset, as_run, levels_of, pairs_of, preset_of, robots_of
 
 Rows = npt.NDArray[np.intp]
-SCHEMA = "airground_drake.trace/7"
+SCHEMA = "airground_drake.run.trace/7"
 TABLES = ("signals.parquet", "decisions.parquet", "problems.parquet", "proposals.parquet")
 SHARED = ("method", "composition", "seed", "zeta_m", "events", "faults")
 """What meta.json and the run's entry in report.json both say."""
@@ -36,7 +36,7 @@ class Run:
         events: by time.
         decision_times_s: CPU time of each decision.
         wall_s: wall-clock time of the simulation.
-        signals: see airground_drake/trace.py for the columns.
+        signals: see airground_drake/run/trace.py for the columns.
         decisions: a row per decision of the gatekeeper.
         problems: the problem (26) of each decision.
         proposals: a row per proposal of the UAV.

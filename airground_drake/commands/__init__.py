@@ -10,8 +10,8 @@ from importlib import import_module
 from importlib.metadata import version
 from typing import NamedTuple
 
-from airground_drake import interruption
-from airground_drake.usage import Parser, refuse
+from airground_drake.base import interruption
+from airground_drake.base.usage import Parser, refuse
 
 
 class Command(NamedTuple):
@@ -73,7 +73,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if name is None:
         parser.error(f"a command is needed: {', '.join(COMMANDS)}")
     if name in GONE:
-        return refuse(f"`airground {name}` is gone: use `{GONE[name]}` (docs/migration.md)")
+        return refuse(f"`airground {name}` is gone: use `{GONE[name]}` (CHANGELOG.md)")
     if name not in COMMANDS:
         close = difflib.get_close_matches(name, COMMANDS, n=1)
         meant = f"did you mean {close[0]}? " if close else ""

@@ -8,15 +8,22 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from airground_drake import files
+from airground_drake.base import files
+from airground_drake.base.errors import (
+    AirgroundError,
+    FolderError,
+    LimitError,
+    ScenarioError,
+    UnknownNameError,
+    one_line,
+)
+from airground_drake.base.parallel import processors
+from airground_drake.base.progress import progress_bar
+from airground_drake.base.usage import EXIT_TOOL, Parser, positive, refuse, whole
 from airground_drake.campaign.rows import UNFINISHED
-from airground_drake.errors import AirgroundError, FolderError, LimitError, ScenarioError, UnknownNameError, one_line
-from airground_drake.parallel import processors
-from airground_drake.progress import progress_bar
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.estimate import DEFAULT_LIMITS, Limits
 from airground_drake.scenarios.shipped import argument
-from airground_drake.usage import EXIT_TOOL, Parser, positive, refuse, whole
 
 if TYPE_CHECKING:
     from airground_drake.campaign.spec import Spec

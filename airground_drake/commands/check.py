@@ -15,8 +15,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from airground_drake.base.usage import refuse
 from airground_drake.check import command as checker
-from airground_drake.usage import refuse
 
 if TYPE_CHECKING:
     import argparse

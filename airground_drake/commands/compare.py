@@ -8,10 +8,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from airground_drake import files
-from airground_drake.errors import AirgroundError, TraceError, one_line
+from airground_drake.base import files
+from airground_drake.base.errors import AirgroundError, TraceError, one_line
+from airground_drake.base.usage import Parser, refuse
 from airground_drake.report import compare
-from airground_drake.usage import Parser, refuse
 
 EXIT_WORSE = 1
 PARTS = ("overall", "verdicts", "margins", "exercised", "expectations", "reproduction", "audit", "events")
@@ -99,9 +99,9 @@ def _page(
     folders: tuple[Path, Path], before: compare.Document, after: compare.Document, found: Mapping[str, Any]
 ) -> str:
     """The comparison as a page, with the runs of which both reports have a trace."""
-    from airground_drake import trace
     from airground_drake.report import pages
     from airground_drake.report.figures import overlay
+    from airground_drake.run import trace
 
     worse = [
         _line(change).removeprefix("worse: ")

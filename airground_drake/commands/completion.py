@@ -7,9 +7,9 @@ from collections.abc import Iterable, Sequence
 from importlib import import_module
 from pathlib import Path
 
+from airground_drake.base.usage import Parser
 from airground_drake.registry import SAMPLERS
 from airground_drake.scenarios.shipped import shipped
-from airground_drake.usage import Parser
 
 SHELLS = ("bash", "zsh", "tcsh")
 EPILOG = """\

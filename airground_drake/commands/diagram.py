@@ -6,11 +6,11 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from airground_drake import files
-from airground_drake.errors import AirgroundError, UnknownNameError
+from airground_drake.base import files
+from airground_drake.base.errors import AirgroundError, UnknownNameError
+from airground_drake.base.usage import Parser, overridable, refuse
 from airground_drake.registry import METHODS
 from airground_drake.scenarios import plugins
-from airground_drake.usage import Parser, overridable, refuse
 
 FORMATS = ("dot", "svg", "pdf", "png")
 
@@ -35,9 +35,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         Exit code: 0, or 2 if the scenario or the folder cannot be used.
     """
     options = parser().parse_args(arguments)
-    from airground_drake import graphviz
-    from airground_drake.diagram import build_diagram, most_complete
     from airground_drake.scenarios.load import load
+    from airground_drake.systems import graphviz
+    from airground_drake.systems.diagram import build_diagram, most_complete
 
     try:
         scenario, _ = load(options.scenario, options.set)

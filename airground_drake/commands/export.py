@@ -6,10 +6,10 @@ import argparse
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from airground_drake import files
+from airground_drake.base import files
+from airground_drake.base.errors import AirgroundError, UnknownNameError
+from airground_drake.base.usage import Parser, refuse
 from airground_drake.commands.replay import outside_reports, runs_of
-from airground_drake.errors import AirgroundError, UnknownNameError
-from airground_drake.usage import Parser, refuse
 
 KINDS = ("csv", "mcap")
 
@@ -49,8 +49,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _written(folder: Path, kind: str, output: Path) -> Iterator[Path]:
     """The files of a saved run, as they are written."""
-    from airground_drake import trace
     from airground_drake.export import recording, tables
+    from airground_drake.run import trace
     from airground_drake.scenarios.load import from_data
 
     saved = trace.load(folder)

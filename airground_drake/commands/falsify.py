@@ -10,16 +10,16 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from airground_drake import files
+from airground_drake.base import files
+from airground_drake.base.errors import AirgroundError, Fault, FolderError, ScenarioError, UnknownNameError, one_line
+from airground_drake.base.parallel import processors
+from airground_drake.base.progress import progress_bar
+from airground_drake.base.usage import EXIT_TOOL, Parser, positive, refuse, whole
 from airground_drake.campaign.rows import COLUMNS
-from airground_drake.errors import AirgroundError, Fault, FolderError, ScenarioError, UnknownNameError, one_line
-from airground_drake.parallel import processors
-from airground_drake.progress import progress_bar
 from airground_drake.registry import RUN_CLAIMS, SAMPLERS, is_plugin
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.estimate import DEFAULT_LIMITS
 from airground_drake.scenarios.shipped import argument
-from airground_drake.usage import EXIT_TOOL, Parser, positive, refuse, whole
 
 if TYPE_CHECKING:
     from airground_drake.campaign.falsification import Best, Search

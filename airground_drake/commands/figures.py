@@ -6,9 +6,9 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
+from airground_drake.base.errors import AirgroundError
+from airground_drake.base.usage import Parser, refuse
 from airground_drake.commands.replay import outside_reports, runs_of
-from airground_drake.errors import AirgroundError
-from airground_drake.usage import Parser, refuse
 
 FORMATS, STYLES = ("pdf", "png", "svg"), ("ieee", "thesis")
 """As in `export.figures`, which takes seconds to import."""
@@ -39,9 +39,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         runs = runs_of(options.folder)
         outside_reports(options.output, "the figures")
-        from airground_drake import trace
         from airground_drake.export import figures
         from airground_drake.report.compare import read
+        from airground_drake.run import trace
         from airground_drake.scenarios.load import from_data
 
         traces = {name: trace.load(options.folder / "trace" / name) for name in runs}

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from airground_drake import files
-from airground_drake.errors import AirgroundError, FolderError, ReportError, TraceError
+from airground_drake.base import files
+from airground_drake.base.errors import AirgroundError, FolderError, ReportError, TraceError
+from airground_drake.base.usage import Parser, refuse
 from airground_drake.report import compare, folder, summary
-from airground_drake.usage import Parser, refuse
 
 PAGE = "index.html"
 MARK = "airground_drake index"
@@ -97,8 +97,8 @@ def _headline(document: Mapping[str, Any]) -> summary.Line | None:
 
 def _thumbnail(report: Path, document: Mapping[str, Any], prefix: str) -> str:
     """The last run as a picture; '' if it has no trace that can be used."""
-    from airground_drake import trace
     from airground_drake.report.figures import thumbnail
+    from airground_drake.run import trace
 
     runs = [run for run in document["runs"] if run.isidentifier()]
     try:

@@ -7,12 +7,12 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-from airground_drake import files
-from airground_drake.errors import FolderError, one_line
+from airground_drake.base import files
+from airground_drake.base.errors import FolderError, one_line
+from airground_drake.base.usage import Parser, refuse, whole
 from airground_drake.scenarios.fleet import fleet
 from airground_drake.scenarios.limits import MAX_NAME, MAX_SEED, MAX_UGVS
 from airground_drake.scenarios.shipped import argument, json_schema_file, shipped_files
-from airground_drake.usage import Parser, refuse, whole
 
 MOST_OBSTACLES = 2000 - MAX_UGVS
 """Beside as many UGVs as are allowed, what the checker looks at."""

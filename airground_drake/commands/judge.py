@@ -9,9 +9,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from airground_drake import files
-from airground_drake.errors import AirgroundError, one_line
-from airground_drake.usage import Parser, overridable, refuse
+from airground_drake.base import files
+from airground_drake.base.errors import AirgroundError, one_line
+from airground_drake.base.usage import Parser, overridable, refuse
 
 if TYPE_CHECKING:
     import pandas as pd

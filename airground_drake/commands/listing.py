@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Iterator, Sequence
 
+from airground_drake.base.usage import Parser
 from airground_drake.registry import METHODS, MODEL_CLAIMS, POLICIES, ROUTES, RUN_CLAIMS, SAMPLERS, UAV_TASKS, Registry
 from airground_drake.scenarios.shipped import shipped, title
-from airground_drake.usage import Parser
 
 Lines = Iterator[tuple[str, str]]
 """Names, and what each is."""

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from airground_drake.errors import AirgroundError
-from airground_drake.usage import Parser, positive, refuse
+from airground_drake.base.errors import AirgroundError
+from airground_drake.base.usage import Parser, positive, refuse
 
 if TYPE_CHECKING:
     from airground_drake.proofs.runs import Proved

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from airground_drake import files
-from airground_drake.errors import AirgroundError, FolderError, UnknownNameError, one_line
+from airground_drake.base import files
+from airground_drake.base.errors import AirgroundError, FolderError, UnknownNameError, one_line
+from airground_drake.base.usage import Parser, refuse
 from airground_drake.report.folder import is_report
-from airground_drake.usage import Parser, refuse
 
 if TYPE_CHECKING:
     from airground_drake.replay.scene import Scene
@@ -141,8 +141,8 @@ def outside_reports(folder: Path, what: str) -> None:
 
 
 def _scene(folder: Path, run: str) -> Scene:
-    from airground_drake import trace
     from airground_drake.replay.scene import scene
+    from airground_drake.run import trace
     from airground_drake.scenarios.load import from_data
 
     saved = trace.load(folder / "trace" / run)

@@ -8,14 +8,14 @@ from pathlib import Path
 from threading import Event
 from typing import TYPE_CHECKING
 
-from airground_drake import files
-from airground_drake.errors import AirgroundError, SimulationError, UnknownNameError
+from airground_drake.base import files
+from airground_drake.base.errors import AirgroundError, SimulationError, UnknownNameError
+from airground_drake.base.usage import EXIT_TOOL, Parser, overridable, positive, refuse
 from airground_drake.registry import METHODS
 from airground_drake.scenarios import plugins
-from airground_drake.usage import EXIT_TOOL, Parser, overridable, positive, refuse
 
 if TYPE_CHECKING:
-    from airground_drake.trace import Trace
+    from airground_drake.run.trace import Trace
 
 SPEED = 1.0
 """Simulated seconds per second in Meshcat, unless the command line says otherwise."""
@@ -56,8 +56,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             raise UnknownNameError("run", name, methods)
         if options.output is not None:
             files.make_folder(options.output, "the trace")
-        from airground_drake import trace as traces
-        from airground_drake.simulation import simulate
+        from airground_drake.run import trace as traces
+        from airground_drake.run.simulation import simulate
 
         with plugins.admitted(scenario, options.scenario, allow=options.allow_plugins):
             if options.meshcat:

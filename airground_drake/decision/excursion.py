@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 
 SUPERVISING, INTERVENING = 0, 1
 """Modes of `decision.trigger.Mode`, as numba takes them; the third is REFRACTORY."""

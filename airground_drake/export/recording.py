@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from airground_drake.errors import ExportError
+from airground_drake.base.errors import ExportError
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.trace import Trace
 from airground_drake.view.looks import OBSTACLE_COLOR, SAFE_COLOR, STATE_COLORS, UAV_COLOR, UNSEEN_COLOR
 from airground_drake.view.stage import Robot, Stage, stage, states
 

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from airground_drake import files
-from airground_drake.trace import TABLES, Trace
+from airground_drake.base import files
+from airground_drake.run.trace import TABLES, Trace
 
 
 def write(trace: Trace, folder: Path) -> Iterator[Path]:

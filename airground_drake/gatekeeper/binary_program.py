@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from pydrake.solvers import MathematicalProgram
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.gatekeeper.blocks import block_of_stage
 from airground_drake.gatekeeper.half_planes import offsets
 from airground_drake.gatekeeper.problem import Problem

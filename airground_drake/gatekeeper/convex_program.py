@@ -12,7 +12,7 @@ from numba import njit
 from pydrake.solvers import MathematicalProgram
 from scipy.sparse import csc_matrix
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.gatekeeper.cost import error_weights
 from airground_drake.gatekeeper.half_planes import offsets
 from airground_drake.gatekeeper.problem import Problem

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 
 
 class Terms(NamedTuple):

@@ -10,7 +10,7 @@ import daqp
 import numpy as np
 import numpy.typing as npt
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.gatekeeper.binary_program import BinaryProgram
 
 _BINARY, _SOFT, _NO_BOUND = 16, 8, 1e30

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.gatekeeper.problem import Problem
 from airground_drake.gatekeeper.reachable_box import nearest_in_reach, within_reach
 

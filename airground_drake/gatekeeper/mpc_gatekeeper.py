@@ -11,7 +11,7 @@ from typing import Any, Self
 import numpy as np
 import numpy.typing as npt
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.gatekeeper.answer import Decision, Planned, Rules, costs_throughout, in_words, settle
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.patience import Commitment

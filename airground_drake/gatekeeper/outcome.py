@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numba import njit
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.gatekeeper.rollout import (
     ACCEPTED,
     REFUSED,

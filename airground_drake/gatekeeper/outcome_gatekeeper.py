@@ -19,7 +19,7 @@ from time import thread_time
 import numpy as np
 import numpy.typing as npt
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.gatekeeper.answer import Decision, Foreseen, Reason
 from airground_drake.gatekeeper.mpc_gatekeeper import Gatekeepers, Memory, View
 from airground_drake.gatekeeper.outcome import Other, Outcome, Outlook, outcomes

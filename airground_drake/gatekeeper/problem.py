@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.gatekeeper.cost import Terms, error_weights, half_plane_cost, plan_cost
 from airground_drake.gatekeeper.rollout import ClosedLoop, Scene, closed_loop
 from airground_drake.intervention.policy import Proposal

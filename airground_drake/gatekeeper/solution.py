@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.gatekeeper.problem import Evaluation, Problem
 from airground_drake.gatekeeper.rounding import rounding_deviation
 

@@ -8,7 +8,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)

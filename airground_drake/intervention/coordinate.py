@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.coordination.joint import Effort, Plan, plan
 from airground_drake.intervention.coordination.roadmap import RobotTask, Space

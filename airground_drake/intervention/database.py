@@ -9,7 +9,7 @@ from typing import Any, Literal, Self, get_args
 
 import numpy as np
 
-from airground_drake.errors import PolicyError, described
+from airground_drake.base.errors import PolicyError, described
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.guest.process import GuestPolicy
 from airground_drake.intervention.guest.time_limit import OutOfTime, time_limit

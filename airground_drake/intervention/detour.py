@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.geometry.motion import Motion
 from airground_drake.geometry.paths import NoPath, Path, shortest_path
 from airground_drake.intervention.policy import Observation, Policy, Teammate

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 
 STANDS_S = 1.0
 """A UGV stands once it has kept to one place for this long, s."""

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.intervention.policy import Proposal
 
 ACCEPT, SILENT, REFUSE, DONE = 1.0, 0.0, -1.0, 2.0

@@ -8,7 +8,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.database import BehaviourDatabase, Fault, Negotiation
 from airground_drake.intervention.messages import (
@@ -77,7 +77,7 @@ class Planner:
     Policies are asked for UGVs that are intervened on. What they propose to others, which are to make way, is a
     proposal like any other, in force as long as the UGV that it is for is intervened on. A refusal withdraws the
     proposal, and all other parts of its joint plan; the next behaviour is tried after a rest. The obstacles that the
-    UGV senses come with every answer, and the UAV knows them from then on. See docs/protocol.md.
+    UGV senses come with every answer, and the UAV knows them from then on. See docs/design.md.
 
     Attributes:
         ugvs: names.

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 
-from airground_drake.arrays import LARGEST, Array, read_only
+from airground_drake.base.arrays import LARGEST, Array, read_only
 from airground_drake.geometry.motion import Motion
 from airground_drake.nsbc.task import pseudoinverse
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.detour import Detour
 from airground_drake.intervention.policy import SHORTEST_LEG_S, Observation, Policy

@@ -19,7 +19,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.nsbc import kernels
 
 Composition = Literal["augmented", "recursion_nearest", "recursion_listed"]

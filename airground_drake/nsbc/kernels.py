@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 
 MARGIN_M_S = 1e-12
 """Added to every bound in the projection, m/s. Without it the velocity of a robot in contact misses the bound, which is

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.kernels import avoid_one, fill_half_spaces, gather, limit_one
 from airground_drake.nsbc.team import Neighbourhood

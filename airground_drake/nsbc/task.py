@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 
 
 class Task(abc.ABC):

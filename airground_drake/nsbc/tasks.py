@@ -11,7 +11,7 @@ from functools import cache
 
 import numpy as np
 
-from airground_drake.arrays import Array, read_only
+from airground_drake.base.arrays import Array, read_only
 from airground_drake.nsbc.task import Task
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.nsbc import kernels
 from airground_drake.nsbc.avoidance import Surroundings
 

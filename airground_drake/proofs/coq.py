@@ -8,7 +8,7 @@ import subprocess
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from airground_drake.errors import AirgroundError, one_line
+from airground_drake.base.errors import AirgroundError, one_line
 from airground_drake.proofs.record import ALLOWED_AXIOMS, FOLDER, closure
 
 LIMIT_S = 600.0

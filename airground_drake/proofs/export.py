@@ -12,7 +12,7 @@ from math import isqrt, lcm
 from typing import Any
 
 from airground_drake.proofs.record import FOLDER
-from airground_drake.trace import Trace
+from airground_drake.run.trace import Trace
 
 PARTS = 2**60
 """Positions are rounded to 1/PARTS m: some coordinates are as small as 1e-100 m. At a metre binary64 is coarser."""

@@ -12,9 +12,9 @@ from fractions import Fraction
 from itertools import chain
 from typing import NamedTuple
 
-from airground_drake.errors import AirgroundError
+from airground_drake.base.errors import AirgroundError
 from airground_drake.proofs.export import PARTS, demands
-from airground_drake.trace import Trace
+from airground_drake.run.trace import Trace
 
 
 class ReadbackError(AirgroundError):

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from airground_drake import files
+from airground_drake.base import files
 from airground_drake.proofs.theorems import THEOREMS
 
 FOLDER = Path(__file__).parent

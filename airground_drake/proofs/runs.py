@@ -10,13 +10,14 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from airground_drake import files, trace
-from airground_drake.errors import TraceError, UnknownNameError, one_line
+from airground_drake.base import files
+from airground_drake.base.errors import TraceError, UnknownNameError, one_line
 from airground_drake.proofs import coq, readback
 from airground_drake.proofs.export import Demand, Recorded, distances_file, law_file, recorded
 from airground_drake.proofs.record import FOLDER, digest
 from airground_drake.proofs.too_near import TooNear, too_near
-from airground_drake.trace import Trace
+from airground_drake.run import trace
+from airground_drake.run.trace import Trace
 
 SCHEMA = "airground_drake.proofs/1"
 PLACE = "proofs"

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from airground_drake import files
+from airground_drake.base import files
 from airground_drake.proofs import coq
 from airground_drake.proofs.record import FOLDER, RECORD, digest, file_of, read_record
 from airground_drake.proofs.theorems import THEOREMS

@@ -8,7 +8,7 @@ from functools import cache
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from urllib.parse import quote, unquote
 
-from airground_drake.errors import AirgroundError
+from airground_drake.base.errors import AirgroundError
 
 
 def serve(runs: Sequence[str], page: Callable[[str], str]) -> None:

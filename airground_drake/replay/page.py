@@ -8,7 +8,7 @@ from typing import Any
 
 from jinja2 import Template
 
-from airground_drake.errors import ReplayError
+from airground_drake.base.errors import ReplayError
 from airground_drake.replay.recording import recorded
 from airground_drake.replay.scene import FRAMES_PER_S, MAX_NAMED_OBSTACLES, Scene
 from airground_drake.report.html import digest

@@ -7,7 +7,7 @@ import numpy.typing as npt
 from pydrake.geometry import Meshcat, MeshcatAnimation
 from pydrake.math import RigidTransform
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.replay.proposals import Sent
 from airground_drake.replay.scene import FRAMES_PER_S, Scene
 from airground_drake.view.draw import draw, rgba, robot_path, served, shadow_path, state_path

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.registry import METHODS
 from airground_drake.replay.proposals import Sent, sent
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.trace import Trace
 from airground_drake.view.stage import Robot, Stage, stage, states
 
 FRAMES_PER_S = 30

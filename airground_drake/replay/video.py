@@ -12,8 +12,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
-from airground_drake import files
-from airground_drake.errors import ReplayError
+from airground_drake.base import files
+from airground_drake.base.errors import ReplayError
 from airground_drake.replay.proposals import Sent
 from airground_drake.replay.scene import MAX_NAMED_OBSTACLES, Body, Scene
 from airground_drake.report.figures import canvas

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from airground_drake import interruption
+from airground_drake.base import interruption
 
 if __name__ == "__main__":
     interruption.begin()  # before the imports, which take seconds
@@ -14,7 +14,7 @@ import webbrowser
 from collections.abc import Sequence
 from pathlib import Path
 
-from airground_drake.errors import (
+from airground_drake.base.errors import (
     AirgroundError,
     FolderError,
     LimitError,
@@ -23,12 +23,12 @@ from airground_drake.errors import (
     UnknownNameError,
     one_line,
 )
-from airground_drake.progress import progress_bar
+from airground_drake.base.progress import progress_bar
+from airground_drake.base.usage import EXIT_TOOL, Parser, overridable, positive, refuse
 from airground_drake.report import folder
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.estimate import DEFAULT_LIMITS, GIB, Limits
 from airground_drake.scenarios.shipped import AUDIT, shipped
-from airground_drake.usage import EXIT_TOOL, Parser, overridable, positive, refuse
 
 FORMATS = tuple(folder.PAGES)
 AUDITED = "case_a"

@@ -12,18 +12,21 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from airground_drake import files, graphviz, trace
-from airground_drake.diagram import build_diagram, most_complete
-from airground_drake.parallel import start_in_process
-from airground_drake.progress import Progress
-from airground_drake.report import audit, document, folder, html, junit
+from airground_drake import audit
+from airground_drake.base import files
+from airground_drake.base.parallel import start_in_process
+from airground_drake.base.progress import Progress
+from airground_drake.report import document, folder, html, junit
 from airground_drake.report.figures import moments, threshold, zeno_refine
 from airground_drake.report.figures.draw import draw
 from airground_drake.report.figures.findings import draw as draw_findings
 from airground_drake.report.figures.panels import Figure
+from airground_drake.run import trace
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.trace import Trace
+from airground_drake.systems import graphviz
+from airground_drake.systems.diagram import build_diagram, most_complete
 from airground_drake.verify import Verdict, verify_all
 from airground_drake.verify.registry import model_claims
 

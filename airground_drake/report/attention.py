@@ -6,9 +6,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from airground_drake.errors import one_line
+from airground_drake.base.errors import one_line
+from airground_drake.base.statuses import PASSING, UNDECIDED, outcome
 from airground_drake.scenarios.validate import preset_s
-from airground_drake.statuses import PASSING, UNDECIDED, outcome
 
 MAX_FAULT_CHARS = 300
 MAX_FAULTS = 3

@@ -14,11 +14,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from airground_drake import files
-from airground_drake.errors import ReportError, one_line
+from airground_drake.base import files
+from airground_drake.base.errors import ReportError, one_line
+from airground_drake.base.statuses import UNDECIDED, outcome
 from airground_drake.report.folder import PAGES
 from airground_drake.report.rebuild import WITHIN
-from airground_drake.statuses import UNDECIDED, outcome
 
 SCHEMA = "airground_drake.comparison/1"
 REPORT = "airground_drake.report/2"
@@ -61,7 +61,7 @@ def read(folder: Path) -> Document:
         document = json.loads(text, parse_constant=_finite, parse_float=_finite, parse_int=_short)
         json.dumps(document, ensure_ascii=False).encode()  # no halves of characters
         if is_earlier(document):
-            raise ReportError(f"{path} is by an earlier version: make the report again (docs/migration.md)")
+            raise ReportError(f"{path} is by an earlier version: make the report again (CHANGELOG.md)")
         if document["schema"] != REPORT:
             raise ValueError(f"its schema is not {REPORT}")
         _usable(document)

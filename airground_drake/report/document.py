@@ -11,14 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from airground_drake.files import sha256
+from airground_drake.audit import of_runs
+from airground_drake.base.files import sha256
+from airground_drake.base.statuses import NOT_EXERCISED, STATUSES, UNDECIDED, admits_either, outcome
 from airground_drake.registry import method_of
 from airground_drake.report import metrics, reproduction
-from airground_drake.report.audit import of_runs
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.plugins import OPTION
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.statuses import NOT_EXERCISED, STATUSES, UNDECIDED, admits_either, outcome
-from airground_drake.trace import Trace
 from airground_drake.verify.claim import Verdict
 
 SCHEMA = "airground_drake.report/2"

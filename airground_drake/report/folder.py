@@ -13,8 +13,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from airground_drake import files
-from airground_drake.errors import FolderError, one_line
+from airground_drake.base import files
+from airground_drake.base.errors import FolderError, one_line
 
 PAGES = {"html": "report.html", "json": "report.json", "junit": "junit.xml"}
 """The formats of a report, and the file of each."""

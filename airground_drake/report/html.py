@@ -17,7 +17,8 @@ from typing import Any
 from jinja2 import Environment
 from markupsafe import Markup
 
-from airground_drake.errors import one_line
+from airground_drake.base.errors import one_line
+from airground_drake.base.statuses import PASSING, outcome
 from airground_drake.report import attention, evidence, summary
 from airground_drake.report.figures import svg
 from airground_drake.report.figures.canvas import DARK
@@ -26,7 +27,6 @@ from airground_drake.report.mathml import mathml
 from airground_drake.report.proved import place
 from airground_drake.report.reproduction import YES_NO
 from airground_drake.report.templating import environment_of
-from airground_drake.statuses import PASSING, outcome
 
 STYLE, SCRIPTS = "report.css", ("report.js", "scrubber.js")
 """The style sheet and the scripts of the page, among the templates."""

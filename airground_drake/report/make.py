@@ -11,12 +11,12 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from airground_drake import files
-from airground_drake.errors import ReportError
-from airground_drake.progress import SILENT, Progress
+from airground_drake.base import files
+from airground_drake.base.errors import ReportError
+from airground_drake.base.progress import SILENT, Progress
 from airground_drake.report import folder
 from airground_drake.report.folder import PAGES
-from airground_drake.runs import simulate_all
+from airground_drake.run.runs import simulate_all
 from airground_drake.scenarios.estimate import DEFAULT_LIMITS, Limits, within
 from airground_drake.scenarios.schema import Scenario
 

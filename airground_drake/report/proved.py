@@ -13,8 +13,8 @@ from typing import Any
 
 from markupsafe import Markup
 
-from airground_drake import files
-from airground_drake.errors import ReportError, one_line
+from airground_drake.base import files
+from airground_drake.base.errors import ReportError, one_line
 from airground_drake.report.folder import PAGES
 
 CLAIM = "SAFE-TRACE"

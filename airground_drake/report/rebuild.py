@@ -38,8 +38,8 @@ def lines(folder: Path, judge: Judge | None = None) -> Iterator[dict[str, Any]]:
     Raises:
         ScenarioError, TraceError, OSError: if a file cannot be used.
     """
-    from airground_drake import trace
     from airground_drake.report import document
+    from airground_drake.run import trace
     from airground_drake.scenarios.load import from_data
     from airground_drake.verify import verify_all
 
@@ -78,7 +78,7 @@ def lines(folder: Path, judge: Judge | None = None) -> Iterator[dict[str, Any]]:
 
 def _from_other_runs(report: Mapping[str, Any], scenario: Any, traces: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Findings about the paper that rest on runs and computations beyond those of the report: as recorded."""
-    from airground_drake.report.audit import of_runs
+    from airground_drake.audit import of_runs
 
     here = {item["id"] for item in of_runs(scenario, traces)}
     return [item for item in report["audit"] if item.get("id") not in here]
@@ -137,7 +137,7 @@ def main(arguments: Sequence[str]) -> int:
     Returns:
         Exit code: 0, or 2 if a file cannot be used.
     """
-    from airground_drake.errors import AirgroundError
+    from airground_drake.base.errors import AirgroundError
 
     folder, limit_s = Path(arguments[0]), int(float(arguments[1])) + 1
     resource.setrlimit(resource.RLIMIT_CPU, (limit_s, limit_s))

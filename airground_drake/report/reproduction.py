@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from airground_drake.arrays import Array
-from airground_drake.errors import TraceError
+from airground_drake.base.arrays import Array
+from airground_drake.base.errors import TraceError
 from airground_drake.report.metrics import closest_obstacle, events_of
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Reproduction, Scenario
-from airground_drake.trace import Trace
 
 Measure = Callable[[Trace, str], list[float]]
 

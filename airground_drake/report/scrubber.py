@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.report.figures.canvas import UAV_LOOK, look
-from airground_drake.trace import Trace
+from airground_drake.run.trace import Trace
 from airground_drake.view.stage import states
 
 SAMPLES = 121

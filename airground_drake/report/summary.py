@@ -9,9 +9,9 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from airground_drake.errors import one_line
+from airground_drake.base.errors import one_line
+from airground_drake.base.statuses import NOT_EXERCISED, PASSING, UNDECIDED, admits_either, outcome
 from airground_drake.registry import METHODS
-from airground_drake.statuses import NOT_EXERCISED, PASSING, UNDECIDED, admits_either, outcome
 
 MARKS = {"yes": "✓", "partly": "≈", "no": "✗", "open": "?", "none": "\N{EN DASH}", "": " "}
 """Marks of a line and their icons; '' continues the line before."""

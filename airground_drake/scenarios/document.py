@@ -17,8 +17,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import yaml
 
-from airground_drake import files
-from airground_drake.errors import Fault, ScenarioError, short
+from airground_drake.base import files
+from airground_drake.base.errors import Fault, ScenarioError, short
 from airground_drake.scenarios.shipped import shipped, shipped_files
 
 MAX_BYTES = 2**20

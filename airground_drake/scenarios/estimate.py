@@ -19,7 +19,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
-from airground_drake.errors import LimitError
+from airground_drake.base.errors import LimitError
 from airground_drake.registry import METHODS
 
 if TYPE_CHECKING:  # pydantic, which the schema imports, would delay `report --list`

@@ -14,11 +14,11 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
+from airground_drake.base.statuses import EXPECTATIONS
 from airground_drake.registry import Registry
 from airground_drake.scenarios import schema
 from airground_drake.scenarios.kinds import CLAIM_PATTERN, EXPECTED, NAME_PATTERN, unit_of
 from airground_drake.scenarios.limits import MAX_NAME, MAX_TEXT
-from airground_drake.statuses import EXPECTATIONS
 
 Schema = dict[str, Any]
 

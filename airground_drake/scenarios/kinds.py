@@ -11,10 +11,10 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, BeforeValidator, Field, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
-from airground_drake.arrays import LARGEST
+from airground_drake.base.arrays import LARGEST
+from airground_drake.base.statuses import EXPECTATIONS, alternatives
 from airground_drake.registry import MODEL_CLAIMS, PLUGIN, PLUGIN_PATTERN, RUN_CLAIMS, Registry, is_plugin
 from airground_drake.scenarios.limits import MAX_NAME, MAX_SEED, MAX_TEXT
-from airground_drake.statuses import EXPECTATIONS, alternatives
 
 SMALLEST = 1e-9  # of a positive number
 NAME_PATTERN = "^[A-Za-z_][A-Za-z0-9_]*$"  # of a UGV, an obstacle, a run, a parameter

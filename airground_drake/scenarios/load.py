@@ -18,8 +18,8 @@ from typing import Any
 from pydantic import TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
 
-from airground_drake import files
-from airground_drake.errors import Fault, ScenarioError
+from airground_drake.base import files
+from airground_drake.base.errors import Fault, ScenarioError
 from airground_drake.scenarios import json_schema, validate
 from airground_drake.scenarios.document import Document, of_data, put, read, replace, simple, unknown
 from airground_drake.scenarios.schema import RETIRED_KEYS, Scenario, Vector
@@ -172,8 +172,9 @@ def _in_words(error: ErrorDetails, document: Document) -> ScenarioError:
     key, source = ".".join(at), document.where(*at, key=not of_type)
     if kind == "rule":
         return ScenarioError(source, key, says["value"], says["allowed"])
-    if key in RETIRED_KEYS:
-        return ScenarioError(source, key, Fault("no longer a key"), RETIRED_KEYS[key])
+    general = ".".join(["runs", "NAME", *at[2:]]) if at[:1] == ["runs"] else key
+    if general in RETIRED_KEYS:
+        return ScenarioError(source, key, Fault("no longer a key"), RETIRED_KEYS[general])
     if kind in _UNKNOWN:
         return unknown(source, key, at[-1], json_schema.keys_at(*at[:-1]))
     wanted = f"wanted: {json_schema.wanted_at(*(loc[:-2] + loc[-1:] if loc[-1:] == [json_schema.NAMES] else at))}"

@@ -11,7 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from airground_drake.errors import ScenarioError
+from airground_drake.base.errors import ScenarioError
 from airground_drake.registry import POLICIES, ROUTES, UAV_TASKS, Registry, is_plugin
 
 if TYPE_CHECKING:  # pydantic, which the schema imports, would delay `report --list`

@@ -9,7 +9,7 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from airground_drake.arrays import ROUNDOFF, Array
+from airground_drake.base.arrays import ROUNDOFF, Array
 
 TOLERANCE_M = 1e-9
 """What a distance may fall short of the safe one, as SAFE-TRACE judges it, m."""

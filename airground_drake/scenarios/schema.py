@@ -47,11 +47,12 @@ them once, and proves safety once."""
 
 _NO_LAG = "remove it: longest_s, tries and rest_s bound how long a UGV goes along"
 RETIRED_KEYS = {
-    "gatekeeper.budget_nodes": "remove it: the search of the route mixed_integer is limited in time only",
+    "gatekeeper.budget_nodes": "remove it: the search of the route mixed_integer is limited in iterations",
     "gatekeeper.lag_m": _NO_LAG,
     "gatekeeper.behind_s": _NO_LAG,
+    "runs.NAME.rule": "write it as `set: {gatekeeper.rule: ...}` of the run",
 }
-"""Keys of earlier versions, and what to do about them."""
+"""Keys of earlier versions, and what to do about them; NAME is any run."""
 
 
 @dataclass(slots=True)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import yaml
 
-from airground_drake.errors import one_line
+from airground_drake.base.errors import one_line
 
 AUDIT = "audit"
 """What `airground report` takes besides the name of a scenario or a file."""

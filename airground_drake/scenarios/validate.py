@@ -17,12 +17,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from airground_drake.base.errors import Fault, ScenarioError
+from airground_drake.base.statuses import alternatives
 from airground_drake.decision.bayes import COMPUTED
-from airground_drake.errors import Fault, ScenarioError
 from airground_drake.registry import MODEL_CLAIMS, RETIRED_CLAIMS, ROUTES, RUN_CLAIMS
 from airground_drake.scenarios.rounding import TOLERANCE_M, Rounding
 from airground_drake.scenarios.schema import Scenario, Vector
-from airground_drake.statuses import alternatives
 
 GAINS = ("avoidance_gain_1_s", "motion_gain_1_s", "formation_gain_1_s", "intervention_gain_1_s")
 ARRIVES = "LIVE-GOAL"  # the claim that every UGV ends where it is to end

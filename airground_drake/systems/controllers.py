@@ -24,8 +24,8 @@ from pydrake.systems.framework import (
     ValueProducer,
 )
 
-from airground_drake.arrays import Array, read_only
-from airground_drake.errors import PluginError, short
+from airground_drake.base.arrays import Array, read_only
+from airground_drake.base.errors import PluginError, short
 from airground_drake.intervention.messages import accepted_proposals
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance, limit_speed

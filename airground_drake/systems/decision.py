@@ -21,7 +21,7 @@ from pydrake.systems.framework import (
     WitnessFunctionDirection,
 )
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.decision.excursion import anything_due, extremes, gathered, spans, transitions_due, variables
 from airground_drake.decision.trigger import Mode, Trigger, TriggerState
 from airground_drake.geometry.motion import Motion

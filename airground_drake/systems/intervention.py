@@ -6,7 +6,7 @@ import numpy as np
 from pydrake.common.value import AbstractValue, Value
 from pydrake.systems.framework import Context, DiscreteValues, EventStatus, LeafSystem, State
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.decision.excursion import INTERVENING
 from airground_drake.intervention.halts import NOT_WATCHED, room, standing, watched
 from airground_drake.intervention.planner import Planner, PlannerMemory, sent_after

@@ -8,7 +8,7 @@ import numpy as np
 from pydrake.common.containers import namedview
 from pydrake.common.value import AbstractValue, Value
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.intervention.messages import Report
 
 Status = namedview("Status", ["mode", "triggers", "triggered_at_s", "released_at_s"])

@@ -6,12 +6,12 @@ import warnings
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+from airground_drake.base.statuses import PASSING
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import Overrides
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.statuses import PASSING
 from airground_drake.testing.scenario import chosen
 from airground_drake.testing.words import told
-from airground_drake.trace import Trace
 from airground_drake.verify.claim import TraceClaim, Verdict
 from airground_drake.verify.judge import verify, verify_model
 

@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, Protocol
 import pytest
 
 if TYPE_CHECKING:
+    from airground_drake.run.trace import Trace
     from airground_drake.scenarios.load import Overrides
     from airground_drake.scenarios.schema import Scenario
-    from airground_drake.trace import Trace
 
 
 class Simulations(Protocol):
@@ -53,8 +53,8 @@ def airground_trace(tmp_path_factory: pytest.TempPathFactory) -> Simulations:
     read: dict[str, Trace] = {}
 
     def get(scenario: str | Path | Scenario, run: str, *, set: Overrides = ()) -> Trace:
-        from airground_drake import trace
-        from airground_drake.simulation import simulate
+        from airground_drake.run import trace
+        from airground_drake.run.simulation import simulate
         from airground_drake.testing.scenario import chosen, digest
 
         wanted = chosen(scenario, set)

@@ -6,7 +6,7 @@ import json
 import re
 from pathlib import Path
 
-from airground_drake import files
+from airground_drake.base import files
 from airground_drake.scenarios.load import Overrides, load, resolved, validated
 from airground_drake.scenarios.schema import Scenario
 

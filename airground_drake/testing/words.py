@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from airground_drake.base.statuses import PASSING
 from airground_drake.scenarios.kinds import unit_of
-from airground_drake.statuses import PASSING
 from airground_drake.verify.claim import Verdict
 
 WHO = ("robot", "first", "second", "other", "ugv", "obstacle")

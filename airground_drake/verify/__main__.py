@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from airground_drake import interruption
+from airground_drake.base import interruption
 
 if __name__ == "__main__":
     interruption.begin()  # before the imports, which take seconds
@@ -14,11 +14,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from airground_drake.errors import AirgroundError, UnknownNameError
-from airground_drake.progress import Progress, progress_bar
+from airground_drake.base.errors import AirgroundError, UnknownNameError
+from airground_drake.base.progress import Progress, progress_bar
+from airground_drake.base.statuses import NOT_EXERCISED, outcome
+from airground_drake.base.usage import Parser, refuse
 from airground_drake.scenarios import plugins
-from airground_drake.statuses import NOT_EXERCISED, outcome
-from airground_drake.usage import Parser, refuse
 
 if TYPE_CHECKING:
     from airground_drake.verify.claim import Verdict
@@ -85,7 +85,7 @@ def _judge(target: str, wanted: Sequence[str], progress: Progress, *, allow_plug
         UnknownNameError: if there is no such claim.
         ScenarioError: if code of others is named that is not allowed.
     """
-    from airground_drake import trace
+    from airground_drake.run import trace
     from airground_drake.scenarios.load import from_data, load
     from airground_drake.verify import verify, verify_model
     from airground_drake.verify.registry import model_claims, run_claims

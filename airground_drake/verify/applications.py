@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any
 
-from airground_drake.trace import Trace
+from airground_drake.run.trace import Trace
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.model import thr_choice
 from airground_drake.verify.runs.followed import followed

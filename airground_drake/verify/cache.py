@@ -20,8 +20,8 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, NoReturn
 
-from airground_drake import files
-from airground_drake.statuses import PASSING
+from airground_drake.base import files
+from airground_drake.base.statuses import PASSING
 from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.finding import Finding
 

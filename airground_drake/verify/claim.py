@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from airground_drake.errors import TraceError, described
+from airground_drake.base.errors import TraceError, described
+from airground_drake.base.statuses import PASSING, STATUSES, Status, meets
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.statuses import PASSING, STATUSES, Status, meets
-from airground_drake.trace import Trace
 from airground_drake.verify.finding import Finding
 
 __all__ = [

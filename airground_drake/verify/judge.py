@@ -8,11 +8,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from airground_drake.parallel import run_parallel
-from airground_drake.progress import SILENT, Progress
+from airground_drake.base.parallel import run_parallel
+from airground_drake.base.progress import SILENT, Progress
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import own
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.trace import Trace
 from airground_drake.verify.applications import Count, counts, measured, with_counts, with_runs
 from airground_drake.verify.cache import found
 from airground_drake.verify.claim import ModelClaim, TraceClaim, Verdict

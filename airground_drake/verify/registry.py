@@ -10,7 +10,7 @@ from collections.abc import Collection, Mapping
 from functools import cache
 from typing import TypeVar
 
-from airground_drake.errors import PluginError, UnknownNameError
+from airground_drake.base.errors import PluginError, UnknownNameError
 from airground_drake.registry import MODEL_CLAIMS, RUN_CLAIMS, Registry
 from airground_drake.verify.claim import Claim, ModelClaim, TraceClaim
 

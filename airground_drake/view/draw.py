@@ -8,8 +8,8 @@ import numpy as np
 from pydrake.geometry import Box, Cylinder, Meshcat, MeshcatCone, MeshcatParams, Rgba
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from airground_drake.arrays import Array
-from airground_drake.errors import ReplayError
+from airground_drake.base.arrays import Array
+from airground_drake.base.errors import ReplayError
 from airground_drake.view.geometry import camera, grid
 from airground_drake.view.looks import (
     OBSTACLE_COLOR,

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Obstacle, Scenario, Uav, Ugv
-from airground_drake.trace import Trace
 
 STATES = ("own task", "triggered", "intervened")
 """What a robot does: follow its own task; the same, with its trigger set; carry out a proposal. By index."""

@@ -18,14 +18,16 @@ from pathlib import Path
 from mutation.mutant import PACKAGE, Mutant
 
 RUNNING = (
-    "arrays.py", "components.py", "diagram.py", "events.py", "simulation.py",
+    "base/arrays.py", "run/events.py", "run/simulation.py",
     "decision", "gatekeeper", "geometry", "intervention", "nsbc", "systems",
 )  # fmt: skip
 """Files and folders of what produces a run."""
+PICTURES = ("systems/blocks.py", "systems/graphviz.py", "systems/schematic.py")
+"""Files in them that only draw."""
 PROBES = ("crowd d", "crowd c", "bodies d", "case_b d", "soft_gate c", "crowd b")
 HYPOTHESES = {
-    "components.py": ("test_wiring.py",),
-    "diagram.py": ("test_wiring.py",),
+    "systems/components.py": ("test_wiring.py",),
+    "systems/diagram.py": ("test_wiring.py",),
     "decision": ("test_transitions.py", "test_isolation.py"),
     "nsbc": ("test_wiring.py", "test_hostile_inputs.py", "test_disturbed_runs.py"),
     "systems/controllers.py": ("test_wiring.py",),
@@ -190,7 +192,8 @@ def files(root: Path, only: Sequence[str] = ()) -> list[str]:
         file for name in RUNNING for file in ((package / name).rglob("*.py") if "." not in name else [package / name])
     ]
     paths = sorted(file.relative_to(package).as_posix() for file in found)
-    return [path for path in paths if not only or any(word in path for word in only)]
+    running = [path for path in paths if path not in PICTURES]
+    return [path for path in running if not only or any(word in path for word in only)]
 
 
 def draw(root: Path, count: int, seed: int, only: Sequence[str] = ()) -> list[Mutant]:

@@ -120,8 +120,8 @@ CLAIMS = (
     Mutant(
         "EXEC counts refusals as acceptance",
         "verify/runs/proposals.py",
-        "if given is not None and given[2] and given[1] == sent.number]",
-        "if given is not None and given[1] == sent.number]",
+        "if own is None or not own.accepted:",
+        "if own is None:",
         tests=(f"{RUNS}/test_exec.py",),
     ),
     Mutant(

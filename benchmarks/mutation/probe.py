@@ -44,8 +44,9 @@ Findings = list[list[Any]]
 
 def ways(names: list[str]) -> Findings:
     """Runs alone: a digest of all that each leaves behind."""
-    from airground_drake import files, trace
-    from airground_drake.errors import AirgroundError
+    from airground_drake.base import files
+    from airground_drake.base.errors import AirgroundError
+    from airground_drake.run import trace
 
     found: Findings = []
     for name in names:
@@ -60,10 +61,11 @@ def ways(names: list[str]) -> Findings:
 
 def runs(names: list[str]) -> Findings:
     """Every verdict, and every check of the independent checker that does not agree."""
-    from airground_drake import files, trace
+    from airground_drake.base import files
+    from airground_drake.base.errors import AirgroundError
     from airground_drake.check.report import AGREES, check_report
-    from airground_drake.errors import AirgroundError
     from airground_drake.report import document
+    from airground_drake.run import trace
     from airground_drake.verify import verify
 
     found: Findings = []
@@ -88,8 +90,8 @@ def runs(names: list[str]) -> Findings:
 
 def _simulated(name: str) -> tuple[Any, Any]:
     """The scenario of a probe with its one run, and the trace."""
+    from airground_drake.run.simulation import simulate
     from airground_drake.scenarios.load import load
-    from airground_drake.simulation import simulate
 
     source, run = PROBES[name]
     scenario = load(source)[0]

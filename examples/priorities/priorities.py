@@ -23,10 +23,10 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder, DiscreteValues, LeafSystem
 from pydrake.systems.primitives import LogVectorOutput
 
-from airground_drake.components import first_order_plant
 from airground_drake.nsbc.avoidance import Avoidance, Surroundings, limit_speed
-from airground_drake.nsbc.task import Task, null_space
+from airground_drake.nsbc.task import Task
 from airground_drake.nsbc.tasks import PositionTask
+from airground_drake.systems.components import first_order_plant
 
 Array = NDArray[np.float64]
 
@@ -64,6 +64,11 @@ class Round(Task):
         return np.zeros(1), np.full(1, self.speed)
 
 
+def null_space(jacobian: Array) -> Array:
+    """Projector I - J^+ J of (5) onto the null space of a Jacobian (m, 3): (3, 3)."""
+    return np.eye(3) - np.linalg.pinv(jacobian) @ jacobian
+
+
 def normals(scene: Scene, position: Array) -> Array:
     """Unit vectors away from the obstacles at whose safe circle the UGV is, (k, 3)."""
     offset = position - scene.obstacles
@@ -80,7 +85,7 @@ def command(scene: Scene, position: Array, order: int) -> Array:
         turn = 1.0 if order == 1 else -1.0
         along = turn * np.column_stack([away[:, 1], -away[:, 0], np.zeros(len(away))])
         first = Round(along[np.argmax((along @ away.T).min(axis=1))], SPEED_M_S)  # the one that leads out of a corner
-        wanted = first.velocity(row) + wanted @ null_space(first.jacobian(row))[0].T
+        wanted = first.velocity(row) + wanted @ null_space(first.jacobian(row)[0])
     around = Surroundings(
         scene.obstacles[None], np.full((1, len(scene.obstacles)), DISTANCE_M), np.ones((1, len(scene.obstacles)))
     )

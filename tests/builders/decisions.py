@@ -10,12 +10,12 @@ import numpy as np
 import pandas as pd
 from scipy.optimize import minimize
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.gatekeeper.answer import Rules, settle
 from airground_drake.gatekeeper.solution import Solution
 from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT
+from airground_drake.run.trace import PROBLEM_ARRAYS, PROBLEM_SCALARS, Trace
 from airground_drake.scenarios.schema import Gatekeeper, Obstacle, Preset, Run, Scenario, Ugv
-from airground_drake.trace import PROBLEM_ARRAYS, PROBLEM_SCALARS, Trace
 from builders.layout import decision_table
 from builders.scenarios import AWAY
 from builders.simulation import simulate

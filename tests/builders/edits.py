@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from airground_drake.trace import PROBLEM_ARRAYS, PROBLEM_SCALARS, Trace
+from airground_drake.run.trace import PROBLEM_ARRAYS, PROBLEM_SCALARS, Trace
 from builders.layout import decision_table
 from builders.scenarios import changed
 

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from airground_drake.arrays import Array
-from airground_drake.trace import DECISION_COLUMNS, SCHEMA, Trace
+from airground_drake.base.arrays import Array
+from airground_drake.run.trace import DECISION_COLUMNS, SCHEMA, Trace
 from airground_drake.verify.runs.demands import demanded
 
 HELD = ("noise_m", "decision_variable_m", "mode", "triggers", "triggered_at_s", "released_at_s", "accepted")

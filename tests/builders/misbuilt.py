@@ -9,13 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from airground_drake import components
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.law import UgvLaw
 from airground_drake.nsbc.team import Neighbourhood, Team
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.systems import controllers
+from airground_drake.systems import components, controllers
 
 Patch = Callable[[pytest.MonkeyPatch], None]
 
@@ -74,7 +73,7 @@ def unlayered(patch: pytest.MonkeyPatch) -> None:
         def __init__(self, team: Team, avoidance: Avoidance, **given: Any) -> None:
             super().__init__(team, replace(avoidance, sensing_range=0.0), **given)
 
-    patch.setattr("airground_drake.diagram.UavController", Blind)
+    patch.setattr("airground_drake.systems.diagram.UavController", Blind)
 
 
 def speeding(patch: pytest.MonkeyPatch) -> None:
@@ -97,7 +96,7 @@ def half_rate(patch: pytest.MonkeyPatch) -> None:
             self.avoidance = law.avoidance
             self.law = law
 
-    patch.setattr("airground_drake.diagram.UgvController", Slow)
+    patch.setattr("airground_drake.systems.diagram.UgvController", Slow)
 
 
 MISBUILT: dict[str, tuple[Patch, str]] = {

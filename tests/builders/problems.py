@@ -8,7 +8,6 @@ import numpy as np
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from airground_drake.components import make_presets, make_team
 from airground_drake.gatekeeper.problem import Horizon, Problem, predicted_problem
 from airground_drake.gatekeeper.rollout import Scene
 from airground_drake.geometry.motion import Motion
@@ -17,6 +16,7 @@ from airground_drake.intervention.policy import Observation, Proposal
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.law import UgvLaw
 from airground_drake.scenarios.load import load
+from airground_drake.systems.components import make_presets, make_team
 
 LAW = UgvLaw(Avoidance(3.0, 0.05, 4.0), 2.0, 1.5, intervention_on_top=False)
 

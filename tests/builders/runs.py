@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from functools import cache
 
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Decision, Obstacle
-from airground_drake.trace import Trace
 from builders.scenarios import STILL, case_a, lone
 from builders.simulation import simulate
 

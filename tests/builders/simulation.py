@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.nsbc.avoidance import Avoidance, Surroundings
-from airground_drake.trace import Trace
+from airground_drake.run.trace import Trace
 from builders.layout import HELD, laid_out, reference_at
 
 Drive = Callable[[float], list[list[float]]]

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from airground_drake.base.errors import UnknownNameError
 from airground_drake.campaign.evidence import evidence, strict
 from airground_drake.campaign.page import page, told
 from airground_drake.campaign.rows import COLUMNS, DIED, INVALID, JUDGED, STOPPED, Row, blank
@@ -17,7 +18,6 @@ from airground_drake.campaign.statistics import clopper_pearson, confidence_sequ
 from airground_drake.campaign.stopping import InOrder, Stopping
 from airground_drake.campaign.work import died
 from airground_drake.commands.campaign import _code, _summary
-from airground_drake.errors import UnknownNameError
 
 NAN = float("nan")
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from airground_drake.campaign.spec import load_spec
-from airground_drake.simulation import simulate
+from airground_drake.run.simulation import simulate
 from airground_drake.verify import verify
 
 pytestmark = pytest.mark.slow

@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 from builders.dying import times, work
 
+from airground_drake.base.errors import AirgroundError
 from airground_drake.campaign import pool as module
 from airground_drake.campaign.pool import cluster, local
-from airground_drake.errors import AirgroundError
 
 pytestmark = pytest.mark.slow
 
@@ -27,7 +27,7 @@ def test_a_process_that_dies_loses_no_item_and_does_none_twice(tmp_path: Path) -
 TIDY = """
 import time
 from joblib.externals.loky.backend.queues import Queue
-from airground_drake import interruption
+from airground_drake.base import interruption
 from airground_drake.campaign.pool import local
 
 def slowly(*args, feed=Queue._feed):
@@ -95,7 +95,7 @@ with distributed.LocalCluster(protocol="tcp", **options) as here:
 CLIENT = """
 import itertools, os, signal, sys
 from airground_drake.campaign.pool import cluster
-from airground_drake.errors import AirgroundError
+from airground_drake.base.errors import AirgroundError
 
 try:
     with cluster(sys.argv[1]) as pool:

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from airground_drake.base.errors import ScenarioError
 from airground_drake.campaign import shrink as module
 from airground_drake.campaign.objective import Margin, Most
 from airground_drake.campaign.rows import JUDGED, Row, blank
 from airground_drake.campaign.search import Sampler
 from airground_drake.campaign.shrink import shrink
-from airground_drake.errors import ScenarioError
 from airground_drake.registry import SAMPLERS
 from airground_drake.scenarios.load import from_data, load, resolved
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from airground_drake.base.errors import ScenarioError
 from airground_drake.campaign.spec import Spec, load_spec
-from airground_drake.errors import ScenarioError
 
 TEXT = """
 scenario: minimal

@@ -10,10 +10,10 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from airground_drake.base.errors import FolderError
 from airground_drake.campaign import store as module
 from airground_drake.campaign.rows import COLUMNS, JUDGED, Row, blank
 from airground_drake.campaign.store import JOURNAL, Store, read
-from airground_drake.errors import FolderError
 
 MANIFEST = {"name": "x", "spec_sha256": "0"}
 

@@ -10,10 +10,10 @@ from textwrap import dedent
 
 import pytest
 
+from airground_drake.base.errors import SimulationError
 from airground_drake.campaign import work
 from airground_drake.campaign.rows import COLUMNS, INVALID, JUDGED, STOPPED
 from airground_drake.campaign.spec import Spec, load_spec
-from airground_drake.errors import SimulationError
 from airground_drake.scenarios.estimate import DEFAULT_LIMITS, Limits
 
 TEXT = """

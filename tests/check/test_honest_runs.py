@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from random_scenarios import draw, tried
 
-from airground_drake.errors import ScenarioError
+from airground_drake.base.errors import ScenarioError
 from airground_drake.scenarios.load import from_data, load
 from airground_drake.scenarios.schema import Scenario
 

@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 from report.cases import GOING_ROUND, SUCCESS, make_scenario, make_trace
 
-from airground_drake import trace
 from airground_drake.campaign import pool
 from airground_drake.campaign.pool import Pool
+from airground_drake.run import trace
 from airground_drake.scenarios.load import resolved
 
 

@@ -8,8 +8,8 @@ import pytest
 
 from airground_drake.commands import falsify as module
 from airground_drake.commands.falsify import main
+from airground_drake.run.simulation import simulate
 from airground_drake.scenarios.load import load
-from airground_drake.simulation import simulate
 from airground_drake.verify import verify
 
 SPEC = """

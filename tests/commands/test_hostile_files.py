@@ -15,8 +15,9 @@ import pyarrow.parquet as pq
 import pytest
 from report.cases import FINE, GOING_ROUND, SUCCESS, built, make_scenario, make_trace, make_traces
 
-from airground_drake import files, trace
+from airground_drake.base import files
 from airground_drake.commands import main
+from airground_drake.run import trace
 from airground_drake.scenarios.load import resolved
 
 ROWS = 1_000_000

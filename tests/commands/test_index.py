@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 from report.cases import FINE, built, make_scenario, make_traces
 
-from airground_drake import trace
 from airground_drake.commands.index import MARK, PAGE, main
+from airground_drake.run import trace
 
 
 @pytest.fixture(scope="module")

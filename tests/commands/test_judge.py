@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 from airground_drake.commands import judge
-from airground_drake.trace import Trace
+from airground_drake.run.trace import Trace
 
 Run = Callable[[str, str], Trace]
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from airground_drake import trace
 from airground_drake.commands import main
+from airground_drake.run import trace
 
 
 def test_events_are_printed_and_the_trace_is_saved(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

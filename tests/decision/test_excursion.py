@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from properties import examples
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.decision.excursion import extremes
 
 NUMBER = st.floats(-10.0, 10.0) | st.sampled_from([0.0, 1e-160, -1e-12, 3.0])

@@ -12,9 +12,9 @@ import pytest
 from mcap.reader import make_reader
 from report.cases import GOING_ROUND, SUCCESS, make_scenario, make_trace
 
-from airground_drake.errors import ExportError
+from airground_drake.base.errors import ExportError
 from airground_drake.export import recording
-from airground_drake.trace import Trace
+from airground_drake.run.trace import Trace
 
 Read = list[tuple[str, dict[str, Any], float, dict[str, Any]]]
 

@@ -15,9 +15,9 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource, Integrator, Multiplexer, TrajectorySource
 
-from airground_drake import components
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.messages import ACCEPT, REFUSE
+from airground_drake.systems import components
 
 
 @pytest.mark.parametrize("on_top", [True, False])

@@ -60,7 +60,7 @@ def tail_over_square(error: float, angle: float) -> float:
 
 @given(st.floats(0.01, 20.0), st.floats(-np.pi, np.pi))
 def test_the_terminal_cost_bounds_the_tail_of_25_under_the_own_task(error: float, angle: float) -> None:
-    """1 / (2 B) up to the error at which the speed limit binds; beyond it more (docs/liveness.md)."""
+    """1 / (2 B) up to the error at which the speed limit binds; beyond it more (docs/theory.md)."""
     gain, closing = LAW.motion_gain, LIMIT - SPEED
     weight = 1.0 / (2.0 * gain)
     if gain * error > closing:

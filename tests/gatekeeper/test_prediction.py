@@ -9,13 +9,13 @@ import pytest
 from builders.closed_loop import AVOIDANCE
 from builders.problems import STALL_POSITION, case_a_proposal
 
-from airground_drake.components import make_presets, make_team
 from airground_drake.gatekeeper.problem import Horizon, predicted_problem
 from airground_drake.gatekeeper.rollout import Scene, closed_loop
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.law import UgvLaw
 from airground_drake.scenarios.load import load
+from airground_drake.systems.components import make_presets, make_team
 from airground_drake.systems.controllers import UgvController
 
 

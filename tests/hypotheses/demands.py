@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.scenarios.schema import Scenario
 
 

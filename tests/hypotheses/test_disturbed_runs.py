@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hypotheses.demands import Demands, limited, nearest, unit
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.nsbc.avoidance import Avoidance, HalfSpaces, Surroundings
 from airground_drake.scenarios.load import load
 from airground_drake.verify.model.safe_dist import SafeDist

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypotheses.demands import Demands, nearest, unit
 
-from airground_drake.arrays import ROUNDOFF, Array
+from airground_drake.base.arrays import ROUNDOFF, Array
 from airground_drake.nsbc import kernels
 from airground_drake.nsbc.avoidance import Avoidance, HalfSpaces, Surroundings
 from airground_drake.scenarios.load import load

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.decision.excursion import extremes
 from airground_drake.decision.trigger import Mode, Trigger
 from airground_drake.systems.decision import DecisionBlock, DecisionVariable, EventTrigger

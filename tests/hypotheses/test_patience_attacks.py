@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from airground_drake.arrays import Array
+from airground_drake.audit.companions import Believing
+from airground_drake.base.arrays import Array
 from airground_drake.gatekeeper import outcome_gatekeeper
 from airground_drake.gatekeeper.mpc_gatekeeper import Gatekeepers, Memory, View
 from airground_drake.gatekeeper.outcome import Outcome, Outlook
@@ -28,7 +29,6 @@ from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.law import UgvLaw
 from airground_drake.nsbc.team import Team
-from airground_drake.report.audit.companions import Believing
 from airground_drake.scenarios.load import load
 from airground_drake.verify.model.patience.live_wait import LiveWait
 

@@ -12,15 +12,14 @@ from builders.misbuilt import MISBUILT, Patch
 from hypotheses.wiring import differences
 from pydrake.systems.primitives import LinearSystem
 
-from airground_drake import diagram
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc import team as team_module
 from airground_drake.nsbc.avoidance import Avoidance, HalfSpaces, Surroundings
 from airground_drake.nsbc.law import UgvLaw
 from airground_drake.nsbc.team import Neighbourhood
 from airground_drake.scenarios.load import load
-from airground_drake.systems import controllers
+from airground_drake.systems import controllers, diagram
 
 
 def gathered(change: Callable[[Array, int], Array]) -> Patch:

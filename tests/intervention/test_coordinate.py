@@ -17,6 +17,7 @@ from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.coordinate import NARROWER, Coordinate, predicted
 from airground_drake.intervention.coordination.joint import Plan, plan
 from airground_drake.intervention.policy import Observation, Proposal
+from airground_drake.run.simulation import simulate
 from airground_drake.scenarios.schema import (
     Control,
     Decision,
@@ -30,7 +31,6 @@ from airground_drake.scenarios.schema import (
     Uav,
     Ugv,
 )
-from airground_drake.simulation import simulate
 from airground_drake.verify import verify
 
 BAY = [

@@ -9,8 +9,8 @@ from __future__ import annotations
 import maps
 import numpy as np
 
+from airground_drake.run.simulation import simulate
 from airground_drake.scenarios.load import from_data
-from airground_drake.simulation import simulate
 
 
 def test_the_uav_learns_of_obstacles_from_ugvs_that_have_accepted() -> None:

@@ -9,15 +9,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from airground_drake import components, load, simulate
-from airground_drake.arrays import Array
-from airground_drake.components import make_planner
+from airground_drake import load, simulate
+from airground_drake.base.arrays import Array
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.database import BehaviourDatabase
 from airground_drake.intervention.messages import ACCEPT, DONE, REFUSE, SILENT, Report, accepted_proposals, answer_to
 from airground_drake.intervention.planner import Planner, PlannerMemory, sent_after
 from airground_drake.intervention.policy import Observation, Policy
 from airground_drake.registry import METHODS
+from airground_drake.systems import components
+from airground_drake.systems.components import make_planner
 from airground_drake.verify import verify
 
 PLACES = np.array([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [8.0, 0.0, 0.0], [0.0, 0.0, 3.0]])

@@ -10,15 +10,15 @@ import pytest
 from builders.observations import mate, seen
 from timeline import kinds
 
-from airground_drake.errors import PluginError, UnknownNameError
+from airground_drake.base.errors import PluginError, UnknownNameError
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.database import make_policy
 from airground_drake.intervention.policy import Observation, Policy
 from airground_drake.intervention.wrong import Hostile
 from airground_drake.registry import POLICIES
+from airground_drake.run.simulation import simulate
 from airground_drake.scenarios.schema import Policy as PolicyEntry
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.simulation import simulate
 from airground_drake.verify import verify
 
 

@@ -17,7 +17,7 @@ import pytest
 from builders.hostile_policies import KILLS_OTHERS, KINDS
 from builders.observations import mate, seen
 
-from airground_drake.errors import FAULT_WIDTH, PluginError, PolicyError
+from airground_drake.base.errors import FAULT_WIDTH, PluginError, PolicyError
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.database import BehaviourDatabase, Negotiation, make_policy
 from airground_drake.intervention.guest import process
@@ -27,8 +27,8 @@ from airground_drake.intervention.guest.process import LIVES, GuestPolicy
 from airground_drake.intervention.policy import Observation, Policy, Proposal
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.registry import POLICIES
+from airground_drake.run.simulation import simulate
 from airground_drake.scenarios.load import load
-from airground_drake.simulation import simulate
 from airground_drake.verify.claim import TraceClaim
 
 TEAM = seen([mate("a", (0, 0), (10, 0)), mate("b", (0, 5), (10, 5))], [(5, 0), (7, 1)])

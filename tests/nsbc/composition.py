@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.nsbc.task import Task, pseudoinverse
 
 Layer = tuple[Array, Array]

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from nsbc.test_avoidance import scene
 from properties import examples
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.nsbc import kernels
 from airground_drake.nsbc.avoidance import Avoidance
 

@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from airground_drake import trace
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.commands import main
 from airground_drake.proofs import coq
 from airground_drake.proofs.export import demands, distances_file, recorded
@@ -22,8 +21,9 @@ from airground_drake.proofs.readback import ReadbackError, compare
 from airground_drake.proofs.record import closure
 from airground_drake.proofs.runs import Workshop, expects_kept, prove
 from airground_drake.proofs.too_near import too_near
+from airground_drake.run import trace
+from airground_drake.run.trace import Trace
 from airground_drake.testing.plugin import Simulations
-from airground_drake.trace import Trace
 
 UGV, ROCK = "ugv1", "obstacle_1"
 REFUSED = f"Coq refuses {UGV} and {ROCK}, 2 m"
@@ -254,4 +254,4 @@ def test_a_damaged_trace_is_said(report: Path, coq_version: str, capsys: pytest.
 
 def test_the_command_of_before_names_its_successor(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["proofs", "reports/case_a"]) == 2
-    assert capsys.readouterr().err == "error: `airground proofs` is gone: use `airground prove` (docs/migration.md)\n"
+    assert capsys.readouterr().err == "error: `airground proofs` is gone: use `airground prove` (CHANGELOG.md)\n"

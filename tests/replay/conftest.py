@@ -11,8 +11,8 @@ from report.cases import GOING_ROUND, SUCCESS, make_scenario, make_trace
 
 from airground_drake.replay import scene as scenes
 from airground_drake.replay.scene import Scene
+from airground_drake.run.trace import DECISION_COLUMNS, PROPOSAL_COLUMNS, Trace
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.trace import DECISION_COLUMNS, PROPOSAL_COLUMNS, Trace
 
 
 def with_proposals(trace: Trace, issued: list[float], decisions: list[tuple[float, float, str]]) -> Trace:

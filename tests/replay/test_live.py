@@ -10,7 +10,7 @@ from urllib.request import urlopen
 
 import pytest
 
-from airground_drake.errors import ReplayError
+from airground_drake.base.errors import ReplayError
 from airground_drake.replay import live
 
 asked: list[str] = []

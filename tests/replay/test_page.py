@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from pydrake.geometry import Meshcat, MeshcatAnimation
 
-from airground_drake.errors import ReplayError
+from airground_drake.base.errors import ReplayError
 from airground_drake.replay import page as pages
 from airground_drake.replay import recording
 from airground_drake.replay.scene import FRAMES_PER_S, Scene

@@ -5,7 +5,7 @@ from __future__ import annotations
 from replay.conftest import with_proposals
 
 from airground_drake.replay.proposals import LINGER_S, Span, sent
-from airground_drake.trace import Trace
+from airground_drake.run.trace import Trace
 
 
 def test_refused_and_accepted(trace: Trace) -> None:

@@ -12,8 +12,8 @@ from report.cases import make_scenario
 
 from airground_drake.replay import scene as scenes
 from airground_drake.replay.scene import FRAMES_PER_S, Scene
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.trace import Trace
 from airground_drake.view.stage import INTERVENED, OWN, TRIGGERED
 
 

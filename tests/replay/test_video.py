@@ -9,7 +9,7 @@ import pytest
 from matplotlib.animation import FFMpegWriter
 from PIL import Image
 
-from airground_drake.errors import ReplayError
+from airground_drake.base.errors import ReplayError
 from airground_drake.replay import video
 from airground_drake.replay.scene import Scene
 

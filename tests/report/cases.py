@@ -8,10 +8,10 @@ from typing import Any
 
 from builders.paths import Corners, along
 
+from airground_drake.base.statuses import Status
 from airground_drake.report import document
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Choice, Decision, Obstacle, Preset, Reproduction, Run, Scenario, Uav, Ugv
-from airground_drake.statuses import Status
-from airground_drake.trace import Trace
 from airground_drake.verify.claim import TraceClaim, Verdict
 from airground_drake.verify.finding import Finding
 

@@ -11,8 +11,8 @@ from report.cases import FINE, built, verdict
 
 from airground_drake.report import attention
 from airground_drake.report.figures import moments
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.trace import Trace
 
 AT = {"first": "ugv1", "second": "obstacle_1", "t_s": 7.717}
 TOO_NEAR = {"min_distance_m": 0.0, "safe_distance_m": 2.0, "margin_m": -2.0}

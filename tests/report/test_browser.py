@@ -19,8 +19,8 @@ from airground_drake.commands import index
 from airground_drake.report import audit, document, html
 from airground_drake.report.figures import draw, moments
 from airground_drake.report.figures.panels import Figure
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.trace import Trace
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 NARROW, WIDE = 390, 1280

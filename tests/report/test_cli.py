@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from airground_drake import trace
 from airground_drake.report import make
 from airground_drake.report.__main__ import main
+from airground_drake.run import trace
+from airground_drake.run.simulation import simulate
 from airground_drake.scenarios.load import load, shipped
-from airground_drake.simulation import simulate
 from airground_drake.verify import __main__ as judge
 
 DIAGRAMS = Path(__file__).parents[2] / "diagrams"

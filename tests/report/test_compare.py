@@ -12,9 +12,9 @@ from typing import Any
 import pytest
 from report.cases import FINE, GOING_ROUND, SUCCESS, built, make_scenario, make_trace, make_traces, verdict
 
-from airground_drake import trace
 from airground_drake.commands.compare import main
 from airground_drake.report import compare, document
+from airground_drake.run import trace
 
 Json = dict[str, Any]
 
@@ -43,7 +43,7 @@ def test_the_schema_is_the_reports() -> None:
 
 
 def test_every_verdict_has_a_place_in_the_order() -> None:
-    from airground_drake.statuses import NOT_EXERCISED, STATUSES
+    from airground_drake.base.statuses import NOT_EXERCISED, STATUSES
 
     assert sorted(name for alike in compare.ORDER for name in alike) == sorted([*STATUSES, NOT_EXERCISED, "gone"])
 
@@ -190,7 +190,7 @@ def test_a_report_by_an_earlier_version_is_told_so(
     assert main([str(earlier), str(now)]) == 2
     said = capsys.readouterr().err
     assert said.count("\n") == 1
-    assert "is by an earlier version: make the report again (docs/migration.md)" in said
+    assert "is by an earlier version: make the report again (CHANGELOG.md)" in said
 
 
 class Seen(HTMLParser):

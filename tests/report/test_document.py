@@ -10,8 +10,8 @@ import pytest
 from report.cases import FINE, GOING_ROUND, STALL, Kept, built, make_trace, verdict
 
 from airground_drake.report import document
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.trace import Trace
 from airground_drake.verify.claim import Verdict
 from airground_drake.verify.finding import Finding
 

@@ -16,8 +16,8 @@ from report.cases import FLIGHT, event, make_trace
 
 from airground_drake.report.figures import canvas, draw, labels, svg
 from airground_drake.report.figures.panels import Figure
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Run, Scenario
-from airground_drake.trace import Trace
 
 
 def test_kinds_numbers_and_panels(drawn: list[Figure]) -> None:

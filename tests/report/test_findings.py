@@ -7,9 +7,9 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 
-from airground_drake.report.audit.formulas import formula_findings
-from airground_drake.report.audit.runs import findings as findings_of_runs
-from airground_drake.report.audit.thresholds import threshold_findings
+from airground_drake.audit.formulas import formula_findings
+from airground_drake.audit.runs import findings as findings_of_runs
+from airground_drake.audit.thresholds import threshold_findings
 from airground_drake.report.figures import canvas, findings
 from airground_drake.report.figures.findings.lines import Lines
 from airground_drake.report.figures.findings.products import Factor, Products

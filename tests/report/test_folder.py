@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from airground_drake.errors import FolderError
+from airground_drake.base.errors import FolderError
 from airground_drake.report import document, folder
 
 

@@ -13,12 +13,12 @@ from html.parser import HTMLParser
 import pytest
 from report.cases import FINE, Kept, built, event, make_scenario, make_trace, make_traces, verdict
 
+from airground_drake.base.statuses import STATUSES
 from airground_drake.report import attention, document, html, pages
 from airground_drake.report.figures import draw, moments
 from airground_drake.report.figures.panels import Figure
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Run, Scenario
-from airground_drake.statuses import STATUSES
-from airground_drake.trace import Trace
 from airground_drake.verify.claim import Verdict
 from airground_drake.verify.finding import Finding
 

@@ -6,7 +6,7 @@ import xml.etree.ElementTree as ET
 
 import pytest
 
-from airground_drake.report.audit.typeset import FORMULAS
+from airground_drake.audit.typeset import FORMULAS
 from airground_drake.report.mathml import mathml
 from airground_drake.verify.claim import Claim
 from airground_drake.verify.registry import model_claims, run_claims

@@ -10,7 +10,7 @@ from builders.decisions import decided_run
 from report.cases import make_scenario, make_trace
 
 from airground_drake.report import metrics
-from airground_drake.trace import Trace
+from airground_drake.run.trace import Trace
 
 
 def test_metrics_of_robot_pairs_and_events(traces: dict[str, Trace]) -> None:

@@ -9,12 +9,13 @@ from typing import Any
 import pytest
 from report.cases import FINE, built
 
-from airground_drake import files, trace
+from airground_drake.base import files
+from airground_drake.base.errors import ReportError
 from airground_drake.check.verdicts import check_files
-from airground_drake.errors import ReportError
 from airground_drake.report import document, html, proved
+from airground_drake.run import trace
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.trace import Trace
 
 NEAR = {"first": "ugv1", "second": "uav", "safe_distance_m": 2.0, "least_m": 0.5, "short_m": 1.5, "t_s": 13.0}
 ANSWERS: dict[str, dict[str, Any]] = {

@@ -11,11 +11,11 @@ import pytest
 from builders.paths import Corners
 from report.cases import GOING_ROUND, STALL, STALLING, SUCCESS, event, make_scenario, make_trace
 
-from airground_drake.errors import TraceError
+from airground_drake.base.errors import TraceError
 from airground_drake.report import reproduction
 from airground_drake.report.reproduction import MEASURES
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.trace import Trace
 
 
 def measured(name: str, corners: Corners = STALLING, events: Sequence[dict[str, Any]] = (), **more: Any) -> list[float]:

@@ -15,8 +15,8 @@ from report.cases import FINE, built
 
 from airground_drake.report import html, scrubber
 from airground_drake.report.figures.panels import Figure
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.trace import Trace
 
 
 def test_places_are_those_of_the_drawing(drawn: list[Figure]) -> None:

@@ -21,7 +21,7 @@ if __name__ == "__main__":
 
 from scenarios.cases import DATA, DELETE, SMALL, SMALL_DATA, edit
 
-from airground_drake.errors import ScenarioError
+from airground_drake.base.errors import ScenarioError
 from airground_drake.scenarios.document import MAX_BYTES
 from airground_drake.scenarios.load import load
 

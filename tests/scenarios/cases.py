@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 import yaml
 
-from airground_drake.errors import ScenarioError
+from airground_drake.base.errors import ScenarioError
 from airground_drake.scenarios import schema
 from airground_drake.scenarios.load import load
 

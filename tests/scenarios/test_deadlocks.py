@@ -8,10 +8,10 @@ from feasible import joint_plan, shortest_length
 from scenarios.cases import DEADLOCKS
 from timeline import kinds
 
-from airground_drake.components import make_map, positions
+from airground_drake.run.simulation import simulate
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.simulation import simulate
+from airground_drake.systems.components import make_map, positions
 from airground_drake.verify import verify
 
 ROOM_M = 0.1

@@ -12,12 +12,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenarios.cases import SMALL_DATA, edit
 
-from airground_drake.errors import LimitError
+from airground_drake.base.errors import LimitError
+from airground_drake.run.simulation import simulate
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.estimate import DEFAULT_LIMITS, PROGRAM, Limits, estimate, within
 from airground_drake.scenarios.load import from_data, load, shipped
 from airground_drake.scenarios.schema import Obstacle, Run, Scenario
-from airground_drake.simulation import simulate
-from airground_drake.trace import Trace
 
 EVENTS = 1.25
 """Rows of a run are those counted, and by events up to a quarter more."""

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from properties import examples
 from scenarios.cases import SMALL, SMALL_DATA
 
-from airground_drake.errors import ScenarioError
+from airground_drake.base.errors import ScenarioError
 from airground_drake.scenarios import schema
 from airground_drake.scenarios.document import text_of
 from airground_drake.scenarios.load import load, resolved

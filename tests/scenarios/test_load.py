@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from scenarios.cases import CASE_A, DATA, SMALL, Write, case_a, message
 
-from airground_drake.errors import ScenarioError
+from airground_drake.base.errors import ScenarioError
 from airground_drake.scenarios.document import text_of
 from airground_drake.scenarios.load import load, resolved, shipped, validated
 from airground_drake.scenarios.schema import Uav

@@ -9,15 +9,15 @@ from textwrap import dedent
 
 import pytest
 
-from airground_drake import graphviz
-from airground_drake.diagram import build_diagram
-from airground_drake.errors import PluginError, ScenarioError
+from airground_drake.base.errors import PluginError, ScenarioError
 from airground_drake.intervention import policy
 from airground_drake.registry import POLICIES, ROUTES, is_plugin
-from airground_drake.runs import simulate_all
+from airground_drake.run.runs import simulate_all
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.plugins import admitted, plugins, refuse, without
 from airground_drake.scenarios.schema import Policy, Scenario
+from airground_drake.systems import graphviz
+from airground_drake.systems.diagram import build_diagram
 from airground_drake.verify import verify
 
 

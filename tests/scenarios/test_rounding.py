@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from airground_drake.errors import ScenarioError
+from airground_drake.base.errors import ScenarioError
 from airground_drake.scenarios.load import load, validated
 from airground_drake.scenarios.rounding import TOLERANCE_M, Rounding
 from airground_drake.scenarios.schema import Scenario

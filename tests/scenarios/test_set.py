@@ -7,11 +7,11 @@ from typing import Any
 import pytest
 from scenarios.cases import SMALL, Write, message
 
-from airground_drake.errors import ScenarioError
+from airground_drake.base.errors import ScenarioError
 from airground_drake.report import document
+from airground_drake.run.simulation import simulate
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.load import load, own
-from airground_drake.simulation import simulate
 from airground_drake.verify import verify, verify_model
 
 RUNS = "runs:\n"

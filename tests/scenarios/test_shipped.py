@@ -14,9 +14,9 @@ import pytest
 
 from airground_drake.registry import MODEL_CLAIMS, RUN_CLAIMS
 from airground_drake.report.reproduction import MEASURES
+from airground_drake.run.simulation import Recorder
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import load, shipped
-from airground_drake.simulation import Recorder
-from airground_drake.trace import Trace
 from airground_drake.verify import verify, verify_model
 from airground_drake.verify.claim import Verdict
 

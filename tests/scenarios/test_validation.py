@@ -8,7 +8,7 @@ import pytest
 import yaml
 from scenarios.cases import DELETE, SMALL, SMALL_DATA, Write, edit, message
 
-from airground_drake.errors import ScenarioError
+from airground_drake.base.errors import ScenarioError
 from airground_drake.scenarios import json_schema, validate
 from airground_drake.scenarios.load import load
 

@@ -10,10 +10,10 @@ from pydrake.common import RandomGenerator
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 from pydrake.systems.framework import Context, Diagram
 
-from airground_drake.diagram import RECORDED, Model, build_model
 from airground_drake.intervention.messages import ACCEPT, SILENT
+from airground_drake.run.simulation import EVENT_ACCURACY, simulate
 from airground_drake.scenarios.load import load
-from airground_drake.simulation import EVENT_ACCURACY, simulate
+from airground_drake.systems.diagram import RECORDED, Model, build_model
 
 HALF_S, END_S = 15.0, 18.0
 """Case A triggers at 14.48 s: at half time a proposal is being executed and watched."""

@@ -10,13 +10,13 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource, ZeroOrderHold
 
-from airground_drake.arrays import Array
-from airground_drake.components import make_avoidance, make_team
-from airground_drake.diagram import build_diagram
-from airground_drake.errors import PluginError
+from airground_drake.base.arrays import Array
+from airground_drake.base.errors import PluginError
 from airground_drake.nsbc.tasks import FormationTask
 from airground_drake.scenarios.load import load
+from airground_drake.systems.components import make_avoidance, make_team
 from airground_drake.systems.controllers import UavController
+from airground_drake.systems.diagram import build_diagram
 
 
 def test_a_task_cannot_change_where_the_controller_thinks_that_ugvs_are() -> None:

@@ -17,17 +17,17 @@ from pydrake.systems.primitives import Integrator, LogVectorOutput, PassThrough,
 from pydrake.trajectories import PiecewisePolynomial
 from verify.judging import judge
 
-from airground_drake.arrays import Array
-from airground_drake.components import integrated_noise
+from airground_drake.base.arrays import Array
+from airground_drake.base.errors import PluginError
 from airground_drake.decision.trigger import Trigger
-from airground_drake.diagram import build_diagram
-from airground_drake.errors import PluginError
 from airground_drake.geometry.motion import Motion
+from airground_drake.run.simulation import simulate
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import load
-from airground_drake.simulation import simulate
+from airground_drake.systems.components import integrated_noise
 from airground_drake.systems.decision import DecisionBlock, DecisionVariable, EventTrigger
+from airground_drake.systems.diagram import build_diagram
 from airground_drake.systems.signals import FIELDS
-from airground_drake.trace import Trace
 from airground_drake.verify.engines.segments import NormSignal
 from airground_drake.verify.runs.triggers import transitions
 

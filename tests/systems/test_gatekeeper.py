@@ -11,7 +11,6 @@ import pytest
 from builders.problems import random_problem
 from gatekeeper.oracles import Enumeration
 
-from airground_drake import components
 from airground_drake.gatekeeper import mpc_gatekeeper
 from airground_drake.gatekeeper.answer import Rules
 from airground_drake.gatekeeper.budget import Budget
@@ -20,9 +19,10 @@ from airground_drake.gatekeeper.routes.mixed_integer import MixedIntegerRoute
 from airground_drake.gatekeeper.solution import ConstantPlans, Solution, after_failure
 from airground_drake.registry import ROUTES
 from airground_drake.report import metrics
+from airground_drake.run.simulation import Recorder, simulate
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.simulation import Recorder, simulate
+from airground_drake.systems import components
 from airground_drake.verify.judge import verify
 
 

@@ -6,8 +6,8 @@ import weakref
 import pytest
 from pydrake.systems.framework import LeafSystem
 
+from airground_drake.run.simulation import Recorder
 from airground_drake.scenarios.load import load
-from airground_drake.simulation import Recorder
 from airground_drake.systems.lifetime import weakly
 
 

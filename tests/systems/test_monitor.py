@@ -11,14 +11,13 @@ from pydrake.systems.analysis import Simulator, SimulatorStatus
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 
-from airground_drake import components
-from airground_drake.diagram import build_diagram, make_monitor
 from airground_drake.nsbc.avoidance import Composition
+from airground_drake.run.simulation import EVENT_ACCURACY
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.simulation import EVENT_ACCURACY
-from airground_drake.systems import Monitor, Rule, Violation
-from airground_drake.trace import Trace
+from airground_drake.systems import Monitor, Rule, Violation, components
+from airground_drake.systems.diagram import build_diagram, make_monitor
 from airground_drake.verify import verify
 
 

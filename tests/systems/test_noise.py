@@ -9,8 +9,8 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput
 
-from airground_drake.components import make_noise
 from airground_drake.scenarios.schema import Decision
+from airground_drake.systems.components import make_noise
 
 PERIODS, COUNT = 400, 100
 

@@ -9,9 +9,9 @@ import pytest
 from pydrake.systems.framework import Context
 from systems.test_context import advanced, begun
 
-from airground_drake.diagram import Model, build_model
+from airground_drake.run.simulation import read_back, simulate
 from airground_drake.scenarios.load import load
-from airground_drake.simulation import read_back, simulate
+from airground_drake.systems.diagram import Model, build_model
 from airground_drake.verify.judge import verify
 
 SCENARIO = load("case_a", ["duration_s=1.0"])[0]

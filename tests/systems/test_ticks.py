@@ -10,8 +10,8 @@ from systems.test_gatekeeper import Alternating
 from verify.judging import judge
 
 from airground_drake.registry import ROUTES
+from airground_drake.run.simulation import simulate
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.simulation import simulate
 from airground_drake.systems.ticks import Ticks
 
 

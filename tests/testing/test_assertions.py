@@ -7,11 +7,11 @@ from dataclasses import replace
 import pytest
 from builders.scenarios import changed
 
-from airground_drake.errors import ScenarioError, UnknownNameError
+from airground_drake.base.errors import ScenarioError, UnknownNameError
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import load
 from airground_drake.testing import ClaimError, NotExercisedWarning, assert_holds, assert_proved
 from airground_drake.testing.plugin import Simulations
-from airground_drake.trace import Trace
 from airground_drake.verify.claim import Claim, TraceClaim, Verdict
 from airground_drake.verify.finding import Finding
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from airground_drake import simulation
+from airground_drake.run import simulation
 from airground_drake.scenarios.load import load
 from airground_drake.testing.plugin import Simulations
 

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from properties import examples
 
 from airground_drake.registry import METHODS, POLICIES
+from airground_drake.run.simulation import simulate
 from airground_drake.scenarios.load import from_data, resolved
 from airground_drake.scenarios.schema import Control, Decision, Gatekeeper, Scenario
-from airground_drake.simulation import simulate
 from airground_drake.testing import assert_holds
 from airground_drake.testing.strategies import PARAMETERS, policies, scenarios
 

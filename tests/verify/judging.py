@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Protocol
 
-from airground_drake.trace import Trace
+from airground_drake.run.trace import Trace
 from airground_drake.verify import TRACE_CLAIMS, Finding, TraceClaim
 from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.runs import gate_feas, gate_opt

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 import airground_drake
-from airground_drake import files
+from airground_drake.base import files
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify import cache
 from airground_drake.verify.claim import ModelClaim

@@ -12,8 +12,8 @@ from builders.edits import bumped, dropped, rows, set_nan, with_meta, with_scena
 from builders.runs import passing_by, run_of
 from verify.judging import CLAIMS, GATE, LAW, UNRECORDED, judge
 
-from airground_drake.errors import TraceError
-from airground_drake.trace import Trace, load, save
+from airground_drake.base.errors import TraceError
+from airground_drake.run.trace import Trace, load, save
 from airground_drake.verify import TRACE_CLAIMS, Finding, TraceClaim, verify
 
 

@@ -12,12 +12,12 @@ import pytest
 from builders.runs import run_of
 from verify.judging import CLAIMS
 
+from airground_drake.base.statuses import admits_either, meets, outcome
 from airground_drake.check import verdicts
 from airground_drake.registry import MODEL_CLAIMS, RUN_CLAIMS
+from airground_drake.run.simulation import simulate
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import load
-from airground_drake.simulation import simulate
-from airground_drake.statuses import admits_either, meets, outcome
-from airground_drake.trace import Trace
 from airground_drake.verify import Finding, verify
 from airground_drake.verify.__main__ import main
 from airground_drake.verify.claim import Claim, TraceClaim, Verdict

@@ -13,7 +13,7 @@ from builders.runs import run_of
 
 import airground_drake.registry
 import airground_drake.verify
-from airground_drake.errors import UnknownNameError
+from airground_drake.base.errors import UnknownNameError
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify import MODEL_CLAIMS, TRACE_CLAIMS, registry, verify, verify_model
 from airground_drake.verify.claim import ModelClaim, TraceClaim

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.view import geometry
 
 coordinates = st.floats(-50.0, 50.0)

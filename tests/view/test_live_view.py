@@ -6,8 +6,8 @@ import msgpack
 import pandas as pd
 from pydrake.geometry import Meshcat
 
+from airground_drake.run.simulation import simulate
 from airground_drake.scenarios.load import load
-from airground_drake.simulation import simulate
 from airground_drake.view.draw import robot_path, served, state_path
 from airground_drake.view.stage import INTERVENED, OWN, STATES
 

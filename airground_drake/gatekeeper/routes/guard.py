@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from pydrake.solvers import MathematicalProgramResult, SolutionResult
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.problem import Problem
 from airground_drake.gatekeeper.reachable_box import remaining_cost

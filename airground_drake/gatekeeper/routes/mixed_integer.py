@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.gatekeeper.binary_program import BinaryProgram, Size
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.cost import Terms, half_plane_cost

@@ -15,7 +15,7 @@ from pydrake.solvers import (
     SolverOptions,
 )
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.problem import Evaluation, Problem
 from airground_drake.gatekeeper.reachable_box import within_reach

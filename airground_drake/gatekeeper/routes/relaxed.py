@@ -7,7 +7,7 @@ import math
 import numpy as np
 from pydrake.solvers import ClarabelSolver, SolverOptions
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.convex_program import Shape, TeamProgram, empty_program
 from airground_drake.gatekeeper.dual_bound import dual_bound, multipliers_at

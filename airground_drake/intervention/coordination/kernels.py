@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 
 Indices = npt.NDArray[np.int64]
 

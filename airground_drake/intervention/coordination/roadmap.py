@@ -12,7 +12,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.geometry.paths import NoPath, shortest_path
 from airground_drake.intervention.coordination import kernels
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.intervention.coordination import kernels
 from airground_drake.intervention.coordination.roadmap import Indices, Roadmap, RobotNodes, RobotTask, Space
 from airground_drake.intervention.coordination.timed import distance, timed, without_repeats

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.intervention.coordination import kernels
 
 

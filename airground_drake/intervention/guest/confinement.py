@@ -13,7 +13,7 @@ import os
 import struct
 import sys
 
-from airground_drake import interruption
+from airground_drake.base import interruption
 
 PR_SET_NO_NEW_PRIVS = 38
 LANDLOCK_CREATE_RULESET, LANDLOCK_RESTRICT_SELF = 444, 446

@@ -20,9 +20,9 @@ from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from typing import Any
 
-from airground_drake.errors import FAULT_WIDTH, PluginError, PolicyError, one_line
+from airground_drake.base.errors import FAULT_WIDTH, PluginError, PolicyError, one_line
+from airground_drake.base.interruption import ended_how
 from airground_drake.geometry.motion import Motion
-from airground_drake.interruption import ended_how
 from airground_drake.intervention.guest.codec import LONGEST, decoded, encoded
 from airground_drake.intervention.policy import Observation, Policy
 

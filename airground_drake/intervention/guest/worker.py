@@ -11,7 +11,7 @@ from contextlib import suppress
 from multiprocessing.connection import Connection
 from typing import Any
 
-from airground_drake.errors import AirgroundError, described
+from airground_drake.base.errors import AirgroundError, described
 from airground_drake.intervention.guest.codec import KINDS, LONGEST, decoded, encoded
 from airground_drake.intervention.policy import Policy, motions_of
 from airground_drake.registry import POLICIES

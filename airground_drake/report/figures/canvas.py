@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 
 MAX_POINTS = 600
 """Points of a line at most: two per pixel of a panel, the extremes of each stretch among them."""

@@ -6,12 +6,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.report.figures import canvas, maps, svg, timelines
 from airground_drake.report.figures.panels import Figure, Panel, series
 from airground_drake.report.metrics import closest_obstacle, place
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.trace import Trace
 
 MAX_RUNS = 6
 

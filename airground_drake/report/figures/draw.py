@@ -21,8 +21,8 @@ from airground_drake.report.metrics import Nearby, close_by, events_of, gap_m, r
 from airground_drake.report.reproduction import MEASURES
 from airground_drake.report.scrubber import tracks
 from airground_drake.report.summary import SLACK_M, distance
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.trace import Trace
 
 MAX_RUNS, MAX_UGVS, MAX_TEAM = 6, 4, 6
 """What a figure shows at most: runs, UGVs with distances of their own, UGVs by name. A larger team is in histograms."""

@@ -9,7 +9,7 @@ import numpy as np
 import textalloc
 from matplotlib.axes import Axes
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.report.figures.canvas import INK, MUTED, thin
 
 MAX_LINE_POINTS = 80

@@ -11,7 +11,7 @@ from matplotlib.collections import PatchCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.report.figures.canvas import (
     ALARM,
     INK,
@@ -27,7 +27,7 @@ from airground_drake.report.figures.canvas import (
 from airground_drake.report.figures.labels import Label, place
 from airground_drake.report.metrics import events_of, radius_m
 from airground_drake.report.reproduction import MEASURES
-from airground_drake.trace import Trace
+from airground_drake.run.trace import Trace
 
 MAX_NAMED_OBSTACLES = 12
 _LEFT_IN, _BESIDE_IN = 0.5, 0.65

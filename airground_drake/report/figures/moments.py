@@ -9,12 +9,12 @@ import numpy as np
 from matplotlib.figure import Figure as Drawing
 from matplotlib.patches import Circle
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.report import attention
 from airground_drake.report.figures import canvas, svg
 from airground_drake.report.figures.panels import Figure, Panel, Table
 from airground_drake.report.metrics import place, safe_distance_m
-from airground_drake.trace import Trace
+from airground_drake.run.trace import Trace
 
 MAX_MOMENTS = 8
 SIDE_IN = 1.9

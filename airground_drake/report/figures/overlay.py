@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from airground_drake.report.figures import canvas, svg
 from airground_drake.report.figures.canvas import INK, LOOKS, MUTED, WIDE_IN, look, rule, short, size_in, thin
 from airground_drake.report.figures.panels import Figure, Panel, Table
-from airground_drake.trace import Trace
+from airground_drake.run.trace import Trace
 
 _BEFORE: dict[str, Any] = {"linewidth": 1.0, "linestyle": (0, (3, 2)), "alpha": 0.9, "zorder": 2.0}
 _AFTER: dict[str, Any] = {"linewidth": 1.8, "linestyle": "-", "zorder": 2.5}

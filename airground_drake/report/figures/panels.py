@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
-from airground_drake.arrays import Array
-from airground_drake.trace import Trace
+from airground_drake.base.arrays import Array
+from airground_drake.run.trace import Trace
 
 MAX_TABLE_ROWS = 31
 """Rows of a data table at most; all of them are in the trace."""

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.report.figures import svg
 from airground_drake.report.figures.canvas import look, thin
-from airground_drake.trace import Trace
+from airground_drake.run.trace import Trace
 
 WIDTH, HEIGHT, EDGE = 160.0, 120.0, 6.0
 MAX_POINTS, MAX_UGVS = 240, 20

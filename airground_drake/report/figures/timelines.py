@@ -11,7 +11,7 @@ import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.report.figures.canvas import (
     ALARM,
     FULL_IN,
@@ -28,7 +28,7 @@ from airground_drake.report.figures.canvas import (
 )
 from airground_drake.report.metrics import Nearby, closest_obstacle, events_of, gap_m
 from airground_drake.report.summary import SLACK_M, distance
-from airground_drake.trace import Trace
+from airground_drake.run.trace import Trace
 
 MARKS = {"trigger": "^", "release": "v", "proposal": "D", "accept": "o", "refuse": "X"}
 """Marks of events, by kind."""

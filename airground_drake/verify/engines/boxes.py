@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 
 ROWS = 32
 """Of a block."""

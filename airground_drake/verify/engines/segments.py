@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 
 MERGE_S = 1e-9
 """Rows closer than this are one instant, s: periods that are not binary fractions give simulator steps of

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 
 SCREEN_M = 1e-9
 """What floats find far, or met, by more than this is so, m: for bodies within 1e5 m they err by less than 1e-10 m."""

@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.decision.trigger import Mode, Trigger
 
 SEED = 5

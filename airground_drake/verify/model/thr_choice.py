@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from airground_drake.base.statuses import Status
 from airground_drake.decision.bayes import bayes_risk, optimal_threshold, printed_threshold
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.statuses import Status
-from airground_drake.trace import Trace
 from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.engines.signs import enclose
 from airground_drake.verify.finding import Finding

@@ -24,9 +24,9 @@ from typing import Any
 
 import numpy as np
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
+from airground_drake.base.statuses import Status
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.statuses import Status
 from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.model.levels import levels_of

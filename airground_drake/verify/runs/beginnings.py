@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from airground_drake.arrays import Array
-from airground_drake.trace import Trace
+from airground_drake.base.arrays import Array
+from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.segments import corner_times, interpolate, travelled
 from airground_drake.verify.runs.closed_loops import Scene

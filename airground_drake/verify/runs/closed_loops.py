@@ -11,8 +11,8 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from airground_drake.arrays import Array
-from airground_drake.trace import Trace
+from airground_drake.base.arrays import Array
+from airground_drake.run.trace import Trace
 from airground_drake.verify.runs.control_law import Asked, commanded, inequalities, tracking
 
 AT_ONCE = 5_000_000

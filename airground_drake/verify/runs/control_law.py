@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from airground_drake.arrays import Array
-from airground_drake.trace import Trace
+from airground_drake.base.arrays import Array
+from airground_drake.run.trace import Trace
 from airground_drake.verify.engines.shortfalls import demanded
 from airground_drake.verify.runs.pairs import around, places_of
 from airground_drake.verify.runs.projection import closest, least_violation, shortened

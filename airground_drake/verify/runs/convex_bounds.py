@@ -10,8 +10,8 @@ import numpy as np
 from scipy import sparse
 from scipy.optimize import lsq_linear
 
-from airground_drake.arrays import Array
-from airground_drake.errors import TraceError
+from airground_drake.base.arrays import Array
+from airground_drake.base.errors import TraceError
 from airground_drake.verify.runs.gate_record import Row
 
 WIDE = 1e-5

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from airground_drake.trace import Trace
+from airground_drake.run.trace import Trace
 from airground_drake.verify.runs.control_law import ON_TOP
 from airground_drake.verify.runs.pairs import radii_of, speed_limits
 

@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from airground_drake.arrays import Array
-from airground_drake.errors import TraceError
-from airground_drake.trace import Trace
+from airground_drake.base.arrays import Array
+from airground_drake.base.errors import TraceError
+from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S, TraceClaim
 from airground_drake.verify.engines.segments import corner_times, travelled
 from airground_drake.verify.finding import Finding

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from airground_drake.trace import Trace
+from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.runs.beginnings import known_discs
 from airground_drake.verify.runs.control_samples import control_samples

@@ -12,9 +12,9 @@ from functools import cached_property
 
 import numpy as np
 
-from airground_drake.arrays import Array
-from airground_drake.errors import TraceError
-from airground_drake.trace import Trace
+from airground_drake.base.arrays import Array
+from airground_drake.base.errors import TraceError
+from airground_drake.run.trace import Trace
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.convex_bounds import Enclosure, enclose
 from airground_drake.verify.runs.gate_record import (

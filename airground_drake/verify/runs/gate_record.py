@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from airground_drake.arrays import Array
-from airground_drake.errors import TraceError
-from airground_drake.trace import PROBLEM_ARRAYS, PROBLEM_SCALARS, Trace
+from airground_drake.base.arrays import Array
+from airground_drake.base.errors import TraceError
+from airground_drake.run.trace import PROBLEM_ARRAYS, PROBLEM_SCALARS, Trace
 from airground_drake.verify.claim import TraceClaim
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.control_law import ON_TOP

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from airground_drake.arrays import Array
-from airground_drake.trace import Trace
+from airground_drake.base.arrays import Array
+from airground_drake.run.trace import Trace
 
 GATED_METHODS = ("c", "d")
 """Methods with an optimising gatekeeper."""

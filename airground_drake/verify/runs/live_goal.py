@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from airground_drake.arrays import Array
-from airground_drake.errors import TraceError
-from airground_drake.trace import Trace
+from airground_drake.base.arrays import Array
+from airground_drake.base.errors import TraceError
+from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TraceClaim
 from airground_drake.verify.engines.segments import interpolate
 from airground_drake.verify.finding import Finding

@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from airground_drake.arrays import Array
-from airground_drake.trace import Trace
+from airground_drake.base.arrays import Array
+from airground_drake.run.trace import Trace
 from airground_drake.verify.runs.beginnings import Beginning, beginning
 from airground_drake.verify.runs.closed_loops import Scene, in_batches, roll_out, stacked
 from airground_drake.verify.runs.proposals import Sent

@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from airground_drake.arrays import Array
-from airground_drake.trace import Trace
+from airground_drake.base.arrays import Array
+from airground_drake.run.trace import Trace
 from airground_drake.verify.engines.boxes import apart_at_least, boxes_of
 from airground_drake.verify.engines.segments import MERGE_S, interpolate
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from airground_drake.trace import Trace
+from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.segments import interpolate
 from airground_drake.verify.runs.proposals import answers_to, parts_of, proposals_of, withdrawn_s

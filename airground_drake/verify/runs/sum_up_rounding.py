@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from airground_drake.errors import TraceError
+from airground_drake.base.errors import TraceError
 from airground_drake.verify.runs.gate_record import Off, Row
 
 TIE = 1e-9

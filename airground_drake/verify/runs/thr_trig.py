@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from airground_drake.errors import TraceError
-from airground_drake.trace import Trace
+from airground_drake.base.errors import TraceError
+from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TraceClaim
 from airground_drake.verify.engines.segments import NormSignal
 from airground_drake.verify.finding import Finding

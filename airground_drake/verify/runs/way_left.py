@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.sparse.csgraph import dijkstra
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 
 AROUND = 48
 """Points around each safe circle."""

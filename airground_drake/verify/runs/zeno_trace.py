@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from itertools import pairwise
 
-from airground_drake.errors import TraceError
-from airground_drake.trace import Trace
+from airground_drake.base.errors import TraceError
+from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S, TraceClaim
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.triggers import column_conflict, recorded_events

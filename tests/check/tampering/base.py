@@ -24,8 +24,8 @@ import pytest
 from airground_drake.check import command as checker
 from airground_drake.check.report import AGREES, Line
 from airground_drake.report import rebuild
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.trace import Trace
 from airground_drake.verify import Verdict, judge, verify_all
 from airground_drake.verify.claim import Claim
 

@@ -9,7 +9,7 @@ from builders.problems import INSTANCES, random_problem
 from gatekeeper.contract import check_contract
 from pydrake.solvers import ClarabelSolver, MixedIntegerBranchAndBound, SolutionResult
 
-from airground_drake.errors import ScenarioError
+from airground_drake.base.errors import ScenarioError
 from airground_drake.gatekeeper import drake_solvers
 from airground_drake.gatekeeper.binary_program import BinaryProgram, Size
 from airground_drake.gatekeeper.daqp_solver import minimise
@@ -18,8 +18,8 @@ from airground_drake.gatekeeper.half_planes import normals_along
 from airground_drake.gatekeeper.routes.mixed_integer import MixedIntegerRoute
 from airground_drake.gatekeeper.solution import ConstantPlans
 from airground_drake.report.__main__ import main as report
+from airground_drake.run.simulation import simulate
 from airground_drake.scenarios.load import load
-from airground_drake.simulation import simulate
 
 NAMES = ("random 24x2", "rolled out 1", "a point at the robot", "identical modes", "random 1x1")
 

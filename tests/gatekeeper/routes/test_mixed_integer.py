@@ -23,8 +23,8 @@ from airground_drake.gatekeeper.half_planes import normals_along
 from airground_drake.gatekeeper.problem import Problem
 from airground_drake.gatekeeper.routes.mixed_integer import MixedIntegerRoute
 from airground_drake.gatekeeper.solution import ConstantPlans
+from airground_drake.run.simulation import simulate, warm_up
 from airground_drake.scenarios.load import load
-from airground_drake.simulation import simulate, warm_up
 
 
 def along_half_planes(problem: Problem, plans: np.ndarray, normals: np.ndarray) -> np.ndarray:

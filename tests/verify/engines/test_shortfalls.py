@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.nsbc.avoidance import Avoidance, limit_speed
 from airground_drake.nsbc.team import Team
 from airground_drake.verify.engines import shortfalls as module

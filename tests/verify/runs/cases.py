@@ -8,7 +8,7 @@ import numpy as np
 from builders.decisions import ALL_PLANS, STAGE_S, STAGES, TERMINAL_S
 from builders.edits import DecisionEdit
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 
 
 def task_error(problem: dict[str, Any], positions: Array, terminal_s: float = TERMINAL_S) -> float:

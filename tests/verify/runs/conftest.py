@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from builders.decisions import decided_run
 
-from airground_drake.trace import Trace
+from airground_drake.run.trace import Trace
 
 
 @pytest.fixture(scope="session")

@@ -13,7 +13,7 @@ from builders.edits import first_of, with_meta, with_signals
 from builders.runs import run_of
 from verify.judging import counterexample, judge
 
-from airground_drake.trace import Trace
+from airground_drake.run.trace import Trace
 from airground_drake.verify.runs.standing import standing_conflicts
 
 

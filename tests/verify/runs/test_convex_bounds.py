@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from properties import examples
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.verify.runs import convex_bounds
 from airground_drake.verify.runs.convex_bounds import enclose
 from airground_drake.verify.runs.gate_record import Row

@@ -9,13 +9,14 @@ from typing import Any
 import pytest
 from builders.misbuilt import MISBUILT, Patch
 
-from airground_drake import components, simulation
-from airground_drake.arrays import Array
-from airground_drake.diagram import Model
+from airground_drake.base.arrays import Array
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.team import Neighbourhood, Team
+from airground_drake.run import simulation
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import load
-from airground_drake.trace import Trace
+from airground_drake.systems import components
+from airground_drake.systems.diagram import Model
 from airground_drake.verify import verify
 
 

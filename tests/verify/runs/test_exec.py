@@ -12,19 +12,18 @@ from builders.edits import moved, with_signals
 from builders.runs import run_of
 from verify.judging import judge
 
-from airground_drake import components, diagram
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.intervention import database
 from airground_drake.intervention.messages import accepted_proposals
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc import law
 from airground_drake.nsbc.team import Neighbourhood
+from airground_drake.run.simulation import simulate
+from airground_drake.run.trace import Trace, save
+from airground_drake.run.trace import load as load_trace
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Obstacle, Policy, Scenario
-from airground_drake.simulation import simulate
-from airground_drake.systems import controllers
-from airground_drake.trace import Trace, save
-from airground_drake.trace import load as load_trace
+from airground_drake.systems import components, controllers, diagram
 
 Patch = Callable[[pytest.MonkeyPatch], None]
 

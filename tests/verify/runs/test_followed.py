@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from builders.edits import with_scenario
 
-from airground_drake.trace import Trace
+from airground_drake.run.trace import Trace
 from airground_drake.verify.applications import counts, with_counts
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.followed import Followed, followed

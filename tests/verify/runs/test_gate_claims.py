@@ -13,7 +13,7 @@ from builders.edits import with_decision, with_meta, with_signals
 from verify.judging import FEAS, OPT
 from verify.runs.cases import refused_for_want_of_a_plan
 
-from airground_drake.trace import Trace
+from airground_drake.run.trace import Trace
 
 
 @pytest.mark.parametrize(

@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 from verify.judging import FEAS, OPT
 
+from airground_drake.run.simulation import simulate
+from airground_drake.run.trace import Trace, save
+from airground_drake.run.trace import load as load_trace
 from airground_drake.scenarios.load import load
-from airground_drake.simulation import simulate
-from airground_drake.trace import Trace, save
-from airground_drake.trace import load as load_trace
 
 Simulated = Callable[[str, str, str], Trace]
 

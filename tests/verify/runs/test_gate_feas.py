@@ -30,7 +30,7 @@ from verify.runs.cases import (
 from airground_drake.gatekeeper.answer import Rules, settle
 from airground_drake.gatekeeper.solution import Solution
 from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT
-from airground_drake.trace import Trace
+from airground_drake.run.trace import Trace
 from airground_drake.verify.runs import gate_feas
 from airground_drake.verify.runs.gate_record import Row, rows_of
 

@@ -12,10 +12,10 @@ from verify.judging import judge
 
 from airground_drake.gatekeeper import outcome, outcome_gatekeeper, problem
 from airground_drake.gatekeeper.rollout import ClosedLoop
+from airground_drake.run.simulation import simulate
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import from_data, load, resolved
 from airground_drake.scenarios.schema import Policy
-from airground_drake.simulation import simulate
-from airground_drake.trace import Trace
 from airground_drake.verify.runs import beginnings
 from airground_drake.verify.runs.proposals import proposals_of
 

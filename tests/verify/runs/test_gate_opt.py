@@ -11,8 +11,8 @@ from builders.edits import DecisionEdit, with_decision, with_scenario
 from verify.judging import FEAS, OPT, assert_decision_refuted
 from verify.runs.cases import inflate_loser, long_normals, worst_plan
 
-from airground_drake.arrays import Array
-from airground_drake.trace import Trace
+from airground_drake.base.arrays import Array
+from airground_drake.run.trace import Trace
 from airground_drake.verify.runs import convex_bounds, gate_opt
 from airground_drake.verify.runs.gate_record import Row, rows_of
 

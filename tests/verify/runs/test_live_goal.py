@@ -9,7 +9,7 @@ from builders.edits import moved, with_scenario
 from builders.runs import run_of
 from verify.judging import counterexample, judge
 
-from airground_drake.trace import Trace
+from airground_drake.run.trace import Trace
 
 
 def stall(y: float) -> dict[str, list[float]]:

@@ -11,12 +11,12 @@ import pandas as pd
 import pytest
 from verify.judging import CLAIMS
 
-from airground_drake import components
 from airground_drake.gatekeeper.patience import Commitment, Patience
+from airground_drake.run.simulation import simulate
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Obstacle
-from airground_drake.simulation import simulate
-from airground_drake.trace import Trace
+from airground_drake.systems import components
 from airground_drake.verify.runs.way_left import bounds_of_way_left
 
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.nsbc import kernels
 from airground_drake.verify.runs.control_law import Inequalities, avoiding
 from airground_drake.verify.runs.projection import closest, least_violation

@@ -14,10 +14,10 @@ from builders.scenarios import STILL, case_a, lone
 from builders.simulation import simulate
 from verify.judging import counterexample, judge
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.nsbc.avoidance import Avoidance, Surroundings
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Obstacle
-from airground_drake.trace import Trace
 
 
 def crowd(seed: int) -> Trace:

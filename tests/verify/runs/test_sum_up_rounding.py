@@ -7,7 +7,7 @@ from builders.edits import DecisionEdit, with_decision
 from verify.judging import FEAS, assert_decision_refuted
 from verify.runs.cases import fractional_rounding, relaxed_outside, round_otherwise, understate_rounding
 
-from airground_drake.trace import Trace
+from airground_drake.run.trace import Trace
 
 MUTANTS: list[tuple[DecisionEdit, str]] = [
     (round_otherwise, "rounded against the rule"),

@@ -13,8 +13,8 @@ from builders.scenarios import STILL, changed, lone
 from builders.simulation import Drive, simulate
 from verify.judging import counterexample, judge
 
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Decision, Preset, Threshold
-from airground_drake.trace import Trace
 
 
 def edited_events(edit: Callable[[list[dict[str, Any]]], None], trace: Trace) -> Trace:

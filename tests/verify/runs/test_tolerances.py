@@ -13,7 +13,7 @@ from builders.edits import bumped, moved, with_decision, with_events, with_scena
 from builders.runs import refractory
 
 from airground_drake.registry import RUN_CLAIMS
-from airground_drake.trace import Trace
+from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import MOTION_TOLERANCE_M, TIME_TOLERANCE_S
 from airground_drake.verify.registry import run_claims
 from airground_drake.verify.runs import gate_model, gate_opt

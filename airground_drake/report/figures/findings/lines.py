@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.report.figures import canvas, svg
 from airground_drake.report.figures.panels import MAX_TABLE_ROWS, Figure, Panel, Table
 

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 from matplotlib.patches import Rectangle
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.report.figures import canvas, svg
 from airground_drake.report.figures.panels import Figure, Panel, Table
 

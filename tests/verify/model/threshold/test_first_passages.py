@@ -16,9 +16,9 @@ from scipy.special import ndtr
 from scipy.stats import kstest
 from verify.model.threshold.cases import INPUTS
 
-from airground_drake.components import make_noise, stack_presets
 from airground_drake.geometry.motion import Motion
 from airground_drake.scenarios.schema import Decision
+from airground_drake.systems.components import make_noise, stack_presets
 from airground_drake.systems.decision import DecisionVariable
 from airground_drake.verify.model import first_passages, thr_ddm
 from airground_drake.verify.model.first_passages import PassageExperiment

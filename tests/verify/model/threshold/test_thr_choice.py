@@ -13,8 +13,8 @@ from verify.model.threshold.cases import INPUTS, TABLE_1
 from airground_drake.decision.bayes import optimal_threshold
 from airground_drake.report import html
 from airground_drake.report.figures import threshold
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import load
-from airground_drake.trace import Trace
 from airground_drake.verify import verify_all, verify_model
 from airground_drake.verify.applications import with_runs
 from airground_drake.verify.finding import Finding

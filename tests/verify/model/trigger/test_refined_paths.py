@@ -14,8 +14,8 @@ from pydrake.systems.primitives import LogVectorOutput, TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 from verify.model.trigger.cases import REFINE, simulate, trigger_times
 
-from airground_drake.components import integrated_noise
 from airground_drake.decision.trigger import Trigger
+from airground_drake.systems.components import integrated_noise
 from airground_drake.systems.decision import EventTrigger
 from airground_drake.verify.engines.segments import NormSignal
 from airground_drake.verify.model import refined_paths

@@ -11,7 +11,7 @@ import pytest
 from verify.judging import Judged
 from verify.model.trigger.cases import REFINE
 
-from airground_drake.arrays import Array
+from airground_drake.base.arrays import Array
 from airground_drake.decision.trigger import Trigger, TriggerState
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.model import refined_paths, zeno_refine

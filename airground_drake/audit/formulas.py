@@ -1,0 +1,191 @@
+"""Findings about the tasks, their composition and the optimal control problem, from the paper's formulas alone."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from airground_drake.audit.item import Item, item
+from airground_drake.base.arrays import Array
+from airground_drake.nsbc.tasks import DistanceTask
+from airground_drake.scenarios.load import load
+from airground_drake.scenarios.schema import Scenario
+
+
+def formula_findings(scenario: Scenario) -> list[Item]:
+    """Items 8 and 12 to 17; each is computed, none is quoted."""
+    return [
+        _task_and_configuration(),
+        _feed_forward(scenario),
+        _centroid(scenario),
+        _grid_points(),
+        _rule_three(),
+        _null_space(),
+        _one_speed(scenario),
+    ]
+
+
+def _task_and_configuration() -> Item:
+    """Item 8: (3) applies J^+ to the rate of the configuration, whose size does not fit."""
+    jacobian = _avoidance_jacobian()
+    pseudo_inverse = np.linalg.pinv(jacobian)
+    rate = np.ones(jacobian.shape[1])
+    try:
+        np.matmul(pseudo_inverse, rate)
+        fits = True
+    except ValueError:
+        fits = False
+    return item(
+        8, "(3), (27c), caption of Figure 10",
+        "(3) and (4) write rho (the configuration) where sigma (the task) is meant: for the avoidance task J^+ is 3 x "
+        "1 and rho has 3 components. Besides, (27c) still says {0, 1} where the text relaxes to [0, 1] (as printed the "
+        "rounding (28)-(29) would have nothing to round), and the caption of Figure 10 names methods (b) "
+        "and (c) the wrong way round: the text of 5.2 has the refusal under (c).",
+        "v = J^+ d(rho_d)/dt", "v = J^+ d(sigma_d)/dt",
+        not fits and pseudo_inverse.shape == (3, 1),
+        {
+            "J^+": pseudo_inverse.tolist(), "shape_of_J^+": list(pseudo_inverse.shape),
+            "shape_of_rate_of_rho": list(rate.shape), "shape_of_rate_of_sigma": [jacobian.shape[0]],
+            "product_defined": fits, "(27c) and the caption of Figure 10": "by reading",
+        },
+    )  # fmt: skip
+
+
+def _avoidance_jacobian() -> Array:
+    """Jacobian (1, 3) of the avoidance task (7) at some position."""
+    return DistanceTask(np.zeros(3), 2.0, 3.0).jacobian(np.array([[1.0, 2.0, 0.0]]))[0]
+
+
+def _feed_forward(scenario: Scenario) -> Item:
+    """Item 12: (6) feeds the task's own rate forward, not the desired one."""
+    gain, error = scenario.control.motion_gain_1_s, 1.0
+    rate = scenario.ugvs["ugv1"].preset.speed_m_s
+    # J = I: the task's rate is v itself. As printed v = v + B error, or 0 v = B error; corrected v = rate + B error
+    velocities = {"as_printed": _solutions(0.0, gain * error), "corrected": _solutions(1.0, rate + gain * error)}
+    solutions = _solutions(gain, 0.0)
+    return item(
+        12, "(6)",
+        "(6) feeds forward the rate of the task itself, sigma_m, instead of the desired sigma_md. With J = I it reads "
+        "v = v + B error, which no velocity satisfies unless the error is 0.",
+        "v = J^+ (d(sigma_m)/dt + B error)", "v = J^+ (d(sigma_md)/dt + B error)",
+        solutions == [0.0] and [len(found) for found in velocities.values()] == [0, 1],
+        {
+            "solutions_for_the_error": [f"{solution:g}" for solution in solutions], "error_m": error,
+            "gain_1_s": gain, "desired_rate_m_s": rate, "velocities_m_s": velocities,
+        },
+    )  # fmt: skip
+
+
+def _solutions(slope: float, right: float) -> list[float]:
+    """All x with slope * x = right, where the slope is not 0; nothing where it is."""
+    return [right / slope] if slope else []
+
+
+def _centroid(scenario: Scenario) -> Item:
+    """Item 13: the task value (9) does not depend on the UAV."""
+    targets = {robot: scenario.ugvs[robot].target_m[0] for robot in ("ugv1", "ugv2")}
+    centroid = sum(targets.values()) / 2.0
+    tasks: dict[str, Callable[[float], float]] = {
+        "as_printed_m": lambda uav_x: centroid,
+        "corrected_m": lambda uav_x: uav_x - centroid,
+    }
+    places = [-2.0, 0.0, 2.0, 4.0]
+    at = {"uav_x_m": places} | {name: [task(x) for x in places] for name, task in tasks.items()}
+    printed, ours = (task(1.0) - task(0.0) for task in tasks.values())  # linear: the difference is the slope
+    return item(
+        13, "(9)-(10)",
+        "The task value (9) is the centroid of the UGVs, which does not depend on the UAV's position: its Jacobian is "
+        "0, and so is the velocity (10). The UAV would never move.",
+        {"task": "centroid of the UGVs", "jacobian": int(printed)},
+        {"task": "own position minus the centroid", "jacobian": int(ours)},
+        printed == 0 and ours == 1,
+        {
+            "pseudo_inverse_of_0": float(np.linalg.pinv(np.zeros((1, 1)))[0, 0]), "ugvs_at_x_m": targets,
+            "task_values": at,
+        },
+    )  # fmt: skip
+
+
+def _grid_points() -> Item:
+    """Item 14: (27a) sums N + 1 points and forgets the stage's length."""
+    horizon, stages = 3.0, 60
+    numbers = [5, 10, 20, 40, stages, 2 * stages]
+    as_printed = {n: sum(1.0 for _ in range(n + 1)) for n in numbers}
+    corrected = {n: sum(horizon / n for _ in range(n)) for n in numbers}
+    sums = {"stages": numbers, "as_printed": [*as_printed.values()], "corrected_s": [*corrected.values()]}
+    printed, ours = as_printed[stages], corrected[stages]
+    return item(
+        14, "(27a)",
+        "(27a) discretises the integral (25) over N intervals by a sum over k = 0..N, N + 1 terms, without the "
+        "interval's length: for the integrand 1 it gives 61 where the integral is 3 s.",
+        printed, ours, not math.isclose(printed, horizon) and math.isclose(ours, horizon),
+        {"integrand": 1.0, "horizon_s": horizon, "stages": stages, "integral_s": horizon, "sums": sums},
+    )  # fmt: skip
+
+
+def _rule_three() -> Item:
+    """Item 15: rule (3) of section 3.1.3 says the opposite of its own reason."""
+    n, others, lowest = 3, 2, 2  # dimensions: velocity, all tasks but the lowest, the lowest
+    totals: dict[str, list[int]] = {
+        "lowest_task": [*range(n + 1)],
+        "total": [others + m for m in range(n + 1)],
+        "admitted": [m > n - others for m in range(n + 1)],
+    }
+    smaller = [others + m > n for m in range(n + 1) if m > n - others]
+    return item(
+        15, "section 3.1.3, rule (3)",
+        "Rule (3) lets the lowest task's dimension exceed what the higher ones leave, 'so that n is ensured to be "
+        "greater than the total dimension': it then is smaller. And the introduction to section 3 says that an "
+        "intervention is triggered when the threshold is *not* reached, against (20).",
+        "m_r > n - sum of the others, so that n > the total", "m_r > n - sum of the others means n < the total",
+        lowest > n - others and not n > others + lowest and all(smaller),
+        {
+            "n": n, "higher_tasks": others, "lowest_task": lowest, "total": others + lowest, "totals": totals,
+            "rest": "by reading",
+        },
+    )  # fmt: skip
+
+
+def _null_space() -> Item:
+    """Item 16: under a position intervention nothing of the UGV's own task is left."""
+    jacobian = np.eye(3)
+    left = np.eye(3) - np.linalg.pinv(jacobian) @ jacobian
+    one_axis = np.array([[0.0, 1.0, 0.0]])
+    partly = np.eye(3) - np.linalg.pinv(one_axis) @ one_axis
+    return item(
+        16, "(20), (23)",
+        "Where the intervention is a position, J_int = I, (20) executes nothing of the UGV's own task, avoidance "
+        "included, although the text says that it is partly executed. The paper does not say what J_int is: the "
+        "identity is our choice, and the reason why UGV1 crashes in our case B, method (b). Under an intervention in "
+        "one direction something of the own task is left.",
+        {"rank_of_the_null_space": int(np.linalg.matrix_rank(left))},
+        {"rank_for_an_intervention_in_one_direction": int(np.linalg.matrix_rank(partly))},
+        not left.any() and bool(partly.any()),
+        {"projector": left.tolist(), "projector_for_one_direction": partly.tolist()},
+    )  # fmt: skip
+
+
+def _one_speed(scenario: Scenario) -> Item:
+    """Item 17: the times of cases A and B need two speeds of the same preset trajectory, or three."""
+    speed = {name: load(name)[0].ugvs["ugv1"].preset.speed_m_s for name in ("case_a", "case_b")}
+    travelled = {name: speed[name] * time for name, time in (("case_a", 14.45), ("case_b", 10.6))}
+    crossed = {"case_a": travelled["case_a"] / speed["case_b"], "case_b": travelled["case_b"] / speed["case_a"]}
+    late_s = 18.1
+    third = travelled["case_b"] / late_s
+    return item(
+        17, "Table 1, section 5, Figure 10",
+        f"One Table 1 serves both cases, but triggers at 14.45 s and at 10.6 s need reference speeds of "
+        f"{speed['case_a']:g} and {speed['case_b']:g} m/s: with the other case's speed case A would trigger about "
+        f"{crossed['case_a']:.1f} s, case B about {crossed['case_b']:.1f} s. The caption of Figure 10 has wrong "
+        f"interventions 'after {late_s:g} s' in one method and at 10.6 s in the other. If they begin there, it needs a "
+        f"third speed, {third:.4f} m/s, though before the trigger the methods of a case do not differ. It may only say "
+        f"that they still go on then.",
+        {"trigger_s": {"case_a": 14.45, "case_b": 10.6}, "speed_m_s": 1.0}, {"speed_m_s": speed},
+        abs(travelled["case_a"] - travelled["case_b"]) < 0.1 and abs(speed["case_a"] - speed["case_b"]) > 0.1,
+        {
+            "reference_travelled_at_the_trigger_m": travelled, "trigger_with_the_other_speed_s": crossed,
+            "caption_of_figure_10_s": late_s, "speed_if_it_begins_there_m_s": third,
+        },
+    )  # fmt: skip

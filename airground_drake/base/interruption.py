@@ -1,0 +1,252 @@
+"""Ending at once, and alone: what SIGINT and SIGTERM do to a command, and what becomes of its children.
+
+Nothing is unwound: an exception out of a signal handler may be lost in a callback, and `with` blocks wait for pools
+that still work. The handler kills every process that descends from this one, removes this process's temporary files,
+says so in one line, and leaves. A process that is killed itself cannot do that: those that it has forked end with it.
+
+On Linux a command works in a child of the process that was started (`begin`). The parent only waits. If the child is
+killed, the parent ends and removes what the child has left, and says so. If the parent is killed, the child gets
+SIGTERM.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import fcntl
+import os
+import select
+import signal
+import sys
+import threading
+import traceback
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from types import FrameType
+from typing import NoReturn
+
+from airground_drake.base import files
+from airground_drake.base.usage import EXIT_TOOL, refuse
+
+STOPPING = (signal.SIGINT, signal.SIGTERM)
+ROUNDS = 10
+"""Searches for descendants at most: one that is killed may just have begun another."""
+
+CURRENT_FOLDER = {"PYTHONSAFEPATH": "1", "NUMBA_CACHE_DIR": "", "NUMBA_CACHE_LOCATOR_CLASSES": ""}
+"""Environment in which nothing in the current folder is executed. Child interpreters do not import from there, and
+numba's configuration file there does not choose a cache, from which numba would unpickle. The user's own settings stay.
+"""
+
+_PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36
+
+_exit_code: int | None = None
+"""End of a pipe to the parent that waits for this process: it believes an exit code only if it is told here, too."""
+
+
+def begin() -> None:
+    """What a command does first, before the imports that take seconds: see this module."""
+    for name, value in CURRENT_FOLDER.items():
+        os.environ.setdefault(name, value)
+    _open_standard_streams()
+    if sys.platform == "linux":
+        _go_on_in_a_child()
+    end_on_signals()
+
+
+def _go_on_in_a_child() -> None:
+    """Return in a child process; the parent waits for it, cleans up after it, and leaves with its exit code.
+
+    The parent adopts what the child's descendants leave behind, so that it finds all of them if the child is killed.
+    """
+    global _exit_code
+    told, _exit_code = os.pipe()
+    parent = os.getpid()
+    _prctl(_PR_SET_CHILD_SUBREAPER, 1)
+    child = os.fork()
+    if child == 0:
+        os.close(told)
+        end_with_parent(signal.SIGTERM)
+        if os.getppid() != parent:
+            os._exit(1)
+        return
+    os.close(_exit_code)
+    for each in STOPPING:
+        if signal.getsignal(each) is not signal.SIG_IGN:
+            signal.signal(each, lambda number, _: os.kill(child, number))
+    status: int | None = None
+    while status is None:
+        ended, found = os.wait()  # also for the children that this process has adopted
+        status = found if ended == child else None
+    for each in STOPPING:
+        signal.signal(each, signal.SIG_IGN)
+    code = os.waitstatus_to_exitcode(status)
+    os.set_blocking(told, False)
+    with suppress(BlockingIOError):
+        if os.read(told, 1) == bytes([code % 256]) and code >= 0:
+            os._exit(code)
+    end_descendants()
+    files.sweep_temporary()
+    _remove_semaphores(child)
+    refuse(f"the process of this command died ({ended_how(code)})", EXIT_TOOL)
+    os._exit(EXIT_TOOL)
+
+
+def ended_how(code: int) -> str:
+    """What the exit code of a process says, negative for a signal, in words."""
+    return f"signal {-code}" if code < 0 else f"exit code {code}"
+
+
+def _exit(code: int) -> NoReturn:
+    """Leave at once, and tell the parent that this is meant."""
+    if _exit_code is not None:
+        with suppress(OSError):
+            os.write(_exit_code, bytes([code % 256]))
+    os._exit(code)
+
+
+def _remove_semaphores(pid: int) -> None:
+    """Remove the semaphores of loky that a process has left; the process that would do so was killed with it."""
+    for path in Path("/dev/shm").glob(f"sem.loky-{pid}-*"):
+        path.unlink(missing_ok=True)
+
+
+def end_on_signals() -> None:
+    """From now on SIGINT and SIGTERM end this process with exit code 130 and 143, and its descendants with it."""
+    _open_standard_streams()
+    owner = os.getpid()
+    stderr = os.dup(2)  # 2 itself may be pointed elsewhere while a C library is kept silent
+
+    def end(number: int, frame: FrameType | None) -> NoReturn:
+        for each in STOPPING:
+            signal.signal(each, signal.SIG_IGN)
+        if os.getpid() == owner:  # what was forked has inherited this handler
+            end_descendants()
+            files.discard_partial()
+            _remove_semaphores(owner)
+            with suppress(OSError):
+                os.write(stderr, _line(number, clear=os.isatty(stderr)))
+            _exit(128 + number)
+        os._exit(128 + number)
+
+    for each in STOPPING:
+        if signal.getsignal(each) is not signal.SIG_IGN:  # as for what `nohup` starts
+            signal.signal(each, end)
+    forks = _Forks()
+    os.register_at_fork(before=forks.before, after_in_child=forks.in_child)
+
+
+def _open_standard_streams() -> None:
+    """Point those that are closed to nowhere, or what is opened next takes their place."""
+    for name in ("stdin", "stdout", "stderr"):
+        if getattr(sys, name) is None:
+            nowhere = os.open(os.devnull, os.O_RDWR)  # the least descriptor that is free
+            os.set_inheritable(nowhere, True)
+            setattr(sys, name, os.fdopen(nowhere, "r+"))
+
+
+def run(main: Callable[[], int]) -> NoReturn:
+    """Run a command and leave with its exit code; with 141, quietly, if whoever reads what it prints has gone.
+
+    What no command expects is shown with its traceback, and is the tool's fault.
+    """
+    try:
+        code = main()
+        sys.stdout.flush()
+    except SystemExit as ended:
+        code = ended.code if isinstance(ended.code, int) else EXIT_TOOL
+    except BrokenPipeError:
+        code = 128 + signal.SIGPIPE
+    except OSError as error:
+        code = refuse(error, EXIT_TOOL)
+    except MemoryError:
+        code = refuse("out of memory", EXIT_TOOL)
+    except Exception:
+        code = EXIT_TOOL
+        with suppress(OSError):
+            traceback.print_exc()
+    leave(code)
+
+
+def leave(code: int) -> NoReturn:
+    """End this process with its work done: at once, as an interpreter that winds up has no handlers any more."""
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError, ValueError):  # a reader that has gone, a stream that is closed
+            stream.flush()
+    _exit(code)
+
+
+def _line(number: int, *, clear: bool) -> bytes:
+    """What is said of an interruption; over a line of progress, if there may be one."""
+    before = "\r\033[K" if clear else ""
+    return f"{before}error: interrupted ({signal.Signals(number).name})\n".encode()
+
+
+def end_descendants() -> None:
+    """Kill every process that descends from this one, as far as /proc tells."""
+    for _ in range(ROUNDS):
+        found = _descendants()
+        if not found:
+            return
+        for pid in found:
+            with suppress(ProcessLookupError, PermissionError):
+                os.kill(pid, signal.SIGKILL)
+
+
+def _descendants() -> list[int]:
+    """Living processes whose parent, or its parent, and so on, is this one."""
+    children: dict[int, list[int]] = {}
+    for entry in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(OSError):
+            state, parent = entry.read_text(errors="replace").rpartition(")")[2].split()[:2]
+            if state not in "ZX":
+                children.setdefault(int(parent), []).append(int(entry.parent.name))
+    found, above = [], [os.getpid()]
+    while above:
+        below = children.get(above.pop(), [])
+        found += below
+        above += below
+    return found
+
+
+def end_with_parent(how: signal.Signals = signal.SIGKILL) -> None:
+    """From now on this process is sent a signal when the thread that has started it ends, on Linux."""
+    if sys.platform == "linux":
+        _prctl(_PR_SET_PDEATHSIG, how)
+
+
+def _prctl(option: int, value: int) -> None:
+    with suppress(OSError, AttributeError):
+        ctypes.CDLL(None).prctl(option, value, 0, 0, 0)
+
+
+def end_with_pipe(reader: int) -> None:
+    """From now on this process is killed when the last writer of a pipe has gone, whatever it is doing, on Linux.
+
+    The kernel sees to it, as in `end_with_parent`, but the pipe belongs to a process, not to one of its threads.
+
+    Args:
+        reader: descriptor of the reading end of a pipe to which nothing is ever written.
+    """
+    if sys.platform == "linux":
+        fcntl.fcntl(reader, fcntl.F_SETOWN, os.getpid())
+        fcntl.fcntl(reader, fcntl.F_SETSIG, signal.SIGKILL)
+        fcntl.fcntl(reader, fcntl.F_SETFL, os.O_ASYNC)
+        if select.select([reader], [], [], 0.0)[0]:  # it had gone before
+            os._exit(1)
+
+
+class _Forks:
+    """Sees to it that what is forked ends with the process that has forked it."""
+
+    def __init__(self) -> None:
+        self.parent, self.from_main = 0, False
+
+    def before(self) -> None:
+        self.parent, self.from_main = os.getpid(), threading.current_thread() is threading.main_thread()
+
+    def in_child(self) -> None:
+        """Not where another thread has forked, which may end before its time."""
+        if self.from_main:
+            end_with_parent()
+            if os.getppid() != self.parent:
+                os._exit(1)

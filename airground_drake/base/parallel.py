@@ -1,0 +1,127 @@
+"""Independent pieces of work in processes forked from this one, as many at a time as there are processors.
+
+A piece sees everything that there was before the first one began, and leaves nothing behind but what it returns. A
+process does several pieces, one after the other: one for each piece would import and load anew what pieces share.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import sys
+import time
+import warnings
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from typing import TypeVar
+
+from airground_drake.base.errors import AirgroundError
+from airground_drake.base.progress import SILENT, Progress
+
+T = TypeVar("T")
+
+_pieces: Sequence[Callable[[], object]] = ()
+"""The work at hand: inherited, so that it need not be pickled."""
+
+
+def forks() -> bool:
+    """Whether a process may be forked here."""
+    return "fork" in multiprocessing.get_all_start_methods() and sys.platform != "darwin"
+
+
+def processors() -> int:
+    """How many processors this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def run_parallel(
+    pieces: Sequence[Callable[[], T]],
+    jobs: int | None = None,
+    *,
+    names: Sequence[str] = (),
+    progress: Progress = SILENT,
+) -> list[T]:
+    """What each piece returns, in their order.
+
+    Args:
+        pieces: what they return is pickled. The longest come first, or the last one is waited for.
+        jobs: processes at a time; default: one for each processor. Where there is one, or one piece, or no fork, the
+            pieces are done here, one after the other.
+        names: of the pieces, for `progress`.
+        progress: is told of each piece that is done.
+
+    Raises:
+        AirgroundError: if a process dies.
+        Exception: the first that a piece raises.
+    """
+    global _pieces
+    called = names or [""] * len(pieces)
+    most = min(len(pieces), processors() if jobs is None else jobs)
+    if most <= 1 or not forks() or _pieces:
+        return [_done(_timed(piece), name, progress) for piece, name in zip(pieces, called, strict=True)]
+    _pieces = pieces
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DeprecationWarning)  # idle threads of numerical libraries survive a fork
+            context = multiprocessing.get_context("fork")
+            with ProcessPoolExecutor(most, context, initializer=_begin) as pool:
+                futures = {pool.submit(_piece, index): index for index in range(len(pieces))}
+                for future in as_completed(futures):
+                    _done(future.result(), called[futures[future]], progress)
+                return [future.result()[0] for future in futures]  # type: ignore[misc]
+    except BrokenProcessPool as error:
+        raise AirgroundError("a process that judged claims died") from error
+    finally:
+        _pieces = ()
+
+
+def start_in_process(work: Callable[[], T]) -> Callable[[], T]:
+    """Start some work in a process of its own; what is returned waits for its result, and is to be called once.
+
+    Where there is one processor, or no fork, the work is done when it is waited for.
+
+    Raises:
+        AirgroundError: when it is waited for, if the process ends without having returned.
+    """
+    if not forks() or processors() == 1:
+        return work
+    context = multiprocessing.get_context("fork")
+    receiver, sender = context.Pipe(duplex=False)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # idle threads of numerical libraries survive a fork
+        process = context.Process(target=lambda: sender.send(work()), daemon=True)
+        process.start()
+    sender.close()
+
+    def returned() -> T:
+        try:
+            found: T = receiver.recv()
+        except EOFError:
+            process.join()
+            raise AirgroundError(f"a process died before its work was done (exit code {process.exitcode})") from None
+        process.join()
+        return found
+
+    return returned
+
+
+def _begin() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent's to heed
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+
+
+def _piece(index: int) -> tuple[object, float]:
+    return _timed(_pieces[index])
+
+
+def _timed(piece: Callable[[], T]) -> tuple[T, float]:
+    started = time.perf_counter()
+    return piece(), time.perf_counter() - started
+
+
+def _done(found: tuple[T, float], name: str, progress: Progress) -> T:
+    progress.elapsed_s(name, found[1])
+    progress.advance(1.0, name)
+    return found[0]

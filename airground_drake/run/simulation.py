@@ -1,0 +1,363 @@
+"""Run a model with Drake's Simulator and turn what was logged into a Trace."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+import pandas as pd
+from pydrake.common import RandomGenerator
+from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
+from pydrake.systems.framework import Context, DiagramBuilder
+from pydrake.systems.primitives import LogVectorOutput, Multiplexer
+
+from airground_drake.base.arrays import Array
+from airground_drake.base.errors import SimulationError, UnknownNameError, described
+from airground_drake.gatekeeper.answer import Decision, Foreseen, Planned
+from airground_drake.gatekeeper.outcome import Outlook, outcomes
+from airground_drake.gatekeeper.problem import Horizon, predicted_problem
+from airground_drake.gatekeeper.rollout import Scene
+from airground_drake.gatekeeper.routes.mixed_integer import MixedIntegerRoute
+from airground_drake.geometry.motion import Motion
+from airground_drake.intervention.policy import Proposal
+from airground_drake.nsbc.avoidance import Avoidance, Composition, Surroundings, limit_speed
+from airground_drake.nsbc.kernels import distances, news_within, within
+from airground_drake.nsbc.law import UgvLaw
+from airground_drake.nsbc.team import Team
+from airground_drake.run.events import extract
+from airground_drake.run.trace import (
+    DECISION_COLUMNS,
+    PROBLEM_ARRAYS,
+    PROBLEM_SCALARS,
+    PROPOSAL_COLUMNS,
+    SCHEMA,
+    Trace,
+)
+from airground_drake.scenarios.load import own, resolved, validated
+from airground_drake.scenarios.schema import Scenario
+from airground_drake.systems.components import GatekeepersFactory, make_gatekeepers
+from airground_drake.systems.decision import DecisionVariable
+from airground_drake.systems.diagram import RECORDED, DecisionFactory, Model, build_model
+from airground_drake.systems.lifetime import untie
+from airground_drake.systems.signals import FIELDS, Status
+
+if TYPE_CHECKING:
+    from pydrake.geometry import Meshcat
+
+EVENT_ACCURACY = 1e-6
+"""Accuracy of the Context: witness functions are isolated to it (relative to the time scale of 1 s)."""
+
+MERGE_S = 1e-9
+"""Rows closer than this are one: periods that are not binary fractions give steps of about 1e-17 s."""
+
+
+class Recorder:
+    """A model inside a diagram that logs its exported outputs at every step; may be used for several seeds."""
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        name: str,
+        decision_block: DecisionFactory = DecisionVariable,
+        meshcat: Meshcat | None = None,
+        *,
+        make_gatekeepers: GatekeepersFactory = make_gatekeepers,
+    ) -> None:
+        """Build the model of a run of the scenario and its loggers; `decision_block` and `meshcat` as in `simulate`.
+
+        `make_gatekeepers` is that of `build_model`.
+
+        Raises:
+            ScenarioError: if the scenario is not valid.
+            UnknownNameError: if it has no such run.
+            PluginError: if it names a policy, route or task that cannot be made, or the decision block has other
+                ports.
+        """
+        self._scenario, self._name = validated(scenario), name
+        if name not in self._scenario.runs:
+            raise UnknownNameError("run", name, self._scenario.runs)
+        self._run = self._scenario.runs[name]
+        composition: Composition = self._run.composition  # type: ignore[assignment]
+        self._own = own(self._scenario, name)
+        self._model: Model = build_model(
+            self._own,
+            self._run.method,
+            composition,
+            decision_block=decision_block,
+            disturbed=False,
+            make_gatekeepers=make_gatekeepers,
+        )
+        builder = DiagramBuilder()
+        builder.AddSystem(self._model.diagram)
+        ports = [self._model.diagram.GetOutputPort(name) for name in RECORDED]
+        together = builder.AddNamedSystem("recorded_signals", Multiplexer([port.size() for port in ports]))
+        for i, port in enumerate(ports):
+            builder.Connect(port, together.get_input_port(i))
+        self._log = LogVectorOutput(together.get_output_port(), builder)  # one for all: a log costs a step 10 us
+        if meshcat is not None:
+            from airground_drake.view.live_view import LiveView  # half a second of imports
+
+            view = builder.AddNamedSystem("live_view", LiveView(meshcat, self._scenario))
+            for port in (view.get_input_port(i) for i in range(view.num_input_ports())):
+                builder.Connect(self._model.diagram.GetOutputPort(port.get_name()), port)
+        self._root = builder.Build()
+        self._root.set_name("recorded")
+        untie(self._root)
+        warm_up()
+
+    def simulate(
+        self,
+        seed: int | None = None,
+        duration: float | None = None,
+        watch: Callable[[float], None] | None = None,
+        speed: float = 0.0,
+    ) -> Trace:
+        """One run from the initial state.
+
+        Args:
+            seed: of the decision noise; default: the scenario's.
+            duration: s; default: the scenario's.
+            watch: is told the time, s, at every step.
+            speed: simulated seconds per second at most; 0: as fast as it goes.
+
+        Raises:
+            SimulationError: if Drake or a system stops; names the run and the time.
+        """
+        seed = self._scenario.seed if seed is None else seed
+        context = self._root.CreateDefaultContext()
+        self._root.SetRandomContext(context, RandomGenerator(seed))
+        context.SetAccuracy(EVENT_ACCURACY)
+        simulator = Simulator(self._root, context)
+        period = self._scenario.control.period_s
+        config = SimulatorConfig(integration_scheme="explicit_euler", max_step_size=period, use_error_control=False)
+        ApplySimulatorConfig(config, simulator)  # velocities are held between samples: Euler's method is exact
+        simulator.set_target_realtime_rate(speed)
+        if self._model.gatekeeper is not None:
+            self._model.gatekeeper.reset_timing()
+        if watch is not None:
+            simulator.set_monitor(lambda root: watch(root.get_time()))
+        started = time.perf_counter()
+        try:
+            simulator.Initialize()
+            simulator.AdvanceTo(self._scenario.duration_s if duration is None else duration)
+        except (Exception, SystemExit) as error:  # Drake raises many kinds
+            what = described(error)
+            raise SimulationError(self._name, context.get_time(), what) from error
+        finally:
+            self._model.planner.close()
+        wall = time.perf_counter() - started
+        return self._trace(context, seed, wall)
+
+    def _trace(self, context: Context, seed: int, wall: float) -> Trace:
+        model, ugvs, robots = self._model, self._model.team.ugvs, self._model.team.robots
+        log = self._log.FindLog(context)
+        ends = np.cumsum([model.diagram.GetOutputPort(name).size() for name in RECORDED])
+        data = dict(zip(RECORDED, np.split(log.data(), ends[:-1]), strict=True))
+        t = log.sample_times()
+        keep = _distinct(t, data["team_command"])
+        data = {name: rows[:, keep] for name, rows in data.items()}
+        signals = _signals(t[keep], data, ugvs, robots)
+        gatekeeper = model.gatekeeper
+        decided = gatekeeper.decisions(gatekeeper.GetMyContextFromRoot(context)) if gatekeeper is not None else ()
+        memory = model.planner.memory(model.planner.GetMyContextFromRoot(context))
+        decisions = _decisions([_decision(r, ugvs[r.robot], self._own.gatekeeper.route) for r in decided])
+        sent = [(ugvs[i], proposal.issued, proposal.policy) for i, proposal in memory.sent]
+        meta: dict[str, Any] = {
+            "schema": SCHEMA,
+            "run": self._name,
+            "method": self._run.method,
+            "composition": self._run.composition,
+            "seed": seed,
+            "robots": list(robots),
+            "ugvs": list(ugvs),
+            "scenario": resolved(self._scenario),
+            "events": [],
+            **read_back(model, context),
+            "decision_block": _decision_block(model),
+            "faults": [{"t_s": f.t, "robot": f.robot, "policy": f.policy, "what": f.what} for f in memory.faults],
+        }
+        times = list(gatekeeper.decision_times_s) if gatekeeper is not None else []
+        timings = {"wall_s": wall, "decision_times_s": times}
+        proposals = _proposals(ugvs, memory.sent)
+        trace = Trace(meta, signals, decisions, timings, _problems(decided), proposals)
+        meta["events"] = extract(trace, sent)
+        return trace
+
+
+def read_back(model: Model, root: Context) -> dict[str, Any]:
+    """What runs in a Context, for `Trace.meta`: `zeta_m`, and `controllers` by name (see `controllers.read_back`)."""
+    levels = model.trigger.levels(model.trigger.GetMyContextFromRoot(root))
+    ran = {each.get_name(): each.parameters(each.GetMyContextFromRoot(root)) for each in model.controllers}
+    return {"zeta_m": float(levels.zeta_m), "controllers": ran}
+
+
+def _decision_block(model: Model) -> str:
+    """Name of the class that computes the decision variables in the diagram; "" for that of (15)."""
+    kind = type(model.decision_block)
+    return "" if kind is DecisionVariable else kind.__qualname__
+
+
+def _decision(decision: Decision, robot: str, route: str) -> dict[str, Any]:
+    """A row of `Trace.decisions`."""
+    row: dict[str, Any] = {name: "" if kind == "str" else -1.0 for name, kind in DECISION_COLUMNS.items()}
+    row |= {
+        "t_s": decision.t,
+        "robot": robot,
+        "policy": decision.proposal.policy,
+        "number": decision.proposal.number,
+        "issued_s": decision.proposal.issued,
+        "decision": "accept" if decision.accepted else "refuse",
+        "reason": decision.reason,
+    }
+    grounds = decision.grounds
+    if isinstance(grounds, Foreseen):
+        row |= {"tries": grounds.tries}
+        for choice, outcome in (("refuse", grounds.refuse), ("accept", grounds.accept)):
+            if outcome is not None:
+                row |= {
+                    f"{choice}_outcome_m2_s": outcome.cost,
+                    f"{choice}_stalls": float(outcome.stalls),
+                    f"{choice}_left_m": outcome.left,
+                }
+        return row
+    solution = grounds.solution
+    return row | {
+        "status": solution.status,
+        "route": route,
+        "first_stage": "accept" if solution.accept_first else "refuse",
+        "relaxed_first_stage": solution.relaxed_first_stage,
+        "objective": solution.objective,
+        "route_bound": solution.route_bound,
+        "gap": solution.gap,
+        "objective_accept": solution.objective_accept,
+        "objective_refuse": solution.objective_refuse,
+        "accept_throughout": grounds.throughout[0],
+        "refuse_throughout": grounds.throughout[1],
+        "rounding_deviation_s": solution.rounding_deviation,
+        "predicted_clearance_m": solution.clearance,
+    }
+
+
+def _decisions(rows: Sequence[dict[str, Any]]) -> pd.DataFrame:
+    """`Trace.decisions` of its rows."""
+    columns: dict[str, Any] = {name: [row[name] for row in rows] for name in DECISION_COLUMNS}
+    return pd.DataFrame({name: pd.Series(values, dtype=DECISION_COLUMNS[name]) for name, values in columns.items()})
+
+
+def _proposals(ugvs: Sequence[str], sent: Sequence[tuple[int, Proposal]]) -> pd.DataFrame:
+    """`Trace.proposals` of what was sent to whom."""
+    rows = [
+        (
+            proposal.number, ugvs[i], proposal.policy, float(proposal.issued), proposal.motion.times.tolist(),
+            proposal.motion.positions.ravel().tolist(),
+            np.asarray(proposal.selection, dtype=np.float64).ravel().tolist(),
+            np.asarray(proposal.mapped, dtype=np.float64).ravel().tolist(),
+            np.broadcast_to(proposal.mapped_radii, len(proposal.mapped)).tolist(), proposal.cause or ugvs[i],
+            [float(ugvs.index(name)) for name in proposal.party],
+        )
+        for i, proposal in sent
+    ]  # fmt: skip
+    return pd.DataFrame(rows, columns=list(PROPOSAL_COLUMNS))
+
+
+def _problems(decided: Sequence[Decision]) -> pd.DataFrame:
+    """`Trace.problems` of the decisions."""
+
+    def flat(array: Array | None) -> list[float]:
+        return [] if array is None else array.ravel().tolist()
+
+    planned = [(r.grounds.problem, r.grounds.solution) for r in decided if isinstance(r.grounds, Planned)]
+    rows = [
+        (
+            p.dt, p.error_weight, p.slack_weight, p.terminal_weight,
+            *map(flat, (
+                p.initial, p.accept, p.refuse, p.reference, p.centres, p.distances,
+                s.plan, s.positions, s.relaxed, s.rounded, s.normals,
+            )),
+        )
+        for p, s in planned
+    ]  # fmt: skip
+    return pd.DataFrame(rows, columns=[*PROBLEM_SCALARS, *PROBLEM_ARRAYS])
+
+
+@cache
+def warm_up() -> None:
+    """Load the compiled kernels and the solver, once per process, so that no run's time includes that."""
+    one, motion = np.ones((1, 3)), Motion(np.array([0.0, 1.0]), np.zeros((2, 3)))
+    news_within(one, one, 1.0, within(one, one, 1.0))
+    distances(one, one[0])
+    avoidance = Avoidance(gain=1.0, period=0.1)
+    spaces = avoidance.half_spaces(one, one, Surroundings(np.zeros((1, 1, 3)), np.ones((1, 1)), np.ones((1, 1))))
+    limit_speed(avoidance.apply(-one, spaces), np.ones(1))
+    team = Team(("a",), "b", np.zeros((1, 3)), 1.0, 1.0, 1.0, np.ones(2))
+    team.neighbourhood(slice(0, 1)).around(np.ones((2, 3)))
+    scene = Scene(0.0, one[0], motion, one, one, np.ones(1), np.ones(1), 1.0)
+    law, horizon = UgvLaw(avoidance, 1.0, 1.0, False), Horizon(2, 1, 1.0, 1.0)
+    law.velocity(np.ones((2, 3)), team.neighbourhood(slice(0, 1)), one, one, [None], one, np.ones(1))
+    MixedIntegerRoute().solve(predicted_problem(scene, law, Proposal("", 0.0, motion), horizon))
+    outcomes(scene, law, Proposal("", 0.0, motion), one, 1.0, (), Outlook(longest=1.0))
+
+
+def simulate(
+    scenario: Scenario,
+    run: str,
+    seed: int | None = None,
+    watch: Callable[[float], None] | None = None,
+    decision_block: DecisionFactory = DecisionVariable,
+    meshcat: Meshcat | None = None,
+    speed: float = 0.0,
+) -> Trace:
+    """Simulate one run of a scenario.
+
+    Args:
+        scenario: from a file or made in Python.
+        run: name of one of its runs.
+        seed: of the decision noise, in place of the scenario's.
+        watch: is told the time, s, at every step.
+        decision_block: makes the block that drives the trigger; see `build_diagram`.
+        meshcat: shows the robots while they move; the run is the same with it and without.
+        speed: simulated seconds per second at most, for those who watch; 0: as fast as it goes.
+
+    Raises:
+        ScenarioError: if the scenario, or the seed, is not valid.
+        UnknownNameError: if it has no such run.
+        PluginError: if it names a policy, route or task that cannot be made, or the decision block has other ports.
+        SimulationError: if Drake or a system stops; names the run and the time.
+    """
+    if seed is not None:
+        scenario = validated(scenario, {"seed": seed})
+    return Recorder(scenario, run, decision_block, meshcat).simulate(watch=watch, speed=speed)
+
+
+def _distinct(t: Array, command: Array) -> npt.NDArray[np.intp]:
+    """Indices of rows (T,) at distinct times, for commands (3 (n + 1), T).
+
+    Of rows within MERGE_S of each other the last one is kept that still has the command of the first: the
+    command that led there.
+    """
+    cluster = np.concatenate([[0], np.cumsum(np.diff(t) > MERGE_S)])
+    first = np.searchsorted(cluster, cluster)
+    led = (command == command[:, first]).all(axis=0)
+    return np.unique(np.maximum.accumulate(np.where(led, np.arange(len(t)), 0))[np.append(np.diff(cluster) > 0, True)])
+
+
+def _signals(t: Array, data: dict[str, Array], ugvs: tuple[str, ...], robots: tuple[str, ...]) -> pd.DataFrame:
+    columns: dict[str, Array] = {"t_s": t}
+    for i, robot in enumerate(robots):
+        for a, axis in enumerate("xyz"):
+            columns[f"{robot}.{axis}_m"] = data["team_position"][3 * i + a]
+        for a, axis in enumerate("xyz"):
+            columns[f"{robot}.v{axis}_m_s"] = data["team_command"][3 * i + a]
+    for i, ugv in enumerate(ugvs):
+        for a, axis in enumerate("xyz"):
+            columns[f"{ugv}.ref_{axis}_m"] = data["reference"][3 * i + a]
+        columns[f"{ugv}.noise_m"] = data["noise"][i]
+        columns[f"{ugv}.decision_variable_m"] = data["decision_variable"][i]
+        for k, name in enumerate(Status.get_fields()):
+            columns[f"{ugv}.{name}"] = data["status"][FIELDS * i + k]
+        columns[f"{ugv}.accepted"] = data["accepted"][i]
+    return pd.DataFrame(columns)

@@ -1,0 +1,297 @@
+"""What a run leaves behind: every signal once, every event, every gatekeeper decision; saved and loaded.
+
+Rows of `signals` are the ends of the simulator's steps: all control periods, and the isolated event times in
+between. A row's command is the velocity that was applied *up to* this row since the one before, so that
+position[k] = position[k-1] + (t[k] - t[k-1]) * command[k]: between rows every robot moves on a straight line.
+The other held signals (mode, accepted, ...) are likewise those in force just before the row's time, so an event
+at the last row's time may be absent. Noise is linear between rows. Row 0's command means nothing.
+
+Columns (units in the names; one set per robot or UGV):
+    t_s
+    <robot>.x_m .y_m .z_m                     position, world frame
+    <robot>.vx_m_s .vy_m_s .vz_m_s            command in force up to this row
+    <ugv>.ref_x_m .ref_y_m .ref_z_m           preset trajectory rho_rd(t)
+    <ugv>.noise_m                             integrated noise of (15)
+    <ugv>.decision_variable_m                 x, the signal that the trigger has: ||rho_rd - rho|| + noise, unless
+                                              another block computes it
+    <ugv>.mode                                0 supervising, 1 intervening, 2 refractory
+    <ugv>.triggers                            number of triggers so far
+    <ugv>.triggered_at_s .released_at_s       time of the last one, -1 before the first
+    <ugv>.accepted                            1 while an intervention is accepted
+
+Rows closer than 1e-9 s are one.
+"""
+
+from __future__ import annotations
+
+import copy
+import io
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from html import escape
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+import pandas as pd
+
+from airground_drake.base import files
+from airground_drake.base.arrays import Array, read_only
+from airground_drake.base.errors import TraceError, one_line
+
+T = TypeVar("T")
+
+SCHEMA = "airground_drake.run.trace/7"
+
+DECISION_COLUMNS = {
+    "t_s": "float64",
+    "robot": "str",
+    "policy": "str",
+    "number": "int64",
+    "issued_s": "float64",
+    "decision": "str",
+    "reason": "str",
+    "status": "str",
+    "route": "str",
+    "first_stage": "str",
+    "relaxed_first_stage": "float64",
+    "objective": "float64",
+    "route_bound": "float64",
+    "gap": "float64",
+    "objective_accept": "float64",
+    "objective_refuse": "float64",
+    "accept_throughout": "float64",
+    "refuse_throughout": "float64",
+    "rounding_deviation_s": "float64",
+    "predicted_clearance_m": "float64",
+    "refuse_outcome_m2_s": "float64",
+    "accept_outcome_m2_s": "float64",
+    "refuse_stalls": "float64",
+    "accept_stalls": "float64",
+    "refuse_left_m": "float64",
+    "accept_left_m": "float64",
+    "tries": "float64",
+}
+"""Columns of `Trace.decisions`, one row per robot and gatekeeper call; -1 where a number does not apply. `number` is
+that of the proposal in `Trace.proposals`. Those up to
+`predicted_clearance_m` are of decisions by problem (26), the others of decisions by outcomes: what comes of either
+choice as `gatekeeper.outcome` has it (cost, 1 if it comes to rest short of the goal, way left), and how often the UGV
+has gone along since it last rested."""
+
+PROBLEM_SCALARS = ("dt_s", "error_weight_1_m2_s", "slack_weight_1_m2_s", "terminal_weight_s")
+PROBLEM_ARRAYS = (
+    "initial_m", "accept_m_s", "refuse_m_s", "reference_m", "centres_m", "distances_m",
+    "plan", "positions_m", "relaxed", "rounded", "normals",
+)  # fmt: skip
+"""Columns of `Trace.problems` (empty under method (d)): the data of (26) as each decision saw it, and what the route
+found, row by row as in `decisions`. Arrays are flattened in C order: initial (3), accept, refuse and reference (N x 3),
+centres and normals (N x m x 3), distances (m), plan, relaxed and rounded omega (N), positions of the plan (N x 3);
+empty where the route has none. Normals are those of the half-planes that `route_bound` is about."""
+
+PROPOSAL_COLUMNS = (
+    "number", "robot", "policy", "issued_s", "times_s", "positions_m", "selection", "mapped_m", "mapped_radius_m",
+    "cause", "party",
+)  # fmt: skip
+"""Columns of `Trace.proposals`, one row per proposal sent: its number, which identifies it and counts from 0 in the
+order of sending; for which UGV, by which policy, when; the vertices of the
+motion that it asks for, times (M) and positions (M x 3, flattened in C order), and J_int of (12)-(14), (m x 3, ditto):
+the directions that it concerns, and the obstacles that the UAV knows, centres (k x 3, ditto) and radii (k); and the UGV
+whose trigger it was sent for: this one, or another one that it is to make way for; and where all UGVs with a
+part in the same joint plan are in `ugvs`, counted from 0 (empty: the proposal stands alone)."""
+
+
+TABLES = ("signals", "decisions", "problems", "proposals")
+"""Attributes of `Trace` that are tables, each saved as a Parquet file of its name."""
+
+
+def no_proposals() -> pd.DataFrame:
+    """The table `proposals` of a run in which nothing was sent."""
+    return pd.DataFrame(columns=list(PROPOSAL_COLUMNS))
+
+
+@dataclass(frozen=True, repr=False)
+class Trace:
+    """One run.
+
+    What is read from its tables is kept, so whoever changes them makes another run with `dataclasses.replace`;
+    `verify` and `verify_all` read them anew.
+
+    Attributes:
+        meta: strict JSON: `schema`, `run` (identifier), `method`, `composition`, `seed`, `robots`, `ugvs`
+            (names, array order; the UAV is the last robot), `zeta_m` (threshold in force), `scenario` (the
+            resolved scenario as nested dicts), `events` (list, by time), `controllers` (what the controllers were
+            built with, read back from the diagram: see `systems.controllers.read_back`), `decision_block` (name of
+            the class that computes the decision variables, read back from the diagram; empty for that of (15)),
+            `faults` (list of what went wrong in a policy or solver).
+        signals: see the module's docstring.
+        decisions: see DECISION_COLUMNS.
+        problems: see PROBLEM_ARRAYS.
+        proposals: see PROPOSAL_COLUMNS.
+        timings: kept apart because they differ between identical runs: `wall_s`, how long the run took by the
+            clock, and `decision_times_s`, CPU time of each row of `decisions`, in order.
+    """
+
+    meta: dict[str, Any]
+    signals: pd.DataFrame
+    decisions: pd.DataFrame
+    timings: dict[str, Any] = field(default_factory=dict, compare=False)
+    problems: pd.DataFrame = field(default_factory=lambda: pd.DataFrame(columns=[*PROBLEM_SCALARS, *PROBLEM_ARRAYS]))
+    proposals: pd.DataFrame = field(default_factory=no_proposals)
+    _read: dict[str, Array] = field(default_factory=dict, init=False, repr=False, compare=False)
+    _derived: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
+
+    @property
+    def run(self) -> str:
+        """Identifier of the run in its scenario."""
+        return str(self.meta["run"])
+
+    @property
+    def robots(self) -> list[str]:
+        """Names of all robots: the UGVs, then the UAV."""
+        return list(self.meta["robots"])
+
+    @property
+    def ugvs(self) -> list[str]:
+        """Names of the UGVs."""
+        return list(self.meta["ugvs"])
+
+    @property
+    def scenario(self) -> dict[str, Any]:
+        """The resolved scenario as this run has it, as nested dicts with the keys of the scenario file."""
+        resolved: dict[str, Any] = self.meta["scenario"]
+        given = resolved["runs"].get(self.run, {}).get("set")
+        return self.derived("scenario", lambda: _with(resolved, given)) if given else resolved
+
+    @property
+    def events(self) -> list[dict[str, Any]]:
+        """Events by time: `t_s`, `robot`, `kind`, `position_m`, and what else belongs to the kind."""
+        return list(self.meta["events"])
+
+    @property
+    def t(self) -> Array:
+        """Times of the rows, (T,), s."""
+        return self.column("t_s")
+
+    def column(self, name: str) -> Array:
+        """One column as float64, (T,), read-only: every claim asks for the same few, which are looked at once.
+
+        Raises:
+            TraceError: if it is missing or not finite.
+        """
+        if name in self._read:
+            return self._read[name]
+        if name not in self.signals:
+            raise TraceError(f"run {self.meta.get('run')}: the trace has no column {name!r}")
+        values = self.signals[name].to_numpy(dtype=np.float64, copy=True)
+        if not np.isfinite(values).all():
+            raise TraceError(f"run {self.meta.get('run')}: column {name!r} has values that are not finite")
+        values.setflags(write=False)
+        self._read[name] = values
+        return values
+
+    def derived(self, key: Any, work_out: Callable[[], T]) -> T:
+        """What follows from the run and a key, worked out once: several claims ask for the same."""
+        if key not in self._derived:
+            self._derived[key] = work_out()
+        found: T = self._derived[key]
+        return found
+
+    def vector(self, robot: str, stem: str = "", unit: str = "m") -> Array:
+        """Three columns as (T, 3), read-only: positions by default; stem 'v' and unit 'm_s' for commands, 'ref_'."""
+        columns = (f"{robot}.{stem}{axis}_{unit}" for axis in "xyz")
+        return self.derived(
+            ("vector", robot, stem, unit), lambda: read_only(np.column_stack([self.column(name) for name in columns]))
+        )
+
+    def position(self, robot: str) -> Array:
+        """Positions, (T, 3), m, world frame."""
+        return self.vector(robot)
+
+    def command(self, robot: str) -> Array:
+        """Commands in force up to each row, (T, 3), m/s."""
+        return self.vector(robot, "v", "m_s")
+
+    def reference(self, ugv: str) -> Array:
+        """Preset trajectory, (T, 3), m."""
+        return self.vector(ugv, "ref_")
+
+    def to_pandas(self) -> pd.DataFrame:
+        """The signals as a new table: a row per time, the index `t_s`; columns by robot, then by signal."""
+        table = self.signals.set_index("t_s")
+        parts = [tuple(str(name).split(".", 1)) for name in table]
+        table.columns = pd.MultiIndex.from_tuples(parts, names=["robot", "signal"])
+        return table
+
+    def __repr__(self) -> str:
+        """In one line: which run of which scenario, how many rows and events."""
+        scenario, events = self.meta.get("scenario", {}).get("name"), self.meta.get("events", [])
+        return f"<Trace: run {self.meta.get('run')!r} of {scenario!r}, {len(self.signals)} rows, {len(events)} events>"
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the line of `repr` and a table of the events."""
+        rows = [(f"{event['t_s']:.3f}", event["robot"], event["kind"]) for event in self.events]
+        table = pd.DataFrame(rows, columns=["time, s", "robot", "event"]).to_html(index=False, border=0)
+        return f"<p>{escape(repr(self))}</p>{table}"
+
+
+def _with(resolved: dict[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
+    """A copy of nested dicts and lists with other values at dotted keys."""
+    changed = copy.deepcopy(resolved)
+    for key, value in given.items():
+        *above, last = key.split(".")
+        place: Any = changed
+        for part in above:
+            place = place[int(part) if isinstance(place, list) else part]
+        place[last] = value
+    return changed
+
+
+def save(trace: Trace, folder: Path) -> list[str]:
+    """Write a Parquet file per table, `timings.json`, then `meta.json` with digests.
+
+    Each file is written atomically and `meta.json` last, so that an interrupted save is recognised by `load`.
+
+    Returns:
+        The names of the files.
+
+    Raises:
+        OSError: if the folder cannot be written.
+        ValueError: if `meta` holds a number that is not finite.
+    """
+    tables = {f"{name}.parquet": getattr(trace, name) for name in TABLES}
+    digests = {}
+    for name, table in tables.items():
+        buffer = io.BytesIO()
+        table.to_parquet(buffer, index=False)
+        digests[name] = files.sha256(buffer.getvalue())
+        files.write_bytes(folder / name, buffer.getvalue())
+    files.write_json(folder / "timings.json", trace.timings)
+    files.write_json(folder / "meta.json", {**trace.meta, "files": digests})
+    return [*tables, "timings.json", "meta.json"]
+
+
+def load(folder: Path) -> Trace:
+    """Read a saved trace back.
+
+    Raises:
+        TraceError: if it is of another schema, or a file is missing, unreadable, or differs from the digest in
+            `meta.json`.
+    """
+    try:
+        meta = json.loads(files.read_text(folder / "meta.json"))
+        if meta.get("schema") != SCHEMA:
+            raise TraceError(f"{folder}: schema {meta.get('schema')!r}, this version reads {SCHEMA!r}: simulate again")
+        timings = json.loads(files.read_text(folder / "timings.json"))
+        digests, tables = meta.pop("files"), {}
+        for name in TABLES:
+            path = folder / f"{name}.parquet"
+            data = files.read_bytes(path)
+            if files.sha256(data) != digests[path.name]:
+                raise TraceError(f"{path}: its SHA-256 is not the one recorded in meta.json")
+            tables[name] = files.read_table(data)
+        return Trace(meta, timings=timings, **tables)
+    except OSError as error:
+        raise TraceError(one_line(f"{error.filename}: {error.strerror}; wanted: a file of a saved run")) from error
+    except (LookupError, TypeError, ValueError, AttributeError, RecursionError) as error:
+        raise TraceError(one_line(f"{folder}: not a readable trace: {error}")) from error

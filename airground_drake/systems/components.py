@@ -1,0 +1,246 @@
+"""From a scenario to the objects that the diagram is made of: one factory each, used by whoever judges them, too."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from pydrake.common import RandomDistribution
+from pydrake.systems.primitives import AffineSystem, LinearSystem, RandomSource
+from pydrake.trajectories import PiecewisePolynomial
+
+from airground_drake.base.arrays import Array
+from airground_drake.base.errors import ScenarioError
+from airground_drake.decision.bayes import COMPUTED
+from airground_drake.decision.trigger import Trigger
+from airground_drake.gatekeeper.answer import Rules
+from airground_drake.gatekeeper.budget import Budget
+from airground_drake.gatekeeper.drake_solvers import SOLVERS, lacking
+from airground_drake.gatekeeper.mpc_gatekeeper import Gatekeepers, Judging, PaperGatekeepers
+from airground_drake.gatekeeper.outcome import Outlook
+from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
+from airground_drake.gatekeeper.patience import Patience
+from airground_drake.gatekeeper.problem import Horizon
+from airground_drake.gatekeeper.routes.route import Route
+from airground_drake.geometry.motion import Motion
+from airground_drake.intervention.database import BehaviourDatabase, make_policy
+from airground_drake.intervention.planner import Planner
+from airground_drake.nsbc.avoidance import Avoidance, Composition
+from airground_drake.nsbc.law import UgvLaw
+from airground_drake.nsbc.team import Team
+from airground_drake.registry import ROUTES, Method
+from airground_drake.scenarios.schema import Decision, Scenario
+
+SAME_TIME = 1e-12
+"""Vertices of presets this close, s or relatively, differ by rounding: times are sums of some quotients."""
+
+
+def make_avoidance(scenario: Scenario, composition: Composition = "augmented") -> Avoidance:
+    """The set-based avoidance layer."""
+    control = scenario.control
+    return Avoidance(control.avoidance_gain_1_s, control.period_s, control.sensing_range_m, composition)
+
+
+def make_law(scenario: Scenario, method: Method, composition: Composition = "augmented") -> UgvLaw:
+    """The numbers of the UGVs' control law under a method."""
+    control, avoidance = scenario.control, make_avoidance(scenario, composition)
+    return UgvLaw(avoidance, control.motion_gain_1_s, control.intervention_gain_1_s, method.intervention_on_top)
+
+
+def make_database(scenario: Scenario, method: Method) -> BehaviourDatabase:
+    """The UAV's behaviours; none under a method without interventions.
+
+    Raises:
+        UnknownNameError, PluginError: if the scenario names a policy that cannot be made.
+    """
+    given = scenario.intervention
+    policies = given.policies if method.intervenes else []
+    return BehaviourDatabase(
+        [(entry.name, make_policy(entry.name, entry.parameters, given.budget_s)) for entry in policies],
+        retry=given.retry_s,
+        ranking=given.ranking,  # type: ignore[arg-type]
+        budget=given.budget_s,
+        joint=not method.intervention_on_top,  # the paper's UGVs decide each for itself
+    )
+
+
+def make_planner(scenario: Scenario, method: Method) -> Planner:
+    """The UAV's planner, with what is on its map.
+
+    Raises:
+        UnknownNameError, PluginError: if the scenario names a policy that cannot be made.
+    """
+    mapped, radii = make_map(scenario)
+    return Planner(
+        ugvs=tuple(scenario.ugvs),
+        database=make_database(scenario, method),
+        period=scenario.intervention.period_s,
+        presets=tuple(make_presets(scenario)),
+        targets=positions([ugv.target_m for ugv in scenario.ugvs.values()]),
+        mapped=mapped,
+        mapped_radii=radii,
+        safe_distance=scenario.safe_distance.obstacle_m,
+        robot_distance=scenario.safe_distance.ugv_m,
+        max_speed=np.array([ugv.max_speed_m_s for ugv in scenario.ugvs.values()]),
+        radius=np.array([ugv.radius_m for ugv in scenario.ugvs.values()]),
+    )
+
+
+def make_map(scenario: Scenario) -> tuple[Array, Array]:
+    """The obstacles on the UAV's map: those that it knows, and those that are only there, without a radius.
+
+    Returns:
+        Centres, (m, 3), m, and radii, (m,), m.
+    """
+    known = [obstacle for obstacle in scenario.obstacles.values() if obstacle.known_to_uav]
+    centres = [*(obstacle.position_m for obstacle in known), *scenario.uav.phantoms_m]
+    return positions(centres), np.array([*(o.radius_m for o in known), *(0.0 for _ in scenario.uav.phantoms_m)])
+
+
+def make_route(scenario: Scenario) -> Route:
+    """How the gatekeeper's problem (26) is solved.
+
+    Raises:
+        UnknownNameError, PluginError: if the scenario names a route that cannot be made.
+        ScenarioError: if it names a solver that cannot be used here; says why, and which can.
+    """
+    gate = scenario.gatekeeper
+    chosen: dict[str, Any] = {"blocks": gate.blocks} if gate.blocks else {}
+    if gate.solver != "daqp":
+        if why := lacking(gate.solver):
+            allowed = ", ".join(["daqp", *(name for name in SOLVERS if not lacking(name))])
+            raise ScenarioError(scenario.name, "gatekeeper.solver", gate.solver, f"{why}; allowed here: {allowed}")
+        chosen["solver"] = gate.solver
+    return ROUTES.make(gate.route, of=Route, **chosen)
+
+
+def first_order_plant(robot: str, start: Array) -> LinearSystem:
+    """p_dot = v for one robot: input v (3,), m/s; output p (3,), m, world frame; default state `start` (3,), m."""
+    eye, zero = np.eye(3), np.zeros((3, 3))
+    plant = LinearSystem(A=zero, B=eye, C=eye, D=zero)
+    plant.configure_default_state(start)
+    return plant
+
+
+def make_starts(scenario: Scenario) -> Array:
+    """Initial positions of the UGVs and the UAV, (n + 1, 3), m."""
+    return positions([*(ugv.start_m for ugv in scenario.ugvs.values()), scenario.uav.start_m])
+
+
+def make_team(scenario: Scenario) -> Team:
+    """Names, safe distances, radii and speed limits of the scenario's robots."""
+    speeds = [ugv.max_speed_m_s for ugv in scenario.ugvs.values()]
+    radii = [ugv.radius_m for ugv in scenario.ugvs.values()]
+    return Team(
+        ugvs=tuple(scenario.ugvs),
+        uav=scenario.uav.name,
+        obstacles=positions([obstacle.position_m for obstacle in scenario.obstacles.values()]),
+        obstacle_distance=scenario.safe_distance.obstacle_m,
+        ugv_distance=scenario.safe_distance.ugv_m,
+        air_ground_distance=scenario.safe_distance.air_ground_m,
+        max_speed=np.array([*speeds, scenario.uav.max_speed_m_s]),
+        radius=np.array([*radii, scenario.uav.radius_m]),
+        obstacle_radius=np.array([obstacle.radius_m for obstacle in scenario.obstacles.values()]),
+    )
+
+
+def make_presets(scenario: Scenario) -> list[Motion]:
+    """Preset trajectories of the UGVs."""
+    return [Motion.at_speed(positions(ugv.preset.waypoints_m), ugv.preset.speed_m_s) for ugv in scenario.ugvs.values()]
+
+
+def make_horizon(scenario: Scenario) -> Horizon:
+    """The gatekeeper's grid and weights."""
+    gate = scenario.gatekeeper
+    substeps = round(gate.horizon_s / gate.stages / scenario.control.period_s)
+    weights = gate.error_weight_1_m2_s, gate.slack_weight_1_m2_s, gate.terminal_weight_s
+    return Horizon(gate.stages, substeps, *weights)
+
+
+def make_rules(scenario: Scenario) -> Rules:
+    """When the gatekeeper's decisions become answers, and what they may cost."""
+    gate = scenario.gatekeeper
+    return Rules(
+        switching_margin=gate.switching_margin,
+        min_dwell=gate.min_dwell_s,
+        first_stage=gate.rule == "first_stage",
+        budget=Budget(gate.budget_iterations),
+        budget_share=gate.budget_share if gate.budget == "wall_clock" else None,
+    )
+
+
+def make_outlook(scenario: Scenario) -> Outlook:
+    """How far outcomes are looked at."""
+    gate = scenario.gatekeeper
+    return Outlook(gate.longest_s, gate.settling_s, gate.horizon_s, scenario.arrival_tolerance_m)
+
+
+def make_patience(scenario: Scenario) -> Patience:
+    """How long UGVs go along with the UAV."""
+    gate = scenario.gatekeeper
+    return Patience(gate.tries, gate.rest_s, gate.longest_s)
+
+
+GatekeepersFactory = Callable[[Scenario, UgvLaw], Gatekeepers]
+"""Makes what judges proposals, of a scenario and the law of its UGVs."""
+
+
+def make_gatekeepers(scenario: Scenario, law: UgvLaw) -> Gatekeepers:
+    """How the UGVs judge proposals: by problem (26) where the intervention is on top, else by outcomes.
+
+    Raises:
+        UnknownNameError, PluginError: if the scenario names a route that cannot be made.
+    """
+    team, presets = make_team(scenario), make_presets(scenario)
+    if not law.intervention_on_top:
+        return OutcomeGatekeepers(team, law, presets, make_outlook(scenario), make_patience(scenario))
+    judging = Judging(make_route(scenario), make_horizon(scenario), make_rules(scenario), scenario.gatekeeper.period_s)
+    return PaperGatekeepers(team, law, presets, judging)
+
+
+def make_trigger(scenario: Scenario, zeta: float) -> Trigger:
+    """The trigger automaton with threshold zeta, m."""
+    if scenario.decision.trigger == "bare":
+        return Trigger.bare(zeta)
+    return Trigger(zeta, scenario.decision.release_m, scenario.decision.min_inter_event_s)
+
+
+def threshold(scenario: Scenario) -> float:
+    """Decision threshold zeta, m: the fixed one, the minimiser of the Bayes risk, or the root of (19) as printed."""
+    rule = scenario.decision.threshold
+    if rule.rule in COMPUTED:
+        return COMPUTED[rule.rule](rule.drift_m_s, rule.noise_m_sqrt_s, rule.c1_1_s, rule.c2)
+    return rule.zeta_m
+
+
+def positions(rows: Sequence[Sequence[float]]) -> Array:
+    """Points as an array, (n, 3), m, also where there are none."""
+    return np.array(rows, dtype=np.float64).reshape(-1, 3)
+
+
+def stack_presets(presets: list[Motion]) -> PiecewisePolynomial:
+    """All presets as one trajectory of 3n components over the union of their vertices.
+
+    Vertices of several presets that only rounding keeps apart are one: a velocity over so short a time is rounding.
+    """
+    times = np.unique(np.concatenate([preset.times for preset in presets]))
+    kept = np.append(np.diff(times) > SAME_TIME * np.maximum(1.0, times[1:]), True)
+    kept[0] = True
+    times = times[kept]
+    samples = np.concatenate([preset.sample(times) for preset in presets], axis=1)
+    return PiecewisePolynomial.FirstOrderHold(times, samples.T)
+
+
+def make_noise(count: int, given: Decision) -> tuple[RandomSource, AffineSystem]:
+    """Where the noise of `count` decision variables comes from, and what integrates it; to be connected."""
+    source = RandomSource(RandomDistribution.kGaussian, count, given.noise_period_s)
+    return source, integrated_noise(count, given.noise_m_sqrt_s, given.leak_1_s, given.noise_period_s)
+
+
+def integrated_noise(count: int, intensity: float, leak: float, period: float) -> AffineSystem:
+    """dn = -leak n dt + intensity dW for noise samples held over `period`: Euler-Maruyama on that grid."""
+    eye, zero = np.eye(count), np.zeros(count)
+    return AffineSystem(
+        A=-leak * eye, B=intensity / np.sqrt(period) * eye, f0=zero, C=eye, D=0.0 * eye, y0=zero, time_period=0.0
+    )

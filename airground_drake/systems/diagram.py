@@ -1,0 +1,351 @@
+"""From a scenario to a Drake Diagram of the layers of the paper's Figure 2 and the vehicles, wired by port names.
+
+Data flows through `decision_making` (noise, DDM, trigger), `task_planning` (presets, planner, controllers),
+`optimisation` (gatekeeper) and `vehicles` (commands, disturbances, plants), whose positions are fed back.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from pydrake.systems.framework import Diagram, DiagramBuilder, InputPort, OutputPort, System
+from pydrake.systems.primitives import Demultiplexer, Multiplexer, TrajectorySource
+
+from airground_drake.base.arrays import Array
+from airground_drake.base.errors import PluginError, UnknownNameError
+from airground_drake.geometry.motion import Motion
+from airground_drake.nsbc.avoidance import COMPOSITIONS, Composition
+from airground_drake.nsbc.task import Task
+from airground_drake.nsbc.team import Team
+from airground_drake.registry import METHODS, UAV_TASKS, Method, method_of
+from airground_drake.scenarios.load import validated
+from airground_drake.scenarios.schema import Scenario
+from airground_drake.systems import (
+    DecisionVariable,
+    DirectAcceptance,
+    EventTrigger,
+    Gatekeeper,
+    InterventionPlanner,
+    Laws,
+    Monitor,
+    UavController,
+    UgvController,
+    VelocityDisturbance,
+    components,
+)
+
+RECORDED = (
+    "team_position", "team_command", "reference", "noise", "decision_variable", "status", "accepted",
+)  # fmt: skip
+"""Exported output ports of the diagram, the signals of a trace."""
+
+PlantFactory = Callable[[str, Array], System]
+"""Makes the plant of a robot from its name and its start (3,), m: a System with one input, the velocity (3,), m/s, and
+one output, the position (3,), m, both in the world frame, whose default state has the robot at its start."""
+
+DecisionFactory = Callable[[int, Sequence[Motion]], System]
+"""Makes the block that computes the decision variables, from the number of UGVs n and their presets: a System with the
+output ports `decision_variable` (n), m, and `decision_range` (2n), m, the least and the largest since the simulator's
+step began. Its input ports are fed by name. `systems.DecisionBlock` is a base for such blocks."""
+
+
+@dataclass(frozen=True)
+class Model:
+    """A diagram and the systems in it that a simulation reads.
+
+    Attributes:
+        diagram: the whole system; its exported output ports are RECORDED.
+        method: which method's priorities and gatekeeper it has.
+        team: names, safe distances, speed limits.
+        decision_block: what drives the trigger.
+        trigger: of all UGVs.
+        planner: the UAV's planner.
+        gatekeeper: of methods (c) and (d), else None.
+        controllers: of the UGVs, and of the UAV.
+    """
+
+    diagram: Diagram
+    method: Method
+    team: Team
+    decision_block: System
+    trigger: EventTrigger
+    planner: InterventionPlanner
+    gatekeeper: Gatekeeper | None
+    controllers: tuple[UgvController, UavController]
+
+
+def build_diagram(
+    scenario: Scenario,
+    method: str | None = None,
+    composition: Composition | None = None,
+    plants: PlantFactory = components.first_order_plant,
+    monitor: Monitor | None = None,
+    decision_block: DecisionFactory = DecisionVariable,
+) -> Diagram:
+    """The diagram of a scenario, for inspection, simulation or embedding.
+
+    Args:
+        scenario: from a file or made in Python.
+        method: default: that of the scenario's last run.
+        composition: of the UGVs' avoidance tasks; default: 'augmented', or without `method` that of the last run.
+        plants: makes the plant of each robot. The claims are about the default, `first_order_plant`.
+        monitor: watches the diagram while it runs; see `make_monitor`.
+        decision_block: makes the block that drives the trigger. The default, `systems.DecisionVariable`, is (15).
+
+    Returns:
+        A Diagram whose default context has every robot at its start; to be simulated, a context needs an accuracy:
+        `context.SetAccuracy(1e-6)`. Outputs: RECORDED. Inputs: `disturbance_<robot>` (3), m/s, added to the robot's
+        velocity; 0 where not connected. With a monitor, its output `violation`, too. The scenario's seed has no part
+        in it: the noise is that of `diagram.SetRandomContext(context, RandomGenerator(seed))`.
+
+    Raises:
+        ScenarioError: if the scenario is not valid.
+        UnknownNameError: if there is no such method or composition.
+        PluginError: if it names a policy, route or task that cannot be made, or a plant or the decision block has other
+            ports.
+    """
+    return build_model(validated(scenario), method, composition, plants, monitor, decision_block).diagram
+
+
+def build_model(
+    scenario: Scenario,
+    method: str | None = None,
+    composition: Composition | None = None,
+    plants: PlantFactory = components.first_order_plant,
+    monitor: Monitor | None = None,
+    decision_block: DecisionFactory = DecisionVariable,
+    *,
+    disturbed: bool = True,
+    make_gatekeepers: components.GatekeepersFactory = components.make_gatekeepers,
+) -> Model:
+    """Build and wire all components of one method of a valid scenario; else as `build_diagram`.
+
+    If it is not to be `disturbed`, the diagram has no inputs for disturbances: commands go straight to the plants.
+    `make_gatekeepers` makes what judges proposals in another way; claims about decisions are about the default.
+    """
+    chosen, composition = _chosen(scenario, method, composition)
+    team, presets = components.make_team(scenario), components.make_presets(scenario)
+    n = len(team.ugvs)
+    law = components.make_law(scenario, chosen, composition)
+    # first, so that the seed of its noise does not depend on what a plant may draw
+    block = _checked_block(n, decision_block(n, presets))
+    trigger = EventTrigger(n, components.make_trigger(scenario, components.threshold(scenario)))
+    decision = _decision_making(scenario, n, block, trigger)
+    starts = dict(zip(team.robots, components.make_starts(scenario), strict=True))
+    checked = {robot: _checked(robot, plants(robot, start)) for robot, start in starts.items()}
+    vehicles = _vehicles(team, checked, disturbed=disturbed)
+    planner = InterventionPlanner(components.make_planner(scenario, chosen), scenario.control.period_s)
+    gatekeeper = None
+    if chosen.gated:
+        gatekeepers = make_gatekeepers(scenario, law)
+        gatekeeper = Gatekeeper(gatekeepers, n, period=scenario.gatekeeper.period_s, control=scenario.control.period_s)
+    controllers = UgvController(team, law), _uav_controller(scenario, team)
+    parts = {
+        "decision_making": decision,
+        "task_planning": _task_planning(presets, planner, *controllers),
+        "optimisation": _optimisation(gatekeeper if gatekeeper is not None else DirectAcceptance(n)),
+        "vehicles": vehicles,
+    }
+    if monitor is not None:
+        parts["monitor"] = monitor
+    named = {port.get_name(): port for part in parts.values() for port in _outputs(part)}
+    exported = [*RECORDED, *(["violation"] if monitor is not None else [])]
+    diagram = _assembled(f"{scenario.name}_method_{chosen.id}", parts, named, exported)
+    return Model(diagram, chosen, team, block, trigger, planner, gatekeeper, controllers)
+
+
+def most_complete(scenario: Scenario) -> str:
+    """The method of the scenario's runs that has the most parts, by its identifier: the one that pictures show."""
+    return max((run.method for run in scenario.runs.values()), key=list(METHODS).index)
+
+
+def _chosen(scenario: Scenario, method: str | None, composition: str | None) -> tuple[Method, Composition]:
+    """The method and the composition that are asked for; without a method, those of the scenario's last run.
+
+    Raises:
+        UnknownNameError: if there is no such method or composition.
+    """
+    if method is None:
+        last = next(reversed(scenario.runs.values()))
+        method = last.method
+        composition = last.composition if composition is None else composition
+    composition = "augmented" if composition is None else composition
+    if composition not in COMPOSITIONS:
+        raise UnknownNameError("composition", composition, COMPOSITIONS)
+    return method_of(method), composition
+
+
+def _decision_making(scenario: Scenario, n: int, variable: System, events: EventTrigger) -> Diagram:
+    """The decision-making layer of n UGVs: noise, the block of the decision variables, triggers."""
+    source, noise = components.make_noise(n, scenario.decision)
+    systems = {
+        "noise_source": source, "decision_noise": noise, "decision_variable": variable, "event_trigger": events,
+    }  # fmt: skip
+    named = {
+        "noise": noise.get_output_port(),
+        "decision_variable": variable.GetOutputPort("decision_variable"),
+        "decision_range": variable.GetOutputPort("decision_range"),
+        "status": events.GetOutputPort("status"),
+    }
+    exported = [name for name in named if name != "decision_range"]
+    return _assembled("decision_making", systems, named, exported, [(source.get_output_port(), noise.get_input_port())])
+
+
+def _task_planning(
+    presets: Sequence[Motion], planner: InterventionPlanner, ugvs: UgvController, uav: UavController
+) -> Diagram:
+    """The task planning layer: preset trajectories, the UAV's proposals, and the tasks that all robots compose."""
+    reference = TrajectorySource(components.stack_presets(list(presets)), output_derivative_order=1)
+    systems = {
+        "reference": reference, "intervention_planner": planner, "ugv_controller": ugvs, "uav_controller": uav,
+    }  # fmt: skip
+    named = {
+        "reference": reference.get_output_port(),
+        "proposals": planner.GetOutputPort("proposals"),
+        "ugv_command": ugvs.GetOutputPort("command"),
+        "accepted": ugvs.GetOutputPort("accepted"),
+        "uav_command": uav.GetOutputPort("command"),
+    }
+    return _assembled("task_planning", systems, named)
+
+
+def _optimisation(gatekeeper: Gatekeeper | DirectAcceptance) -> Diagram:
+    """The optimisation layer: the UGVs accept or refuse."""
+    named = {name: gatekeeper.GetOutputPort(name) for name in ("answers", "reports")}
+    return _assembled("optimisation", {"gatekeeper": gatekeeper}, named)
+
+
+def _vehicles(team: Team, plants: Mapping[str, System], *, disturbed: bool) -> Diagram:
+    """Where the robots are, and what moves them: commands, disturbances, plants."""
+    n = len(team.ugvs)
+    builder = DiagramBuilder()
+    team_command = builder.AddNamedSystem("team_command", Multiplexer([3 * n, 3]))
+    commanded = team_command.get_output_port()
+    if disturbed:
+        disturbance = builder.AddNamedSystem("velocity_disturbance", VelocityDisturbance(team.robots))
+        builder.Connect(commanded, disturbance.GetInputPort("command"))
+        commanded = disturbance.GetOutputPort("velocity")
+    velocities = builder.AddNamedSystem("team_velocity", Demultiplexer(3 * (n + 1), 3))
+    for robot, plant in plants.items():
+        builder.AddNamedSystem(f"{robot}_plant", plant)
+    team_position = builder.AddNamedSystem("team_position", Multiplexer([3] * (n + 1)))
+    for i, plant in enumerate(plants.values()):
+        builder.Connect(plant.get_output_port(0), team_position.get_input_port(i))
+        builder.Connect(velocities.get_output_port(i), plant.get_input_port(0))
+    builder.Connect(commanded, velocities.get_input_port())
+    for i, robots in enumerate(("ugv", "uav")):
+        builder.ExportInput(team_command.get_input_port(i), f"{robots}_command")
+    for robot in team.robots if disturbed else ():
+        builder.ExportInput(disturbance.GetInputPort(f"disturbance_{robot}"), f"disturbance_{robot}")
+    builder.ExportOutput(team_position.get_output_port(), "team_position")
+    builder.ExportOutput(team_command.get_output_port(), "team_command")
+    return _built("vehicles", builder)
+
+
+def _assembled(
+    name: str,
+    systems: Mapping[str, System],
+    named: Mapping[str, OutputPort],
+    exported: Iterable[str] | None = None,
+    wires: Iterable[tuple[OutputPort, InputPort]] = (),
+) -> Diagram:
+    """A Diagram of systems by name, in which input ports are fed by name.
+
+    Args:
+        name: of the diagram.
+        systems: what is in it, in the order in which Drake goes through them.
+        named: output ports. Each feeds the input ports of its name; an input port of another name becomes one of the
+            diagram, together with all that have the same.
+        exported: which of `named` are output ports of the diagram; default: all.
+        wires: what else feeds what.
+    """
+    builder = DiagramBuilder()
+    for each, system in systems.items():
+        builder.AddNamedSystem(each, system)
+    for source, target in wires:
+        builder.Connect(source, target)
+    inputs = set()
+    for port in (system.get_input_port(i) for system in systems.values() for i in range(system.num_input_ports())):
+        wanted = port.get_name()
+        if builder.IsConnectedOrExported(port):
+            continue
+        if wanted in named:
+            builder.Connect(named[wanted], port)
+        elif wanted in inputs:
+            builder.ConnectInput(wanted, port)
+        else:
+            builder.ExportInput(port, wanted)
+            inputs.add(wanted)
+    for each in named if exported is None else exported:
+        builder.ExportOutput(named[each], each)
+    return _built(name, builder)
+
+
+def _built(name: str, builder: DiagramBuilder) -> Diagram:
+    diagram = builder.Build()
+    diagram.set_name(name)
+    return diagram
+
+
+def _outputs(system: System) -> list[OutputPort]:
+    return [system.get_output_port(i) for i in range(system.num_output_ports())]
+
+
+def make_monitor(
+    scenario: Scenario, method: str | None = None, composition: Composition | None = None, *, terminate: bool = False
+) -> Monitor:
+    """A monitor of a diagram of the scenario, with laws of its own.
+
+    Args:
+        scenario: what is to hold, whatever the diagram was built from.
+        method: default: that of the scenario's last run.
+        composition: of the UGVs' avoidance tasks; default: 'augmented', without a method that of the last run.
+        terminate: end the simulation at the first violation.
+
+    Raises:
+        ScenarioError, UnknownNameError, PluginError: as `build_diagram`.
+    """
+    scenario = validated(scenario)
+    chosen, composition = _chosen(scenario, method, composition)
+    team = components.make_team(scenario)
+    ugvs = UgvController(team, components.make_law(scenario, chosen, composition))
+    laws = Laws(ugvs.velocity, _uav_controller(scenario, team).velocity)
+    return Monitor(team, components.make_avoidance(scenario), laws, terminate=terminate)
+
+
+def _uav_controller(scenario: Scenario, team: Team) -> UavController:
+    return UavController(
+        team,
+        components.make_avoidance(scenario),
+        task=UAV_TASKS.load(scenario.uav.task, of=Task),
+        gain=scenario.control.formation_gain_1_s,
+        altitude=scenario.uav.altitude_m,
+    )
+
+
+def _checked(robot: str, plant: System) -> System:
+    """The plant of a robot, if it has the ports of one.
+
+    Raises:
+        PluginError: if not.
+    """
+    ports = [plant.get_input_port(i).size() for i in range(plant.num_input_ports())]
+    outputs = [plant.get_output_port(i).size() for i in range(plant.num_output_ports())]
+    if ports[:1] != [3] or outputs[:1] != [3]:
+        wanted = "allowed: velocity (3) first among its inputs, position (3) first among its outputs"
+        raise PluginError(f"the plant of {robot} has inputs of sizes {ports}, outputs of sizes {outputs}; {wanted}")
+    return plant
+
+
+def _checked_block(n: int, block: System) -> System:
+    """The block of the decision variables of n UGVs, if it has the output ports of one.
+
+    Raises:
+        PluginError: if not.
+    """
+    sizes = {port.get_name(): port.size() for port in _outputs(block)}
+    wanted = {"decision_variable": n, "decision_range": 2 * n}
+    if any(sizes.get(name) != size for name, size in wanted.items()):
+        raise PluginError(f"the decision block has output ports of sizes {sizes}; they must include {wanted}")
+    return block
