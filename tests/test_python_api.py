@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, System
 from pydrake.systems.primitives import ConstantVectorSource, Integrator, LinearSystem
@@ -19,7 +20,7 @@ from airground_drake.nsbc.tasks import PositionTask
 from airground_drake.scenarios.load import resolved, validated
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.systems.components import first_order_plant
-from airground_drake.verify import verify
+from airground_drake.verify import verdicts_to_pandas, verify
 
 Edit = Callable[[Scenario], Any]
 
@@ -275,3 +276,18 @@ def test_a_trace_as_a_table_and_in_a_notebook() -> None:
     assert set(table.columns.get_level_values("robot")) == set(trace.robots)
     assert repr(trace) == f"<Trace: run 'b' of 'case_a', {len(trace.t)} rows, {len(trace.events)} events>"
     assert "<td>trigger</td>" in trace._repr_html_()
+    verdicts = verify(trace, ["SAFE-TRACE"])
+    assert repr(verdicts[0]) == "<Verdict: SAFE-TRACE on run 'b': holds>"
+    assert "Does not establish" in verdicts[0]._repr_html_()
+    found = verdicts_to_pandas(verdicts)
+    assert found.loc[0, ["claim", "run", "status"]].tolist() == ["SAFE-TRACE", "b", "holds"]
+    assert found.loc[0, "margin"] == verdicts[0].finding.margin
+
+
+def test_a_trace_is_drawn_on_axes_of_ones_own() -> None:
+    scenario, _ = load("case_a", {"duration_s": 1.0})
+    trace, axes = simulate(scenario, "a"), Figure().subplots()
+    assert trace.plot(axes) is axes
+    drawn = {line.get_label(): line.get_xydata() for line in axes.get_lines()}
+    assert np.array_equal(drawn["ugv1"], trace.position("ugv1")[:, :2])
+    assert len(axes.patches) == 2 * len(scenario.obstacles)

@@ -18,7 +18,7 @@ from .rules import SMALL, Array, Flags, NotEstablished, at_most, close, holds, s
 from .scenario import Levels, Pair, Preset, as_run, levels_of, pairs_of, preset_of, robots_of
 
 Rows = npt.NDArray[np.intp]
-SCHEMA = "airground_drake.run.trace/7"
+SCHEMA = "airground_drake.trace/7"
 TABLES = ("signals.parquet", "decisions.parquet", "problems.parquet", "proposals.parquet")
 SHARED = ("method", "composition", "seed", "zeta_m", "events", "faults")
 """What meta.json and the run's entry in report.json both say."""

@@ -34,7 +34,7 @@ def verdicts(report: Mapping[str, Any]) -> str:
         found.setdefault(claim["id"], {})[claim["run"]] = {"not_exercised": "not tested"}.get(status, status)
     runs = list(report["runs"])
     rows = [[name, *(statuses.get(run, "") for run in ("", *runs))] for name, statuses in found.items()]
-    return _table(["claim", "model", *(f"run {run}" for run in runs)], "l" * (2 + len(runs)), rows)
+    return _table(["claim", "model", *runs], "l" * (2 + len(runs)), rows)
 
 
 def reproduction(report: Mapping[str, Any]) -> str:

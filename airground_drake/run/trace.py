@@ -31,7 +31,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -40,9 +40,12 @@ from airground_drake.base import files
 from airground_drake.base.arrays import Array, read_only
 from airground_drake.base.errors import TraceError, one_line
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
 T = TypeVar("T")
 
-SCHEMA = "airground_drake.run.trace/7"
+SCHEMA = "airground_drake.trace/7"
 
 DECISION_COLUMNS = {
     "t_s": "float64",
@@ -222,6 +225,12 @@ class Trace:
         parts = [tuple(str(name).split(".", 1)) for name in table]
         table.columns = pd.MultiIndex.from_tuples(parts, names=["robot", "signal"])
         return table
+
+    def plot(self, axes: Axes | None = None) -> Axes:
+        """Draw the paths of the run on axes of yours, or on new ones: see `run.plot`."""
+        from airground_drake.run.plot import paths  # matplotlib takes half a second to import
+
+        return paths(self, axes)
 
     def __repr__(self) -> str:
         """In one line: which run of which scenario, how many rows and events."""

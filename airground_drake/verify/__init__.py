@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from airground_drake.verify.cache import cache_folder
     from airground_drake.verify.claim import Claim, ModelClaim, TraceClaim, Verdict
     from airground_drake.verify.finding import Finding
-    from airground_drake.verify.judge import verify, verify_all, verify_model
+    from airground_drake.verify.judge import verdicts_to_pandas, verify, verify_all, verify_model
 
     MODEL_CLAIMS: tuple[ModelClaim, ...]
     TRACE_CLAIMS: tuple[TraceClaim, ...]
@@ -31,6 +31,7 @@ __all__ = [
     "TraceClaim",
     "Verdict",
     "cache_folder",
+    "verdicts_to_pandas",
     "verify",
     "verify_all",
     "verify_model",
@@ -38,6 +39,7 @@ __all__ = [
 
 _HOME = {
     "cache_folder": "cache",
+    "verdicts_to_pandas": "judge",
     "verify": "judge",
     "verify_all": "judge",
     "verify_model": "judge",

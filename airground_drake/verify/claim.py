@@ -5,12 +5,13 @@ from __future__ import annotations
 import abc
 import json
 from dataclasses import asdict, dataclass, field
+from html import escape
 from typing import Any
 
 import numpy as np
 
 from airground_drake.base.errors import TraceError, described
-from airground_drake.base.statuses import PASSING, STATUSES, Status, meets
+from airground_drake.base.statuses import PASSING, STATUSES, Status, meets, outcome
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.finding import Finding
@@ -133,7 +134,7 @@ class TraceClaim(Claim):
         return finding
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Verdict:
     """A claim and what was found.
 
@@ -150,6 +151,16 @@ class Verdict:
     finding: Finding
     expected: str
     inputs: dict[str, Any] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        """In one line: which claim, on which run, what was found."""
+        about = f"run {self.run!r}" if self.run else "the model"
+        return f"<Verdict: {self.claim.id} on {about}: {outcome(self.finding.status, self.finding.exercised)}>"
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the line of `repr`, what the claim says, and what it does not establish."""
+        says = (repr(self), self.claim.statement, f"Does not establish: {self.claim.does_not_establish}")
+        return "".join(f"<p>{escape(line)}</p>" for line in says)
 
     @property
     def as_expected(self) -> bool:

@@ -8,6 +8,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import pandas as pd
+
 from airground_drake.base.parallel import run_parallel
 from airground_drake.base.progress import SILENT, Progress
 from airground_drake.run.trace import Trace
@@ -18,6 +20,19 @@ from airground_drake.verify.cache import found
 from airground_drake.verify.claim import ModelClaim, TraceClaim, Verdict
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.registry import model_claims, run_claims
+
+
+def verdicts_to_pandas(verdicts: Iterable[Verdict]) -> pd.DataFrame:
+    """A row per verdict: claim, run ('' for the model), status, how often tested, margin, unit, quantity, expected."""
+    columns = ["claim", "run", "status", "exercised", "margin", "unit", "quantity", "expected"]
+    rows = [
+        (
+            verdict.claim.id, verdict.run, verdict.finding.status, verdict.finding.exercised, verdict.finding.margin,
+            verdict.finding.unit, verdict.finding.quantity, verdict.expected,
+        )
+        for verdict in verdicts
+    ]  # fmt: skip
+    return pd.DataFrame(rows, columns=columns)
 
 
 def verify(trace: Trace, claims: Collection[str] | None = None, progress: Progress = SILENT) -> list[Verdict]:

@@ -60,6 +60,12 @@ def trace_of_another_schema(folder: Path) -> None:
 
 
 @tampering()
+def digest_of_a_table_removed(folder: Path) -> None:
+    with edited_json(trace(folder) / "meta.json") as meta:
+        del meta["files"]["problems.parquet"]
+
+
+@tampering()
 def times_are_no_list(folder: Path) -> None:
     with edited_timings(folder) as timings:
         timings["decision_times_s"] = timings["decision_times_s"][:1]
