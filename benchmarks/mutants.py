@@ -240,7 +240,7 @@ class Bench:
 
     def _failing(self, mutant: Mutant, copy: Copy) -> str:
         """The first test that fails on the copy and passes on the package as it is; '' if there is none."""
-        options = ("-n", "0", "-x", "-v", "--no-header", "-p", "no:cacheprovider")
+        options = ("-m", "", "-n", "0", "-x", "-v", "--no-header", "-p", "no:cacheprovider")
         done = copy.run(sys.executable, "-m", "pytest", *options, *mutant.tests)
         failed = re.findall(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", done.stdout, flags=re.MULTILINE)
         if done.returncode == 0 or not failed:

@@ -10,6 +10,8 @@ from pathlib import Path
 import pytest
 import yaml
 
+pytestmark = pytest.mark.slow
+
 NAMES = ("airground_drake", "cvc5", "joblib", "json", "multiprocessing", "numpy", "pandas", "pickle", "z3")
 HOSTILE = "import os\nopen(os.path.join(os.path.dirname(os.path.abspath(__file__)), 'ran'), 'a').write(__name__)\n"
 CAMPAIGN = {

@@ -34,6 +34,7 @@ def blocks(page: Path, language: str) -> list[str]:
     return re.findall(rf"```{language}\n(.*?)```", page.read_text(encoding="utf-8"), flags=re.DOTALL)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_python_blocks_run(page: Path) -> None:
     for block in blocks(page, "python"):
@@ -76,6 +77,7 @@ def test_what_follows_from_the_code_is_current() -> None:
         assert len(part().splitlines()) > 20
 
 
+@pytest.mark.slow
 def test_the_tutorial_from_an_empty_folder(tmp_path: Path) -> None:
     """Its files as they come, its commands in the order of the page; the first one installs, which CI does."""
     steps = re.findall(r"```(\w+)\n(.*?)```", (ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8"), re.DOTALL)
@@ -102,6 +104,7 @@ def test_everything_in_my_robots_is_explained() -> None:
     assert sorted(shown) == sorted(f"my_robots/{path.name}" for path in (EXAMPLES / "my_robots").glob("*.py"))
 
 
+@pytest.mark.slow
 def test_everything_that_can_be_added_works_from_a_folder_of_its_own(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -119,6 +122,7 @@ def test_everything_that_can_be_added_works_from_a_folder_of_its_own(
     assert reached["uav"][:2] == pytest.approx(reached["ugv1"][:2], abs=0.01)
 
 
+@pytest.mark.slow
 def test_a_sampler_of_ones_own_looks_for_violations(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     command = [str(EXAMPLES / "pushed.yaml"), "--sampler", "my_robots/climb.py:Climb", "--allow-plugins"]
     assert falsify([*command, "-n", "6", "--jobs", "1", "-o", str(tmp_path / "worst.yaml")]) == 0

@@ -20,6 +20,8 @@ import pytest
 from airground_drake.run.simulation import simulate
 from airground_drake.scenarios.load import load
 
+pytestmark = pytest.mark.slow
+
 EXAMPLES = Path(__file__).parent.parent / "examples"
 OPTIONS = ("-p", "airground_drake.testing.plugin", "-p", "no:cacheprovider", "--hypothesis-profile=ci")
 """Of pytest; the profile draws the same examples each time."""

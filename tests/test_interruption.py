@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.slow
+
 PROGRAM = """
 import multiprocessing, os, subprocess, sys, time
 from pathlib import Path

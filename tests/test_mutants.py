@@ -44,6 +44,7 @@ def test_names_are_unique_and_what_is_run_exists(listed: Any) -> None:
         assert [test for test in mutant.tests if not (ROOT / test).exists()] == []
 
 
+@pytest.mark.slow
 def test_drawn_mutants_apply_once_and_are_the_same_for_a_seed(listed: Any) -> None:
     drawn = import_module("mutation.drawn")
     found = drawn.draw(ROOT, 200, seed=0)

@@ -57,6 +57,7 @@ def test_recursion_as_printed_is_unsafe_and_does_not_stall(run: Runs) -> None:
         assert "arrival" in kinds(of_run, "ugv1")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scenario", sorted(set(shipped()) - set(DEADLOCKS)))
 def test_every_run_has_the_verdicts_that_its_scenario_declares(run: Runs, scenario: str) -> None:
     for name in load(scenario)[0].runs:
@@ -93,6 +94,7 @@ def test_same_seed_same_bytes_other_seed_other_trigger(case_a: Scenario, run: Ru
     assert all(verdict.as_expected for verdict in verify(other))
 
 
+@pytest.mark.slow
 def test_runs_in_several_processes_are_those_in_one(
     case_a: Scenario, run: Runs, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -136,6 +138,7 @@ assert before and compiled() == before, (before, compiled())
 """
 
 
+@pytest.mark.slow
 def test_warming_up_compiles_all_that_a_run_needs() -> None:
     """Otherwise the first decision of a process would count the compiler's time as its own."""
     subprocess.run([sys.executable, "-c", WARM_UP], check=True, timeout=300)

@@ -169,8 +169,10 @@ def _nothing_is_executed_before_it_was_proposed(run: Run) -> None:
 
 
 def _decisions_are_on_proposals(run: Run) -> None:
-    """Each decision is on a proposal that was sent, and the columns of the other method are unused."""
-    key = ["robot", "issued_s", "policy"]
+    """Proposals have numbers; each decision is on one that was sent; the columns of the other method are unused."""
+    numbers = run.proposals["number"]
+    same("proposals are numbered as they are sent", numbers.tolist(), list(range(len(numbers))))
+    key = ["number", "robot", "issued_s", "policy"]
     sent = set(run.proposals[key].itertuples(index=False, name=None))
     unused = OF_OUTCOMES if run.method == "c" else OF_PROBLEMS
     for row in run.decisions.to_dict("records"):

@@ -15,6 +15,7 @@ def benchmark_of() -> dict[str, Any]:
     return runpy.run_path(str(Path(__file__).parents[2] / "benchmarks" / "gatekeeper.py"))
 
 
+@pytest.mark.slow
 def test_a_run_with_method_c_gives_problems(benchmark_of: dict[str, Any]) -> None:
     samples = benchmark_of["recorded"]("case_a", "c", 5)
     assert 1 < len(samples) <= 5

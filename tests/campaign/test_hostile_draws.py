@@ -10,6 +10,8 @@ from airground_drake.campaign.spec import load_spec
 from airground_drake.run.simulation import simulate
 from airground_drake.verify import verify
 
+pytestmark = pytest.mark.slow
+
 HOSTILE = Path(__file__).parents[2] / "benchmarks" / "campaigns" / "hostile.yaml"
 
 

@@ -15,6 +15,8 @@ from airground_drake.base.errors import AirgroundError
 from airground_drake.campaign import pool as module
 from airground_drake.campaign.pool import cluster, local
 
+pytestmark = pytest.mark.slow
+
 
 def test_a_process_that_dies_loses_no_item_and_does_none_twice(tmp_path: Path) -> None:
     with local(jobs=2) as pool:

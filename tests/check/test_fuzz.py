@@ -10,12 +10,15 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import pytest
 from check.tampering.base import copy, mend, seal, write
 from hypothesis import given
 from hypothesis import strategies as st
 from properties import examples
 
 from airground_drake import check
+
+pytestmark = pytest.mark.slow
 
 FILES = (
     "report.json", "trace/d/meta.json", "trace/c/meta.json", "trace/d/timings.json", "trace/d/signals.parquet",

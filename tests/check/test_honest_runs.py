@@ -11,6 +11,8 @@ from airground_drake.base.errors import ScenarioError
 from airground_drake.scenarios.load import from_data, load
 from airground_drake.scenarios.schema import Scenario
 
+pytestmark = pytest.mark.slow
+
 KINDS: dict[str, dict[str, dict[str, Any]]] = {
     "as_drawn": {},
     "nothing_triggers": {"decision": {"threshold": {"rule": "fixed", "zeta_m": 1e3}}},

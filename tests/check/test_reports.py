@@ -30,6 +30,7 @@ GATED = ("runs={c: {method: c}, d: {method: d}}", "reproduction=[]")
 """The runs that have a gatekeeper: the others are those of the report above."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("changes", "reasons"),
     [

@@ -183,6 +183,7 @@ def _session(stat: Path) -> int:
     return 0
 
 
+@pytest.mark.slow
 def test_killed_in_the_midst_it_loses_nothing_that_was_finished(spec: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     command = [

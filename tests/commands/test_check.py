@@ -62,6 +62,7 @@ def test_files_that_are_not_the_reports_are_not_judged_again(
     assert said.count("(judged again)") == 1
 
 
+@pytest.mark.slow
 def test_claims_are_judged_again_where_drake_cannot_be_imported(short: Path) -> None:
     code = "import sys, runpy; sys.modules['pydrake'] = None; sys.argv[1:] = sys.argv[1:]; "
     code += "runpy.run_module('airground_drake.report.rebuild', run_name='__main__')"
@@ -78,6 +79,7 @@ def test_usage_and_what_is_no_report(tmp_path: Path, capsys: pytest.CaptureFixtu
         assert capsys.readouterr().err.count("\n") == 1
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("coqc") is None and not os.environ.get("CI"), reason="Coq is not installed")
 def test_coq_proves_the_runs_again(short: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert check.main(["--json", "--coq", str(copy(short, tmp_path / "copy"))]) == 0

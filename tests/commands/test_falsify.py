@@ -31,6 +31,7 @@ def falsified(tmp_path: Path, method: str, *more: str, spec: str = SPEC) -> int:
     return main([str(path), "--jobs", "1", "-n", "2", "--shrink", "12", "-o", str(tmp_path / "found.yaml"), *more])
 
 
+@pytest.mark.slow
 def test_a_violation_is_found_and_made_small(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert falsified(tmp_path, "b", "--sampler", "halton") == 1
     assert "made small" in capsys.readouterr().out
@@ -68,6 +69,7 @@ def test_where_there_is_none_the_worst_is_kept(tmp_path: Path) -> None:
     assert not (tmp_path / "found_small.yaml").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("in_this_process")
 def test_a_time_is_made_long(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert falsified(tmp_path, "b", "--most", "intervened_s", "--limit", "0.1") == 1

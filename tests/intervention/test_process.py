@@ -143,6 +143,7 @@ START()
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
 @pytest.mark.parametrize("start", ["hang", "in_a_thread"])
 def test_a_policys_process_ends_with_the_one_that_started_it(start: str, how: signal.Signals) -> None:

@@ -29,6 +29,7 @@ UGV, ROCK = "ugv1", "obstacle_1"
 REFUSED = f"Coq refuses {UGV} and {ROCK}, 2 m"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["c", "d"])
 def test_case_a_keeps_its_distances_and_obeys_the_law(name: str, run: Simulations, workshop: Workshop) -> None:
     distances, law, rounded = prove(workshop, run("case_a", name))
@@ -40,6 +41,7 @@ def test_case_a_keeps_its_distances_and_obeys_the_law(name: str, run: Simulation
     assert f"2 <= norm (sub (position run_{name} ugv1 t) (position run_{name} obstacle_1 t)) /\\" in said
 
 
+@pytest.mark.slow
 def test_the_run_of_case_b_that_hits_the_obstacle_is_refused(run: Simulations, workshop: Workshop) -> None:
     distances, law, _ = prove(workshop, run("case_b", "b"))
     assert not distances.proved
@@ -65,6 +67,7 @@ def near_the_rock(of: Trace) -> tuple[int, Array, Array]:
     return row, rock, offsets[row]
 
 
+@pytest.mark.slow
 def test_a_step_through_an_obstacle_is_refused_though_both_of_its_ends_keep_the_distance(
     run: Simulations, workshop: Workshop
 ) -> None:
@@ -76,6 +79,7 @@ def test_a_step_through_an_obstacle_is_refused_though_both_of_its_ends_keep_the_
     assert distances.why.startswith(f"{REFUSED}. In exact arithmetic ")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("short_m", "kept"), [(6e-14, False), (-6e-14, True)])
 def test_some_rounding_errors_short_is_too_short(
     short_m: float, kept: bool, run: Simulations, workshop: Workshop
@@ -112,6 +116,7 @@ def short(of: Trace, rows: int = 5) -> Trace:
     return replace(of, signals=of.signals.iloc[:rows].reset_index(drop=True))
 
 
+@pytest.mark.slow
 def test_tiny_coordinates_are_rounded_and_it_is_said_by_how_much(run: Simulations, workshop: Workshop) -> None:
     few = short(run("case_a", "d"))
     tiny = moved(few, 2, few.position(UGV)[2] + np.array([0.0, 0.0, 1e-100]))
@@ -120,6 +125,7 @@ def test_tiny_coordinates_are_rounded_and_it_is_said_by_how_much(run: Simulation
     assert (rounded.coordinates, rounded.most_m) == (1, 1e-100)
 
 
+@pytest.mark.slow
 def test_names_that_mean_something_in_coq_are_replaced(run: Simulations, workshop: Workshop) -> None:
     few = short(run("case_a", "d"))
     names = {"ugv1": "norm", "ugv2": "ugv1_and_uav", "obstacle_2": "forall", "obstacle_3": "Größe"}
@@ -201,6 +207,7 @@ def report(tmp_path: Path, run: Simulations) -> Path:
     return tmp_path / "report"
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("compiled_before")
 def test_the_command_proves_a_report_and_writes_down_what_it_found(
     report: Path, coq_version: str, capsys: pytest.CaptureFixture[str]

@@ -17,6 +17,7 @@ from airground_drake.proofs.theories import Checked, differences, write_record
 ASSUMED = "Variable it_is_so : forall n : nat, n = 0.\nTheorem so : 1 = 0.\nProof. apply it_is_so. Qed.\n"
 
 
+@pytest.mark.slow
 def test_all_theorems_are_proved_on_allowed_axioms(compiled: Path, tmp_path: Path) -> None:
     """In one question to Coq; `airground prove`, which CI runs, asks for each theorem alone."""
     folder = tmp_path / "theories"
@@ -83,6 +84,7 @@ WRONG = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("theory", "right", "wrong", "lemma"), WRONG)
 def test_wrong_variants_are_not_proved(
     theory: str, right: str, wrong: str, lemma: str, coq_version: str, tmp_path: Path

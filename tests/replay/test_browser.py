@@ -18,7 +18,10 @@ CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", 
 WAIT_MS = 120_000
 NAMES, OBSTACLES = ("__proto__", "constructor", "uav"), ("toString", "valueOf", "rock")
 
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on the path: apt-get install chromium")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on the path: apt-get install chromium"),
+]
 
 
 @pytest.fixture(scope="module")

@@ -61,6 +61,7 @@ def module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], s
     return write
 
 
+@pytest.mark.slow
 def test_a_run_with_hostile_policies_is_reported_as_it_was(
     report: Report, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -121,6 +122,7 @@ def test_names_of_no_module_are_one_line(name: str, capsys: pytest.CaptureFixtur
     assert capsys.readouterr().err.count("\n") == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", ROUTES)
 def test_a_simulation_that_ends_its_process_is_no_report(
     text: str, module: Callable[[str], str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -174,12 +176,14 @@ def ended(folder: Path, *settings: str) -> tuple[int, list[str]]:
     return done.returncode, done.stderr.splitlines()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("when", CLAIMS)
 def test_a_claim_that_ends_its_process_is_no_report(when: str, module: Callable[[str], str], tmp_path: Path) -> None:
     said = ended(tmp_path, f"claims={{MINE: '{module(CLAIMS[when])}'}}")
     assert said == (4, ["error: the process of this command died (exit code 0)"])
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="`prlimit` is of Linux")
 @pytest.mark.parametrize(("above", "who"), [(1, "that simulated it"), (2, "of this command")])
 def test_a_policy_that_takes_time_away_from_another_process_is_one_line(
@@ -204,6 +208,7 @@ def saved(report: Report, tmp_path: Path, module: Callable[[str], str]) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_judging_a_saved_run_imports_nothing_that_it_names(saved: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert judge.main([str(saved), "SAFE-TRACE", "SAFE-GATE", "EXEC"]) == 0
     assert not [name for name in sys.modules if name.startswith("evil_")]

@@ -35,6 +35,7 @@ def test_what_is_asked_for_is_drawn(scenario: Scenario) -> None:
     assert from_data(resolved(scenario), "drawn") == scenario
 
 
+@pytest.mark.slow
 def test_draws_are_valid_and_of_many_kinds() -> None:
     seen: Counter[str] = Counter()
 
@@ -67,6 +68,7 @@ def test_every_policy_of_the_package_can_be_drawn() -> None:
     assert set(PARAMETERS) == set(POLICIES.own)
 
 
+@pytest.mark.slow
 def test_what_is_found_is_the_least() -> None:
     two = settings(database=None, max_examples=60)
     drawn = scenarios(ugvs=st.integers(1, 3), obstacles=st.integers(0, 1))
@@ -80,6 +82,7 @@ def test_what_is_found_is_the_least() -> None:
     assert (least.control, least.decision, least.gatekeeper) == (Control(), Decision(), Gatekeeper())
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::airground_drake.testing.NotExercisedWarning")
 @settings(max_examples=3)
 @given(scenarios(ugvs=st.integers(1, 2), methods=st.just("d"), policies=policies(("hostile",)), durations=st.just(3.0)))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -24,25 +23,6 @@ write_table = partial(base.write_table, run=RUN)
 without_event = partial(without_event_of, run=RUN)
 
 
-def set_decision(folder: Path, row: int, **values: Any) -> None:
-    """Change columns of one decision."""
-    with edited_table(folder, "decisions") as frame:
-        for name, value in values.items():
-            frame.loc[row, name] = value
-
-
-def scale_decisions(folder: Path, column: str, factor: float) -> None:
-    """Multiply a column of all decisions."""
-    with edited_table(folder, "decisions") as frame:
-        frame[column] *= factor
-
-
-def edit_arrays(folder: Path, name: str, edit: Callable[[Any], Any]) -> None:
-    """Change an array of every problem."""
-    with edited_table(folder, "problems") as frame:
-        frame[name] = [edit(np.array(value)) for value in frame[name]]
-
-
 def keep_decisions(folder: Path, kept: list[int]) -> None:
     """Keep some decisions, with their problems and times."""
     for table in ("decisions", "problems"):
@@ -58,24 +38,15 @@ def decisions_in_another_order(folder: Path) -> None:
 
 
 @tampering()
-def decision_flipped(folder: Path) -> None:
-    set_decision(folder, 0, decision="accept")
-
-
-@tampering()
 def decision_and_reason_flipped_with_its_event(folder: Path) -> None:
-    set_decision(folder, 0, decision="accept", reason="cheaper")
-    set_decision(folder, 1, decision="accept", reason="kept")
+    with edited_table(folder, "decisions") as frame:
+        frame.loc[0, ["decision", "reason"]] = "accept", "cheaper"
+        frame.loc[1, ["decision", "reason"]] = "accept", "kept"
     with edited_entries(folder) as entries:
         for entry in entries:
             first(entry, "refuse")["kind"] = "accept"
         counts = entries[0]["metrics"]["event_counts"][UGV]
         counts.update(accept=2, refuse=0)
-
-
-@tampering()
-def decision_removed(folder: Path) -> None:
-    keep_decisions(folder, [row for row in range(len(read_table(folder, "decisions"))) if row != 10])
 
 
 @tampering()
@@ -111,59 +82,6 @@ def messages_all_removed(folder: Path) -> None:
 
 
 @tampering()
-def first_stage_is_no_choice(folder: Path) -> None:
-    set_decision(folder, 0, first_stage="banana")
-
-
-@tampering()
-def gap_is_nan(folder: Path) -> None:
-    with edited_table(folder, "decisions") as frame:
-        frame["gap"] = np.nan
-
-
-@tampering()
-def losing_choice_made_dear(folder: Path) -> None:
-    with edited_table(folder, "decisions") as frame:
-        frame.loc[frame["first_stage"] == "refuse", "objective_accept"] *= 3.0
-
-
-@tampering()
-def decision_of_another_robot(folder: Path) -> None:
-    set_decision(folder, 20, robot="ugv2")
-
-
-@tampering()
-def decision_on_another_policy(folder: Path) -> None:
-    set_decision(folder, 20, policy="towards")
-
-
-@tampering()
-def decision_by_another_route(folder: Path) -> None:
-    set_decision(folder, 20, route="nonlinear")
-
-
-@tampering()
-def objective_lowered(folder: Path) -> None:
-    scale_decisions(folder, "objective", 0.99)
-
-
-@tampering()
-def objective_of_refusal_raised(folder: Path) -> None:
-    scale_decisions(folder, "objective_refuse", 1.5)
-
-
-@tampering()
-def cost_of_accepting_throughout_raised(folder: Path) -> None:
-    scale_decisions(folder, "accept_throughout", 1.01)
-
-
-@tampering()
-def lower_bound_raised(folder: Path) -> None:
-    with edited_table(folder, "decisions") as frame:
-        frame["route_bound"] *= 1.001
-
-
-@tampering()
 def lower_bound_lowered_with_its_gap(folder: Path) -> None:
     """A bound that is far from the best one, with the gap that follows from it."""
     with edited_table(folder, "decisions") as frame:
@@ -172,53 +90,10 @@ def lower_bound_lowered_with_its_gap(folder: Path) -> None:
 
 
 @tampering()
-def gap_hidden(folder: Path) -> None:
-    with edited_table(folder, "decisions") as frame:
-        frame["gap"] -= 0.01
-
-
-@tampering()
-def gap_exaggerated(folder: Path) -> None:
-    with edited_table(folder, "decisions") as frame:
-        frame["gap"] += 0.01
-
-
-@tampering()
-def rounding_error_hidden(folder: Path) -> None:
-    scale_decisions(folder, "rounding_deviation_s", 0.9)
-
-
-@tampering()
-def relaxed_first_stage_changed(folder: Path) -> None:
-    with edited_table(folder, "decisions") as frame:
-        frame["relaxed_first_stage"] = 1.0 - frame["relaxed_first_stage"]
-
-
-@tampering()
-def clearance_raised(folder: Path) -> None:
-    with edited_table(folder, "decisions") as frame:
-        frame["predicted_clearance_m"] += 0.01
-
-
-@tampering()
-def plans_inverted(folder: Path) -> None:
-    edit_arrays(folder, "plan", lambda plan: 1.0 - plan)
-
-
-@tampering()
-def predicted_positions_moved(folder: Path) -> None:
-    edit_arrays(folder, "positions_m", lambda positions: positions + 1e-3)
-
-
-@tampering()
 def relaxation_invented(folder: Path) -> None:
-    for name in ("relaxed", "rounded"):
-        edit_arrays(folder, name, lambda omega: np.ones(60))
-
-
-@tampering()
-def mode_velocities_changed(folder: Path) -> None:
-    edit_arrays(folder, "accept_m_s", lambda velocity: 0.9 * velocity)
+    with edited_table(folder, "problems") as frame:
+        for name in ("relaxed", "rounded"):
+            frame[name] = [np.ones(60)] * len(frame)
 
 
 @tampering()
@@ -249,57 +124,10 @@ def cost(problem: Any, path: Any) -> float:
 
 
 @tampering()
-def normals_lengthened(folder: Path) -> None:
-    edit_arrays(folder, "normals", lambda normals: 1.01 * normals)
-
-
-@tampering()
-def obstacle_of_a_problem_moved(folder: Path) -> None:
-    edit_arrays(folder, "centres_m", lambda centres: centres + 0.01)
-
-
-@tampering()
-def safe_distance_of_a_problem_lowered(folder: Path) -> None:
-    edit_arrays(folder, "distances_m", lambda distances: 0.99 * distances)
-
-
-@tampering()
 def obstacles_left_out_of_a_problem(folder: Path) -> None:
-    for name in ("centres_m", "normals", "distances_m"):
-        edit_arrays(folder, name, lambda values: values[:0])
-
-
-@tampering()
-def slack_weight_of_a_problem_lowered(folder: Path) -> None:
     with edited_table(folder, "problems") as frame:
-        frame["slack_weight_1_m2_s"] *= 0.1
-
-
-@tampering()
-def terminal_cost_added_to_a_problem(folder: Path) -> None:
-    with edited_table(folder, "problems") as frame:
-        frame["terminal_weight_s"] += 0.25
-
-
-@tampering()
-def stages_shortened(folder: Path) -> None:
-    with edited_table(folder, "problems") as frame:
-        frame["dt_s"] *= 0.9
-
-
-@tampering()
-def reference_of_a_problem_moved(folder: Path) -> None:
-    edit_arrays(folder, "reference_m", lambda reference: reference + 0.01)
-
-
-@tampering()
-def problem_with_nan(folder: Path) -> None:
-    edit_arrays(folder, "reference_m", lambda reference: reference * np.nan)
-
-
-@tampering()
-def positions_of_a_plan_missing(folder: Path) -> None:
-    edit_arrays(folder, "positions_m", lambda positions: positions[:30])
+        for name in ("centres_m", "normals", "distances_m"):
+            frame[name] = [np.empty(0)] * len(frame)
 
 
 @tampering()
@@ -309,12 +137,23 @@ def decision_times_lowered(folder: Path) -> None:
 
 
 @tampering()
-def decision_time_removed(folder: Path) -> None:
-    with edited_timings(folder) as timings:
-        del timings["decision_times_s"][-1]
+def proposal_for_another_ugv(folder: Path) -> None:
+    with base.edited_table(folder, "proposals") as frame:
+        frame["cause"] = [next(ugv for ugv in ("ugv1", "ugv2") if ugv != robot) for robot in frame["robot"]]
 
 
 @tampering()
-def decision_before_it_began(folder: Path) -> None:
-    with edited_timings(folder) as timings:
-        timings["decision_times_s"][0] = -1.0
+def last_predicted_velocity_changed(folder: Path) -> None:
+    with edited_table(folder, "problems") as frame:
+        frame["accept_m_s"] = [np.append(np.array(v)[:-3], np.array(v)[-3:] + 1e-5) for v in frame["accept_m_s"]]
+
+
+@tampering()
+def decisions_on_a_proposal_that_is_not_in_the_table(folder: Path) -> None:
+    write_table(folder, read_table(folder, "proposals").iloc[1:], "proposals")
+
+
+@tampering()
+def executed_directions_fewer(folder: Path) -> None:
+    with base.edited_table(folder, "proposals") as frame:
+        frame["selection"] = [value[:3] for value in frame["selection"]]

@@ -25,27 +25,6 @@ def without_event(folder: Path, kind: str, run: str = RUN) -> None:
             del counts[kind]
 
 
-@tampering()
-def status_of_an_answer_changed(folder: Path) -> None:
-    with edited_entries(folder) as entries:
-        for entry in entries:
-            first(entry, "accept")["status"] = "optimal"
-
-
-@tampering()
-def something_added_to_an_event(folder: Path) -> None:
-    with edited_entries(folder) as entries:
-        for entry in entries:
-            first(entry, "trigger")["why"] = "stuck"
-
-
-@tampering()
-def another_obstacle_was_hit(folder: Path) -> None:
-    with edited_entries(folder, "b") as entries:
-        for entry in entries:
-            first(entry, "collision")["obstacle"] = "obstacle_9"
-
-
 def exchange_traces(folder: Path) -> None:
     """Exchange the folders of two runs."""
     trace(folder, "b").rename(folder / "trace" / "x")
@@ -112,31 +91,10 @@ def proposal_added(folder: Path) -> None:
 
 
 @tampering()
-def policy_of_an_answer_changed(folder: Path) -> None:
-    with edited_entries(folder) as entries:
-        for entry in entries:
-            first(entry, "refuse")["policy"] = "detour"
-
-
-@tampering()
-def place_of_a_trigger_moved(folder: Path) -> None:
-    with edited_entries(folder) as entries:
-        for entry in entries:
-            first(entry, "trigger")["position_m"][0] += 1e-3
-
-
-@tampering()
 def events_reversed(folder: Path) -> None:
     with edited_entries(folder) as entries:
         for entry in entries:
             entry["events"].reverse()
-
-
-@tampering()
-def trigger_moved(folder: Path) -> None:
-    with edited_entries(folder) as entries:
-        for entry in entries:
-            first(entry, "trigger")["t_s"] -= 1e-3
 
 
 @tampering()
@@ -145,20 +103,6 @@ def trigger_of_the_uav(folder: Path) -> None:
         for entry in entries:
             event = {**entry["events"][0], "kind": "trigger", "robot": "uav"}
             entry["events"] += [{**event, "t_s": t_s} for t_s in (24.8, 24.9)]
-
-
-@tampering()
-def threshold_in_force_changed(folder: Path) -> None:
-    with edited_entries(folder) as entries:
-        for entry in entries:
-            entry["zeta_m"] = 2.9
-
-
-@tampering()
-def composition_changed(folder: Path) -> None:
-    with edited_entries(folder) as entries:
-        for entry in entries:
-            entry["composition"] = "recursion_nearest"
 
 
 @tampering()

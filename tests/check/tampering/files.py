@@ -8,14 +8,12 @@ from pathlib import Path
 
 import pandas as pd
 from check.tampering.base import (
-    RUN,
     UGV,
     edited_json,
     edited_report,
     edited_table,
     edited_timings,
     middle,
-    read_table,
     refused_as_a_whole,
     seal,
     tampering,
@@ -43,26 +41,6 @@ def parquet_truncated(folder: Path) -> None:
 def parquet_is_garbage(folder: Path) -> None:
     write(trace(folder) / "decisions.parquet", b"PAR1 and nothing else")
     seal(folder)
-
-
-@tampering()
-def signals_missing(folder: Path) -> None:
-    (trace(folder) / "signals.parquet").unlink()
-
-
-@tampering()
-def problems_missing(folder: Path) -> None:
-    (trace(folder) / "problems.parquet").unlink()
-
-
-@tampering()
-def timings_missing(folder: Path) -> None:
-    (trace(folder) / "timings.json").unlink()
-
-
-@tampering()
-def meta_missing(folder: Path) -> None:
-    (trace(folder) / "meta.json").unlink()
 
 
 @tampering()
@@ -130,43 +108,6 @@ def problems_with_labels(folder: Path) -> None:
     path.unlink()
     reversed_rows.to_parquet(path, index=True)
     seal(folder, "c")
-
-
-@tampering()
-def column_missing(folder: Path) -> None:
-    frame = read_table(folder).drop(columns="uav.vz_m_s")
-    path = trace(folder, RUN) / "signals.parquet"
-    path.unlink()
-    frame.to_parquet(path, index=False)
-    seal(folder)
-
-
-@tampering(mended=False)
-def page_changed(folder: Path) -> None:
-    page = folder / "report.html"
-    write(page, page.read_bytes().replace(b"declared", b"wanted"))
-
-
-@tampering(mended=False)
-def junit_changed(folder: Path) -> None:
-    path = folder / "junit.xml"
-    write(path, path.read_bytes().replace(b"<testcase", b"<!-- --><testcase", 1))
-
-
-@tampering(mended=False)
-def diagram_changed(folder: Path) -> None:
-    write(folder / "diagram.svg", b"<svg/>")
-
-
-@tampering(mended=False)
-def meta_changed(folder: Path) -> None:
-    with edited_json(trace(folder) / "meta.json") as meta:
-        meta["note"] = "added"
-
-
-@tampering(mended=False)
-def page_missing(folder: Path) -> None:
-    (folder / "report.html").unlink()
 
 
 @tampering(mended=False)

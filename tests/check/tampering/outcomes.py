@@ -28,25 +28,6 @@ def first_refused(frame: pd.DataFrame) -> Any:
     return frame["reason"] == "stalls"
 
 
-def under_way(frame: pd.DataFrame) -> Any:
-    return (frame["decision"] == "accept") & (frame["reason"] == "kept")
-
-
-@tampering()
-def outcome_made_better(folder: Path) -> None:
-    change(folder, first_accepted, accept_outcome_m2_s=lambda value: 0.99 * value)
-
-
-@tampering()
-def stall_denied(folder: Path) -> None:
-    change(folder, first_refused, accept_stalls=0.0)
-
-
-@tampering()
-def way_left_made_long(folder: Path) -> None:
-    change(folder, first_refused, refuse_left_m=lambda value: 3.0 * value)
-
-
 @tampering()
 def map_in_a_message_exchanged(folder: Path) -> None:
     with edited_table(folder, "proposals") as frame:
@@ -64,49 +45,9 @@ def large_obstacle_added_to_a_message(folder: Path) -> None:
 
 
 @tampering()
-def radius_left_out_of_a_message(folder: Path) -> None:
-    with edited_table(folder, "proposals") as frame:
-        frame["mapped_radius_m"] = [radii[:-1] for radii in frame["mapped_radius_m"]]
-
-
-@tampering()
-def reason_of_a_refusal_changed(folder: Path) -> None:
-    change(folder, first_refused, reason="not_cheaper")
-
-
-@tampering()
 def favour_to_itself(folder: Path) -> None:
     """Accepted although of no use, to make way for the very UGV that is asked."""
     change(folder, first_refused, decision="accept", reason="makes_way", accept_stalls=0.0)
-
-
-@tampering()
-def tries_understated(folder: Path) -> None:
-    change(folder, under_way, tries=0.0)
-
-
-@tampering()
-def filler_changed(folder: Path) -> None:
-    with edited_table(folder, "decisions") as frame:
-        frame.loc[1, "gap"] = -1.002
-
-
-@tampering()
-def filler_changed_where_problems_are_solved(folder: Path) -> None:
-    with base.edited_table(folder, "decisions", "c") as frame:
-        frame.loc[1, "tries"] = -1.002
-
-
-@tampering()
-def obstacle_on_the_map_moved(folder: Path) -> None:
-    with edited_table(folder, "proposals") as frame:
-        frame["mapped_m"] = [points + np.append(0.001, np.zeros(len(points) - 1)) for points in frame["mapped_m"]]
-
-
-@tampering()
-def radius_on_the_map_changed(folder: Path) -> None:
-    with edited_table(folder, "proposals") as frame:
-        frame["mapped_radius_m"] = [radii + 0.001 for radii in frame["mapped_radius_m"]]
 
 
 @tampering()

@@ -45,12 +45,6 @@ def refutation_left_undecided_everywhere(folder: Path) -> None:
 
 
 @tampering()
-def refuted_though_it_holds(folder: Path) -> None:
-    with edited_claim(folder, "SAFE-TRACE") as claim:
-        claim.update(status="refuted", counterexample={"t_s": 1.0})
-
-
-@tampering()
 def refuted_by_no_rule(folder: Path) -> None:
     """A claim is called refuted, and expected to be; no rule of it is broken."""
     with edited_scenarios(folder) as scenarios:
@@ -58,12 +52,6 @@ def refuted_by_no_rule(folder: Path) -> None:
             scenario["runs"][RUN]["expected"]["GATE-FEAS"] = "refuted"
     with edited_claim(folder, "GATE-FEAS") as claim:
         claim.update(status="refuted", expected="refuted", counterexample={"t_s": 1.0}, margin=None)
-
-
-@tampering()
-def time_between_triggers_invented(folder: Path) -> None:
-    with edited_claim(folder, "ZENO-TRACE") as claim:
-        claim.update(margin=0.5, unit="s")
 
 
 @tampering()
@@ -77,30 +65,6 @@ def method_unknown(folder: Path) -> None:
     with edited_report(folder) as report:
         report["claims"] = [c for c in report["claims"] if c["run"] != RUN or c["id"] not in GATED]
         report["overall"]["counts"]["holds"] -= len(GATED)
-
-
-@tampering()
-def claim_removed(folder: Path) -> None:
-    with edited_report(folder) as report:
-        report["claims"].remove(claim_of(report, "SAFE-HYP", "b"))
-
-
-@tampering()
-def proof_removed(folder: Path) -> None:
-    with edited_report(folder) as report:
-        report["claims"].remove(claim_of(report, "SAFE-INV", ""))
-
-
-@tampering()
-def claim_twice(folder: Path) -> None:
-    with edited_report(folder) as report:
-        report["claims"].append(claim_of(report, "COMM"))
-
-
-@tampering()
-def claim_unknown(folder: Path) -> None:
-    with edited_report(folder) as report:
-        report["claims"].append({**claim_of(report, "COMM"), "id": "SAFE-ALL"})
 
 
 @tampering()

@@ -9,12 +9,12 @@ import pandas as pd
 from check.tampering.base import UGV, edited_entries, edited_table, middle, read_table, tampering, write_table
 
 
-def shift(frame: pd.DataFrame, row: int, offset_m: float) -> None:
-    """Move the UGV at one row, with commands that lead there and back."""
+def moved(frame: pd.DataFrame, robot: str, row: int, by_m: float) -> None:
+    """Put a robot elsewhere at one row, with commands that lead there and back."""
     dt = np.diff(frame["t_s"])
-    frame.loc[row, f"{UGV}.x_m"] += offset_m
-    frame.loc[row, f"{UGV}.vx_m_s"] += offset_m / dt[row - 1]
-    frame.loc[row + 1, f"{UGV}.vx_m_s"] -= offset_m / dt[row]
+    frame.loc[row, f"{robot}.x_m"] += by_m
+    frame.loc[row, f"{robot}.vx_m_s"] += by_m / dt[row - 1]
+    frame.loc[row + 1, f"{robot}.vx_m_s"] -= by_m / dt[row]
 
 
 @tampering()
@@ -26,22 +26,15 @@ def position_changed(folder: Path) -> None:
 @tampering()
 def position_and_commands_changed(folder: Path) -> None:
     with edited_table(folder) as frame:
-        shift(frame, middle(frame), 1e-4)
+        moved(frame, UGV, middle(frame), 1e-4)
 
 
 @tampering()
 def position_commands_and_decision_variable_changed(folder: Path) -> None:
     with edited_table(folder) as frame:
-        shift(frame, middle(frame), 1e-3)
+        moved(frame, UGV, middle(frame), 1e-3)
         error = [frame[f"{UGV}.ref_{axis}_m"] - frame[f"{UGV}.{axis}_m"] for axis in "xyz"]
         frame[f"{UGV}.decision_variable_m"] = np.linalg.norm(error, axis=0) + frame[f"{UGV}.noise_m"]
-
-
-@tampering()
-def whole_team_moved(folder: Path) -> None:
-    with edited_table(folder) as frame:
-        for robot in ("ugv1", "ugv2", "uav"):
-            frame[f"{robot}.x_m"] += 0.5
 
 
 @tampering()
@@ -51,32 +44,10 @@ def crash_hidden(folder: Path) -> None:
 
 
 @tampering()
-def command_changed(folder: Path) -> None:
-    with edited_table(folder) as frame:
-        frame.loc[middle(frame), f"{UGV}.vy_m_s"] += 1e-3
-
-
-@tampering()
 def faster_than_the_limit(folder: Path) -> None:
     """The UAV jumps by 1 m and back, by commands that lead there."""
     with edited_table(folder) as frame:
-        row = middle(frame)
-        dt = np.diff(frame["t_s"])
-        frame.loc[row, "uav.z_m"] += 1.0
-        frame.loc[row, "uav.vz_m_s"] += 1.0 / dt[row - 1]
-        frame.loc[row + 1, "uav.vz_m_s"] -= 1.0 / dt[row]
-
-
-@tampering()
-def times_stretched(folder: Path) -> None:
-    with edited_table(folder) as frame:
-        frame["t_s"] *= 1.0 + 1e-6
-
-
-@tampering()
-def one_time_changed(folder: Path) -> None:
-    with edited_table(folder) as frame:
-        frame.loc[middle(frame), "t_s"] += 1e-4
+        moved(frame, "uav", middle(frame), 1.0)
 
 
 @tampering()
@@ -87,35 +58,6 @@ def last_rows_dropped(folder: Path) -> None:
 @tampering()
 def first_rows_dropped(folder: Path) -> None:
     write_table(folder, read_table(folder).iloc[5:])
-
-
-@tampering()
-def middle_row_dropped(folder: Path) -> None:
-    frame = read_table(folder)
-    write_table(folder, frame.drop(index=middle(frame)))
-
-
-@tampering()
-def standing_row_dropped(folder: Path) -> None:
-    frame = read_table(folder)
-    write_table(folder, frame.drop(index=len(frame) - 3))
-
-
-@tampering()
-def row_duplicated(folder: Path) -> None:
-    frame = read_table(folder)
-    write_table(folder, pd.concat([frame.iloc[:50], frame.iloc[49:]]))
-
-
-@tampering()
-def rows_in_another_order(folder: Path) -> None:
-    frame = read_table(folder)
-    write_table(folder, frame.iloc[[*range(50), 51, 50, *range(52, len(frame))]])
-
-
-@tampering()
-def signals_empty(folder: Path) -> None:
-    write_table(folder, read_table(folder).iloc[:0])
 
 
 @tampering()
@@ -153,47 +95,9 @@ def noise_from_elsewhere(folder: Path) -> None:
 
 
 @tampering()
-def preset_changed(folder: Path) -> None:
-    with edited_table(folder) as frame:
-        frame[f"{UGV}.ref_x_m"] += 0.01
-
-
-@tampering()
-def mode_changed(folder: Path) -> None:
-    with edited_table(folder) as frame:
-        frame.loc[middle(frame), f"{UGV}.mode"] = 0.0
-
-
-@tampering()
-def trigger_count_changed(folder: Path) -> None:
-    with edited_table(folder) as frame:
-        frame.loc[len(frame) - 1, f"{UGV}.triggers"] += 1.0
-
-
-@tampering()
-def release_forgotten(folder: Path) -> None:
-    """At one row the last release is none yet; no event is added or lost by that."""
-    with edited_table(folder) as frame:
-        frame.loc[len(frame) - 1, f"{UGV}.released_at_s"] = -1.0
-
-
-@tampering()
-def executed_without_acceptance(folder: Path) -> None:
-    with edited_table(folder) as frame:
-        frame.loc[50, f"{UGV}.accepted"] = 1.0
-
-
-@tampering()
 def executed_without_a_proposal(folder: Path) -> None:
     with edited_table(folder, run="b") as frame:
         frame.loc[50, f"{UGV}.accepted"] = 1.0
-
-
-@tampering()
-def acceptance_hidden(folder: Path) -> None:
-    """What was executed by an acceptance looks as if the UGV had done it of its own accord."""
-    with edited_table(folder) as frame:
-        frame[f"{UGV}.accepted"] = 0.0
 
 
 @tampering()
@@ -212,12 +116,12 @@ def trigger_late(folder: Path) -> None:
 
 
 @tampering()
-def flag_between_yes_and_no(folder: Path) -> None:
+def uav_flies_otherwise(folder: Path) -> None:
     with edited_table(folder) as frame:
-        frame.loc[middle(frame), f"{UGV}.accepted"] = 0.5
+        moved(frame, "uav", 100, 1e-4)
 
 
 @tampering()
-def command_before_the_start(folder: Path) -> None:
+def intervention_said_to_be_over_early(folder: Path) -> None:
     with edited_table(folder) as frame:
-        frame.loc[0, f"{UGV}.vx_m_s"] = 0.001
+        frame.loc[middle(frame) :, f"{UGV}.accepted"] = 0.0

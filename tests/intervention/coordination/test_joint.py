@@ -75,8 +75,8 @@ def test_every_distance_is_kept_at_all_times(
 @pytest.mark.parametrize(
     ("obstacles", "ways"),
     [
-        (CORRIDOR, [((-10.0, 0.0), (10.0, 0.0)), ((10.0, 0.0), (-10.0, 0.0))]),
-        (CORRIDOR, [((-5.0, 0.0), (5.0, 0.0)), ((5.0, 0.0), (-5.0, 0.0))]),
+        pytest.param(CORRIDOR, [((-10.0, 0.0), (10.0, 0.0)), ((10.0, 0.0), (-10.0, 0.0))], marks=pytest.mark.slow),
+        pytest.param(CORRIDOR, [((-5.0, 0.0), (5.0, 0.0)), ((5.0, 0.0), (-5.0, 0.0))], marks=pytest.mark.slow),
         ([], [((-1.0, 0.0), (5.0, 0.0)), ((1.0, 0.0), (-5.0, 0.0))]),
         ([(4.0 * math.cos(a), 4.0 * math.sin(a)) for a in np.linspace(-1.7, 1.7, 9)], [((2.0, 0.0), (9.0, 0.0))]),
         ([(1.995, 0.6), (-1.995, 0.6)], [((0.0, 0.6 - math.sqrt(4.0 - 1.995**2)), (0.0, 8.0))]),

@@ -17,39 +17,13 @@ def task_error(problem: dict[str, Any], positions: Array, terminal_s: float = TE
     return float(STAGE_S * error.sum() + terminal_s * error[-3:].sum())
 
 
-def flip_plan(row: dict[str, Any], problem: dict[str, Any]) -> None:
-    problem["plan"] = 1.0 - problem["plan"]
-
-
 def fractional_plan(row: dict[str, Any], problem: dict[str, Any]) -> None:
     problem["plan"][3] = 0.5
-
-
-def shift_position(row: dict[str, Any], problem: dict[str, Any]) -> None:
-    problem["positions_m"][3] += 1e-6
-
-
-def shift_initial(row: dict[str, Any], problem: dict[str, Any]) -> None:
-    problem["initial_m"][0] += 1e-6
-
-
-def shift_reference(row: dict[str, Any], problem: dict[str, Any]) -> None:
-    problem["reference_m"][-2] -= 1e-6
-
-
-def understate_cost(row: dict[str, Any], problem: dict[str, Any]) -> None:
-    chosen = f"objective_{row['first_stage']}"
-    row["objective"] *= 1.0 - 1e-6
-    row[chosen] = row["objective"]
 
 
 def inflate_loser(row: dict[str, Any], problem: dict[str, Any]) -> None:
     other = {"accept": "refuse", "refuse": "accept"}[row["first_stage"]]
     row[f"objective_{other}"] *= 10.0
-
-
-def overstate_clearance(row: dict[str, Any], problem: dict[str, Any]) -> None:
-    row["predicted_clearance_m"] += 1e-3
 
 
 def wrong_first_stage(row: dict[str, Any], problem: dict[str, Any]) -> None:
@@ -64,10 +38,6 @@ def without_point(index: int) -> DecisionEdit:
         problem["distances_m"] = problem["distances_m"][keep : keep + 1]
 
     return edit
-
-
-def smaller_distance(row: dict[str, Any], problem: dict[str, Any]) -> None:
-    problem["distances_m"][0] = 1.9
 
 
 def standing_robot(row: dict[str, Any], problem: dict[str, Any]) -> None:
@@ -87,10 +57,6 @@ def without_terminal_cost(row: dict[str, Any], problem: dict[str, Any]) -> None:
     """What the running code would record if it forgot the terminal cost."""
     row["objective"] -= task_error(problem, problem["positions_m"]) - task_error(problem, problem["positions_m"], 0.0)
     row[f"objective_{row['first_stage']}"] = row["objective"]
-
-
-def too_fast(row: dict[str, Any], problem: dict[str, Any]) -> None:
-    problem["refuse_m_s"][:3] = [0.0, -6.1, 0.0]
 
 
 def contrary_answer(row: dict[str, Any], problem: dict[str, Any]) -> None:
@@ -116,20 +82,6 @@ def relaxed_outside(row: dict[str, Any], problem: dict[str, Any]) -> None:
 
 def understate_rounding(row: dict[str, Any], problem: dict[str, Any]) -> None:
     row["rounding_deviation_s"] *= 0.5
-
-
-def overstate_bound(row: dict[str, Any], problem: dict[str, Any]) -> None:
-    row["route_bound"] *= 1.001
-    row["gap"] = 1.0 - (1.0 - row["gap"]) * 1.001
-
-
-def understate_bound(row: dict[str, Any], problem: dict[str, Any]) -> None:
-    row["route_bound"] *= 0.99
-    row["gap"] = 1.0 - (1.0 - row["gap"]) * 0.99
-
-
-def understate_gap(row: dict[str, Any], problem: dict[str, Any]) -> None:
-    row["gap"] *= 0.5
 
 
 def long_normals(row: dict[str, Any], problem: dict[str, Any]) -> None:

@@ -6,31 +6,18 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
 import pytest
+from builders.misbuilt import MISBUILT, Patch
 
 from airground_drake.base.arrays import Array
 from airground_drake.nsbc.avoidance import Avoidance
-from airground_drake.nsbc.law import UgvLaw
 from airground_drake.nsbc.team import Neighbourhood, Team
 from airground_drake.run import simulation
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import load
-from airground_drake.systems import components, controllers
+from airground_drake.systems import components
 from airground_drake.systems.diagram import Model
 from airground_drake.verify import verify
-
-Patch = Callable[[pytest.MonkeyPatch], None]
-
-
-def with_layer(**changed: Any) -> Patch:
-    right = components.make_avoidance
-    return lambda patch: patch.setattr(components, "make_avoidance", lambda *args: replace(right(*args), **changed))
-
-
-def with_law(**changed: Any) -> Patch:
-    right = components.make_law
-    return lambda patch: patch.setattr(components, "make_law", lambda *args: replace(right(*args), **changed))
 
 
 def with_neighbours(change: Callable[[Neighbourhood], Neighbourhood]) -> Patch:
@@ -38,54 +25,15 @@ def with_neighbours(change: Callable[[Neighbourhood], Neighbourhood]) -> Patch:
     return lambda patch: patch.setattr(Team, "neighbourhood", lambda self, rows: change(right(self, rows)))
 
 
-def with_team(change: Callable[[Team], Team]) -> Patch:
-    right = components.make_team
-    return lambda patch: patch.setattr(components, "make_team", lambda scenario: change(right(scenario)))
+def recursive(patch: pytest.MonkeyPatch) -> None:
+    right, layer = components.make_law, Avoidance(3.0, 0.05, 4.0, "recursion_nearest")
+    patch.setattr(components, "make_law", lambda *args: replace(right(*args), avoidance=layer))
 
 
-def as_space(patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(Team, "mobility", property(lambda self: np.ones((len(self.robots), 3))))
-
-
-def at_half_the_rate(patch: pytest.MonkeyPatch) -> None:
-    class Slow(controllers.UgvController):
-        def __init__(self, team: Team, law: UgvLaw) -> None:
-            slow = replace(law.avoidance, period=2.0 * law.avoidance.period)
-            super().__init__(team, replace(law, avoidance=slow))
-            self.law, self.avoidance = law, law.avoidance
-
-    patch.setattr("airground_drake.systems.diagram.UgvController", Slow)
-
-
-def without_a_layer(patch: pytest.MonkeyPatch) -> None:
-    class Blind(controllers.UavController):
-        def __init__(self, team: Team, avoidance: Avoidance, **given: Any) -> None:
-            super().__init__(team, replace(avoidance, sensing_range=0.0), **given)
-
-    patch.setattr("airground_drake.systems.diagram.UavController", Blind)
-
-
-def times(factor: float, which: Callable[[Array], Array]) -> Callable[[Neighbourhood], Neighbourhood]:
-    """Some of the safe distances, by their shares, times a factor."""
-    return lambda given: replace(given, distance=np.where(which(given.share), factor, 1.0) * given.distance)
-
-
-MUTANTS: dict[str, tuple[Patch, str]] = {
-    "all safe distances x 0.9": (with_neighbours(times(0.9, lambda share: share > 0.0)), "safe_m"),
-    "distances to obstacles x 0.9": (with_neighbours(times(0.9, lambda share: share == 1.0)), "safe_m"),
-    "distances of robots x 1.000001": (with_neighbours(times(1.000001, lambda share: share < 1.0)), "safe_m"),
-    "share 0.4": (with_neighbours(lambda g: replace(g, share=np.where(g.share < 1.0, 0.4, g.share))), "share"),
+MUTANTS: dict[str, tuple[Patch, str]] = MISBUILT | {
     "obstacles that are not there": (with_neighbours(lambda g: replace(g, obstacles=g.obstacles + 0.1)), "obstacles_m"),
     "others in another order": (with_neighbours(lambda g: replace(g, others=g.others[:, ::-1])), "others"),
-    "gain": (with_layer(gain=2.9), "gain_1_s"),
-    "period": (with_layer(period=0.1), "sampling_s"),
-    "range": (with_layer(sensing_range=3.9), "sensing_range_m"),
-    "composition": (with_law(avoidance=Avoidance(3.0, 0.05, 4.0, "recursion_nearest")), "composition"),
-    "mobility": (as_space, "mobility"),
-    "speed limit": (with_team(lambda team: replace(team, max_speed=1.1 * team.max_speed)), "max_speed_m_s"),
-    "intervention on top": (with_law(intervention_on_top=True), "intervention_on_top"),
-    "sampling": (at_half_the_rate, "sampling_s"),
-    "UAV that senses nothing": (without_a_layer, "sensing_range_m"),
+    "composition": (recursive, "composition"),
 }
 
 

@@ -3,29 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from pathlib import Path
 
 import pytest
-from builders.edits import with_decision
 from verify.judging import FEAS, OPT
-from verify.runs.cases import (
-    contrary_answer,
-    flip_plan,
-    inflate_loser,
-    long_normals,
-    overstate_bound,
-    overstate_clearance,
-    round_otherwise,
-    shift_initial,
-    shift_position,
-    shift_reference,
-    smaller_distance,
-    too_fast,
-    understate_bound,
-    understate_cost,
-    understate_gap,
-    understate_rounding,
-)
 
 from airground_drake.run.simulation import simulate
 from airground_drake.run.trace import Trace, save
@@ -66,15 +47,8 @@ def test_a_local_optimum_bounds_nothing(record_of: Simulated) -> None:
     assert FEAS.judge(trace).evidence["rounded_plans"] > 0
 
 
-def test_a_real_run_saved_and_broken(record_of: Simulated, tmp_path: Any) -> None:
+def test_a_real_run_that_was_saved_is_judged_alike(record_of: Simulated, tmp_path: Path) -> None:
     trace = record_of("case_b", "c", "relaxed")
     save(trace, tmp_path)
     for claim in (FEAS, OPT):
         assert claim.judge(load_trace(tmp_path)) == claim.judge(trace)
-    for claim, edit in (
-        (FEAS, flip_plan), (FEAS, shift_position), (FEAS, shift_initial), (FEAS, shift_reference), (FEAS, too_fast),
-        (FEAS, understate_cost), (FEAS, smaller_distance), (FEAS, overstate_clearance), (FEAS, contrary_answer),
-        (FEAS, round_otherwise), (FEAS, understate_rounding), (OPT, overstate_bound), (OPT, understate_bound),
-        (OPT, understate_gap), (OPT, long_normals), (OPT, inflate_loser),
-    ):  # fmt: skip
-        assert claim.judge(with_decision(trace, edit)).status == "refuted", edit

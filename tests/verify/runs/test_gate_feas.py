@@ -16,19 +16,11 @@ from hypothesis import strategies as st
 from verify.judging import FEAS, assert_decision_refuted
 from verify.runs.cases import (
     contrary_answer,
-    flip_plan,
     fractional_plan,
     lighter_slack,
     other_terminal_cost,
-    overstate_clearance,
-    shift_initial,
-    shift_position,
-    shift_reference,
-    smaller_distance,
     standing_robot,
     task_error,
-    too_fast,
-    understate_cost,
     without_point,
     without_terminal_cost,
     wrong_first_stage,
@@ -42,23 +34,15 @@ from airground_drake.run.trace import Trace
 from airground_drake.verify.runs import gate_feas
 from airground_drake.verify.runs.gate_record import Row, rows_of
 
-MUTANTS: list[tuple[DecisionEdit, str]] = [
-    (flip_plan, "positions are not those of (23)"),
+MUTANTS: list[tuple[DecisionEdit, str]] = [  # numbers that are off: test_tolerances.py
     (fractional_plan, "omega is not binary"),
-    (shift_position, "positions are not those of (23)"),
-    (shift_initial, "initial position"),
-    (shift_reference, "reference"),
-    (understate_cost, "objective"),
-    (overstate_clearance, "predicted clearance"),
     (wrong_first_stage, "first stage"),
     (without_point(0), "rock is left out"),
     (without_point(1), "ugv2 is left out"),
-    (smaller_distance, "nothing that the UGV senses"),
     (standing_robot, "nothing that the UGV senses"),
     (lighter_slack, "weight of slack"),
     (other_terminal_cost, "weight of the terminal cost"),
     (without_terminal_cost, "objective"),
-    (too_fast, "faster than the speed limit"),
     (contrary_answer, "answer or reason"),
     (wrong_reason, "answer or reason"),
 ]

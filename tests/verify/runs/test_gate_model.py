@@ -39,6 +39,7 @@ def test_stages_of_several_control_periods_hold() -> None:
     assert finding.evidence["decisions"] > 5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("claim", ["EXEC", "GATE-MODEL"])
 def test_a_queue_along_an_axis_is_squeezed_and_holds(queue: Trace, claim: str) -> None:
     """Each between two others and in contact with both: predicted to be pushed by both, it may leap for kilometres."""
@@ -153,6 +154,7 @@ MUTANTS: dict[str, Patch] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MUTANTS)
 def test_a_wrong_prediction_model_is_refuted(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     scenario = load("case_b")[0]

@@ -304,3 +304,13 @@ def test_twice_the_tolerance_is_refuted_and_half_of_it_holds(run: Callable[[str,
 def test_every_claim_about_runs_is_in_the_table_or_has_no_tolerance() -> None:
     assert sorted({case.claim for case in CASES} | set(WITHOUT)) == sorted(RUN_CLAIMS)
     assert not {case.claim for case in CASES} & set(WITHOUT)
+
+
+def test_what_may_differ_by_more_than_rounding_is_known() -> None:
+    """Lengths in m, velocities in m/s, times in s, and costs relative to what costs may differ by."""
+    assert {f"{case.claim}: {case.what}": case.tolerance for case in CASES if case.tolerance > 1e-5} == {
+        "LIVE-GOAL: distance from the target": 0.1, "LIVE-GOAL: distance from the stall": 0.1,
+        "LIVE-GOAL: motion at the end": 1e-3, "GATE-FEAS: cost of refusing": 1.0, "GATE-FEAS: cost of the plan": 1.0,
+        "GATE-FEAS: speed": 1e-4, "GATE-OPT: bound too low": 1e-3, "GATE-MODEL: way left": 1e-3,
+    }  # fmt: skip
+    assert cost_tolerance(1.0) < 1e-8
