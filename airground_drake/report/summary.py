@@ -226,7 +226,8 @@ def text(document: Document) -> str:
     ]
     for question, answered in answers(document):
         for k, (mark, says) in enumerate(answered):
-            lines.append(f"{'' if k else question:<11} [{MARKS[mark]}] {says}" if mark else f"{'':<15} {says}")
+            asked = "" if k else question
+            lines.append(f"{asked:<11} [{MARKS[mark]}] {says}" if mark else f"{asked:<15} {says}")
     lines.append(f"Do not conclude: {'; '.join(do_not_conclude(document))}.")
     return "\n".join(map(one_line, lines))
 
