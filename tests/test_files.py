@@ -58,7 +58,7 @@ def test_a_temporary_folder_of_a_killed_process_is_swept_and_no_other(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    program = "import os; from airground_drake import files; made = files.temporary_folder(); "
+    program = "import os; from airground_drake.base import files; made = files.temporary_folder(); "
     program += "(made.__enter__() / 'trace').mkdir(); os.kill(os.getpid(), 9)"
     subprocess.run([sys.executable, "-c", program], env={**os.environ, "TMPDIR": str(tmp_path)}, check=False)
     (left,) = tmp_path.iterdir()

@@ -239,7 +239,7 @@ def test_exit_codes_that_commands_share_are_defined_once() -> None:
         for name in (ast.walk(node) if isinstance(node, ast.Assign) else ())
         if isinstance(name, ast.Name) and isinstance(name.ctx, ast.Store) and name.id in ("EXIT_USAGE", "EXIT_TOOL")
     ]
-    assert sorted(defined) == [("usage.py", "EXIT_TOOL"), ("usage.py", "EXIT_USAGE")]
+    assert sorted(defined) == [("base/usage.py", "EXIT_TOOL"), ("base/usage.py", "EXIT_USAGE")]
 
 
 @pytest.mark.parametrize("stderr", ["2>&-", "2>/dev/full"])
@@ -253,7 +253,7 @@ def test_where_nobody_can_be_told_the_exit_code_is_the_same(line: str, code: int
 
 
 def test_what_no_command_expects_is_the_tools_fault() -> None:
-    program = "from airground_drake import interruption; interruption.run(lambda: 1 // 0)"
+    program = "from airground_drake.base import interruption; interruption.run(lambda: 1 // 0)"
     ran = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
     assert ran.returncode == 4
     assert "ZeroDivisionError" in ran.stderr

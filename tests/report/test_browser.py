@@ -15,8 +15,9 @@ from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Browser, Page, sync_playwright
 from report.cases import FINE, built, verdict
 
+from airground_drake import audit
 from airground_drake.commands import index
-from airground_drake.report import audit, document, html
+from airground_drake.report import document, html
 from airground_drake.report.figures import draw, moments
 from airground_drake.report.figures.panels import Figure
 from airground_drake.run.trace import Trace

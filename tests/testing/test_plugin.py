@@ -27,7 +27,7 @@ def test_a_run_is_simulated_once_however_it_is_named(
     first = airground_trace("minimal", "a", set=SHORT)
     monkeypatch.setattr(simulation, "simulate", None)
     file = tmp_path / "mine.yaml"
-    file.write_bytes((Path(simulation.__file__).parent / "scenarios" / "minimal.yaml").read_bytes())
+    file.write_bytes((Path(simulation.__file__).parents[1] / "scenarios" / "minimal.yaml").read_bytes())
     scenario = load("minimal")[0]
     scenario.duration_s = 0.1
     assert airground_trace("minimal", "a", set=["duration_s=0.1"]) is first
