@@ -121,7 +121,17 @@ class Course:
 
 
 def headline(document: Document) -> Line:
-    """The report in a sentence."""
+    """The report in a sentence, and in another one if a verdict is not the one that the scenario declares."""
+    mark, told = _outcome(document)
+    differs = sum(not c["as_expected"] and c["status"] not in UNDECIDED for c in document["claims"])
+    if not differs:
+        return Line(mark, told)
+    checks = "1 check is" if differs == 1 else f"{differs} checks are"
+    return Line("partly" if mark == "yes" else mark, f"{told} {checks} not as declared.")
+
+
+def _outcome(document: Document) -> Line:
+    """What came of the runs, in a sentence."""
     every = courses(document)
     main = [course for course in every if course.plain] or every
     unknown = [course.name for course in main if course.safe is None or course.away is None]
@@ -153,7 +163,7 @@ def answers(document: Document) -> list[Answer]:
     """The five questions, as far as the report has something to say about each."""
     every = courses(document)
     asked = [Answer("Safe?", list(_safe(document, every))), Answer("Arrived?", list(_arrived(document, every)))]
-    asked = [] if methods(document) else asked
+    asked = [] if methods(document) else [*asked, Answer("Runs", list(_runs(document, every)))]
     rest = [("Zeno-free?", _zeno(document)), ("Threshold?", _threshold(document)), ("Paper?", _paper(document))]
     return [answer for answer in [*asked, *(Answer(name, list(lines)) for name, lines in rest)] if answer.lines]
 
@@ -216,7 +226,8 @@ def text(document: Document) -> str:
     ]
     for question, answered in answers(document):
         for k, (mark, says) in enumerate(answered):
-            lines.append(f"{'' if k else question:<11} [{MARKS[mark]}] {says}" if mark else f"{'':<15} {says}")
+            asked = "" if k else question
+            lines.append(f"{asked:<11} [{MARKS[mark]}] {says}" if mark else f"{asked:<15} {says}")
     lines.append(f"Do not conclude: {'; '.join(do_not_conclude(document))}.")
     return "\n".join(map(one_line, lines))
 
@@ -278,6 +289,18 @@ def _judged(claim: Mapping[str, Any] | None, short: bool) -> tuple[bool | None, 
     if claim["status"] in UNDECIDED:
         return None, f"SAFE-TRACE: {claim['status'].replace('_', ' ')}"
     return True, ""
+
+
+def _runs(document: Document, every: Sequence[Course]) -> Iterator[Line]:
+    """What the runs are, for those who do not know their letters."""
+    told = []
+    for course in every:
+        changed = document["scenario"]["resolved"]["runs"][course.name].get("set") or {}
+        extra = "; ".join(f"{key}: {value}" for key, value in changed.items())
+        if course.plain and course.method in METHODS:
+            told.append(f"{course.name}: {METHODS[course.method].says}{f' ({extra})' if extra else ''}")
+    if told:
+        yield Line("", f"{'; '.join(told)}.")
 
 
 def _safe(document: Document, every: Sequence[Course]) -> Iterator[Line]:
@@ -506,9 +529,10 @@ def _intrusion(course: Course, *, brief: bool = False) -> str:
     told = f"{least.robot} comes to {distance(least.value_m, least.required_m)} of {least.other}"
     if brief:
         return told
+    if course.collisions:
+        told = f"{_colliding(course)}, {distance(least.value_m, least.required_m)} from {least.other}"
     told += f" at {least.t_s:.2f} s, required {least.required_m:g} m"
-    told += f"; {short} more pair{'s' * (short > 1)} too close" if short else ""
-    return f"{_colliding(course)}: {told}" if course.collisions else told
+    return told + (f"; {short} more pair{'s' * (short > 1)} too close" if short else "")
 
 
 def _colliding(course: Course) -> str:
@@ -521,7 +545,11 @@ def _declared(document: Document, course: Course) -> str:
     claim = next(
         c for c in [*document["claims"], None] if c is None or (c["id"], c["run"]) == ("SAFE-TRACE", course.name)
     )
-    return " (as declared)" if claim and claim["as_expected"] and claim["status"] == "refuted" else ""
+    return (
+        " (a failure that the scenario declares)"
+        if claim and claim["as_expected"] and claim["status"] == "refuted"
+        else ""
+    )
 
 
 def _failures(unsafe: Sequence[Course], short: Sequence[Course]) -> str:

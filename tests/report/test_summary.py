@@ -132,11 +132,12 @@ def test_a_crash_is_never_green_whatever_was_declared(declared: str) -> None:
         reproduction=[row("reproduced")], overall=overall,
     )  # fmt: skip
     mark, says = summary.headline(found)
-    assert (mark, says) == ("partly", "Only method (d) is safe and brings everyone home. Under (b), ugv1 collides.")
+    told = "Only method (d) is safe and brings everyone home. Under (b), ugv1 collides."
+    assert (mark, says) == ("partly", told + " 1 check is not as declared." * (declared == "holds"))
     first = lines(found, "Safe?")[0]
     assert first.mark == "no"
-    assert first.text.startswith("b: ugv1 collides: ugv1 comes to 0.000 m of rock at 11.35 s, required 2 m")
-    assert ("(as declared)" in first.text) == (declared == "refuted")
+    assert first.text.startswith("b: ugv1 collides, 0.000 m from rock at 11.35 s, required 2 m")
+    assert ("(a failure that the scenario declares)" in first.text) == (declared == "refuted")
     assert lines(found, "Arrived?")[1] == ("no", "b: ugv1 collided, ended at (3.37, 5.10) m.")
     assert summary.as_declared(found).mark == ("yes" if declared == "refuted" else "no")
 
@@ -171,7 +172,7 @@ def test_the_uav_has_three_coordinates_and_counts_where_all_ugvs_are_home() -> N
 def test_a_claim_that_is_refuted_although_the_distances_are_kept() -> None:
     found = document({"d": run("d")}, claim("SAFE-TRACE", "d", "refuted"))
     assert summary.headline(found).mark == "no"
-    assert lines(found, "Safe?")[0] == ("no", "d: SAFE-TRACE is refuted (as declared).")
+    assert lines(found, "Safe?")[0] == ("no", "d: SAFE-TRACE is refuted (a failure that the scenario declares).")
 
 
 @pytest.mark.parametrize("status", ["inconclusive", "error", "not_run"])
