@@ -8,12 +8,9 @@ from pathlib import Path
 
 import pandas as pd
 from check.tampering.base import (
-    UGV,
     edited_json,
     edited_report,
-    edited_table,
     edited_timings,
-    middle,
     refused_as_a_whole,
     seal,
     tampering,
@@ -23,11 +20,12 @@ from check.tampering.base import (
 
 
 @tampering()
-def position_changed_digest_left(folder: Path) -> None:
-    recorded = (trace(folder) / "meta.json").read_bytes()
-    with edited_table(folder) as frame:
-        frame.loc[middle(frame), f"{UGV}.x_m"] += 1e-3
-    write(trace(folder) / "meta.json", recorded)
+def table_in_other_bytes_digest_left(folder: Path) -> None:
+    """With the same rows, so that no other rule notices."""
+    path = trace(folder) / "signals.parquet"
+    frame = pd.read_parquet(path)
+    path.unlink()
+    frame.to_parquet(path, index=False, compression="gzip")
 
 
 @tampering()
