@@ -70,7 +70,7 @@ class UgvController(LeafSystem):
         self.DeclareStateOutputPort("accepted", accepted)
         gains = [law.avoidance.gain, law.motion_gain, law.intervention_gain]
         self._gains = self.DeclareNumericParameter(BasicVector(gains))
-        self._law = _cached(self, "law", weakly(self._calc_law), self._gains)
+        self._law = _cached(self, law, weakly(self._calc_law), self._gains)
         self.DeclarePeriodicDiscreteUpdateEvent(law.avoidance.period, 0.0, weakly(self._update))
 
     def gains(self, context: Context) -> Any:
@@ -179,7 +179,7 @@ class UavController(LeafSystem):
         command = self.DeclareDiscreteState(3)
         self.DeclareStateOutputPort("command", command)
         self._gains = self.DeclareNumericParameter(BasicVector([avoidance.gain, gain]))
-        self._layer = _cached(self, "avoidance", weakly(self._calc_layer), self._gains)
+        self._layer = _cached(self, avoidance, weakly(self._calc_layer), self._gains)
         self.DeclarePeriodicDiscreteUpdateEvent(avoidance.period, 0.0, weakly(self._update))
 
     def gains(self, context: Context) -> Any:
@@ -233,11 +233,11 @@ class UavController(LeafSystem):
         return _velocity_of(task, read_only(positions[-1:]))
 
 
-def _cached(system: LeafSystem, name: str, calc: Callable[..., None], gains: int) -> CacheIndex:
-    """What follows from the gains of a Context, worked out when they change."""
-    producer = ValueProducer(allocate=lambda: Value(None), calc=calc)
+def _cached(system: LeafSystem, model: Any, calc: Callable[..., None], gains: int) -> CacheIndex:
+    """What follows from the gains of a Context, of the type of `model`, worked out when they change."""
+    producer = ValueProducer(allocate=lambda: Value(model), calc=calc)
     return system.DeclareCacheEntry(
-        name, producer, {system.numeric_parameter_ticket(NumericParameterIndex(gains))}
+        type(model).__name__, producer, {system.numeric_parameter_ticket(NumericParameterIndex(gains))}
     ).cache_index()
 
 
