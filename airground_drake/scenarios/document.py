@@ -145,7 +145,8 @@ def _read_bytes(name_or_path: str) -> tuple[str, bytes]:
         wanted = f"{close}wanted: the path of a YAML file, or a shipped scenario: {', '.join(shipped())}"
         raise ScenarioError(name_or_path, "", Fault("no such scenario or file"), wanted) from None
     except (OSError, ValueError) as error:
-        fault = Fault(f"cannot be read ({getattr(error, 'strerror', None) or error})")
+        why = getattr(error, "strerror", None) or "a path has no null character"  # which a ValueError is about
+        fault = Fault(f"cannot be read ({why})")
         raise ScenarioError(source, "", fault, "wanted: a readable YAML file") from None
     if len(data) > MAX_BYTES:
         raise ScenarioError(source, "", Fault("too large"), f"at most {MAX_BYTES} bytes are allowed")
@@ -175,10 +176,11 @@ def _composed(text: str, source: str) -> yaml.Node:
         loader = _Loader(text)
         loader.name = source
         root: yaml.Node | None = loader.get_single_node()
-    except (yaml.YAMLError, ValueError, OverflowError) as error:  # the latter from escapes such as "\U99999999"
+    except (yaml.YAMLError, ValueError, OverflowError) as error:
         mark = getattr(error, "problem_mark", None)
         line = mark.line + 1 if mark else text.count("\n", 0, getattr(error, "position", 0)) + 1
-        problem = getattr(error, "problem", None) or getattr(error, "reason", None) or error
+        problem = getattr(error, "problem", None) or getattr(error, "reason", None)
+        problem = problem or "no such character"  # an escape such as "\U99999999"
         raise ScenarioError(f"{source}:{line}", "", Fault(f"not YAML: {problem}"), "wanted: YAML text") from None
     if root is None:
         raise ScenarioError(source, "", Fault("empty"), "wanted: YAML text")
