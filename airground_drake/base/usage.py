@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import NoReturn
 
@@ -54,6 +54,19 @@ def whole(least: int, most: float = math.inf) -> Callable[[str], int]:
         return value
 
     return number
+
+
+def formats_of(allowed: Sequence[str]) -> Callable[[str], tuple[str, ...]]:
+    """What takes an argument that is a comma-separated list of formats."""
+
+    def formats(text: str) -> tuple[str, ...]:
+        chosen = tuple(text.split(","))
+        unknown = [name for name in chosen if name not in allowed]
+        if unknown:
+            raise argparse.ArgumentTypeError(f"{', '.join(unknown)!r} is not allowed; formats are {', '.join(allowed)}")
+        return chosen
+
+    return formats
 
 
 def positive(text: str) -> float:

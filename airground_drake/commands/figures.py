@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from airground_drake.base.errors import AirgroundError
-from airground_drake.base.usage import Parser, refuse
+from airground_drake.base.usage import Parser, formats_of, refuse
 from airground_drake.commands.replay import outside_reports, runs_of
 
 FORMATS, STYLES = ("pdf", "png", "svg"), ("ieee", "thesis")
@@ -23,7 +23,10 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument("folder", type=Path, metavar="DIR", help="folder of a report")
     parser.add_argument("--style", choices=STYLES, default="ieee", help="type and width (default: ieee)")
     parser.add_argument(
-        "--format", type=_formats, default=("pdf",), help=f"comma-separated: {','.join(FORMATS)} (default: pdf)"
+        "--format",
+        type=formats_of(FORMATS),
+        default=("pdf",),
+        help=f"comma-separated: {','.join(FORMATS)} (default: pdf)",
     )
     parser.add_argument("-o", "--output", type=Path, default=Path("figures"), metavar="FOLDER", help="default: figures")
     return parser
@@ -53,11 +56,3 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (AirgroundError, OSError) as error:
         return refuse(error)
     return 0
-
-
-def _formats(text: str) -> tuple[str, ...]:
-    chosen = tuple(text.split(","))
-    unknown = [name for name in chosen if name not in FORMATS]
-    if unknown:
-        raise argparse.ArgumentTypeError(f"{', '.join(unknown)!r} is not allowed; formats are {', '.join(FORMATS)}")
-    return chosen

@@ -24,7 +24,7 @@ from airground_drake.base.errors import (
     one_line,
 )
 from airground_drake.base.progress import progress_bar
-from airground_drake.base.usage import EXIT_TOOL, Parser, overridable, positive, refuse
+from airground_drake.base.usage import EXIT_TOOL, Parser, formats_of, overridable, positive, refuse
 from airground_drake.report import folder
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.estimate import DEFAULT_LIMITS, GIB, Limits
@@ -111,7 +111,7 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument("scenario", nargs="?", help="name of a shipped scenario, path to a YAML file, or audit")
     parser.add_argument("-o", "--output", type=Path, metavar="DIR", help=f"default: reports/<scenario>; {folder.RULE}")
     parser.add_argument(
-        "--format", type=_formats, default=FORMATS, help="comma-separated: html,json,junit (default: all)"
+        "--format", type=formats_of(FORMATS), default=FORMATS, help="comma-separated: html,json,junit (default: all)"
     )
     overridable(parser)
     parser.add_argument("--seed", type=int, metavar="N", help="seed of the decision noise")
@@ -133,14 +133,6 @@ def parser() -> argparse.ArgumentParser:
     loudness.add_argument("-q", "--quiet", action="store_true", help="say nothing but errors")
     loudness.add_argument("-v", "--verbose", action="store_true", help="say what took how long")
     return parser
-
-
-def _formats(text: str) -> tuple[str, ...]:
-    chosen = tuple(text.split(","))
-    unknown = [name for name in chosen if name not in FORMATS]
-    if unknown:
-        raise argparse.ArgumentTypeError(f"{', '.join(unknown)!r} is not allowed; formats are {', '.join(FORMATS)}")
-    return chosen
 
 
 if __name__ == "__main__":
