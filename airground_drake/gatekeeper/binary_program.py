@@ -93,7 +93,7 @@ class BinaryProgram:
     def _rows(
         self, problem: Problem, normals: Array, steps: Array, away: Array
     ) -> tuple[Array, npt.NDArray[np.float64]]:
-        """Coefficients (rows, B + N) and lower bounds of the half-planes; one row that asks nothing if there is none.
+        """Coefficients (rows, B + N) and lower bounds of the half-planes; if there are no half-planes, one empty row.
 
         Args:
             problem: data of (26).

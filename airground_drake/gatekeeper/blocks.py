@@ -1,4 +1,4 @@
-"""Blocks of stages, for each of which a plan makes one choice."""
+"""Blocks of stages: a plan makes one choice per block."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ class Solution:
         objective: cost (25) of the plan returned.
         route_bound: lower bound of the problem that the route solves, with supporting half-planes for the exact
             distances of (26d), whose optimum may be lower: over binary plans by `mixed_integer`, over relaxed ones by
-            `relaxed`. A local optimum has none.
+            `relaxed`. A local optimum has no bound.
         gap: (objective - route_bound) / objective, the objective being that of the same problem.
         objective_accept: lowest cost found of a plan that starts by accepting.
         objective_refuse: lowest cost found of a plan that starts by refusing.

@@ -92,7 +92,7 @@ class Coordinate(Policy):
         return self._proposals(seen, group, found)
 
     def _is_known_to_be_shut_in(self, seen: Observation) -> bool:
-        """Whether the UGV found no way here before, even alone, on the same map: later there is none either.
+        """Whether the UGV found no way here before, even alone, on the same map. Waiting opens no way.
 
         Time takes away places at which the preset can be joined, and adds none.
         """
