@@ -105,19 +105,6 @@ def text_of(data: Mapping[str, Any]) -> str:
     return text
 
 
-def read_data(path: Path) -> tuple[Any, str]:
-    """Another YAML file of ours as nested dicts, lists and scalars, by the rules and limits of scenario files.
-
-    Returns:
-        The data, None where no value is given, and the SHA-256 of the file's bytes.
-
-    Raises:
-        ScenarioError: if it cannot be read.
-    """
-    document, data = read(path)
-    return document.data, files.sha256(data)
-
-
 def read(name_or_path: str | Path) -> tuple[Document, bytes]:
     """A YAML file, or a shipped scenario; and its bytes.
 

@@ -13,7 +13,7 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from pydantic import TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
@@ -26,6 +26,8 @@ from airground_drake.scenarios.schema import RETIRED_KEYS, Scenario, Vector
 from airground_drake.scenarios.shipped import shipped
 
 __all__ = ["from_data", "load", "own", "resolved", "shipped", "validated"]
+
+T = TypeVar("T")
 
 Overrides = Sequence[str] | Mapping[str, Any]
 """`dotted.key=value` with the value in YAML, or values by dotted key."""
@@ -137,10 +139,7 @@ def _as_set(document: Document, run: str, settings: Mapping[str, Any]) -> Scenar
 
 def _checked(document: Document) -> Scenario:
     """The scenario of a document, whatever its runs set."""
-    try:
-        scenario = _adapter().validate_python(document.data)
-    except ValidationError as error:
-        raise _in_words(min(error.errors(include_url=False), key=_rank), document) from None
+    scenario = filled(Scenario, document)
     _complete(scenario)
     try:
         validate.check(scenario, document.source)
@@ -150,9 +149,23 @@ def _checked(document: Document) -> Scenario:
     return scenario
 
 
+def filled(kind: type[T], document: Document) -> T:
+    """A dataclass with the data of a document, checked by pydantic.
+
+    Raises:
+        ScenarioError: if a key or value is not what the dataclass says.
+    """
+    try:
+        found: T = _adapter(kind).validate_python(document.data)
+    except ValidationError as error:
+        first = min(error.errors(include_url=False), key=_rank)
+        raise _in_words(first, document, json_schema.schema_of(kind)) from None
+    return found
+
+
 @functools.cache
-def _adapter() -> TypeAdapter[Scenario]:
-    return TypeAdapter(Scenario)
+def _adapter(kind: type) -> TypeAdapter[Any]:
+    return TypeAdapter(kind)
 
 
 _UNKNOWN = ("unexpected_keyword_argument", "invalid_key")
@@ -163,7 +176,7 @@ def _rank(error: ErrorDetails) -> int:
     return 0 if error["type"] in _UNKNOWN else 1 if error["type"] == "missing" else 2
 
 
-def _in_words(error: ErrorDetails, document: Document) -> ScenarioError:
+def _in_words(error: ErrorDetails, document: Document, schema: json_schema.Schema) -> ScenarioError:
     """What pydantic says of a value, in one line: where it is, its key, the value, and what is allowed."""
     kind, given, says = error["type"], error["input"], error.get("ctx", {})
     loc = [str(part) for part in error["loc"]]
@@ -176,8 +189,9 @@ def _in_words(error: ErrorDetails, document: Document) -> ScenarioError:
     if general in RETIRED_KEYS:
         return ScenarioError(source, key, Fault("no longer a key"), RETIRED_KEYS[general])
     if kind in _UNKNOWN:
-        return unknown(source, key, at[-1], json_schema.keys_at(*at[:-1]))
-    wanted = f"wanted: {json_schema.wanted_at(*(loc[:-2] + loc[-1:] if loc[-1:] == [json_schema.NAMES] else at))}"
+        return unknown(source, key, at[-1], json_schema.keys_at(schema, *at[:-1]))
+    place = loc[:-2] + loc[-1:] if loc[-1:] == [json_schema.NAMES] else at
+    wanted = f"wanted: {json_schema.wanted_at(schema, *place)}"
     if kind == "missing":
         new = f", as {'.'.join(at[:-1])} is new" * source.startswith("--set ")
         return ScenarioError(source, key, Fault("missing"), wanted + new)
