@@ -196,7 +196,7 @@ def load_spec(path: Path) -> Spec:
     document, content = read(path)
     if isinstance(document.data, dict):
         document.data.setdefault("name", path.stem)
-    found = filled(File, document)
+    found: File = filled(File, document)
     scenario = found.scenario if found.scenario in shipped() else str(path.parent / found.scenario)
     given = vars(found) | {"scenario": scenario}
     spec = Spec(**given, digest=files.sha256(content), source=str(path), data=_judged_part(scenario))

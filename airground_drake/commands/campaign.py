@@ -17,7 +17,7 @@ from airground_drake.base.errors import (
     UnknownNameError,
     one_line,
 )
-from airground_drake.base.parallel import processors
+from airground_drake.base.parallel import one_thread_each, processors
 from airground_drake.base.progress import progress_bar
 from airground_drake.base.usage import EXIT_TOOL, Parser, positive, refuse, whole
 from airground_drake.campaign.rows import UNFINISHED
@@ -78,6 +78,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = of_command.parse_args(arguments)
     if options.only is not None and (options.resume or options.stop_when or options.number is not None):
         of_command.error("--only is one draw alone: -n, --resume and --stop-when do not go with it")
+    one_thread_each()
     from airground_drake.campaign.spec import load_spec
 
     try:

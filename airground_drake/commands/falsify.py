@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from airground_drake.base import files
 from airground_drake.base.errors import AirgroundError, Fault, FolderError, ScenarioError, UnknownNameError, one_line
-from airground_drake.base.parallel import processors
+from airground_drake.base.parallel import one_thread_each, processors
 from airground_drake.base.progress import progress_bar
 from airground_drake.base.usage import EXIT_TOOL, Parser, positive, refuse, whole
 from airground_drake.campaign.rows import COLUMNS
@@ -71,6 +71,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = of_command.parse_args(arguments)
     if options.limit is not None and options.most is None:
         of_command.error("--limit is of a time: name it with --most")
+    one_thread_each()
     from airground_drake.campaign.spec import load_spec
 
     try:

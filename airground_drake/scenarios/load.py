@@ -13,7 +13,7 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
@@ -26,8 +26,6 @@ from airground_drake.scenarios.schema import RETIRED_KEYS, Scenario, Vector
 from airground_drake.scenarios.shipped import shipped
 
 __all__ = ["from_data", "load", "own", "resolved", "shipped", "validated"]
-
-T = TypeVar("T")
 
 Overrides = Sequence[str] | Mapping[str, Any]
 """`dotted.key=value` with the value in YAML, or values by dotted key."""
@@ -139,7 +137,7 @@ def _as_set(document: Document, run: str, settings: Mapping[str, Any]) -> Scenar
 
 def _checked(document: Document) -> Scenario:
     """The scenario of a document, whatever its runs set."""
-    scenario = filled(Scenario, document)
+    scenario: Scenario = filled(Scenario, document)
     _complete(scenario)
     try:
         validate.check(scenario, document.source)
@@ -149,18 +147,17 @@ def _checked(document: Document) -> Scenario:
     return scenario
 
 
-def filled(kind: type[T], document: Document) -> T:
+def filled(kind: type, document: Document) -> Any:
     """A dataclass with the data of a document, checked by pydantic.
 
     Raises:
         ScenarioError: if a key or value is not what the dataclass says.
     """
     try:
-        found: T = _adapter(kind).validate_python(document.data)
+        return _adapter(kind).validate_python(document.data)
     except ValidationError as error:
         first = min(error.errors(include_url=False), key=_rank)
         raise _in_words(first, document, json_schema.schema_of(kind)) from None
-    return found
 
 
 @functools.cache
