@@ -24,6 +24,9 @@ from airground_drake.base.progress import SILENT, Progress
 
 T = TypeVar("T")
 
+MOST_JOBS = 1000
+"""Processes at a time that may be asked for: all of them begin at once."""
+
 _pieces: Sequence[Callable[[], object]] = ()
 """The work at hand: inherited, so that it need not be pickled."""
 

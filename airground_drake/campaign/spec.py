@@ -29,7 +29,7 @@ from airground_drake.campaign.distributions import KINDS, RANDOM, Choice, Key, c
 from airground_drake.campaign.rows import TIMES
 from airground_drake.registry import RUN_CLAIMS
 from airground_drake.scenarios import plugins
-from airground_drake.scenarios.document import read, suggestion
+from airground_drake.scenarios.document import UNKNOWN_KEY, Document, read, suggestion
 from airground_drake.scenarios.kinds import WANTED, Real, Words, refused
 from airground_drake.scenarios.limits import MAX_NAME
 from airground_drake.scenarios.load import filled, from_data, load, shipped
@@ -185,7 +185,7 @@ class Spec(File):
 
 
 def load_spec(path: Path) -> Spec:
-    """Read a campaign, and see that its first draw can be made.
+    """Read a campaign, and see that it names keys, runs and claims that there are.
 
     Raises:
         ScenarioError: if the file cannot be read, or something in it is not allowed.
@@ -207,10 +207,7 @@ def load_spec(path: Path) -> Spec:
     try:
         base = spec.base()
     except ScenarioError as error:
-        key = error.source.removeprefix("--set ").partition("=")[0]
-        if key not in spec.fixed:
-            raise
-        raise ScenarioError(document.where("set", key), f"set.{error.key}", error.value, error.allowed) from None
+        raise _placed(error, document, "set") from None
     for key, names, allowed in (("runs", spec.runs, base.runs), ("claims", spec.claims, RUN_CLAIMS)):
         for index, name in enumerate(names):
             if name not in allowed:
@@ -218,7 +215,20 @@ def load_spec(path: Path) -> Spec:
     for name in spec.marks:
         if name not in TIMES:
             raise _unknown(document.where("marks", name, key=True), f"marks.{name}", name, TIMES)
+    try:
+        spec.draw(0)
+    except ScenarioError as error:
+        if error.value == UNKNOWN_KEY:  # no draw would be valid; whatever else is wrong may be so in this draw only
+            raise _placed(error, document, "draw") from None
     return spec
+
+
+def _placed(error: ScenarioError, document: Document, part: str) -> ScenarioError:
+    """The error of an override, with the line of the spec that the override comes from."""
+    key = error.source.removeprefix("--set ").partition("=")[0]
+    if (part, key) not in document.places:
+        return error
+    return ScenarioError(document.where(part, key), f"{part}.{error.key}", error.value, error.allowed)
 
 
 def _unknown(source: str, key: str, name: str, allowed: Iterable[str]) -> ScenarioError:

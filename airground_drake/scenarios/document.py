@@ -38,6 +38,8 @@ _SCALARS: dict[str, tuple[str | None, Callable[[str], object]]] = {  # tag: its 
     "str": (None, lambda text: text.encode().decode()),  # refuses lone surrogates
 }
 
+UNKNOWN_KEY = Fault("unknown key")
+
 Children = dict[str, tuple[yaml.Node, yaml.Node]]
 """Key node (for its line) and value node of each entry."""
 
@@ -336,7 +338,7 @@ def suggestion(name: str, options: Iterable[str]) -> str:
 def unknown(source: str, key: str, part: str, options: Sequence[str]) -> ScenarioError:
     """The error of a key that there is not, the last part of a dotted one."""
     return ScenarioError(
-        source, key, Fault("unknown key"), f"{suggestion(part, options)}allowed: {', '.join(options) or 'none'}"
+        source, key, UNKNOWN_KEY, f"{suggestion(part, options)}allowed: {', '.join(options) or 'none'}"
     )
 
 

@@ -114,6 +114,7 @@ def test_a_course_without_room_is_a_draw_that_cannot_be_made(tmp_path: Path) -> 
             "scenario: minimal\nset: {control.period_s: no}",
             ":2: set.control.period_s: 'no' is not allowed; wanted: a num",
         ),
+        ("scenario: minimal\ndraw: {contrl.period_s: {uniform: [1, 2]}}", ":2: draw.contrl: unknown key; did you mean"),
         ("a: &a [*a]", ":1: nested too deeply"),
         ("\tx", ":1: not YAML"),
     ],
