@@ -1,4 +1,4 @@
-"""A campaign from beginning to end: what is left is drawn and judged, kept, and concluded from."""
+"""A campaign from beginning to end: judge the draws that are left, keep them, write the evidence."""
 
 from __future__ import annotations
 
@@ -38,24 +38,24 @@ def conduct(
     allow_plugins: bool = False,
     progress: Progress = SILENT,
 ) -> dict[str, Any]:
-    """Do what is left of a campaign, and write the evidence and its page.
+    """Do the rest of a campaign, and write the evidence and its page.
 
     Args:
         spec: what is drawn.
         folder: new or empty; with `resume`, one that has a part of the same campaign.
-        pool: that does the work.
-        number: of draws; default: all combinations of what is gone through in turn.
+        pool: does the work.
+        number: of draws; default: all combinations of the grids.
         resume: go on with what the folder has.
         stopping: when to end early.
         limits: what the scenario of a draw may ask for.
-        allow_plugins: whether code of others may be imported and run.
+        allow_plugins: whether third-party code may be imported and run.
         progress: is told how far it is.
 
     Returns:
         The evidence, strict JSON.
 
     Raises:
-        ScenarioError: if code of others is named that is not allowed.
+        ScenarioError: if third-party code is named that is not allowed.
         FolderError: if the folder cannot be used, or has draws beyond the number.
         LimitError: if the rows would be more than `MOST_ROWS`.
         ValueError: if there is a rule to stop, and draws that are not independent.
@@ -104,7 +104,7 @@ def _refuted(counts: Counter[str]) -> str:
 
 
 def _known(store: Store) -> Iterator[tuple[int, list[Row]]]:
-    """What an earlier call has finished, draw by draw."""
+    """The draws that an earlier call has finished."""
     for _, rows in store.table().groupby("index"):
         yield (
             int(rows["index"].iloc[0]),

@@ -33,7 +33,7 @@ class Search:
         spec: of the scenarios; the course, if there is one, is that of draw 0.
         objective: what is made least.
         limits: what a scenario may ask for.
-        allow_plugins: whether code of others may be imported and run.
+        allow_plugins: whether third-party code may be imported and run.
     """
 
     spec: Spec
@@ -71,12 +71,12 @@ class Search:
 
 @dataclass(frozen=True)
 class Best:
-    """What a search has come to.
+    """The result of a search.
 
     Attributes:
         tried: points.
-        value: the least of the objective; infinite if it could be measured nowhere.
-        point: where, (n,); (0,) if nowhere.
+        value: the least of the objective; infinite if it was never measured.
+        point: where, (n,); (0,) if it was never measured.
         found: whether it is a counterexample.
     """
 
@@ -120,7 +120,7 @@ def falsify(search: Search, sampler: Sampler, number: int, pool: Pool, progress:
 
 
 def _asked(sampler: Sampler, n: int) -> Array:
-    """The points (k, n) that a sampler, perhaps somebody else's, asks for.
+    """The points (k, n) that a sampler, perhaps a third-party one, asks for.
 
     Raises:
         PluginError: if it raises, or these are not one or more points in [0, 1).

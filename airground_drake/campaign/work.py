@@ -1,4 +1,4 @@
-"""One draw of a campaign: its scenario is simulated, its runs are judged, and what came of it are rows."""
+"""One draw of a campaign: simulate its scenario, judge its runs, make rows of the verdicts."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def rows_of(spec: Spec, index: int, limits: Limits, *, allow_plugins: bool = Fal
         spec: of the campaign.
         index: of the draw.
         limits: what its scenario may ask for; one that asks for more is `invalid`, one that takes longer `stopped`.
-        allow_plugins: whether code of others may be imported and run.
+        allow_plugins: whether third-party code may be imported and run.
 
     Returns:
         A row for each run and claim, with the columns of `rows.COLUMNS`.
@@ -46,7 +46,7 @@ def rows_of(spec: Spec, index: int, limits: Limits, *, allow_plugins: bool = Fal
 
 @cache
 def _keep_what_is_loaded() -> None:
-    """Libraries and compiled code are no garbage: once they are loaded, collections need not look at them again."""
+    """Exempt libraries and compiled code from garbage collection, once they are loaded."""
     gc.collect()
     gc.freeze()
 
@@ -64,7 +64,7 @@ def rows_at(
 
 
 def _strict(value: Any) -> Any:
-    """What is drawn as strict JSON: what is not finite, which no scenario takes, in words."""
+    """Drawn values as strict JSON; numbers that are not finite as text."""
     if isinstance(value, dict):
         return {name: _strict(each) for name, each in value.items()}
     if isinstance(value, list):
@@ -90,17 +90,17 @@ def rows_of_scenario(
 
 
 def trace_of(spec: Spec, scenario: Scenario, limits: Limits, *, allow_plugins: bool = False) -> Trace | None:
-    """Of the first run of a scenario, alike; None if that cannot be simulated."""
+    """The trace of a scenario's first run, within the same limits; None if it cannot be simulated."""
     try:
         with _within(spec, scenario, limits, allow_plugins=allow_plugins):
             return simulate(scenario, next(iter(scenario.runs)))
-    except (Exception, SystemExit, DrawOutOfTime):  # code of others
+    except (Exception, SystemExit, DrawOutOfTime):  # third-party code
         return None
 
 
 @contextmanager
 def _within(spec: Spec, scenario: Scenario, limits: Limits, *, allow_plugins: bool) -> Iterator[None]:
-    """Code of others is found, or refused; what takes too long is stopped.
+    """Find or refuse third-party code; stop what takes too long.
 
     Raises:
         AirgroundError: if the scenario asks for more than it may.
@@ -128,7 +128,7 @@ def _rows_of_run(scenario: Scenario, run: str, claims: Collection[str], common: 
 
 
 def died(index: int) -> list[Row]:
-    """What is known of a draw whose process ended again and again."""
+    """The row of a draw whose process died again and again."""
     return [blank() | {"index": index, "ended": DIED, "what": "the process that simulated it died", "drawn": "{}"}]
 
 
@@ -162,5 +162,5 @@ def _happened(trace: Trace) -> Row:
 
 
 def _intervened(trace: Trace, ugv: str) -> float:
-    """For how long a UGV did what the UAV asked for, s; each row's state is in force up to it."""
+    """How long a UGV followed the UAV, s; each row has the state of the interval before it."""
     return float(np.diff(trace.t) @ (trace.column(f"{ugv}.accepted")[1:] != 0.0))

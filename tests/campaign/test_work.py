@@ -63,7 +63,7 @@ def test_numbers_that_are_none_and_runs_that_are_not_there_make_no_scenario_eith
 def test_code_of_others_is_not_imported(spec: Spec) -> None:
     own = replace(spec, fixed={"intervention.policies": [{"name": "no_such_module:Policy"}]})
     (row,) = work.rows_of(own, 0, DEFAULT_LIMITS)
-    assert (row["ended"], "code of others" in row["what"]) == (INVALID, True)
+    assert (row["ended"], "third-party code" in row["what"]) == (INVALID, True)
 
 
 def test_a_run_that_stops_is_a_row(spec: Spec, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -85,7 +85,7 @@ SLOW = """
 
 
 def test_a_draw_that_never_ends_is_stopped(spec: Spec, tmp_path: Path) -> None:
-    """By code of others that is found beside the spec."""
+    """By third-party code that is found beside the spec."""
     (tmp_path / "slow.py").write_text(dedent(SLOW), encoding="utf-8")
     changes = {
         "gatekeeper.route": "slow.py:Route",
