@@ -35,7 +35,6 @@ def conduct(
     resume: bool = False,
     stopping: Stopping | None = None,
     limits: Limits = DEFAULT_LIMITS,
-    allow_plugins: bool = False,
     progress: Progress = SILENT,
 ) -> dict[str, Any]:
     """Do the rest of a campaign, and write the evidence and its page.
@@ -48,7 +47,6 @@ def conduct(
         resume: go on with what the folder has.
         stopping: when to end early.
         limits: what the scenario of a draw may ask for.
-        allow_plugins: whether third-party code may be imported and run.
         progress: is told how far it is.
 
     Returns:
@@ -68,7 +66,7 @@ def conduct(
     if asked > MOST_ROWS:
         allowed = f"{MOST_ROWS:g} rows, one for each draw, run and claim"
         raise LimitError(spec.name, f"{wanted.stop:.3g} draws ({asked:.3g} rows)", allowed)
-    if not allow_plugins:
+    if not limits.plugins:
         spec.refuse_plugins()
     store = Store(folder, _manifest(spec, limits), resume=resume)
     try:
@@ -79,7 +77,7 @@ def conduct(
         left = [] if met else [index for index in wanted if index not in store.finished]
         progress.stage(spec.name, len(left), "draws")
         refuted = Counter[str]()
-        for index, judged in pool(partial(rows_of, spec, limits=limits, allow_plugins=allow_plugins), left):
+        for index, judged in pool(partial(rows_of, spec, limits=limits), left):
             rows = died(index) if judged is None else judged
             store.add(rows)
             refuted.update(row["claim"] for row in rows if row["status"] == "refuted")
@@ -119,5 +117,5 @@ def _manifest(spec: Spec, limits: Limits) -> dict[str, Any]:
         "scenario_sha256": spec.base_digest(),
         "package": version("airground_drake"),
         "drake": version("drake"),
-        "limits": limits._asdict(),
+        "limits": {name: value for name, value in limits._asdict().items() if name != "plugins"},
     }

@@ -33,13 +33,11 @@ class Search:
         spec: of the scenarios; the course, if there is one, is that of draw 0.
         objective: what is made least.
         limits: what a scenario may ask for.
-        allow_plugins: whether third-party code may be imported and run.
     """
 
     spec: Spec
     objective: Objective
     limits: Limits
-    allow_plugins: bool = False
 
     def values(self, point: Array) -> dict[str, Any]:
         """By dotted key, at a point of the unit cube."""
@@ -47,7 +45,7 @@ class Search:
 
     def at(self, points: Array, k: int) -> tuple[float, bool]:
         """The objective at one of some points (., n), and whether it is a counterexample."""
-        return self._judge(rows_at(self.spec, self.values(points[k]), 0, self.limits, allow_plugins=self.allow_plugins))
+        return self._judge(rows_at(self.spec, self.values(points[k]), 0, self.limits))
 
     def fails(self, data: dict[str, Any]) -> bool:
         """Whether a scenario, as nested dicts and lists, is valid and a counterexample."""
@@ -55,7 +53,7 @@ class Search:
             scenario = from_data(data, "smaller scenario")
         except ScenarioError:
             return False
-        return self._judge(rows_of_scenario(self.spec, scenario, self.limits, allow_plugins=self.allow_plugins))[1]
+        return self._judge(rows_of_scenario(self.spec, scenario, self.limits))[1]
 
     def trace(self, data: dict[str, Any]) -> Trace | None:
         """Of the first run of a scenario; None if it is not valid, or cannot be simulated."""
@@ -63,7 +61,7 @@ class Search:
             scenario = from_data(data, "smaller scenario")
         except ScenarioError:
             return None
-        return trace_of(self.spec, scenario, self.limits, allow_plugins=self.allow_plugins)
+        return trace_of(self.spec, scenario, self.limits)
 
     def _judge(self, rows: list[Row]) -> tuple[float, bool]:
         return self.objective.value(rows), self.objective.found(rows)

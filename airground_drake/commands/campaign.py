@@ -109,7 +109,7 @@ def _all(spec: Spec, options: argparse.Namespace) -> int:
     ):
         found = conduct(
             spec, folder, processes, options.number, resume=options.resume, stopping=stopping,
-            limits=_limits(options), allow_plugins=options.allow_plugins, progress=progress,
+            limits=_limits(options), progress=progress,
         )  # fmt: skip
     print(f"{_summary(found, looked=bool(options.stop_when or options.resume))}\n{one_line(str(folder))}")
     return _code(found)
@@ -132,7 +132,7 @@ def _only(spec: Spec, options: argparse.Namespace) -> int:
         if not (path.is_file() and path.read_bytes() == text.encode()):  # the same draw may be asked for again
             files.try_to_create(path)
             files.write_text(path, text)
-    rows = rows_of(spec, options.only, _limits(options), allow_plugins=options.allow_plugins)
+    rows = rows_of(spec, options.only, _limits(options))
     for row in rows:
         margin = "" if math.isnan(row["margin"]) else f" {row['margin']:.6g} {row['unit']}"
         print(f"{row['run']:12} {row['claim'] or row['ended']:12} {row['status'] or row['what']}{margin}")
@@ -144,7 +144,7 @@ def _only(spec: Spec, options: argparse.Namespace) -> int:
 
 
 def _limits(options: argparse.Namespace) -> Limits:
-    return Limits(options.limit_steps, DEFAULT_LIMITS.memory, options.limit_time)
+    return Limits(options.limit_steps, DEFAULT_LIMITS.memory, options.limit_time, options.allow_plugins)
 
 
 def _code(found: dict[str, Any]) -> int:

@@ -52,11 +52,13 @@ class Limits(NamedTuple):
         work: steps.
         memory: bytes.
         time: by the clock, s, for a draw of a campaign: third-party code may never end.
+        plugins: whether third-party code of a draw may be imported and run.
     """
 
     work: float = 1e7
     memory: float = 8.0 * GIB
     time: float = 3600.0
+    plugins: bool = False
 
 
 DEFAULT_LIMITS = Limits()

@@ -94,9 +94,9 @@ def test_a_draw_that_never_ends_is_stopped(spec: Spec, tmp_path: Path) -> None:
         "decision.release_m": 0.2,
     }
     hangs = replace(spec, fixed=changes)
-    (row,) = work.rows_of(hangs, 0, Limits(time=1.0), allow_plugins=True)
-    assert (row["ended"], row["what"]) == (STOPPED, "not done after 1 s")
-    assert work.trace_of(hangs, hangs.draw(0), Limits(time=1.0), allow_plugins=True) is None
+    (row,) = work.rows_of(hangs, 0, Limits(time=0.5, plugins=True))
+    assert (row["ended"], row["what"]) == (STOPPED, "not done after 0.5 s")
+    assert work.trace_of(hangs, hangs.draw(0), Limits(time=0.5, plugins=True)) is None
 
 
 IDLE = """
@@ -109,7 +109,7 @@ IDLE = """
 def test_what_is_made_small_is_simulated_with_code_beside_the_spec(spec: Spec, tmp_path: Path) -> None:
     (tmp_path / "idle.py").write_text(dedent(IDLE), encoding="utf-8")
     own = replace(spec, fixed={"intervention.policies": [{"name": "idle.py:Policy"}]})
-    trace = work.trace_of(own, own.draw(0), DEFAULT_LIMITS, allow_plugins=True)
+    trace = work.trace_of(own, own.draw(0), Limits(plugins=True))
     assert trace is not None
     assert trace.run == next(iter(own.draw(0).runs))
     assert work.trace_of(own, own.draw(0), DEFAULT_LIMITS) is None
