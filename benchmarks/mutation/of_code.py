@@ -46,8 +46,6 @@ TEAM = (
         "np.delete(np.arange(count), (i + 1) % count)",
     ),
     Mutant("the UAV cannot climb", "world/world.py", "else np.ones(3)", "else np.array([1.0, 1.0, 0.0])"),
-        "the UAV cannot climb", "world/world.py", 'if self.kind == "ugv" else np.ones(3)', "if True else np.ones(3)"
-    ),
     Mutant("UGVs may leave the ground", "world/world.py", 'if self.kind == "ugv" else', "if False else", tests=WIRING),
     Mutant(
         "robots avoid only what the UAV knows",
