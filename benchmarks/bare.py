@@ -99,7 +99,7 @@ def by_scipy(scenario: Scenario) -> Way:
 def by_drake(recorder: Recorder) -> Way:
     """The diagram, with its logs, noise and trigger, and the trace made of them."""
     trace = recorder.simulate()
-    period = trace.scenario["control"]["period_s"]
+    period = trace.scenario.control.period_s
     rows = np.searchsorted(trace.t, period * np.arange(round(trace.t[-1] / period) + 1) - 1e-6)
     fired = [event["t_s"] for event in trace.events if event["kind"] == "trigger"]
     return np.stack([trace.position(robot)[rows] for robot in trace.robots], axis=1), min(fired, default=np.inf)

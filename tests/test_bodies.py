@@ -88,7 +88,7 @@ def test_a_collision_is_of_surfaces(bodies: Trace) -> None:
 
     assert not collisions(bodies)
     least = np.linalg.norm(bodies.position("ugv1") - [5.0, 0.0, 0.0], axis=1).min()
-    needed = least - bodies.scenario["safe_distance"]["collision_m"] - OWN - ROCK
+    needed = least - bodies.scenario.safe_distance.collision_m - OWN - ROCK
     assert not collisions(larger(bodies, "rock", needed - 1e-6))
     assert collisions(larger(bodies, "rock", needed + 1e-6))
     assert collisions(larger(bodies, "ugv1", needed + 1e-6))
