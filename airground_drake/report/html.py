@@ -57,8 +57,6 @@ PLACES = {"distances": "safe", **dict.fromkeys(("decision", "events", "gaps", "t
 """Sections of the figures; the others are maps of what happened."""
 LOOKS = {"yes": "good", "partly": "tuned", "no": "bad", "open": "open", "none": "idle"}
 """Class of each mark of the first screen, which sets its colour: never by colour alone."""
-NAMES = {"yes": "yes", "partly": "in part", "no": "no", "open": "not known", "none": "neither"}
-"""What a screen reader says for each mark."""
 
 CHIPS = {
     "as_expected": ("✓", "as declared", "good"),
@@ -116,6 +114,7 @@ def render(document: Mapping[str, Any], figures: Sequence[Figure], diagram_svg: 
         required=summary.required_m(document),
         beware=summary.do_not_conclude(document),
         declared=summary.as_declared(document),
+        legend=summary.legend(document),
         sections=[(name, title) for name, title in SECTIONS.items() if shown.get(name, True)],
         plates=plates,
         beside=_beside(figures),
@@ -140,7 +139,7 @@ def _environment() -> Environment:
     )  # fmt: skip
     environment.globals.update(
         chips=CHIPS, shown=_shown, refused=attention.REFUSED, max_faults=MAX_FAULTS,
-        marks=summary.MARKS, kinds=LOOKS, names=NAMES,
+        marks=summary.MARKS, kinds=LOOKS, names=summary.MEANINGS,
         policy=Markup(security_policy(style, scripts)), style=Markup(style), scripts=list(map(Markup, scripts)),
     )  # fmt: skip
     return environment
@@ -277,6 +276,9 @@ def _by_claim(claims: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
             "id": name,
             "claims": members,
             "fine": all(claim["as_expected"] for claim in members),
+            "settled": all(
+                claim["as_expected"] and claim["status"] in PASSING and not claim["run"] for claim in members
+            ),
             "verdicts": _together(members, sum(bool(claim["run"]) for claim in members)),
         }
         for name, members in groups.items()
