@@ -6,7 +6,6 @@ it has everything but the filter of claims and the marks that move over the traj
 
 from __future__ import annotations
 
-import json
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from functools import cache, partial
@@ -14,10 +13,10 @@ from hashlib import sha256
 from importlib import resources
 from typing import Any
 
+import yaml
 from jinja2 import Environment
 from markupsafe import Markup
 
-from airground_drake.base.errors import one_line
 from airground_drake.base.statuses import PASSING, outcome
 from airground_drake.report import attention, evidence, summary
 from airground_drake.report.figures import svg
@@ -33,7 +32,7 @@ STYLE, SCRIPTS = "report.css", ("report.js", "scrubber.js")
 NOTHING = "'none'"
 """In a content security policy: no source at all."""
 MAX_DIAGRAM_CHARS = 500_000
-MAX_JSON_CHARS = 4_000
+MAX_SCENARIO_CHARS = 20_000
 LINE_CHARS = 110
 KINDS = ("declared", "stuck")
 """Evidence of these kinds is shown instead of the verdict where that passes: it must not look like more than it is."""
@@ -134,7 +133,7 @@ def _environment() -> Environment:
     style = stylesheet()
     scripts = [_template(name) for name in SCRIPTS]
     environment.filters.update(
-        num=number, value=value, pretty=pretty, together=attention.faults_together, inline=Markup, mathml=mathml,
+        num=number, value=value, yaml=as_yaml, together=attention.faults_together, inline=Markup, mathml=mathml,
         evidence=evidence_tables, proof=place, records=partial(evidence.tables, number=number), brief=brief,
     )  # fmt: skip
     environment.globals.update(
@@ -235,23 +234,14 @@ def brief(x: Any, unit: str = "") -> str:
     return f"{number(x, 5)} {unit}".strip() if isinstance(x, int | float) else str(x)
 
 
-def pretty(x: Any, limit: int = MAX_JSON_CHARS) -> str:
-    """JSON for reading: what fits on a line is on a line; cut where it gets long."""
-    text = "\n".join(map(one_line, _lay_out(x, "").split("\n")))
-    return text if len(text) <= limit else f"{text[:limit]}\n… cut here; report.json has all of it"
-
-
-def _lay_out(x: Any, indent: str) -> str:
-    flat = json.dumps(x, ensure_ascii=False, allow_nan=False)
-    if len(indent) + len(flat) <= LINE_CHARS or not isinstance(x, (Mapping, list)):
-        return flat
-    deeper = f"{indent} "
-    if isinstance(x, Mapping):
-        items = [f"{json.dumps(key, ensure_ascii=False)}: {_lay_out(item, deeper)}" for key, item in x.items()]
-    else:
-        items = [_lay_out(item, deeper) for item in x]
-    opening, closing = "{}" if isinstance(x, Mapping) else "[]"
-    return f"{opening}\n{deeper}{f',{chr(10)}{deeper}'.join(items)}\n{indent}{closing}"
+def as_yaml(x: Any) -> str:
+    """A scenario for reading; what is not ASCII is escaped, and so is what would turn or break lines."""
+    text: str = yaml.safe_dump(x, default_flow_style=None, sort_keys=False, width=LINE_CHARS)
+    return (
+        text
+        if len(text) <= MAX_SCENARIO_CHARS
+        else f"{text[:MAX_SCENARIO_CHARS]}\n… cut here; report.json has all of it"
+    )
 
 
 def _diagram(source: str | None, name: str) -> str | None:

@@ -6,6 +6,7 @@ Marks follow what happened in the runs. Whether the scenario declared it so is a
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from textwrap import wrap
 from typing import Any, NamedTuple
 
 from airground_drake.base.errors import one_line
@@ -25,6 +26,8 @@ MEANINGS = {
 """What the marks mean, for their legend and for screen readers."""
 NEGLIGIBLE = 1e-3
 """A risk that is higher by this share than the least counts as least."""
+WIDTH = 110
+"""Characters of a line on a terminal, about."""
 MAX_NAMES = 3
 """Robots that a line names."""
 WORDS_OF_REFUSALS = {
@@ -160,16 +163,17 @@ def as_declared(document: Document) -> Line:
 def text(document: Document) -> str:
     """The first screen for a terminal."""
     mark, says = headline(document)
-    lines = [f"[{MARKS[mark]}] {says}"]
+    lines = [one_line(f"[{MARKS[mark]}] {says}")]
     lines += _table(methods(document), required_m(document))
     for question, answered in answers(document):
         for k, (mark, says) in enumerate(answered):
             asked = "" if k else question
-            lines.append(f"{asked:<11} [{MARKS[mark]}] {says}" if mark else f"{asked:<15} {says}")
+            said = f"{asked:<11} [{MARKS[mark]}] {says}" if mark else f"{asked:<15} {says}"
+            lines += wrap(one_line(said), WIDTH, subsequent_indent=16 * " ")
     lines.append("Do not conclude that")
-    lines += [f"  - {clause}" for clause in do_not_conclude(document)]
+    lines += [one_line(f"  - {clause}") for clause in do_not_conclude(document)]
     lines.append(f"Marks: {legend(document)}.")
-    return "\n".join(map(one_line, lines))
+    return "\n".join(lines)
 
 
 def _table(rows: Sequence[Row], required: str) -> list[str]:
@@ -179,7 +183,7 @@ def _table(rows: Sequence[Row], required: str) -> list[str]:
         safe, arrived = (f"[{MARKS[mark]}] {says}" for mark, says in (row.safe, row.arrived))
         cells.append([row.run, row.method, safe, arrived, row.interventions])
     widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
-    return ["  ".join(map(str.ljust, row, widths)).rstrip() for row in cells] if rows else []
+    return [one_line("  ".join(map(str.ljust, row, widths)).rstrip()) for row in cells] if rows else []
 
 
 def legend(document: Document) -> str:
