@@ -203,9 +203,10 @@ def _runs(document: Document, every: Sequence[Course]) -> Iterator[Line]:
     told = []
     for course in every:
         changed = document["scenario"]["resolved"]["runs"][course.name].get("set") or {}
-        extra = "; ".join(f"{key}: {value}" for key, value in changed.items())
+        extra = ", ".join(f"{key} {value}" for key, value in changed.items())
         if course.plain and course.method in METHODS:
-            told.append(f"{course.name}: {METHODS[course.method].says}{f' ({extra})' if extra else ''}")
+            says = f"({course.method}) with {extra}" if extra else METHODS[course.method].says
+            told.append(f"{course.name}: {says}")
     if told:
         yield Line("", f"{'; '.join(told)}.")
 

@@ -47,4 +47,5 @@ def test_a_kept_page_says_what_the_code_says(name: str, made: dict[str, tuple[st
 def test_the_readme_shows_the_first_screen_of_case_a(made: dict[str, tuple[str, dict[str, Any]]]) -> None:
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     printed = re.findall(r"```text\n(.*?)```", readme, re.DOTALL)
+    assert readme.count("\n") < 120
     assert printed == [summary.text(made["case_a"][1]) + "\n"]
