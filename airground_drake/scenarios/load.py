@@ -8,20 +8,20 @@ from __future__ import annotations
 
 import copy
 import dataclasses
-import functools
 import json
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from airground_drake.base import files
 from airground_drake.base.errors import Fault, ScenarioError
 from airground_drake.scenarios import json_schema, validate
 from airground_drake.scenarios.document import Document, of_data, put, read, replace, simple, unknown
+from airground_drake.scenarios.recorded import adapter
 from airground_drake.scenarios.schema import RETIRED_KEYS, Scenario, Vector
 from airground_drake.scenarios.shipped import shipped
 
@@ -138,7 +138,7 @@ def _as_set(document: Document, run: str, settings: Mapping[str, Any]) -> Scenar
 def _checked(document: Document) -> Scenario:
     """The scenario of a document, whatever its runs set."""
     try:
-        scenario = _adapter().validate_python(document.data)
+        scenario = adapter().validate_python(document.data)
     except ValidationError as error:
         raise _in_words(min(error.errors(include_url=False), key=_rank), document) from None
     _complete(scenario)
@@ -148,11 +148,6 @@ def _checked(document: Document) -> Scenario:
         place = document.where(*error.key.split("."), key=True)
         raise ScenarioError(place, error.key, error.value, error.allowed) from None
     return scenario
-
-
-@functools.cache
-def _adapter() -> TypeAdapter[Scenario]:
-    return TypeAdapter(Scenario)
 
 
 _UNKNOWN = ("unexpected_keyword_argument", "invalid_key")
