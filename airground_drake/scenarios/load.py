@@ -8,20 +8,20 @@ from __future__ import annotations
 
 import copy
 import dataclasses
-import functools
 import json
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from airground_drake.base import files
 from airground_drake.base.errors import Fault, ScenarioError
 from airground_drake.scenarios import json_schema, validate
 from airground_drake.scenarios.document import Document, of_data, put, read, replace, simple, unknown
+from airground_drake.scenarios.recorded import adapter
 from airground_drake.scenarios.schema import RETIRED_KEYS, Scenario, Vector
 from airground_drake.scenarios.shipped import shipped
 
@@ -154,15 +154,10 @@ def filled(kind: type, document: Document) -> Any:
         ScenarioError: if a key or value is not what the dataclass says.
     """
     try:
-        return _adapter(kind).validate_python(document.data)
+        return adapter(kind).validate_python(document.data)
     except ValidationError as error:
         first = min(error.errors(include_url=False), key=_rank)
         raise _in_words(first, document, json_schema.schema_of(kind)) from None
-
-
-@functools.cache
-def _adapter(kind: type) -> TypeAdapter[Any]:
-    return TypeAdapter(kind)
 
 
 _UNKNOWN = ("unexpected_keyword_argument", "invalid_key")

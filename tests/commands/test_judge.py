@@ -18,7 +18,7 @@ Run = Callable[[str, str], Trace]
 
 def sampled(trace: Trace) -> pd.DataFrame:
     """Where the robots of a run were at its control samples."""
-    period = trace.scenario["control"]["period_s"]
+    period = trace.scenario.control.period_s
     t = period * np.arange(round(trace.t[-1] / period) + 1)
     rows = np.searchsorted(trace.t, t - 1e-9)
     tables = [
