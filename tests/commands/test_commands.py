@@ -164,6 +164,9 @@ report a b
 run minimal d --set duration_s=1e12
 run minimal d -o spec.yaml/below
 run minimal z
+run minimal d --speed 2
+replay . d --speed 2
+replay . --video x.webp
 check
 check spec.yaml
 list nothing
