@@ -22,9 +22,10 @@ from airground_drake.gatekeeper.solution import after_failure
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT, Disc, Proposals, Report, Reports, answer_to
 from airground_drake.intervention.policy import Proposal
+from airground_drake.nsbc.avoidance import Surroundings
 from airground_drake.nsbc.kernels import distances
 from airground_drake.nsbc.law import UgvLaw
-from airground_drake.nsbc.team import Team
+from airground_drake.world.world import World
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,8 +83,8 @@ class View:
     Attributes:
         t: time, s.
         proposals: in force, one entry per UGV.
-        positions: of all robots, (n + 1, 3), m.
-        velocities: of all robots, (n + 1, 3), m/s.
+        positions: of all bodies that move, (M, 3), m.
+        velocities: of these, (M, 3), m/s.
         before: memory from the sample before.
     """
 
@@ -102,14 +103,13 @@ class Gatekeepers(abc.ABC):
             meanwhile).
     """
 
-    def __init__(self, team: Team, law: UgvLaw, presets: Sequence[Motion]) -> None:
-        """Of the UGVs of a team, with their control law and preset trajectories."""
+    def __init__(self, world: World, law: UgvLaw, presets: Sequence[Motion]) -> None:
+        """Of the UGVs of a world, with their control law and preset trajectories."""
         self._law = law
         self._presets = tuple(presets)
-        self._team = team
-        self._discs = np.column_stack([team.obstacles, team.obstacle_radii])
-        self._neighbourhood = team.neighbourhood(slice(0, len(team.ugvs)))
-        self._max_speed = team.max_speed
+        self._world = world
+        self._near = world.around(world.select("ugv"))
+        self._discs = np.column_stack([self._near.still, world.radius[len(world.moving) :]])
         self.times_s: list[float] = []
 
     @abc.abstractmethod
@@ -119,8 +119,8 @@ class Gatekeepers(abc.ABC):
         Args:
             t: time, s.
             proposals: one entry per UGV.
-            positions: of all robots, (n + 1, 3), m.
-            velocities: of all robots, (n + 1, 3), m/s.
+            positions: of all bodies that move, (M, 3), m.
+            velocities: of these, (M, 3), m/s.
             memory: from the sample before.
         """
 
@@ -130,7 +130,7 @@ class Gatekeepers(abc.ABC):
 
     def _sensed(self, position: Array) -> npt.NDArray[np.bool_]:
         """Which obstacles are within sensing range, (m,)."""
-        away = distances(self._neighbourhood.obstacles, position)
+        away = distances(self._near.still, position)
         return np.asarray(away <= self._law.avoidance.sensing_range)
 
     def _report(self, position: Array, decision: Decision) -> Report:
@@ -141,25 +141,25 @@ class Gatekeepers(abc.ABC):
 
     def _scene(self, seen: View, i: int) -> Scene:
         """What a UGV has around it: all obstacles and robots, whether within sensing range or not."""
-        around = self._neighbourhood
+        near = self._near
         return Scene(
             t=seen.t,
             position=seen.positions[i].copy(),
             preset=self._presets[i],
-            centres=around.around(seen.positions).centre[i],
-            velocities=np.concatenate([np.zeros_like(around.obstacles), seen.velocities[around.others[i]]]),
-            distances=around.distance[i],
-            shares=around.share[i],
-            max_speed=float(self._max_speed[i]),
+            centres=Surroundings.of(near, seen.positions).centre[i],
+            velocities=np.concatenate([np.zeros_like(near.still), seen.velocities[near.others[i]]]),
+            distances=near.distance[i],
+            shares=near.share[i],
+            max_speed=float(near.max_speed[i]),
         )
 
 
 class PaperGatekeepers(Gatekeepers):
     """Method (c): problem (26) at every sample, and the first stage of its plan is the answer."""
 
-    def __init__(self, team: Team, law: UgvLaw, presets: Sequence[Motion], judging: Judging) -> None:
-        """Of the UGVs of a team, with their control law, their preset trajectories and how they judge."""
-        super().__init__(team, law, presets)
+    def __init__(self, world: World, law: UgvLaw, presets: Sequence[Motion], judging: Judging) -> None:
+        """Of the UGVs of a world, with their control law, their preset trajectories and how they judge."""
+        super().__init__(world, law, presets)
         self._judging = judging
 
     def sample(self, t: float, proposals: Proposals, positions: Array, velocities: Array, memory: Memory) -> Memory:

@@ -29,7 +29,7 @@ from airground_drake.intervention.messages import ACCEPT, DONE, REFUSE, SILENT, 
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.kernels import news_within, within
 from airground_drake.nsbc.law import UgvLaw
-from airground_drake.nsbc.team import Team
+from airground_drake.world.world import World
 
 ACCEPTING: tuple[Reason, ...] = ("cheaper", "makes_way")
 """Reasons for which a proposal is accepted."""
@@ -43,11 +43,12 @@ class OutcomeGatekeepers(Gatekeepers):
     """The UGVs of a team under method (d)."""
 
     def __init__(
-        self, team: Team, law: UgvLaw, presets: Sequence[Motion], outlook: Outlook, patience: Patience
+        self, world: World, law: UgvLaw, presets: Sequence[Motion], outlook: Outlook, patience: Patience
     ) -> None:
-        """Of the UGVs of a team: their law, their preset trajectories, how far they look and how long they wait."""
-        super().__init__(team, law, presets)
+        """Of the UGVs of a world: their law, their preset trajectories, how far they look and how long they wait."""
+        super().__init__(world, law, presets)
         self._outlook, self._patience = outlook, patience
+        self._ugvs = world.names("ugv")
 
     def idle(self, proposals: Proposals, positions: Array, memory: Memory) -> bool:
         """Whether a sample changes nothing."""
@@ -89,7 +90,7 @@ class OutcomeGatekeepers(Gatekeepers):
 
     def _remembered(self, positions: Array, memory: Memory) -> np.ndarray:
         """Which obstacles each UGV has sensed up to now, (n, m); the very same array if nothing is new."""
-        points, own, reach = self._neighbourhood.obstacles, positions[:-1], self._law.avoidance.sensing_range
+        points, own, reach = self._near.still, positions[self._near.members], self._law.avoidance.sensing_range
         if memory.sensed.shape != (len(own), len(points)):
             return within(points, own, reach)
         if news_within(points, own, reach, memory.sensed):
@@ -100,7 +101,7 @@ class OutcomeGatekeepers(Gatekeepers):
         """Whether a UGV senses an obstacle for the first time that is not on the proposal's map."""
         if sensed is memory.sensed:
             return False
-        new = self._team.obstacles[sensed[i] & ~memory.sensed[i]]
+        new = self._near.still[sensed[i] & ~memory.sensed[i]]
         apart = np.linalg.norm(new[:, None] - proposal.mapped, axis=2)
         return not (apart <= SAME_M).any(axis=1).all()
 
@@ -116,7 +117,7 @@ class OutcomeGatekeepers(Gatekeepers):
     def _weigh(self, seen: View, i: int, proposal: Proposal) -> tuple[Reason, Outcome, Outcome]:
         """The reason for the answer, and what comes of refusing and of accepting."""
         refuse, accept = self.foresee(seen, i, proposal)
-        favour = proposal.cause in self._team.ugvs and proposal.cause != self._team.ugvs[i]
+        favour = proposal.cause in self._ugvs and proposal.cause != self._ugvs[i]
         return reason_of(refuse, accept, favour=favour), refuse, accept
 
     def _go_on(
@@ -138,9 +139,9 @@ class OutcomeGatekeepers(Gatekeepers):
         """What comes of refusing and of accepting, with what the UGV knows."""
         scene = self._scene(seen, i)
         discs, distances = self._known(seen, i, proposal)
-        first = len(self._neighbourhood.obstacles)
+        first = len(self._near.still)
         others = []
-        for k, j in enumerate(self._neighbourhood.others[i], start=first):
+        for k, j in enumerate(self._near.others[i], start=first):
             asked = seen.proposals[j] if j < len(seen.proposals) else None
             answer = SILENT if asked is None else answer_to(asked, seen.before.answers, int(j))
             others.append(
@@ -162,15 +163,16 @@ class OutcomeGatekeepers(Gatekeepers):
             Centres, (k, 3), and safe distances, (k,), m.
         """
         was = seen.before.sensed[i]
-        sensed, claimed = self._team.obstacles[was], proposal.mapped
+        sensed, claimed = self._near.still[was], proposal.mapped
         radii = np.broadcast_to(proposal.mapped_radii, len(claimed))
         hidden = np.linalg.norm(claimed - seen.positions[i], axis=1) > self._law.avoidance.sensing_range
         apart = np.linalg.norm(claimed[:, None] - sensed, axis=2)
         new = np.flatnonzero(hidden & (apart > SAME_M).all(axis=1) & np.isfinite(radii) & (radii >= 0.0))
         nearest = np.argsort(np.linalg.norm(claimed[new] - seen.positions[i], axis=1), kind="stable")[:MOST_CLAIMED]
         new = new[np.sort(nearest)]
-        bodies = np.concatenate([self._team.obstacle_radii[was], radii[new]])
-        return np.concatenate([sensed, claimed[new]]), self._team.distance_to(bodies)[i]
+        away = self._world.apart("ugv", "obstacle") + (self._world.radius[self._near.members[i]] + radii[new])
+        distances = np.concatenate([self._near.distance[i, : len(was)][was], away])
+        return np.concatenate([sensed, claimed[new]]), distances
 
 
 def _answer(decision: Decision, standing: float) -> float:

@@ -138,10 +138,7 @@ def _as_set(document: Document, run: str, settings: Mapping[str, Any]) -> Scenar
 
 def _checked(document: Document) -> Scenario:
     """The scenario of a document, whatever its runs set."""
-    try:
-        scenario = adapter().validate_python(document.data)
-    except ValidationError as error:
-        raise _in_words(min(error.errors(include_url=False), key=_rank), document) from None
+    scenario: Scenario = filled(Scenario, document)
     _complete(scenario)
     try:
         validate.check(scenario, document.source)
@@ -149,6 +146,19 @@ def _checked(document: Document) -> Scenario:
         place = document.where(*error.key.split("."), key=True)
         raise ScenarioError(place, error.key, error.value, error.allowed) from None
     return scenario
+
+
+def filled(kind: type, document: Document) -> Any:
+    """A dataclass with the data of a document, checked by pydantic.
+
+    Raises:
+        ScenarioError: if a key or value is not what the dataclass says.
+    """
+    try:
+        return adapter(kind).validate_python(document.data)
+    except ValidationError as error:
+        first = min(error.errors(include_url=False), key=_rank)
+        raise _in_words(first, document, json_schema.schema_of(kind)) from None
 
 
 _UNKNOWN = ("unexpected_keyword_argument", "invalid_key")
@@ -159,7 +169,7 @@ def _rank(error: ErrorDetails) -> int:
     return 0 if error["type"] in _UNKNOWN else 1 if error["type"] == "missing" else 2
 
 
-def _in_words(error: ErrorDetails, document: Document) -> ScenarioError:
+def _in_words(error: ErrorDetails, document: Document, schema: json_schema.Schema) -> ScenarioError:
     """What pydantic says of a value, in one line: where it is, its key, the value, and what is allowed."""
     kind, given, says = error["type"], error["input"], error.get("ctx", {})
     loc = [str(part) for part in error["loc"]]
@@ -172,8 +182,9 @@ def _in_words(error: ErrorDetails, document: Document) -> ScenarioError:
     if general in RETIRED_KEYS:
         return ScenarioError(source, key, Fault("no longer a key"), RETIRED_KEYS[general])
     if kind in _UNKNOWN:
-        return unknown(source, key, at[-1], json_schema.keys_at(*at[:-1]))
-    wanted = f"wanted: {json_schema.wanted_at(*(loc[:-2] + loc[-1:] if loc[-1:] == [json_schema.NAMES] else at))}"
+        return unknown(source, key, at[-1], json_schema.keys_at(schema, *at[:-1]))
+    place = loc[:-2] + loc[-1:] if loc[-1:] == [json_schema.NAMES] else at
+    wanted = f"wanted: {json_schema.wanted_at(schema, *place)}"
     if kind == "missing":
         new = f", as {'.'.join(at[:-1])} is new" * source.startswith("--set ")
         return ScenarioError(source, key, Fault("missing"), wanted + new)

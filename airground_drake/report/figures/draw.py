@@ -18,9 +18,9 @@ from airground_drake.registry import METHODS
 from airground_drake.report.figures import canvas, comparison, maps, svg, timelines
 from airground_drake.report.figures.panels import MAX_TABLE_ROWS, Figure, Panel, Table, series
 from airground_drake.report.metrics import Nearby, close_by, events_of, gap_m, radius_m
+from airground_drake.report.outcomes import SLACK_M, distance
 from airground_drake.report.reproduction import MEASURES
 from airground_drake.report.scrubber import tracks
-from airground_drake.report.summary import SLACK_M, distance
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
 
