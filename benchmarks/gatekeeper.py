@@ -32,9 +32,9 @@ import numpy as np
 
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.half_planes import normals_along
-from airground_drake.gatekeeper.outcome import Other, Outlook, outcomes
+from airground_drake.gatekeeper.outcome import Outlook, outcomes
 from airground_drake.gatekeeper.problem import Horizon, Problem, predicted_problem
-from airground_drake.gatekeeper.rollout import Scene
+from airground_drake.gatekeeper.rollout import View
 from airground_drake.gatekeeper.rounding import sum_up_rounding
 from airground_drake.gatekeeper.routes.mixed_integer import MixedIntegerRoute
 from airground_drake.gatekeeper.routes.nonlinear import NonlinearRoute
@@ -98,16 +98,12 @@ def rolled_out(rng: np.random.Generator, ugvs: int, discs: int, stages: int, saf
     return sample
 
 
-def outcomes_of(situations: list[tuple[Scene, Proposal]], discs: int, safe: float) -> None:
+def outcomes_of(situations: list[tuple[View, Proposal]]) -> None:
     """What method (d) looks at, at one sample: both outcomes for every UGV."""
     motions = [proposal.motion for _, proposal in situations]
-    for i, (scene, proposal) in enumerate(situations):
-        asked = motions[:i] + motions[i + 1 :]
-        others = [
-            Other(scene.centres[discs + k], scene.velocities[discs + k], motion, False, safe, 0.5)
-            for k, motion in enumerate(asked)
-        ]
-        outcomes(scene, LAW, proposal, scene.centres[:discs], safe, others, Outlook(longest=30.0))
+    for i, (seen, proposal) in enumerate(situations):
+        asked = tuple((motion, False) for motion in motions[:i] + motions[i + 1 :])
+        outcomes(replace(seen, asked=asked), LAW, proposal, Outlook(longest=30.0))
 
 
 def cost_of_outcomes(count: int) -> None:
@@ -115,11 +111,11 @@ def cost_of_outcomes(count: int) -> None:
     for ugvs, discs in ((1, 4), (2, 4), (4, 4), (2, 16)):
         rng = np.random.default_rng([ugvs, discs])
         samples = [among(rng, ugvs, discs, 2.0 if discs < 16 else 1.0) for _ in range(count)]
-        outcomes_of(samples[0], discs, 2.0)
+        outcomes_of(samples[0])
         times = []
         for sample in samples:
             started = time.process_time()
-            outcomes_of(sample, discs, 2.0 if discs < 16 else 1.0)
+            outcomes_of(sample)
             times.append(1e3 * (time.process_time() - started))
         p50, p99 = np.percentile(times, [50, 99])
         print(
@@ -127,7 +123,7 @@ def cost_of_outcomes(count: int) -> None:
         )
 
 
-def among(rng: np.random.Generator, ugvs: int, discs: int, safe: float) -> list[tuple[Scene, Proposal]]:
+def among(rng: np.random.Generator, ugvs: int, discs: int, safe: float) -> list[tuple[View, Proposal]]:
     """UGVs among the same discs, all within sensing range of the first; each senses the others, which move."""
     angle, radius = rng.uniform(-np.pi, np.pi, discs), rng.uniform(safe + 0.1, 3.8, discs)
     centres = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), np.zeros(discs)])
@@ -141,7 +137,7 @@ def among(rng: np.random.Generator, ugvs: int, discs: int, safe: float) -> list[
         goal = starts[i] + rng.uniform(-6.0, 6.0, 3) * [1, 1, 0]
         preset = Motion.at_speed(np.array([starts[i], goal]), 0.56, start=-rng.uniform(0.0, 4.0))
         aim = goal if rng.random() < 0.7 else starts[i] + rng.uniform(-6.0, 6.0, 3) * [1, 1, 0]
-        scene = Scene(
+        scene = View(
             t=0.0,
             position=starts[i],
             preset=preset,

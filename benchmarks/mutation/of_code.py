@@ -546,8 +546,8 @@ INTERVENTION = (
     Mutant(
         "UGVs report what is out of their sight",
         "gatekeeper/mpc_gatekeeper.py",
-        "away <= self._law.avoidance.sensing_range",
-        "away >= self._law.avoidance.sensing_range",
+        "away <= self.law.avoidance.sensing_range",
+        "away >= self.law.avoidance.sensing_range",
     ),
     Mutant(
         "proposals are not withdrawn after a release",
@@ -724,8 +724,8 @@ GATEKEEPER = (
     Mutant(
         "other robots are predicted to stand",
         "gatekeeper/mpc_gatekeeper.py",
-        "seen.velocities[around.others[i]]]),",
-        "0.0 * seen.velocities[around.others[i]]]),",
+        "now.velocities[around.others[i]]]),",
+        "0.0 * now.velocities[around.others[i]]]),",
     ),
     Mutant(
         "points are predicted to stand where they are",
@@ -761,8 +761,8 @@ GATEKEEPER = (
     Mutant(
         "an answer is always new",
         "gatekeeper/mpc_gatekeeper.py",
-        "since.append(memory.since[i] if answer == answer_to(proposal, memory.answers, i) else t)",
-        "since.append(t)",
+        "since.append(before.since[i] if answer == answer_to(proposal, before.answers, i) else now.t)",
+        "since.append(now.t)",
     ),
     Mutant(
         "no gain counts as a gain",
@@ -908,16 +908,16 @@ MIX_UPS = (
     Mutant(
         "a roll-out lasts as long as the preset trajectory",
         "gatekeeper/outcome.py",
-        "ends = min(max(until, scene.preset.end), scene.t + look.longest) + look.past",
-        "ends = max(until, scene.preset.end) + look.past",
+        "ends = min(max(until, seen.preset.end), t + look.longest) + look.past",
+        "ends = max(until, seen.preset.end) + look.past",
         runs=("crowd d",),
         tests=("tests/gatekeeper/test_outcome.py",),
     ),
     Mutant(
         "the dwell of an answer runs on over proposals",
         "gatekeeper/mpc_gatekeeper.py",
-        "answer == answer_to(proposal, memory.answers, i) else t",
-        "answer == memory.answers[2 * i] else t",
+        "answer == answer_to(proposal, before.answers, i) else now.t",
+        "answer == before.answers[2 * i] else now.t",
         runs=("crowd c",),
         tests=("tests/gatekeeper/test_mpc_gatekeeper.py",),
     ),
@@ -946,7 +946,7 @@ MIX_UPS = (
     Mutant(
         "a withdrawal is not noticed before the next proposal",
         "gatekeeper/mpc_gatekeeper.py",
-        "return not any(proposals) and not any(memory.answers[::2])",
+        "return not any(proposals) and not any(before.answers[::2])",
         "return not any(proposals)",
         runs=("crowd d",),
         tests=ATTACKS,

@@ -19,10 +19,11 @@ import pytest
 from airground_drake.audit.companions import Believing
 from airground_drake.base.arrays import Array
 from airground_drake.gatekeeper import outcome_gatekeeper
-from airground_drake.gatekeeper.mpc_gatekeeper import Gatekeepers, Memory, View
+from airground_drake.gatekeeper.mpc_gatekeeper import Gatekeepers, GatekeeperState, Inputs
 from airground_drake.gatekeeper.outcome import Outcome, Outlook
 from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
 from airground_drake.gatekeeper.patience import Patience
+from airground_drake.gatekeeper.rollout import View
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.messages import ACCEPT, DONE, REFUSE, answer_to
 from airground_drake.intervention.policy import Proposal
@@ -46,9 +47,9 @@ FORGED = ("favours to nobody", "favours to itself")
 class Unmoved(Believing):
     """Sees no use in any proposal, and nothing that speaks against a favour."""
 
-    def foresee(self, seen: View, i: int, proposal: Proposal) -> tuple[Outcome, Outcome]:
+    def foresee(self, seen: View, law: UgvLaw, proposal: Proposal) -> tuple[Outcome, Outcome]:
         """Neither stalls, and accepting costs more."""
-        refuse, accept = super().foresee(seen, i, proposal)
+        refuse, accept = super().foresee(seen, law, proposal)
         return Outcome(refuse.positions, False, 0.0, 1.0), Outcome(accept.positions, False, 0.0, 2.0)
 
 
@@ -64,7 +65,7 @@ def _attack(name: str, patience: Patience, period: float) -> dict[str, Any]:
     law = UgvLaw(Avoidance(1.0, period), 1.0, 1.0, intervention_on_top=False)
     kind = Unmoved if name in FAVOURS else Believing
     gatekeepers = kind(team, law, [preset] * 2, Outlook(patience.longest), patience)
-    memory, proposal, place = Memory.empty(2), None, np.zeros(3)
+    memory, proposal, place = GatekeeperState.empty(2), None, np.zeros(3)
     accepted, executed, worst, began, longest, tries, unexpected = False, 0.0, 0.0, 0.0, 0.0, 0, 0
     left, alone = patience.most, 0.0
     reasons: set[str] = set()
@@ -80,7 +81,7 @@ def _attack(name: str, patience: Patience, period: float) -> dict[str, Any]:
             worst = max(worst, executed)
         positions = np.stack([place] * 3)
         if not gatekeepers.idle((proposal, None), positions, memory):
-            memory = gatekeepers.sample(t, (proposal, None), positions, np.zeros((3, 3)), memory)
+            memory = gatekeepers.sample(Inputs(t, (proposal, None), positions, np.zeros((3, 3)), law), memory)
             reasons |= {decision.reason for decision in memory.decisions}
         accepted = answer_to(proposal, memory.answers, 0) == ACCEPT
         if before and not (accepted and proposal is asked):
@@ -99,7 +100,12 @@ def _attack(name: str, patience: Patience, period: float) -> dict[str, Any]:
 
 
 def _next(
-    name: str, proposal: Proposal | None, memory: Memory, t: float, rng: np.random.Generator, patience: Patience
+    name: str,
+    proposal: Proposal | None,
+    memory: GatekeeperState,
+    t: float,
+    rng: np.random.Generator,
+    patience: Patience,
 ) -> Proposal | None:
     """What the UAV proposes now: a new one when the last is refused, withdrawn or replaced."""
     refused = memory.answers[0] in (REFUSE, DONE)
@@ -152,8 +158,8 @@ def test_attacks_use_all_tries_and_no_more() -> None:
 TURNED = [
     ("standing != ACCEPT:  # withdrawn", "proposal is None:"),
     (
-        "            held[i] = self._patience.rested(held[i], t)\n            if proposal is None:\n",
-        "            if proposal is None:\n                held[i] = self._patience.rested(held[i], t)\n",
+        "            held[i] = self._patience.rested(held[i], now.t)\n            if proposal is None:\n",
+        "            if proposal is None:\n                held[i] = self._patience.rested(held[i], now.t)\n",
     ),
     ("proposal.cause in self._team.ugvs and proposal", "proposal"),
 ]
