@@ -7,7 +7,7 @@ from numba import njit
 
 from airground_drake.base.arrays import Array
 from airground_drake.gatekeeper.cost import Terms
-from airground_drake.gatekeeper.problem import Kinematics, Problem
+from airground_drake.gatekeeper.problem import Problem
 
 
 def dual_bound(problem: Problem, normals: Array, omega: Array, multipliers: Array) -> float:
@@ -25,13 +25,11 @@ def dual_bound(problem: Problem, normals: Array, omega: Array, multipliers: Arra
         multipliers: of the half-planes, (N, m), 1/m; negative ones count as 0.
     """
     at = problem.positions(omega)
-    return float(_dual_bound(problem.kinematics, problem.terms, normals, omega, at, multipliers))
+    return float(_dual_bound(problem.terms, normals, omega, at, multipliers))
 
 
 @njit(cache=True)
-def _dual_bound(
-    motion: Kinematics, terms: Terms, normals: Array, omega: Array, positions: Array, multipliers: Array
-) -> float:
+def _dual_bound(terms: Terms, normals: Array, omega: Array, positions: Array, multipliers: Array) -> float:
     total, gradient = 0.0, np.zeros(3)  # of what comes from stage k on, in the position at its end
     for k in range(len(omega) - 1, -1, -1):
         pressure = 0.0
@@ -51,7 +49,7 @@ def _dual_bound(
             error = positions[k, a] - terms.reference[k, a]
             total += terms.dt * terms.error_weights[k] * error * error
             gradient[a] += 2.0 * terms.dt * terms.error_weights[k] * error
-            slope += terms.dt * (motion.velocities[1, k, a] - motion.velocities[0, k, a]) * gradient[a]
+            slope += terms.dt * (terms.velocities[1, k, a] - terms.velocities[0, k, a]) * gradient[a]
         total += min(-omega[k] * slope, (1.0 - omega[k]) * slope)
     return total
 

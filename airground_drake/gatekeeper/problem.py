@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
@@ -77,15 +76,11 @@ class Problem:
 
     @cached_property
     def terms(self) -> Terms:
-        """What (25) is made of, for compiled code."""
+        """What (23) and (25) are made of, for compiled code."""
         weights = error_weights(self.stages, self.dt, self.error_weight, self.terminal_weight)
-        data = self.reference, self.centres, self.distances
+        modes = np.stack([self.refuse, self.accept])
+        data = self.initial, modes, self.reference, self.centres, self.distances
         return Terms(float(self.dt), *data, weights, float(self.slack_weight))
-
-    @cached_property
-    def kinematics(self) -> Kinematics:
-        """(23), for compiled code."""
-        return Kinematics(float(self.dt), self.initial, np.stack([self.refuse, self.accept]))
 
     def is_finite(self) -> bool:
         """Whether all data are finite numbers."""
@@ -117,20 +112,6 @@ class Problem:
     def evaluate_half_planes(self, positions: Array, normals: Array) -> float:
         """Cost (25) through positions (N, 3) m when distances are measured along unit normals (N, m, 3)."""
         return half_plane_cost(self.terms, positions, normals)
-
-
-class Kinematics(NamedTuple):
-    """(23) as numba takes it.
-
-    Attributes:
-        dt: length of a stage, s.
-        initial: (3,), m.
-        velocities: of the modes, (2, N, 3), m/s, in the order of `rollout.REFUSED` and `ACCEPTED`.
-    """
-
-    dt: float
-    initial: Array
-    velocities: Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,12 +12,12 @@ from numba import njit
 
 from airground_drake.base.arrays import Array
 from airground_drake.gatekeeper.cost import Terms
-from airground_drake.gatekeeper.problem import Kinematics, Problem
+from airground_drake.gatekeeper.problem import Problem
 
 
 def nearest_in_reach(problem: Problem) -> Array:
     """Where in the box of each stage a plan could be nearest to each point, (N, m, 3), m."""
-    nearest: Array = _nearest(problem.kinematics, problem.terms)
+    nearest: Array = _nearest(problem.terms)
     return nearest
 
 
@@ -30,24 +30,24 @@ def within_reach(problem: Problem) -> npt.NDArray[np.bool_]:
 
 def remaining_cost(problem: Problem) -> Array:
     """Lower bound of (25) over the stages from k on, for k = 0..N, (N + 1,): task error from the box."""
-    tail: Array = _remaining_cost(problem.kinematics, problem.terms)
+    tail: Array = _remaining_cost(problem.terms)
     return tail
 
 
 @njit(cache=True)
-def _grow(motion: Kinematics, k: int, low: Array, high: Array) -> None:
+def _grow(terms: Terms, k: int, low: Array, high: Array) -> None:
     """From the box (low, high), (3,) each, m, at the beginning of stage k to that at its end, in place."""
     for a in range(3):
-        low[a] += motion.dt * min(motion.velocities[1, k, a], motion.velocities[0, k, a])
-        high[a] += motion.dt * max(motion.velocities[1, k, a], motion.velocities[0, k, a])
+        low[a] += terms.dt * min(terms.velocities[1, k, a], terms.velocities[0, k, a])
+        high[a] += terms.dt * max(terms.velocities[1, k, a], terms.velocities[0, k, a])
 
 
 @njit(cache=True)
-def _nearest(motion: Kinematics, terms: Terms) -> Array:
+def _nearest(terms: Terms) -> Array:
     nearest = np.empty_like(terms.centres)
-    low, high = motion.initial.copy(), motion.initial.copy()
+    low, high = terms.initial.copy(), terms.initial.copy()
     for k in range(len(terms.reference)):
-        _grow(motion, k, low, high)
+        _grow(terms, k, low, high)
         for m in range(len(terms.distances)):
             for a in range(3):
                 nearest[k, m, a] = min(max(terms.centres[k, m, a], low[a]), high[a])
@@ -55,12 +55,12 @@ def _nearest(motion: Kinematics, terms: Terms) -> Array:
 
 
 @njit(cache=True)
-def _remaining_cost(motion: Kinematics, terms: Terms) -> Array:
+def _remaining_cost(terms: Terms) -> Array:
     stages = len(terms.reference)
     tail = np.zeros(stages + 1)
-    low, high = motion.initial.copy(), motion.initial.copy()
+    low, high = terms.initial.copy(), terms.initial.copy()
     for k in range(stages):
-        _grow(motion, k, low, high)
+        _grow(terms, k, low, high)
         squared = 0.0
         for a in range(3):
             squared += max(0.0, low[a] - terms.reference[k, a], terms.reference[k, a] - high[a]) ** 2
