@@ -31,13 +31,11 @@ import cvxpy
 import numpy as np
 
 from airground_drake.gatekeeper.budget import Budget
-from airground_drake.gatekeeper.half_planes import normals_along
 from airground_drake.gatekeeper.outcome import Outlook, outcomes
 from airground_drake.gatekeeper.problem import Horizon, Problem, predicted_problem
+from airground_drake.gatekeeper.relaxation import normals_along, sum_up_rounding
 from airground_drake.gatekeeper.rollout import View
-from airground_drake.gatekeeper.rounding import sum_up_rounding
 from airground_drake.gatekeeper.routes.mixed_integer import MixedIntegerRoute
-from airground_drake.gatekeeper.routes.nonlinear import NonlinearRoute
 from airground_drake.gatekeeper.routes.relaxed import RelaxedRoute
 from airground_drake.gatekeeper.routes.route import Route
 from airground_drake.gatekeeper.solution import ConstantPlans, Solution, cheapest
@@ -60,7 +58,7 @@ COLUMNS = ("problems", "ugvs", "points", "stages", "route", "decisions", "p50_ms
 DEFAULT = "mixed_integer"
 RULE = 1e-3
 """What the default route may miss, relative."""
-SLOW = {"nonlinear_ipopt": 60, "cvxpy+scip": 60}
+SLOW = {"cvxpy+scip": 60}
 """Most stages, and one in ten solutions, for what takes seconds."""
 SCIP_LIMIT_S = 10.0
 
@@ -256,7 +254,6 @@ def contestants() -> dict[str, Callable[[], Any]]:
     """Every route, and the references that are installed."""
     routes: dict[str, Callable[[], Any]] = {name: ROUTES.load(name, of=Route) for name in ROUTES.own}
     routes["mixed_10"] = lambda: MixedIntegerRoute(10)
-    routes["nonlinear_ipopt"] = lambda: NonlinearRoute("ipopt")
     for name, module, make in (("casadi+ipopt", "casadi", CasadiRoute), ("cvxpy+scip", "pyscipopt", ScipRoute)):
         if find_spec(module) is None:
             print(f"{name}: {module} is not installed, left out")

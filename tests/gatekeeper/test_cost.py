@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from airground_drake.gatekeeper.half_planes import normals_along
 from airground_drake.gatekeeper.problem import Horizon, predicted_problem
+from airground_drake.gatekeeper.relaxation import normals_along
 from airground_drake.gatekeeper.rollout import View
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.policy import Proposal

@@ -10,15 +10,13 @@ import numpy.typing as npt
 from numba import njit
 
 from airground_drake.base.arrays import Array
-from airground_drake.gatekeeper.binary_program import BinaryProgram, Size
+from airground_drake.gatekeeper.binary_program import BinaryProgram
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.cost import Terms, half_plane_cost
 from airground_drake.gatekeeper.daqp_solver import Found, minimise
 from airground_drake.gatekeeper.drake_solvers import DrakeSearch
-from airground_drake.gatekeeper.dual_bound import dual_bound, multipliers_at
-from airground_drake.gatekeeper.half_planes import normals_along
 from airground_drake.gatekeeper.problem import Problem
-from airground_drake.gatekeeper.rounding import sum_up_rounding
+from airground_drake.gatekeeper.relaxation import dual_bound, multipliers_at, normals_along, sum_up_rounding
 from airground_drake.gatekeeper.routes.guard import guarded, unavoidable_cost
 from airground_drake.gatekeeper.solution import ConstantPlans, Solution, Status, cheapest
 
@@ -58,7 +56,7 @@ class MixedIntegerRoute:
             raise ValueError(f"blocks: {blocks}, allowed: 1 or more")
         self._blocks = blocks
         self._search: Callable[..., Found] = minimise if solver == "daqp" else DrakeSearch(solver).minimise
-        self._programs: dict[Size, BinaryProgram] = {}
+        self._programs: dict[tuple[int, int], BinaryProgram] = {}
 
     def solve(self, problem: Problem, budget: Budget = Budget()) -> Solution:  # noqa: B008 (immutable)
         """See `Route`."""
@@ -95,9 +93,9 @@ class MixedIntegerRoute:
 
     def _program(self, problem: Problem) -> BinaryProgram:
         stages = problem.stages
-        size = Size(stages, stages if self._blocks is None else min(self._blocks, stages))
+        size = stages, stages if self._blocks is None else min(self._blocks, stages)
         if size not in self._programs:
-            self._programs[size] = BinaryProgram(size)
+            self._programs[size] = BinaryProgram(*size)
         return self._programs[size]
 
 
