@@ -992,14 +992,6 @@ MIX_UPS = (
         tests=("tests/intervention/test_planner.py",),
     ),
     Mutant(
-        "one party of a joint plan is not told of a refusal",
-        "intervention/planner.py",
-        "party_refused = proposal is not None and bool(proposal.party)",
-        "party_refused = proposal is not None and bool(proposal.party) and name != self.ugvs[0]",
-        runs=("crowd d",),
-        tests=("tests/intervention/test_planner.py",),
-    ),
-    Mutant(
         "one party of a joint plan is not named",
         "intervention/database.py",
         "party = tuple(sorted(motions)) if",
