@@ -29,6 +29,7 @@ from airground_drake.registry import method_of
 from airground_drake.run.simulation import Recorder
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Scenario
+from airground_drake.scenarios.world import make_world
 from airground_drake.systems import UavController, UgvController, components
 
 Way = tuple[Array, float]
@@ -40,15 +41,15 @@ class Law:
 
     def __init__(self, scenario: Scenario) -> None:
         """Without any diagram."""
-        control, team = scenario.control, components.make_team(scenario)
+        control, world = scenario.control, make_world(scenario)
         avoidance: Avoidance = components.make_avoidance(scenario)
         law = components.make_law(scenario, method_of("a"))
-        self.ugvs = UgvController(team, law).velocity
+        self.ugvs = UgvController(world, law).velocity
         self.uav = UavController(
-            team, avoidance, gain=control.formation_gain_1_s, altitude=scenario.uav.altitude_m
+            world, avoidance, gain=control.formation_gain_1_s, altitude=scenario.uav.altitude_m
         ).velocity
         self.presets, self.period = components.make_presets(scenario), control.period_s
-        self.starts, self.zeta = components.make_starts(scenario), components.threshold(scenario)
+        self.starts, self.zeta = world.starts, components.threshold(scenario)
         self.samples = round(scenario.duration_s / control.period_s)
 
     def command(self, t: float, positions: Array, before: Array) -> Array:
@@ -98,7 +99,7 @@ def by_scipy(scenario: Scenario) -> Way:
 def by_drake(recorder: Recorder) -> Way:
     """The diagram, with its logs, noise and trigger, and the trace made of them."""
     trace = recorder.simulate()
-    period = trace.scenario["control"]["period_s"]
+    period = trace.scenario.control.period_s
     rows = np.searchsorted(trace.t, period * np.arange(round(trace.t[-1] / period) + 1) - 1e-6)
     fired = [event["t_s"] for event in trace.events if event["kind"] == "trigger"]
     return np.stack([trace.position(robot)[rows] for robot in trace.robots], axis=1), min(fired, default=np.inf)

@@ -59,8 +59,8 @@ def test_bodies_collide_when_their_surfaces_come_near_whose_radius_it_may_be(sha
     apart = {"o": 1.0, "uav": float(np.linalg.norm(trace.position("ugv1") - trace.position("uav"), axis=1).min())}
     assert apart["uav"] > 0.5
     for other in apart:
-        radii = apart[other] - trace.scenario["safe_distance"]["collision_m"] - gap_m
-        given = deepcopy(trace.scenario)
+        radii = apart[other] - trace.scenario.safe_distance.collision_m - gap_m
+        given = deepcopy(trace.meta["scenario"])
         given["ugvs"]["ugv1"]["radius_m"] = share * radii
         (given["obstacles"]["o"] if other == "o" else given["uav"])["radius_m"] = (1.0 - share) * radii
         found = collisions(replace(trace, meta={**trace.meta, "scenario": given}))

@@ -50,8 +50,8 @@ def test_recursion_as_printed_is_unsafe_and_does_not_stall(run: Runs) -> None:
     for name in ("a_recursion_nearest", "a_recursion_listed"):
         of_run = run("case_a", name)
         distance = [
-            np.linalg.norm(of_run.position("ugv1") - o["position_m"], axis=1).min()
-            for o in of_run.scenario["obstacles"].values()
+            np.linalg.norm(of_run.position("ugv1") - o.position_m, axis=1).min()
+            for o in of_run.scenario.obstacles.values()
         ]
         assert min(distance) < 1.95
         assert "arrival" in kinds(of_run, "ugv1")

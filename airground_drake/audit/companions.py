@@ -24,7 +24,8 @@ from airground_drake.run.simulation import Recorder, simulate
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.systems.components import make_outlook, make_patience, make_presets, make_team
+from airground_drake.scenarios.world import make_world
+from airground_drake.systems.components import make_outlook, make_patience, make_presets
 
 PAPERS_ROUTE = "gatekeeper.route=relaxed"
 """The paper's own way to decide, (27)-(29), whatever the default of a scenario."""
@@ -46,7 +47,7 @@ class Believing(OutcomeGatekeepers):
     @classmethod
     def of(cls, scenario: Scenario, law: UgvLaw) -> Believing:
         """In place of the gatekeepers of a scenario."""
-        return cls(make_team(scenario), law, make_presets(scenario), make_outlook(scenario), make_patience(scenario))
+        return cls(make_world(scenario), law, make_presets(scenario), make_outlook(scenario), make_patience(scenario))
 
 
 def companion_findings() -> list[Item]:

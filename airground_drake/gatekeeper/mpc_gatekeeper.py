@@ -22,9 +22,10 @@ from airground_drake.gatekeeper.solution import after_failure
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT, Disc, Proposals, Report, Reports, answer_to
 from airground_drake.intervention.policy import Proposal
+from airground_drake.nsbc.avoidance import Surroundings
 from airground_drake.nsbc.kernels import distances
 from airground_drake.nsbc.law import UgvLaw
-from airground_drake.nsbc.team import Team
+from airground_drake.world.world import World
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,8 +66,8 @@ class Inputs:
     Attributes:
         t: time, s.
         proposals: in force, one entry per UGV.
-        positions: of all robots, (n + 1, 3), m.
-        velocities: of all robots, (n + 1, 3), m/s.
+        positions: of all bodies that move, (M, 3), m.
+        velocities: of these, (M, 3), m/s.
         law: the UGVs' control law, with the gains in force.
     """
 
@@ -86,14 +87,13 @@ class Gatekeepers(abc.ABC):
             meanwhile).
     """
 
-    def __init__(self, team: Team, law: UgvLaw, presets: Sequence[Motion]) -> None:
-        """Of the UGVs of a team, with their control law and preset trajectories."""
+    def __init__(self, world: World, law: UgvLaw, presets: Sequence[Motion]) -> None:
+        """Of the UGVs of a world, with their control law and preset trajectories."""
         self.law = law
         self._presets = tuple(presets)
-        self._team = team
-        self._discs = np.column_stack([team.obstacles, team.obstacle_radii])
-        self._neighbourhood = team.neighbourhood(slice(0, len(team.ugvs)))
-        self._max_speed = team.max_speed
+        self._world = world
+        self._near = world.around(world.select("ugv"))
+        self._discs = np.column_stack([self._near.still, world.radius[len(world.moving) :]])
         self.times_s: list[float] = []
 
     @abc.abstractmethod
@@ -106,7 +106,7 @@ class Gatekeepers(abc.ABC):
 
     def _sensed(self, position: Array) -> npt.NDArray[np.bool_]:
         """Which obstacles are within sensing range, (m,)."""
-        away = distances(self._neighbourhood.obstacles, position)
+        away = distances(self._near.still, position)
         return np.asarray(away <= self.law.avoidance.sensing_range)
 
     def _report(self, position: Array, decision: Decision) -> Report:
@@ -117,16 +117,16 @@ class Gatekeepers(abc.ABC):
 
     def _view(self, now: Inputs, i: int) -> View:
         """What a UGV has around it: all obstacles and robots, whether within sensing range or not."""
-        around = self._neighbourhood
+        near = self._near
         return View(
             t=now.t,
             position=now.positions[i].copy(),
             preset=self._presets[i],
-            centres=around.around(now.positions).centre[i],
-            velocities=np.concatenate([np.zeros_like(around.obstacles), now.velocities[around.others[i]]]),
-            distances=around.distance[i],
-            shares=around.share[i],
-            max_speed=float(self._max_speed[i]),
+            centres=Surroundings.of(near, now.positions).centre[i],
+            velocities=np.concatenate([np.zeros_like(near.still), now.velocities[near.others[i]]]),
+            distances=near.distance[i],
+            shares=near.share[i],
+            max_speed=float(near.max_speed[i]),
         )
 
 
@@ -134,19 +134,19 @@ class PaperGatekeepers(Gatekeepers):
     """Method (c): problem (26) at every sample, and the first stage of its plan is the answer."""
 
     def __init__(
-        self, team: Team, law: UgvLaw, presets: Sequence[Motion], route: Route, horizon: Horizon, rules: Rules
+        self, world: World, law: UgvLaw, presets: Sequence[Motion], route: Route, horizon: Horizon, rules: Rules
     ) -> None:
-        """Of the UGVs of a team.
+        """Of the UGVs of a world.
 
         Args:
-            team: names, safe distances, speed limits.
+            world: who keeps what distance from whom.
             law: their control law.
             presets: their preset trajectories.
             route: solves (26).
             horizon: grid and weights of (25)-(27).
             rules: from the solution to the answer.
         """
-        super().__init__(team, law, presets)
+        super().__init__(world, law, presets)
         self._route, self._horizon, self._rules = route, horizon, rules
 
     def sample(self, now: Inputs, before: GatekeeperState) -> GatekeeperState:

@@ -30,7 +30,7 @@ from airground_drake.intervention.messages import ACCEPT, DONE, REFUSE, SILENT, 
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.kernels import news_within, within
 from airground_drake.nsbc.law import UgvLaw
-from airground_drake.nsbc.team import Team
+from airground_drake.world.world import World
 
 ACCEPTING: tuple[Reason, ...] = ("cheaper", "makes_way")
 """Reasons for which a proposal is accepted."""
@@ -44,11 +44,12 @@ class OutcomeGatekeepers(Gatekeepers):
     """The UGVs of a team under method (d)."""
 
     def __init__(
-        self, team: Team, law: UgvLaw, presets: Sequence[Motion], outlook: Outlook, patience: Patience
+        self, world: World, law: UgvLaw, presets: Sequence[Motion], outlook: Outlook, patience: Patience
     ) -> None:
-        """Of the UGVs of a team: their law, their preset trajectories, how far they look and how long they wait."""
-        super().__init__(team, law, presets)
+        """Of the UGVs of a world: their law, their preset trajectories, how far they look and how long they wait."""
+        super().__init__(world, law, presets)
         self._outlook, self._patience = outlook, patience
+        self._ugvs = world.names("ugv")
 
     def idle(self, proposals: Proposals, positions: Array, before: GatekeeperState) -> bool:
         """Whether a sample changes nothing."""
@@ -89,7 +90,7 @@ class OutcomeGatekeepers(Gatekeepers):
 
     def _remembered(self, positions: Array, before: GatekeeperState) -> np.ndarray:
         """Which obstacles each UGV has sensed up to now, (n, m); the very same array if nothing is new."""
-        points, own, reach = self._neighbourhood.obstacles, positions[:-1], self.law.avoidance.sensing_range
+        points, own, reach = self._near.still, positions[self._near.members], self.law.avoidance.sensing_range
         if before.sensed.shape != (len(own), len(points)):
             return within(points, own, reach)
         if news_within(points, own, reach, before.sensed):
@@ -100,7 +101,7 @@ class OutcomeGatekeepers(Gatekeepers):
         """Whether a UGV senses an obstacle for the first time that is not on the proposal's map."""
         if sensed is before.sensed:
             return False
-        new = self._team.obstacles[sensed[i] & ~before.sensed[i]]
+        new = self._near.still[sensed[i] & ~before.sensed[i]]
         apart = np.linalg.norm(new[:, None] - proposal.mapped, axis=2)
         return not (apart <= SAME_M).any(axis=1).all()
 
@@ -135,7 +136,7 @@ class OutcomeGatekeepers(Gatekeepers):
     ) -> tuple[Reason, Outcome, Outcome]:
         """The reason for the answer, and what comes of refusing and of accepting."""
         refuse, accept = self.foresee(self._view_of(now, known, i, proposal), now.law, proposal)
-        favour = proposal.cause in self._team.ugvs and proposal.cause != self._team.ugvs[i]
+        favour = proposal.cause in self._ugvs and proposal.cause != self._ugvs[i]
         return reason_of(refuse, accept, favour=favour), refuse, accept
 
     def foresee(self, seen: View, law: UgvLaw, proposal: Proposal) -> tuple[Outcome, Outcome]:
@@ -144,10 +145,10 @@ class OutcomeGatekeepers(Gatekeepers):
 
     def _view_of(self, now: Inputs, known: GatekeeperState, i: int, proposal: Proposal) -> View:
         """What a UGV knows: obstacles that it has sensed or been told of, other robots and what these are asked."""
-        around, m = self._view(now, i), len(self._team.obstacles)
+        around, m = self._view(now, i), len(self._near.still)
         discs, distances = self._known(now.positions[i], known.sensed[i], i, proposal)
         asked = []
-        for j in self._neighbourhood.others[i].tolist():
+        for j in self._near.others[i].tolist():
             other = now.proposals[j] if j < len(now.proposals) else None
             answer = answer_to(other, known.answers, j)
             asked.append((other.motion, answer == ACCEPT) if other and answer in (ACCEPT, SILENT) else None)
@@ -175,15 +176,16 @@ class OutcomeGatekeepers(Gatekeepers):
         Returns:
             Centres, (k, 3), and safe distances, (k,), m.
         """
-        own, claimed = self._team.obstacles[sensed], proposal.mapped
+        own, claimed = self._near.still[sensed], proposal.mapped
         radii = np.broadcast_to(proposal.mapped_radii, len(claimed))
         hidden = np.linalg.norm(claimed - position, axis=1) > self.law.avoidance.sensing_range
         apart = np.linalg.norm(claimed[:, None] - own, axis=2)
         new = np.flatnonzero(hidden & (apart > SAME_M).all(axis=1) & np.isfinite(radii) & (radii >= 0.0))
         nearest = np.argsort(np.linalg.norm(claimed[new] - position, axis=1), kind="stable")[:MOST_CLAIMED]
         new = new[np.sort(nearest)]
-        bodies = np.concatenate([self._team.obstacle_radii[sensed], radii[new]])
-        return np.concatenate([own, claimed[new]]), self._team.distance_to(bodies)[i]
+        away = self._world.apart("ugv", "obstacle") + (self._world.radius[self._near.members[i]] + radii[new])
+        distances = np.concatenate([self._near.distance[i, : len(sensed)][sensed], away])
+        return np.concatenate([own, claimed[new]]), distances
 
 
 def _answer(decision: Decision, standing: float) -> float:

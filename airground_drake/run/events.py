@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
+from airground_drake.scenarios.schema import Obstacle, Uav, Ugv
 
 
 def extract(trace: Trace, sent: Iterable[tuple[str, float, str]]) -> list[dict[str, Any]]:
@@ -47,9 +48,8 @@ def extract(trace: Trace, sent: Iterable[tuple[str, float, str]]) -> list[dict[s
 def _add_arrival(trace: Trace, robot: str, add: Any) -> None:
     """The time from which on the robot stays within the arrival tolerance of its target."""
     scenario = trace.scenario
-    spec = scenario["ugvs"].get(robot, scenario["uav"])
-    away = np.linalg.norm(trace.position(robot) - np.array(spec["target_m"]), axis=1)
-    outside = np.flatnonzero(away > scenario["arrival_tolerance_m"])
+    away = np.linalg.norm(trace.position(robot) - np.array(scenario.robots[robot].target_m), axis=1)
+    outside = np.flatnonzero(away > scenario.arrival_tolerance_m)
     first = int(outside[-1]) + 1 if len(outside) else 0
     if first < len(away):
         add(trace.t[first], robot, "arrival")
@@ -58,15 +58,14 @@ def _add_arrival(trace: Trace, robot: str, add: Any) -> None:
 def _add_collisions(trace: Trace, robot: str, add: Any) -> None:
     """Visits within collision distance, from surface to surface, of obstacles and of robots that are listed later."""
     scenario, position = trace.scenario, trace.position(robot)
-    bodies = {**scenario["ugvs"], scenario["uav"]["name"]: scenario["uav"]}
-    own = bodies[robot]["radius_m"]
+    bodies, own = scenario.robots, scenario.robots[robot].radius_m
     low, high = position.min(axis=0), position.max(axis=0)  # the box around its way
 
-    def within(body: dict[str, Any]) -> float:
-        return float(scenario["safe_distance"]["collision_m"]) + float(own + body["radius_m"])
+    def within(body: Ugv | Uav | Obstacle) -> float:
+        return scenario.safe_distance.collision_m + (own + body.radius_m)
 
-    names, there = list(scenario["obstacles"]), list(scenario["obstacles"].values())
-    places = np.array([body["position_m"] for body in there], dtype=np.float64).reshape(-1, 3)
+    names, there = list(scenario.obstacles), list(scenario.obstacles.values())
+    places = np.array([body.position_m for body in there], dtype=np.float64).reshape(-1, 3)
     beside = np.linalg.norm(np.maximum(np.maximum(low - places, places - high), 0.0), axis=1)
     for k in np.flatnonzero(beside <= [within(body) for body in there]):
         for row in visits(position - places[k], within(there[k])):

@@ -24,10 +24,9 @@ from airground_drake.gatekeeper.rollout import View
 from airground_drake.gatekeeper.routes.mixed_integer import MixedIntegerRoute
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.policy import Proposal
-from airground_drake.nsbc.avoidance import Avoidance, Composition, Surroundings, limit_speed
+from airground_drake.nsbc.avoidance import Avoidance, Composition, Surroundings
 from airground_drake.nsbc.kernels import distances, news_within, within
 from airground_drake.nsbc.law import UgvLaw
-from airground_drake.nsbc.team import Team
 from airground_drake.run.events import extract
 from airground_drake.run.trace import (
     DECISION_COLUMNS,
@@ -44,6 +43,8 @@ from airground_drake.systems.decision import DecisionVariable
 from airground_drake.systems.diagram import RECORDED, DecisionFactory, Model, build_model
 from airground_drake.systems.lifetime import untie
 from airground_drake.systems.signals import FIELDS, Status
+from airground_drake.world.plant import FirstOrder
+from airground_drake.world.world import Body, World
 
 if TYPE_CHECKING:
     from pydrake.geometry import Meshcat
@@ -153,7 +154,7 @@ class Recorder:
         return self._trace(context, seed, wall)
 
     def _trace(self, context: Context, seed: int, wall: float) -> Trace:
-        model, ugvs, robots = self._model, self._model.team.ugvs, self._model.team.robots
+        model, ugvs, robots = self._model, self._model.world.names("ugv"), self._model.world.robots
         log = self._log.FindLog(context)
         ends = np.cumsum([model.diagram.GetOutputPort(name).size() for name in RECORDED])
         data = dict(zip(RECORDED, np.split(log.data(), ends[:-1]), strict=True))
@@ -290,13 +291,14 @@ def warm_up() -> None:
     news_within(one, one, 1.0, within(one, one, 1.0))
     distances(one, one[0])
     avoidance = Avoidance(gain=1.0, period=0.1)
-    spaces = avoidance.half_spaces(one, one, Surroundings(np.zeros((1, 1, 3)), np.ones((1, 1)), np.ones((1, 1))))
-    limit_speed(avoidance.apply(-one, spaces), np.ones(1))
-    team = Team(("a",), "b", np.zeros((1, 3)), 1.0, 1.0, 1.0, np.ones(2))
-    team.neighbourhood(slice(0, 1)).around(np.ones((2, 3)))
+    plant = FirstOrder()
+    world = World((Body("a", "ugv", one[0], plant=plant), Body("b", "uav", one[0], plant=plant)), {})
+    near = world.around(slice(0, 1))
+    avoidance.command(one, world.starts, near)
+    Surroundings.of(near, world.starts)
     seen = View(0.0, one[0], motion, one, one, np.ones(1), np.ones(1), 1.0)
     law, horizon = UgvLaw(avoidance, 1.0, 1.0, False), Horizon(2, 1, 1.0, 1.0)
-    law.velocity(np.ones((2, 3)), team.neighbourhood(slice(0, 1)), one, one, [None], one, np.ones(1))
+    law.velocity(world.starts, near, one, one, [None])
     MixedIntegerRoute().solve(predicted_problem(seen, law, Proposal("", 0.0, motion), horizon))
     outcomes(seen, law, Proposal("", 0.0, motion), Outlook(longest=1.0))
 
@@ -333,7 +335,7 @@ def simulate(
 
 
 def _distinct(t: Array, command: Array) -> npt.NDArray[np.intp]:
-    """Indices of rows (T,) at distinct times, for commands (3 (n + 1), T).
+    """Indices of rows (T,) at distinct times, for commands (3 r, T) of r robots.
 
     Of rows within MERGE_S of each other the last one is kept that still has the command of the first: the
     command that led there.
@@ -348,7 +350,7 @@ def _signals(t: Array, data: dict[str, Array], ugvs: tuple[str, ...], robots: tu
     columns: dict[str, Array] = {"t_s": t}
     for i, robot in enumerate(robots):
         for a, axis in enumerate("xyz"):
-            columns[f"{robot}.{axis}_m"] = data["team_position"][3 * i + a]
+            columns[f"{robot}.{axis}_m"] = data["bodies"][3 * i + a]
         for a, axis in enumerate("xyz"):
             columns[f"{robot}.v{axis}_m_s"] = data["team_command"][3 * i + a]
     for i, ugv in enumerate(ugvs):

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from pydrake.systems.framework import Diagram, InputPortIndex, OutputPortIndex, PortDataType, System
 
 UNITS = {
-    "team_position": "m",
+    "bodies": "m",
     "team_command": "m/s",
     "ugv_command": "m/s",
     "uav_command": "m/s",

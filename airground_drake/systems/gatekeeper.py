@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any, Self
 
-import numpy as np
 from pydrake.common.value import AbstractValue, Value
 from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSystem, State, ValueProducer
 
@@ -12,8 +11,9 @@ from airground_drake.gatekeeper.answer import Decision
 from airground_drake.gatekeeper.mpc_gatekeeper import Gatekeepers, GatekeeperState, Inputs
 from airground_drake.intervention.messages import ACCEPT, SILENT, Report
 from airground_drake.systems.lifetime import weakly
-from airground_drake.systems.signals import Answer, UgvGains, laid_out, no_proposals, no_reports
+from airground_drake.systems.signals import Answer, UgvGains, declare_bodies, laid_out, no_proposals, no_reports
 from airground_drake.systems.ticks import Ticks
+from airground_drake.world.world import World
 
 
 class DecisionLog(list[Decision]):
@@ -32,24 +32,22 @@ class Gatekeeper(LeafSystem):
     outcome and watches the progress, see `gatekeeper.outcome_gatekeeper`. The answer goes to its controller and back
     to the UAV.
 
-    Ports (n UGVs):
-        in  `team_position` (3(n+1)) m; `ugv_command` (3n) and `uav_command` (3) m/s, for the predicted motion
-            of the other robots; `gains`, the `UgvGains` that the controllers run with; `proposals` abstract, n of
-            Proposal or None.
+    Ports (n UGVs, r robots, M bodies that move):
+        in  `bodies` (3M) m; `team_command` (3r) m/s, for the predicted motion of the other robots; `gains`, the
+            `UgvGains` that the controllers run with; `proposals` abstract, n of Proposal or None.
         out `answers` (2n), an `Answer` per UGV, and `reports` (abstract), see `messages`; held.
     State: abstract, a `GatekeeperState`.
     Rate: one update per gatekeeper period, from t = 0. What it decides there is published at the end of the
     simulator's step: put into a log that the Context holds, as Drake's loggers do. The log decides nothing.
     """
 
-    def __init__(self, gatekeepers: Gatekeepers, count: int, *, period: float, control: float) -> None:
-        """Declare ports, state and the periodic update for `count` UGVs; its period and the controllers', s."""
+    def __init__(self, gatekeepers: Gatekeepers, world: World, *, period: float, control: float) -> None:
+        """Declare ports, state and the periodic update for the UGVs of a world; its period and the controllers', s."""
         super().__init__()
-        n = count
+        n = len(world.names("ugv"))
         self._gatekeepers = gatekeepers
-        self._position = self.DeclareVectorInputPort("team_position", 3 * (n + 1))
-        self._ugv_command = self.DeclareVectorInputPort("ugv_command", 3 * n)
-        self._uav_command = self.DeclareVectorInputPort("uav_command", 3)
+        self._bodies = declare_bodies(self, world)
+        self._command = self.DeclareVectorInputPort("team_command", 3 * len(world.robots))
         self._gains = self.DeclareVectorInputPort("gains", len(UgvGains.get_fields()))
         self._proposals = self.DeclareAbstractInputPort("proposals", no_proposals(n))
         state = self.DeclareAbstractState(Value(GatekeeperState.empty(n)))
@@ -109,10 +107,10 @@ class Gatekeeper(LeafSystem):
         if not self._ticks.due(context.get_time()):
             return EventStatus.DidNothing()
         proposals, before = self._proposals.Eval(context), self._memory(context)
-        positions = self._position.Eval(context).reshape(-1, 3)
+        positions = self._bodies.Eval(context).reshape(-1, 3)
         if self._gatekeepers.idle(proposals, positions, before):
             return EventStatus.DidNothing()
-        velocities = np.concatenate([self._ugv_command.Eval(context), self._uav_command.Eval(context)]).reshape(-1, 3)
+        velocities = self._command.Eval(context).reshape(-1, 3)
         law = self._gatekeepers.law.with_gains(*self._gains.Eval(context).tolist())
         now = Inputs(context.get_time(), proposals, positions, velocities, law)
         state.get_mutable_abstract_state(self._state).set_value(self._gatekeepers.sample(now, before))

@@ -55,7 +55,7 @@ def assert_holds(trace: Trace, *claims: str | TraceClaim, exercised: bool = Fals
     objects = [claim for claim in claims if not isinstance(claim, str)]
     verdicts = verify(trace, named or None) if named or not claims else []
     verdicts += [Verdict(claim, trace.run, claim.judge(trace), claim.expected) for claim in objects]
-    place = f"run {trace.run} of {trace.scenario['name']} (method {trace.meta['method']}, seed {trace.meta['seed']})"
+    place = f"run {trace.run} of {trace.scenario.name} (method {trace.meta['method']}, seed {trace.meta['seed']})"
     if silent := sorted(set(named) - {verdict.claim.id for verdict in verdicts}):
         raise ClaimError(f"{', '.join(silent)}: nothing is claimed about {place}")
     _require(verdicts, f"on {place}", exercised=exercised)

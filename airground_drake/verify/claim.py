@@ -214,9 +214,9 @@ def require_motion(trace: Trace) -> None:
             not agree with its command to within `MOTION_TOLERANCE_M`.
     """
     scenario, t = trace.scenario, trace.t
-    if scenario["runs"].get(trace.run, {}).get("method") != trace.meta["method"]:
+    if trace.run not in scenario.runs or scenario.runs[trace.run].method != trace.meta["method"]:
         raise TraceError(f"the scenario declares no run {trace.run!r} of method {trace.meta['method']!r}")
-    if trace.ugvs != list(scenario["ugvs"]) or trace.robots != [*trace.ugvs, scenario["uav"]["name"]]:
+    if trace.ugvs != list(scenario.ugvs) or trace.robots != [*trace.ugvs, scenario.uav.name]:
         raise TraceError(f"the trace is of the robots {trace.robots}, which are not those of its scenario")
     if len(t) < 2 or (np.diff(t) < 0.0).any():
         raise TraceError("the trace has fewer than two rows, or its time runs backwards")
@@ -235,8 +235,8 @@ def require_whole_run(trace: Trace) -> None:
         TraceError: if they do not.
     """
     t = trace.t
-    duration = trace.scenario["duration_s"]
-    period = trace.scenario["control"]["period_s"]
+    duration = trace.scenario.duration_s
+    period = trace.scenario.control.period_s
     if abs(t[0]) > TIME_TOLERANCE_S or abs(t[-1] - duration) > TIME_TOLERANCE_S:
         raise TraceError(f"the trace covers {t[0]} to {t[-1]} s of a run from 0 to {duration} s")
     gap = np.diff(t)

@@ -16,7 +16,8 @@ from airground_drake.intervention.policy import Observation, Proposal
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.law import UgvLaw
 from airground_drake.scenarios.load import load
-from airground_drake.systems.components import make_presets, make_team
+from airground_drake.scenarios.world import make_world
+from airground_drake.systems.components import make_presets
 
 LAW = UgvLaw(Avoidance(3.0, 0.05, 4.0), 2.0, 1.5, intervention_on_top=False)
 
@@ -109,15 +110,15 @@ STALL_POSITION = np.array([3.36888, 5.10219, 0.0])
 
 def case_a_proposal() -> tuple[View, UgvLaw, Proposal, Horizon]:
     scenario = load("case_a")[0]
-    team, preset = make_team(scenario), make_presets(scenario)[0]
+    preset, obstacles = make_presets(scenario)[0], make_world(scenario).around(slice(0, 1)).still
     t = 14.5
     seen = Observation(
         t=t, start=t + 0.05, robot="ugv1", position=STALL_POSITION, target=np.array([3.3, 13.0, 0.0]), preset=preset,
-        obstacles=team.obstacles, mapped=team.obstacles, others=np.zeros((0, 3)), safe_distance=2.0, refusals=0,
+        obstacles=obstacles, mapped=obstacles, others=np.zeros((0, 3)), safe_distance=2.0, refusals=0,
     )  # fmt: skip
     motion = Detour(speed_m_s=2.85).propose(seen)
     assert motion is not None
-    scene = View(t + 0.05, STALL_POSITION, preset, team.obstacles, np.zeros((3, 3)), np.full(3, 2.0), np.ones(3), 3.0)
+    scene = View(t + 0.05, STALL_POSITION, preset, obstacles, np.zeros((3, 3)), np.full(3, 2.0), np.ones(3), 3.0)
     law = UgvLaw(Avoidance(3.0, 0.05, 4.0), 2.0, 1.5, intervention_on_top=False)
     return scene, law, Proposal("detour", t, motion), Horizon(60, 1, 1.0, 1000.0)
 

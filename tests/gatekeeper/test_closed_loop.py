@@ -29,11 +29,11 @@ def test_switching_plans_are_those_of_the_running_controller_in_a_diagram(seed: 
     controller = builder.AddNamedSystem("controller", case.controller)
     plant = builder.AddNamedSystem("plant", Integrator(6))
     others = builder.AddNamedSystem("uav", ConstantVectorSource(FAR))
-    position = builder.AddNamedSystem("team_position", Multiplexer([6, 3]))
+    position = builder.AddNamedSystem("bodies", Multiplexer([6, 3]))
     builder.Connect(controller.GetOutputPort("command"), plant.get_input_port())
     builder.Connect(plant.get_output_port(), position.get_input_port(0))
     builder.Connect(others.get_output_port(), position.get_input_port(1))
-    builder.Connect(position.get_output_port(), controller.GetInputPort("team_position"))
+    builder.Connect(position.get_output_port(), controller.GetInputPort("bodies"))
     reference = builder.AddNamedSystem(
         "reference",
         TrajectorySource(

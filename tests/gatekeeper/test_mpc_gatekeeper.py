@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from builders.worlds import world
 
 from airground_drake.gatekeeper.answer import Decision, Rules
 from airground_drake.gatekeeper.budget import Budget
@@ -16,7 +17,6 @@ from airground_drake.intervention.messages import ACCEPT
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.law import UgvLaw
-from airground_drake.nsbc.team import Team
 
 
 class Agreeing(PaperGatekeepers):
@@ -29,11 +29,10 @@ class Agreeing(PaperGatekeepers):
 
 
 def test_the_dwell_of_an_answer_begins_anew_with_each_proposal() -> None:
-    team = Team(("ugv",), "uav", np.empty((0, 3)), 2.0, 2.0, 1.0, np.ones(2))
     law = UgvLaw(Avoidance(3.0, 0.05, 4.0), 2.0, 1.5, intervention_on_top=True)
     motion = Motion(np.zeros(1), np.zeros((1, 3)))
     rules = Rules(switching_margin=0.1, min_dwell=0.2)
-    gate = Agreeing(team, law, [motion], RelaxedRoute(), Horizon(4, 1, 1.0, 1.0, 0.0), rules)
+    gate = Agreeing(world(("ugv",)), law, [motion], RelaxedRoute(), Horizon(4, 1, 1.0, 1.0, 0.0), rules)
     state = GatekeeperState.empty(1)
     since = []
     for k, number in enumerate((0, 0, 1, 1)):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from builders.worlds import world
 
 from airground_drake.gatekeeper.mpc_gatekeeper import GatekeeperState, Inputs
 from airground_drake.gatekeeper.outcome import Outcome, Outlook
@@ -14,7 +15,6 @@ from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.law import UgvLaw
-from airground_drake.nsbc.team import Team
 
 ROCK = np.array([[3.0, 0.0, 0.0]])
 STAYS = Motion(np.array([0.0, 5.0]), np.array([[20.0, 0.0, 0.0], [20.0, 0.0, 0.0]]))
@@ -22,11 +22,10 @@ STAYS = Motion(np.array([0.0, 5.0]), np.array([[20.0, 0.0, 0.0], [20.0, 0.0, 0.0
 
 def gatekeepers(*ugvs: str, rocks: np.ndarray = ROCK) -> OutcomeGatekeepers:
     """Of UGVs that are to be at (20, 0), with a rock on the way and a sensing range of 4 m."""
-    team = Team(ugvs, "uav", rocks, 2.0, 2.0, 1.0, np.full(len(ugvs) + 1, 3.0))
     law = UgvLaw(Avoidance(3.0, 0.05, 4.0), 2.0, 1.5, intervention_on_top=False)
     patience = Patience(most=2, rest=1.0, longest=5.0)
     preset = Motion(np.zeros(1), np.array([[20.0, 0.0, 0.0]]))
-    return OutcomeGatekeepers(team, law, [preset] * len(ugvs), Outlook(5.0), patience)
+    return OutcomeGatekeepers(world(ugvs, rocks), law, [preset] * len(ugvs), Outlook(5.0), patience)
 
 
 def sampled(

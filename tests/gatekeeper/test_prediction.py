@@ -15,7 +15,8 @@ from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.law import UgvLaw
 from airground_drake.scenarios.load import load
-from airground_drake.systems.components import make_presets, make_team
+from airground_drake.scenarios.world import make_world
+from airground_drake.systems.components import make_presets
 from airground_drake.systems.controllers import UgvController
 
 
@@ -27,8 +28,8 @@ def test_prediction_is_the_running_controller(on_top: bool, selection: np.ndarra
     scene, law, proposal, _ = case_a_proposal()
     law = replace(law, intervention_on_top=on_top)
     proposal = replace(proposal, selection=selection)
-    team, presets = make_team(scenario), make_presets(scenario)
-    controller = UgvController(team, law)
+    presets = make_presets(scenario)
+    controller = UgvController(make_world(scenario), law)
     h = law.avoidance.period
     loop = closed_loop(scene, law, proposal, 60, 1)
     for accepted, predicted in zip((True, False), loop.constant_plans()[:2], strict=True):

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from builders.worlds import world
 
 from airground_drake.audit.companions import Believing
 from airground_drake.base.arrays import Array
@@ -29,7 +30,6 @@ from airground_drake.intervention.messages import ACCEPT, DONE, REFUSE, answer_t
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.law import UgvLaw
-from airground_drake.nsbc.team import Team
 from airground_drake.scenarios.load import load
 from airground_drake.verify.model.patience.live_wait import LiveWait
 
@@ -60,11 +60,10 @@ def attacks(patience: Patience, period: float) -> list[dict[str, Any]]:
 
 def _attack(name: str, patience: Patience, period: float) -> dict[str, Any]:
     rng = np.random.default_rng(len(name))
-    team = Team((UGV, OTHER), "uav", np.empty((0, 3)), 1.0, 1.0, 1.0, np.ones(3))
     preset = Motion(np.zeros(1), np.zeros((1, 3)))
     law = UgvLaw(Avoidance(1.0, period), 1.0, 1.0, intervention_on_top=False)
     kind = Unmoved if name in FAVOURS else Believing
-    gatekeepers = kind(team, law, [preset] * 2, Outlook(patience.longest), patience)
+    gatekeepers = kind(world((UGV, OTHER), max_speed=1.0), law, [preset] * 2, Outlook(patience.longest), patience)
     memory, proposal, place = GatekeeperState.empty(2), None, np.zeros(3)
     accepted, executed, worst, began, longest, tries, unexpected = False, 0.0, 0.0, 0.0, 0.0, 0, 0
     left, alone = patience.most, 0.0
@@ -162,7 +161,7 @@ TURNED = [
         "            held[i] = self._patience.rested(held[i], now.t)\n            if proposal is None:\n",
         "            if proposal is None:\n                held[i] = self._patience.rested(held[i], now.t)\n",
     ),
-    ("proposal.cause in self._team.ugvs and proposal", "proposal"),
+    ("proposal.cause in self._ugvs and proposal", "proposal"),
     ("self._patience.over(held, now.t)", f"self._patience.over(held, now.t - {PERIOD})"),
     ("if self._patience.exhausted(held):", "if held.tries > self._patience.most:"),
 ]

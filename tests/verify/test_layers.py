@@ -16,7 +16,8 @@ PACKAGE = Path(airground_drake.__file__).parent
 ALLOWED: dict[str, set[str]] = {
     "engines": {"base.arrays", "base.interruption", "base.statuses", "verify.engines", "verify.finding"},
     "runs": {
-        "base.arrays", "base.errors", "run.trace", "verify.engines", "verify.runs", "verify.claim", "verify.finding",
+        "base.arrays", "base.errors", "run.trace", "scenarios.schema", "verify.engines", "verify.runs", "verify.claim",
+        "verify.finding",
     },
 }  # fmt: skip
 """By folder of verify/, beginnings of what its modules may import of this package."""

@@ -97,9 +97,9 @@ def of_run(trace: Trace) -> dict[str, Any]:
         for this drift with the assumed noise, m, and with the run's own, m; and the extra risk at the run's drift and
         noise. None where there is no such number: a task error that does not grow, or a run without noise.
     """
-    decision = trace.scenario["decision"]
-    rule, noise, zeta = decision["threshold"], float(decision["noise_m_sqrt_s"]), float(trace.meta["zeta_m"])
-    costs = rule["c1_1_s"], rule["c2"]
+    decision = trace.scenario.decision
+    rule, noise, zeta = decision.threshold, decision.noise_m_sqrt_s, float(trace.meta["zeta_m"])
+    costs = rule.c1_1_s, rule.c2
     found = {}
     for ugv in trace.ugvs:
         times = [float(event["t_s"]) for event in trace.events if (event["robot"], event["kind"]) == (ugv, "trigger")]
@@ -110,7 +110,7 @@ def of_run(trace: Trace) -> dict[str, Any]:
         before, after = np.interp([begin, times[0]], trace.t, error)
         drift = float(after - before) / (times[0] - begin)
         optima = [optimal_threshold(drift, each, *costs) if drift > 0.0 and each > 0.0 else None
-                  for each in (rule["noise_m_sqrt_s"], noise)]  # fmt: skip
+                  for each in (rule.noise_m_sqrt_s, noise)]  # fmt: skip
         extra = None
         if optima[1] is not None:
             more = bayes_risk(zeta, drift, noise, *costs) - bayes_risk(optima[1], drift, noise, *costs)

@@ -21,7 +21,7 @@ def control_samples(t: Array, period: float) -> npt.NDArray[np.intp]:
 
 def samples_of(trace: Trace) -> npt.NDArray[np.intp]:
     """Rows of the control samples of a run, (S,)."""
-    return control_samples(trace.t, trace.scenario["control"]["period_s"])
+    return control_samples(trace.t, trace.scenario.control.period_s)
 
 
 def chosen_at(trace: Trace, samples: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:

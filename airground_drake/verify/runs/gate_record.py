@@ -157,14 +157,14 @@ def rows_of(trace: Trace) -> list[Row]:
 
 def _solved(trace: Trace, given: dict[str, Any], problem: dict[Any, Any]) -> Row:
     """A decision with its problem, a row of `Trace.problems`."""
-    gate = trace.scenario["gatekeeper"]
+    gate = trace.scenario.gatekeeper
     scalars = [float(problem[name]) for name in PROBLEM_SCALARS]
     dt, error, slack, terminal = scalars
     flat = {name: np.asarray(problem[name], dtype=np.float64).ravel() for name in PROBLEM_ARRAYS}
-    row = Row(given, dt, error, slack, terminal, _shaped(flat, int(gate["stages"])))
+    row = Row(given, dt, error, slack, terminal, _shaped(flat, int(gate.stages)))
     if not all(np.isfinite(values).all() for values in (np.array(scalars), *flat.values())):
         raise TraceError(f"{row.label}: its problem has numbers that are not finite")
-    if given["route"] != gate["route"]:
+    if given["route"] != gate.route:
         raise TraceError(f"{row.label}: not by the scenario's route")
     decided = given["status"] in ("optimal", "budget_spent", "solver_failed")
     if row.planned != decided or (decided and row.data["positions_m"] is None):

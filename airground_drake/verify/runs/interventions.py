@@ -20,5 +20,5 @@ def intervening(trace: Trace, ugv: str) -> Array:
 
 def talk_is_due(trace: Trace, ugv: str) -> bool:
     """Whether a UGV is intervened on for longer than a proposal and a decision on it take."""
-    periods = trace.scenario["intervention"]["period_s"] + trace.scenario["gatekeeper"]["period_s"]
+    periods = trace.scenario.intervention.period_s + trace.scenario.gatekeeper.period_s
     return bool((np.diff(intervening(trace, ugv)) > periods).any())

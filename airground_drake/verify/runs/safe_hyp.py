@@ -208,8 +208,8 @@ def _listed(trace: Trace, one: Guarantee) -> dict[str, Any]:
 
 def _gain(trace: Trace) -> Fraction:
     """a = min(A h, 1), of the numbers as they are written."""
-    control = trace.scenario["control"]
-    return min(_written(control["avoidance_gain_1_s"]) * _written(control["period_s"]), Fraction(1))
+    control = trace.scenario.control
+    return min(_written(control.avoidance_gain_1_s) * _written(control.period_s), Fraction(1))
 
 
 def _written(number: float) -> Fraction:
@@ -226,7 +226,7 @@ def guarantees(trace: Trace) -> list[Guarantee]:
 
 
 def _guarantees(trace: Trace) -> Iterator[Guarantee]:
-    samples, period = np.append(samples_of(trace), len(trace.t) - 1), trace.scenario["control"]["period_s"]
+    samples, period = np.append(samples_of(trace), len(trace.t) - 1), trace.scenario.control.period_s
     lasting = float(trace.t[samples[-1]] - trace.t[samples[-2]])
     last = Fraction(1) if abs(lasting - period) <= TIME_TOLERANCE_S else Fraction(lasting) / Fraction(period)
     places = {name: p if p.ndim == 1 else p[samples] for name, p in places_of(trace).items()}
@@ -275,9 +275,9 @@ def _binding(trace: Trace) -> tuple[int, dict[str, int]]:
 
 def _static(trace: Trace) -> Iterator[_Hypothesis]:
     """Hypotheses on the scenario and the start: gain, sensing range, distances at t = 0."""
-    control, places, limit = trace.scenario["control"], places_of(trace), speed_limits(trace)
-    period, reach = _written(control["period_s"]), _written(control["sensing_range_m"])
-    stable = np.array([float(1 - _written(control["avoidance_gain_1_s"]) * period)])
+    control, places, limit = trace.scenario.control, places_of(trace), speed_limits(trace)
+    period, reach = _written(control.period_s), _written(control.sensing_range_m)
+    stable = np.array([float(1 - _written(control.avoidance_gain_1_s) * period)])
     yield _Hypothesis("gain: A h <= 1", "1", trace.t[:1], stable, 0.0, {})
 
     @cache
@@ -300,7 +300,7 @@ def _static(trace: Trace) -> Iterator[_Hypothesis]:
 
 def _sampled(trace: Trace) -> Iterator[_Hypothesis]:
     """Hypotheses at the control samples: their spacing, straight motion between them, speed limits, planar motion."""
-    period, limits, t, samples = trace.scenario["control"]["period_s"], speed_limits(trace), trace.t, samples_of(trace)
+    period, limits, t, samples = trace.scenario.control.period_s, speed_limits(trace), trace.t, samples_of(trace)
     spacing = np.diff(np.append(t[samples], t[-1]))
     yield _Hypothesis("sampling", "s", t[samples], period - spacing, TIME_TOLERANCE_S, {})
     ends = np.append(samples, len(t) - 1)

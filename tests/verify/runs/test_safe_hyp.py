@@ -40,7 +40,7 @@ def test_what_is_missed_is_what_the_controllers_inequalities_lack(seed: int) -> 
     ticks = np.flatnonzero(np.abs(trace.t / h - np.round(trace.t / h)) < 1e-6)
     place = {name: trace.position(name)[ticks] for name in trace.robots}
     place |= {
-        name: np.broadcast_to(each["position_m"], (len(ticks), 3)) for name, each in trace.scenario["obstacles"].items()
+        name: np.broadcast_to(each.position_m, (len(ticks), 3)) for name, each in trace.scenario.obstacles.items()
     }
     step = {name: np.diff(each, axis=0) for name, each in place.items()}
 
@@ -139,7 +139,7 @@ def test_safe_hyp_without_a_gain_promises_what_all_samples_leave() -> None:
         "gain_1_s"
     ] = 0.0
     (pair,) = judge("SAFE-HYP", trace).evidence["pairs"]
-    samples = round(trace.scenario["duration_s"] / 0.025)
+    samples = round(trace.scenario.duration_s / 0.025)
     assert pair["guarantee_m"] == pytest.approx(2.0 - samples * 2.0**-10, abs=1e-12)
 
 
