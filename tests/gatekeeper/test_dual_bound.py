@@ -9,11 +9,8 @@ import pytest
 from builders.problems import PLANS, random_problem, rolled_out
 from hypothesis import given
 from hypothesis import strategies as st
-from pydrake.solvers import ClarabelSolver, SolverOptions
 
-from airground_drake.gatekeeper.convex_program import team_program
-from airground_drake.gatekeeper.dual_bound import dual_bound
-from airground_drake.gatekeeper.half_planes import normals_along
+from airground_drake.gatekeeper.relaxation import dual_bound, normals_along
 from gatekeeper.contract import used
 from gatekeeper.formulas import half_plane_cost
 
@@ -35,13 +32,9 @@ def test_the_dual_bound_holds_for_any_multipliers(seed: int, at: np.ndarray, ome
 
 
 def test_the_bound_of_the_relaxation_is_tight() -> None:
-    """The optimum of the same program, solved to a tenth of the route's tolerance, is not above the bound."""
-    options = SolverOptions()
-    for name in ("tol_gap_abs", "tol_gap_rel", "tol_feas"):
-        options.SetOption(ClarabelSolver.id(), name, 1e-9)
+    """The relaxed plan costs, along the half-planes, no more than the bound: so it is the optimum."""
     for problem in [*(random_problem(s, 24, 1 + s % 3) for s in range(8)), *(rolled_out(s) for s in range(8))]:
         solution = used("relaxed").solve(problem)
-        program = team_program([problem], [solution.normals]).program
-        optimum = ClarabelSolver().Solve(program, None, options).get_optimal_cost()
-        assert solution.route_bound == pytest.approx(optimum, rel=2e-5, abs=1e-8)
-        assert solution.route_bound <= optimum * (1.0 + 1e-7) + 1e-9
+        assert solution.relaxed is not None
+        reached = half_plane_cost(problem, solution.relaxed, solution.normals)
+        assert solution.route_bound == pytest.approx(reached, rel=1e-7, abs=1e-9)

@@ -10,7 +10,7 @@ from builders.closed_loop import AVOIDANCE
 from builders.problems import STALL_POSITION, case_a_proposal
 
 from airground_drake.gatekeeper.problem import Horizon, predicted_problem
-from airground_drake.gatekeeper.rollout import Scene, closed_loop
+from airground_drake.gatekeeper.rollout import View, closed_loop
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.law import UgvLaw
@@ -51,7 +51,7 @@ def test_prediction_is_the_running_controller(on_top: bool, selection: np.ndarra
 def test_points_are_kept_that_any_plan_might_reach(max_speed: float, kept: int) -> None:
     """A disc 1.5 m away, 1.5 s, and both constant plans at rest."""
     one, rest = np.ones(1), Motion(np.zeros(1), np.zeros((1, 3)))
-    scene = Scene(0.0, np.zeros(3), rest, np.array([[3.5, 0.0, 0.0]]), np.zeros((1, 3)), 2 * one, one, max_speed)
+    scene = View(0.0, np.zeros(3), rest, np.array([[3.5, 0.0, 0.0]]), np.zeros((1, 3)), 2 * one, one, max_speed)
     law = UgvLaw(AVOIDANCE, 2.0, 1.5, intervention_on_top=False)
     problem = predicted_problem(scene, law, Proposal("stay", 0.0, rest), Horizon(24, 1, 1.0, 200.0))
     assert len(problem.distances) == kept

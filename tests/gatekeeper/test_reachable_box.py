@@ -7,8 +7,7 @@ from builders.problems import PLANS, random_problem
 from hypothesis import given
 from hypothesis import strategies as st
 
-from airground_drake.gatekeeper.half_planes import normals_along
-from airground_drake.gatekeeper.reachable_box import remaining_cost, within_reach
+from airground_drake.gatekeeper.relaxation import normals_along, remaining_cost, within_reach
 
 
 @given(st.integers(0, 10**6), PLANS)

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from airground_drake.gatekeeper.rounding import rounding_deviation, sum_up_rounding
+from airground_drake.gatekeeper.relaxation import rounding_deviation, sum_up_rounding
 
 
 @given(arrays(np.float64, st.integers(1, 120), elements=st.floats(0.0, 1.0)))
