@@ -648,8 +648,7 @@ INTERVENTION = (
 
 ROUTES = (
     "tests/gatekeeper/test_answer.py",
-    "tests/gatekeeper/test_dual_bound.py",
-    "tests/gatekeeper/test_rounding.py",
+    "tests/gatekeeper/test_relaxation.py",
     "tests/gatekeeper/routes/test_relaxed.py",
     "tests/gatekeeper/routes/test_contract.py",
 )
