@@ -1,8 +1,8 @@
 """Runs of a campaign per second, and memory over many: `python benchmarks/throughput.py -n 40 --memory 2000`.
 
-The same draws in this process, in processes of loky, and on a Dask cluster of this machine. For each: runs per second
-by the clock, CPU seconds per run where it is worked (simulating, judging), and two efficiencies: of the clock, that is
-the rate over that of one process times the number of processes, which says little if other programs want the
+The same draws in this process, in processes forked from it, and on a Dask cluster of this machine. For each: runs per
+second by the clock, CPU seconds per run where it is worked (simulating, judging), and two efficiencies: of the clock,
+that is the rate over that of one process times the number of processes, which says little if other programs want the
 processors or there are fewer of them; and of the work, CPU seconds per run in one process over those in many. With
 `--memory`, so many short runs in this process, and what it has grown by since the tenth.
 """
@@ -53,7 +53,7 @@ def dask(workers: int) -> Iterator[Pool]:
         yield processes
 
 
-POOLS: dict[str, Any] = {"loky": pool.local, "dask": dask}
+POOLS: dict[str, Any] = {"local": pool.local, "dask": dask}
 
 
 def rates(spec: Spec, number: int, jobs: list[int], pools: list[str]) -> list[dict[str, Any]]:

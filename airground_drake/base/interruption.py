@@ -86,7 +86,6 @@ def _go_on_in_a_child() -> None:
             os._exit(code)
     end_descendants()
     files.sweep_temporary()
-    _remove_semaphores(child)
     refuse(f"the process of this command died ({ended_how(code)})", EXIT_TOOL)
     os._exit(EXIT_TOOL)
 
@@ -104,12 +103,6 @@ def _exit(code: int) -> NoReturn:
     os._exit(code)
 
 
-def _remove_semaphores(pid: int) -> None:
-    """Remove the semaphores of loky that a process has left; the process that would do so was killed with it."""
-    for path in Path("/dev/shm").glob(f"sem.loky-{pid}-*"):
-        path.unlink(missing_ok=True)
-
-
 def end_on_signals() -> None:
     """From now on SIGINT and SIGTERM end this process with exit code 130 and 143, and its descendants with it."""
     _open_standard_streams()
@@ -122,7 +115,6 @@ def end_on_signals() -> None:
         if os.getpid() == owner:  # what was forked has inherited this handler
             end_descendants()
             files.discard_partial()
-            _remove_semaphores(owner)
             with suppress(OSError):
                 os.write(stderr, _line(number, clear=os.isatty(stderr)))
             _exit(128 + number)

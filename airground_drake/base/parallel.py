@@ -12,15 +12,20 @@ import signal
 import sys
 import time
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from typing import TypeVar
 
 from airground_drake.base.errors import AirgroundError
+from airground_drake.base.interruption import end_with_parent
 from airground_drake.base.progress import SILENT, Progress
 
 T = TypeVar("T")
+
+MOST_JOBS = 1000
+"""Processes at a time that may be asked for: all of them begin at once."""
 
 _pieces: Sequence[Callable[[], object]] = ()
 """The work at hand: inherited, so that it need not be pickled."""
@@ -31,9 +36,35 @@ def forks() -> bool:
     return "fork" in multiprocessing.get_all_start_methods() and sys.platform != "darwin"
 
 
+def one_thread_each() -> None:
+    """Numerical libraries that are not loaded yet get one thread: as many processes as processors will use them."""
+    for name in ("OMP", "OPENBLAS", "MKL", "BLIS", "NUMEXPR"):
+        os.environ.setdefault(f"{name}_NUM_THREADS", "1")
+
+
 def processors() -> int:
     """How many processors this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@contextmanager
+def processes(jobs: int) -> Iterator[ProcessPoolExecutor]:
+    """So many processes that take calls; those that are still at work in the end are killed.
+
+    They are forked by the first call, and see everything that there is then. Where no process may be forked they begin
+    with nothing, and what is called is pickled there as elsewhere.
+    """
+    before = set(multiprocessing.active_children())
+    context = multiprocessing.get_context("fork" if forks() else "spawn")
+    pool = ProcessPoolExecutor(jobs, context, initializer=_begin)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DeprecationWarning)  # idle threads of numerical libraries survive a fork
+            yield pool
+    finally:
+        for process in set(multiprocessing.active_children()) - before:
+            process.kill()
+        pool.shutdown()
 
 
 def run_parallel(
@@ -63,14 +94,11 @@ def run_parallel(
         return [_done(_timed(piece), name, progress) for piece, name in zip(pieces, called, strict=True)]
     _pieces = pieces
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", DeprecationWarning)  # idle threads of numerical libraries survive a fork
-            context = multiprocessing.get_context("fork")
-            with ProcessPoolExecutor(most, context, initializer=_begin) as pool:
-                futures = {pool.submit(_piece, index): index for index in range(len(pieces))}
-                for future in as_completed(futures):
-                    _done(future.result(), called[futures[future]], progress)
-                return [future.result()[0] for future in futures]  # type: ignore[misc]
+        with processes(most) as pool:
+            futures = {pool.submit(_piece, index): index for index in range(len(pieces))}
+            for future in as_completed(futures):
+                _done(future.result(), called[futures[future]], progress)
+            return [future.result()[0] for future in futures]  # type: ignore[misc]
     except BrokenProcessPool as error:
         raise AirgroundError("a process that judged claims died") from error
     finally:
@@ -110,6 +138,7 @@ def start_in_process(work: Callable[[], T]) -> Callable[[], T]:
 def _begin() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent's to heed
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    end_with_parent()
 
 
 def _piece(index: int) -> tuple[object, float]:

@@ -17,12 +17,13 @@ from airground_drake.base.errors import (
     UnknownNameError,
     one_line,
 )
-from airground_drake.base.parallel import processors
+from airground_drake.base.parallel import MOST_JOBS, one_thread_each, processors
 from airground_drake.base.progress import progress_bar
 from airground_drake.base.usage import EXIT_TOOL, Parser, positive, refuse, whole
 from airground_drake.campaign.rows import UNFINISHED
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.estimate import DEFAULT_LIMITS, Limits
+from airground_drake.scenarios.limits import MAX_SEED
 from airground_drake.scenarios.shipped import argument
 
 if TYPE_CHECKING:
@@ -48,8 +49,12 @@ def parser() -> argparse.ArgumentParser:
         help="default: campaigns/<name>; new, or --resume; with --only, the file of the scenario",
     )  # fmt: skip
     parser.add_argument("--resume", action="store_true", help="go on with what the folder has")
-    parser.add_argument("--only", type=whole(0), metavar="INDEX", help="this draw alone; its scenario is written")
-    parser.add_argument("--jobs", type=whole(1), metavar="N", help="processes (default: one for each processor)")
+    parser.add_argument(
+        "--only", type=whole(0, MAX_SEED), metavar="INDEX", help="this draw alone; its scenario is written"
+    )
+    parser.add_argument(
+        "--jobs", type=whole(1, MOST_JOBS), metavar="N", help="processes (default: one for each processor)"
+    )
     parser.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster, such as tcp://host:8786")
     parser.add_argument(
         "--stop-when", metavar="RULE", help="end early, such as at 'SAFE-TRACE < 1e-2': the anytime-valid bound"
@@ -78,6 +83,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = of_command.parse_args(arguments)
     if options.only is not None and (options.resume or options.stop_when or options.number is not None):
         of_command.error("--only is one draw alone: -n, --resume and --stop-when do not go with it")
+    one_thread_each()
     from airground_drake.campaign.spec import load_spec
 
     try:
@@ -96,7 +102,7 @@ def _all(spec: Spec, options: argparse.Namespace) -> int:
 
     stopping = Stopping.parse(options.stop_when, spec.claims) if options.stop_when else None
     folder = options.output or Path("campaigns") / spec.name
-    jobs = options.jobs or processors()
+    jobs = min(options.jobs or processors(), options.number or spec.combinations)
     with (
         progress_bar(quiet=options.quiet) as progress,
         pool.cluster(options.scheduler) if options.scheduler else pool.local(jobs) as processes,

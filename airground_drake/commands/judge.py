@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from airground_drake.base import files
-from airground_drake.base.errors import AirgroundError, one_line
+from airground_drake.base.errors import FAULT_WIDTH, AirgroundError, one_line
 from airground_drake.base.usage import Parser, overridable, refuse
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (AirgroundError, OSError) as error:
         return refuse(error)
     except (positions.UnusableError, ValueError) as error:
-        return refuse(f"{options.positions}: {error}")
+        return refuse(f"{options.positions}: {str(error)[:FAULT_WIDTH]}")
     broken = [one for one in found if not one.kept]
     if options.json:
         pairs = [{**one._asdict(), "kept": one.kept} for one in found]

@@ -22,9 +22,9 @@ def of_run(data: Mapping[str, Any], run: str) -> Scenario:
         TraceError: if they are no scenario; names the first key and what is wrong there.
     """
     try:
-        scenario = adapter().validate_python(data)
+        scenario: Scenario = adapter(Scenario).validate_python(data)
         if run in scenario.runs and scenario.runs[run].set:
-            scenario = adapter().validate_python(_with(data, scenario.runs[run].set))
+            scenario = adapter(Scenario).validate_python(_with(data, scenario.runs[run].set))
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         key = ".".join(map(str, first["loc"]))
@@ -35,9 +35,9 @@ def of_run(data: Mapping[str, Any], run: str) -> Scenario:
 
 
 @functools.cache
-def adapter() -> TypeAdapter[Scenario]:
-    """What checks nested data against the types of the schema, and makes its dataclasses."""
-    return TypeAdapter(Scenario)
+def adapter(kind: type) -> TypeAdapter[Any]:
+    """What checks nested data against the types of a dataclass, and makes it."""
+    return TypeAdapter(kind)
 
 
 def _with(data: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:

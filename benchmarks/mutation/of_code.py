@@ -131,8 +131,8 @@ BODIES = (
     Mutant(
         "collisions are of centres",
         "run/events.py",
-        '["collision_m"]) + float(own + body["radius_m"])',
-        '["collision_m"])',
+        "within = collision_m + own.shape.radius_m",
+        "within = collision_m",
         runs=("bodies b",),
     ),
     Mutant(

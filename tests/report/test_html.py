@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from base64 import b64encode
 from collections.abc import Callable
@@ -11,6 +10,7 @@ from hashlib import sha256
 from html.parser import HTMLParser
 
 import pytest
+import yaml
 from report.cases import FINE, Kept, built, event, make_scenario, make_trace, make_traces, verdict
 
 from airground_drake.base.statuses import STATUSES
@@ -88,7 +88,7 @@ def test_faults_are_told_once_each_cut_and_without_what_turns_or_breaks_lines() 
     assert (one["count"], one["first_s"], one["last_s"], one["robots"]) == (900, 0.0, 449.5, ["ugv0", "ugv1"])
     assert cut["what"].startswith("\\u202eevil\\n\\x1b[2J")
     assert len(cut["what"]) < attention.MAX_FAULT_CHARS + 30
-    assert html.pretty({"a": "\u202e"}) == '{"a": "\\u202e"}'
+    assert html.as_yaml({"a": "\u202e"}) == '{a: "\\u202E"}\n'
 
 
 @pytest.fixture(scope="module")
@@ -260,10 +260,10 @@ def test_numbers_for_reading() -> None:
     assert html.value(None, "m") == "no value"
 
 
-def test_json_for_reading_is_json() -> None:
+def test_a_scenario_for_reading_is_yaml() -> None:
     data = {"a": [{"x": 1.5, "long": "y" * 90}, {"x": None}], "b": {}}
-    assert json.loads(html.pretty(data)) == data
-    assert html.pretty(["z" * 9000]).endswith("report.json has all of it")
+    assert yaml.safe_load(html.as_yaml(data)) == data
+    assert html.as_yaml(["z" * 90_000]).endswith("report.json has all of it")
 
 
 def test_readers_of_many_names_know_every_status() -> None:

@@ -23,11 +23,6 @@ def distance(one: Array, other: Array, begin: float = 0.0, end: float = np.inf) 
     return float(kernels.closest(one, other, begin, end))
 
 
-def distance_to_point(motion: Array, point: Array) -> float:
-    """Least distance of a timed motion (M, 3) to a point (2,), m."""
-    return distance(motion, at_rest(point))
-
-
 def speed(motion: Array) -> float:
     """Largest speed of a timed motion (M, 3), m/s."""
     legs = np.diff(motion, axis=0)

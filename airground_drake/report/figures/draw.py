@@ -18,9 +18,9 @@ from airground_drake.registry import METHODS
 from airground_drake.report.figures import canvas, comparison, maps, svg, timelines
 from airground_drake.report.figures.panels import MAX_TABLE_ROWS, Figure, Panel, Table, series
 from airground_drake.report.metrics import Nearby, close_by, events_of, gap_m, radius_m
+from airground_drake.report.outcomes import SLACK_M, distance
 from airground_drake.report.reproduction import MEASURES
 from airground_drake.report.scrubber import tracks
-from airground_drake.report.summary import SLACK_M, distance
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
 
@@ -147,7 +147,7 @@ def _trajectories(chosen: _Selection) -> Figure:
         f"{_ends(chosen)}○ start, \N{MULTIPLICATION SIGN} target, ▲ trigger, □ stands still, ✖ collision. Hexagon: "
         f"obstacle (hollow: not on the UAV's map), {circles}. Thin dashed line: the UAV.{thin}"
     )
-    robots = [*chosen.team, first.robots[-1]]
+    robots = [*chosen.team, *first.uavs]
     panels = []
     for position, (heading, trace) in enumerate(chosen.shown.items()):
         drawing = maps.plane(trace, chosen.team, frame, width_in)

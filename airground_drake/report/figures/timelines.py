@@ -27,7 +27,7 @@ from airground_drake.report.figures.canvas import (
     time_line,
 )
 from airground_drake.report.metrics import Nearby, closest_obstacle, events_of, gap_m
-from airground_drake.report.summary import SLACK_M, distance
+from airground_drake.report.outcomes import SLACK_M, distance
 from airground_drake.run.trace import Trace
 
 MARKS = {"trigger": "^", "release": "v", "proposal": "D", "accept": "o", "refuse": "X"}

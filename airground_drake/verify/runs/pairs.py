@@ -11,8 +11,7 @@ import numpy as np
 from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.plants import plant_of
-from airground_drake.verify.engines.boxes import apart_at_least, boxes_of
-from airground_drake.verify.engines.segments import MERGE_S, interpolate
+from airground_drake.verify.engines.geometry import MERGE_S, apart_at_least, boxes_of, interpolate
 
 
 class Pair(NamedTuple):
