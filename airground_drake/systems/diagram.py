@@ -163,7 +163,7 @@ def most_complete(scenario: Scenario) -> str:
 
 
 def _chosen(scenario: Scenario, method: str | None, composition: str | None) -> tuple[Method, Composition]:
-    """The method and the composition that are asked for; without a method, those of the scenario's last run.
+    """The requested method and composition; without a method, those of the scenario's last run.
 
     Raises:
         UnknownNameError: if there is no such method or composition.
