@@ -1,7 +1,7 @@
 """The runs of a scenario, each simulated in a child process; what comes back is a saved trace, read with its checks.
 
 So nothing that a scenario's routes and tasks do to the process that they run in reaches the one in which verdicts are
-made. A run that ends its process counts as a failure and does not end the caller.
+made; and a run that ends its process is a failure that the caller survives.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ FAILURE = "failure.json"
 TOLD_S = 0.2
 """Period of progress messages, s."""
 STANDSTILL_S = 600.0
-"""A run is ended when its simulated time stands still for this long by the clock, s. Only code from outside the package
-can hang: every step of the package itself has a bounded number of iterations."""
+"""A run ends when its simulated time has stood still for so long by the clock, s. Only third-party code can hang: every
+step of the package is bounded in counts."""
 
 
 def simulate_all(

@@ -21,6 +21,7 @@ UNITS = {
     "noise": "m",
     "decision_variable": "m",
     "decision_range": "m",
+    "gains": "1/s",
 }
 """Units of ports, by the port's name or by its part before a robot's name. Other ports have several units or none."""
 
