@@ -30,7 +30,7 @@ class BinaryProgram:
 
     Attributes:
         program: what a solver takes.
-        omega: binary variables (24), (26c), (B,): 1 accepts, and 1 - omega is the other mode. (27) has shares in [0, 1].
+        omega: binary variables (24), (26c), (B,): 1 accepts, and 1 - omega is the other mode; in (27), shares.
         u: slack (26e), (N,), m.
         error: cost of task errors in (25).
         slack: cost of slack in (25).
