@@ -137,15 +137,15 @@ class BehaviourDatabase:
     def plan(self, held: Negotiation, seen: Observation) -> tuple[dict[str, Negotiation], list[Fault]]:
         """Next proposal for a UGV that needs one, and those to others that go with it.
 
-            A UGV without a proposal is planned for again after `retry`, s. Each time that no policy proposes anything to
-        anybody, that time doubles.
+        A UGV without a proposal is planned for again after `retry`. Each time in a row that no policy proposes
+        anything to anybody, that time doubles.
 
-            Args:
-                held: with this UGV.
-                seen: what the UAV sees.
+        Args:
+            held: with this UGV.
+            seen: what the UAV sees.
 
-            Returns:
-                The negotiations that change, by UGV, and faults of the policies asked.
+        Returns:
+            The negotiations that change, by UGV, and faults of the policies asked.
         """
         seen = replace(seen, refusals=held.refusals)
         candidates, faults = self._ranked(seen, held.turn) if self.ranking == "predicted" else self._next(seen, held)
