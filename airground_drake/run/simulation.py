@@ -134,8 +134,10 @@ class Recorder:
         context.SetAccuracy(EVENT_ACCURACY)
         simulator = Simulator(self._root, context)
         period = self._scenario.control.period_s
-        config = SimulatorConfig(integration_scheme="explicit_euler", max_step_size=period, use_error_control=False)
-        ApplySimulatorConfig(config, simulator)  # velocities are held between samples: Euler's method is exact
+        # velocities are held between samples: for straight motion Euler's method is exact
+        scheme = "explicit_euler" if self._model.world.moves_straight(period) else "runge_kutta3"
+        config = SimulatorConfig(integration_scheme=scheme, max_step_size=period, use_error_control=False)
+        ApplySimulatorConfig(config, simulator)
         simulator.set_target_realtime_rate(speed)
         if self._model.gatekeeper is not None:
             self._model.gatekeeper.reset_timing()

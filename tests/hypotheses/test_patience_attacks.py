@@ -31,7 +31,7 @@ from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.law import UgvLaw
 from airground_drake.scenarios.load import load
-from airground_drake.verify.model.patience.live_wait import LiveWait
+from airground_drake.verify.model.live_wait import LiveWait
 
 MOST_SAMPLES = 20_000
 """Of each attack: else as many as all tries with a rest after each take, and a fifth more."""

@@ -19,7 +19,7 @@ from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.law import UgvLaw
 from airground_drake.scenarios.load import load
 from airground_drake.systems.controllers import UgvController
-from airground_drake.verify.model.patience.live_gate import LiveGate
+from airground_drake.verify.model.live_gate import LiveGate
 
 RUNS = 4
 PUSHED_M = 0.5
