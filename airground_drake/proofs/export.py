@@ -10,6 +10,7 @@ from functools import cache
 from itertools import combinations, groupby, pairwise
 from math import isqrt, lcm
 
+from airground_drake.base.exact import decimal
 from airground_drake.proofs.record import FOLDER
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
@@ -93,11 +94,6 @@ def demands(scenario: Scenario) -> list[tuple[str, str, Fraction]]:
     found = [(robot, obstacle, safe.obstacle_m) for robot in robots for obstacle in scenario.obstacles]
     found += [(*two, safe.air_ground_m if uav in two else safe.ugv_m) for two in combinations(robots, 2)]
     return [(one, other, decimal(apart) + radius[one] + radius[other]) for one, other, apart in found]
-
-
-def decimal(number: float) -> Fraction:
-    """The decimal number that a scenario's number prints as."""
-    return Fraction(repr(number))
 
 
 def _rounded(place: Sequence[float]) -> Place:

@@ -10,7 +10,7 @@ from datetime import datetime
 from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 from airground_drake import audit
 from airground_drake.base import files
@@ -28,6 +28,8 @@ from airground_drake.scenarios.schema import Scenario
 from airground_drake.systems import graphviz
 from airground_drake.systems.diagram import build_diagram, most_complete
 from airground_drake.verify import Verdict, verify_all
+from airground_drake.verify.model.thr_choice import Choice
+from airground_drake.verify.model.zeno_refine import Series
 from airground_drake.verify.registry import model_claims
 
 PACKAGES = ("airground_drake", "drake", "numpy", "scipy", "numba", "pandas", "matplotlib", "daqp")
@@ -109,7 +111,9 @@ def write(
 def _refinement(verdicts: Sequence[Verdict], audited: bool) -> list[Figure]:
     """The figure of ZENO-REFINE, if there is such a verdict: beside finding 9, where that is in the report."""
     drawn = [
-        zeno_refine.draw(each.finding.evidence) for each in verdicts if (each.claim.id, each.run) == ("ZENO-REFINE", "")
+        zeno_refine.draw(cast("Series", each.finding.evidence))
+        for each in verdicts
+        if (each.claim.id, each.run) == ("ZENO-REFINE", "")
     ]
     return [replace(figure, beside="audit-9") if audited else figure for figure in drawn if figure is not None]
 
@@ -117,7 +121,7 @@ def _refinement(verdicts: Sequence[Verdict], audited: bool) -> list[Figure]:
 def _threshold(verdicts: Sequence[Verdict]) -> list[Figure]:
     """The figure of THR-CHOICE, if there is such a verdict about the model of all runs."""
     chosen = [verdict for verdict in verdicts if (verdict.claim.id, verdict.run) == ("THR-CHOICE", "")]
-    drawn = [threshold.draw(verdict.inputs, verdict.finding.evidence) for verdict in chosen]
+    drawn = [threshold.draw(verdict.inputs, cast("Choice", verdict.finding.evidence)) for verdict in chosen]
     return [figure for figure in drawn if figure is not None]
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
-from airground_drake.verify.engines.segments import Approach, closest_approach
+from airground_drake.verify.engines.geometry import Approach, closest_approach
 from airground_drake.verify.runs.pairs import apart_of, least_of, pairs_of
 
 MOST_OBSTACLES = 20

@@ -19,6 +19,7 @@ from pydantic_core import ErrorDetails
 
 from airground_drake.base import files
 from airground_drake.base.errors import Fault, ScenarioError
+from airground_drake.base.exact import decimal
 from airground_drake.scenarios import json_schema, validate
 from airground_drake.scenarios.document import Document, of_data, put, read, replace, simple, unknown
 from airground_drake.scenarios.recorded import adapter
@@ -136,7 +137,7 @@ def _as_set(document: Document, run: str, settings: Mapping[str, Any]) -> Scenar
 
 
 def _checked(document: Document) -> Scenario:
-    """The scenario of a document, whatever its runs set."""
+    """The scenario of a document, without what its runs set."""
     scenario: Scenario = filled(Scenario, document)
     _complete(scenario)
     try:
@@ -211,7 +212,7 @@ def _rounded_down(gain: float, period: float) -> float:
     Proofs take numbers as the decimals that they print as: 3.3333333333333335 * 0.3 is 1 in floating point, and more
     than 1 there. A smaller gain only demands less.
     """
-    while gain * period == 1.0 < validate.exactly(gain) * validate.exactly(period):
+    while gain * period == 1.0 < decimal(gain) * decimal(period):
         gain = math.nextafter(gain, 0.0)
     return gain
 

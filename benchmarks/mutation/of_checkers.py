@@ -41,17 +41,17 @@ CLAIMS = (
     Mutant(
         "claims forget radii",
         "verify/runs/pairs.py",
-        'float(body["radius_m"]) for name',
-        '0.0 * float(body["radius_m"]) for name',
+        "{name: body.radius_m for name",
+        "{name: 0.0 * body.radius_m for name",
         runs=("bodies d",),
     ),
     Mutant(
         "SAFE-TRACE looks at the ends of segments only",
-        "verify/engines/segments.py",
+        "verify/engines/geometry.py",
         "fraction = np.clip(np.divide(along",
         "fraction = np.round(np.divide(along",
         runs=BOTH,
-        tests=(f"{RUNS}/test_safe_trace.py", "tests/verify/engines/test_segments.py"),
+        tests=(f"{RUNS}/test_safe_trace.py", "tests/verify/engines/test_geometry.py"),
     ),
     Mutant(
         "ZENO-TRACE allows half the dwell",
@@ -79,11 +79,11 @@ CLAIMS = (
     ),
     Mutant(
         "THR-TRIG overlooks dips",
-        "verify/engines/segments.py",
+        "verify/engines/geometry.py",
         "knots = np.union1d(t, _minima(t, parts))",
         "knots = np.union1d(t, t)",
         runs=("crowd d",),
-        tests=(f"{RUNS}/test_thr_trig.py", "tests/verify/engines/test_segments.py"),
+        tests=(f"{RUNS}/test_thr_trig.py", "tests/verify/engines/test_geometry.py"),
     ),
     Mutant(
         "SAFE-HYP gives every robot the whole share",

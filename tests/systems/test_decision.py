@@ -29,7 +29,7 @@ from airground_drake.systems.components import integrated_noise
 from airground_drake.systems.decision import DecisionBlock, DecisionVariable, EventTrigger
 from airground_drake.systems.diagram import build_diagram
 from airground_drake.systems.signals import FIELDS
-from airground_drake.verify.engines.segments import NormSignal
+from airground_drake.verify.engines.geometry import NormSignal
 from airground_drake.verify.runs.triggers import transitions
 
 

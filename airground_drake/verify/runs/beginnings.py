@@ -10,7 +10,7 @@ import numpy as np
 from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
-from airground_drake.verify.engines.segments import corner_times, interpolate, travelled
+from airground_drake.verify.engines.geometry import corner_times, interpolate, travelled
 from airground_drake.verify.runs.closed_loops import Scene
 from airground_drake.verify.runs.pairs import Pair, around, pairs_of, places_of, preset_of, radii_of, speed_limits
 from airground_drake.verify.runs.proposals import Sent

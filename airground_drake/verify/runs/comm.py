@@ -13,7 +13,7 @@ from airground_drake.base.errors import TraceError
 from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S, TraceClaim
 from airground_drake.verify.finding import Finding
-from airground_drake.verify.runs.interventions import GATED_METHODS, intervening, talk_is_due
+from airground_drake.verify.runs.instants import GATED_METHODS, intervening, talk_is_due
 from airground_drake.verify.runs.standing import map_conflicts, standing_conflicts
 
 KINDS = ("proposal", "decision")

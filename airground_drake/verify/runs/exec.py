@@ -13,7 +13,7 @@ from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError
 from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S, TraceClaim
-from airground_drake.verify.engines.segments import corner_times, travelled
+from airground_drake.verify.engines.geometry import corner_times, travelled
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.control_law import (
     Asked,
@@ -25,7 +25,7 @@ from airground_drake.verify.runs.control_law import (
     spare,
     tracking,
 )
-from airground_drake.verify.runs.control_samples import chosen_at, samples_of
+from airground_drake.verify.runs.instants import chosen_at, samples_of
 from airground_drake.verify.runs.pairs import preset_of
 from airground_drake.verify.runs.proposals import Sent, accepted_at
 

@@ -9,7 +9,7 @@ import numpy as np
 from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.runs.beginnings import known_discs
-from airground_drake.verify.runs.control_samples import control_samples
+from airground_drake.verify.runs.instants import control_samples
 from airground_drake.verify.runs.proposals import accepted_at, proposals_of
 
 METHOD = "d"

@@ -12,7 +12,7 @@ from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Gatekeeper
 from airground_drake.verify.claim import TIME_TOLERANCE_S
-from airground_drake.verify.engines.segments import interpolate, travelled
+from airground_drake.verify.engines.geometry import interpolate, travelled
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.beginnings import sensed
 from airground_drake.verify.runs.control_law import ON_TOP
@@ -24,7 +24,7 @@ from airground_drake.verify.runs.gate_record import (
     conclude,
     cost_tolerance,
 )
-from airground_drake.verify.runs.interventions import intervening
+from airground_drake.verify.runs.instants import intervening
 from airground_drake.verify.runs.pairs import preset_of
 from airground_drake.verify.runs.proposals import proposals_of
 from airground_drake.verify.runs.sum_up_rounding import (

@@ -11,13 +11,13 @@ from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError
 from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
-from airground_drake.verify.engines.segments import interpolate
+from airground_drake.verify.engines.geometry import interpolate
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.beginnings import scene, sensed
 from airground_drake.verify.runs.closed_loops import Scene, in_batches, roll_out, stacked
 from airground_drake.verify.runs.control_law import ON_TOP
-from airground_drake.verify.runs.control_samples import samples_of
 from airground_drake.verify.runs.gate_record import GateClaim, Off, Row, conclude
+from airground_drake.verify.runs.instants import samples_of
 from airground_drake.verify.runs.outcome_rolls import foreseen
 from airground_drake.verify.runs.proposals import accepted_at, proposals_of
 

@@ -122,7 +122,7 @@ class GateOpt(ProblemClaim):
                 compared.append(compare_with_blocks(each, self.largest_gap))
         finding = self._finding(bounded, lacking)
         listed = {"decisions": len(rows), "without_a_plan": [row.label for row in rows if not row.planned]}
-        return conclude(replace(finding, evidence=listed | finding.evidence, exercised=len(planned)), compared)
+        return conclude(replace(finding, evidence={**listed, **finding.evidence}, exercised=len(planned)), compared)
 
     def _finding(self, bounded: Sequence[Bounded], lacking: Sequence[Row]) -> Finding:
         """What the gaps say, as long as nothing recorded is wrong; a gap that is too wide is open, not refuted."""

@@ -19,7 +19,7 @@ from airground_drake.run.trace import PROBLEM_ARRAYS, PROBLEM_SCALARS, Trace
 from airground_drake.verify.claim import TraceClaim
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.control_law import ON_TOP
-from airground_drake.verify.runs.interventions import GATED_METHODS, talk_is_due
+from airground_drake.verify.runs.instants import GATED_METHODS, talk_is_due
 
 POSITION_TOLERANCE_M = 1e-9
 """Recorded and recomputed positions may differ by this, m: rounding of N additions errs by 1e-13 m."""
@@ -263,7 +263,7 @@ class GateClaim(TraceClaim):
             reason = "no UGV was intervened on: nothing to decide"
             return Finding("holds", evidence={"decisions": 0, "reason": reason}, exercised=0)
         finding = self.judge_rows(trace, rows)
-        return replace(finding, evidence=finding.evidence | {"without_decisions": without})
+        return replace(finding, evidence={**finding.evidence, "without_decisions": without})
 
     @abc.abstractmethod
     def judge_rows(self, trace: Trace, rows: list[Row]) -> Finding:

@@ -11,7 +11,7 @@ from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError
 from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TraceClaim
-from airground_drake.verify.engines.segments import interpolate
+from airground_drake.verify.engines.geometry import interpolate
 from airground_drake.verify.finding import Finding
 
 AT_REST_S = 1.0

@@ -11,10 +11,9 @@ from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError
 from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
-from airground_drake.verify.engines.segments import interpolate
+from airground_drake.verify.engines.geometry import interpolate
 from airground_drake.verify.runs.control_law import selected
-from airground_drake.verify.runs.control_samples import control_samples
-from airground_drake.verify.runs.interventions import GATED_METHODS
+from airground_drake.verify.runs.instants import GATED_METHODS, control_samples
 
 
 class Answer(NamedTuple):

@@ -11,7 +11,7 @@ import numpy as np
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Obstacle
 from airground_drake.verify.claim import TIME_TOLERANCE_S
-from airground_drake.verify.engines.segments import interpolate
+from airground_drake.verify.engines.geometry import interpolate
 from airground_drake.verify.runs.proposals import answers_to, parts_of, proposals_of, withdrawn_s
 
 SENSED_M = 1e-9

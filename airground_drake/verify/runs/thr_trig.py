@@ -14,7 +14,7 @@ from airground_drake.base.errors import TraceError
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Threshold
 from airground_drake.verify.claim import TraceClaim
-from airground_drake.verify.engines.segments import NormSignal
+from airground_drake.verify.engines.geometry import NormSignal
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.triggers import (
     Conflict,

@@ -18,8 +18,7 @@ from airground_drake.intervention.messages import accepted_proposals
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc import law
 from airground_drake.run.simulation import simulate
-from airground_drake.run.trace import Trace, save
-from airground_drake.run.trace import load as load_trace
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Obstacle, Policy, Scenario
 from airground_drake.systems import components, controllers, diagram
@@ -312,10 +311,3 @@ def test_proposals_that_are_none_are_an_error(run: Callable[[str, str], Trace], 
 def test_scripted_motions_are_refuted() -> None:
     """The numpy simulation of the other tests has laws of its own."""
     assert judge("EXEC", run_of("a")).status == "refuted"
-
-
-def test_proposals_are_saved_and_loaded(run: Callable[[str, str], Trace], tmp_path: Any) -> None:
-    trace = run("case_b", "d")
-    save(trace, tmp_path)
-    assert (tmp_path / "proposals.parquet").is_file()
-    assert judge("EXEC", load_trace(tmp_path)) == judge("EXEC", trace)

@@ -19,8 +19,6 @@ from verify.runs.cases import (
     fractional_plan,
     lighter_slack,
     other_terminal_cost,
-    shift_initial,
-    shift_reference,
     standing_robot,
     task_error,
     without_point,
@@ -39,8 +37,6 @@ from airground_drake.verify.runs.gate_record import Row, rows_of
 
 MUTANTS: list[tuple[DecisionEdit, str]] = [  # numbers that are off: test_tolerances.py
     (fractional_plan, "omega is not binary"),
-    (shift_initial, "initial position"),
-    (shift_reference, "reference"),
     (wrong_first_stage, "first stage"),
     (without_point(0), "rock is left out"),
     (without_point(1), "ugv2 is left out"),
