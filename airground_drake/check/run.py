@@ -20,6 +20,41 @@ from .scenario import Levels, Pair, Preset, as_run, levels_of, pairs_of, preset_
 Rows = npt.NDArray[np.intp]
 SCHEMA = "airground_drake.trace/7"
 TABLES = ("signals.parquet", "decisions.parquet", "problems.parquet", "proposals.parquet")
+OF_ROBOT = ("x_m", "y_m", "z_m", "vx_m_s", "vy_m_s", "vz_m_s")
+OF_UGV = (
+    "ref_x_m", "ref_y_m", "ref_z_m", "noise_m", "decision_variable_m", "mode", "triggers", "triggered_at_s",
+    "released_at_s", "accepted",
+)  # fmt: skip
+"""Signals of each robot, and of each UGV besides."""
+OF_MPC = (
+    "relaxed_first_stage", "objective", "route_bound", "gap", "objective_accept", "objective_refuse",
+    "accept_throughout", "refuse_throughout", "rounding_deviation_s", "predicted_clearance_m",
+)  # fmt: skip
+"""Columns of decisions that method (c) fills: it solves problem (26)."""
+OF_OUTCOMES = (
+    "refuse_outcome_m2_s", "accept_outcome_m2_s", "refuse_stalls", "accept_stalls", "refuse_left_m", "accept_left_m",
+    "tries",
+)  # fmt: skip
+"""Columns of decisions that method (d) fills: it compares outcomes."""
+COLUMNS = {
+    "decisions.parquet": (
+        "t_s", "robot", "policy", "number", "issued_s", "decision", "reason", "status", "route", "first_stage",
+        *OF_MPC, *OF_OUTCOMES,
+    ),
+    "problems.parquet": (
+        "dt_s", "error_weight_1_m2_s", "slack_weight_1_m2_s", "terminal_weight_s", "initial_m", "accept_m_s",
+        "refuse_m_s", "reference_m", "centres_m", "distances_m", "plan", "positions_m", "relaxed", "rounded", "normals",
+    ),
+    "proposals.parquet": (
+        "number", "robot", "policy", "issued_s", "times_s", "positions_m", "selection", "mapped_m", "mapped_radius_m",
+        "cause", "party",
+    ),
+}  # fmt: skip
+"""Columns of the tables other than the signals."""
+META = (
+    "schema", "run", "method", "composition", "seed", "robots", "ugvs", "scenario", "events", "zeta_m", "controllers",
+    "decision_block", "faults", "files",
+)  # fmt: skip
 SHARED = ("method", "composition", "seed", "zeta_m", "events", "faults")
 """What meta.json and the run's entry in report.json both say."""
 INTERVENING = 1.0
@@ -183,10 +218,15 @@ def _run(name: str, scenario_text: str, entry_text: str, contents: tuple[bytes, 
     scenario, entry = json.loads(scenario_text), json.loads(entry_text)
     meta, timings = parse_json(contents[0], "meta.json"), parse_json(contents[1], "timings.json")
     same("files of the trace", sorted(meta["files"]), sorted(TABLES))
+    same("what meta.json says", sorted(meta), sorted(META))
+    same("what timings.json says", sorted(timings), ["decision_times_s", "wall_s"])
     tables = []
     for file, content in zip(TABLES, contents[2:], strict=True):
         same("SHA-256 of a table", meta["files"][file], sha256(content), about=file)
         tables.append(parse_table(content, file))
+        columns = COLUMNS.get(file) or _signals_of(scenario)
+        strange = sorted({*tables[-1].columns} - {*columns})
+        same("no column but those of a trace", strange, [], about=file)
     _is_of_the_run(meta, entry, scenario, name)
     run = Run(name, as_run(scenario, name), meta["events"], timings["decision_times_s"], timings["wall_s"], *tables)
     same("a time for each decision", len(run.decision_times_s), len(run.decisions))
@@ -200,6 +240,12 @@ def _run(name: str, scenario_text: str, entry_text: str, contents: tuple[bytes, 
     _nothing_is_commanded_before_the_start(run)
     _flags_are_0_or_1(run)
     return run
+
+
+def _signals_of(scenario: Json) -> list[str]:
+    """Columns of the signals."""
+    of_robots = [f"{robot}.{name}" for robot in robots_of(scenario) for name in OF_ROBOT]
+    return ["t_s", *of_robots, *(f"{ugv}.{name}" for ugv in scenario["ugvs"] for name in OF_UGV)]
 
 
 def _is_of_the_run(meta: Json, entry: Json, scenario: Json, name: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
@@ -140,7 +141,7 @@ def check_overall(folder: Path, report: Json) -> str:
 
 
 def check_files(folder: Path, there: Sequence[str], recorded: Json) -> str:
-    """Every file that is named is there with its SHA-256, and no other but those that commands add later.
+    """Every file that is named is there with its SHA-256, and no file is there that no report has.
 
     Returns:
         What was found, in words.
@@ -149,6 +150,8 @@ def check_files(folder: Path, there: Sequence[str], recorded: Json) -> str:
         Disagreement: if a rule is broken.
         NotEstablished: if a file cannot be read.
     """
+    for name in there:
+        holds("a report has such a file", OF_A_REPORT.fullmatch(name) is not None, "a file", "nothing", about=name)
     found = {name for name in there if name != "report.json" and not name.startswith(ADDED_LATER)}
     for name in sorted({*recorded} | found):
         holds("a file that is named is there", name in found, "nothing", "a file", about=name)
@@ -159,6 +162,11 @@ def check_files(folder: Path, there: Sequence[str], recorded: Json) -> str:
 
 ADDED_LATER = "proofs/"
 """Folder of the files that `airground prove` adds to a report."""
+OF_A_REPORT = re.compile(
+    r"report\.json|report\.html|junit\.xml|diagram\.(dot|svg)|proofs/(proofs\.json|run_\w+\.v)"
+    r"|trace/[^/]+/((meta|timings)\.json|(signals|decisions|problems|proposals)\.parquet)"
+)
+"""Files that a report may have."""
 
 
 def _overall(report: Json) -> Json:

@@ -234,4 +234,4 @@ def mutant(root: Path, path: str, text: str, edit: Edit) -> Mutant:
         tests = ["tests/test_simulation.py", "tests/test_diagram.py"]
     tests = [*(f"tests/hypotheses/{name}" for name in ours), *tests]
     what = f"{path}:{edit.line}:{edit.start - first}: {edit.kind}: {was[:60]!r} becomes {edit.new[:60]!r}"
-    return Mutant(what, path, old, new, PROBES, tests=tuple(tests))
+    return Mutant(what, path, "", old, new, PROBES, tuple(tests))
