@@ -1,4 +1,4 @@
-"""A run as its trace has it: of the run that it claims to be, complete, and obeying its own law of motion."""
+"""A recorded run: it belongs to the run of the scenario, is complete, and obeys its law of motion."""
 
 from __future__ import annotations
 
@@ -109,12 +109,12 @@ class Run:
 
     @cached_property
     def pairs(self) -> list[Pair]:
-        """What is to be kept apart."""
+        """Pairs of bodies and the distances that they must keep."""
         return pairs_of(self.scenario)
 
     @cached_property
     def apart_m(self) -> dict[tuple[str, str], float]:
-        """What each pair keeps apart at least, by both names in either order."""
+        """Lower bound of the distance of each pair, by both names in either order, m."""
         least = least_apart_m(self.position_m, self.pairs).tolist()
         found = {(pair.robot, pair.other): apart for pair, apart in zip(self.pairs, least, strict=True)}
         return found | {(other, robot): apart for (robot, other), apart in found.items()}
@@ -175,7 +175,7 @@ class Run:
 
     @cached_property
     def _columns(self) -> dict[str, Array]:
-        """Those that were asked for."""
+        """Columns that were read before."""
         return {}
 
     def vector(self, robot: str, stem: str, unit: str) -> Array:
@@ -197,7 +197,7 @@ class Run:
 
 
 def read_run(folder: Path, name: str, report: Json) -> Run:
-    """Read a trace and apply every rule that any claim about it rests on; equal files give the same Run.
+    """Read a trace and apply the rules that all claims about it rest on; equal files give the same Run.
 
     Args:
         folder: of the trace.
@@ -264,7 +264,7 @@ def _is_of_the_run(meta: Json, entry: Json, scenario: Json, name: str) -> None:
 
 
 def _decisions_come_by_time(run: Run) -> None:
-    """What a decision rests on is before it in the table, too."""
+    """The decisions of a UGV are in the order of time."""
     for ugv in run.ugvs:
         times = run.decisions.loc[run.decisions["robot"] == ugv, "t_s"].to_numpy(dtype=np.float64)
         later = times[1:]
@@ -298,7 +298,7 @@ def _robots_are_where_their_commands_lead(run: Run) -> None:
 
 
 def _nothing_is_commanded_before_the_start(run: Run) -> None:
-    """The first row is the start, to which no command has led."""
+    """The first row is the start, so its command is 0."""
     for robot in run.robots:
         first = run.command_m_s[robot][0]
         close("command before the start", first, np.zeros(3), within=0.0, about=robot, t_s=float(run.t_s[0]))

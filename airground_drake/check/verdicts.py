@@ -1,4 +1,4 @@
-"""Which claims a report must have, what is expected of each, and the verdict that follows from all of them."""
+"""The claims that a report must have, the expected verdict of each, and the verdict over all."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ KNOWN = {*EVERY_RUN, *(claim for claims in BY_METHOD.values() for claim in claim
 """Identifiers of the claims of this package."""
 
 UNDECIDED = ("inconclusive", "error", "not_run")
-"""Statuses that say nothing about a claim."""
+"""Statuses that leave a claim open."""
 PASSING = ("proved", "holds", "supported")
 """Statuses with which a claim was established."""
 EXERCISED = "exercised"
@@ -51,8 +51,8 @@ NOT_EXERCISED = "not_exercised"
 def expectations(scenario: Json, recorded: Sequence[Json]) -> dict[tuple[str, str], str]:
     """The verdict that a scenario declares for each claim of this package, by run ('': about the model) and claim.
 
-    A claim about the model may have been judged again for a run that sets values of its own. Which ones must be is
-    decided where their constants are known, when the report is judged again.
+    A claim about the model may have been judged again for a run that sets values of its own. The checker does not know
+    which ones must be; `airground check` finds out when it judges the report again.
     """
     wanted = {("", name): status for name, status in ABOUT_THE_MODEL.items()}
     for run, about in scenario["runs"].items():
@@ -170,7 +170,7 @@ OF_A_REPORT = re.compile(
 
 
 def _overall(report: Json) -> Json:
-    """The verdict over all claims, and what stands in its way; findings about the paper count if all were made."""
+    """The verdict over all claims, and the claims that prevent it; findings about the paper count if all are there."""
     claims, audit = report["claims"], report["audit"]
     keys = ("id", "run", "status", "expected", "exercised")
     unexpected = [{key: claim[key] for key in keys} for claim in claims if not meets(claim["expected"], claim)]

@@ -237,7 +237,7 @@ class Gatekeeper:
     of a relaxation and 20,000 iterations of the search of `mixed_integer` (budget 'counted': a run is the same on every
     machine on which these take less than 10 s, ten times what they take), or besides the share `budget_share` of the
     sampling period by the clock (budget 'wall_clock': for real time). `terminal_weight_s` is the w of a terminal cost
-    w a ||rho_rd - rho_N||^2 besides (25); the paper has none.
+    w a ||rho_rd - rho_N||^2 besides (25); the paper has no such cost.
 
     Under method (d) outcomes are compared instead, `settling_s` past the end of motion and preset trajectory. An
     accepted proposal is executed for `longest_s` at most. A UGV accepts `tries` proposals, and then none until it has

@@ -1,4 +1,4 @@
-"""Mutants that nobody has written: edits of the running code, drawn at random from its syntax trees.
+"""Random mutants: edits of the code that produces a run, drawn from its syntax trees.
 
 A line is drawn first, of all lines of the code in question on which there is something to edit, then a kind of edit
 that is possible there, then the edit. Docstrings, messages, strings, annotations and what is raised are left alone.
@@ -23,7 +23,7 @@ RUNNING = (
 )  # fmt: skip
 """Files and folders of what produces a run."""
 PICTURES = ("systems/blocks.py", "systems/graphviz.py", "systems/schematic.py")
-"""Files in them that only draw."""
+"""Files in these folders that only draw diagrams."""
 PROBES = ("crowd d", "crowd c", "bodies d", "case_b d", "soft_gate c", "crowd b")
 HYPOTHESES = {
     "systems/components.py": ("test_wiring.py",),

@@ -17,6 +17,7 @@ from check.tampering.base import (
     edited_report,
     edited_scenarios,
     edited_table,
+    named,
     read_table,
     tampering,
     trace,
@@ -50,9 +51,7 @@ SHOWN = {
     "diagram_has_another_block": ("diagram.svg", "gatekeeper", "keeper"),
 }
 for _name, _words in SHOWN.items():
-    _edit = _other_words(*_words)
-    _edit.__name__ = _name
-    tampering()(_edit)
+    tampering()(named(_name, _other_words(*_words)))
 
 
 @tampering()
