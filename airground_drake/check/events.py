@@ -11,7 +11,7 @@ import numpy as np
 
 from .files import Json
 from .rules import SMALL, Array, Disagreement, close, holds, same
-from .run import OF_MPC, OF_OUTCOMES, Run
+from .run import OF_MPC, OF_OUTCOMES, OF_SOLUTIONS, Run
 from .scenario import apart_m
 
 UNUSED = -1.0
@@ -168,5 +168,8 @@ def _decisions_are_on_proposals(run: Run) -> None:
     for row in run.decisions.to_dict("records"):
         about, on = f"decision of {row['robot']}", tuple(row[name] for name in key)
         holds("a decision is on a proposal", on in sent, str(on), "one that was sent", about=about, t_s=row["t_s"])
-        for name in unused:
+        kept = OF_OUTCOMES[:-1] if run.method == "d" and row["reason"] == "kept" else ()  # nothing is weighed again
+        for name in (*unused, *kept):
             same(f"column {name} is unused", row[name], UNUSED, about=about, t_s=row["t_s"])
+        for name in OF_SOLUTIONS if run.method == "d" else ():
+            same(f"column {name} is unused", row[name], "", about=about, t_s=row["t_s"])

@@ -26,6 +26,8 @@ OF_UGV = (
     "released_at_s", "accepted",
 )  # fmt: skip
 """Signals of each robot, and of each UGV besides."""
+OF_SOLUTIONS = ("status", "route", "first_stage")
+"""Columns of decisions that only method (c) fills, in words."""
 OF_MPC = (
     "relaxed_first_stage", "objective", "route_bound", "gap", "objective_accept", "objective_refuse",
     "accept_throughout", "refuse_throughout", "rounding_deviation_s", "predicted_clearance_m",
@@ -38,8 +40,8 @@ OF_OUTCOMES = (
 """Columns of decisions that method (d) fills: it compares outcomes."""
 COLUMNS = {
     "decisions.parquet": (
-        "t_s", "robot", "policy", "number", "issued_s", "decision", "reason", "status", "route", "first_stage",
-        *OF_MPC, *OF_OUTCOMES,
+        "t_s", "robot", "policy", "number", "issued_s", "decision", "reason",
+        *OF_SOLUTIONS, *OF_MPC, *OF_OUTCOMES,
     ),
     "problems.parquet": (
         "dt_s", "error_weight_1_m2_s", "slack_weight_1_m2_s", "terminal_weight_s", "initial_m", "accept_m_s",

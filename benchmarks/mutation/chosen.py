@@ -5,7 +5,12 @@ from __future__ import annotations
 from mutation.mutant import Mutant
 
 WIRING = ("tests/hypotheses/test_wiring.py",)
-TRIGGER = ("tests/hypotheses/test_transitions.py", "tests/hypotheses/test_isolation.py", "tests/decision")
+TRIGGER = (
+    "tests/hypotheses/test_transitions.py",
+    "tests/hypotheses/test_isolation.py",
+    "tests/decision",
+    "tests/systems/test_decision.py",
+)
 ATTACKS = ("tests/hypotheses/test_patience_attacks.py",)
 PLANNER = ("tests/intervention",)
 ROUTES = ("tests/gatekeeper/test_dual_bound.py", "tests/gatekeeper/routes/test_contract.py")
@@ -48,7 +53,7 @@ WIRINGS = (
         "VelocityDisturbance._calc",
         "velocity[3 * i : 3 * i + 3] += port.Eval(context)",
         "velocity[3 * i : 3 * i + 3] -= port.Eval(context)",
-        tests=(*WIRING, "tests/test_simulation.py"),
+        tests=(*WIRING, "tests/test_simulation.py", "tests/test_python_api.py"),
     ),
 )
 """Wiring: who keeps what distance, with which share, on which plants."""
@@ -376,7 +381,9 @@ JUDGES = (
         'same("SHA-256 of a table", meta["files"][file], sha256(content), about=file)',
         "pass",
         runs=(),
-        tests=("tests/check/test_tampering.py::test_a_tampered_report_is_refused[table_in_other_bytes_digest_left]",),
+        tests=(
+            "tests/check/test_tampering.py::test_the_checker_itself_names_the_broken_rule[table_in_other_bytes_digest_left]",
+        ),
     ),
     Mutant(
         "checker: commands need not lead anywhere",
@@ -385,7 +392,7 @@ JUDGES = (
         'close("law of motion", run.position_m[robot][1:], led, within=SMALL,',
         'close("law of motion", run.position_m[robot][1:], led, within=1e9,',
         runs=(),
-        tests=("tests/check/test_tampering.py::test_a_tampered_report_is_refused[position_changed]",),
+        tests=("tests/check/test_tampering.py::test_the_checker_itself_names_the_broken_rule[position_changed]",),
     ),
 )
 """What judges: claims and the checker. On honest runs one that demands less says the same."""

@@ -33,6 +33,16 @@ def test_a_tampered_report_is_refused(report: Path, name: str) -> None:
     assert all(line["rule"] and line["text"] for line in outcome.refused)
 
 
+@pytest.mark.parametrize(
+    ("name", "rule"),
+    [("position_changed", "law of motion"), ("table_in_other_bytes_digest_left", "SHA-256 of a table")],
+    ids=["position_changed", "table_in_other_bytes_digest_left"],
+)
+def test_the_checker_itself_names_the_broken_rule(report: Path, name: str, rule: str) -> None:
+    refused = attempt(report, TAMPERINGS[name].edit).refused
+    assert ("checker", rule) in [(line["by"], line["rule"]) for line in refused]
+
+
 def leaves(value: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
     """The place of every value of a JSON document that has no parts."""
     parts = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
