@@ -30,7 +30,7 @@ from airground_drake.audit.companions import Believing
 from airground_drake.base.arrays import Array
 from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
 from airground_drake.gatekeeper.problem import Horizon, predicted_problem
-from airground_drake.gatekeeper.rollout import Scene
+from airground_drake.gatekeeper.rollout import View
 from airground_drake.gatekeeper.routes.relaxed import RelaxedRoute
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.planner import Planner
@@ -42,10 +42,12 @@ from airground_drake.run.simulation import Recorder
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Policy, Run, Scenario
+from airground_drake.scenarios.world import make_world
 from airground_drake.systems import components
-from airground_drake.systems.components import make_planner, make_presets, make_team
+from airground_drake.systems.components import make_planner, make_presets
 from airground_drake.systems.controllers import UgvController
 from airground_drake.verify.runs.safe_trace import SafeTrace
+from airground_drake.world.world import Body
 
 STEPS = 30
 """Control periods for which a proposal is executed at decision level."""
@@ -68,26 +70,27 @@ def at_decision_level(seed: int, proposals: int) -> tuple[float, int, int]:
     """Worst margin under (d), m; proposals that (c) accepted; those of them that then came below d."""
     random = np.random.default_rng(seed)
     scenario = load("case_a")[0]
-    base, presets = make_team(scenario), make_presets(scenario)
+    base, presets = make_world(scenario), make_presets(scenario)
     gate = scenario.gatekeeper
     horizon = Horizon(gate.stages, 1, gate.error_weight_1_m2_s, gate.slack_weight_1_m2_s)
     avoidance = Avoidance(scenario.control.avoidance_gain_1_s, scenario.control.period_s, 4.0)
-    route, h, d = RelaxedRoute(), avoidance.period, base.obstacle_distance
+    route, h, d = RelaxedRoute(), avoidance.period, scenario.safe_distance.obstacle_m
     worst, accepted, below = np.inf, 0, 0
     for _ in range(proposals):
         centres = np.column_stack([random.uniform(-4.0, 4.0, (4, 2)), np.zeros(4)])
         start = safe_start(random, centres, d)
-        team = replace(base, obstacles=centres, obstacle_radius=0.0)
+        points = (Body(f"obstacle_{k}", "obstacle", centre) for k, centre in enumerate(centres))
+        world = replace(base, bodies=(*base.moving, *points))
         t = float(random.uniform(0.0, 20.0))
         proposal = Proposal("hostile", t, attack(random, start, centres, t))
         for on_top in (False, True):
             law = UgvLaw(avoidance, 2.0, 1.5, intervention_on_top=on_top)
             if on_top:
-                scene = Scene(t, start, presets[0], centres, np.zeros((4, 3)), np.full(4, d), np.ones(4), 3.0)
+                scene = View(t, start, presets[0], centres, np.zeros((4, 3)), np.full(4, d), np.ones(4), 3.0)
                 if not route.solve(predicted_problem(scene, law, proposal, horizon)).accept_first:
                     continue
                 accepted += 1
-            controller = UgvController(team, law)
+            controller = UgvController(world, law)
             margin = execute(controller, presets[0], proposal, start, t, h, centres) - d
             if on_top:
                 below += margin < -1e-9
@@ -262,7 +265,7 @@ def print_lies(found: list[Told]) -> None:
 def stolen_s(trace: Trace, ugv: str) -> float:
     """The longest that a UGV executed interventions between two rests, s."""
     t, busy = trace.t, trace.column(f"{ugv}.accepted") != 0.0
-    rest_s = trace.scenario["gatekeeper"]["rest_s"] - 1e-9
+    rest_s = trace.scenario.gatekeeper.rest_s - 1e-9
     worst, sum_s, alone_s = 0.0, 0.0, 0.0
     for k in range(1, len(t)):
         step = float(t[k] - t[k - 1])

@@ -39,7 +39,7 @@ from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import from_data
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify import verify
-from airground_drake.verify.engines.segments import closest_approach
+from airground_drake.verify.engines.geometry import closest_approach
 
 METHODS = ("a", "b", "c", "d", "orca")
 

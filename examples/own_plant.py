@@ -40,7 +40,7 @@ def nearest_to_the_rock(scenario: Scenario) -> float:
     team = builder.AddNamedSystem("team", build_diagram(scenario, "d", plants=lagging))
     wind = builder.AddNamedSystem("wind", ConstantVectorSource(np.array(WIND_M_S)))
     builder.Connect(wind.get_output_port(), team.GetInputPort("disturbance_ugv1"))
-    log = LogVectorOutput(team.GetOutputPort("team_position"), builder)
+    log = LogVectorOutput(team.GetOutputPort("bodies"), builder)
     diagram = builder.Build()
 
     simulator = Simulator(diagram)

@@ -15,6 +15,7 @@ from airground_drake.registry import METHODS
 from airground_drake.scenarios.load import load, shipped
 from airground_drake.systems import DecisionBlock, blocks, graphviz, schematic
 from airground_drake.systems.diagram import build_diagram, make_monitor
+from airground_drake.world.world import World
 
 PAGE_PT = 785
 """Width of a landscape page of A4 with margins of 1 cm."""
@@ -95,7 +96,7 @@ def test_wires_go_to_the_right_and_what_is_fed_back_is_told(diagram: Diagram) ->
 def edges(text: str) -> set[tuple[str, str]]:
     """The wires of a picture, those from and to the vehicles as if these were one block."""
     found = re.findall(r'^"([^"]*)" -> "([^"]*)"', text, re.MULTILINE)
-    told = [["vehicles" if end.endswith("_plant") or end == "team_position" else end for end in each] for each in found]
+    told = [["vehicles" if end.endswith("_plant") or end == "bodies" else end for end in each] for each in found]
     return {(source, target) for source, target in told if source != target}
 
 
@@ -127,8 +128,8 @@ def test_a_block_of_ones_own_is_drawn_with_what_feeds_it() -> None:
     class Model(DecisionBlock):
         """Also sees what the UGVs are commanded."""
 
-        def __init__(self, count: int, presets: Sequence[Motion]) -> None:
-            super().__init__(count, presets)
+        def __init__(self, world: World, presets: Sequence[Motion]) -> None:
+            super().__init__(world, presets)
             self.DeclareVectorInputPort("uav_command", 3)
 
     scenario = load("case_a")[0]

@@ -9,17 +9,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from builders.misbuilt import neighbours
 
 from airground_drake.base.arrays import Array
 from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
-from airground_drake.nsbc.team import Team
 from airground_drake.report import metrics
 from airground_drake.run import events
 from airground_drake.run.simulation import simulate
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import load, validated
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.systems import components
 from airground_drake.verify import verify
 
 ROCK, OWN, FLIER = 0.5, 0.25, 0.25
@@ -89,7 +88,7 @@ def test_a_collision_is_of_surfaces(bodies: Trace) -> None:
 
     assert not collisions(bodies)
     least = np.linalg.norm(bodies.position("ugv1") - [5.0, 0.0, 0.0], axis=1).min()
-    needed = least - bodies.scenario["safe_distance"]["collision_m"] - OWN - ROCK
+    needed = least - bodies.scenario.safe_distance.collision_m - OWN - ROCK
     assert not collisions(larger(bodies, "rock", needed - 1e-6))
     assert collisions(larger(bodies, "rock", needed + 1e-6))
     assert collisions(larger(bodies, "ugv1", needed + 1e-6))
@@ -98,19 +97,18 @@ def test_a_collision_is_of_surfaces(bodies: Trace) -> None:
 def points_in_mind(self: OutcomeGatekeepers, *args: Any) -> tuple[Array, Array]:
     """What a gatekeeper knows that takes obstacles for points."""
     discs, distances = KNOWN(self, *args)
-    return discs, np.full_like(distances, self._team.obstacle_distance)
+    return discs, np.full_like(distances, self._world.apart("ugv", "obstacle"))
 
 
 KNOWN = OutcomeGatekeepers._known
-PAIRS, TEAM = Team.pair_distance, components.make_team
 
 FORGETFUL: dict[str, tuple[Callable[[pytest.MonkeyPatch], None], set[str]]] = {
     "an obstacle's radius": (
-        lambda patch: patch.setattr(components, "make_team", lambda given: replace(TEAM(given), obstacle_radius=0.0)),
+        neighbours(lambda near: near._replace(distance=near.distance - ROCK * (near.share == 1.0))),
         {"SAFE-TRACE", "SAFE-HYP", "EXEC", "GATE-MODEL"},
     ),
     "the other robot's radius": (
-        lambda patch: patch.setattr(Team, "pair_distance", lambda team: PAIRS(team) - team.radii),
+        neighbours(lambda near: near._replace(distance=near.distance - FLIER * (near.share == 0.5))),
         {"SAFE-TRACE", "SAFE-HYP", "EXEC"},
     ),
     "radii in the gatekeeper only": (

@@ -22,6 +22,7 @@ LAYERS = (
     ("base", "check"),
     ("registry",),
     ("geometry",),
+    ("world",),
     ("nsbc",),
     ("decision", "intervention"),
     ("gatekeeper",),
@@ -47,7 +48,7 @@ def test_every_system_and_port_has_a_name() -> None:
         "optimisation": ["gatekeeper"],
         "vehicles": [
             "team_command", "velocity_disturbance", "team_velocity", "ugv1_plant", "ugv2_plant", "uav_plant",
-            "team_position",
+            "bodies",
         ],
     }  # fmt: skip
     assert [diagram.get_output_port(i).get_name() for i in range(diagram.num_output_ports())] == list(RECORDED)

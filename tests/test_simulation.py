@@ -50,8 +50,8 @@ def test_recursion_as_printed_is_unsafe_and_does_not_stall(run: Runs) -> None:
     for name in ("a_recursion_nearest", "a_recursion_listed"):
         of_run = run("case_a", name)
         distance = [
-            np.linalg.norm(of_run.position("ugv1") - o["position_m"], axis=1).min()
-            for o in of_run.scenario["obstacles"].values()
+            np.linalg.norm(of_run.position("ugv1") - o.position_m, axis=1).min()
+            for o in of_run.scenario.obstacles.values()
         ]
         assert min(distance) < 1.95
         assert "arrival" in kinds(of_run, "ugv1")
@@ -119,13 +119,13 @@ def test_runs_in_several_processes_are_those_in_one(
 
 WARM_UP = """
 from airground_drake.run import simulation
-from airground_drake.gatekeeper import cost, dual_bound, outcome, reachable_box, rollout
+from airground_drake.gatekeeper import cost, outcome, relaxation, rollout
 from airground_drake.nsbc import kernels, law
 from airground_drake.scenarios.load import load
 
 
 def compiled():
-    modules = (kernels, law, rollout, cost, dual_bound, outcome, reachable_box)
+    modules = (kernels, law, rollout, cost, outcome, relaxation)
     functions = [(f.__qualname__, f) for module in modules for f in vars(module).values() if hasattr(f, "signatures")]
     return {name: list(map(str, f.signatures)) for name, f in functions}
 

@@ -11,9 +11,9 @@ from pydrake.solvers import ClarabelSolver, MathematicalProgram
 
 from airground_drake.audit.item import Item
 from airground_drake.base.arrays import Array
-from airground_drake.gatekeeper.mpc_gatekeeper import View
 from airground_drake.gatekeeper.outcome import Outcome
 from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
+from airground_drake.gatekeeper.rollout import View
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.law import UgvLaw
 from airground_drake.report.figures.canvas import thin
@@ -24,7 +24,8 @@ from airground_drake.run.simulation import Recorder, simulate
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.systems.components import make_outlook, make_patience, make_presets, make_team
+from airground_drake.scenarios.world import make_world
+from airground_drake.systems.components import make_outlook, make_patience, make_presets
 
 PAPERS_ROUTE = "gatekeeper.route=relaxed"
 """The paper's own way to decide, (27)-(29), whatever the default of a scenario."""
@@ -37,16 +38,16 @@ LIGHT = "c, error weight 1"
 class Believing(OutcomeGatekeepers):
     """Gatekeepers that take every proposal for useful."""
 
-    def foresee(self, seen: View, i: int, proposal: Proposal) -> tuple[Outcome, Outcome]:
+    def foresee(self, seen: View, law: UgvLaw, proposal: Proposal) -> tuple[Outcome, Outcome]:
         """Refusing stalls, accepting does not."""
-        steps = np.arange(0.0, 2.0, self._law.avoidance.period)
+        steps = np.arange(0.0, 2.0, law.avoidance.period)
         follows = proposal.motion.sample(seen.t + steps)
         return Outcome(follows, True, 1.0, 1.0), Outcome(follows, False, 0.0, 0.0)
 
     @classmethod
     def of(cls, scenario: Scenario, law: UgvLaw) -> Believing:
         """Make them for a scenario."""
-        return cls(make_team(scenario), law, make_presets(scenario), make_outlook(scenario), make_patience(scenario))
+        return cls(make_world(scenario), law, make_presets(scenario), make_outlook(scenario), make_patience(scenario))
 
 
 def companion_findings() -> list[Item]:

@@ -1,7 +1,7 @@
 """Independent pieces of work in processes forked from this one, as many at a time as there are processors.
 
-A piece sees everything that there was before the first one began, and leaves nothing behind but what it returns. A
-process does several pieces, one after the other: one for each piece would import and load anew what pieces share.
+A piece sees everything that existed before the first one began; only what it returns is kept. A process does several
+pieces, one after the other: they share what they import and load.
 """
 
 from __future__ import annotations
@@ -12,18 +12,23 @@ import signal
 import sys
 import time
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from typing import TypeVar
 
 from airground_drake.base.errors import AirgroundError
+from airground_drake.base.interruption import end_with_parent
 from airground_drake.base.progress import SILENT, Progress
 
 T = TypeVar("T")
 
+MOST_JOBS = 1000
+"""Processes at a time that may be asked for: all of them begin at once."""
+
 _pieces: Sequence[Callable[[], object]] = ()
-"""The work at hand: inherited, so that it need not be pickled."""
+"""The current work: forked processes inherit it, so that it need not be pickled."""
 
 
 def forks() -> bool:
@@ -31,9 +36,35 @@ def forks() -> bool:
     return "fork" in multiprocessing.get_all_start_methods() and sys.platform != "darwin"
 
 
+def one_thread_each() -> None:
+    """Numerical libraries that are not loaded yet get one thread: as many processes as processors will use them."""
+    for name in ("OMP", "OPENBLAS", "MKL", "BLIS", "NUMEXPR"):
+        os.environ.setdefault(f"{name}_NUM_THREADS", "1")
+
+
 def processors() -> int:
     """How many processors this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@contextmanager
+def processes(jobs: int) -> Iterator[ProcessPoolExecutor]:
+    """A pool of so many processes. At the end of the block, those that still work are killed.
+
+    The first call forks them: they see everything that exists then. Where forking is not safe, they start empty. Calls
+    and results are pickled.
+    """
+    before = set(multiprocessing.active_children())
+    context = multiprocessing.get_context("fork" if forks() else "spawn")
+    pool = ProcessPoolExecutor(jobs, context, initializer=_begin)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DeprecationWarning)  # idle threads of numerical libraries survive a fork
+            yield pool
+    finally:
+        for process in set(multiprocessing.active_children()) - before:
+            process.kill()
+        pool.shutdown()
 
 
 def run_parallel(
@@ -63,14 +94,11 @@ def run_parallel(
         return [_done(_timed(piece), name, progress) for piece, name in zip(pieces, called, strict=True)]
     _pieces = pieces
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", DeprecationWarning)  # idle threads of numerical libraries survive a fork
-            context = multiprocessing.get_context("fork")
-            with ProcessPoolExecutor(most, context, initializer=_begin) as pool:
-                futures = {pool.submit(_piece, index): index for index in range(len(pieces))}
-                for future in as_completed(futures):
-                    _done(future.result(), called[futures[future]], progress)
-                return [future.result()[0] for future in futures]  # type: ignore[misc]
+        with processes(most) as pool:
+            futures = {pool.submit(_piece, index): index for index in range(len(pieces))}
+            for future in as_completed(futures):
+                _done(future.result(), called[futures[future]], progress)
+            return [future.result()[0] for future in futures]  # type: ignore[misc]
     except BrokenProcessPool as error:
         raise AirgroundError("a process that judged claims died") from error
     finally:
@@ -78,9 +106,9 @@ def run_parallel(
 
 
 def start_in_process(work: Callable[[], T]) -> Callable[[], T]:
-    """Start some work in a process of its own; what is returned waits for its result, and is to be called once.
+    """Start some work in a process of its own; returns a function that waits for the result, to be called once.
 
-    Where there is one processor, or no fork, the work is done when it is waited for.
+    With one processor, or without fork, the work is done when the result is asked for.
 
     Raises:
         AirgroundError: when it is waited for, if the process ends without having returned.
@@ -110,6 +138,7 @@ def start_in_process(work: Callable[[], T]) -> Callable[[], T]:
 def _begin() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent's to heed
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    end_with_parent()
 
 
 def _piece(index: int) -> tuple[object, float]:

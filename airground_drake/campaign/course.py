@@ -2,21 +2,41 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
+from pydantic import BeforeValidator, ConfigDict, Field, PlainValidator, WithJsonSchema
 
 from airground_drake.base.arrays import Array
+from airground_drake.scenarios.kinds import Number, Positive, as_float, refused
+from airground_drake.scenarios.limits import MAX_UGVS
 
 TRIES = 10_000
 """Places that are tried before a field counts as full."""
+MOST_OBSTACLES = 10_000
 BEYOND_M = 0.3
 """What starts and targets have beyond the safe distance, m."""
 
 REPLACES = ("ugvs", "obstacles", "uav.start_m", "uav.target_m")
 """Keys of a scenario, dotted, that a course draws."""
+
+
+def _range(least: int, most: int) -> Callable[[object], tuple[int, int]]:
+    """Reads a whole number, or the least and largest one, within bounds."""
+
+    def read(value: object) -> tuple[int, int]:
+        low, high = value if isinstance(value, list) and len(value) == 2 else (value, value)
+        if type(low) is not int or type(high) is not int or not least <= low <= high <= most:
+            raise refused(value, f"wanted: a whole number from {least} to {most}, or [least, most]")
+        return low, high
+
+    return read
+
+
+Ugvs = Annotated[tuple[int, int], PlainValidator(_range(1, MAX_UGVS)), WithJsonSchema({})]
+Obstacles = Annotated[tuple[int, int], PlainValidator(_range(0, MOST_OBSTACLES)), WithJsonSchema({})]
 
 
 @dataclass(frozen=True)
@@ -33,13 +53,15 @@ class Course:
         hidden: share of the obstacles that are not on the UAV's map.
     """
 
-    ugvs: tuple[int, int] = (1, 4)
-    obstacles: tuple[int, int] = (4, 9)
-    length_m: float = 20.0
-    width_m: float = 16.0
-    preset_m_s: float = 1.0
-    max_speed_m_s: float = 3.0
-    hidden: float = 0.0
+    __pydantic_config__: ClassVar = ConfigDict(extra="forbid")
+
+    ugvs: Ugvs = (1, 4)
+    obstacles: Obstacles = (4, 9)
+    length_m: Positive = 20.0
+    width_m: Positive = 16.0
+    preset_m_s: Positive = 1.0
+    max_speed_m_s: Positive = 3.0
+    hidden: Annotated[Number, Field(ge=0.0, le=1.0), BeforeValidator(as_float)] = 0.0
 
     def values(self, rng: np.random.Generator, obstacle_m: float, ugv_m: float, altitude_m: float) -> dict[str, Any]:
         """The keys of a scenario that a course replaces, dotted: UGVs, obstacles, start and target of the UAV.

@@ -1,32 +1,24 @@
-"""Much of the same work, on the processors of this machine (joblib's loky) or on a Dask cluster."""
+"""Much of the same work, on the processors of this machine or on a Dask cluster."""
 
 from __future__ import annotations
 
-import gc
 import itertools
 import logging
-import threading
 import uuid
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import CancelledError
-from contextlib import contextmanager
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import ExitStack, contextmanager
 from functools import partial
 from typing import Any, Protocol, TypeVar
 
 from airground_drake.base.errors import AirgroundError, one_line
-from airground_drake.base.interruption import end_with_parent
+from airground_drake.base.parallel import processes
 
 DEATHS = 2
-"""An item in whose presence so many processes have died is given up."""
+"""An item is given up when so many of its processes have died."""
 AHEAD = 4
 """Items that are handed out beforehand for each process."""
-IDLE_S = 300.0
-"""A process that has had nothing to do for so long ends, s."""
-ENDING_S = 5.0
-"""A thread of the pool that has ended has so long to end, s."""
-ENVIRONMENT = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL", "BLIS", "NUMEXPR")}
-"""Of the processes: one thread each for numerical libraries."""
-ENVIRONMENT["PYTHONSAFEPATH"] = "1"  # loky starts them with `-m`, which would import from the current folder
 
 T = TypeVar("T")
 
@@ -35,7 +27,7 @@ class Pool(Protocol):
     """Does the same work for many items."""
 
     def __call__(self, work: Callable[[int], T], items: Iterable[int]) -> Iterator[tuple[int, T | None]]:
-        """What comes of each item, as it is finished; None where its process has died again and again.
+        """The result of each item, as it is finished; None if its process has died again and again.
 
         Args:
             work: for one item; goes to other processes, and so is pickled.
@@ -45,66 +37,63 @@ class Pool(Protocol):
 
 @contextmanager
 def local(jobs: int) -> Iterator[Pool]:
-    """So many processes of this machine, which end in the end."""
-    from joblib.externals import loky  # takes a while, which other commands need not wait for
+    """A pool of so many processes of this machine."""
+    with ExitStack() as alive:
+        yield _Local(jobs, alive)
 
-    others = set(threading.enumerate())
+
+class _Local:
+    """Processes that go on from one call to the next; all are replaced when one of them dies."""
+
+    def __init__(self, jobs: int, alive: ExitStack) -> None:
+        self._jobs, self._alive = jobs, alive
+        self._processes: ProcessPoolExecutor = alive.enter_context(processes(jobs))
+
+    def __call__(self, work: Callable[[int], T], items: Iterable[int]) -> Iterator[tuple[int, T | None]]:
+        """See `Pool`.
+
+        If a process dies, its pool ends the others, too. The items that were handed out are then done again, each in a
+        process of its own.
+        """
+        waiting, under_way = iter(items), dict[Future[T], int]()
+        while True:
+            for item in itertools.islice(waiting, AHEAD * self._jobs - len(under_way)):
+                under_way[_submitted(self._processes, partial(work, item))] = item
+            if not under_way:
+                return
+            done = wait(under_way, return_when=FIRST_COMPLETED).done
+            if any(map(_lost, done)):
+                done = set(under_way)
+                wait(done)
+                self._alive.close()
+                self._processes = self._alive.enter_context(processes(self._jobs))
+            for future in done:
+                item = under_way.pop(future)
+                yield item, _alone(partial(work, item)) if _lost(future) else future.result()
+
+
+def _submitted(pool: ProcessPoolExecutor, call: Callable[[], T]) -> Future[T]:
+    """The future of a call; failed already if a process of the pool has just died."""
     try:
-        yield partial(_locally, jobs)
-    finally:
-        loky.get_reusable_executor(reuse=True).shutdown(wait=True, kill_workers=True)
-        gc.collect()  # its semaphores are in cycles; those that are left when the command ends would be warned of
-        for thread in set(threading.enumerate()) - others:  # that which feeds a queue holds semaphores until it ends
-            thread.join(ENDING_S)
-
-
-def _locally(jobs: int, work: Callable[[int], T], items: Iterable[int]) -> Iterator[tuple[int, T | None]]:
-    """See `Pool`.
-
-    If a process dies, those that are there end with it, and the items that they may have been at are done again, each
-    in a process of its own.
-    """
-    from joblib.externals import loky
-
-    waiting, under_way = iter(items), dict[Any, int]()
-    while True:
-        for item in itertools.islice(waiting, AHEAD * jobs - len(under_way)):
-            under_way[_submitted(partial(work, item), jobs)] = item
-        if not under_way:
-            return
-        done = loky.wait(under_way, return_when=loky.FIRST_COMPLETED).done
-        for future in tuple(under_way) if any(map(_lost, done)) else done:
-            item = under_way.pop(future)
-            yield item, _alone(partial(work, item)) if _lost(future) else future.result()
-
-
-def _submitted(call: Callable[[], T], jobs: int) -> Any:
-    """The future of a call in one of so many processes; failed already if one of them has just died."""
-    from joblib.externals import loky
-
-    try:
-        processes = loky.get_reusable_executor(jobs, timeout=IDLE_S, env=ENVIRONMENT, initializer=end_with_parent)
-        return processes.submit(call)
-    except loky.BrokenProcessPool as error:
-        future = loky.Future()
+        return pool.submit(call)
+    except BrokenProcessPool as error:
+        future = Future[T]()
         future.set_exception(error)
         return future
 
 
-def _lost(future: Any) -> bool:
+def _lost(future: Future[T]) -> bool:
     """Whether a process died before it had finished this."""
-    from joblib.externals import loky
-
-    return isinstance(future.exception(), loky.BrokenProcessPool)
+    return isinstance(future.exception(), BrokenProcessPool)
 
 
 def _alone(call: Callable[[], T]) -> T | None:
     """The result of a call in a process of its own, begun again if that dies; None if it always does."""
     for _ in range(DEATHS):
-        future = _submitted(call, 1)
-        if not _lost(future):
-            result: T = future.result()
-            return result
+        with processes(1) as one:
+            future = _submitted(one, call)
+            if not _lost(future):
+                return future.result()
     return None
 
 
@@ -112,7 +101,7 @@ def _alone(call: Callable[[], T]) -> T | None:
 def cluster(scheduler: str, timeout_s: float = 10.0) -> Iterator[Pool]:
     """The workers of a Dask cluster, each of which must have this package installed.
 
-    A worker that dies is Dask's to notice: its items go to others; one that has killed several is given up.
+    Dask replaces workers that die, and gives up an item that has killed several.
 
     Raises:
         AirgroundError: if the scheduler cannot be reached, or Dask is not installed.
@@ -134,7 +123,7 @@ def cluster(scheduler: str, timeout_s: float = 10.0) -> Iterator[Pool]:
 def _on_cluster(
     dask: Any, client: Any, work: Callable[[int], T], items: Iterable[int]
 ) -> Iterator[tuple[int, T | None]]:
-    """See `Pool`. A scheduler has one name for each item of all its clients; workers may come at any time.
+    """See `Pool`. Names of items are unique to this client; workers may join at any time.
 
     Raises:
         AirgroundError: if the scheduler is lost.
@@ -160,7 +149,7 @@ def _on_cluster(
 
 
 def _result(dask: Any, future: Any) -> Any:
-    """Of an item that is finished; None if its workers have died.
+    """The result of a finished item; None if its workers have died.
 
     Raises:
         Exception: what the work has raised.

@@ -14,39 +14,60 @@ claims: [SAFE-TRACE]          # default: all claims about runs
 
 from __future__ import annotations
 
-import dataclasses
-import difflib
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, ClassVar
 
-from airground_drake.base.arrays import LARGEST
+from pydantic import BeforeValidator, ConfigDict, Field, PlainValidator, WithJsonSchema
+
+from airground_drake.base import files
 from airground_drake.base.errors import Fault, ScenarioError
 from airground_drake.campaign.course import REPLACES, Course
 from airground_drake.campaign.distributions import KINDS, RANDOM, Choice, Key, combinations, made, stream, values_of
 from airground_drake.campaign.rows import TIMES
 from airground_drake.registry import RUN_CLAIMS
 from airground_drake.scenarios import plugins
-from airground_drake.scenarios.document import read_data
-from airground_drake.scenarios.limits import MAX_NAME, MAX_UGVS
-from airground_drake.scenarios.load import from_data, load, shipped
+from airground_drake.scenarios.document import UNKNOWN_KEY, Document, read, suggestion
+from airground_drake.scenarios.kinds import WANTED, Real, Words, refused
+from airground_drake.scenarios.limits import MAX_NAME
+from airground_drake.scenarios.load import filled, from_data, load, shipped
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.finding import PLAIN_NAME
 
-MOST_OBSTACLES = 10_000
-"""That a course may draw."""
-KEYS = ("name", "title", "scenario", "runs", "seed", "set", "draw", "course", "claims", "marks")
 COURSE = "course"
 """Name of the random stream of maps and teams."""
 NOT_JUDGED: dict[str, Any] = {"reproduction": [], "choices": []}
 """Keys that say what is in the paper, and nothing about a drawn scenario."""
 
 
-@dataclass(frozen=True)
-class Spec:
-    """A campaign as its file has it.
+def _wanted(words: str, **bounds: Any) -> Any:
+    """What messages say of a key's value, besides its bounds."""
+    return Field(json_schema_extra={WANTED: words}, **bounds)
+
+
+def _key(given: object) -> Key:
+    """How a key is drawn."""
+    if not isinstance(given, dict) or len(given) != 1:
+        raise refused(given, f"wanted: one of {', '.join(KINDS)} and its parameters")
+    ((kind, parameters),) = given.items()
+    if kind not in KINDS:
+        raise refused(kind, f"{suggestion(kind, KINDS)}allowed: {', '.join(KINDS)}")
+    try:
+        return made(kind, parameters)
+    except ValueError as error:
+        raise refused(parameters, str(error), kind) from None
+
+
+_DOTTED = "a mapping with dotted keys of the scenario"
+_Key = Annotated[Key, PlainValidator(_key), WithJsonSchema({})]
+_Names = Annotated[tuple[Words, ...], _wanted("a list of names")]
+
+
+@dataclass(frozen=True, kw_only=True)
+class File:
+    """The keys of a campaign's file.
 
     Attributes:
         name, title: for people.
@@ -58,21 +79,35 @@ class Spec:
         course: random maps and teams, if any.
         claims: identifiers of the claims to judge; empty: all about runs.
         marks: values to be found in distributions of times, by column.
-        digest: SHA-256 of the file.
-        source: its path.
-        data: what the scenario's file held when the campaign was read, without what is not judged.
     """
 
-    name: str
-    title: str
-    scenario: str
-    runs: tuple[str, ...]
-    seed: int
-    fixed: Mapping[str, Any]
-    drawn: Mapping[str, Key]
-    course: Course | None
-    claims: tuple[str, ...]
-    marks: Mapping[str, float]
+    __pydantic_config__: ClassVar = ConfigDict(extra="forbid")
+
+    name: Annotated[
+        str,
+        _wanted("a name of at most 100 letters, digits, _, . and -", pattern=f"^{PLAIN_NAME.pattern}$", strict=True),
+    ]
+    title: Words = ""
+    scenario: Annotated[Words, _wanted("a shipped scenario, or the path of a YAML file", min_length=1)]
+    runs: _Names = ()
+    seed: Annotated[int, _wanted("a whole number from 0 on", strict=True, ge=0)] = 0
+    fixed: Annotated[dict[str, Any], _wanted(_DOTTED, alias="set")] = field(default_factory=dict)
+    drawn: Annotated[dict[str, _Key], _wanted(_DOTTED, alias="draw")] = field(default_factory=dict)
+    course: Annotated[Course | None, BeforeValidator(lambda given: {} if given is None else given)] = None
+    claims: _Names = ()
+    marks: dict[str, Real] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Spec(File):
+    """A campaign as its file has it.
+
+    Attributes:
+        digest: SHA-256 of the file.
+        source: its path.
+        data: content of the scenario's file when the campaign was read, without NOT_JUDGED.
+    """
+
     digest: str
     source: str
     data: Any = field(repr=False)
@@ -122,12 +157,14 @@ class Spec:
             except ValueError as error:
                 raise ScenarioError(self.source, COURSE, Fault(str(error)), "wanted: a larger field") from None
         scenario = self._with(overrides | dict(values))
-        _known(self.runs, scenario.runs, self.source, "runs")
+        for run in self.runs:
+            if run not in scenario.runs:
+                raise _unknown(self.source, "runs", run, scenario.runs)
         runs = {run: scenario.runs[run] for run in self.runs} if self.runs else scenario.runs
         return replace(scenario, name=f"{_identifier(self.name)[: MAX_NAME - 1 - len(str(index))]}_{index}", runs=runs)
 
     def refuse_plugins(self) -> None:
-        """Refuse code of others, in the scenario or in anything that may be drawn.
+        """Refuse third-party code in the scenario and in everything that may be drawn.
 
         Raises:
             ScenarioError: if any is named; says where, and how to allow it.
@@ -148,7 +185,7 @@ class Spec:
 
 
 def load_spec(path: Path) -> Spec:
-    """Read a campaign, and see that its first draw can be made.
+    """Read a campaign, and see that it names keys, runs and claims that there are.
 
     Raises:
         ScenarioError: if the file cannot be read, or something in it is not allowed.
@@ -156,35 +193,46 @@ def load_spec(path: Path) -> Spec:
     if not path.exists():
         wanted = "wanted: the path of a campaign (YAML: a scenario, and distributions over its keys)"
         raise ScenarioError(str(path), "", Fault("no such file"), wanted)
-    data, digest = read_data(path)
-    source = str(path)
-    given = _mapping(data, source, "", KEYS)
-    name = given.get("name", path.stem)
-    if not isinstance(name, str) or not PLAIN_NAME.fullmatch(name):
-        raise ScenarioError(source, "name", name, f"wanted: {PLAIN_NAME.pattern}")
-    scenario = _scenario(given.get("scenario"), path)
-    spec = Spec(
-        name,
-        _text(given.get("title", ""), source, "title"),
-        scenario,
-        _names(given.get("runs", []), source, "runs"),
-        _seed(given.get("seed", 0), source),
-        _keys(given.get("set", {}), source, "set"),
-        _drawn(given.get("draw", {}), source),
-        _course(given.get("course"), source) if "course" in given else None,
-        _names(given.get("claims", []), source, "claims"),
-        _marks(given.get("marks", {}), source),
-        digest,
-        source,
-        _judged_part(scenario),
-    )  # fmt: skip
+    document, content = read(path)
+    if isinstance(document.data, dict):
+        document.data.setdefault("name", path.stem)
+    found: File = filled(File, document)
+    scenario = found.scenario if found.scenario in shipped() else str(path.parent / found.scenario)
+    given = vars(found) | {"scenario": scenario}
+    spec = Spec(**given, digest=files.sha256(content), source=str(path), data=_judged_part(scenario))
     for key in spec.fixed if spec.course is not None else ():
         if f"{key}.".startswith(tuple(f"{each}." for each in REPLACES)):
             wanted = "wanted: a key that the course does not draw; one under draw comes after the course"
-            raise ScenarioError(source, f"set.{key}", Fault("the course would replace it"), wanted)
-    _known(spec.runs, spec.base().runs, source, "runs")
-    _known(spec.claims, tuple(RUN_CLAIMS), source, "claims")
+            raise ScenarioError(document.where("set", key), f"set.{key}", Fault("the course would replace it"), wanted)
+    try:
+        base = spec.base()
+    except ScenarioError as error:
+        raise _placed(error, document, "set") from None
+    for key, names, allowed in (("runs", spec.runs, base.runs), ("claims", spec.claims, RUN_CLAIMS)):
+        for index, name in enumerate(names):
+            if name not in allowed:
+                raise _unknown(document.where(key, str(index)), key, name, allowed)
+    for name in spec.marks:
+        if name not in TIMES:
+            raise _unknown(document.where("marks", name, key=True), f"marks.{name}", name, TIMES)
+    try:
+        spec.draw(0)
+    except ScenarioError as error:
+        if error.value == UNKNOWN_KEY:  # no draw would be valid; other faults may be of this draw only
+            raise _placed(error, document, "draw") from None
     return spec
+
+
+def _placed(error: ScenarioError, document: Document, part: str) -> ScenarioError:
+    """The error of an override, with the line of the spec that the override comes from."""
+    key = error.source.removeprefix("--set ").partition("=")[0]
+    if (part, key) not in document.places:
+        return error
+    return ScenarioError(document.where(part, key), f"{part}.{error.key}", error.value, error.allowed)
+
+
+def _unknown(source: str, key: str, name: str, allowed: Iterable[str]) -> ScenarioError:
+    return ScenarioError(source, key, name, f"{suggestion(name, allowed)}allowed: {', '.join(allowed)}")
 
 
 def _identifier(name: str) -> str:
@@ -194,99 +242,5 @@ def _identifier(name: str) -> str:
 
 
 def _judged_part(scenario: str) -> dict[str, Any]:
-    data = read_data(Path(scenario))[0]
+    data = read(scenario)[0].data
     return data | NOT_JUDGED if isinstance(data, dict) else {}  # `Spec.base` says what is wrong, and in which line
-
-
-def _mapping(given: Any, source: str, key: str, allowed: Collection[str]) -> dict[str, Any]:
-    if not isinstance(given, dict):
-        raise ScenarioError(source, key, given, f"wanted: a mapping with the keys {', '.join(allowed)}")
-    _known(given, allowed, source, key)
-    return given
-
-
-def _known(names: Collection[str], allowed: Collection[str], source: str, key: str) -> None:
-    for name in names:
-        if name not in allowed:
-            close = difflib.get_close_matches(str(name), list(allowed), n=1)
-            meant = f"did you mean {close[0]}? " if close else ""
-            raise ScenarioError(source, key or str(name), name, f"{meant}allowed: {', '.join(allowed)}")
-
-
-def _text(given: Any, source: str, key: str) -> str:
-    if not isinstance(given, str):
-        raise ScenarioError(source, key, given, "wanted: text")
-    return given
-
-
-def _scenario(given: Any, path: Path) -> str:
-    """Shipped, or beside the file."""
-    if not isinstance(given, str) or not given:
-        raise ScenarioError(str(path), "scenario", given, "wanted: a shipped scenario, or the path of a YAML file")
-    return given if given in shipped() else str(path.parent / given)
-
-
-def _seed(given: Any, source: str) -> int:
-    if type(given) is not int or given < 0:
-        raise ScenarioError(source, "seed", given, "wanted: a whole number from 0 on")
-    return given
-
-
-def _marks(given: Any, source: str) -> dict[str, float]:
-    for name, value in _mapping(given, source, "marks", TIMES).items():
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise ScenarioError(source, f"marks.{name}", value, "wanted: a number in s")
-    return dict(given)
-
-
-def _names(given: Any, source: str, key: str) -> tuple[str, ...]:
-    if not isinstance(given, list) or not all(isinstance(each, str) for each in given):
-        raise ScenarioError(source, key, given, "wanted: a list of names")
-    return tuple(given)
-
-
-def _keys(given: Any, source: str, key: str) -> dict[str, Any]:
-    if not isinstance(given, dict):
-        raise ScenarioError(source, key, given, "wanted: a mapping with dotted keys of the scenario")
-    return given
-
-
-def _drawn(given: Any, source: str) -> dict[str, Key]:
-    return {key: _distribution(each, source, f"draw.{key}") for key, each in _keys(given, source, "draw").items()}
-
-
-def _distribution(given: Any, source: str, key: str) -> Key:
-    kinds = ", ".join(KINDS)
-    if not isinstance(given, dict) or len(given) != 1:
-        raise ScenarioError(source, key, given, f"wanted: one of {kinds} and its parameters")
-    ((kind, parameters),) = given.items()
-    _known([kind], KINDS, source, key)
-    try:
-        return made(kind, parameters)
-    except ValueError as error:
-        raise ScenarioError(source, f"{key}.{kind}", parameters, str(error)) from None
-
-
-def _course(given: Any, source: str) -> Course:
-    fields = {field.name: field.default for field in dataclasses.fields(Course)}
-    values = _mapping({} if given is None else given, source, "course", tuple(fields))
-    return Course(
-        **{name: _course_value(value, fields[name], source, f"course.{name}") for name, value in values.items()}
-    )
-
-
-def _course_value(value: Any, default: Any, source: str, key: str) -> Any:
-    """A count or a range of counts where the default is a range; else a number."""
-    if isinstance(default, tuple):
-        low, high = value if isinstance(value, list) and len(value) == 2 else (value, value)
-        least = 1 if key.endswith("ugvs") else 0
-        most = MAX_UGVS if key.endswith("ugvs") else MOST_OBSTACLES
-        if type(low) is not int or type(high) is not int or not least <= low <= high <= most:
-            raise ScenarioError(source, key, value, f"wanted: a whole number from {least} to {most}, or [least, most]")
-        return low, high
-    share = key.endswith("hidden")
-    wrong = isinstance(value, bool) or not isinstance(value, int | float)
-    if wrong or not (0 <= value <= 1 if share else 0 < value <= LARGEST):
-        wanted = "a share, 0 to 1" if share else f"a positive number up to {LARGEST:g}"
-        raise ScenarioError(source, key, value, f"wanted: {wanted}")
-    return float(value)

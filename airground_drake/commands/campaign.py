@@ -17,12 +17,13 @@ from airground_drake.base.errors import (
     UnknownNameError,
     one_line,
 )
-from airground_drake.base.parallel import processors
+from airground_drake.base.parallel import MOST_JOBS, one_thread_each, processors
 from airground_drake.base.progress import progress_bar
 from airground_drake.base.usage import EXIT_TOOL, Parser, positive, refuse, whole
 from airground_drake.campaign.rows import UNFINISHED
 from airground_drake.scenarios import plugins
 from airground_drake.scenarios.estimate import DEFAULT_LIMITS, Limits
+from airground_drake.scenarios.limits import MAX_SEED
 from airground_drake.scenarios.shipped import argument
 
 if TYPE_CHECKING:
@@ -48,8 +49,12 @@ def parser() -> argparse.ArgumentParser:
         help="default: campaigns/<name>; new, or --resume; with --only, the file of the scenario",
     )  # fmt: skip
     parser.add_argument("--resume", action="store_true", help="go on with what the folder has")
-    parser.add_argument("--only", type=whole(0), metavar="INDEX", help="this draw alone; its scenario is written")
-    parser.add_argument("--jobs", type=whole(1), metavar="N", help="processes (default: one for each processor)")
+    parser.add_argument(
+        "--only", type=whole(0, MAX_SEED), metavar="INDEX", help="this draw alone; its scenario is written"
+    )
+    parser.add_argument(
+        "--jobs", type=whole(1, MOST_JOBS), metavar="N", help="processes (default: one for each processor)"
+    )
     parser.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster, such as tcp://host:8786")
     parser.add_argument(
         "--stop-when", metavar="RULE", help="end early, such as at 'SAFE-TRACE < 1e-2': the anytime-valid bound"
@@ -60,7 +65,7 @@ def parser() -> argparse.ArgumentParser:
     )  # fmt: skip
     parser.add_argument(
         "--limit-time", type=positive, default=DEFAULT_LIMITS.time, metavar="S",
-        help="a draw that takes longer is stopped (default: %(default)g)",
+        help="stop a draw that takes longer (default: %(default)g)",
     )  # fmt: skip
     parser.add_argument("-q", "--quiet", action="store_true", help="no progress")
     parser.add_argument(plugins.OPTION, action="store_true", help=plugins.HELP)
@@ -78,6 +83,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = of_command.parse_args(arguments)
     if options.only is not None and (options.resume or options.stop_when or options.number is not None):
         of_command.error("--only is one draw alone: -n, --resume and --stop-when do not go with it")
+    one_thread_each()
     from airground_drake.campaign.spec import load_spec
 
     try:
@@ -96,14 +102,14 @@ def _all(spec: Spec, options: argparse.Namespace) -> int:
 
     stopping = Stopping.parse(options.stop_when, spec.claims) if options.stop_when else None
     folder = options.output or Path("campaigns") / spec.name
-    jobs = options.jobs or processors()
+    jobs = min(options.jobs or processors(), options.number or spec.combinations)
     with (
         progress_bar(quiet=options.quiet) as progress,
         pool.cluster(options.scheduler) if options.scheduler else pool.local(jobs) as processes,
     ):
         found = conduct(
             spec, folder, processes, options.number, resume=options.resume, stopping=stopping,
-            limits=_limits(options), allow_plugins=options.allow_plugins, progress=progress,
+            limits=_limits(options), progress=progress,
         )  # fmt: skip
     print(f"{_summary(found, looked=bool(options.stop_when or options.resume))}\n{one_line(str(folder))}")
     return _code(found)
@@ -126,7 +132,7 @@ def _only(spec: Spec, options: argparse.Namespace) -> int:
         if not (path.is_file() and path.read_bytes() == text.encode()):  # the same draw may be asked for again
             files.try_to_create(path)
             files.write_text(path, text)
-    rows = rows_of(spec, options.only, _limits(options), allow_plugins=options.allow_plugins)
+    rows = rows_of(spec, options.only, _limits(options))
     for row in rows:
         margin = "" if math.isnan(row["margin"]) else f" {row['margin']:.6g} {row['unit']}"
         print(f"{row['run']:12} {row['claim'] or row['ended']:12} {row['status'] or row['what']}{margin}")
@@ -138,7 +144,7 @@ def _only(spec: Spec, options: argparse.Namespace) -> int:
 
 
 def _limits(options: argparse.Namespace) -> Limits:
-    return Limits(options.limit_steps, DEFAULT_LIMITS.memory, options.limit_time)
+    return Limits(options.limit_steps, DEFAULT_LIMITS.memory, options.limit_time, options.allow_plugins)
 
 
 def _code(found: dict[str, Any]) -> int:
@@ -148,7 +154,7 @@ def _code(found: dict[str, Any]) -> int:
 
 
 def _undecided(found: dict[str, Any]) -> list[str]:
-    """What is undecided, in words: what exit code 3 stands for."""
+    """What is undecided, in words: the reasons of exit code 3."""
     draws, ended = found["draws"], found["ended"]
     lines = [f"{ended[name]} of {draws} draws {name}" for name in UNFINISHED if name in ended]
     for claim in found["claims"]:
@@ -165,7 +171,7 @@ def _name(claim: dict[str, Any]) -> str:
 
 
 def _summary(found: dict[str, Any], *, looked: bool) -> str:
-    """As text; the bounds hold for a number of draws fixed beforehand, or, if somebody has looked, at any time."""
+    """As text. The bounds hold for a number of draws fixed beforehand; after intermediate looks, at any time."""
     ended = ", ".join(f"{count} {name}" for name, count in found["ended"].items())
     lines = [f"{found['name']}: {found['draws']} draws ({ended}), {found['simulated_s']:.0f} s simulated"]
     for claim in found["claims"]:

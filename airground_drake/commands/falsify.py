@@ -11,8 +11,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from airground_drake.base import files
-from airground_drake.base.errors import AirgroundError, Fault, FolderError, ScenarioError, UnknownNameError, one_line
-from airground_drake.base.parallel import processors
+from airground_drake.base.errors import (
+    AirgroundError,
+    Fault,
+    FolderError,
+    PluginError,
+    ScenarioError,
+    UnknownNameError,
+    one_line,
+)
+from airground_drake.base.parallel import MOST_JOBS, one_thread_each, processors
 from airground_drake.base.progress import progress_bar
 from airground_drake.base.usage import EXIT_TOOL, Parser, positive, refuse, whole
 from airground_drake.campaign.rows import COLUMNS
@@ -54,7 +62,9 @@ def parser() -> argparse.ArgumentParser:
         help="runs to make a counterexample small (default: %(default)s)",
     )  # fmt: skip
     parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="new; default: <name>_<sampler>.yaml")
-    parser.add_argument("--jobs", type=whole(1), metavar="N", help="processes (default: one for each processor)")
+    parser.add_argument(
+        "--jobs", type=whole(1, MOST_JOBS), metavar="N", help="processes (default: one for each processor)"
+    )
     parser.add_argument("-q", "--quiet", action="store_true", help="no progress")
     parser.add_argument(plugins.OPTION, action="store_true", help=plugins.HELP)
     return parser
@@ -71,6 +81,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = of_command.parse_args(arguments)
     if options.limit is not None and options.most is None:
         of_command.error("--limit is of a time: name it with --most")
+    one_thread_each()
     from airground_drake.campaign.spec import load_spec
 
     try:
@@ -98,13 +109,18 @@ def _run(spec: Spec, options: argparse.Namespace) -> int:
         raise ScenarioError("--sampler", "", options.sampler, plugins.WANTED)
     if not options.allow_plugins:
         spec.refuse_plugins()
-    with plugins.beside(spec.source, allow=options.allow_plugins):
-        sampler = SAMPLERS.make(options.sampler, of=Sampler, dimensions=dimensions(spec.drawn), seed=spec.seed)
+    try:
+        with plugins.beside(spec.source, allow=options.allow_plugins):
+            sampler = SAMPLERS.make(options.sampler, of=Sampler, dimensions=dimensions(spec.drawn), seed=spec.seed)
+    except PluginError as error:
+        raise ScenarioError("--sampler", "", Fault(str(error)), f"allowed: {', '.join(SAMPLERS.allowed)}") from None
     path: Path = options.output or Path(f"{spec.name}_{options.sampler.rpartition(':')[2]}.yaml")
     files.try_to_create(path)
     files.try_to_create(_small(path))
-    search = Search(replace(spec, claims=(options.claim,)), objective, DEFAULT_LIMITS, options.allow_plugins)
-    with progress_bar(quiet=options.quiet) as progress, pool.local(options.jobs or processors()) as processes:
+    limits = DEFAULT_LIMITS._replace(plugins=options.allow_plugins)
+    search = Search(replace(spec, claims=(options.claim,)), objective, limits)
+    jobs = min(options.jobs or processors(), options.number)
+    with progress_bar(quiet=options.quiet) as progress, pool.local(jobs) as processes:
         _try(search, processes)
         progress.stage(spec.name, options.number, "scenarios")
         best = falsify(search, sampler, options.number, processes, progress)
@@ -129,7 +145,7 @@ def _try(search: Search, pool: Pool) -> None:
     from airground_drake.campaign.work import rows_of
 
     spec = search.spec
-    for _, rows in pool(partial(rows_of, spec, limits=search.limits, allow_plugins=search.allow_plugins), [0]):
+    for _, rows in pool(partial(rows_of, spec, limits=search.limits), [0]):
         if rows and all(row["ended"] == JUDGED and not row["claim"] for row in rows):
             raise ScenarioError("--claim", "", spec.claims[0], f"wanted: one that applies to a run of {spec.source}")
 

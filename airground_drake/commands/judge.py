@@ -1,4 +1,4 @@
-"""`airground judge POSITIONS --scenario NAME`: judge positions that come from elsewhere, such as a laboratory."""
+"""`airground judge POSITIONS --scenario NAME`: judge recorded positions, such as those of a laboratory."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from airground_drake.base import files
-from airground_drake.base.errors import AirgroundError, one_line
+from airground_drake.base.errors import FAULT_WIDTH, AirgroundError, one_line
 from airground_drake.base.usage import Parser, overridable, refuse
 
 if TYPE_CHECKING:
@@ -24,8 +24,8 @@ def parser() -> argparse.ArgumentParser:
     """What the command line takes."""
     parser = Parser(
         prog="airground judge",
-        description="Judge sampled positions of robots, wherever they come from: the distances that were kept, and by "
-        "how much the samples miss the avoidance law.",
+        description="Judge sampled positions of robots from any source: which distances were kept, and by how much "
+        "the samples miss the avoidance law.",
         epilog="exit codes: 0 every distance is kept, 1 one is not, 2 usage, or a file that cannot be used",
     )
     parser.add_argument(
@@ -55,7 +55,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (AirgroundError, OSError) as error:
         return refuse(error)
     except (positions.UnusableError, ValueError) as error:
-        return refuse(f"{options.positions}: {error}")
+        return refuse(f"{options.positions}: {str(error)[:FAULT_WIDTH]}")
     broken = [one for one in found if not one.kept]
     if options.json:
         pairs = [{**one._asdict(), "kept": one.kept} for one in found]

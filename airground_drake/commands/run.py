@@ -85,7 +85,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _said(trace: Trace) -> Iterator[str]:
     """A line for the run, then one for each event."""
     method = str(trace.meta["method"])
-    yield f"{trace.scenario['name']}, run {trace.run}: method ({method}), {METHODS[method].says}; {trace.t[-1]:g} s"
+    yield f"{trace.scenario.name}, run {trace.run}: method ({method}), {METHODS[method].says}; {trace.t[-1]:g} s"
     for event in trace.events:
         x, y, _ = event["position_m"]
         yield f"{event['t_s']:9.3f} s  {event['robot']:12} {event['kind']:10} at ({x:.2f}, {y:.2f}) m"

@@ -8,8 +8,7 @@ that point, the velocity v of one control period h must satisfy
 
 with share = 1 for an obstacle and 1/2 for each robot of a pair. As ||x + s v|| >= ||x|| + s (x.v)/||x||, the
 distance is then at least d during the whole period, whatever velocity the lower priorities ask for: v = 0
-satisfies all of them, so a safe choice always exists. Of bodies, D and d are distances of centres: `team.py` puts both
-radii into d.
+satisfies all of them, so a safe choice always exists. D and d are distances of centres: `World` puts both radii into d.
 """
 
 from __future__ import annotations
@@ -21,6 +20,7 @@ import numpy as np
 
 from airground_drake.base.arrays import Array
 from airground_drake.nsbc import kernels
+from airground_drake.world.world import Neighbours
 
 Composition = Literal["augmented", "recursion_nearest", "recursion_listed"]
 COMPOSITIONS: tuple[Composition, ...] = get_args(Composition)
@@ -60,6 +60,11 @@ class Surroundings:
     distance: Array
     share: Array
 
+    @classmethod
+    def of(cls, near: Neighbours, positions: Array) -> Surroundings:
+        """What is around the members when all bodies that move are at positions (M, 3) m."""
+        return cls(kernels.gather(positions, near.still, near.others), near.distance, near.share)
+
 
 @dataclass(frozen=True)
 class Avoidance:
@@ -97,6 +102,16 @@ class Avoidance:
     def apply(self, lower: Array, spaces: HalfSpaces) -> Array:
         """Put the avoidance tasks above lower-priority velocities: (n, 3) m/s to (n, 3) m/s."""
         return kernels.team_avoid(lower, spaces.normal, spaces.bound, self.code)
+
+    def command(self, lower: Array, positions: Array, near: Neighbours) -> Array:
+        """Commands of k robots, (k, 3), m/s: lower-priority velocities (k, 3), limited in speed, below avoidance.
+
+        Args:
+            lower: what the tasks below ask for, m/s.
+            positions: of all bodies that move, (M, 3), m, world frame.
+            near: the robots and what is around them.
+        """
+        return kernels.commands(lower, positions, near, self.gain, self.period, self.sensing_range, self.code)
 
 
 def limit_speed(velocity: Array, max_speed: Array) -> Array:

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from numba import njit
 
 from airground_drake.base.arrays import Array
+from airground_drake.world.world import Neighbours
 
 MARGIN_M_S = 1e-12
 """Added to every bound in the projection, m/s. Without it the velocity of a robot in contact misses the bound, which is
@@ -173,6 +174,28 @@ def gather(positions: Array, obstacles: Array, others: npt.NDArray[np.intp]) -> 
             for k in range(others.shape[1]):
                 centre[i, m + k, a] = positions[others[i, k], a]
     return centre
+
+
+@njit(cache=True)
+def commands(
+    lower: Array,
+    positions: Array,
+    near: Neighbours,
+    gain: float,
+    period: float,
+    sensing_range: float,
+    composition: int,
+) -> Array:
+    """Velocities of k robots, (k, 3), m/s; see `Avoidance.command`."""
+    velocity, centre = limit_speed(lower, near.max_speed), gather(positions, near.still, near.others)
+    normal, bound = np.empty(centre.shape[1:]), np.empty(centre.shape[1])
+    for i in range(len(velocity)):
+        fill_half_spaces(
+            positions[near.members[i]], centre[i], near.distance[i], near.share[i], gain, period, near.mobility[i],
+            sensing_range, normal, bound,
+        )  # fmt: skip
+        velocity[i] = avoid_one(velocity[i], normal, bound, composition)
+    return velocity
 
 
 @njit(cache=True)

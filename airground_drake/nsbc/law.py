@@ -7,7 +7,7 @@ Compiled, and written once: the controllers command by it (`UgvLaw.velocity`), a
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from typing import NamedTuple
 
@@ -18,7 +18,7 @@ from numba import njit
 from airground_drake.base.arrays import Array
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.kernels import avoid_one, fill_half_spaces, gather, limit_one
-from airground_drake.nsbc.team import Neighbourhood
+from airground_drake.world.world import Neighbours
 
 
 class Intervention(NamedTuple):
@@ -63,6 +63,11 @@ class UgvLaw:
     intervention_gain: float
     intervention_on_top: bool
 
+    def with_gains(self, avoidance: float, motion: float, intervention: float) -> UgvLaw:
+        """The law with other gains, 1/s."""
+        layer = replace(self.avoidance, gain=avoidance)
+        return replace(self, avoidance=layer, motion_gain=motion, intervention_gain=intervention)
+
     @cached_property
     def numbers(self) -> Numbers:
         """For compiled code."""
@@ -75,23 +80,19 @@ class UgvLaw:
     def velocity(
         self,
         positions: Array,
-        near: Neighbourhood,
+        near: Neighbours,
         target: Array,
         rate: Array,
         asked: Sequence[Intervention | None],
-        mobility: Array,
-        max_speed: Array,
     ) -> Array:
         """Commands of n UGVs, (n, 3), m/s: `command` for each.
 
         Args:
-            positions: of all robots, the UGVs first, (N, 3), m, world frame.
-            near: obstacles and robots around the UGVs.
+            positions: of all bodies that move, (M, 3), m, world frame.
+            near: the UGVs and what is around them.
             target: of the UGVs' own task (6), (n, 3), m.
             rate: velocity of the target, (n, 3), m/s.
             asked: per UGV, what the accepted intervention asks for, or None.
-            mobility: (n, 3), 1 where a robot can move, else 0.
-            max_speed: (n,), m/s.
         """
         executing, together = _nothing_asked(len(target))
         if any(one is not None for one in asked):
@@ -100,10 +101,7 @@ class UgvLaw:
                 if one is not None:
                     executing[i] = True
                     together.wanted[i], together.rate[i], together.chosen[i] = one
-        return _commands(
-            self.numbers, positions, near.obstacles, near.others, near.distance, near.share, target, rate,
-            executing, together, mobility, max_speed,
-        )  # fmt: skip
+        return _commands(self.numbers, positions, near, target, rate, executing, together)
 
 
 @cache
@@ -168,27 +166,24 @@ def command(
 def _commands(
     law: Numbers,
     positions: Array,
-    obstacles: Array,
-    others: npt.NDArray[np.intp],
-    distance: Array,
-    share: Array,
+    near: Neighbours,
     target: Array,
     rate: Array,
     executing: npt.NDArray[np.bool_],
     asked: Intervention,
-    mobility: Array,
-    max_speed: Array,
 ) -> Array:
-    """`command` for n UGVs, (n, 3), m/s: arrays as in `UgvLaw.velocity` and `Neighbourhood`."""
-    velocity, centre = np.empty(target.shape), gather(positions, obstacles, others)
+    """`command` for n UGVs, (n, 3), m/s: arrays as in `UgvLaw.velocity`."""
+    velocity, centre = np.empty(target.shape), gather(positions, near.still, near.others)
     normal, bound = np.empty(centre.shape[1:]), np.empty(centre.shape[1])
     for i in range(len(target)):
+        position = positions[near.members[i]]
         fill_half_spaces(
-            positions[i], centre[i], distance[i], share[i], law.avoidance_gain, law.period, mobility[i],
+            position, centre[i], near.distance[i], near.share[i], law.avoidance_gain, law.period, near.mobility[i],
             law.sensing_range, normal, bound,
         )  # fmt: skip
         velocity[i] = command(
-            law, positions[i], target[i], rate[i], executing[i],
-            Intervention(asked.wanted[i], asked.rate[i], asked.chosen[i]), normal, bound, mobility[i], max_speed[i],
+            law, position, target[i], rate[i], executing[i],
+            Intervention(asked.wanted[i], asked.rate[i], asked.chosen[i]), normal, bound, near.mobility[i],
+            near.max_speed[i],
         )  # fmt: skip
     return velocity

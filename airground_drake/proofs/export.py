@@ -9,10 +9,11 @@ from fractions import Fraction
 from functools import cache
 from itertools import combinations, groupby, pairwise
 from math import isqrt, lcm
-from typing import Any
 
+from airground_drake.base.exact import decimal
 from airground_drake.proofs.record import FOLDER
 from airground_drake.run.trace import Trace
+from airground_drake.scenarios.schema import Scenario
 
 PARTS = 2**60
 """Positions are rounded to 1/PARTS m: some coordinates are as small as 1e-100 m. At a metre binary64 is coarser."""
@@ -69,9 +70,9 @@ def recorded(trace: Trace) -> Recorded:
     Raises:
         TraceError: if a column is missing or not finite.
     """
-    control = trace.scenario["control"]
+    control = trace.scenario.control
     places: dict[str, tuple[Place, ...]] = {
-        name: (_rounded(obstacle["position_m"]),) for name, obstacle in trace.scenario["obstacles"].items()
+        name: (_rounded(obstacle.position_m),) for name, obstacle in trace.scenario.obstacles.items()
     }
     places |= {robot: tuple(map(_rounded, trace.position(robot).tolist())) for robot in trace.robots}
     spelled = _spelled(list(places))
@@ -82,24 +83,17 @@ def recorded(trace: Trace) -> Recorded:
         demands=tuple(
             Demand(spelled[first], spelled[second], safe_m) for first, second, safe_m in demands(trace.scenario)
         ),
-        gain=min(decimal(control["avoidance_gain_1_s"]) * decimal(control["period_s"]), Fraction(1)),
+        gain=min(decimal(control.avoidance_gain_1_s) * decimal(control.period_s), Fraction(1)),
     )
 
 
-def demands(scenario: Mapping[str, Any]) -> list[tuple[str, str, Fraction]]:
+def demands(scenario: Scenario) -> list[tuple[str, str, Fraction]]:
     """Who is to keep which distance from whom, m: each robot from each obstacle, and each two robots."""
-    robots = {**scenario["ugvs"], scenario["uav"]["name"]: scenario["uav"]}
-    safe = {kind: decimal(value) for kind, value in scenario["safe_distance"].items()}
-    radius = {name: decimal(body["radius_m"]) for name, body in {**robots, **scenario["obstacles"]}.items()}
-    found = [(robot, obstacle, "obstacle_m") for robot in robots for obstacle in scenario["obstacles"]]
-    for one, other in combinations(robots, 2):
-        found.append((one, other, "air_ground_m" if scenario["uav"]["name"] in (one, other) else "ugv_m"))
-    return [(one, other, safe[kind] + radius[one] + radius[other]) for one, other, kind in found]
-
-
-def decimal(number: float) -> Fraction:
-    """The decimal number that a scenario's number prints as."""
-    return Fraction(repr(number))
+    robots, safe, uav = scenario.robots, scenario.safe_distance, scenario.uav.name
+    radius = {name: decimal(body.radius_m) for name, body in scenario.bodies.items()}
+    found = [(robot, obstacle, safe.obstacle_m) for robot in robots for obstacle in scenario.obstacles]
+    found += [(*two, safe.air_ground_m if uav in two else safe.ugv_m) for two in combinations(robots, 2)]
+    return [(one, other, decimal(apart) + radius[one] + radius[other]) for one, other, apart in found]
 
 
 def _rounded(place: Sequence[float]) -> Place:

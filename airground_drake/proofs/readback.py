@@ -39,7 +39,7 @@ def compare(text: str, trace: Trace) -> Rounding:
     unit, times, listed = _parts(rf"^Definition {run} := Run (\w+) \[\n(.*?)\] \[\n(.*?)\]\.$", text)
     if [Fraction(int(t, 0), int(unit, 0)) for t in times.split(";\n")] != [Fraction(t) for t in trace.t.tolist()]:
         raise ReadbackError(f"{run}: the times are not those of the trace")
-    recorded = {name: [obstacle["position_m"]] for name, obstacle in trace.scenario["obstacles"].items()}
+    recorded = {name: [obstacle.position_m] for name, obstacle in trace.scenario.obstacles.items()}
     recorded |= {robot: trace.position(robot).tolist() for robot in trace.robots}
     bodies = [name.removesuffix("_places") for name in listed.split("; ")]
     numbers = re.findall(r"^Definition (\w+) := (\d+)%nat\.$", text, re.MULTILINE)

@@ -200,7 +200,7 @@ def prove_report(report: Path, names: Sequence[str] = (), limit_s: float = coq.L
 
 def expects_kept(run: Trace) -> bool:
     """Whether the scenario expects that the run keeps its distances: SAFE-TRACE may not be refuted."""
-    expected: str = run.scenario["runs"][run.run]["expected"].get("SAFE-TRACE", "holds")
+    expected = run.scenario.runs[run.run].expected.get("SAFE-TRACE", "holds")
     return "refuted" not in expected
 
 

@@ -6,7 +6,6 @@ it has everything but the filter of claims and the marks that move over the traj
 
 from __future__ import annotations
 
-import json
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from functools import cache, partial
@@ -14,10 +13,10 @@ from hashlib import sha256
 from importlib import resources
 from typing import Any
 
+import yaml
 from jinja2 import Environment
 from markupsafe import Markup
 
-from airground_drake.base.errors import one_line
 from airground_drake.base.statuses import PASSING, outcome
 from airground_drake.report import attention, evidence, summary
 from airground_drake.report.figures import svg
@@ -33,7 +32,7 @@ STYLE, SCRIPTS = "report.css", ("report.js", "scrubber.js")
 NOTHING = "'none'"
 """In a content security policy: no source at all."""
 MAX_DIAGRAM_CHARS = 500_000
-MAX_JSON_CHARS = 4_000
+MAX_SCENARIO_CHARS = 20_000
 LINE_CHARS = 110
 KINDS = ("declared", "stuck")
 """Evidence of these kinds is shown instead of the verdict where that passes: it must not look like more than it is."""
@@ -57,8 +56,6 @@ PLACES = {"distances": "safe", **dict.fromkeys(("decision", "events", "gaps", "t
 """Sections of the figures; the others are maps of what happened."""
 LOOKS = {"yes": "good", "partly": "tuned", "no": "bad", "open": "open", "none": "idle"}
 """Class of each mark of the first screen, which sets its colour: never by colour alone."""
-NAMES = {"yes": "yes", "partly": "in part", "no": "no", "open": "not known", "none": "neither"}
-"""What a screen reader says for each mark."""
 
 CHIPS = {
     "as_expected": ("✓", "as declared", "good"),
@@ -116,6 +113,7 @@ def render(document: Mapping[str, Any], figures: Sequence[Figure], diagram_svg: 
         required=summary.required_m(document),
         beware=summary.do_not_conclude(document),
         declared=summary.as_declared(document),
+        legend=summary.legend(document),
         sections=[(name, title) for name, title in SECTIONS.items() if shown.get(name, True)],
         plates=plates,
         beside=_beside(figures),
@@ -135,12 +133,12 @@ def _environment() -> Environment:
     style = stylesheet()
     scripts = [_template(name) for name in SCRIPTS]
     environment.filters.update(
-        num=number, value=value, pretty=pretty, together=attention.faults_together, inline=Markup, mathml=mathml,
+        num=number, value=value, yaml=as_yaml, together=attention.faults_together, inline=Markup, mathml=mathml,
         evidence=evidence_tables, proof=place, records=partial(evidence.tables, number=number), brief=brief,
     )  # fmt: skip
     environment.globals.update(
         chips=CHIPS, shown=_shown, refused=attention.REFUSED, max_faults=MAX_FAULTS,
-        marks=summary.MARKS, kinds=LOOKS, names=NAMES,
+        marks=summary.MARKS, kinds=LOOKS, names=summary.MEANINGS,
         policy=Markup(security_policy(style, scripts)), style=Markup(style), scripts=list(map(Markup, scripts)),
     )  # fmt: skip
     return environment
@@ -236,23 +234,14 @@ def brief(x: Any, unit: str = "") -> str:
     return f"{number(x, 5)} {unit}".strip() if isinstance(x, int | float) else str(x)
 
 
-def pretty(x: Any, limit: int = MAX_JSON_CHARS) -> str:
-    """JSON for reading: what fits on a line is on a line; cut where it gets long."""
-    text = "\n".join(map(one_line, _lay_out(x, "").split("\n")))
-    return text if len(text) <= limit else f"{text[:limit]}\n… cut here; report.json has all of it"
-
-
-def _lay_out(x: Any, indent: str) -> str:
-    flat = json.dumps(x, ensure_ascii=False, allow_nan=False)
-    if len(indent) + len(flat) <= LINE_CHARS or not isinstance(x, (Mapping, list)):
-        return flat
-    deeper = f"{indent} "
-    if isinstance(x, Mapping):
-        items = [f"{json.dumps(key, ensure_ascii=False)}: {_lay_out(item, deeper)}" for key, item in x.items()]
-    else:
-        items = [_lay_out(item, deeper) for item in x]
-    opening, closing = "{}" if isinstance(x, Mapping) else "[]"
-    return f"{opening}\n{deeper}{f',{chr(10)}{deeper}'.join(items)}\n{indent}{closing}"
+def as_yaml(x: Any) -> str:
+    """A scenario for reading; what is not ASCII is escaped, and so is what would turn or break lines."""
+    text: str = yaml.safe_dump(x, default_flow_style=None, sort_keys=False, width=LINE_CHARS)
+    return (
+        text
+        if len(text) <= MAX_SCENARIO_CHARS
+        else f"{text[:MAX_SCENARIO_CHARS]}\n… cut here; report.json has all of it"
+    )
 
 
 def _diagram(source: str | None, name: str) -> str | None:
@@ -277,6 +266,9 @@ def _by_claim(claims: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
             "id": name,
             "claims": members,
             "fine": all(claim["as_expected"] for claim in members),
+            "settled": all(
+                claim["as_expected"] and claim["status"] in PASSING and not claim["run"] for claim in members
+            ),
             "verdicts": _together(members, sum(bool(claim["run"]) for claim in members)),
         }
         for name, members in groups.items()

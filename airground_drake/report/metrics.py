@@ -11,7 +11,7 @@ import numpy as np
 
 from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
-from airground_drake.verify.engines.segments import Approach, closest_approach
+from airground_drake.verify.engines.geometry import Approach, closest_approach
 from airground_drake.verify.runs.pairs import apart_of, least_of, pairs_of
 
 MOST_OBSTACLES = 20
@@ -85,7 +85,7 @@ def gatekeeper(trace: Trace) -> dict[str, Any] | None:
         return None
     gaps = table["gap"][table["gap"] >= 0.0]
     times = np.asarray(trace.timings.get("decision_times_s", []), dtype=np.float64)
-    period = float(trace.scenario["gatekeeper"]["period_s"])
+    period = float(trace.scenario.gatekeeper.period_s)
     levels = {"p50": 0.5, "p99": 0.99, "max": 1.0}
     time_s = {name: float(np.quantile(times, at, method="higher")) for name, at in levels.items() if times.size}
     return {
@@ -160,7 +160,7 @@ def closest_obstacle(trace: Trace, robot: str) -> Closest | None:
 def close_by(trace: Trace, robot: str) -> list[Nearby]:
     """Smallest distances of a robot to its nearest obstacles and robots, exact, those of least margin first."""
     robots = [other for other in trace.robots if other != robot]
-    found = _distances(trace, robot, list(trace.scenario["obstacles"]), NEAR_OBSTACLES)
+    found = _distances(trace, robot, list(trace.scenario.obstacles), NEAR_OBSTACLES)
     found |= _distances(trace, robot, robots, NEAR_ROBOTS)
     return sorted(_surfaces(trace, robot, found), key=lambda at: at.value - at.required_m)
 
@@ -182,18 +182,17 @@ def gap_m(trace: Trace, robot: str, other: str) -> Array:
 
 def place(trace: Trace, name: str) -> Array:
     """Position of an obstacle, (3,), or of a robot, (T, 3), m."""
-    if name in trace.scenario["obstacles"]:
-        return np.asarray(trace.scenario["obstacles"][name]["position_m"], dtype=np.float64)
+    if name in trace.scenario.obstacles:
+        return np.asarray(trace.scenario.obstacles[name].position_m, dtype=np.float64)
     return trace.position(name)
 
 
 def safe_distance_m(trace: Trace, robot: str, other: str) -> float:
     """The safe distance of centres that the scenario sets for a robot and an obstacle or another robot, m."""
-    if other in trace.scenario["obstacles"]:
-        kind = "obstacle_m"
-    else:
-        kind = "air_ground_m" if trace.scenario["uav"]["name"] in (robot, other) else "ugv_m"
-    return float(trace.scenario["safe_distance"][kind]) + radii_m(trace, robot, other)
+    scenario, safe = trace.scenario, trace.scenario.safe_distance
+    if other in scenario.obstacles:
+        return safe.obstacle_m + radii_m(trace, robot, other)
+    return (safe.air_ground_m if scenario.uav.name in (robot, other) else safe.ugv_m) + radii_m(trace, robot, other)
 
 
 def radii_m(trace: Trace, one: str, other: str) -> float:
@@ -203,12 +202,11 @@ def radii_m(trace: Trace, one: str, other: str) -> float:
 
 def radius_m(trace: Trace, name: str) -> float:
     """Radius of a robot or an obstacle, m."""
-    scenario = trace.scenario
-    return float((scenario["obstacles"].get(name) or scenario["ugvs"].get(name, scenario["uav"]))["radius_m"])
+    return trace.scenario.bodies[name].radius_m
 
 
 def _to_obstacles(trace: Trace, robot: str) -> dict[str, dict[str, float]]:
-    return _distances(trace, robot, list(trace.scenario["obstacles"]), MOST_OBSTACLES)
+    return _distances(trace, robot, list(trace.scenario.obstacles), MOST_OBSTACLES)
 
 
 def events_of(trace: Trace, robot: str, *kinds: str) -> list[dict[str, Any]]:

@@ -57,8 +57,8 @@ def distances_while_stalled(trace: Trace, robot: str) -> list[float]:
         return []
     final = trace.position(robot)[-1]
     distance = {
-        name: float(np.linalg.norm(final - np.asarray(obstacle["position_m"])))
-        for name, obstacle in trace.scenario["obstacles"].items()
+        name: float(np.linalg.norm(final - np.asarray(obstacle.position_m)))
+        for name, obstacle in trace.scenario.obstacles.items()
     }
     return [distance[name] for name in sorted(sorted(distance, key=distance.__getitem__)[:2])]
 
@@ -262,5 +262,5 @@ def _arrived(trace: Trace, robot: str) -> bool:
     scenario = trace.scenario
     if robot not in trace.robots:
         raise TraceError(f"run {trace.run}: there is no robot {robot!r}; there are {', '.join(trace.robots)}")
-    target = (scenario["ugvs"][robot] if robot in scenario["ugvs"] else scenario["uav"])["target_m"]
-    return bool(np.linalg.norm(trace.position(robot)[-1] - np.asarray(target)) <= scenario["arrival_tolerance_m"])
+    target = scenario.robots[robot].target_m
+    return bool(np.linalg.norm(trace.position(robot)[-1] - np.asarray(target)) <= scenario.arrival_tolerance_m)

@@ -1,4 +1,4 @@
-"""What the first screen of a report says, from report.json alone: headline, five answers, what not to conclude.
+"""The words of a report's first screen: headline, five answers, what not to conclude. `outcomes` has the facts.
 
 Marks follow what happened in the runs. Whether the scenario declared it so is a statement of its own, `as_declared`.
 """
@@ -6,19 +6,30 @@ Marks follow what happened in the runs. Whether the scenario declared it so is a
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from textwrap import wrap
 from typing import Any, NamedTuple
 
 from airground_drake.base.errors import one_line
 from airground_drake.base.statuses import NOT_EXERCISED, PASSING, UNDECIDED, admits_either, outcome
 from airground_drake.registry import METHODS
+from airground_drake.report.outcomes import SLACK_M, Course, Document, courses, distance, proved_for_d, statuses
 
 MARKS = {"yes": "✓", "partly": "≈", "no": "✗", "open": "?", "none": "\N{EN DASH}", "": " "}
 """Marks of a line and their icons; '' continues the line before."""
+MEANINGS = {
+    "yes": "yes",
+    "partly": "in part",
+    "no": "no",
+    "open": "not known",
+    "none": "neither good nor bad",
+}
+"""What the marks mean, for their legend and for screen readers."""
+NEGLIGIBLE = 1e-3
+"""A risk that is higher by this share than the least counts as least."""
+WIDTH = 110
+"""Characters of a line on a terminal, about."""
 MAX_NAMES = 3
 """Robots that a line names."""
-SLACK_M = 1e-9
-"""Distances that fall short of the required one by less are kept, as in SAFE-TRACE."""
 WORDS_OF_REFUSALS = {
     "waits": "waiting looked cheaper",
     "first_stage": "waiting looked cheaper",
@@ -29,8 +40,6 @@ WORDS_OF_REFUSALS = {
     "exhausted": "it had gone along as often as it does",
 }
 """Why a proposal was refused, in a few words."""
-
-Document = Mapping[str, Any]
 
 
 class Line(NamedTuple):
@@ -55,69 +64,6 @@ class Row(NamedTuple):
     safe: Line
     arrived: Line
     interventions: str
-
-
-class Near(NamedTuple):
-    """The smallest distance of a pair, of centres."""
-
-    margin_m: float
-    robot: str
-    other: str
-    value_m: float
-    required_m: float
-    t_s: float
-
-    def told(self) -> str:
-        """The distance and from whom."""
-        return f"{distance(self.value_m, self.required_m)} ({self.robot} to {self.other})"
-
-
-@dataclass
-class Course:
-    """What came of a run.
-
-    Attributes:
-        name: of the run.
-        method: its identifier.
-        plain: whether priorities are composed as the package does it; False: by a recursion that is only compared.
-        near: pairs, those of least margin first.
-        safe: whether every pair kept its distance; None: nobody knows.
-        why: why nobody knows, or what the claim says where the distances do not.
-        tested: whether any pair came near enough to be kept apart.
-        collisions: events.
-        away: robots that did not end at their targets, and where they did.
-        stuck: those of them that stand where the scenario says that they stall.
-        last_s: when the last robot arrived, s.
-        there: how many UGVs ended at their targets.
-    """
-
-    name: str
-    method: str
-    plain: bool
-    near: list[Near] = field(default_factory=list)
-    safe: bool | None = None
-    why: str = "it was not run"
-    tested: bool = False
-    collisions: list[Mapping[str, Any]] = field(default_factory=list)
-    away: dict[str, Sequence[float]] | None = None
-    stuck: set[str] = field(default_factory=set)
-    last_s: float = 0.0
-    there: int = 0
-
-    @property
-    def helped(self) -> bool:
-        """Whether the UAV intervenes."""
-        return METHODS[self.method].intervenes if self.method in METHODS else True
-
-    @property
-    def fine(self) -> bool:
-        """Whether every distance was kept and every robot arrived."""
-        return self.safe is True and self.away == {}
-
-    @property
-    def crashed(self) -> bool:
-        """Whether a robot collided."""
-        return bool(self.collisions)
 
 
 def headline(document: Document) -> Line:
@@ -183,18 +129,18 @@ def required_m(document: Document) -> str:
 
 
 def do_not_conclude(document: Document) -> list[str]:
-    """What a reader might wrongly take away, each in a few words."""
+    """What a reader might wrongly conclude: clauses that continue "Do not conclude that"."""
     every = courses(document)
-    said = ["that real vehicles are safe: the model is first-order, its sensing perfect"]
-    seen = [course for course in every if course.safe and not (course.method == "d" and _proved_for_d(document, every))]
+    said = ["real vehicles are safe: the model is first-order, its sensing perfect"]
+    seen = [course for course in every if course.safe and not (course.method == "d" and proved_for_d(document, every))]
     if seen:
-        said.append(f"that {_methods(seen)} {'is' if _one(seen) else 'are'} safe elsewhere: seen in these runs only")
+        said.append(f"{_methods(seen)} {'is' if _one(seen) else 'are'} safe elsewhere: seen in these runs only")
     if any(course.away == {} for course in every):
-        said.append("that all arrive from other starts or with other seeds: arrival is seen, not proved")
+        said.append("all arrive from other starts or with other seeds: arrival is seen, not proved")
     if document["runs"] and not _triggers(document):
-        said.append("that the UAV helps: it was never called")
+        said.append("the UAV helps: it was never called")
     if any(course.safe is None for course in every):
-        said.append("that what could not be judged is fine")
+        said.append("what could not be judged is fine")
     return said
 
 
@@ -216,79 +162,40 @@ def as_declared(document: Document) -> Line:
 
 def text(document: Document) -> str:
     """The first screen for a terminal."""
-    rows = methods(document)
     mark, says = headline(document)
-    lines = [f"[{MARKS[mark]}] {says}"]
-    lines += [
-        f"    {row.run}: [{MARKS[row.safe.mark]}] {row.safe.text}; [{MARKS[row.arrived.mark]}] {row.arrived.text}; "
-        f"interventions: {row.interventions}"
-        for row in rows
-    ]
+    lines = [one_line(f"[{MARKS[mark]}] {says}")]
+    lines += _table(methods(document), required_m(document))
     for question, answered in answers(document):
         for k, (mark, says) in enumerate(answered):
             asked = "" if k else question
-            lines.append(f"{asked:<11} [{MARKS[mark]}] {says}" if mark else f"{asked:<15} {says}")
-    lines.append(f"Do not conclude: {'; '.join(do_not_conclude(document))}.")
-    return "\n".join(map(one_line, lines))
+            said = f"{asked:<11} [{MARKS[mark]}] {says}" if mark else f"{asked:<15} {says}"
+            lines += wrap(one_line(said), WIDTH, subsequent_indent=16 * " ")
+    lines.append("Do not conclude that")
+    lines += [one_line(f"  - {clause}") for clause in do_not_conclude(document)]
+    lines.append(f"Marks: {legend(document)}.")
+    return "\n".join(lines)
 
 
-def courses(document: Document) -> list[Course]:
-    """What came of every run that the scenario names, in its order."""
-    resolved = document["scenario"]["resolved"]
-    return [
-        _course(document, name, run)
-        if name in document["runs"]
-        else Course(name, str(run["method"]), run["composition"] == "augmented")
-        for name, run in resolved["runs"].items()
+def _table(rows: Sequence[Row], required: str) -> list[str]:
+    """The table of methods in columns of equal width."""
+    cells = [["", "method", f"safe? ({required})", "arrived?", "interventions"]]
+    for row in rows:
+        safe, arrived = (f"[{MARKS[mark]}] {says}" for mark, says in (row.safe, row.arrived))
+        cells.append([row.run, row.method, safe, arrived, row.interventions])
+    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+    return [one_line("  ".join(map(str.ljust, row, widths)).rstrip()) for row in cells] if rows else []
+
+
+def legend(document: Document) -> str:
+    """The marks on the first screen with their meanings."""
+    found = [
+        headline(document),
+        as_declared(document),
+        *(line for answer in answers(document) for line in answer.lines),
     ]
-
-
-def _course(document: Document, name: str, spec: Mapping[str, Any]) -> Course:
-    resolved, run = document["scenario"]["resolved"], document["runs"][name]
-    metrics, uav = run["metrics"], resolved["uav"]
-    pairs: dict[frozenset[str], Near] = {}
-    for kind in ("min_distance_m", "min_robot_distance_m"):
-        for robot, others in metrics[kind].items():
-            for other, found in others.items():
-                value, required = found["value"], found["safe_distance_m"]
-                pair = Near(value - required, robot, other, value, required, found["t_s"])
-                pairs.setdefault(frozenset((robot, other)), pair)
-    near = sorted(pairs.values())
-    hits = [event for event in run["events"] if event["kind"] == "collision"]
-    claim = next((each for each in document["claims"] if (each["id"], each["run"]) == ("SAFE-TRACE", name)), None)
-    safe, why = _judged(claim, bool(hits) or bool(near and near[0].margin_m < -SLACK_M))
-    targets = {**{ugv: each["target_m"] for ugv, each in resolved["ugvs"].items()}, uav["name"]: uav["target_m"]}
-    ends = metrics["final_position_m"]
-    off = {
-        robot: ends[robot]
-        for robot, target in targets.items()
-        if robot not in ends or _apart(ends[robot], target) > resolved["arrival_tolerance_m"]
-    }
-    if len(off) > 1:
-        off.pop(uav["name"], None)  # it follows the UGVs: where they are not home, neither is it
-    goal = next((each for each in document["claims"] if (each["id"], each["run"]) == ("LIVE-GOAL", name)), None)
-    conditions = goal["evidence"].get("conditions", []) if goal else []
-    stuck = {
-        each["robot"] for each in conditions if each.get("condition") == "stands" and each["margin_m"] >= 0.0
-    } & off.keys()
-    arrivals = [event["t_s"] for event in run["events"] if event["kind"] == "arrival"]
-    there = len(resolved["ugvs"].keys() - off.keys())
-    tested = claim is not None and claim["exercised"] != 0
-    method, plain = str(run["method"]), spec["composition"] == "augmented"
-    return Course(name, method, plain, near, safe, why, tested, hits, off, stuck, max(arrivals, default=0.0), there)
-
-
-def _judged(claim: Mapping[str, Any] | None, short: bool) -> tuple[bool | None, str]:
-    """Whether a run was safe, by its distances and by SAFE-TRACE, and what the claim says if that decides."""
-    if short:
-        return False, ""
-    if claim is None:
-        return None, "SAFE-TRACE was not checked"
-    if claim["status"] == "refuted":
-        return False, "SAFE-TRACE is refuted"
-    if claim["status"] in UNDECIDED:
-        return None, f"SAFE-TRACE: {claim['status'].replace('_', ' ')}"
-    return True, ""
+    found += [line for row in methods(document) for line in (row.safe, row.arrived)]
+    used = {line.mark for line in found}
+    return ", ".join(f"{MARKS[mark]} {meaning}" for mark, meaning in MEANINGS.items() if mark in used)
 
 
 def _runs(document: Document, every: Sequence[Course]) -> Iterator[Line]:
@@ -296,9 +203,10 @@ def _runs(document: Document, every: Sequence[Course]) -> Iterator[Line]:
     told = []
     for course in every:
         changed = document["scenario"]["resolved"]["runs"][course.name].get("set") or {}
-        extra = "; ".join(f"{key}: {value}" for key, value in changed.items())
+        extra = ", ".join(f"{key} {value}" for key, value in changed.items())
         if course.plain and course.method in METHODS:
-            told.append(f"{course.name}: {METHODS[course.method].says}{f' ({extra})' if extra else ''}")
+            says = f"({course.method}) with {extra}" if extra else METHODS[course.method].says
+            told.append(f"{course.name}: {says}")
     if told:
         yield Line("", f"{'; '.join(told)}.")
 
@@ -328,28 +236,12 @@ def _safe(document: Document, every: Sequence[Course]) -> Iterator[Line]:
 
 
 def _proof(document: Document, every: Sequence[Course]) -> Line:
-    if _proved_for_d(document, every):
+    if proved_for_d(document, every):
         return Line("", "Proved for (d), whatever the UAV asks for.")
-    theorems = _statuses(document, ("SAFE-INV", "SAFE-GATE"))
+    theorems = statuses(document, ("SAFE-INV", "SAFE-GATE"))
     if theorems and set(theorems) == {"proved"}:
         return Line("no", "The proof for (d) does not apply: a run did not meet its conditions (SAFE-HYP).")
     return Line("open", "Not proved for (d).")
-
-
-def _proved_for_d(document: Document, every: Sequence[Course]) -> bool:
-    theorems = _statuses(document, ("SAFE-INV", "SAFE-GATE"))
-    runs = [course.name for course in every if course.method == "d"]
-    met = [c for c in document["claims"] if c["id"] == "SAFE-HYP" and c["run"] in runs]
-    return (
-        len(theorems) == 2
-        and set(theorems) == {"proved"}
-        and len(met) == len(runs) > 0
-        and all(claim["status"] in PASSING and claim["exercised"] for claim in met)
-    )
-
-
-def _statuses(document: Document, names: Sequence[str]) -> list[str]:
-    return [str(claim["status"]) for claim in document["claims"] if claim["id"] in names and not claim["run"]]
 
 
 def _arrived(document: Document, every: Sequence[Course]) -> Iterator[Line]:
@@ -392,7 +284,7 @@ def _whereabouts(document: Document, course: Course) -> str:
 def _zeno(document: Document) -> Iterator[Line]:
     decision = document["scenario"]["resolved"]["decision"]
     bound = decision["min_inter_event_s"]
-    for status in _statuses(document, ["ZENO-PROOF"]):
+    for status in statuses(document, ["ZENO-PROOF"]):
         if status == "proved":
             yield Line("yes", f"Proved: triggers are at least {bound:g} s apart.")
         else:
@@ -433,24 +325,28 @@ def _threshold(document: Document) -> Iterator[Line]:
         when = f"at {times[0]:.3f} s" if len(times) == 1 else f"{len(fired)} times{runs}, first at {times[0]:.3f} s"
         yield Line("yes", f"Fired at {zeta} m, {when}; none missed, none spurious.")
     for claim in document["claims"]:
-        found = claim["evidence"]
-        if claim["id"] == "THR-CHOICE" and "optimal_threshold_m" in found:
-            best, cost = found["optimal_threshold_m"], found["extra_risk"]
-            mine = f"{found['threshold_in_force_m']:.4g} m"
-            if found["kind"] != "declared":
-                yield Line("yes", f"{mine} is the Bayes optimum for the assumed drift and noise.")
-            else:
-                told = f"{mine} is declared; the Bayes optimum for the assumed drift and noise is {best:.4g} m"
-                yield Line("partly", f"{told} (extra risk {cost:.2g}){_for_the_drift(found.get('runs', {}))}.")
+        if claim["id"] == "THR-CHOICE" and "optimal_threshold_m" in claim["evidence"]:
+            yield from _choice(claim["evidence"])
 
 
-def _for_the_drift(runs: Mapping[str, Mapping[str, Any]]) -> str:
-    """The optimum for the drift of the first robot that triggered."""
-    for name, row in runs.items():
+def _choice(found: Mapping[str, Any]) -> Iterator[Line]:
+    """How good the threshold is: for the assumed drift, and for that of the first robot that triggered."""
+    zeta, best = found["threshold_in_force_m"], found["optimal_threshold_m"]
+    excess = found["extra_risk"] / found["least_risk"]
+    if found["kind"] != "declared":
+        yield Line("yes", f"{zeta:.4g} m is the Bayes optimum for the assumed drift and noise.")
+    elif excess < NEGLIGIBLE:
+        yield Line("yes", f"{zeta:.4g} m is as good as the Bayes optimum for the assumed drift, {best:.4g} m.")
+    else:
+        told = f"the Bayes optimum for the assumed drift is {best:.4g} m: the risk is {100 * excess:.2g} % higher"
+        yield Line("partly", f"{zeta:.4g} m was chosen by hand; {told}.")
+    for name, row in found.get("runs", {}).items():
         run, _, robot = name.partition(" ")
-        best = row.get("optimum_for_this_drift_m")
-        return f"; for the drift that {robot} had in run {run}, {best:.2g} m" if best is not None else ""
-    return ""
+        real = row.get("optimum_for_this_drift_m")
+        if real is not None:
+            told = f"In run {run}, {robot} drifted at {row['drift_m_s']:.2g} m/s; for that drift, {real:.2g} m is best"
+            yield Line("partly", f"{told}: {zeta:.4g} m calls the UAV {'late' if zeta > real else 'early'}.")
+        return
 
 
 def _paper(document: Document) -> Iterator[Line]:
@@ -476,7 +372,7 @@ def _row(document: Document, course: Course) -> Row:
     says = METHODS[course.method].says if course.method in METHODS else course.method
     own = document["scenario"]["resolved"]["runs"][course.name].get("set", {})
     says += "".join(f", {key}: {value}" for key, value in own.items())
-    proved = ", proved" if course.method == "d" and _proved_for_d(document, [course]) else ""
+    proved = ", proved" if course.method == "d" and proved_for_d(document, [course]) else ""
     if course.safe is None:
         safe = Line("open", f"not known, {course.why}")
     elif not course.safe:
@@ -510,14 +406,6 @@ def _interventions(document: Document, course: Course) -> str:
             words = WORDS_OF_REFUSALS.get(reason, reason.replace("_", " "))
             reasons[words] = reasons.get(words, 0) + count
     return told + (f": {max(reasons, key=reasons.__getitem__)}" if refused and reasons else "")
-
-
-def distance(value_m: float, required_m: float) -> str:
-    """A distance, with as many decimals as it takes to tell it from the required one that it falls short of."""
-    decimals = 3
-    while value_m < required_m - SLACK_M and float(f"{value_m:.{decimals}f}") >= required_m and decimals < 9:
-        decimals += 1
-    return f"{value_m:.{decimals}f} m"
 
 
 def _intrusion(course: Course, *, brief: bool = False) -> str:
@@ -612,7 +500,3 @@ def _listed(before: str, words: Sequence[str], between: str = ", ") -> str:
 
 def _capital(says: str) -> str:
     return says[:1].upper() + says[1:]
-
-
-def _apart(one: Sequence[float], other: Sequence[float]) -> float:
-    return float(sum((a - b) ** 2 for a, b in zip(one, other, strict=True)) ** 0.5)

@@ -32,20 +32,20 @@ def paths(trace: Trace, axes: Axes | None = None) -> Axes:
 
         _, axes = pyplot.subplots()
     scenario = trace.scenario
-    for name, obstacle in scenario["obstacles"].items():
-        centre, radius = obstacle["position_m"][:2], float(obstacle.get("radius_m", 0.0))
-        safe = radius + float(scenario["safe_distance"]["obstacle_m"])
-        axes.add_patch(Circle(centre, safe, fill=False, linestyle=":", color="0.5"))
-        axes.add_patch(Circle(centre, max(radius, 0.05), color="0.3"))
-        axes.annotate(name, centre)
+    for name, obstacle in scenario.obstacles.items():
+        (x, y, _), radius = obstacle.position_m, obstacle.radius_m
+        safe = radius + scenario.safe_distance.obstacle_m
+        axes.add_patch(Circle((x, y), safe, fill=False, linestyle=":", color="0.5"))
+        axes.add_patch(Circle((x, y), max(radius, 0.05), color="0.3"))
+        axes.annotate(name, (x, y))
     for robot in trace.robots:
         path = trace.position(robot)
         (line,) = axes.plot(*path[:, :2].T, linestyle="-" if robot in trace.ugvs else "--", label=robot)
         axes.plot(*path[0, :2], marker="o", markerfacecolor="white", color=line.get_color())
         if robot in trace.ugvs:
-            target = np.asarray(scenario["ugvs"][robot]["target_m"])
+            target = np.asarray(scenario.ugvs[robot].target_m)
             axes.plot(*target[:2], marker="x", color=line.get_color())
     axes.set_aspect("equal", adjustable="datalim")
-    axes.set(xlabel="x, m", ylabel="y, m", title=f"{scenario['name']}, run {trace.run}")
+    axes.set(xlabel="x, m", ylabel="y, m", title=f"{scenario.name}, run {trace.run}")
     axes.legend()
     return axes

@@ -17,17 +17,16 @@ from pydrake.systems.primitives import LogVectorOutput, Multiplexer
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import SimulationError, UnknownNameError, described
-from airground_drake.gatekeeper.answer import Decision, Foreseen, Planned
+from airground_drake.gatekeeper.answer import Decision
 from airground_drake.gatekeeper.outcome import Outlook, outcomes
 from airground_drake.gatekeeper.problem import Horizon, predicted_problem
-from airground_drake.gatekeeper.rollout import Scene
+from airground_drake.gatekeeper.rollout import View
 from airground_drake.gatekeeper.routes.mixed_integer import MixedIntegerRoute
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.policy import Proposal
-from airground_drake.nsbc.avoidance import Avoidance, Composition, Surroundings, limit_speed
+from airground_drake.nsbc.avoidance import Avoidance, Composition, Surroundings
 from airground_drake.nsbc.kernels import distances, news_within, within
 from airground_drake.nsbc.law import UgvLaw
-from airground_drake.nsbc.team import Team
 from airground_drake.run.events import extract
 from airground_drake.run.trace import (
     DECISION_COLUMNS,
@@ -44,6 +43,8 @@ from airground_drake.systems.decision import DecisionVariable
 from airground_drake.systems.diagram import RECORDED, DecisionFactory, Model, build_model
 from airground_drake.systems.lifetime import untie
 from airground_drake.systems.signals import FIELDS, Status
+from airground_drake.world.plant import FirstOrder
+from airground_drake.world.world import Body, World
 
 if TYPE_CHECKING:
     from pydrake.geometry import Meshcat
@@ -133,8 +134,10 @@ class Recorder:
         context.SetAccuracy(EVENT_ACCURACY)
         simulator = Simulator(self._root, context)
         period = self._scenario.control.period_s
-        config = SimulatorConfig(integration_scheme="explicit_euler", max_step_size=period, use_error_control=False)
-        ApplySimulatorConfig(config, simulator)  # velocities are held between samples: Euler's method is exact
+        # velocities are held between samples: for straight motion Euler's method is exact
+        scheme = "explicit_euler" if self._model.world.moves_straight(period) else "runge_kutta3"
+        config = SimulatorConfig(integration_scheme=scheme, max_step_size=period, use_error_control=False)
+        ApplySimulatorConfig(config, simulator)
         simulator.set_target_realtime_rate(speed)
         if self._model.gatekeeper is not None:
             self._model.gatekeeper.reset_timing()
@@ -153,7 +156,7 @@ class Recorder:
         return self._trace(context, seed, wall)
 
     def _trace(self, context: Context, seed: int, wall: float) -> Trace:
-        model, ugvs, robots = self._model, self._model.team.ugvs, self._model.team.robots
+        model, ugvs, robots = self._model, self._model.world.names("ugv"), self._model.world.robots
         log = self._log.FindLog(context)
         ends = np.cumsum([model.diagram.GetOutputPort(name).size() for name in RECORDED])
         data = dict(zip(RECORDED, np.split(log.data(), ends[:-1]), strict=True))
@@ -213,10 +216,10 @@ def _decision(decision: Decision, robot: str, route: str) -> dict[str, Any]:
         "decision": "accept" if decision.accepted else "refuse",
         "reason": decision.reason,
     }
-    grounds = decision.grounds
-    if isinstance(grounds, Foreseen):
-        row |= {"tries": grounds.tries}
-        for choice, outcome in (("refuse", grounds.refuse), ("accept", grounds.accept)):
+    solution = decision.solution
+    if solution is None:
+        row |= {"tries": decision.tries}
+        for choice, outcome in (("refuse", decision.refuse), ("accept", decision.accept)):
             if outcome is not None:
                 row |= {
                     f"{choice}_outcome_m2_s": outcome.cost,
@@ -224,7 +227,6 @@ def _decision(decision: Decision, robot: str, route: str) -> dict[str, Any]:
                     f"{choice}_left_m": outcome.left,
                 }
         return row
-    solution = grounds.solution
     return row | {
         "status": solution.status,
         "route": route,
@@ -235,8 +237,8 @@ def _decision(decision: Decision, robot: str, route: str) -> dict[str, Any]:
         "gap": solution.gap,
         "objective_accept": solution.objective_accept,
         "objective_refuse": solution.objective_refuse,
-        "accept_throughout": grounds.throughout[0],
-        "refuse_throughout": grounds.throughout[1],
+        "accept_throughout": decision.throughout[0],
+        "refuse_throughout": decision.throughout[1],
         "rounding_deviation_s": solution.rounding_deviation,
         "predicted_clearance_m": solution.clearance,
     }
@@ -270,7 +272,7 @@ def _problems(decided: Sequence[Decision]) -> pd.DataFrame:
     def flat(array: Array | None) -> list[float]:
         return [] if array is None else array.ravel().tolist()
 
-    planned = [(r.grounds.problem, r.grounds.solution) for r in decided if isinstance(r.grounds, Planned)]
+    planned = [(r.problem, r.solution) for r in decided if r.problem is not None and r.solution is not None]
     rows = [
         (
             p.dt, p.error_weight, p.slack_weight, p.terminal_weight,
@@ -291,15 +293,16 @@ def warm_up() -> None:
     news_within(one, one, 1.0, within(one, one, 1.0))
     distances(one, one[0])
     avoidance = Avoidance(gain=1.0, period=0.1)
-    spaces = avoidance.half_spaces(one, one, Surroundings(np.zeros((1, 1, 3)), np.ones((1, 1)), np.ones((1, 1))))
-    limit_speed(avoidance.apply(-one, spaces), np.ones(1))
-    team = Team(("a",), "b", np.zeros((1, 3)), 1.0, 1.0, 1.0, np.ones(2))
-    team.neighbourhood(slice(0, 1)).around(np.ones((2, 3)))
-    scene = Scene(0.0, one[0], motion, one, one, np.ones(1), np.ones(1), 1.0)
+    plant = FirstOrder()
+    world = World((Body("a", "ugv", one[0], plant=plant), Body("b", "uav", one[0], plant=plant)), {})
+    near = world.around(slice(0, 1))
+    avoidance.command(one, world.starts, near)
+    Surroundings.of(near, world.starts)
+    seen = View(0.0, one[0], motion, one, one, np.ones(1), np.ones(1), 1.0)
     law, horizon = UgvLaw(avoidance, 1.0, 1.0, False), Horizon(2, 1, 1.0, 1.0)
-    law.velocity(np.ones((2, 3)), team.neighbourhood(slice(0, 1)), one, one, [None], one, np.ones(1))
-    MixedIntegerRoute().solve(predicted_problem(scene, law, Proposal("", 0.0, motion), horizon))
-    outcomes(scene, law, Proposal("", 0.0, motion), one, 1.0, (), Outlook(longest=1.0))
+    law.velocity(world.starts, near, one, one, [None])
+    MixedIntegerRoute().solve(predicted_problem(seen, law, Proposal("", 0.0, motion), horizon))
+    outcomes(seen, law, Proposal("", 0.0, motion), Outlook(longest=1.0))
 
 
 def simulate(
@@ -334,7 +337,7 @@ def simulate(
 
 
 def _distinct(t: Array, command: Array) -> npt.NDArray[np.intp]:
-    """Indices of rows (T,) at distinct times, for commands (3 (n + 1), T).
+    """Indices of rows (T,) at distinct times, for commands (3 r, T) of r robots.
 
     Of rows within MERGE_S of each other the last one is kept that still has the command of the first: the
     command that led there.
@@ -349,7 +352,7 @@ def _signals(t: Array, data: dict[str, Array], ugvs: tuple[str, ...], robots: tu
     columns: dict[str, Array] = {"t_s": t}
     for i, robot in enumerate(robots):
         for a, axis in enumerate("xyz"):
-            columns[f"{robot}.{axis}_m"] = data["team_position"][3 * i + a]
+            columns[f"{robot}.{axis}_m"] = data["bodies"][3 * i + a]
         for a, axis in enumerate("xyz"):
             columns[f"{robot}.v{axis}_m_s"] = data["team_command"][3 * i + a]
     for i, ugv in enumerate(ugvs):

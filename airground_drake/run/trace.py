@@ -24,10 +24,9 @@ Rows closer than 1e-9 s are one.
 
 from __future__ import annotations
 
-import copy
 import io
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
@@ -39,6 +38,8 @@ import pandas as pd
 from airground_drake.base import files
 from airground_drake.base.arrays import Array, read_only
 from airground_drake.base.errors import TraceError, one_line
+from airground_drake.scenarios.recorded import of_run
+from airground_drake.scenarios.schema import Scenario
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -117,7 +118,7 @@ def no_proposals() -> pd.DataFrame:
 class Trace:
     """One run.
 
-    What is read from its tables is kept, so whoever changes them makes another run with `dataclasses.replace`;
+    Values read from its tables are cached. To change a table, make another run with `dataclasses.replace`;
     `verify` and `verify_all` read them anew.
 
     Attributes:
@@ -160,11 +161,13 @@ class Trace:
         return list(self.meta["ugvs"])
 
     @property
-    def scenario(self) -> dict[str, Any]:
-        """The resolved scenario as this run has it, as nested dicts with the keys of the scenario file."""
-        resolved: dict[str, Any] = self.meta["scenario"]
-        given = resolved["runs"].get(self.run, {}).get("set")
-        return self.derived("scenario", lambda: _with(resolved, given)) if given else resolved
+    def scenario(self) -> Scenario:
+        """The resolved scenario as this run had it, made from the metadata once.
+
+        Raises:
+            TraceError: if the metadata hold no scenario.
+        """
+        return self.derived("scenario", lambda: of_run(self.meta["scenario"], self.run))
 
     @property
     def events(self) -> list[dict[str, Any]]:
@@ -242,18 +245,6 @@ class Trace:
         rows = [(f"{event['t_s']:.3f}", event["robot"], event["kind"]) for event in self.events]
         table = pd.DataFrame(rows, columns=["time, s", "robot", "event"]).to_html(index=False, border=0)
         return f"<p>{escape(repr(self))}</p>{table}"
-
-
-def _with(resolved: dict[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
-    """A copy of nested dicts and lists with other values at dotted keys."""
-    changed = copy.deepcopy(resolved)
-    for key, value in given.items():
-        *above, last = key.split(".")
-        place: Any = changed
-        for part in above:
-            place = place[int(part) if isinstance(place, list) else part]
-        place[last] = value
-    return changed
 
 
 def save(trace: Trace, folder: Path) -> list[str]:

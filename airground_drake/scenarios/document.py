@@ -38,6 +38,8 @@ _SCALARS: dict[str, tuple[str | None, Callable[[str], object]]] = {  # tag: its 
     "str": (None, lambda text: text.encode().decode()),  # refuses lone surrogates
 }
 
+UNKNOWN_KEY = Fault("unknown key")
+
 Children = dict[str, tuple[yaml.Node, yaml.Node]]
 """Key node (for its line) and value node of each entry."""
 
@@ -103,19 +105,6 @@ def text_of(data: Mapping[str, Any]) -> str:
     """A YAML file of ours from nested dicts, lists and scalars."""
     text: str = yaml.dump(data, Dumper=_Dumper, sort_keys=False, allow_unicode=True)
     return text
-
-
-def read_data(path: Path) -> tuple[Any, str]:
-    """Another YAML file of ours as nested dicts, lists and scalars, by the rules and limits of scenario files.
-
-    Returns:
-        The data, None where no value is given, and the SHA-256 of the file's bytes.
-
-    Raises:
-        ScenarioError: if it cannot be read.
-    """
-    document, data = read(path)
-    return document.data, files.sha256(data)
 
 
 def read(name_or_path: str | Path) -> tuple[Document, bytes]:
@@ -349,7 +338,7 @@ def suggestion(name: str, options: Iterable[str]) -> str:
 def unknown(source: str, key: str, part: str, options: Sequence[str]) -> ScenarioError:
     """The error of a key that there is not, the last part of a dotted one."""
     return ScenarioError(
-        source, key, Fault("unknown key"), f"{suggestion(part, options)}allowed: {', '.join(options) or 'none'}"
+        source, key, UNKNOWN_KEY, f"{suggestion(part, options)}allowed: {', '.join(options) or 'none'}"
     )
 
 

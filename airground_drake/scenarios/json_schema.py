@@ -17,7 +17,7 @@ from pydantic import TypeAdapter
 from airground_drake.base.statuses import EXPECTATIONS
 from airground_drake.registry import Registry
 from airground_drake.scenarios import schema
-from airground_drake.scenarios.kinds import CLAIM_PATTERN, EXPECTED, NAME_PATTERN, unit_of
+from airground_drake.scenarios.kinds import CLAIM_PATTERN, EXPECTED, NAME_PATTERN, WANTED, unit_of
 from airground_drake.scenarios.limits import MAX_NAME, MAX_TEXT
 
 Schema = dict[str, Any]
@@ -96,17 +96,19 @@ def _object(kind: type, made: Schema) -> Schema:
     }
 
 
-def keys_at(*at: str) -> list[str]:
-    """Keys of the mapping at a place in a scenario, a place being the names and indices that lead to it."""
-    return [key for key in _at(at)[0]["properties"] if key != "<<"]
+def keys_at(whole: Schema, *at: str) -> list[str]:
+    """Keys of the mapping at a place in a file with this schema: the names and indices that lead to it."""
+    return [key for key in _at(whole, at)[0]["properties"] if key != "<<"]
 
 
-def wanted_at(*at: str) -> str:
-    """What may stand at a place in a scenario, in words."""
-    says, name = _at(at)
+def wanted_at(whole: Schema, *at: str) -> str:
+    """What may stand at a place in a file with this schema, in words."""
+    says, name = _at(whole, at)
     kind, unit = says.get("type", "string"), unit_of(name, " in ")
+    if WANTED in says:
+        return str(says[WANTED])
     if "properties" in says:
-        return f"a mapping with the keys {', '.join(keys_at(*at))}"
+        return f"a mapping with the keys {', '.join(keys_at(whole, *at))}"
     if kind in ("array", "object"):
         what, size = ("list", "Items") if kind == "array" else ("mapping", "Properties")
         least, most = says.get(f"min{size}"), says.get(f"max{size}")
@@ -125,13 +127,13 @@ def wanted_at(*at: str) -> str:
 
 
 @functools.cache
-def _whole() -> Schema:
-    return scenario_schema()
+def schema_of(kind: type) -> Schema:
+    """The schema of the files that a dataclass stands for, to be read only."""
+    return scenario_schema() if kind is schema.Scenario else TypeAdapter(kind).json_schema()
 
 
-def _at(at: Sequence[str]) -> tuple[Schema, str]:
-    """What is said of a place in a scenario, and the name whose suffix gives its unit."""
-    whole = _whole()
+def _at(whole: Schema, at: Sequence[str]) -> tuple[Schema, str]:
+    """What is said of a place, and the name whose suffix gives its unit."""
     says, name = whole, ""
     for part in at:
         inner = says.get("properties", {}).get(part)
@@ -140,5 +142,6 @@ def _at(at: Sequence[str]) -> tuple[Schema, str]:
         if part == NAMES:
             inner = says["propertyNames"]["anyOf"][0]
         says = inner or says.get("items") or says.get("additionalProperties") or {}
+        says = next((each for each in says.get("anyOf", ()) if "$ref" in each), says)  # else null
         says = whole["$defs"][says["$ref"].rpartition("/")[2]] if "$ref" in says else says
     return says, name

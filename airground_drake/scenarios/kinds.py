@@ -8,7 +8,14 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BeforeValidator, Field, GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Field,
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
+    ValidationInfo,
+)
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from airground_drake.base.arrays import LARGEST
@@ -23,6 +30,10 @@ CLAIM_PATTERN = f"^[A-Z][A-Z0-9-]{{0,{MAX_NAME - 1}}}$"
 PLUG_IN = {"type": "string", "pattern": PLUGIN_PATTERN}
 EXPECTED = "x-expected"
 """Word for the registry of claims in the place of JSON Schema's words for their expected verdicts."""
+RECORDED = "recorded"
+"""Context in which pydantic reads the scenario of a run's metadata: rules of names are not checked again."""
+WANTED = "x-wanted"
+"""Word of a JSON Schema for what messages say of a value, where types and bounds do not say it."""
 
 # Unit by the suffix of a key, the longest suffix first.
 _UNITS = {"m_sqrt_s": "m/sqrt(s)", "1_m2_s": "1/(m^2 s)", "m_s": "m/s", "1_s": "1/s", "m": "m", "s": "s"}
@@ -33,12 +44,12 @@ def unit_of(name: str, before: str = "") -> str:
     return next((before + unit for suffix, unit in _UNITS.items() if name.endswith(f"_{suffix}")), "")
 
 
-def _refused(value: object, allowed: str, *at: str) -> PydanticCustomError:
+def refused(value: object, allowed: str, *at: str) -> PydanticCustomError:
     """The error of a value that breaks a rule, `at` a place within what the rule looks at; `allowed` says the rule."""
     return PydanticCustomError("rule", "{allowed}", {"value": value, "allowed": allowed, "at": at})
 
 
-def _as_float(value: object) -> object:
+def as_float(value: object) -> object:
     """A whole number as a floating-point number; infinite if it is too large for one."""
     if type(value) is not int:
         return value
@@ -48,7 +59,7 @@ def _as_float(value: object) -> object:
 def _visible(text: str) -> str:
     """Refuse text that would take something else's place where it is shown."""
     if hidden := next(filter(_is_hidden, text), None):
-        raise _refused(hidden, "text without control characters and without marks that turn the direction of writing")
+        raise refused(hidden, "text without control characters and without marks that turn the direction of writing")
     return text
 
 
@@ -59,13 +70,13 @@ def _is_hidden(character: str) -> bool:
 
 def _on_the_ground(point: list[float]) -> list[float]:
     if point[2] != 0.0:
-        raise _refused(point, "z must be 0 m: a UGV moves on the ground")
+        raise refused(point, "z must be 0 m: a UGV moves on the ground")
     return point
 
 
 def _all_or_none(point: list[float]) -> list[float]:
     if len(point) not in (0, 3):
-        raise _refused(point, "3 numbers in m: [x, y, z]")
+        raise refused(point, "3 numbers in m: [x, y, z]")
     return point
 
 
@@ -74,18 +85,18 @@ Name = Annotated[str, Field(strict=True, max_length=MAX_NAME, pattern=NAME_PATTE
 YesNo = Annotated[bool, Field(strict=True)]
 Count = Annotated[int, Field(strict=True, ge=1, le=MAX_SEED)]
 CountFromZero = Annotated[int, Field(strict=True, ge=0, le=MAX_SEED)]
-_Number = Annotated[float, Field(strict=True, allow_inf_nan=False, le=LARGEST)]
-Real = Annotated[_Number, Field(ge=-LARGEST), BeforeValidator(_as_float)]
-Positive = Annotated[_Number, Field(ge=SMALLEST), BeforeValidator(_as_float)]
-Share = Annotated[_Number, Field(ge=SMALLEST, le=1.0), BeforeValidator(_as_float)]
-NotNegative = Annotated[_Number, Field(ge=0.0), BeforeValidator(_as_float)]
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False, le=LARGEST)]
+Real = Annotated[Number, Field(ge=-LARGEST), BeforeValidator(as_float)]
+Positive = Annotated[Number, Field(ge=SMALLEST), BeforeValidator(as_float)]
+Share = Annotated[Number, Field(ge=SMALLEST, le=1.0), BeforeValidator(as_float)]
+NotNegative = Annotated[Number, Field(ge=0.0), BeforeValidator(as_float)]
 Point = Annotated[list[Real], Field(strict=True, min_length=3, max_length=3)]  # no set, which has no order
 GroundPoint = Annotated[Point, AfterValidator(_on_the_ground)]
 
 
 @dataclass(frozen=True)
 class Rule:
-    """A function that returns a value or raises `_refused`, and what JSON Schema says of the rule.
+    """A function that returns a value or raises `refused`, and what JSON Schema says of the rule.
 
     A registry in what it says stands for its names at the time: `json_schema.py` puts them in.
     """
@@ -94,8 +105,15 @@ class Rule:
     says: Callable[[], dict[str, Any]]
 
     def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
-        """Check what the annotations before this one have let pass."""
-        return core_schema.no_info_after_validator_function(self.check, handler(source))
+        """Check what the annotations before this one have let pass, except in the metadata of a run.
+
+        A run may be judged where a plug-in that it named is not installed.
+        """
+
+        def checked(value: Any, info: ValidationInfo) -> Any:
+            return value if info.context == RECORDED else self.check(value)
+
+        return core_schema.with_info_after_validator_function(checked, handler(source))
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         """What the annotations before this one say, and this."""
@@ -114,7 +132,7 @@ def one_of(options: Iterable[str], place: str = "") -> Rule:
 
     def check(value: str) -> str:
         if value not in allowed():
-            raise _refused(value, f"one of {', '.join(each or repr(each) for each in allowed())}")
+            raise refused(value, f"one of {', '.join(each or repr(each) for each in allowed())}")
         return value
 
     return Rule(check, lambda: {"enum": allowed()})
@@ -125,9 +143,9 @@ def registered(registry: Registry, retired: Mapping[str, str] | None = None) -> 
 
     def check(value: str) -> str:
         if retired and value in retired:
-            raise _refused(value, f"no longer a {registry.kind}: use {retired[value]}")
+            raise refused(value, f"no longer a {registry.kind}: use {retired[value]}")
         if not registry.accepts(value):
-            raise _refused(value, f"one of {', '.join(registry.allowed)}")
+            raise refused(value, f"one of {', '.join(registry.allowed)}")
         return value
 
     return Rule(check, lambda: {"anyOf": [{"enum": registry}, PLUG_IN]})
@@ -140,7 +158,7 @@ def expected_of(claims: Registry) -> Rule:
         for claim, expected in value.items():
             if not set(alternatives(expected)) <= set(EXPECTATIONS):
                 several = "or several of them, such as: exercised or refuted"
-                raise _refused(expected, f"one of {', '.join(EXPECTATIONS)}, {several}", claim)
+                raise refused(expected, f"one of {', '.join(EXPECTATIONS)}, {several}", claim)
         return value
 
     return Rule(check, lambda: {EXPECTED: claims})
@@ -148,7 +166,7 @@ def expected_of(claims: Registry) -> Rule:
 
 def _one_value(value: object) -> object:
     if not isinstance(value, bool | int | float | str):
-        raise _refused(value, "one value: a number, a text, true or false")
+        raise refused(value, "one value: a number, a text, true or false")
     return _visible(value) if isinstance(value, str) else value
 
 
@@ -162,7 +180,7 @@ def settings_of(sections: tuple[str, ...]) -> Rule:
         for key, given in value.items():
             if key.partition(".")[0] not in sections or "." not in key:
                 allowed = f"a run may set keys of {', '.join(sections)}, such as gatekeeper.rule"
-                raise _refused(given, allowed, key)
+                raise refused(given, allowed, key)
         return value
 
     return Rule(check, lambda: {"propertyNames": {"pattern": rf"^(({'|'.join(sections)})\..+|<<)$"}})
@@ -173,9 +191,9 @@ def _claims_of_others(value: dict[str, str]) -> dict[str, str]:
     for claim, place in value.items():
         if claim in (*RUN_CLAIMS, *MODEL_CLAIMS) or not re.fullmatch(CLAIM_PATTERN, claim):
             what = f"a new identifier of at most {MAX_NAME} capitals, digits and hyphens, such as MY-CLAIM"
-            raise _refused(claim, what, claim)
+            raise refused(claim, what, claim)
         if not is_plugin(place):
-            raise _refused(place, PLUGIN, claim)
+            raise refused(place, PLUGIN, claim)
     return value
 
 

@@ -8,20 +8,21 @@ from __future__ import annotations
 
 import copy
 import dataclasses
-import functools
 import json
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from airground_drake.base import files
 from airground_drake.base.errors import Fault, ScenarioError
+from airground_drake.base.exact import decimal
 from airground_drake.scenarios import json_schema, validate
 from airground_drake.scenarios.document import Document, of_data, put, read, replace, simple, unknown
+from airground_drake.scenarios.recorded import adapter
 from airground_drake.scenarios.schema import RETIRED_KEYS, Scenario, Vector
 from airground_drake.scenarios.shipped import shipped
 
@@ -136,11 +137,8 @@ def _as_set(document: Document, run: str, settings: Mapping[str, Any]) -> Scenar
 
 
 def _checked(document: Document) -> Scenario:
-    """The scenario of a document, whatever its runs set."""
-    try:
-        scenario = _adapter().validate_python(document.data)
-    except ValidationError as error:
-        raise _in_words(min(error.errors(include_url=False), key=_rank), document) from None
+    """The scenario of a document, without what its runs set."""
+    scenario: Scenario = filled(Scenario, document)
     _complete(scenario)
     try:
         validate.check(scenario, document.source)
@@ -150,9 +148,17 @@ def _checked(document: Document) -> Scenario:
     return scenario
 
 
-@functools.cache
-def _adapter() -> TypeAdapter[Scenario]:
-    return TypeAdapter(Scenario)
+def filled(kind: type, document: Document) -> Any:
+    """A dataclass with the data of a document, checked by pydantic.
+
+    Raises:
+        ScenarioError: if a key or value is not what the dataclass says.
+    """
+    try:
+        return adapter(kind).validate_python(document.data)
+    except ValidationError as error:
+        first = min(error.errors(include_url=False), key=_rank)
+        raise _in_words(first, document, json_schema.schema_of(kind)) from None
 
 
 _UNKNOWN = ("unexpected_keyword_argument", "invalid_key")
@@ -163,7 +169,7 @@ def _rank(error: ErrorDetails) -> int:
     return 0 if error["type"] in _UNKNOWN else 1 if error["type"] == "missing" else 2
 
 
-def _in_words(error: ErrorDetails, document: Document) -> ScenarioError:
+def _in_words(error: ErrorDetails, document: Document, schema: json_schema.Schema) -> ScenarioError:
     """What pydantic says of a value, in one line: where it is, its key, the value, and what is allowed."""
     kind, given, says = error["type"], error["input"], error.get("ctx", {})
     loc = [str(part) for part in error["loc"]]
@@ -176,8 +182,9 @@ def _in_words(error: ErrorDetails, document: Document) -> ScenarioError:
     if general in RETIRED_KEYS:
         return ScenarioError(source, key, Fault("no longer a key"), RETIRED_KEYS[general])
     if kind in _UNKNOWN:
-        return unknown(source, key, at[-1], json_schema.keys_at(*at[:-1]))
-    wanted = f"wanted: {json_schema.wanted_at(*(loc[:-2] + loc[-1:] if loc[-1:] == [json_schema.NAMES] else at))}"
+        return unknown(source, key, at[-1], json_schema.keys_at(schema, *at[:-1]))
+    place = loc[:-2] + loc[-1:] if loc[-1:] == [json_schema.NAMES] else at
+    wanted = f"wanted: {json_schema.wanted_at(schema, *place)}"
     if kind == "missing":
         new = f", as {'.'.join(at[:-1])} is new" * source.startswith("--set ")
         return ScenarioError(source, key, Fault("missing"), wanted + new)
@@ -205,7 +212,7 @@ def _rounded_down(gain: float, period: float) -> float:
     Proofs take numbers as the decimals that they print as: 3.3333333333333335 * 0.3 is 1 in floating point, and more
     than 1 there. A smaller gain only demands less.
     """
-    while gain * period == 1.0 < validate.exactly(gain) * validate.exactly(period):
+    while gain * period == 1.0 < decimal(gain) * decimal(period):
         gain = math.nextafter(gain, 0.0)
     return gain
 

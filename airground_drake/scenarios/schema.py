@@ -409,3 +409,13 @@ class Scenario:
     """The paper's numbers to compare with."""
     choices: list[Choice] = field(default_factory=list)
     """Where values come from that are not the paper's."""
+
+    @property
+    def robots(self) -> dict[str, Ugv | Uav]:
+        """The UGVs and then the UAV, by name."""
+        return {**self.ugvs, self.uav.name: self.uav}
+
+    @property
+    def bodies(self) -> dict[str, Ugv | Uav | Obstacle]:
+        """The robots and then the obstacles, by name."""
+        return {**self.robots, **self.obstacles}

@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from airground_drake.base.errors import Fault, ScenarioError
+from airground_drake.base.exact import decimal
 from airground_drake.base.statuses import alternatives
 from airground_drake.decision.bayes import COMPUTED
 from airground_drake.registry import MODEL_CLAIMS, RETIRED_CLAIMS, ROUTES, RUN_CLAIMS
@@ -126,8 +127,8 @@ def _gains(scenario: Scenario) -> Problems:
     period = scenario.control.period_s
     for name in GAINS:
         gain = getattr(scenario.control, name)
-        if exactly(gain) * exactly(period) > 1:  # as the proofs take them
-            most = _shown(1 / exactly(period), ROUND_FLOOR)
+        if decimal(gain) * decimal(period) > 1:  # as the proofs take them
+            most = _shown(1 / decimal(period), ROUND_FLOOR)
             yield f"control.{name}", gain, f"at most {most} 1/s: gain * control.period_s must not exceed 1"
 
 
@@ -148,7 +149,7 @@ def _periods(scenario: Scenario) -> Problems:
         yield "decision.noise_period_s", noise, f"{rule}, or go into it a whole number of times"
     step, leak = min(control, noise), scenario.decision.leak_1_s
     if leak * step > 1.0:
-        most = _shown(1 / exactly(step), ROUND_FLOOR)
+        most = _shown(1 / decimal(step), ROUND_FLOOR)
         allowed = f"at most {most} 1/s: leak * {step:.9g} s, a step of the noise, must not exceed 1"
         yield "decision.leak_1_s", leak, allowed
 
@@ -212,11 +213,6 @@ def _nearest_pairs(scenario: Scenario) -> list[tuple[str, _Body, _Body]]:
     return [*pairs, *(("obstacle_m", max(flier, ugvs[0]), each) for each in fixed)]
 
 
-def exactly(number: float) -> Fraction:
-    """The decimal that a number prints as, which is what proofs take it for."""
-    return Fraction(repr(float(number)))
-
-
 def _shown(number: Fraction, rounding: str) -> str:
     """A number of nine digits, rounded so that it is itself allowed."""
     digits = Context(prec=9, rounding=rounding).divide(Decimal(number.numerator), Decimal(number.denominator))
@@ -225,17 +221,17 @@ def _shown(number: Fraction, rounding: str) -> str:
 
 def _closing(one: _Body, other: _Body, period: float) -> Fraction:
     """How much nearer two can come in a control period, m."""
-    return (exactly(one.speed) + exactly(other.speed)) * exactly(period)
+    return (decimal(one.speed) + decimal(other.speed)) * decimal(period)
 
 
 def _sensing(scenario: Scenario) -> Problems:
     """What is farther than the sensing range must not come within the safe distance in one control period."""
     period = scenario.control.period_s
     needed, kind, one, other = max(
-        (exactly(getattr(scenario.safe_distance, kind) + (a.radius + b.radius)) + _closing(a, b, period), kind, a, b)
+        (decimal(getattr(scenario.safe_distance, kind) + (a.radius + b.radius)) + _closing(a, b, period), kind, a, b)
         for kind, a, b in _nearest_pairs(scenario)
     )
-    if exactly(scenario.control.sensing_range_m) < needed:
+    if decimal(scenario.control.sensing_range_m) < needed:
         apart = f"safe_distance.{kind} {getattr(scenario.safe_distance, kind):.9g} m{_and(one.radius + other.radius)}"
         total = f"{apart} + closing {one.speed + other.speed:.9g} m/s * control.period_s {period:.9g} s"
         allowed = f"at least {_shown(needed, ROUND_CEILING)} m for {one.name} and {other.name}: {total}"

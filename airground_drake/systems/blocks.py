@@ -10,7 +10,7 @@ from typing import NamedTuple
 from pydrake.systems.framework import Diagram, InputPortIndex, OutputPortIndex, PortDataType, System
 
 UNITS = {
-    "team_position": "m",
+    "bodies": "m",
     "team_command": "m/s",
     "ugv_command": "m/s",
     "uav_command": "m/s",
@@ -21,6 +21,7 @@ UNITS = {
     "noise": "m",
     "decision_variable": "m",
     "decision_range": "m",
+    "gains": "1/s",
 }
 """Of ports by name, or by its part before a robot's; what is not here is of several units or has none."""
 

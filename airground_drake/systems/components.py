@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from pydrake.common import RandomDistribution
-from pydrake.systems.primitives import AffineSystem, LinearSystem, RandomSource
+from pydrake.systems.primitives import AffineSystem, RandomSource
 from pydrake.trajectories import PiecewisePolynomial
 
 from airground_drake.base.arrays import Array
@@ -17,7 +17,7 @@ from airground_drake.decision.trigger import Trigger
 from airground_drake.gatekeeper.answer import Rules
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.drake_solvers import SOLVERS, lacking
-from airground_drake.gatekeeper.mpc_gatekeeper import Gatekeepers, Judging, PaperGatekeepers
+from airground_drake.gatekeeper.mpc_gatekeeper import Gatekeepers, PaperGatekeepers
 from airground_drake.gatekeeper.outcome import Outlook
 from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
 from airground_drake.gatekeeper.patience import Patience
@@ -28,9 +28,9 @@ from airground_drake.intervention.database import BehaviourDatabase, make_policy
 from airground_drake.intervention.planner import Planner
 from airground_drake.nsbc.avoidance import Avoidance, Composition
 from airground_drake.nsbc.law import UgvLaw
-from airground_drake.nsbc.team import Team
 from airground_drake.registry import ROUTES, Method
 from airground_drake.scenarios.schema import Decision, Scenario
+from airground_drake.scenarios.world import make_world
 
 SAME_TIME = 1e-12
 """Vertices of presets this close, s or relatively, differ by rounding: times are sums of some quotients."""
@@ -115,36 +115,6 @@ def make_route(scenario: Scenario) -> Route:
     return ROUTES.make(gate.route, of=Route, **chosen)
 
 
-def first_order_plant(robot: str, start: Array) -> LinearSystem:
-    """p_dot = v for one robot: input v (3,), m/s; output p (3,), m, world frame; default state `start` (3,), m."""
-    eye, zero = np.eye(3), np.zeros((3, 3))
-    plant = LinearSystem(A=zero, B=eye, C=eye, D=zero)
-    plant.configure_default_state(start)
-    return plant
-
-
-def make_starts(scenario: Scenario) -> Array:
-    """Initial positions of the UGVs and the UAV, (n + 1, 3), m."""
-    return positions([*(ugv.start_m for ugv in scenario.ugvs.values()), scenario.uav.start_m])
-
-
-def make_team(scenario: Scenario) -> Team:
-    """Names, safe distances, radii and speed limits of the scenario's robots."""
-    speeds = [ugv.max_speed_m_s for ugv in scenario.ugvs.values()]
-    radii = [ugv.radius_m for ugv in scenario.ugvs.values()]
-    return Team(
-        ugvs=tuple(scenario.ugvs),
-        uav=scenario.uav.name,
-        obstacles=positions([obstacle.position_m for obstacle in scenario.obstacles.values()]),
-        obstacle_distance=scenario.safe_distance.obstacle_m,
-        ugv_distance=scenario.safe_distance.ugv_m,
-        air_ground_distance=scenario.safe_distance.air_ground_m,
-        max_speed=np.array([*speeds, scenario.uav.max_speed_m_s]),
-        radius=np.array([*radii, scenario.uav.radius_m]),
-        obstacle_radius=np.array([obstacle.radius_m for obstacle in scenario.obstacles.values()]),
-    )
-
-
 def make_presets(scenario: Scenario) -> list[Motion]:
     """Preset trajectories of the UGVs."""
     return [Motion.at_speed(positions(ugv.preset.waypoints_m), ugv.preset.speed_m_s) for ugv in scenario.ugvs.values()]
@@ -166,7 +136,7 @@ def make_rules(scenario: Scenario) -> Rules:
         min_dwell=gate.min_dwell_s,
         first_stage=gate.rule == "first_stage",
         budget=Budget(gate.budget_iterations),
-        budget_share=gate.budget_share if gate.budget == "wall_clock" else None,
+        allowance_s=gate.budget_share * gate.period_s if gate.budget == "wall_clock" else None,
     )
 
 
@@ -192,11 +162,10 @@ def make_gatekeepers(scenario: Scenario, law: UgvLaw) -> Gatekeepers:
     Raises:
         UnknownNameError, PluginError: if the scenario names a route that cannot be made.
     """
-    team, presets = make_team(scenario), make_presets(scenario)
+    world, presets = make_world(scenario), make_presets(scenario)
     if not law.intervention_on_top:
-        return OutcomeGatekeepers(team, law, presets, make_outlook(scenario), make_patience(scenario))
-    judging = Judging(make_route(scenario), make_horizon(scenario), make_rules(scenario), scenario.gatekeeper.period_s)
-    return PaperGatekeepers(team, law, presets, judging)
+        return OutcomeGatekeepers(world, law, presets, make_outlook(scenario), make_patience(scenario))
+    return PaperGatekeepers(world, law, presets, make_route(scenario), make_horizon(scenario), make_rules(scenario))
 
 
 def make_trigger(scenario: Scenario, zeta: float) -> Trigger:

@@ -28,22 +28,23 @@ from airground_drake.base.arrays import Array, read_only
 from airground_drake.base.errors import PluginError, short
 from airground_drake.intervention.messages import accepted_proposals
 from airground_drake.intervention.policy import Proposal
-from airground_drake.nsbc.avoidance import Avoidance, limit_speed
+from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.law import Intervention, UgvLaw
 from airground_drake.nsbc.task import Task
 from airground_drake.nsbc.tasks import FormationTask
-from airground_drake.nsbc.team import Neighbourhood, Team
 from airground_drake.systems.lifetime import weakly
-from airground_drake.systems.signals import UavGains, UgvGains, no_proposals
+from airground_drake.systems.signals import UavGains, UgvGains, declare_bodies, no_proposals
+from airground_drake.world.world import Neighbours, World
 
 
 class UgvController(LeafSystem):
     """NSBC of all UGVs, see `UgvLaw`: avoidance (7)-(8), tracking (6), intervention (14), composed as (5) or (20).
 
-    Ports (n UGVs, world frame):
-        in  `team_position` (3(n+1)) m; `reference` (6n): preset positions m, then velocities m/s;
+    Ports (n UGVs, M bodies that move, world frame):
+        in  `bodies` (3M) m; `reference` (6n): preset positions m, then velocities m/s;
             `proposals` abstract, n of Proposal or None; `answers` (2n), see `messages`.
-        out `command` (3n) m/s; `accepted` (n), 1 while an intervention is executed. Both held.
+        out `command` (3n) m/s; `accepted` (n), 1 while an intervention is executed; both held. `gains`, the
+            `UgvGains` in force, for whoever predicts the command.
     Parameters: `UgvGains`; by default those of the law.
     Rate: one update per control period, from t = 0.
 
@@ -52,15 +53,13 @@ class UgvController(LeafSystem):
         avoidance: its avoidance layer.
     """
 
-    def __init__(self, team: Team, law: UgvLaw) -> None:
+    def __init__(self, world: World, law: UgvLaw) -> None:
         """Declare ports, state and the periodic update."""
         super().__init__()
-        n = len(team.ugvs)
+        n = len(world.names("ugv"))
         self.law, self.avoidance = law, law.avoidance
-        self._neighbourhood = team.neighbourhood(slice(0, n))
-        self._mobility = team.mobility[:n]
-        self._max_speed = team.max_speed[:n]
-        self._position = self.DeclareVectorInputPort("team_position", 3 * (n + 1))
+        self._near = world.around(world.select("ugv"))
+        self._bodies = declare_bodies(self, world)
         self._reference = self.DeclareVectorInputPort("reference", 6 * n)
         self._proposals = self.DeclareAbstractInputPort("proposals", no_proposals(n))
         self._answers = self.DeclareVectorInputPort("answers", 2 * n)
@@ -71,6 +70,8 @@ class UgvController(LeafSystem):
         gains = [law.avoidance.gain, law.motion_gain, law.intervention_gain]
         self._gains = self.DeclareNumericParameter(BasicVector(gains))
         self._law = _cached(self, law, weakly(self._calc_law), self._gains)
+        given = {self.numeric_parameter_ticket(NumericParameterIndex(self._gains))}
+        self.DeclareVectorOutputPort("gains", len(gains), weakly(self._calc_gains), prerequisites_of_calc=given)
         self.DeclarePeriodicDiscreteUpdateEvent(law.avoidance.period, 0.0, weakly(self._update))
 
     def gains(self, context: Context) -> Any:
@@ -89,16 +90,17 @@ class UgvController(LeafSystem):
     def parameters(self, context: Context) -> dict[str, Any]:
         """What it runs with, see `read_back`, and whether it puts interventions on top of avoidance."""
         law = self.law_in(context)
-        found = read_back(self, law.avoidance, self._neighbourhood, self._mobility, self._max_speed)
+        found = read_back(self, law.avoidance, self._near)
         return {**found, "composition": law.avoidance.composition, "intervention_on_top": law.intervention_on_top}
 
     def _calc_law(self, context: Context, output: AbstractValue) -> None:
-        avoidance, motion, intervention = context.get_numeric_parameter(self._gains).value().tolist()
-        layer = replace(self.law.avoidance, gain=avoidance)
-        output.set_value(replace(self.law, avoidance=layer, motion_gain=motion, intervention_gain=intervention))
+        output.set_value(self.law.with_gains(*context.get_numeric_parameter(self._gains).value().tolist()))
+
+    def _calc_gains(self, context: Context, output: BasicVector) -> None:
+        output.SetFromVector(context.get_numeric_parameter(self._gains).value())
 
     def _update(self, context: Context, discrete: DiscreteValues) -> None:
-        positions = _finite(self._position.Eval(context)).reshape(-1, 3)
+        positions = _finite(self._bodies.Eval(context)).reshape(-1, 3)
         reference, rate = self._reference.Eval(context).reshape(2, -1, 3)
         proposals = accepted_proposals(self._proposals.Eval(context), self._answers.Eval(context))
         law = self.get_cache_entry(self._law).Eval(context)
@@ -119,7 +121,7 @@ class UgvController(LeafSystem):
 
         Args:
             t: time, s.
-            positions: of all robots, (n + 1, 3), m.
+            positions: of all bodies that move, (M, 3), m.
             reference: preset positions, (n, 3), m.
             rate: preset velocities, (n, 3), m/s.
             accepted: per UGV, the accepted proposal or None.
@@ -130,14 +132,14 @@ class UgvController(LeafSystem):
         """
         law = self.law if law is None else law
         asked = [None if p is None else Intervention(*p.motion.at(t), p.chosen) for p in accepted]
-        return law.velocity(positions, self._neighbourhood, reference, rate, asked, self._mobility, self._max_speed)
+        return law.velocity(positions, self._near, reference, rate, asked)
 
 
 class UavController(LeafSystem):
-    """NSBC of the UAV: obstacle avoidance (11) above a task, by default to stay over the UGVs' centroid, (9)-(10).
+    """NSBC of a UAV: obstacle avoidance (11) above a task, by default to stay over the UGVs' centroid, (9)-(10).
 
-    Ports (n UGVs, world frame):
-        in  `team_position` (3(n+1)) m; `ugv_command` (3n) m/s, fed forward as the centroid's rate.
+    Ports (n UGVs, M bodies that move, world frame):
+        in  `bodies` (3M) m; `ugv_command` (3n) m/s, fed forward as the centroid's rate.
         out `command` (3) m/s, held.
     Parameters: `UavGains`.
     Rate: one update per control period, from t = 0.
@@ -148,7 +150,7 @@ class UavController(LeafSystem):
 
     def __init__(
         self,
-        team: Team,
+        world: World,
         avoidance: Avoidance,
         *,
         gain: float,
@@ -158,7 +160,7 @@ class UavController(LeafSystem):
         """Declare ports, state and the periodic update.
 
         Args:
-            team: names, safe distances, speed limits.
+            world: with one UAV.
             avoidance: the set-based layer.
             gain: of the task, 1/s, by default.
             altitude: m.
@@ -166,16 +168,14 @@ class UavController(LeafSystem):
                 gain; asked for the velocity of one robot, (1, 3), m/s.
         """
         super().__init__()
-        n = len(team.ugvs)
         self.avoidance = avoidance
         self._task = task
         self._gain = gain
         self._altitude = altitude
-        self._neighbourhood = team.neighbourhood(slice(n, n + 1))
-        self._mobility = team.mobility[n:]
-        self._max_speed = team.max_speed[n:]
-        self._position = self.DeclareVectorInputPort("team_position", 3 * (n + 1))
-        self._ugv_command = self.DeclareVectorInputPort("ugv_command", 3 * n)
+        self._ugvs, self._own = world.select("ugv"), world.select("uav")
+        self._near = world.around(self._own)
+        self._bodies = declare_bodies(self, world)
+        self._ugv_command = self.DeclareVectorInputPort("ugv_command", 3 * len(world.names("ugv")))
         command = self.DeclareDiscreteState(3)
         self.DeclareStateOutputPort("command", command)
         self._gains = self.DeclareNumericParameter(BasicVector([avoidance.gain, gain]))
@@ -193,14 +193,14 @@ class UavController(LeafSystem):
     def parameters(self, context: Context) -> dict[str, Any]:
         """What it runs with, see `read_back`."""
         layer, _ = self.get_cache_entry(self._layer).Eval(context)
-        return read_back(self, layer, self._neighbourhood, self._mobility, self._max_speed)
+        return read_back(self, layer, self._near)
 
     def _calc_layer(self, context: Context, output: AbstractValue) -> None:
         avoidance, formation = context.get_numeric_parameter(self._gains).value().tolist()
         output.set_value((replace(self.avoidance, gain=avoidance), formation))
 
     def _update(self, context: Context, discrete: DiscreteValues) -> None:
-        positions = _finite(self._position.Eval(context)).reshape(-1, 3)
+        positions = _finite(self._bodies.Eval(context)).reshape(-1, 3)
         commands = self._ugv_command.Eval(context).reshape(-1, 3)
         discrete.set_value(0, self.velocity(positions, commands, *self.get_cache_entry(self._layer).Eval(context)))
 
@@ -210,7 +210,7 @@ class UavController(LeafSystem):
         """What the law commands, (3,), m/s.
 
         Args:
-            positions: of all robots, (n + 1, 3), m.
+            positions: of all bodies that move, (M, 3), m.
             ugv_commands: of the UGVs, at the sample before, (n, 3), m/s.
             avoidance: the set-based layer; default: with the default gain.
             gain: of the task, 1/s; default: as it was built.
@@ -220,47 +220,45 @@ class UavController(LeafSystem):
         """
         avoidance = self.avoidance if avoidance is None else avoidance
         gain = self._gain if gain is None else gain
-        lower = limit_speed(self._asked(positions, ugv_commands, gain), self._max_speed)
-        spaces = avoidance.half_spaces(positions[-1:], self._mobility, self._neighbourhood.around(positions))
-        velocity: Array = avoidance.apply(lower, spaces)[0]
+        velocity: Array = avoidance.command(self._asked(positions, ugv_commands, gain), positions, self._near)[0]
         return velocity
 
     def _asked(self, positions: Array, ugv_commands: Array, gain: float) -> Array:
-        """What the task asks for, (1, 3), m/s; another one than the package's own is watched."""
+        """What the task asks for, (1, 3), m/s. The answer of a task from outside the package is checked."""
+        ugvs, own = positions[self._ugvs], positions[self._own]
         if self._task is FormationTask:
-            return FormationTask(positions[:-1], ugv_commands, self._altitude, gain).velocity(positions[-1:])
-        task = self._task(read_only(positions[:-1]), read_only(ugv_commands), self._altitude, gain)
-        return _velocity_of(task, read_only(positions[-1:]))
+            return FormationTask(ugvs, ugv_commands, self._altitude, gain).velocity(own)
+        task = self._task(read_only(ugvs), read_only(ugv_commands), self._altitude, gain)
+        return _velocity_of(task, read_only(own))
 
 
 def _cached(system: LeafSystem, model: Any, calc: Callable[..., None], gains: int) -> CacheIndex:
-    """What follows from the gains of a Context, of the type of `model`, worked out when they change."""
+    """Declare a value that is computed from the gains of a Context when they change; it has the type of `model`."""
     producer = ValueProducer(allocate=lambda: Value(model), calc=calc)
     return system.DeclareCacheEntry(
         type(model).__name__, producer, {system.numeric_parameter_ticket(NumericParameterIndex(gains))}
     ).cache_index()
 
 
-def read_back(
-    system: LeafSystem, avoidance: Avoidance, neighbourhood: Neighbourhood, mobility: Array, max_speed: Array
-) -> dict[str, Any]:
+def read_back(system: LeafSystem, avoidance: Avoidance, near: Neighbours) -> dict[str, Any]:
     """The parameters of a controller's avoidance as it runs in a Context, in strict JSON, for the trace.
 
     Returns:
-        Of its k robots: `members`, their indices in team order; `obstacles_m`, centres (m, 3); `others`, indices of the
-        n robots that each avoids, (k, n); `safe_m` and `share` beside the obstacles, then beside the robots,
-        (k, m + n); `mobility` (k, 3); `max_speed_m_s` (k,). Of all: `sampling_s`, period and offset; `gain_1_s`,
-        `period_s`, `sensing_range_m`. Arrays in C order, `safe_m` and `share` as [value, how many] in a row.
+        Of its k robots: `members`, their indices in the order of the world; `obstacles_m`, centres (m, 3); `others`,
+        indices of the n robots that each avoids, (k, n); `safe_m` and `share` beside the obstacles, then beside the
+        robots, (k, m + n); `mobility` (k, 3); `max_speed_m_s` (k,). Of all: `sampling_s`, period and offset;
+        `gain_1_s`, `period_s`, `sensing_range_m`. Arrays in C order; `safe_m` and `share` as [value, how many] in a
+        row.
     """
     timing = system.GetUniquePeriodicDiscreteUpdateAttribute()
     return {
-        "members": neighbourhood.members.tolist(),
-        "obstacles_m": neighbourhood.obstacles.ravel().tolist(),
-        "others": neighbourhood.others.ravel().tolist(),
-        "safe_m": _in_runs(neighbourhood.distance),
-        "share": _in_runs(neighbourhood.share),
-        "mobility": mobility.ravel().tolist(),
-        "max_speed_m_s": max_speed.tolist(),
+        "members": near.members.tolist(),
+        "obstacles_m": near.still.ravel().tolist(),
+        "others": near.others.ravel().tolist(),
+        "safe_m": _in_runs(near.distance),
+        "share": _in_runs(near.share),
+        "mobility": near.mobility.ravel().tolist(),
+        "max_speed_m_s": near.max_speed.tolist(),
         "sampling_s": [timing.period_sec(), timing.offset_sec()],
         "gain_1_s": avoidance.gain,
         "period_s": avoidance.period,
@@ -274,7 +272,7 @@ def _in_runs(array: Array) -> list[list[float]]:
 
 
 def _finite(positions: Array) -> Array:
-    """Positions, as they come from the plants; what is nowhere is avoided by nobody."""
+    """The positions that the plants give; raise if one is not finite, because no robot could avoid such a body."""
     if not math.isfinite(positions @ positions) and not np.isfinite(positions).all():  # quickly, then exactly
         raise PluginError(f"positions are not finite, from a plant or a disturbance: {short(repr(positions.tolist()))}")
     return positions

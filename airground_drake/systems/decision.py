@@ -26,7 +26,16 @@ from airground_drake.decision.excursion import anything_due, extremes, gathered,
 from airground_drake.decision.trigger import Mode, Trigger, TriggerState
 from airground_drake.geometry.motion import Motion
 from airground_drake.systems.lifetime import weakly
-from airground_drake.systems.signals import FIELDS, Status, TriggerLevels, laid_out, of_ugv
+from airground_drake.systems.signals import (
+    FIELDS,
+    Status,
+    TriggerLevels,
+    components_of,
+    declare_bodies,
+    laid_out,
+    of_ugv,
+)
+from airground_drake.world.world import World
 
 NOT_BEGUN = -1.0
 """Beginning of the run and of the step, s, before there is one."""
@@ -44,25 +53,27 @@ class DecisionBlock(LeafSystem):
     to miss nothing between two updates. A subclass defines `value`, and `extremes` if the variable can be smaller or
     larger within a straight stretch than at its ends.
 
-    Ports (n UGVs):
-        in  `team_position` (3(n+1)) m; `reference` (6n), positions first; `noise` (n) m.
+    Ports (n UGVs, M bodies that move):
+        in  `bodies` (3M) m; `reference` (6n), positions first; `noise` (n) m.
         out `decision_variable` (n) m, x now; `decision_range` (2n) m, the least x since the step began, then the
             largest one. Both are continuous in time.
     State (1 + 5n): of the beginning of the step, time, s; then of every UGV task error (3), noise and x, m.
     Rate: one update per step of the simulator.
     """
 
-    def __init__(self, count: int, presets: Sequence[Motion] = ()) -> None:
-        """Declare ports, state and events for `count` UGVs; the presets (default: none) tell where references bend."""
+    def __init__(self, world: World, presets: Sequence[Motion] = ()) -> None:
+        """Declare ports, state and events for the UGVs of a world; their presets tell where references bend."""
         super().__init__()
+        count = len(world.names("ugv"))
+        self._ugvs = components_of(world, "ugv")
         self._presets = tuple(presets)
         self._corners = sorted((t, j) for j, preset in enumerate(self._presets) for t in preset.times.tolist())
         self._corner_times = [t for t, _ in self._corners]
-        self._position = self.DeclareVectorInputPort("team_position", 3 * (count + 1))
+        self._bodies = declare_bodies(self, world)
         self._reference = self.DeclareVectorInputPort("reference", 6 * count)
         self._noise = self.DeclareVectorInputPort("noise", count)
         self.DeclareDiscreteState(np.array([NOT_BEGUN, *([0.0] * 5 * count)]))
-        given = {self._position.ticket(), self._reference.ticket(), self._noise.ticket(), self.time_ticket()}
+        given = {self._bodies.ticket(), self._reference.ticket(), self._noise.ticket(), self.time_ticket()}
         producer = ValueProducer(allocate=lambda: Value(np.zeros(0)), calc=weakly(self._calc_signals))
         self._signals = self.DeclareCacheEntry("signals", producer, given).cache_index()
         self.DeclareVectorOutputPort(
@@ -97,7 +108,7 @@ class DecisionBlock(LeafSystem):
 
     def _calc_signals(self, context: Context, output: AbstractValue) -> None:
         """What the state keeps of an instant, as it is now."""
-        position, reference = self._position.Eval(context), self._reference.Eval(context)
+        position, reference = self._bodies.Eval(context)[self._ugvs], self._reference.Eval(context)
         output.set_value(
             self._with_variable(gathered(context.get_time(), position, reference, self._noise.Eval(context)))
         )

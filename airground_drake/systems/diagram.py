@@ -17,10 +17,10 @@ from airground_drake.base.errors import PluginError, UnknownNameError
 from airground_drake.geometry.motion import Motion
 from airground_drake.nsbc.avoidance import COMPOSITIONS, Composition
 from airground_drake.nsbc.task import Task
-from airground_drake.nsbc.team import Team
 from airground_drake.registry import METHODS, UAV_TASKS, Method, method_of
 from airground_drake.scenarios.load import validated
 from airground_drake.scenarios.schema import Scenario
+from airground_drake.scenarios.world import make_world
 from airground_drake.systems import (
     DecisionVariable,
     DirectAcceptance,
@@ -34,9 +34,11 @@ from airground_drake.systems import (
     VelocityDisturbance,
     components,
 )
+from airground_drake.systems.plant import PLANTS
+from airground_drake.world.world import ROBOTS, Body, World
 
 RECORDED = (
-    "team_position", "team_command", "reference", "noise", "decision_variable", "status", "accepted",
+    "bodies", "team_command", "reference", "noise", "decision_variable", "status", "accepted",
 )  # fmt: skip
 """Exported output ports of the diagram, the signals of a trace."""
 
@@ -44,8 +46,8 @@ PlantFactory = Callable[[str, Array], System]
 """Makes the plant of a robot from its name and its start (3,), m: a System with one input, the velocity (3,), m/s, and
 one output, the position (3,), m, both in the world frame, whose default state has the robot at its start."""
 
-DecisionFactory = Callable[[int, Sequence[Motion]], System]
-"""Makes the block that computes the decision variables, from the number of UGVs n and their presets: a System with the
+DecisionFactory = Callable[[World, Sequence[Motion]], System]
+"""Makes the block that computes the decision variables of n UGVs, from their world and their presets: a System with the
 output ports `decision_variable` (n), m, and `decision_range` (2n), m, the least and the largest since the simulator's
 step began. Its input ports are fed by name. `systems.DecisionBlock` is a base for such blocks."""
 
@@ -57,7 +59,7 @@ class Model:
     Attributes:
         diagram: the whole system; its exported output ports are RECORDED.
         method: which method's priorities and gatekeeper it has.
-        team: names, safe distances, speed limits.
+        world: all bodies, in the order of the port `bodies`.
         decision_block: what drives the trigger.
         trigger: of all UGVs.
         planner: the UAV's planner.
@@ -67,7 +69,7 @@ class Model:
 
     diagram: Diagram
     method: Method
-    team: Team
+    world: World
     decision_block: System
     trigger: EventTrigger
     planner: InterventionPlanner
@@ -79,7 +81,7 @@ def build_diagram(
     scenario: Scenario,
     method: str | None = None,
     composition: Composition | None = None,
-    plants: PlantFactory = components.first_order_plant,
+    plants: PlantFactory | None = None,
     monitor: Monitor | None = None,
     decision_block: DecisionFactory = DecisionVariable,
 ) -> Diagram:
@@ -89,7 +91,7 @@ def build_diagram(
         scenario: from a file or made in Python.
         method: default: that of the scenario's last run.
         composition: of the UGVs' avoidance tasks; default: 'augmented', or without `method` that of the last run.
-        plants: makes the plant of each robot. The claims are about the default, `first_order_plant`.
+        plants: makes the plant of each robot. The claims are about the default, the plants of the scenario.
         monitor: watches the diagram while it runs; see `make_monitor`.
         decision_block: makes the block that drives the trigger. The default, `systems.DecisionVariable`, is (15).
 
@@ -112,7 +114,7 @@ def build_model(
     scenario: Scenario,
     method: str | None = None,
     composition: Composition | None = None,
-    plants: PlantFactory = components.first_order_plant,
+    plants: PlantFactory | None = None,
     monitor: Monitor | None = None,
     decision_block: DecisionFactory = DecisionVariable,
     *,
@@ -125,22 +127,22 @@ def build_model(
     `make_gatekeepers` makes what judges proposals in another way; claims about decisions are about the default.
     """
     chosen, composition = _chosen(scenario, method, composition)
-    team, presets = components.make_team(scenario), components.make_presets(scenario)
-    n = len(team.ugvs)
+    world, presets = make_world(scenario), components.make_presets(scenario)
+    n = len(world.names("ugv"))
     law = components.make_law(scenario, chosen, composition)
     # first, so that the seed of its noise does not depend on what a plant may draw
-    block = _checked_block(n, decision_block(n, presets))
+    block = _checked_block(n, decision_block(world, presets))
     trigger = EventTrigger(n, components.make_trigger(scenario, components.threshold(scenario)))
     decision = _decision_making(scenario, n, block, trigger)
-    starts = dict(zip(team.robots, components.make_starts(scenario), strict=True))
-    checked = {robot: _checked(robot, plants(robot, start)) for robot, start in starts.items()}
-    vehicles = _vehicles(team, checked, disturbed=disturbed)
-    planner = InterventionPlanner(components.make_planner(scenario, chosen), scenario.control.period_s)
+    made = {body.name: _plant(body) if plants is None else plants(body.name, body.start_m) for body in world.moving}
+    vehicles = _vehicles(world, {name: _checked(name, plant) for name, plant in made.items()}, disturbed=disturbed)
+    planner = InterventionPlanner(components.make_planner(scenario, chosen), world, scenario.control.period_s)
     gatekeeper = None
     if chosen.gated:
         gatekeepers = make_gatekeepers(scenario, law)
-        gatekeeper = Gatekeeper(gatekeepers, n, period=scenario.gatekeeper.period_s, control=scenario.control.period_s)
-    controllers = UgvController(team, law), _uav_controller(scenario, team)
+        periods = {"period": scenario.gatekeeper.period_s, "control": scenario.control.period_s}
+        gatekeeper = Gatekeeper(gatekeepers, world, **periods)
+    controllers = UgvController(world, law), _uav_controller(scenario, world)
     parts = {
         "decision_making": decision,
         "task_planning": _task_planning(presets, planner, *controllers),
@@ -152,7 +154,7 @@ def build_model(
     named = {port.get_name(): port for part in parts.values() for port in _outputs(part)}
     exported = [*RECORDED, *(["violation"] if monitor is not None else [])]
     diagram = _assembled(f"{scenario.name}_method_{chosen.id}", parts, named, exported)
-    return Model(diagram, chosen, team, block, trigger, planner, gatekeeper, controllers)
+    return Model(diagram, chosen, world, block, trigger, planner, gatekeeper, controllers)
 
 
 def most_complete(scenario: Scenario) -> str:
@@ -205,6 +207,7 @@ def _task_planning(
         "proposals": planner.GetOutputPort("proposals"),
         "ugv_command": ugvs.GetOutputPort("command"),
         "accepted": ugvs.GetOutputPort("accepted"),
+        "gains": ugvs.GetOutputPort("gains"),
         "uav_command": uav.GetOutputPort("command"),
     }
     return _assembled("task_planning", systems, named)
@@ -216,29 +219,29 @@ def _optimisation(gatekeeper: Gatekeeper | DirectAcceptance) -> Diagram:
     return _assembled("optimisation", {"gatekeeper": gatekeeper}, named)
 
 
-def _vehicles(team: Team, plants: Mapping[str, System], *, disturbed: bool) -> Diagram:
+def _vehicles(world: World, plants: Mapping[str, System], *, disturbed: bool) -> Diagram:
     """Where the robots are, and what moves them: commands, disturbances, plants."""
-    n = len(team.ugvs)
     builder = DiagramBuilder()
-    team_command = builder.AddNamedSystem("team_command", Multiplexer([3 * n, 3]))
+    sizes = [3 * len(world.names(kind)) for kind in ROBOTS]
+    team_command = builder.AddNamedSystem("team_command", Multiplexer(sizes))
     commanded = team_command.get_output_port()
     if disturbed:
-        disturbance = builder.AddNamedSystem("velocity_disturbance", VelocityDisturbance(team.robots))
+        disturbance = builder.AddNamedSystem("velocity_disturbance", VelocityDisturbance(world.robots))
         builder.Connect(commanded, disturbance.GetInputPort("command"))
         commanded = disturbance.GetOutputPort("velocity")
-    velocities = builder.AddNamedSystem("team_velocity", Demultiplexer(3 * (n + 1), 3))
+    velocities = builder.AddNamedSystem("team_velocity", Demultiplexer(sum(sizes), 3))
     for robot, plant in plants.items():
         builder.AddNamedSystem(f"{robot}_plant", plant)
-    team_position = builder.AddNamedSystem("team_position", Multiplexer([3] * (n + 1)))
+    bodies = builder.AddNamedSystem("bodies", Multiplexer([3] * len(plants)))
     for i, plant in enumerate(plants.values()):
-        builder.Connect(plant.get_output_port(0), team_position.get_input_port(i))
+        builder.Connect(plant.get_output_port(0), bodies.get_input_port(i))
         builder.Connect(velocities.get_output_port(i), plant.get_input_port(0))
     builder.Connect(commanded, velocities.get_input_port())
-    for i, robots in enumerate(("ugv", "uav")):
-        builder.ExportInput(team_command.get_input_port(i), f"{robots}_command")
-    for robot in team.robots if disturbed else ():
+    for i, kind in enumerate(ROBOTS):
+        builder.ExportInput(team_command.get_input_port(i), f"{kind}_command")
+    for robot in world.robots if disturbed else ():
         builder.ExportInput(disturbance.GetInputPort(f"disturbance_{robot}"), f"disturbance_{robot}")
-    builder.ExportOutput(team_position.get_output_port(), "team_position")
+    builder.ExportOutput(bodies.get_output_port(), "bodies")
     builder.ExportOutput(team_command.get_output_port(), "team_command")
     return _built("vehicles", builder)
 
@@ -308,20 +311,26 @@ def make_monitor(
     """
     scenario = validated(scenario)
     chosen, composition = _chosen(scenario, method, composition)
-    team = components.make_team(scenario)
-    ugvs = UgvController(team, components.make_law(scenario, chosen, composition))
-    laws = Laws(ugvs.velocity, _uav_controller(scenario, team).velocity)
-    return Monitor(team, components.make_avoidance(scenario), laws, terminate=terminate)
+    world = make_world(scenario)
+    ugvs = UgvController(world, components.make_law(scenario, chosen, composition))
+    laws = Laws(ugvs.velocity, _uav_controller(scenario, world).velocity)
+    return Monitor(world, components.make_avoidance(scenario), laws, terminate=terminate)
 
 
-def _uav_controller(scenario: Scenario, team: Team) -> UavController:
+def _uav_controller(scenario: Scenario, world: World) -> UavController:
     return UavController(
-        team,
+        world,
         components.make_avoidance(scenario),
         task=UAV_TASKS.load(scenario.uav.task, of=Task),
         gain=scenario.control.formation_gain_1_s,
         altitude=scenario.uav.altitude_m,
     )
+
+
+def _plant(body: Body) -> System:
+    """The Drake system of a body that moves."""
+    assert body.plant is not None
+    return PLANTS[body.plant.kind](body)
 
 
 def _checked(robot: str, plant: System) -> System:

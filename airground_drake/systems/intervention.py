@@ -9,10 +9,11 @@ from pydrake.systems.framework import Context, DiscreteValues, EventStatus, Leaf
 from airground_drake.base.arrays import Array
 from airground_drake.decision.excursion import INTERVENING
 from airground_drake.intervention.halts import NOT_WATCHED, room, standing, watched
-from airground_drake.intervention.planner import Planner, PlannerMemory, sent_after
+from airground_drake.intervention.planner import Planner, PlannerState, sent_after
 from airground_drake.systems.lifetime import weakly
-from airground_drake.systems.signals import FIELDS, no_proposals, no_reports
+from airground_drake.systems.signals import FIELDS, components_of, declare_bodies, no_proposals, no_reports
 from airground_drake.systems.ticks import Ticks
+from airground_drake.world.world import ROBOTS, World
 
 
 class InterventionPlanner(LeafSystem):
@@ -20,20 +21,22 @@ class InterventionPlanner(LeafSystem):
 
     The system numbers the proposals itself, see `sent_after`.
 
-    Ports (n UGVs):
-        in  `team_position` (3(n+1)) m; `status` (4n) from EventTrigger; `answers` (2n) and `reports`
+    Ports (n UGVs, M bodies that move):
+        in  `bodies` (3M) m; `status` (4n) from EventTrigger; `answers` (2n) and `reports`
             (abstract), see `messages`.
         out `proposals` abstract, n of Proposal or None.
-    State: where each UGV has been since when, see `halts`; abstract, a `PlannerMemory`.
+    State: where each UGV has been since when, see `halts`; abstract, a `PlannerState`.
     Rate: one update per planning period, from t = 0. A proposal can act one period after it is made.
     """
 
-    def __init__(self, planner: Planner, control_period: float | None = None) -> None:
+    def __init__(self, planner: Planner, world: World, control_period: float | None = None) -> None:
         """Declare ports, state and the periodic update; the controllers' period in s (default: the planner's)."""
         super().__init__()
         self._planner = planner
         n = len(planner.ugvs)
-        self._position = self.DeclareVectorInputPort("team_position", 3 * (n + 1))
+        self._ugvs = components_of(world, "ugv")
+        self._robots = world.select(*ROBOTS)
+        self._bodies = declare_bodies(self, world)
         self._status = self.DeclareVectorInputPort("status", FIELDS * n)
         self._answers = self.DeclareVectorInputPort("answers", 2 * n)
         self._reports = self.DeclareAbstractInputPort("reports", no_reports(n))
@@ -51,9 +54,9 @@ class InterventionPlanner(LeafSystem):
         self.DeclarePeriodicDiscreteUpdateEvent(self._ticks.period, 0.0, weakly(self._watch))
         self.DeclarePeriodicUnrestrictedUpdateEvent(self._ticks.period, 0.0, weakly(self._update))
 
-    def memory(self, context: Context) -> PlannerMemory:
+    def memory(self, context: Context) -> PlannerState:
         """What was sent and what went wrong, up to the context's time."""
-        memory: PlannerMemory = context.get_abstract_state(self._memory).get_value()
+        memory: PlannerState = context.get_abstract_state(self._memory).get_value()
         return memory
 
     def close(self) -> None:
@@ -71,7 +74,7 @@ class InterventionPlanner(LeafSystem):
 
     def _halts(self, context: Context) -> Array:
         before = context.get_discrete_state(0).value()
-        return watched(before, context.get_time(), self._position.Eval(context), self._room)
+        return watched(before, context.get_time(), self._bodies.Eval(context)[self._ugvs], self._room)
 
     def _update(self, context: Context, state: State) -> EventStatus:
         t = context.get_time()
@@ -81,7 +84,7 @@ class InterventionPlanner(LeafSystem):
         intervening = [mode == INTERVENING for mode in self._status.Eval(context)[::FIELDS].tolist()]
         if self._planner.idle(before, intervening):
             return EventStatus.DidNothing()
-        positions = self._position.Eval(context).reshape(-1, 3)
+        positions = self._bodies.Eval(context).reshape(-1, 3)[self._robots]
         answers, reports = self._answers.Eval(context), self._reports.Eval(context)
         stands = standing(self._halts(context), t).tolist()  # of this instant: the state is updated after this
         memory = self._planner.plan(before, t, positions, intervening, answers, reports, stands)

@@ -14,10 +14,10 @@ from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSys
 from airground_drake.base.arrays import Array
 from airground_drake.intervention.messages import accepted_proposals
 from airground_drake.intervention.policy import Proposal
-from airground_drake.nsbc.avoidance import Avoidance
-from airground_drake.nsbc.team import Team
+from airground_drake.nsbc.avoidance import Avoidance, Surroundings
 from airground_drake.systems.lifetime import weakly
-from airground_drake.systems.signals import no_proposals
+from airground_drake.systems.signals import declare_bodies, no_proposals
+from airground_drake.world.world import ROBOTS, World
 
 INEQUALITY_TOLERANCE_M_S = 1e-9
 """By this much a velocity may miss an inequality or a limit, m/s, as in SAFE-HYP: rounding errs by 1e-13 m/s."""
@@ -39,7 +39,7 @@ class Violation(NamedTuple):
 
     Attributes:
         t_s: control sample at which the command was chosen.
-        robot: index in team order.
+        robot: index in the order of the world.
         rule: what it breaks.
         amount_m_s: by how much.
     """
@@ -74,12 +74,12 @@ class Memory:
 
 @dataclass(frozen=True)
 class Laws:
-    """The laws that commands are compared with, made anew by whoever makes the monitor.
+    """The laws that commands are compared with; the monitor's maker makes them anew.
 
     Attributes:
-        ugvs: commands (n, 3), m/s, from the time, positions (n + 1, 3), preset positions and velocities (n, 3) each,
+        ugvs: commands (n, 3), m/s, from the time, positions (M, 3), preset positions and velocities (n, 3) each,
             and per UGV the accepted proposal or None.
-        uav: command (3,), m/s, from positions (n + 1, 3), m, and the UGVs' commands (n, 3), m/s, of the sample before.
+        uav: command (3,), m/s, from positions (M, 3), m, and the UGVs' commands (n, 3), m/s, of the sample before.
     """
 
     ugvs: Callable[[float, Array, Array, Array, Sequence[Proposal | None]], Array]
@@ -92,11 +92,11 @@ class Monitor(LeafSystem):
     The avoidance inequalities, speed limits and planar motion of all robots are watched; with laws, and where their
     inputs are connected, the commands, too.
 
-    Ports (n UGVs, world frame):
-        in  `team_position` (3(n+1)) m; `team_command` (3(n+1)) m/s; for the laws: `reference` (6n): preset positions m,
+    Ports (n UGVs, r robots, M bodies that move, world frame):
+        in  `bodies` (3M) m; `team_command` (3r) m/s; for the laws: `reference` (6n): preset positions m,
             then velocities m/s; `proposals` abstract, n of Proposal or None; `answers` (2n), see `messages`.
         out `violation` (5): 1 from the first violation on, else 0; then its control sample, s, the robot's index in
-            team order, the `Rule`, the amount, m/s (-1 each where there is none).
+            the order of the world, the `Rule`, the amount, m/s (-1 each where there is none).
     State: abstract, a `Memory`.
     Rate: one update per control period, from t = 0. What is chosen at a tick is judged at the next one, when it can be
     seen; so the last command of a simulation is not judged.
@@ -105,22 +105,24 @@ class Monitor(LeafSystem):
     composition. Claims that share nothing with the controllers judge the trace afterwards.
     """
 
-    def __init__(self, team: Team, avoidance: Avoidance, laws: Laws | None = None, *, terminate: bool = False) -> None:
+    def __init__(
+        self, world: World, avoidance: Avoidance, laws: Laws | None = None, *, terminate: bool = False
+    ) -> None:
         """Declare ports, state and the periodic update.
 
         Args:
-            team: names, safe distances, speed limits.
+            world: the bodies that the commands are judged in.
             avoidance: the set-based layer.
             laws: None: inequalities and limits only.
             terminate: end the simulation at the first violation.
         """
         super().__init__()
-        n = len(team.ugvs)
-        self._robots, self._max_speed, self._mobility = team.robots, team.max_speed, team.mobility
-        self._neighbourhood = team.neighbourhood(slice(0, n + 1))
+        n = len(world.names("ugv"))
+        self._robots, self._ugvs, self._uav = world.robots, world.select("ugv"), world.select("uav")
+        self._near = world.around(world.select(*ROBOTS))
         self._avoidance, self._laws, self._terminate = avoidance, laws, terminate
-        self._position = self.DeclareVectorInputPort("team_position", 3 * (n + 1))
-        self._command = self.DeclareVectorInputPort("team_command", 3 * (n + 1))
+        self._bodies = declare_bodies(self, world)
+        self._command = self.DeclareVectorInputPort("team_command", 3 * len(world.robots))
         self._reference = self.DeclareVectorInputPort("reference", 6 * n)
         self._proposals = self.DeclareAbstractInputPort("proposals", no_proposals(n))
         self._answers = self.DeclareVectorInputPort("answers", 2 * n)
@@ -148,7 +150,7 @@ class Monitor(LeafSystem):
             return EventStatus.DidNothing()
         found = None if memory.sample is None else self._first(context, memory.sample)
         reference = self._reference.Eval(context).copy() if self._reference.HasValue(context) else None
-        positions, commands = (port.Eval(context).reshape(-1, 3).copy() for port in (self._position, self._command))
+        positions, commands = (port.Eval(context).reshape(-1, 3).copy() for port in (self._bodies, self._command))
         sample = Sample(context.get_time(), positions, reference, commands)
         state.get_mutable_abstract_state(int(self._memory)).set_value(Memory(sample, found))
         if found is not None and self._terminate:
@@ -159,14 +161,14 @@ class Monitor(LeafSystem):
     def _first(self, context: Context, sample: Sample) -> Violation | None:
         """What the commands chosen at the last sample, held until now, break the most, if anything."""
         commands = self._command.Eval(context).reshape(-1, 3)
-        spaces = self._avoidance.half_spaces(
-            sample.positions, self._mobility, self._neighbourhood.around(sample.positions)
-        )
+        near = self._near
+        own = sample.positions[near.members]
+        spaces = self._avoidance.half_spaces(own, near.mobility, Surroundings.of(near, sample.positions))
         speed = np.linalg.norm(commands, axis=1)
         missed: dict[Rule, Array] = {
             Rule.AVOIDANCE: -spaces.slack(commands).min(axis=1, initial=np.inf),
-            Rule.SPEED_LIMIT: speed - self._max_speed,
-            Rule.PLANAR_MOTION: np.where(self._mobility[:, 2] == 0.0, np.abs(commands[:, 2]), 0.0),
+            Rule.SPEED_LIMIT: speed - near.max_speed,
+            Rule.PLANAR_MOTION: np.where(near.mobility[:, 2] == 0.0, np.abs(commands[:, 2]), 0.0),
         }
         for rule, amount in missed.items():
             robot = int(np.argmax(amount))
@@ -179,7 +181,7 @@ class Monitor(LeafSystem):
         return Violation(sample.t, robot, Rule.LAW, float(away[robot])) if away[robot] > LAW_TOLERANCE_M_S else None
 
     def _by_the_laws(self, context: Context, sample: Sample, laws: Laws, commands: Array) -> Array:
-        """Commands by the laws, (n + 1, 3), m/s; those given for the UGVs where their inputs are not connected.
+        """Commands by the laws, (r, 3), m/s; those given for the UGVs where their inputs are not connected.
 
         Until this tick's own updates are made, proposals and answers are those that the controllers saw at the last.
         """
@@ -188,6 +190,6 @@ class Monitor(LeafSystem):
         if sample.reference is not None and all(port.HasValue(context) for port in ports):
             accepted = accepted_proposals(self._proposals.Eval(context), self._answers.Eval(context))
             reference, rate = sample.reference.reshape(2, -1, 3)
-            due[:-1] = laws.ugvs(sample.t, sample.positions, reference, rate, accepted)
-        due[-1] = laws.uav(sample.positions, sample.commands_before[:-1])
+            due[self._ugvs] = laws.ugvs(sample.t, sample.positions, reference, rate, accepted)
+        due[self._uav] = laws.uav(sample.positions, sample.commands_before[self._ugvs])
         return due

@@ -1,24 +1,43 @@
-"""Between commands and plants: what disturbs the motion."""
+"""The Drake systems of plants, by the kind of the plant, and what disturbs their motion."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
-from pydrake.systems.framework import BasicVector, Context, LeafSystem
+import numpy as np
+from pydrake.systems.framework import BasicVector, Context, LeafSystem, System
+from pydrake.systems.primitives import LinearSystem
 
+from airground_drake.base.arrays import Array
 from airground_drake.systems.lifetime import weakly
+from airground_drake.world.plant import FirstOrder
+from airground_drake.world.world import Body
+
+
+def first_order_plant(robot: str, start: Array) -> LinearSystem:
+    """p_dot = v for one robot: input v (3,), m/s; output p (3,), m, world frame; default state `start` (3,), m."""
+    eye, zero = np.eye(3), np.zeros((3, 3))
+    plant = LinearSystem(A=zero, B=eye, C=eye, D=zero)
+    plant.configure_default_state(start)
+    return plant
+
+
+PLANTS: dict[str, Callable[[Body], System]] = {
+    FirstOrder.kind: lambda body: first_order_plant(body.name, body.start_m),
+}
+"""Makes the Drake system of a body, by the kind of its plant."""
 
 
 class VelocityDisturbance(LeafSystem):
     """Adds a disturbance to the command of each robot: p_dot = v + w, the disturbance w of SAFE-DIST.
 
-    Ports (n UGVs, world frame):
-        in  `command` (3(n+1)) m/s; `disturbance_<robot>` (3) m/s for every robot, 0 where not connected.
-        out `velocity` (3(n+1)) m/s.
+    Ports (r robots, world frame):
+        in  `command` (3r) m/s; `disturbance_<robot>` (3) m/s for every robot, 0 where not connected.
+        out `velocity` (3r) m/s.
     """
 
     def __init__(self, robots: Sequence[str]) -> None:
-        """Declare the ports for robots with these names, in team order."""
+        """Declare the ports for robots with these names, in the order of the world."""
         super().__init__()
         self._command = self.DeclareVectorInputPort("command", 3 * len(robots))
         self._disturbances = [self.DeclareVectorInputPort(f"disturbance_{robot}", 3) for robot in robots]

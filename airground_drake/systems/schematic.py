@@ -141,7 +141,7 @@ def _parts(diagram: Diagram) -> list[Diagram]:
 
 def _title(diagram: Diagram, plants: Sequence[str], shown: Sequence[str], left_out: Iterable[str]) -> str:
     """Name of the diagram, and below it how to read the picture."""
-    told = ["solid: numbers, dashed: messages, bold: positions, blue: recorded"]
+    told = ["solid: numbers, dashed: messages, bold: positions (to the gatekeeper: commands, too), blue: recorded"]
     if len(shown) < len(plants):
         told.append(f"{len(plants)} vehicles, {len(shown)} of them shown")
     aside = sorted(name for name in left_out if name in {each.get_name() for each in diagram.GetSystems()})
@@ -214,7 +214,7 @@ def _routes(boxes: Mapping[str, Box], frames: Mapping[str, Box], plants: Sequenc
     ugv, uav = boxes["ugv_controller"], boxes["uav_controller"]
     above, below, beside = planner.y + 7, planner.y - 7, ddm.left + 24
     judged, asked, answered = gate.left - 22, ugv.left - 28, ugv.left - 14
-    fanned, down = boxes[plants[0]].left - 12, (ugv.right + 9, ugv.right + 18)
+    fanned = boxes[plants[0]].left - 12
     bus = frames["task_planning"].low - BUS_PT
     start = (boxes[plants[-1]].right + 10, bus)
     found = {
@@ -242,12 +242,6 @@ def _routes(boxes: Mapping[str, Box], frames: Mapping[str, Box], plants: Sequenc
             _bent((gate.right, gate.y + 8), answered, (ugv.left, ugv.y - 9)), (answered + 20, gate.up - 4)
         ),
         ("ugv_controller", "uav_controller"): Route([(uav.x, ugv.low), (uav.x, uav.up)]),
-        ("ugv_controller", "gatekeeper"): Route(
-            _bent((ugv.right, ugv.y - 9), down[1], (gate.right, gate.y - 10)), (uav.x, gate.y - 16)
-        ),
-        ("uav_controller", "gatekeeper"): Route(
-            _bent((uav.right, uav.y - 9), down[0], (gate.right, gate.y - 1)), (uav.x, gate.y + 5)
-        ),
         ("uav_controller", plants[-1]): Route(
             [(uav.right, uav.y), (boxes[plants[-1]].left, uav.y)], ((uav.right + fanned) / 2, uav.y + 11)
         ),
@@ -287,11 +281,11 @@ def _edges(
     routes = _routes(boxes, frames, plants)
     junction = (boxes[plants[-1]].right + 10, frames["task_planning"].low - BUS_PT)
     bold = "penwidth=2.5, "
-    lines = [f'"team_position" [pos="{junction[0]:g},{junction[1]:g}", shape=point, width=0.05, label=""]']
+    lines = [f'"bodies" [pos="{junction[0]:g},{junction[1]:g}", shape=point, width=0.05, label=""]']
     for plant in plants:
         box = boxes[plant]
         corners = [(box.right, box.y), (junction[0], box.y), junction]
-        lines.append(f'"{plant}" -> "team_position" [{bold}dir=none, pos="{_spline(corners, arrow=False)}"]')
+        lines.append(f'"{plant}" -> "bodies" [{bold}dir=none, pos="{_spline(corners, arrow=False)}"]')
     for (source, target), given in joined.items():
         if not {source, target} <= {"vehicles", *boxes}:
             continue
@@ -305,7 +299,7 @@ def _edges(
             if route.label is not None:
                 words = "<BR/>".join(_told(name, recorded, narrow=target == "vehicles") for name, _ in given)
                 look += f'label=<{words}>, lp="{route.label[0]:g},{route.label[1]:g}", '
-            tail = "team_position" if source == "vehicles" else source
+            tail = "bodies" if source == "vehicles" else source
             lines.append(f'"{tail}" -> "{head}" [{look}pos="{_spline(route.corners)}"]')
     return lines
 

@@ -7,9 +7,11 @@ from typing import Any
 import numpy as np
 from pydrake.common.containers import namedview
 from pydrake.common.value import AbstractValue, Value
+from pydrake.systems.framework import InputPort, LeafSystem
 
 from airground_drake.base.arrays import Array
 from airground_drake.intervention.messages import Report
+from airground_drake.world.world import Kind, World
 
 Status = namedview("Status", ["mode", "triggers", "triggered_at_s", "released_at_s"])
 """Of one UGV, from the trigger: its `decision.trigger.Mode`, how often it triggered, when it last did and was released
@@ -25,6 +27,21 @@ TriggerLevels = namedview("TriggerLevels", ["zeta_m", "release_m", "dwell_s"])
 
 FIELDS = len(Status.get_fields())
 """Numbers of the trigger's status per UGV."""
+
+
+def declare_bodies(system: LeafSystem, world: World) -> InputPort:
+    """Declare the input port `bodies`: positions of all bodies of a world that move, (3 M,), m, in their order.
+
+    Bodies at rest are in the `World`; so no tick copies them. `values.reshape(-1, 3)[world.select("ugv")]` is a view of
+    the positions of the UGVs.
+    """
+    return system.DeclareVectorInputPort("bodies", 3 * len(world.moving))
+
+
+def components_of(world: World, *kinds: Kind) -> slice:
+    """Which numbers of the port `bodies`, or of `team_command`, belong to the bodies of some kinds."""
+    rows = world.select(*kinds)
+    return slice(3 * rows.start, 3 * rows.stop)
 
 
 def of_ugv(view: Any, values: Array, index: int) -> Any:

@@ -20,7 +20,7 @@ class ClaimError(AssertionError):
     """Claims that did not come out as asserted.
 
     Attributes:
-        verdicts: theirs, of which `finding.status` says whether they were refuted, could not be decided
+        verdicts: of the claims; `finding.status` says whether they were refuted, could not be decided
             (`inconclusive`), or something kept them from being decided (`error`, `not_run`).
     """
 
@@ -35,7 +35,7 @@ class NotExercisedWarning(UserWarning):
 
 
 def assert_holds(trace: Trace, *claims: str | TraceClaim, exercised: bool = False) -> None:
-    """Assert that claims about a run hold, whatever its scenario expects of them.
+    """Assert that claims about a run hold, without regard to what its scenario expects.
 
     Args:
         trace: the run.
@@ -55,7 +55,7 @@ def assert_holds(trace: Trace, *claims: str | TraceClaim, exercised: bool = Fals
     objects = [claim for claim in claims if not isinstance(claim, str)]
     verdicts = verify(trace, named or None) if named or not claims else []
     verdicts += [Verdict(claim, trace.run, claim.judge(trace), claim.expected) for claim in objects]
-    place = f"run {trace.run} of {trace.scenario['name']} (method {trace.meta['method']}, seed {trace.meta['seed']})"
+    place = f"run {trace.run} of {trace.scenario.name} (method {trace.meta['method']}, seed {trace.meta['seed']})"
     if silent := sorted(set(named) - {verdict.claim.id for verdict in verdicts}):
         raise ClaimError(f"{', '.join(silent)}: nothing is claimed about {place}")
     _require(verdicts, f"on {place}", exercised=exercised)

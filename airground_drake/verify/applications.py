@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from typing import Any
 
 from airground_drake.run.trace import Trace
 from airground_drake.verify.finding import Finding
@@ -68,7 +67,7 @@ def with_counts(claim: str, finding: Finding, of_runs: Iterable[dict[str, Count]
     return replace(finding, evidence={**finding.evidence, "applies_to": met, "of": cases})
 
 
-def measured(trace: Trace) -> dict[str, Any]:
+def measured(trace: Trace) -> dict[str, thr_choice.Measured]:
     """What THR-CHOICE shows of a run: `thr_choice.of_run`; {} where records are missing or wrong, as in `counts`."""
     try:
         return thr_choice.of_run(trace)
@@ -76,7 +75,7 @@ def measured(trace: Trace) -> dict[str, Any]:
         return {}
 
 
-def with_runs(claim: str, finding: Finding, of_runs: Iterable[dict[str, Any]]) -> Finding:
+def with_runs(claim: str, finding: Finding, of_runs: Iterable[dict[str, thr_choice.Measured]]) -> Finding:
     """THR-CHOICE with what was measured in the runs under `runs`; other findings as they are."""
     if claim != "THR-CHOICE" or finding.status == "error":
         return finding

@@ -13,6 +13,7 @@ import numpy as np
 from airground_drake.base.errors import TraceError, described
 from airground_drake.base.statuses import PASSING, STATUSES, Status, meets, outcome
 from airground_drake.run.trace import Trace
+from airground_drake.scenarios.plants import plant_of
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.finding import Finding
 
@@ -207,24 +208,25 @@ def require_count(claim: Claim, finding: Finding) -> None:
 
 
 def require_motion(trace: Trace) -> None:
-    """Check that the trace is of the shape that its docstring states: position[k] = position[k-1] + dt command[k].
+    """Check that each position follows from the one before and the command by the robot's plant, as the trace says.
 
     Raises:
         TraceError: if time runs backwards, the run or the robots are not those of the scenario, or a step does
             not agree with its command to within `MOTION_TOLERANCE_M`.
     """
     scenario, t = trace.scenario, trace.t
-    if scenario["runs"].get(trace.run, {}).get("method") != trace.meta["method"]:
+    if trace.run not in scenario.runs or scenario.runs[trace.run].method != trace.meta["method"]:
         raise TraceError(f"the scenario declares no run {trace.run!r} of method {trace.meta['method']!r}")
-    if trace.ugvs != list(scenario["ugvs"]) or trace.robots != [*trace.ugvs, scenario["uav"]["name"]]:
+    if trace.ugvs != list(scenario.ugvs) or trace.robots != [*trace.ugvs, scenario.uav.name]:
         raise TraceError(f"the trace is of the robots {trace.robots}, which are not those of its scenario")
     if len(t) < 2 or (np.diff(t) < 0.0).any():
         raise TraceError("the trace has fewer than two rows, or its time runs backwards")
     for robot in trace.robots:
-        predicted = np.diff(t)[:, None] * trace.command(robot)[1:]
-        off = np.abs(np.diff(trace.position(robot), axis=0) - predicted).max(axis=1)
+        given, position = scenario.robots[robot], trace.position(robot)
+        plant = plant_of(given)
+        off = np.abs(position[1:] - plant.step(position[:-1], trace.command(robot)[1:], np.diff(t))).max(axis=1)
         k = int(np.argmax(off))
-        if off[k] > MOTION_TOLERANCE_M:
+        if off[k] > MOTION_TOLERANCE_M + plant.reach(given.max_speed_m_s, scenario.control.period_s):
             raise TraceError(f"{robot} at t = {t[k + 1]} s is {off[k]:.3g} m from where its command leads to")
 
 
@@ -235,8 +237,8 @@ def require_whole_run(trace: Trace) -> None:
         TraceError: if they do not.
     """
     t = trace.t
-    duration = trace.scenario["duration_s"]
-    period = trace.scenario["control"]["period_s"]
+    duration = trace.scenario.duration_s
+    period = trace.scenario.control.period_s
     if abs(t[0]) > TIME_TOLERANCE_S or abs(t[-1] - duration) > TIME_TOLERANCE_S:
         raise TraceError(f"the trace covers {t[0]} to {t[-1]} s of a run from 0 to {duration} s")
     gap = np.diff(t)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -34,7 +35,7 @@ class Finding:
     unit: str = ""
     where: dict[str, Any] = field(default_factory=dict)
     counterexample: dict[str, Any] | None = None
-    evidence: dict[str, Any] = field(default_factory=dict)
+    evidence: Mapping[str, Any] = field(default_factory=dict)
     quantity: str = ""
     exercised: int | None = None
     from_cache: bool = False

@@ -11,17 +11,19 @@ from pydrake.systems.framework import Context, LeafSystem
 
 from airground_drake.decision.trigger import Mode
 from airground_drake.scenarios.schema import Scenario
+from airground_drake.scenarios.world import make_world
 from airground_drake.systems.lifetime import weakly
-from airground_drake.systems.signals import FIELDS
+from airground_drake.systems.signals import FIELDS, declare_bodies
 from airground_drake.view.draw import draw, robot_path, shadow_path, state_path
 from airground_drake.view.stage import INTERVENED, OWN, STATES, TRIGGERED, stage
+from airground_drake.world.world import ROBOTS
 
 
 class LiveView(LeafSystem):
     """Draws a scenario in a Meshcat, and moves its robots there as the simulation goes on.
 
-    Its input ports have the names of the output ports that they belong to (n UGVs, then the UAV):
-        `team_position` (3(n+1)) m; `status` (4n), of the event trigger; `accepted` (n), 1 while an intervention is
+    Its input ports have the names of the output ports that they belong to (n UGVs, M bodies that move):
+        `bodies` (3M) m; `status` (4n), of the event trigger; `accepted` (n), 1 while an intervention is
         accepted.
 
     It publishes at the ends of the simulator's steps, at most FRAMES_PER_S times in a second of simulated time: so it
@@ -34,9 +36,10 @@ class LiveView(LeafSystem):
     def __init__(self, meshcat: Meshcat, scenario: Scenario) -> None:
         """Draw what stands in a valid scenario, and declare the ports."""
         super().__init__()
-        n = len(scenario.ugvs)
-        self._meshcat, self._count = meshcat, n
-        self._position = self.DeclareVectorInputPort("team_position", 3 * (n + 1))
+        world = make_world(scenario)
+        n, self._uavs = len(scenario.ugvs), world.select("uav")
+        self._meshcat, self._robots = meshcat, world.select(*ROBOTS)
+        self._bodies = declare_bodies(self, world)
         self._status = self.DeclareVectorInputPort("status", FIELDS * n)
         self._accepted = self.DeclareVectorInputPort("accepted", n)
         self._shown_s = -math.inf
@@ -54,11 +57,12 @@ class LiveView(LeafSystem):
         if t < self._shown_s + 1.0 / self.FRAMES_PER_S - 1e-9:
             return
         self._shown_s = t
-        positions = self._position.Eval(context).reshape(-1, 3)
+        positions = self._bodies.Eval(context).reshape(-1, 3)
         modes, accepted = self._status.Eval(context)[::FIELDS], self._accepted.Eval(context)
-        for k, position in enumerate(positions):
+        for k, position in enumerate(positions[self._robots]):
             self._meshcat.SetTransform(robot_path(k), RigidTransform(position), t)
-        self._meshcat.SetTransform(shadow_path(self._count), RigidTransform(positions[-1] * [1.0, 1.0, 0.0]), t)
+        for k, above in enumerate(positions[self._uavs], start=self._uavs.start):
+            self._meshcat.SetTransform(shadow_path(k), RigidTransform(above * [1.0, 1.0, 0.0]), t)
         states = np.where(accepted > 0, INTERVENED, np.where(modes == Mode.INTERVENING, TRIGGERED, OWN))
         for k, state in enumerate(states):
             for each in range(len(STATES)):

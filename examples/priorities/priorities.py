@@ -26,7 +26,7 @@ from pydrake.systems.primitives import LogVectorOutput
 from airground_drake.nsbc.avoidance import Avoidance, Surroundings, limit_speed
 from airground_drake.nsbc.task import Task
 from airground_drake.nsbc.tasks import PositionTask
-from airground_drake.systems.components import first_order_plant
+from airground_drake.systems.plant import first_order_plant
 
 Array = NDArray[np.float64]
 

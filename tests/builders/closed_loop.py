@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from copy import copy
 
 import numpy as np
 
 from airground_drake.gatekeeper.problem import Horizon, Problem, predicted_problem
-from airground_drake.gatekeeper.rollout import ClosedLoop, Scene, closed_loop
+from airground_drake.gatekeeper.rollout import ClosedLoop, View, closed_loop
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.law import UgvLaw
-from airground_drake.nsbc.team import Team
 from airground_drake.systems.controllers import UgvController
+from airground_drake.world.world import World
+from builders.worlds import world
 
 H = 0.0625
 """Control period, s: a binary fraction, so that vertices of motions can lie exactly on control samples."""
@@ -35,7 +36,7 @@ class Instance:
         discs = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(count)]) * rng.uniform(2.1, 3.5, (count, 1))
         self.other = np.array([*rng.uniform(2.0, 3.0, 2), 0.0])
         self.drift = np.array([*rng.uniform(-2.0, 0.5, 2), 0.0]) if moving else np.zeros(3)
-        self.team = Team(("ugv1", "ugv2"), "uav", discs, 2.0, 1.0, 1.0, np.array([3.0, 3.0, 9.0]))
+        self.discs = discs
         self.law = UgvLaw(AVOIDANCE, 2.0, 1.5, on_top)
 
         def travel(vertices: int, speed: float) -> Motion:
@@ -47,15 +48,19 @@ class Instance:
         self.preset = travel(2, 0.8)
         selection = np.eye(3) if rng.random() < 0.7 else np.array([[rng.normal(), rng.normal(), 0.0]])
         self.proposal = Proposal("way", 0.0, travel(4, 2.8), selection)
-        around = self.team.neighbourhood(slice(0, 1))
-        self.scene = Scene(
+        near = self.world.around(slice(0, 1))
+        self.scene = View(
             0.0, np.zeros(3), self.preset, np.vstack([discs, self.other, FAR]),
-            np.vstack([np.zeros_like(discs), self.drift, np.zeros(3)]), around.distance[0], around.share[0], 3.0,
+            np.vstack([np.zeros_like(discs), self.drift, np.zeros(3)]), near.distance[0], near.share[0], 3.0,
         )  # fmt: skip
 
     @property
+    def world(self) -> World:
+        return world(("ugv1", "ugv2"), self.discs, 2.0, 1.0, 1.0, max_speed=[3.0, 3.0, 9.0])
+
+    @property
     def controller(self) -> UgvController:
-        return UgvController(self.team, self.law)
+        return UgvController(self.world, self.law)
 
     def problem(self, stages: int, substeps: int = 1, error_weight: float = 1.0) -> Problem:
         return predicted_problem(self.scene, self.law, self.proposal, Horizon(stages, substeps, error_weight, 200.0))
@@ -66,8 +71,9 @@ class Instance:
 
 def run_controller(case: Instance, sensed: np.ndarray, answers: np.ndarray, substeps: int) -> np.ndarray:
     """Positions at the ends of the stages by calling the running controller's law step by step."""
-    team = replace(case.team, obstacles=case.team.obstacles[sensed[:-2]])
-    controller = UgvController(team, case.law)
+    known = copy(case)
+    known.discs = case.discs[sensed[:-2]]
+    controller = known.controller
     position, ends = np.zeros(3), []
     for k in range(len(answers) * substeps):
         t = k * H

@@ -30,7 +30,7 @@ def with_meta(trace: Trace, **changes: Any) -> Trace:
 def with_scenario(trace: Trace, **changes: Any) -> Trace:
     """A copy that claims to be of another scenario: dotted keys, with __ for the dots."""
     dotted = {key.replace("__", "."): value for key, value in changes.items()}
-    return with_meta(trace, scenario=changed(trace.scenario, dotted))
+    return with_meta(trace, scenario=changed(trace.meta["scenario"], dotted))
 
 
 def with_events(trace: Trace, change: Callable[[list[dict[str, Any]]], list[dict[str, Any]]]) -> Trace:

@@ -84,7 +84,7 @@ def reference_at(preset: dict[str, Any], t: float) -> list[float]:
     left = preset["speed_m_s"] * t
     for a, b in pairwise(preset["waypoints_m"]):
         length = math.dist(a, b)
-        if left <= length:
+        if left < length:
             return [p + (q - p) * left / length for p, q in zip(a, b, strict=True)]
         left -= length
     return list(preset["waypoints_m"][-1])

@@ -9,43 +9,35 @@ from typing import Any
 import numpy as np
 import pytest
 
-from airground_drake.base.arrays import Array
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.law import UgvLaw
-from airground_drake.nsbc.team import Neighbourhood, Team
-from airground_drake.scenarios.schema import Scenario
 from airground_drake.systems import components, controllers
+from airground_drake.world.world import Body, Kind, Neighbours, World
 
 Patch = Callable[[pytest.MonkeyPatch], None]
 
 
-def distance_between(first_uav: bool, factor: float) -> Patch:
-    right = Team.pair_distance
-
-    def wrong(self: Team) -> Array:
-        found = right(self)
-        rows = np.arange(len(found))
-        with_uav = (rows == rows[-1]) | (rows == rows[-1])[:, None]
-        return np.where(with_uav == first_uav, factor * found, found)
-
-    return lambda patch: patch.setattr(Team, "pair_distance", wrong)
+def neighbours(change: Callable[[Neighbours], Neighbours]) -> Patch:
+    right = World.around
+    return lambda patch: patch.setattr(World, "around", lambda self, rows: change(right(self, rows)))
 
 
-def neighbourhood(change: Callable[[Team, Neighbourhood], Neighbourhood]) -> Patch:
-    right = Team.neighbourhood
-    return lambda patch: patch.setattr(Team, "neighbourhood", lambda self, rows: change(self, right(self, rows)))
+def distances(factor: float, *kinds: Kind) -> Patch:
+    """Between bodies of these kinds."""
+
+    def apply(patch: pytest.MonkeyPatch) -> None:
+        right = World.apart
+
+        def wrong(self: World, first: Kind, second: Kind) -> float:
+            return right(self, first, second) * (factor if {first, second} == set(kinds) else 1.0)
+
+        patch.setattr(World, "apart", wrong)
+
+    return apply
 
 
 def shares(value: float) -> Patch:
-    return neighbourhood(lambda team, given: replace(given, share=np.where(given.share < 1.0, value, given.share)))
-
-
-def obstacle_distance(factor: float) -> Patch:
-    def change(team: Team, given: Neighbourhood) -> Neighbourhood:
-        obstacle = np.arange(given.distance.shape[1]) < len(team.obstacles)
-        return replace(given, distance=np.where(obstacle, factor * given.distance, given.distance))
-
-    return neighbourhood(change)
+    return neighbours(lambda given: given._replace(share=np.where(given.share < 1.0, value, given.share)))
 
 
 def layer(**changed: Any) -> Patch:
@@ -58,7 +50,7 @@ def layer(**changed: Any) -> Patch:
 
 
 def mobility_lost(patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(Team, "mobility", property(lambda self: np.ones((len(self.robots), 3))))
+    patch.setattr(Body, "mobility", np.ones(3))
 
 
 def on_top(patch: pytest.MonkeyPatch) -> None:
@@ -70,29 +62,22 @@ def unlayered(patch: pytest.MonkeyPatch) -> None:
     """The UAV without its layer."""
 
     class Blind(controllers.UavController):
-        def __init__(self, team: Team, avoidance: Avoidance, **given: Any) -> None:
-            super().__init__(team, replace(avoidance, sensing_range=0.0), **given)
+        def __init__(self, world: World, avoidance: Avoidance, **given: Any) -> None:
+            super().__init__(world, replace(avoidance, sensing_range=0.0), **given)
 
     patch.setattr("airground_drake.systems.diagram.UavController", Blind)
 
 
-def speeding(patch: pytest.MonkeyPatch) -> None:
-    right = components.make_team
-
-    def wrong(scenario: Scenario) -> Team:
-        found = right(scenario)
-        return replace(found, max_speed=1.5 * found.max_speed)
-
-    patch.setattr(components, "make_team", wrong)
+speeding = neighbours(lambda given: given._replace(max_speed=1.5 * given.max_speed))
 
 
 def half_rate(patch: pytest.MonkeyPatch) -> None:
     """The UGVs sampled at half the rate."""
 
     class Slow(controllers.UgvController):
-        def __init__(self, team: Team, law: UgvLaw) -> None:
+        def __init__(self, world: World, law: UgvLaw) -> None:
             period = law.avoidance.period
-            super().__init__(team, replace(law, avoidance=replace(law.avoidance, period=2.0 * period)))
+            super().__init__(world, replace(law, avoidance=replace(law.avoidance, period=2.0 * period)))
             self.avoidance = law.avoidance
             self.law = law
 
@@ -100,12 +85,12 @@ def half_rate(patch: pytest.MonkeyPatch) -> None:
 
 
 MISBUILT: dict[str, tuple[Patch, str]] = {
-    "distance UAV/UGV times 0.9": (distance_between(True, 0.9), "safe_m"),
-    "distance UAV/UGV times 0.9999": (distance_between(True, 0.9999), "safe_m"),
-    "distance UGV/UGV times 0.9": (distance_between(False, 0.9), "safe_m"),
-    "distance UGV/UGV times 1.1": (distance_between(False, 1.1), "safe_m"),
-    "distance UGV/UGV times 1.000001": (distance_between(False, 1.000001), "safe_m"),
-    "distance to obstacles times 0.9": (obstacle_distance(0.9), "safe_m"),
+    "distance UAV/UGV times 0.9": (distances(0.9, "ugv", "uav"), "safe_m"),
+    "distance UAV/UGV times 0.9999": (distances(0.9999, "ugv", "uav"), "safe_m"),
+    "distance UGV/UGV times 0.9": (distances(0.9, "ugv"), "safe_m"),
+    "distance UGV/UGV times 1.1": (distances(1.1, "ugv"), "safe_m"),
+    "distance UGV/UGV times 1.000001": (distances(1.000001, "ugv"), "safe_m"),
+    "distance to obstacles times 0.9": (distances(0.9, "ugv", "obstacle"), "safe_m"),
     "share 1 for robots": (shares(1.0), "share"),
     "share 0 for robots": (shares(0.0), "share"),
     "share 0.51 for robots": (shares(0.51), "share"),

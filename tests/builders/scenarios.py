@@ -11,7 +11,7 @@ from airground_drake.scenarios.schema import Decision, Obstacle, Preset, Run, Sc
 AWAY = Uav(start_m=[50.0, 50.0, 2.0], target_m=[50.0, 50.0, 2.0])
 """Far from everything else."""
 
-STILL = Preset([[0.0, 0.0, 0.0]], 1.0)
+STILL = Preset([[0.0, 0.0, 0.0]] * 2, 1.0)
 
 
 def case_a(changes: dict[str, Any] | None = None) -> dict[str, Any]:

@@ -9,13 +9,11 @@ from functools import partial
 from pathlib import Path
 
 import pytest
-from builders.dying import times, work
+from builders.dying import asleep, process, times, work
 
 from airground_drake.base.errors import AirgroundError
 from airground_drake.campaign import pool as module
 from airground_drake.campaign.pool import cluster, local
-
-pytestmark = pytest.mark.slow
 
 
 def test_a_process_that_dies_loses_no_item_and_does_none_twice(tmp_path: Path) -> None:
@@ -24,29 +22,15 @@ def test_a_process_that_dies_loses_no_item_and_does_none_twice(tmp_path: Path) -
     assert sorted(found) == [(item, None if item == 5 else item * item) for item in range(9)]
 
 
-TIDY = """
-import time
-from joblib.externals.loky.backend.queues import Queue
-from airground_drake.base import interruption
-from airground_drake.campaign.pool import local
-
-def slowly(*args, feed=Queue._feed):
-    feed(*args)
-    time.sleep(0.3)
-
-Queue._feed = staticmethod(slowly)
-with local(2) as pool:
-    list(pool(abs, range(5)))
-interruption.leave(0)
-"""
+def test_processes_go_on_from_one_call_to_the_next_and_end_in_the_end() -> None:
+    with local(jobs=2) as pool:
+        first, second = ({pid for _, pid in pool(process, range(20))} for _ in range(2))
+        next(pool(asleep, [0, 600]))  # the other one is still at work
+    assert len(first | second) <= 2
+    assert not any(Path(f"/proc/{pid}").exists() for pid in first | second)
 
 
-def test_it_leaves_nothing_to_warn_of() -> None:
-    """Not even if the thread that feeds the processes, and holds semaphores, is slow to end."""
-    ran = subprocess.run([sys.executable, "-c", TIDY], capture_output=True, text=True)
-    assert (ran.returncode, ran.stderr) == (0, "")
-
-
+@pytest.mark.slow
 def test_the_same_on_a_cluster_of_two_workers() -> None:
     distributed = pytest.importorskip("distributed")
     options = {"n_workers": 2, "threads_per_worker": 1, "processes": False, "dashboard_address": ":0"}
@@ -55,6 +39,7 @@ def test_the_same_on_a_cluster_of_two_workers() -> None:
     assert sorted(found) == [(item, 3 * item) for item in range(40)]
 
 
+@pytest.mark.slow
 def test_campaigns_that_share_a_scheduler_get_their_own_results() -> None:
     distributed = pytest.importorskip("distributed")
     options = {"n_workers": 2, "threads_per_worker": 1, "processes": False, "dashboard_address": ":0"}
@@ -68,6 +53,7 @@ def test_campaigns_that_share_a_scheduler_get_their_own_results() -> None:
     assert sorted(each for _, each in found) == [(item, 7 * item) for item in range(20)]
 
 
+@pytest.mark.slow
 def test_an_item_that_has_killed_its_workers_is_given_up_and_what_work_raises_is_raised() -> None:
     distributed = pytest.importorskip("distributed")
 
@@ -106,6 +92,7 @@ except AirgroundError as error:
 """
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_is_lost_is_one_line() -> None:
     pytest.importorskip("distributed")
     command = [sys.executable, "-c"]
@@ -121,6 +108,7 @@ def test_a_scheduler_that_is_lost_is_one_line() -> None:
     assert (ran.returncode, ran.stderr) == (0, "")
 
 
+@pytest.mark.slow
 def test_no_scheduler_is_one_line() -> None:
     pytest.importorskip("distributed")
     with pytest.raises(AirgroundError, match="no Dask scheduler at"), cluster("tcp://127.0.0.1:9", timeout_s=0.5):

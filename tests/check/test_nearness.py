@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from airground_drake.check.nearness import ROWS, least_apart_m
 from airground_drake.check.scenario import Pair
-from airground_drake.verify.engines.segments import closest_approach
+from airground_drake.verify.engines.geometry import closest_approach
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(2, 3 * ROWS), st.floats(0.01, 10.0))

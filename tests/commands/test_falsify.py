@@ -106,6 +106,17 @@ def test_a_sampler_of_ones_own_is_found_beside_the_spec(tmp_path: Path, capsys: 
     assert load(tmp_path / "found.yaml")[0].obstacles["rock"].position_m == [5.0, 0.0, 0.0]
 
 
+@pytest.mark.parametrize("sampler", ["os:path", "os.path:join", "nowhere.py:Climb"])
+def test_what_is_no_sampler_is_refused_before_the_search(
+    sampler: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert falsified(tmp_path, "d", "--sampler", sampler, "--allow-plugins") == 2
+    said = capsys.readouterr().err
+    assert said.startswith(f"error: --sampler: sampler '{sampler}'")
+    assert said.count("\n") == 1
+    assert not (tmp_path / "found.yaml").exists()
+
+
 @pytest.mark.usefixtures("in_this_process")
 @pytest.mark.parametrize(
     ("faulty", "said"),
@@ -156,6 +167,7 @@ def test_where_nothing_is_judged_nothing_is_said_of_a_margin(
         *(["-n", number] for number in ("0", "-3", "x")),
         ["--shrink", "-1"],
         ["--jobs", "0"],
+        ["--jobs", "1001"],
         ["--limit", "1"],
         *(["--most", "intervened_s", "--limit", limit] for limit in ("0", "-1", "nan", "inf")),
     ],

@@ -18,7 +18,7 @@ Run = Callable[[str, str], Trace]
 
 def sampled(trace: Trace) -> pd.DataFrame:
     """Where the robots of a run were at its control samples."""
-    period = trace.scenario["control"]["period_s"]
+    period = trace.scenario.control.period_s
     t = period * np.arange(round(trace.t[-1] / period) + 1)
     rows = np.searchsorted(trace.t, t - 1e-9)
     tables = [
@@ -88,6 +88,7 @@ def test_parquet_and_the_text_for_people(run: Run, tmp_path: Path, capsys: pytes
         ),
         (lambda table: table.iloc[::-1], "does not come after the row before"),
         (lambda table: table.drop(index=3), "are not sampled at the same times"),
+        (lambda table: table.rename(columns={"z_m": "z" * 100_000}), "its columns are"),
     ],
 )
 def test_a_table_that_cannot_be_used_is_one_line(
@@ -101,6 +102,7 @@ def test_a_table_that_cannot_be_used_is_one_line(
     assert code == 2
     assert says in said
     assert said.count("\n") == 1
+    assert len(said) < 1000
 
 
 @pytest.mark.parametrize("name", ["nowhere.csv", "positions.txt"])

@@ -8,6 +8,7 @@ import flint
 import numpy as np
 import numpy.typing as npt
 import pytest
+from builders.worlds import world
 
 from airground_drake.base.arrays import Array
 from airground_drake.decision.excursion import extremes
@@ -34,7 +35,7 @@ def disagreements(trigger: Trigger, block: type[DecisionVariable] = DecisionVari
         modes = rng.integers(0, 2, UGVS)
         levels = np.where(modes == Mode.SUPERVISING, trigger.zeta, trigger.release)
         before, after = _random_steps(rng, levels)
-        due = _running(block(UGVS), EventTrigger(UGVS, trigger), modes, before, after)
+        due = _running(block(world(UGVS)), EventTrigger(UGVS, trigger), modes, before, after)
         for j in range(UGVS):
             size = float(np.abs(np.concatenate([before[j], after[j]])).max()) + abs(float(levels[j]))
             low, high = _range(before[j], after[j])
@@ -87,7 +88,7 @@ def _running(
     source.SetTime(1.0 + step)
     begun = np.column_stack([before, variable.value(1.0, np.ascontiguousarray(before))])
     source.SetDiscreteState(0, np.concatenate([[1.0], begun.ravel()]))
-    variable.GetInputPort("team_position").FixValue(source, np.zeros(3 * count + 3))
+    variable.GetInputPort("bodies").FixValue(source, np.zeros(3 * count + 3))
     variable.GetInputPort("reference").FixValue(source, np.concatenate([after[:, :3].ravel(), np.zeros(3 * count)]))
     variable.GetInputPort("noise").FixValue(source, after[:, 3])
     context = system.CreateDefaultContext()

@@ -5,20 +5,21 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from builders.worlds import world
 
-from airground_drake.gatekeeper.mpc_gatekeeper import Memory, View
+from airground_drake.gatekeeper.mpc_gatekeeper import GatekeeperState, Inputs
 from airground_drake.gatekeeper.outcome import Outcome, Outlook
 from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
 from airground_drake.gatekeeper.patience import Commitment, Patience
+from airground_drake.gatekeeper.rollout import View
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.messages import ACCEPT
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.law import UgvLaw
-from airground_drake.nsbc.team import Team
 from airground_drake.scenarios.load import load
 from airground_drake.systems.controllers import UgvController
-from airground_drake.verify.model.patience.live_gate import LiveGate
+from airground_drake.verify.model.live_gate import LiveGate
 
 RUNS = 4
 PUSHED_M = 0.5
@@ -31,9 +32,9 @@ FAR = np.array([0.0, -1e3, 0.0])
 class Stalled(OutcomeGatekeepers):
     """Takes its own way for stalled, so that every proposal is worth it; predicts acceptance as always."""
 
-    def foresee(self, seen: View, i: int, proposal: Proposal) -> tuple[Outcome, Outcome]:
+    def foresee(self, seen: View, law: UgvLaw, proposal: Proposal) -> tuple[Outcome, Outcome]:
         """Refusing stalls; the way of accepting is the real one."""
-        _, accept = super().foresee(seen, i, proposal)
+        _, accept = super().foresee(seen, law, proposal)
         return Outcome(accept.positions, True, 1.0, 1.0), Outcome(accept.positions, False, 0.0, 0.0)
 
 
@@ -54,19 +55,19 @@ def _run(rng: np.random.Generator, patience: Patience, inputs: dict[str, Any]) -
     room = limit * h + PUSHED_M + d + 0.1
     across = np.array([-np.sin(heading[1]), np.cos(heading[1]), 0.0])
     stands = corners[1] + legs[1] / 2.0 + across * (room + np.linalg.norm(legs, axis=1).sum())
-    team = Team(("ugv",), "uav", stands[None], d, 1.0, 1.0, np.array([limit, 1.0]))
+    around = world(("ugv",), stands[None], d, 1.0, 1.0, max_speed=[limit, 1.0])
     avoidance = Avoidance(inputs["avoidance_gain_1_s"], h, inputs["sensing_range_m"])
     law = UgvLaw(avoidance, inputs["motion_gain_1_s"], gain, intervention_on_top=False)
     preset = Motion(np.zeros(1), np.zeros((1, 3)))
-    gatekeepers = Stalled(team, law, [preset], Outlook(patience.longest), patience)
-    controller = UgvController(team, law)
-    memory, proposal = Memory.empty(1), Proposal("way", 0.0, motion)
+    gatekeepers = Stalled(around, law, [preset], Outlook(patience.longest), patience)
+    controller = UgvController(around, law)
+    memory, proposal = GatekeeperState.empty(1), Proposal("way", 0.0, motion)
     place, largest, over = np.zeros(3), 0.0, -1.0
     push = np.zeros(3)
     for k in range(count * LEGS + 2 * every + 1):
         t = k * h
         if k % every == 0:
-            memory = gatekeepers.sample(t, (proposal,), np.stack([place, FAR]), np.zeros((2, 3)), memory)
+            memory = gatekeepers.sample(Inputs(t, (proposal,), np.stack([place, FAR]), np.zeros((2, 3)), law), memory)
             if not memory.decisions[-1].accepted:
                 over = t
                 break

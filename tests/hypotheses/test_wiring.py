@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -14,23 +15,24 @@ from pydrake.systems.primitives import LinearSystem
 
 from airground_drake.base.arrays import Array
 from airground_drake.intervention.policy import Proposal
-from airground_drake.nsbc import team as team_module
-from airground_drake.nsbc.avoidance import Avoidance, HalfSpaces, Surroundings
+from airground_drake.nsbc.avoidance import Avoidance, Surroundings, limit_speed
 from airground_drake.nsbc.law import UgvLaw
-from airground_drake.nsbc.team import Neighbourhood
 from airground_drake.scenarios.load import load
 from airground_drake.systems import controllers, diagram
+from airground_drake.world.world import Neighbours
 
 
-def gathered(change: Callable[[Array, int], Array]) -> Patch:
-    """Another `kernels.gather`: `change(centres, number of obstacles)`."""
-    right = team_module.kernels.gather
+def uav_among(change: Callable[[Array, int], Array], edit: Callable[[Array], None] = lambda bound: None) -> Patch:
+    """The UAV's command by other inequalities: centres `change(centres, number of obstacles)`, bounds by `edit`."""
 
-    def wrong(self: Neighbourhood, positions: Array) -> Surroundings:
-        centre = change(right(positions, self.obstacles, self.others), len(self.obstacles))
-        return Surroundings(centre, self.distance, self.share)
+    def wrong(self: Avoidance, lower: Array, positions: Array, near: Neighbours) -> Array:
+        around = Surroundings.of(near, positions)
+        around = replace(around, centre=change(around.centre, len(near.still)))
+        spaces = self.half_spaces(positions[near.members], near.mobility, around)
+        edit(spaces.bound)
+        return self.apply(limit_speed(lower, near.max_speed), spaces)
 
-    return lambda patch: patch.setattr(Neighbourhood, "around", wrong)
+    return lambda patch: patch.setattr(Avoidance, "command", wrong)
 
 
 def far(centre: Array, columns: slice) -> Array:
@@ -64,27 +66,15 @@ def swapped(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(UgvLaw, "velocity", wrong)
 
 
-def first_half_space_dropped(patch: pytest.MonkeyPatch) -> None:
-    right = Avoidance.half_spaces
-
-    def wrong(self: Avoidance, *args: Any) -> HalfSpaces:
-        found = right(self, *args)
-        bound = found.bound.copy()
-        bound[0, 0] = -np.inf
-        return HalfSpaces(found.normal, bound)
-
-    patch.setattr(Avoidance, "half_spaces", wrong)
-
-
 MUTANTS: dict[str, Patch] = {name: patch for name, (patch, _) in MISBUILT.items()} | {
-    "gather leaves out the UAV": gathered(lambda centre, m: far(centre, slice(-1, None))),
-    "gather leaves out an obstacle": gathered(lambda centre, m: far(centre, slice(0, min(m, 1)))),
-    "gather leaves out the UGVs": gathered(lambda centre, m: far(centre, slice(m, -1))),
-    "gather in another order": gathered(lambda centre, m: np.roll(centre, 1, axis=1)),
+    "gather leaves out the UAV": uav_among(lambda centre, m: far(centre, slice(-1, None))),
+    "gather leaves out an obstacle": uav_among(lambda centre, m: far(centre, slice(0, min(m, 1)))),
+    "gather leaves out the UGVs": uav_among(lambda centre, m: far(centre, slice(m, -1))),
+    "gather in another order": uav_among(lambda centre, m: np.roll(centre, 1, axis=1)),
     "everything accepted": everything_accepted,
     "another proposal's answer": any_issue_answered,
     "commands swapped": swapped,
-    "one inequality dropped": first_half_space_dropped,
+    "one inequality dropped": uav_among(lambda centre, m: centre, lambda bound: bound[:, 0].fill(-np.inf)),
 }
 
 

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import cvxpy
 import numpy as np
 import pytest
+from builders.worlds import world
 from hypothesis import given
 from hypothesis import strategies as st
 from nsbc.composition import augmented
 from properties import examples
 from scipy.optimize import linprog
 
-from airground_drake.nsbc.avoidance import Avoidance, HalfSpaces, Surroundings, limit_speed
-from airground_drake.nsbc.team import Team
+from airground_drake.nsbc.avoidance import Avoidance, HalfSpaces, Surroundings
+from airground_drake.world.world import ROBOTS, Neighbours, World
 
 D = 2.0
 SEEDS = st.integers(0, 2**31)
@@ -22,7 +21,7 @@ SEEDS = st.integers(0, 2**31)
 
 def scene(
     seed: int, robots: int = 3, obstacles: int = 6, spread: float = 8.0, *, largest: float = 0.0
-) -> tuple[Team, np.ndarray]:
+) -> tuple[World, np.ndarray]:
     """A team at safe random positions, UAV included; many pairs at exactly the safe distance; radii up to `largest`."""
     rng = np.random.default_rng(seed)
     centres = np.column_stack([rng.uniform(-spread, spread, (obstacles, 2)), rng.choice([0.0, 0.5], obstacles)])
@@ -41,8 +40,8 @@ def scene(
         if all(np.linalg.norm(trial - place) >= D + own[i] + radius for place, radius in bodies):
             positions.append(trial)
     positions.append(np.array([*rng.uniform(-spread, spread, 2), 3.0 + 3.0 * largest]))
-    names, speeds = tuple(f"u{i}" for i in range(robots)), np.full(robots + 1, 6.0)
-    return Team(names, "uav", centres, D, D, 1.0, speeds, own, fixed), np.array(positions)
+    found = world(robots, centres, D, D, max_speed=6.0, radius=own, obstacle_radius=fixed)
+    return found, np.array(positions)
 
 
 def closest(position: np.ndarray, velocity: np.ndarray, centre: np.ndarray, other: np.ndarray, h: float) -> float:
@@ -52,38 +51,31 @@ def closest(position: np.ndarray, velocity: np.ndarray, centre: np.ndarray, othe
     return float(np.linalg.norm(x + s * v))
 
 
-def worst_margin(team: Team, positions: np.ndarray, velocities: np.ndarray, h: float) -> float:
-    n, own, fixed = len(positions), team.radii, team.obstacle_radii
-    margins = [
-        closest(positions[i], velocities[i], o, np.zeros(3), h) - (D + own[i] + radius)
-        for i in range(n)
-        for o, radius in zip(team.obstacles, fixed, strict=True)
-    ]
-    margins += [
-        closest(positions[i], velocities[i], positions[j], velocities[j], h)
-        - ((1.0 if i == n - 1 else D) + own[i] + own[j])
-        for i in range(n)
-        for j in range(i)
-    ]
-    return min(margins)
+def worst_margin(near: Neighbours, positions: np.ndarray, velocities: np.ndarray, h: float) -> float:
+    centres = np.vstack([near.still, positions])
+    moving = np.vstack([np.zeros_like(near.still), velocities])
+    m = len(near.still)
+    return min(
+        closest(positions[i], velocities[i], centres[k], moving[k], h) - near.distance[i, column]
+        for i in near.members
+        for column, k in enumerate([*range(m), *(m + near.others[i])])
+    )
 
 
 def attack(seed: int, steps: int, avoidance: Avoidance, *, share: float | None = None, largest: float = 0.0) -> float:
     """Drive a team by hostile velocities through the avoidance layer; the worst continuous-time margin, m."""
     team, positions = scene(seed, largest=largest)
     rng = np.random.default_rng(seed + 1)
-    neighbourhood = team.neighbourhood(slice(None))
+    near = team.around(team.select(*ROBOTS))
     if share is not None:
-        neighbourhood = replace(neighbourhood, share=np.where(neighbourhood.share < 1.0, share, 1.0))
+        near = near._replace(share=np.where(near.share < 1.0, share, 1.0))
     worst = np.inf
     for _ in range(steps):
-        around = neighbourhood.around(positions)
+        around = Surroundings.of(near, positions)
         nearest = around.centre[np.arange(len(positions)), rng.integers(around.centre.shape[1], size=len(positions))]
         towards = nearest - positions if rng.random() < 0.7 else rng.normal(size=positions.shape)
-        lower = limit_speed(100.0 * towards * team.mobility, team.max_speed)
-        spaces = avoidance.half_spaces(positions, team.mobility, around)
-        velocities = avoidance.apply(lower, spaces)
-        worst = min(worst, worst_margin(team, positions, velocities, avoidance.period))
+        velocities = avoidance.command(100.0 * towards * near.mobility, positions, near)
+        worst = min(worst, worst_margin(near, positions, velocities, avoidance.period))
         positions = positions + avoidance.period * velocities
     return worst
 
@@ -113,8 +105,9 @@ def test_robots_that_each_take_the_whole_share_are_refuted() -> None:
 def test_inequalities_hold_in_floating_point_from_any_safe_state(seed: int) -> None:
     team, positions = scene(seed)
     avoidance = Avoidance(3.0, 0.05)
-    spaces = avoidance.half_spaces(positions, team.mobility, team.neighbourhood(slice(None)).around(positions))
-    lower = np.random.default_rng(seed).normal(size=positions.shape) * 10 * team.mobility
+    near = team.around(team.select(*ROBOTS))
+    spaces = avoidance.half_spaces(positions, near.mobility, Surroundings.of(near, positions))
+    lower = np.random.default_rng(seed).normal(size=positions.shape) * 10 * near.mobility
     slack = spaces.slack(avoidance.apply(lower, spaces))
     assert (slack[spaces.bound <= 0.0] >= -1e-15).all()
     assert (slack >= -1e-9).all()
@@ -126,8 +119,9 @@ def test_a_velocity_is_scaled_back_until_no_inequality_is_missed_by_rounding(spe
     avoidance = Avoidance(3.0, 0.05)
     for seed in range(60):
         team, positions = scene(seed)
-        spaces = avoidance.half_spaces(positions, team.mobility, team.neighbourhood(slice(None)).around(positions))
-        lower = np.random.default_rng(seed).normal(size=positions.shape) * speed * team.mobility
+        near = team.around(team.select(*ROBOTS))
+        spaces = avoidance.half_spaces(positions, near.mobility, Surroundings.of(near, positions))
+        lower = np.random.default_rng(seed).normal(size=positions.shape) * speed * near.mobility
         for v, normal, bound in zip(avoidance.apply(lower, spaces), spaces.normal, spaces.bound, strict=True):
             for (x, y, z), least in zip(normal.tolist(), bound.tolist(), strict=True):
                 assert x * v[0] + y * v[1] + z * v[2] >= min(least, 0.0)
@@ -157,8 +151,9 @@ def test_projection_is_the_augmented_composition_over_its_active_set(seed: int) 
     """v = J^+ b + (I - J^+ J) v_lower with J the stacked rows of the constraints that end up active."""
     team, positions = scene(seed, robots=2)
     avoidance = Avoidance(3.0, 0.05)
-    spaces = avoidance.half_spaces(positions, team.mobility, team.neighbourhood(slice(None)).around(positions))
-    lower = np.random.default_rng(seed).normal(size=positions.shape) * 10 * team.mobility
+    near = team.around(team.select(*ROBOTS))
+    spaces = avoidance.half_spaces(positions, near.mobility, Surroundings.of(near, positions))
+    lower = np.random.default_rng(seed).normal(size=positions.shape) * 10 * near.mobility
     velocity = avoidance.apply(lower, spaces)
     for i in range(len(positions)):
         active = np.abs(spaces.slack(velocity)[i]) < 1e-9

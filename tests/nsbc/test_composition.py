@@ -12,7 +12,7 @@ from nsbc.composition import InterventionTask, augmented, null_space, recursion
 from airground_drake.nsbc import law
 from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.nsbc.task import pseudoinverse
-from airground_drake.nsbc.team import Neighbourhood
+from airground_drake.world.world import Neighbours
 
 
 @given(arrays(np.float64, (3, 2, 1, 3), elements=COORDINATE), arrays(np.float64, (3, 2, 3), elements=COORDINATE))
@@ -43,9 +43,12 @@ def test_the_law_has_20_as_the_composition_of_tasks(position: np.ndarray, select
     count = len(position)
     none = np.zeros((count, 0))
     commanded = law.UgvLaw(Avoidance(1.0, 0.1), 0.7, 1.5, intervention_on_top=True).velocity(
-        position, Neighbourhood(np.arange(count), none.astype(np.intp), np.zeros((0, 3)), none, none), target, rate,
-        [law.Intervention(*asked, chosen) for asked in zip(task.target, task.rate, strict=True)],
-        np.tile(plane, (count, 1)), np.full(count, 1e9),
+        position,
+        Neighbours(
+            np.arange(count), none.astype(np.intp), np.zeros((0, 3)), none, none, np.tile(plane, (count, 1)),
+            np.full(count, 1e9),
+        ),
+        target, rate, [law.Intervention(*asked, chosen) for asked in zip(task.target, task.rate, strict=True)],
     )  # fmt: skip
     np.testing.assert_allclose(commanded, composed, rtol=1e-9, atol=1e-9)
 

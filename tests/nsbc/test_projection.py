@@ -15,7 +15,8 @@ from properties import examples
 
 from airground_drake.base.arrays import Array
 from airground_drake.nsbc import kernels
-from airground_drake.nsbc.avoidance import Avoidance
+from airground_drake.nsbc.avoidance import Avoidance, Surroundings
+from airground_drake.world.world import ROBOTS
 
 SEEDS = st.integers(0, 2**32 - 1)
 Row = list[Fraction]
@@ -88,8 +89,9 @@ def test_the_command_of_any_team_is_the_closest_allowed_velocity(seed: int) -> N
     rng = np.random.default_rng(seed)
     positions[1, :2] = positions[0, :2] + rng.normal(size=2)  # inside each other's safe distance at times
     avoidance = Avoidance(3.0, 0.05)
-    spaces = avoidance.half_spaces(positions, team.mobility, team.neighbourhood(slice(None)).around(positions))
-    lower = rng.normal(size=positions.shape) * 10.0 ** rng.uniform(-2.0, 1.0) * team.mobility
+    near = team.around(team.select(*ROBOTS))
+    spaces = avoidance.half_spaces(positions, near.mobility, Surroundings.of(near, positions))
+    lower = rng.normal(size=positions.shape) * 10.0 ** rng.uniform(-2.0, 1.0) * near.mobility
     velocity = avoidance.apply(lower, spaces)
     for v, wish, normal, bound in zip(velocity, lower, spaces.normal, spaces.bound, strict=True):
         missed = bool((normal @ wish < bound).any())

@@ -8,7 +8,6 @@ import shutil
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -23,6 +22,7 @@ from airground_drake.proofs.runs import Workshop, expects_kept, prove
 from airground_drake.proofs.too_near import too_near
 from airground_drake.run import trace
 from airground_drake.run.trace import Trace
+from airground_drake.scenarios.schema import Obstacle, Preset, Run, SafeDistance, Scenario, Uav, Ugv
 from airground_drake.testing.plugin import Simulations
 
 UGV, ROCK = "ugv1", "obstacle_1"
@@ -61,7 +61,7 @@ def moved(of: Trace, row: int, place: Array) -> Trace:
 
 def near_the_rock(of: Trace) -> tuple[int, Array, Array]:
     """The row in which UGV1 is nearest to an obstacle, and the vectors from there to it and back, m."""
-    rock = np.array(of.scenario["obstacles"][ROCK]["position_m"])
+    rock = np.array(of.scenario.obstacles[ROCK].position_m)
     offsets = of.position(UGV) - rock
     row = int(np.argmin(np.linalg.norm(offsets, axis=1)))
     return row, rock, offsets[row]
@@ -98,7 +98,7 @@ def test_some_rounding_errors_short_is_too_short(
 
 def test_every_pair_that_comes_too_near_is_named_with_its_distance_and_time(run: Simulations) -> None:
     few = short(run("case_a", "d"))
-    rocks = [np.array(few.scenario["obstacles"][name]["position_m"]) for name in (ROCK, "obstacle_2")]
+    rocks = [np.array(few.scenario.obstacles[name].position_m) for name in (ROCK, "obstacle_2")]
     through = moved(moved(few, 1, rocks[0] - [1.0, 0.0, 0.0]), 2, rocks[0] + [3.0, 0.0, 0.0])  # past it on one line
     towards = moved(moved(through, 3, rocks[1] + [9.0, 0.0, 0.0]), 4, rocks[1] + [0.5, 0.0, 0.0])
     found = {one.demand.lemma: one for one in too_near(recorded(towards))}
@@ -140,12 +140,15 @@ def test_names_that_mean_something_in_coq_are_replaced(run: Simulations, worksho
 
 
 def test_every_pair_is_to_keep_its_kind_of_distance_and_both_radii() -> None:
-    body = {"radius_m": 0.1}
-    scenario = {
-        "ugvs": {"one": body, "two": {"radius_m": 0.2}}, "uav": {"name": "above", "radius_m": 0.4},
-        "obstacles": {"rock": {"radius_m": 0.8}},
-        "safe_distance": {"obstacle_m": 2.0, "ugv_m": 3.0, "air_ground_m": 1.0},
-    }  # fmt: skip
+    here, way = [0.0] * 3, Preset([[0.0] * 3, [1.0, 0.0, 0.0]])
+    scenario = Scenario(
+        name="bodies",
+        ugvs={"one": Ugv(here, here, way, radius_m=0.1), "two": Ugv(here, here, way, radius_m=0.2)},
+        uav=Uav("above", start_m=here, radius_m=0.4),
+        obstacles={"rock": Obstacle(here, radius_m=0.8)},
+        safe_distance=SafeDistance(obstacle_m=2.0, ugv_m=3.0, air_ground_m=1.0),
+        runs={"d": Run("d")},
+    )
     assert [(one, other, float(safe)) for one, other, safe in demands(scenario)] == [
         ("one", "rock", 2.9), ("two", "rock", 3.0), ("above", "rock", 3.2),
         ("one", "two", 3.3), ("one", "above", 1.5), ("two", "above", 1.6),
@@ -185,7 +188,8 @@ def test_a_scenario_says_which_runs_are_to_keep_their_distances(
     expected: dict[str, str], kept: bool, run: Simulations
 ) -> None:
     of = run("case_a", "d")
-    scenario: dict[str, Any] = {**of.scenario, "runs": {"d": {"expected": expected}}}
+    given = of.meta["scenario"]
+    scenario = {**given, "runs": {"d": {**given["runs"]["d"], "expected": expected}}}
     assert expects_kept(replace(of, meta={**of.meta, "scenario": scenario})) is kept
 
 
@@ -220,7 +224,7 @@ def test_the_command_proves_a_report_and_writes_down_what_it_found(
     assert sorted(path.name for path in (report / "proofs").iterdir()) == ["proofs.json", "run_d.v", "run_d_law.v"]
 
     of = trace.load(report / "trace" / "d")
-    rock = np.array(of.scenario["obstacles"][ROCK]["position_m"])
+    rock = np.array(of.scenario.obstacles[ROCK].position_m)
     trace.save(moved(of, 3, rock), report / "trace" / "d")
     assert main(["prove", str(report), "--run", "d"]) == 1
     said = capsys.readouterr().out

@@ -11,6 +11,7 @@ from hashlib import sha256
 from html.parser import HTMLParser
 
 import pytest
+import yaml
 from report.cases import FINE, Kept, built, event, make_scenario, make_trace, make_traces, verdict
 
 from airground_drake.base.statuses import STATUSES
@@ -22,7 +23,7 @@ from airground_drake.scenarios.schema import Run, Scenario
 from airground_drake.verify.claim import Verdict
 from airground_drake.verify.finding import Finding
 
-HOSTILE = "<script>alert('$x$')</script>"
+HOSTILE, PLACEHOLDER = "<script>alert('$x$')</script>", "placeholder"
 
 
 class Page(HTMLParser):
@@ -58,14 +59,14 @@ DIAGRAM = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9"><text>plant
 
 @pytest.fixture(scope="module")
 def hostile_page() -> str:
-    """Everything that a user can name is hostile."""
-    scenario = make_scenario(HOSTILE)
-    scenario = replace(scenario, name=HOSTILE, title=HOSTILE, description=HOSTILE)
+    """Everything in report.json that somebody could have written there is hostile: also names, in a forged report."""
+    scenario = make_scenario(PLACEHOLDER)
+    scenario = replace(scenario, name=PLACEHOLDER, title=HOSTILE, description=HOSTILE)
     scenario.choices[0].reason = scenario.reproduction[0].why = HOSTILE
-    scenario.runs[HOSTILE] = Run("b")
+    scenario.runs[PLACEHOLDER] = Run("b")
     traces = make_traces(scenario)
-    traces[HOSTILE] = make_trace(scenario, HOSTILE, events=[event(1.0, HOSTILE, HOSTILE)])
-    traces[HOSTILE].meta["faults"].append({"t_s": 1.0, "robot": HOSTILE, "policy": HOSTILE, "what": HOSTILE})
+    traces[PLACEHOLDER] = make_trace(scenario, PLACEHOLDER, events=[event(1.0, PLACEHOLDER, PLACEHOLDER)])
+    traces[PLACEHOLDER].meta["faults"].append({"t_s": 1.0, "robot": HOSTILE, "policy": HOSTILE, "what": HOSTILE})
     claim = type(
         "Hostile",
         (Kept,),
@@ -76,9 +77,11 @@ def hostile_page() -> str:
         },
     )
     finding = Finding("refuted", -1.0, HOSTILE, {HOSTILE: HOSTILE}, {"x": HOSTILE}, {HOSTILE: [HOSTILE]})
-    report = built(scenario, traces, [*FINE, Verdict(claim(), HOSTILE, finding, "holds")])
+    report = built(scenario, traces, [*FINE, Verdict(claim(), PLACEHOLDER, finding, "holds")])
+    figures = [*draw.draw(scenario, traces), *moments.draw(report, traces)]
+    report = json.loads(json.dumps(report).replace(PLACEHOLDER, HOSTILE))
     report["provenance"][HOSTILE] = report["provenance"]["command"] = HOSTILE
-    return html.render(report, [*draw.draw(scenario, traces), *moments.draw(report, traces)], DIAGRAM)
+    return html.render(report, figures, DIAGRAM)
 
 
 def test_faults_are_told_once_each_cut_and_without_what_turns_or_breaks_lines() -> None:
@@ -88,7 +91,7 @@ def test_faults_are_told_once_each_cut_and_without_what_turns_or_breaks_lines() 
     assert (one["count"], one["first_s"], one["last_s"], one["robots"]) == (900, 0.0, 449.5, ["ugv0", "ugv1"])
     assert cut["what"].startswith("\\u202eevil\\n\\x1b[2J")
     assert len(cut["what"]) < attention.MAX_FAULT_CHARS + 30
-    assert html.pretty({"a": "\u202e"}) == '{"a": "\\u202e"}'
+    assert html.as_yaml({"a": "\u202e"}) == '{a: "\\u202E"}\n'
 
 
 @pytest.fixture(scope="module")
@@ -260,10 +263,10 @@ def test_numbers_for_reading() -> None:
     assert html.value(None, "m") == "no value"
 
 
-def test_json_for_reading_is_json() -> None:
+def test_a_scenario_for_reading_is_yaml() -> None:
     data = {"a": [{"x": 1.5, "long": "y" * 90}, {"x": None}], "b": {}}
-    assert json.loads(html.pretty(data)) == data
-    assert html.pretty(["z" * 9000]).endswith("report.json has all of it")
+    assert yaml.safe_load(html.as_yaml(data)) == data
+    assert html.as_yaml(["z" * 90_000]).endswith("report.json has all of it")
 
 
 def test_readers_of_many_names_know_every_status() -> None:

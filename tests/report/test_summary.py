@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from airground_drake.report import summary
+from airground_drake.report import outcomes, summary
 
 Document = dict[str, Any]
 TARGET, STUCK = [0.0, 9.0, 0.0], [3.369, 5.102, 0.0]
@@ -116,8 +116,10 @@ def test_case_a_in_short() -> None:
     assert lines(found, "Paper?") == [
         ("partly", "2 of 3 results match: 1 without tuning, 1 after calibration; not reproduced: A8.")
     ]
-    assert "that method (a) is safe elsewhere: seen in these runs only" in summary.do_not_conclude(found)
-    assert all(each.text in summary.text(found) for answer in summary.answers(found) for each in answer.lines)
+    assert "method (a) is safe elsewhere: seen in these runs only" in summary.do_not_conclude(found)
+    assert summary.legend(found) == "✓ yes, ≈ in part, \N{EN DASH} neither good nor bad"
+    printed = " ".join(summary.text(found).split())
+    assert all(each.text in printed for answer in summary.answers(found) for each in answer.lines)
 
 
 @pytest.mark.parametrize("declared", ["refuted", "holds"])
@@ -181,7 +183,7 @@ def test_what_could_not_be_judged_is_not_safe(status: str) -> None:
     assert summary.headline(found) == ("open", "Not decided: run d could not be judged.")
     assert lines(found, "Safe?")[0] == ("open", f"d: not known, SAFE-TRACE: {status.replace('_', ' ')}.")
     assert lines(found, "Safe?")[1] == ("open", "Not proved for (d).")
-    assert "that what could not be judged is fine" in summary.do_not_conclude(found)
+    assert "what could not be judged is fine" in summary.do_not_conclude(found)
 
 
 def test_a_run_that_is_missing() -> None:
@@ -190,7 +192,7 @@ def test_a_run_that_is_missing() -> None:
     assert ("open", "c: not known, it was not run.") in lines(found, "Safe?")
     assert ("open", "c: not known, it was not run.") in lines(found, "Arrived?")
     assert summary.headline(document({}))[0] == "open"
-    assert not summary.text(document({})).count("✓")
+    assert "✓" not in summary.text(document({})).partition("Marks")[0]
 
 
 def test_nothing_triggered_and_nothing_came_near() -> None:
@@ -203,7 +205,7 @@ def test_nothing_triggered_and_nothing_came_near() -> None:
     assert "not tested" in safe.text
     assert lines(found, "Threshold?") == [("none", "Not tested here: nothing reached the 3 m.")]
     assert lines(found, "Zeno-free?") == [("", "Not tested here: nothing triggered (see scenario dwell).")]
-    assert "that the UAV helps: it was never called" in summary.do_not_conclude(found)
+    assert "the UAV helps: it was never called" in summary.do_not_conclude(found)
 
 
 def test_the_proof_is_claimed_only_where_its_conditions_were_met() -> None:
@@ -226,14 +228,24 @@ def test_refuted_triggers_and_gaps() -> None:
     )
 
 
-def test_the_threshold_is_set_against_the_optimum_of_the_run_s_own_drift() -> None:
+@pytest.mark.parametrize(
+    ("extra", "real", "marks", "told"),
+    [
+        (3e-7, 0.28, ["yes", "partly"], "3 m calls the UAV late"),
+        (0.02, 4.0, ["partly", "partly"], "3 m calls the UAV early"),
+        (0.02, None, ["partly"], "the risk is 5 % higher"),
+    ],
+)
+def test_a_threshold_is_good_or_bad_for_the_assumed_drift_and_for_that_of_the_run(
+    extra: float, real: float | None, marks: list[str], told: str
+) -> None:
     evidence = {
-        "kind": "declared", "threshold_in_force_m": 3.0, "optimal_threshold_m": 2.992, "extra_risk": 3e-7,
-        "runs": {"a ugv1": {"optimum_for_this_drift_m": 0.28}},
+        "kind": "declared", "threshold_in_force_m": 3.0, "optimal_threshold_m": 2.992, "extra_risk": extra,
+        "least_risk": 0.4, "runs": {"a ugv1": {"optimum_for_this_drift_m": real, "drift_m_s": 0.56}},
     }  # fmt: skip
-    told = lines(document({"a": run("a")}, claim("THR-CHOICE", evidence=evidence)), "Threshold?")[-1]
-    assert told.mark == "partly"
-    assert told.text.endswith("is 2.992 m (extra risk 3e-07); for the drift that ugv1 had in run a, 0.28 m.")
+    found = document({"a": run("a", events=(trigger(),))}, claim("THR-CHOICE", evidence=evidence))
+    assert [line.mark for line in lines(found, "Threshold?")] == marks
+    assert told in lines(found, "Threshold?")[-1].text
 
 
 def test_a_scenario_without_a_counterpart_has_a_table_of_methods() -> None:
@@ -276,9 +288,9 @@ def test_the_pair_of_least_margin_counts_not_that_of_least_distance() -> None:
 
 
 def test_a_distance_that_falls_short_by_little_does_not_look_kept() -> None:
-    assert summary.distance(1.99996, 2.0) == "1.99996 m"
-    assert summary.distance(2.0, 2.0) == "2.000 m"
-    assert summary.distance(0.49497, 1.0) == "0.495 m"
+    assert outcomes.distance(1.99996, 2.0) == "1.99996 m"
+    assert outcomes.distance(2.0, 2.0) == "2.000 m"
+    assert outcomes.distance(0.49497, 1.0) == "0.495 m"
     assert summary.headline(document({"d": run("d", 1.99996)})).mark == "no"
 
 

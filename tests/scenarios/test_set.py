@@ -65,7 +65,7 @@ def test_a_run_is_simulated_judged_and_shown_with_what_it_sets(write: Write) -> 
     settings = "decision.threshold.zeta_m: 2, decision.noise_m_sqrt_s: 0.01"
     scenario = load(write(with_run(settings)), ["runs.other.method=a", "duration_s=1"])[0]
     trace = simulate(scenario, "other")
-    assert trace.meta["zeta_m"] == trace.scenario["decision"]["threshold"]["zeta_m"] == 2.0
+    assert trace.meta["zeta_m"] == trace.scenario.decision.threshold.zeta_m == 2.0
     assert trace.column("one.noise_m").any()
     assert not simulate(scenario, "d").column("one.noise_m").any()
     assert trace.meta["scenario"]["decision"]["threshold"]["zeta_m"] == 3.0

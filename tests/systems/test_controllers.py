@@ -14,7 +14,8 @@ from airground_drake.base.arrays import Array
 from airground_drake.base.errors import PluginError
 from airground_drake.nsbc.tasks import FormationTask
 from airground_drake.scenarios.load import load
-from airground_drake.systems.components import make_avoidance, make_team
+from airground_drake.scenarios.world import make_world
+from airground_drake.systems.components import make_avoidance
 from airground_drake.systems.controllers import UavController
 from airground_drake.systems.diagram import build_diagram
 
@@ -30,8 +31,10 @@ def test_a_task_cannot_change_where_the_controller_thinks_that_ugvs_are() -> Non
             super().__init__(positions, velocities, altitude, gain)
 
     case_a = load("case_a")[0]
-    team, avoidance = make_team(case_a), make_avoidance(case_a)
-    controllers = (UavController(team, avoidance, gain=1.0, altitude=2.0, task=each) for each in (Moves, FormationTask))
+    world, avoidance = make_world(case_a), make_avoidance(case_a)
+    controllers = (
+        UavController(world, avoidance, gain=1.0, altitude=2.0, task=each) for each in (Moves, FormationTask)
+    )
     positions = np.array([[0.0, 0.0, 0.0], [3.0, 0.0, 0.0], [1.0, 0.0, 1.1]])
     own, plain = (controller.velocity(positions, np.zeros((2, 3))) for controller in controllers)
     assert own.tolist() == plain.tolist()
@@ -47,7 +50,7 @@ def test_a_task_that_asks_for_no_velocity_is_named(asked: Any) -> None:
             return asked
 
     case_a = load("case_a")[0]
-    controller = UavController(make_team(case_a), make_avoidance(case_a), gain=1.0, altitude=2.0, task=Odd)
+    controller = UavController(make_world(case_a), make_avoidance(case_a), gain=1.0, altitude=2.0, task=Odd)
     with pytest.raises(
         PluginError, match=r"^the UAV's task Odd asks for .* as velocity; wanted: \(1, 3\) finite numbers"
     ):
@@ -61,7 +64,7 @@ def test_a_task_cannot_move_the_uav_that_its_avoidance_sees() -> None:
             return super().velocity(position)
 
     case_a = load("case_a")[0]
-    controller = UavController(make_team(case_a), make_avoidance(case_a), gain=1.0, altitude=2.0, task=Writes)
+    controller = UavController(make_world(case_a), make_avoidance(case_a), gain=1.0, altitude=2.0, task=Writes)
     with pytest.raises(ValueError, match="read-only"):
         controller.velocity(np.zeros((3, 3)), np.zeros((2, 3)))
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from builders.worlds import world
 from hypothesis import given
 from hypothesis import strategies as st
 from properties import examples
@@ -28,7 +29,7 @@ from airground_drake.systems.components import integrated_noise
 from airground_drake.systems.decision import DecisionBlock, DecisionVariable, EventTrigger
 from airground_drake.systems.diagram import build_diagram
 from airground_drake.systems.signals import FIELDS
-from airground_drake.verify.engines.segments import NormSignal
+from airground_drake.verify.engines.geometry import NormSignal
 from airground_drake.verify.runs.triggers import transitions
 
 
@@ -45,7 +46,7 @@ def run(trigger: Trigger, path: Path, step: float, presets: Sequence[Motion] = (
     """Rows (4n, T) of the running trigger's status; references move by the presets, or stand still."""
     builder = DiagramBuilder()
     n = path.noise.shape[1]
-    variable = builder.AddNamedSystem("decision_variable", DecisionVariable(n, presets))
+    variable = builder.AddNamedSystem("decision_variable", DecisionVariable(world(n), presets))
     system = builder.AddNamedSystem("event_trigger", EventTrigger(n, trigger))
     for port in ("decision_variable", "decision_range"):
         builder.Connect(variable.GetOutputPort(port), system.GetInputPort(port))
@@ -55,7 +56,7 @@ def run(trigger: Trigger, path: Path, step: float, presets: Sequence[Motion] = (
         t = np.unique(np.concatenate([path.t, *(preset.times for preset in presets)]))
         reference = np.stack([preset.sample(t) for preset in presets], axis=1)
     signals = {
-        "team_position": (path.t, np.vstack([-path.error.reshape(len(path.t), -1).T, np.zeros((3, len(path.t)))])),
+        "bodies": (path.t, np.vstack([-path.error.reshape(len(path.t), -1).T, np.zeros((3, len(path.t)))])),
         "reference": (t, np.vstack([reference.reshape(len(t), -1).T, np.zeros((3 * n, len(t)))])),
         "noise": (path.t, path.noise.T),
     }
@@ -263,4 +264,4 @@ def test_a_run_of_another_block_does_not_pass_for_one_of_15() -> None:
 
 def test_a_decision_block_without_a_range_is_refused() -> None:
     with pytest.raises(PluginError, match=r"the decision block has output ports of sizes .*'decision_range': 4"):
-        build_diagram(load("case_a")[0], decision_block=lambda count, presets: PassThrough(count))
+        build_diagram(load("case_a")[0], decision_block=lambda bodies, presets: PassThrough(len(bodies.names("ugv"))))

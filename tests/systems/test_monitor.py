@@ -16,6 +16,7 @@ from airground_drake.run.simulation import EVENT_ACCURACY
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Scenario
+from airground_drake.scenarios.world import make_world
 from airground_drake.systems import Monitor, Rule, Violation, components
 from airground_drake.systems.diagram import build_diagram, make_monitor
 from airground_drake.verify import verify
@@ -114,8 +115,9 @@ def test_it_can_be_wired_into_any_diagram(command: list[float], rule: Rule | Non
     """Without laws, with only positions and commands connected."""
     scenario = load("case_a")[0]
     builder = DiagramBuilder()
-    monitor = builder.AddSystem(Monitor(components.make_team(scenario), components.make_avoidance(scenario)))
-    for name, values in (("team_position", components.make_starts(scenario).ravel()), ("team_command", command)):
+    world = make_world(scenario)
+    monitor = builder.AddSystem(Monitor(world, components.make_avoidance(scenario)))
+    for name, values in (("bodies", world.starts.ravel()), ("team_command", command)):
         source = builder.AddSystem(ConstantVectorSource(np.array(values, dtype=float)))
         builder.Connect(source.get_output_port(), monitor.GetInputPort(name))
     simulator = Simulator(builder.Build())

@@ -29,11 +29,11 @@ def test_a_gain_that_is_changed_in_a_context_acts_there_and_nowhere_else(which: 
     unchanged = changed.Clone()
     gains = controller.mutable_gains(controller.GetMyMutableContextFromRoot(changed))
     setattr(gains, gain, 0.5 * getattr(gains, gain))
-    place = model.diagram.GetOutputPort("team_position")
+    place = model.diagram.GetOutputPort("bodies")
     ends = [place.Eval(advanced(model.diagram, each, 2.0).get_context()) for each in (changed, unchanged)]
     assert (ends[0] != ends[1]).any()
     other, context = prepared()
-    expected = other.diagram.GetOutputPort("team_position").Eval(advanced(other.diagram, context, 2.0).get_context())
+    expected = other.diagram.GetOutputPort("bodies").Eval(advanced(other.diagram, context, 2.0).get_context())
     np.testing.assert_array_equal(ends[1], expected)
 
 

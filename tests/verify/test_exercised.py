@@ -41,10 +41,14 @@ def idle() -> dict[str, Verdict]:
     return {verdict.claim.id: verdict for name in scenario.runs for verdict in verify(simulate(scenario, name))}
 
 
-def test_every_claim_says_what_it_counts() -> None:
+SAID = ("statement", "formula", "method", "equations", "does_not_establish", "exercised_by")
+
+
+def test_every_claim_says_what_it_is_and_what_it_counts() -> None:
     for registry in (RUN_CLAIMS, MODEL_CLAIMS):
         for name in registry.own:
-            assert registry.load(name, of=Claim).exercised_by, name
+            claim = registry.load(name, of=Claim)
+            assert all((*(getattr(claim, word).strip() for word in SAID), claim.assumptions, *claim.assumptions)), name
 
 
 @pytest.mark.parametrize("claim", CLAIMS)

@@ -68,9 +68,9 @@ def _frame(runs: Mapping[str, Trace], robot: str, gaps: Mapping[str, Array]) -> 
     """Around the closest approaches of the runs and the two obstacles nearest to them."""
     closest = np.array([trace.position(robot)[int(gaps[name].argmin()), :2] for name, trace in runs.items()])
     first = next(iter(runs.values()))
-    centres = np.array([place(first, name)[:2] for name in first.scenario["obstacles"]])
+    centres = np.array([place(first, name)[:2] for name in first.scenario.obstacles])
     reach = np.linalg.norm(centres - closest.mean(axis=0), axis=1)
     points = np.concatenate([closest, centres[np.argsort(reach, kind="stable")[:2]]])
-    pad = 0.4 * float(first.scenario["safe_distance"]["obstacle_m"])
+    pad = 0.4 * float(first.scenario.safe_distance.obstacle_m)
     (left, bottom), (right, top) = points.min(axis=0) - pad, points.max(axis=0) + pad
     return maps.Frame(left, right, bottom, top)

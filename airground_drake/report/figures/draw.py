@@ -18,9 +18,9 @@ from airground_drake.registry import METHODS
 from airground_drake.report.figures import canvas, comparison, maps, svg, timelines
 from airground_drake.report.figures.panels import MAX_TABLE_ROWS, Figure, Panel, Table, series
 from airground_drake.report.metrics import Nearby, close_by, events_of, gap_m, radius_m
+from airground_drake.report.outcomes import SLACK_M, distance
 from airground_drake.report.reproduction import MEASURES
 from airground_drake.report.scrubber import tracks
-from airground_drake.report.summary import SLACK_M, distance
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
 
@@ -139,7 +139,7 @@ def _trajectories(chosen: _Selection) -> Figure:
     roomy = len(first.ugvs) > 2
     width_in = frame.width_in(canvas.WIDE_IN if roomy else canvas.MAP_IN, canvas.TALLEST_IN)
     circles = "safe circle dashed"
-    if any(radius_m(first, name) > 0.0 for name in (*first.robots, *first.scenario["obstacles"])):
+    if any(radius_m(first, name) > 0.0 for name in (*first.robots, *first.scenario.obstacles)):
         circles = "dark disc as large as it is, safe circle dashed"
     hidden = len(first.ugvs) - len(chosen.team)
     thin = f" Thin grey lines, which end in dots: {hidden} more UGVs." if hidden else ""
@@ -165,7 +165,7 @@ def _distances(chosen: _Selection) -> Figure | None:
     if not required:
         return None
     top = FARTHEST * max(required)
-    world = [*chosen.first.scenario["obstacles"], *chosen.first.robots]
+    world = [*chosen.first.scenario.obstacles, *chosen.first.robots]
     met = {ugv: {at.other for (_, each), those in near.items() if each == ugv for at in those} for ugv in chosen.ugvs}
     looks = {ugv: {other: k for k, other in enumerate(filter(met[ugv].__contains__, world))} for ugv in chosen.ugvs}
     half = (len(chosen.ugvs) + 1) // 2  # a single run takes both columns of the page
@@ -250,7 +250,7 @@ def _gaps(chosen: _Selection) -> Figure | None:
     gaps = {name: sorted(found) for name, found in gaps.items() if found}
     if not gaps:
         return None
-    bound = float(chosen.first.scenario["decision"]["min_inter_event_s"])
+    bound = float(chosen.first.scenario.decision.min_inter_event_s)
     least = min(gap for found in gaps.values() for _, gap in found)
     caption = (
         f"Smallest gap {least:.3f} s; the minimum inter-event time is {bound:g} s (line). Each mark is a trigger, "

@@ -28,6 +28,7 @@ from airground_drake.report.figures.labels import Label, place
 from airground_drake.report.metrics import events_of, radius_m
 from airground_drake.report.reproduction import MEASURES
 from airground_drake.run.trace import Trace
+from airground_drake.scenarios.schema import Obstacle, Scenario
 
 MAX_NAMED_OBSTACLES = 12
 _LEFT_IN, _BESIDE_IN = 0.5, 0.65
@@ -52,9 +53,9 @@ def frame_of(traces: Sequence[Trace], robots: Sequence[str]) -> Frame:
     scenario = traces[0].scenario
     ways = [(trace.position(robot)[:, :2], radius_m(trace, robot)) for trace in traces for robot in robots]
     points = [way + side * radius for way, radius in ways for side in ((-1.0, 1.0) if radius else (0.0,))]
-    points += [np.array([scenario["ugvs"][robot]["target_m"][:2] for robot in robots if robot in scenario["ugvs"]])]
-    reach = np.array([_safe_circle_m(scenario, obstacle) for obstacle in scenario["obstacles"].values()])[:, None]
-    centres = np.array([obstacle["position_m"][:2] for obstacle in scenario["obstacles"].values()])
+    points += [np.array([scenario.ugvs[robot].target_m[:2] for robot in robots if robot in scenario.ugvs])]
+    reach = np.array([_safe_circle_m(scenario, obstacle) for obstacle in scenario.obstacles.values()])[:, None]
+    centres = np.array([obstacle.position_m[:2] for obstacle in scenario.obstacles.values()])
     points += [centres - reach, centres + reach] if len(centres) else []
     every = np.concatenate(points)
     (left, bottom), (right, top) = every.min(axis=0) - 0.4, every.max(axis=0) + 0.4
@@ -73,7 +74,7 @@ def plane(trace: Trace, ugvs: Sequence[str], frame: Frame, width_in: float) -> F
         if robot not in ugvs:
             axes.plot(*trace.position(robot)[:, :2].T, color=MUTED, linewidth=0.7, zorder=1)
             axes.plot(*trace.position(robot)[-1, :2], marker=".", markersize=3, color=MUTED, zorder=1)
-    targets = {**{name: ugv["target_m"] for name, ugv in trace.scenario["ugvs"].items()}, uav: None}
+    targets = {**{name: ugv.target_m for name, ugv in trace.scenario.ugvs.items()}, uav: None}
     for position, robot in enumerate([*ugvs, uav]):
         appearance = UAV_LOOK if robot == uav else look(position)
         _path(axes, trace.position(robot), appearance, linewidth=1.1 if robot == uav else 1.9)
@@ -123,43 +124,42 @@ def _map(trace: Trace, frame: Frame, width_in: float, above_in: float = 0.1) -> 
     axes.set_ylim(frame.bottom, frame.top)
     axes.set_aspect("equal")
     rule(axes, "x, m", "y, m")
-    obstacles = list(trace.scenario["obstacles"].values())
-    circles = [Circle(each["position_m"][:2], _safe_circle_m(trace.scenario, each)) for each in obstacles]
+    obstacles = list(trace.scenario.obstacles.values())
+    circles = [
+        Circle((each.position_m[0], each.position_m[1]), _safe_circle_m(trace.scenario, each)) for each in obstacles
+    ]
     dashes = (0, (2, 2))
     axes.add_collection(
         PatchCollection(circles, facecolor="#f3f3f3", edgecolor=MUTED, linestyle=dashes, linewidth=1.0, zorder=1.0)
     )
     for obstacle in obstacles:
-        _body(axes, obstacle["position_m"], obstacle["radius_m"], INK)
+        _body(axes, obstacle.position_m, obstacle.radius_m, INK)
     for known, fill in ((True, INK), (False, "white")):
-        places = [each["position_m"] for each in obstacles if each["known_to_uav"] is known]
+        places = [each.position_m for each in obstacles if each.known_to_uav is known]
         shown = [(x, y) for x, y, _ in places if frame.left < x < frame.right and frame.bottom < y < frame.top]
         axes.plot(
             *np.reshape(shown, (-1, 2)).T, linestyle="none", marker="h", markersize=6, color=INK, markerfacecolor=fill,
             zorder=3,
         )  # fmt: skip
-    for x, y, _ in trace.scenario["uav"].get("phantoms_m", []):
+    for x, y, _ in trace.scenario.uav.phantoms_m:
         axes.plot(x, y, marker="x", markersize=6, color=MUTED, zorder=3)
     return figure, axes
 
 
-def _obstacles(scenario: Mapping[str, Any]) -> list[Label]:
+def _obstacles(scenario: Scenario) -> list[Label]:
     """Names of the obstacles, if they are few, and of what is on the UAV's map only."""
-    named = scenario["obstacles"] if len(scenario["obstacles"]) <= MAX_NAMED_OBSTACLES else {}
+    named = scenario.obstacles if len(scenario.obstacles) <= MAX_NAMED_OBSTACLES else {}
     hint = {True: "", False: "\n(unseen by the UAV)"}
     places = [
-        *(
-            (obstacle["position_m"], short(name, 12) + hint[obstacle["known_to_uav"]])
-            for name, obstacle in named.items()
-        ),
-        *((at, "(only on the UAV's map)") for at in scenario["uav"].get("phantoms_m", [])),
+        *((obstacle.position_m, short(name, 12) + hint[obstacle.known_to_uav]) for name, obstacle in named.items()),
+        *((at, "(only on the UAV's map)") for at in scenario.uav.phantoms_m),
     ]
     return [Label(np.array(at), text, size_pt=7.5) for at, text in places]
 
 
-def _safe_circle_m(scenario: Mapping[str, Any], obstacle: Mapping[str, Any]) -> float:
+def _safe_circle_m(scenario: Scenario, obstacle: Obstacle) -> float:
     """Radius of the circle round an obstacle that no robot's surface may enter, m."""
-    return float(scenario["safe_distance"]["obstacle_m"] + obstacle["radius_m"])
+    return scenario.safe_distance.obstacle_m + obstacle.radius_m
 
 
 def _body(axes: Axes, at: Sequence[float] | Array, radius: float, color: str) -> None:
@@ -173,7 +173,7 @@ def _path(axes: Axes, path: Array, appearance: Look, **options: Any) -> None:
     axes.plot(*path[rows, :2].T, color=appearance.color, linestyle=appearance.dash, **options)
 
 
-def _name(robot: str, at: Array, appearance: Look) -> Label:
+def _name(robot: str, at: Sequence[float] | Array, appearance: Look) -> Label:
     return Label(np.asarray(at), short(robot, 9), appearance.color, weight="bold")
 
 

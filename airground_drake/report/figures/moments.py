@@ -29,7 +29,7 @@ def draw(document: Mapping[str, Any], traces: Mapping[str, Trace]) -> list[Figur
             trace = traces.get(item.run)
             if trace is None or item.t_s is None or len(found) == MAX_MOMENTS:
                 continue
-            bodies = [name for name in item.bodies if name in trace.robots or name in trace.scenario["obstacles"]]
+            bodies = [name for name in item.bodies if name in trace.robots or name in trace.scenario.obstacles]
             if any(name in trace.robots for name in bodies):
                 found.append(_figure(position, trace, bodies, item.t_s))
     return found
@@ -56,7 +56,8 @@ def _map(trace: Trace, at: Mapping[str, Array], t_s: float) -> Drawing:
     drawing = Drawing(figsize=(SIDE_IN, SIDE_IN))
     axes = drawing.add_axes((0.0, 0.0, 1.0, 1.0))
     names = list(at)
-    targets = [trace.scenario["ugvs"][names[0]]["target_m"]] if len(names) == 1 and names[0] in trace.ugvs else []
+    alone = len(names) == 1 and names[0] in trace.ugvs
+    targets = [np.array(trace.scenario.ugvs[names[0]].target_m)] if alone else []
     places = np.array([where[:2] for where in (*at.values(), *targets)])
     d = safe_distance_m(trace, *names[:2]) if len(names) > 1 and names[0] in trace.robots else 1.0
     half = 0.5 * float(np.ptp(places, axis=0).max()) + 1.5 * d
@@ -67,8 +68,8 @@ def _map(trace: Trace, at: Mapping[str, Array], t_s: float) -> Drawing:
     axes.set_ylim(middle[1] - half, middle[1] + half)
     axes.set_xticks([])
     axes.set_yticks([])
-    for name, obstacle in trace.scenario["obstacles"].items():
-        x, y = obstacle["position_m"][:2]
+    for name, obstacle in trace.scenario.obstacles.items():
+        x, y = obstacle.position_m[:2]
         if max(abs(x - middle[0]), abs(y - middle[1])) < half:
             marked = canvas.ALARM if name in at else canvas.INK
             axes.plot(x, y, marker="h", markersize=6, color=marked)

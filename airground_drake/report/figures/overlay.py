@@ -54,8 +54,8 @@ def draw(run: str, position: int, before: Trace, after: Trace) -> Figure:
 
 def _paths(before: Trace, after: Trace, ugvs: Sequence[str]) -> Drawing:
     figure, axes = _axes(len(ugvs))
-    for obstacle in after.scenario["obstacles"].values():
-        axes.plot(*obstacle["position_m"][:2], marker="h", markersize=6, color=INK, linestyle="none")
+    for obstacle in after.scenario.obstacles.values():
+        axes.plot(*obstacle.position_m[:2], marker="h", markersize=6, color=INK, linestyle="none")
     for i, ugv in enumerate(ugvs):
         for trace, how in ((before, _BEFORE), (after, _AFTER)):
             path = trace.position(ugv)[:, :2]

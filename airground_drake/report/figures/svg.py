@@ -106,7 +106,11 @@ def _clean(element: ET.Element, prefix: str, used: set[str]) -> None:
         elif "url(" in value:
             element.set(name, _REFERENCE.sub(rf"url(#{prefix}-\1)", value))
         elif name in _ROUNDED and "scale" not in value and "matrix" not in value:
-            element.set(name, _LONG_NUMBER.sub(lambda match: f"{float(match.group()):.2f}", value))
+            rounded = _LONG_NUMBER.sub(lambda match: f"{float(match.group()):.2f}".rstrip("0").rstrip("."), value)
+            element.set(name, " ".join(rounded.split()))
+    if not (element.text or "").strip():  # spaces between elements are half of a drawing
+        element.text = None
+    element.tail = (element.tail or "").strip() or None
 
 
 def _leads_outside(value: str) -> bool:

@@ -11,13 +11,14 @@ from airground_drake.decision.bayes import bayes_risk
 from airground_drake.report.figures import canvas
 from airground_drake.report.figures.findings.lines import Lines
 from airground_drake.report.figures.panels import Figure
+from airground_drake.verify.model.thr_choice import Choice, Measured
 
 POINTS = 200
 BEYOND = 1.6
 """The axis goes so far beyond the largest mark."""
 
 
-def draw(inputs: Mapping[str, Any], evidence: Mapping[str, Any]) -> Figure | None:
+def draw(inputs: Mapping[str, Any], evidence: Choice) -> Figure | None:
     """The figure, from what the claim is about and its evidence; None without them."""
     if "optimal_threshold_m" not in evidence:
         return None
@@ -34,14 +35,14 @@ def draw(inputs: Mapping[str, Any], evidence: Mapping[str, Any]) -> Figure | Non
         {name: (each, bayes_risk(each, *constants)) for name, each in places.items()},
     )  # fmt: skip
     caption = (
-        f"The threshold in force, {places['in force']:.4g} m, is {evidence['kind']}. "
-        f"Assumed: drift {constants[0]:g} m/s, noise {constants[1]:g} m/√s.{_as_it_was(evidence.get('runs', {}))}"
+        f"The threshold in force is {places['in force']:.4g} m ({evidence['kind']}). The curve assumes a drift of "
+        f"{constants[0]:g} m/s and a noise of {constants[1]:g} m/√s.{_as_it_was(evidence.get('runs', {}))}"
     )
     with canvas.style():
         return shown.plate("threshold-choice", "", caption)
 
 
-def _as_it_was(runs: Mapping[str, Mapping[str, Any]]) -> str:
+def _as_it_was(runs: Mapping[str, Measured]) -> str:
     """The drift and noise of the first UGV that triggered, and what would be optimal for them."""
     for name, row in runs.items():
         optima = {
@@ -50,7 +51,7 @@ def _as_it_was(runs: Mapping[str, Mapping[str, Any]]) -> str:
         }
         best = [f"{zeta:.3g} m with {noise}" for noise, zeta in optima.items() if zeta is not None]
         return (
-            f" In run {name.replace(' ', ', ')}, the drift really was {row['drift_m_s']:.4g} m/s, the noise "
-            f"{row['noise_m_sqrt_s']:g} m/√s; optimal for this drift: {' and '.join(best) or 'no threshold'}."
+            f" In run {name.replace(' ', ', ')} had a drift of {row['drift_m_s']:.4g} m/s and a noise of "
+            f"{row['noise_m_sqrt_s']:g} m/√s; best for that drift: {' and '.join(best) or 'no threshold'}."
         )
-    return " No run triggered, so that none shows a drift."
+    return " No run triggered: the real drift is not known."

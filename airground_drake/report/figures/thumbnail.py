@@ -22,7 +22,7 @@ def draw(trace: Trace, prefix: str) -> str:
     """
     ugvs = trace.ugvs[:MAX_UGVS]
     paths = {ugv: trace.position(ugv)[:, :2] for ugv in ugvs}
-    obstacles = [np.asarray(each["position_m"][:2]) for each in trace.scenario["obstacles"].values()]
+    obstacles = [np.asarray(each.position_m[:2]) for each in trace.scenario.obstacles.values()]
     low, high = (edge(np.vstack(list(paths.values())), axis=0) for edge in (np.min, np.max))
     scale = min((WIDTH - 2 * EDGE) / max(high[0] - low[0], 1.0), (HEIGHT - 2 * EDGE) / max(high[1] - low[1], 1.0))
 

@@ -27,7 +27,7 @@ from airground_drake.report.figures.canvas import (
     time_line,
 )
 from airground_drake.report.metrics import Nearby, closest_obstacle, events_of, gap_m
-from airground_drake.report.summary import SLACK_M, distance
+from airground_drake.report.outcomes import SLACK_M, distance
 from airground_drake.run.trace import Trace
 
 MARKS = {"trigger": "^", "release": "v", "proposal": "D", "accept": "o", "refuse": "X"}
@@ -43,10 +43,10 @@ _FORBIDDEN: dict[str, Any] = {
 def decision(trace: Trace, ugvs: Sequence[str], top: float) -> Figure:
     """Decision variables of a run with the threshold and the release level."""
     figure, (axes,) = _time_axes(1, 2.5, trace, above_in=0.08)
-    zeta, release = float(trace.meta["zeta_m"]), float(trace.scenario["decision"]["release_m"])
+    zeta, release = float(trace.meta["zeta_m"]), float(trace.scenario.decision.release_m)
     labels = [(zeta, f"threshold {zeta:.3g}", INK)]
     level(axes, zeta, "-")
-    if trace.scenario["decision"]["trigger"] == "automaton":
+    if trace.scenario.decision.trigger == "automaton":
         level(axes, release, (0, (1, 1.5)))
         labels.append((release, f"release {release:.3g}", INK))
     axes.set_ylim(0.0, top)
@@ -177,7 +177,7 @@ def histogram(quantity: str, of_runs: Mapping[str, Sequence[float]]) -> Figure:
 def compared_distances(runs: Mapping[str, Trace], robot: str) -> Figure:
     """Distance to the nearest obstacle over time of one robot in several runs, with the minima."""
     first = next(iter(runs.values()))
-    d = float(first.scenario["safe_distance"]["obstacle_m"])
+    d = float(first.scenario.safe_distance.obstacle_m)
     figure, (axes,) = _time_axes(
         1,
         3.0 + 0.22 * len(runs),
@@ -206,7 +206,7 @@ def compared_distances(runs: Mapping[str, Trace], robot: str) -> Figure:
 
 def nearest_distance(trace: Trace, robot: str) -> Array:
     """Distance to the nearest obstacle at the rows, of surfaces, (T,), m."""
-    nearest: Array = np.min([gap_m(trace, robot, name) for name in trace.scenario["obstacles"]], axis=0)
+    nearest: Array = np.min([gap_m(trace, robot, name) for name in trace.scenario.obstacles], axis=0)
     return nearest
 
 

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
 from airground_drake.report.figures import canvas, svg
 from airground_drake.report.figures.panels import Figure, Panel, Table
+from airground_drake.verify.model.zeno_refine import Series
 
-_SERIES = {"bare": "bare threshold", "automaton": "automaton"}
+_SERIES: dict[Literal["bare", "automaton"], str] = {"bare": "bare threshold", "automaton": "automaton"}
 
 
-def draw(evidence: Mapping[str, Any]) -> Figure | None:
-    """The figure, from the finding's evidence alone (`verify.refinement.series`); None without it."""
+def draw(evidence: Series) -> Figure | None:
+    """The figure, from the finding's evidence alone; None without it."""
     if not evidence.get("fit"):
         return None
     steps = np.array(evidence["dt_s"])
@@ -49,7 +49,7 @@ def draw(evidence: Mapping[str, Any]) -> Figure | None:
     return Figure("refinement", title, caption, (panel,), beside="ZENO-REFINE")
 
 
-def _counts(steps: Any, evidence: Mapping[str, Any]) -> Drawing:
+def _counts(steps: Any, evidence: Series) -> Drawing:
     """log2 of the mean count against the number of halvings: a slope of 1/2 is an exponent of -1/2."""
     drawing = Drawing(figsize=(canvas.WIDE_IN, 2.6))
     axes = drawing.add_axes((0.15, 0.2, 0.5, 0.75))

@@ -1,6 +1,7 @@
 "use strict";
 {
   const folds = [...document.querySelectorAll("details.claim")];
+  const settled = [...document.querySelectorAll("details.settled")];
   const rows = [...document.querySelectorAll("details.claim tr[data-status]")];
   const [status, run, count] = ["by-status", "by-run", "shown"].map((id) => document.getElementById(id));
 
@@ -10,6 +11,10 @@
     }
     for (const fold of folds) {
       fold.hidden = !fold.querySelector("tr[data-status]:not([hidden])");
+    }
+    for (const several of settled) {
+      several.hidden = !several.querySelector("details.claim:not([hidden])");
+      several.open ||= Boolean(status.value || run.value);
     }
     count.textContent = `${folds.filter((fold) => !fold.hidden).length} of ${folds.length} claims`;
   };
@@ -27,7 +32,7 @@
   if (status) {
     for (const each of [status, run]) each.addEventListener("change", filter);
     for (const [id, open] of [["open-all", true], ["close-all", false]]) {
-      document.getElementById(id).addEventListener("click", () => folds.forEach((fold) => { fold.open = open; }));
+      document.getElementById(id).addEventListener("click", () => [...folds, ...settled].forEach((fold) => { fold.open = open; }));
     }
     document.getElementById("tools").hidden = false;
     filter();

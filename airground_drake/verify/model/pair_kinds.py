@@ -10,8 +10,8 @@ from fractions import Fraction
 from itertools import combinations, product
 from typing import Any, NamedTuple
 
+from airground_drake.base.exact import decimal
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.verify.model.theorem import decimal
 
 SHARES = {"obstacle": (Fraction(1), Fraction(0)), "uav_ugv": (Fraction(1, 2),) * 2, "ugv_ugv": (Fraction(1, 2),) * 2}
 """By kind of pair, the parts of an inequality that its two bodies take; an obstacle stands still and takes none."""

@@ -9,10 +9,11 @@ from __future__ import annotations
 from fractions import Fraction
 from typing import Any
 
+from airground_drake.base.exact import decimal
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.model.pair_kinds import Kind, constants, kinds_of
 from airground_drake.verify.model.safe_inv import stable
-from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim, decimal
+from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim
 
 
 class SafeDist(TheoremClaim):

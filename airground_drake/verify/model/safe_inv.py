@@ -9,9 +9,10 @@ from __future__ import annotations
 from fractions import Fraction
 from typing import Any
 
+from airground_drake.base.exact import decimal
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.model.pair_kinds import SHARES, constants, kinds_of
-from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim, decimal
+from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim
 
 
 class SafeInv(TheoremClaim):

@@ -111,8 +111,3 @@ def _named(found: Sequence[Hypothesis], name: str) -> Hypothesis:
 
 def _open(finding: Finding, reason: str) -> Finding:
     return replace(finding, status="inconclusive", evidence={**finding.evidence, "reason": reason})
-
-
-def decimal(value: float) -> Fraction:
-    """The decimal number that a float prints as, exactly: 0.1 is 1/10."""
-    return Fraction(repr(float(value)))

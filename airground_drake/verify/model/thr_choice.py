@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 
@@ -24,6 +24,37 @@ DIGITS = 12
 
 BEFORE_S = 1.0
 """The drift of a run is the growth of the task error over this time before the first trigger, s."""
+
+
+class Choice(TypedDict, total=False):
+    """The evidence: thresholds in m, Bayes risks, and what was measured in the runs, by `run UGV`."""
+
+    kind: str
+    rule: str
+    threshold_in_force_m: float
+    optimal_threshold_m: float
+    threshold_as_printed_in_19_m: float
+    risk_in_force: float
+    least_risk: float
+    extra_risk: float
+    runs: dict[str, Measured]
+
+
+class Measured(TypedDict):
+    """Drift and noise that a UGV had in a run before its first trigger, and what they say of the threshold.
+
+    Thresholds are the optima for this drift: with the noise that the rule assumes, and with the run's own. The extra
+    risk is that of the threshold in force. None: there is no such number, as the task error does not grow, or the run
+    has no noise.
+    """
+
+    first_trigger_s: float
+    drift_m_s: float
+    noise_m_sqrt_s: float
+    threshold_m: float
+    optimum_for_this_drift_m: float | None
+    optimum_for_this_drift_and_noise_m: float | None
+    extra_risk: float | None
 
 
 class ThrChoice(ModelClaim):
@@ -66,7 +97,7 @@ class ThrChoice(ModelClaim):
         least, risk = (float(bayes_risk(each, *numbers)) for each in (optimum, zeta))
         off = abs(zeta - optimum)
         optimal = off <= EQUAL * optimum
-        evidence = {
+        evidence: Choice = {
             "kind": "optimal" if optimal else "declared",
             "rule": inputs["rule"],
             "threshold_in_force_m": zeta,
@@ -83,24 +114,18 @@ class ThrChoice(ModelClaim):
             margin=EQUAL * optimum - off,
             unit="m",
             quantity="tolerance left between threshold and optimum",
-            counterexample=None if optimal else evidence,
+            counterexample=None if optimal else dict(evidence),
             evidence=evidence,
             exercised=1,
         )
 
 
-def of_run(trace: Trace) -> dict[str, Any]:
-    """Drift and noise that a run had, and the thresholds that are optimal for them, for each UGV that triggered.
-
-    Returns:
-        By `run UGV`: time of the first trigger, s; drift, m/s; noise, m/sqrt(s); the threshold in force, m; the optimum
-        for this drift with the assumed noise, m, and with the run's own, m; and the extra risk at the run's drift and
-        noise. None where there is no such number: a task error that does not grow, or a run without noise.
-    """
-    decision = trace.scenario["decision"]
-    rule, noise, zeta = decision["threshold"], float(decision["noise_m_sqrt_s"]), float(trace.meta["zeta_m"])
-    costs = rule["c1_1_s"], rule["c2"]
-    found = {}
+def of_run(trace: Trace) -> dict[str, Measured]:
+    """What was measured in a run, for each UGV that triggered, by `run UGV`."""
+    decision = trace.scenario.decision
+    rule, noise, zeta = decision.threshold, decision.noise_m_sqrt_s, float(trace.meta["zeta_m"])
+    costs = rule.c1_1_s, rule.c2
+    found = dict[str, Measured]()
     for ugv in trace.ugvs:
         times = [float(event["t_s"]) for event in trace.events if (event["robot"], event["kind"]) == (ugv, "trigger")]
         if not times or times[0] <= trace.t[0]:
@@ -110,7 +135,7 @@ def of_run(trace: Trace) -> dict[str, Any]:
         before, after = np.interp([begin, times[0]], trace.t, error)
         drift = float(after - before) / (times[0] - begin)
         optima = [optimal_threshold(drift, each, *costs) if drift > 0.0 and each > 0.0 else None
-                  for each in (rule["noise_m_sqrt_s"], noise)]  # fmt: skip
+                  for each in (rule.noise_m_sqrt_s, noise)]  # fmt: skip
         extra = None
         if optima[1] is not None:
             more = bayes_risk(zeta, drift, noise, *costs) - bayes_risk(optima[1], drift, noise, *costs)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+from airground_drake.base.exact import decimal
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.model.levels import levels_of
-from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim, decimal
+from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim
 
 
 class ThrIso(TheoremClaim):

@@ -5,10 +5,11 @@ from __future__ import annotations
 from fractions import Fraction
 from typing import Any
 
+from airground_drake.base.exact import decimal
 from airground_drake.decision.bayes import bayes_risk
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.engines.signs import Ends, Rule, ball, enclose, sign, value
-from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim, decimal
+from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim
 from airground_drake.verify.model.thr_root import NUMBERS, ThrRoot, as_floats, rule_of, two_signs
 
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 from fractions import Fraction
 from typing import Any
 
+from airground_drake.base.exact import decimal
 from airground_drake.decision.bayes import optimal_threshold
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.engines.signs import Ends, Rule, enclose, value
 from airground_drake.verify.model.levels import threshold_m
-from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim, decimal
+from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim
 
 FLOAT_TOLERANCE = Fraction(1, 10**12)
 """The program's threshold may be this far outside its enclosure, relative to it: rounding errs by some 1e-15."""

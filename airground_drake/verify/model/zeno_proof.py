@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
+from airground_drake.base.exact import decimal
 from airground_drake.decision.trigger import Mode, Trigger, TriggerState
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.model.levels import levels_of, trigger_of
-from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim, decimal
+from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim
 
 SHORTEST_S = 1e-3
 """Bound that is tried where the scenario has none (0 s), s: any number would do, the counterexample scales with it."""

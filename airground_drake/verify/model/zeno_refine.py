@@ -20,7 +20,7 @@ theoretical counts follow from the formula in `refined_paths.py`.
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, Literal, TypedDict
 
 import numpy as np
 
@@ -111,23 +111,57 @@ class ZenoRefine(ModelClaim):
         return judge_experiment(experiment(inputs))
 
 
-def series(setting: Refinement, found: dict[str, Array]) -> dict[str, Any]:
-    """Everything that the figure needs, from the counts of an experiment: the finding's evidence.
+class Counted(TypedDict):
+    """Triggers in a path, a number for each dt: their mean, its standard error, the largest."""
 
-    Returns:
-        `dt_s`: noise steps, s. Under `bare`, `automaton` and `automaton_at_scenario_noise`, one number per dt:
-        `mean` and `largest` number of triggers in a path, `standard_error` of the mean. `expected_bare`: theory of
-        the bare mean, per dt. `counts`: triggers at each dt, by path, a text for each path. `fit`: for `bare` and
-        `automaton`, `exponent`, its `interval`, `intercept` and `correction` (the curve
-        exp(intercept + correction sqrt(dt)) dt^exponent), `at_dt`: that curve per dt. `bias`: of the bare exponent.
-        `most_triggers`: duration/dwell + 1, None without a dwell. `duration_s`,
-        `noise_m_sqrt_s`, `own_noise_m_sqrt_s`, `leak_1_s`, `paths`, `seed`, `level` of the intervals.
+    mean: list[float]
+    standard_error: list[float]
+    largest: list[float]
+
+
+class Fit(TypedDict):
+    """The curve exp(intercept + correction sqrt(dt)) dt^exponent, and its values at each dt."""
+
+    exponent: float
+    interval: list[float]
+    intercept: float
+    correction: float
+    at_dt: list[float]
+
+
+class Series(TypedDict):
+    """The evidence: everything that the figure needs.
+
+    `dt_s` are the noise steps. `expected_bare` is the theory of the bare mean for each dt. `counts` has a text for each
+    path, the triggers at each dt. `bias` is that of the bare exponent, `most_triggers` duration/dwell + 1, None without
+    a dwell, and `level` that of the intervals.
     """
+
+    dt_s: list[float]
+    bare: Counted
+    automaton: Counted
+    automaton_at_scenario_noise: Counted
+    expected_bare: list[float]
+    counts: dict[str, list[str]]
+    fit: dict[str, Fit]
+    bias: float
+    most_triggers: int | None
+    duration_s: float
+    noise_m_sqrt_s: float
+    own_noise_m_sqrt_s: float
+    leak_1_s: float
+    paths: int
+    seed: int
+    level: float
+
+
+def series(setting: Refinement, found: dict[str, Array]) -> Series:
+    """The evidence, from the counts of an experiment."""
     dt, dwell = np.array(setting.dt_s), setting.trigger.dwell
     expected = np.array([expected_bare(setting, step) for step in setting.dt_s])
     rng = np.random.default_rng([SEED, PATHS])
     weights = rng.multinomial(PATHS, np.full(PATHS, 1.0 / PATHS), RESAMPLES) / PATHS
-    fits = {}
+    fits = dict[str, Fit]()
     for name in ("bare", "automaton"):
         intercept, exponent, correction = _fit(dt, found[name].mean(axis=0))
         resampled = _fit(dt, weights @ found[name])[1]
@@ -140,23 +174,30 @@ def series(setting: Refinement, found: dict[str, Array]) -> dict[str, Any]:
         }
     return {
         "dt_s": dt.tolist(),
-        **{
-            name: {
-                "mean": values.mean(axis=0).tolist(),
-                "standard_error": (values.std(axis=0, ddof=1) / math.sqrt(PATHS)).tolist(),
-                "largest": values.max(axis=0).tolist(),
-            }
-            for name, values in found.items()
-        },
+        "bare": _counted(found["bare"]),
+        "automaton": _counted(found["automaton"]),
+        "automaton_at_scenario_noise": _counted(found["automaton_at_scenario_noise"]),
         "expected_bare": expected.tolist(),
         "counts": {name: [" ".join(f"{n:.0f}" for n in row) for row in values] for name, values in found.items()},
         "fit": fits,
         "bias": float(_fit(dt, expected)[1]) + 0.5,
         "most_triggers": int(setting.duration_s / dwell + 1e-9) + 1 if dwell > 0.0 else None,
-        **{name: getattr(setting, name) for name in ("duration_s", "noise_m_sqrt_s", "own_noise_m_sqrt_s", "leak_1_s")},
+        "duration_s": setting.duration_s,
+        "noise_m_sqrt_s": setting.noise_m_sqrt_s,
+        "own_noise_m_sqrt_s": setting.own_noise_m_sqrt_s,
+        "leak_1_s": setting.leak_1_s,
         "paths": PATHS,
         "seed": SEED,
         "level": LEVEL,
+    }
+
+
+def _counted(values: Array) -> Counted:
+    """Of triggers by path and dt."""
+    return {
+        "mean": values.mean(axis=0).tolist(),
+        "standard_error": (values.std(axis=0, ddof=1) / math.sqrt(PATHS)).tolist(),
+        "largest": values.max(axis=0).tolist(),
     }
 
 
@@ -195,9 +236,10 @@ def judge_experiment(setting: Refinement) -> Finding:
         status = "inconclusive"
     elif slack[condition] < -ROUNDING:
         status = "refuted"
-        which = condition.split("'")[0].split(" ")[0]
-        fit = {key: evidence["fit"][which][key] for key in ("exponent", "interval")}
-        broken = {"what": f"not so: {condition}", **fit, "dt_s": evidence["dt_s"], "mean": evidence[which]["mean"]}
+        which: Literal["bare", "automaton"] = "bare" if condition.startswith("bare") else "automaton"
+        fit = evidence["fit"][which]
+        broken = {"what": f"not so: {condition}", "exponent": fit["exponent"], "interval": fit["interval"]}
+        broken |= {"dt_s": evidence["dt_s"], "mean": evidence[which]["mean"]}
     elif (off > STANDARD_ERRORS * spread).any():
         status = "inconclusive"
     quantity = "what the confidence interval of an exponent, or a count, leaves of the condition"

@@ -10,7 +10,7 @@ import numpy as np
 from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
-from airground_drake.verify.engines.segments import corner_times, interpolate, travelled
+from airground_drake.verify.engines.geometry import corner_times, interpolate, travelled
 from airground_drake.verify.runs.closed_loops import Scene
 from airground_drake.verify.runs.pairs import Pair, around, pairs_of, places_of, preset_of, radii_of, speed_limits
 from airground_drake.verify.runs.proposals import Sent
@@ -52,19 +52,19 @@ def beginning(trace: Trace, t: float, number: int, sent: Sequence[Sent]) -> Begi
         number: of the proposal that it decides on.
         sent: all proposals.
     """
-    gate, h = trace.scenario["gatekeeper"], trace.scenario["control"]["period_s"]
+    gate, h = trace.scenario.gatekeeper, trace.scenario.control.period_s
     on = next(one for one in sent if one.number == number)
     robot = on.ugv
     corners, speed = preset_of(trace, robot)
     arrives = float(corner_times(corners, speed)[-1]) if len(corners) > 1 else 0.0
-    longest = gate["longest_s"]
+    longest = gate.longest_s
     until = min(float(on.times_s[-1]), t + longest)
-    ends = min(max(until, arrives), t + longest) + gate["settling_s"]
+    ends = min(max(until, arrives), t + longest) + gate.settling_s
     after = h * np.arange(np.ceil((ends - t) / h) + 1.0)
     discs, distances = known_discs(trace, robot, t, on)
     pairs = [pair for pair in _among_robots(trace) if robot in (pair.first, pair.second)]
     others = [_other(trace, robot, t, after, pair, sent) for pair in pairs]
-    settled = max(until, arrives, t + gate["horizon_s"], *(end for _, _, _, end in others))
+    settled = max(until, arrives, t + gate.horizon_s, *(end for _, _, _, end in others))
     fixed = np.broadcast_to(discs, (len(after), *discs.shape))
     safe = np.array([*distances, *(each[1] for each in others)])
     share = np.array([1.0] * len(discs) + [each[2] for each in others])
@@ -119,7 +119,7 @@ def sensed(trace: Trace, robot: str, t: float, after: Array) -> list[Sensed]:
     here, found = interpolate(trace.t, trace.position(robot), t), []
     for other, pair in around(trace, robot):
         place, velocity = _moves(trace, other, t)
-        if np.linalg.norm(place - here) <= trace.scenario["control"]["sensing_range_m"]:
+        if np.linalg.norm(place - here) <= trace.scenario.control.sensing_range_m:
             found.append(Sensed(other, pair, place + after[:, None] * velocity))
     return found
 
@@ -146,10 +146,10 @@ def known_discs(trace: Trace, robot: str, t: float, on: Sent) -> tuple[Array, Ar
     Returns:
         Centres, (k, 3), and the distances that the UGV keeps from them, (k,), m.
     """
-    sensing, gate_s = trace.scenario["control"]["sensing_range_m"], trace.scenario["gatekeeper"]["period_s"]
+    sensing, gate_s = trace.scenario.control.sensing_range_m, trace.scenario.gatekeeper.period_s
     samples = gate_s * np.arange(round(t / gate_s) + 1.0)
     was = interpolate(trace.t, trace.position(robot), np.minimum(samples, t))
-    places = [o["position_m"] for o in trace.scenario["obstacles"].values()]
+    places = [o.position_m for o in trace.scenario.obstacles.values()]
     obstacles = np.array(places, dtype=np.float64).reshape(-1, 3)
     seen = (np.linalg.norm(was[:, None] - obstacles, axis=2) <= sensing).any(axis=0)
     hidden = np.linalg.norm(on.mapped_m - was[-1], axis=1) > sensing
@@ -158,9 +158,9 @@ def known_discs(trace: Trace, robot: str, t: float, on: Sent) -> tuple[Array, Ar
     new = told[(apart > 1e-9).all(axis=1)]
     order = np.linalg.norm(new[:, :3] - was[-1], axis=1).argsort(kind="stable")
     radius = radii_of(trace)
-    own = np.array([radius[name] for name in trace.scenario["obstacles"]])
+    own = np.array([radius[name] for name in trace.scenario.obstacles])
     known = np.concatenate([np.column_stack([obstacles, own])[seen], new[order.argsort() < MOST_CLAIMED]])
-    return known[:, :3], trace.scenario["safe_distance"]["obstacle_m"] + (radius[robot] + known[:, 3])
+    return known[:, :3], trace.scenario.safe_distance.obstacle_m + (radius[robot] + known[:, 3])
 
 
 def discovers(trace: Trace, robot: str, t: float, on: Sent) -> bool:
@@ -173,7 +173,7 @@ def discovers(trace: Trace, robot: str, t: float, on: Sent) -> bool:
         on: the proposal.
     """
     first = trace.derived(f"first sensed by {robot}", lambda: _first_sensed(trace, robot))
-    obstacles = np.array([o["position_m"] for o in trace.scenario["obstacles"].values()]).reshape(-1, 3)
+    obstacles = np.array([o.position_m for o in trace.scenario.obstacles.values()]).reshape(-1, 3)
     new = obstacles[np.abs(first - t) <= TIME_TOLERANCE_S]
     shown = (np.linalg.norm(new[:, None] - on.mapped_m, axis=2) <= 1e-9).any(axis=1)
     return bool((~shown).any())
@@ -181,13 +181,13 @@ def discovers(trace: Trace, robot: str, t: float, on: Sent) -> bool:
 
 def _first_sensed(trace: Trace, robot: str) -> Array:
     """When a UGV senses each obstacle for the first time, at the gatekeeper's samples, (m,), s; inf if never."""
-    period_s = trace.scenario["gatekeeper"]["period_s"]
+    period_s = trace.scenario.gatekeeper.period_s
     samples = period_s * np.arange(np.floor(trace.t[-1] / period_s + 1e-9) + 1.0)
     was = interpolate(trace.t, trace.position(robot), np.minimum(samples, trace.t[-1]))
     first = []
-    for obstacle in trace.scenario["obstacles"].values():
-        away = np.linalg.norm(was - np.asarray(obstacle["position_m"]), axis=1)
-        seen = np.flatnonzero(away <= trace.scenario["control"]["sensing_range_m"])
+    for obstacle in trace.scenario.obstacles.values():
+        away = np.linalg.norm(was - np.asarray(obstacle.position_m), axis=1)
+        seen = np.flatnonzero(away <= trace.scenario.control.sensing_range_m)
         first.append(samples[seen[0]] if seen.size else np.inf)
     return np.array(first)
 
@@ -201,7 +201,7 @@ def _other(
     """
     other = pair.second if pair.first == robot else pair.first
     place, velocity = _moves(trace, other, t)
-    coasting = place + np.minimum(after, trace.scenario["gatekeeper"]["horizon_s"])[:, None] * velocity
+    coasting = place + np.minimum(after, trace.scenario.gatekeeper.horizon_s)[:, None] * velocity
     asked, accepted = asked_of(trace, other, t, sent)
     if asked is None:
         return (coasting, coasting), pair.safe_m, pair.share, -np.inf

@@ -73,11 +73,11 @@ def stacked(scenes: Sequence[Scene]) -> Scene:
 
 def roll_out(trace: Trace, scenes: Scene) -> Iterator[Array]:
     """Places of R stacked closed loops after each control period, (R, 3), m, by the law of the run."""
-    control, h, place = trace.scenario["control"], trace.scenario["control"]["period_s"], scenes.here
+    control, h, place = trace.scenario.control, trace.scenario.control.period_s, scenes.here
     rates, wishes = (np.diff(part, axis=1) / h for part in (scenes.preset, scenes.wanted))
     for k in range(scenes.executed.shape[1]):
         given = inequalities(place, scenes.points[:, k], scenes.safe, scenes.share, control, planar=True)
-        own = tracking(place, scenes.preset[:, k], rates[:, k], control["motion_gain_1_s"], scenes.limit)
+        own = tracking(place, scenes.preset[:, k], rates[:, k], control.motion_gain_1_s, scenes.limit)
         rows = np.flatnonzero(scenes.executed[:, k])
         asked = Asked(scenes.wanted[rows, k], wishes[rows, k], scenes.chosen[rows])
         place = place + h * commanded(trace, place, own, given, rows, asked, scenes.limit)

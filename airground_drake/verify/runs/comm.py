@@ -13,7 +13,7 @@ from airground_drake.base.errors import TraceError
 from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S, TraceClaim
 from airground_drake.verify.finding import Finding
-from airground_drake.verify.runs.interventions import GATED_METHODS, intervening, talk_is_due
+from airground_drake.verify.runs.instants import GATED_METHODS, intervening, talk_is_due
 from airground_drake.verify.runs.standing import map_conflicts, standing_conflicts
 
 KINDS = ("proposal", "decision")
@@ -144,7 +144,7 @@ def _strays(trace: Trace, ugv: str, sent: dict[str, list[Message]]) -> Iterator[
 
 def _is_called(trace: Trace, ugv: str, t: float) -> bool:
     """Whether a UGV was intervened on at a time, s, or so shortly before that the messages may not have ended yet."""
-    allowance = trace.scenario["intervention"]["period_s"] + trace.scenario["gatekeeper"]["period_s"]
+    allowance = trace.scenario.intervention.period_s + trace.scenario.gatekeeper.period_s
     intervals = intervening(trace, ugv)
     begins, ends = intervals[:, 0] - TIME_TOLERANCE_S, intervals[:, 1] + allowance + TIME_TOLERANCE_S
     return bool(((t >= begins) & (t <= ends)).any())
@@ -158,11 +158,11 @@ def _is_due(trace: Trace, ugv: str, kind: str) -> bool:
 def _always_on(trace: Trace) -> dict[str, int]:
     """What a scheme without a trigger would have spent."""
     scenario, n = trace.scenario, len(trace.ugvs)
-    before = scenario["duration_s"] - TIME_TOLERANCE_S  # the first instant is at 0
+    before = scenario.duration_s - TIME_TOLERANCE_S  # the first instant is at 0
     gated = trace.meta["method"] in GATED_METHODS
     return {
-        "proposal": n * math.ceil(before / scenario["intervention"]["period_s"]),
-        "decision": n * math.ceil(before / scenario["gatekeeper"]["period_s"]) if gated else 0,
+        "proposal": n * math.ceil(before / scenario.intervention.period_s),
+        "decision": n * math.ceil(before / scenario.gatekeeper.period_s) if gated else 0,
     }
 
 

@@ -5,13 +5,14 @@ Velocities in m/s, positions in m, world frame. Nothing of the running code is u
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
+from airground_drake.scenarios.schema import Control
 from airground_drake.verify.engines.shortfalls import demanded
 from airground_drake.verify.runs.pairs import around, places_of
 from airground_drake.verify.runs.projection import closest, least_violation, shortened
@@ -41,7 +42,7 @@ class Asked(NamedTuple):
 
 
 def inequalities(
-    position: Array, centre: Array, safe: Array, share: Array, control: dict[str, Any], *, planar: bool
+    position: Array, centre: Array, safe: Array, share: Array, control: Control, *, planar: bool
 ) -> Inequalities:
     """Set-based avoidance (7)-(8), (11): n.v >= share A (d - D) where D <= d, else n.v >= share (d - D) / h.
 
@@ -56,8 +57,8 @@ def inequalities(
     offset = position[:, None] - centre
     distance = np.sqrt(np.square(offset).sum(axis=2))
     normal = offset / np.where(distance > 0.0, distance, 1.0)[..., None] * (PLANE if planar else 1.0)
-    bound = share * demanded(safe - distance, control["avoidance_gain_1_s"], 1.0 / control["period_s"])
-    return Inequalities(normal, np.where(distance <= control["sensing_range_m"], bound, -np.inf))
+    bound = share * demanded(safe - distance, control.avoidance_gain_1_s, 1.0 / control.period_s)
+    return Inequalities(normal, np.where(distance <= control.sensing_range_m, bound, -np.inf))
 
 
 def inequalities_of(trace: Trace, robot: str, samples: npt.NDArray[np.intp]) -> Inequalities:
@@ -69,7 +70,7 @@ def inequalities_of(trace: Trace, robot: str, samples: npt.NDArray[np.intp]) -> 
         np.stack(others, axis=1) if others else np.empty((len(samples), 0, 3)),
         np.array([pair.safe_m for _, pair in beside]),
         np.array([pair.share for _, pair in beside]),
-        trace.scenario["control"],
+        trace.scenario.control,
         planar=robot in trace.ugvs,
     )
 
@@ -153,7 +154,7 @@ def commanded(
         asked: what those ask for, E of them.
         limit: speed limits, (B,).
     """
-    composition, gain = trace.meta["composition"], trace.scenario["control"]["intervention_gain_1_s"]
+    composition, gain = trace.meta["composition"], trace.scenario.control.intervention_gain_1_s
     if trace.meta["method"] in ON_TOP:
         velocity = avoiding(own, given, composition, planar=True)
         velocity[rows] = intervened(position[rows], velocity[rows], asked, gain, limit[rows])

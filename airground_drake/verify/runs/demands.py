@@ -31,13 +31,13 @@ def demanded(trace: Trace) -> dict[str, dict[str, Any]]:
     and both radii.
     """
     scenario, robots = trace.scenario, trace.robots
-    control, safe, uav = scenario["control"], scenario["safe_distance"], scenario["uav"]["name"]
-    obstacles, radius, limit = scenario["obstacles"], radii_of(trace), speed_limits(trace)
+    control, safe, uav = scenario.control, scenario.safe_distance, scenario.uav.name
+    obstacles, radius, limit = scenario.obstacles, radii_of(trace), speed_limits(trace)
     everybody, bodies = np.arange(len(robots)), np.array([radius[name] for name in robots])
     with_uav = np.array([name == uav for name in robots])
-    beside_robots = np.where(with_uav[:, None] | with_uav, safe["air_ground_m"], safe["ugv_m"])
+    beside_robots = np.where(with_uav[:, None] | with_uav, safe.air_ground_m, safe.ugv_m)
     beside_robots = beside_robots + (bodies[:, None] + bodies)
-    beside_obstacles = safe["obstacle_m"] + (bodies[:, None] + np.array([radius[name] for name in obstacles]))
+    beside_obstacles = safe.obstacle_m + (bodies[:, None] + np.array([radius[name] for name in obstacles]))
     found = {}
     for name, team in zip(CONTROLLERS, (everybody[~with_uav], everybody[with_uav]), strict=True):
         others = np.array([np.delete(everybody, i) for i in team])
@@ -45,21 +45,21 @@ def demanded(trace: Trace) -> dict[str, dict[str, Any]]:
         share = np.where(np.arange(apart.shape[1]) < len(obstacles), OBSTACLE_SHARE, ROBOT_SHARE)
         found[name] = {
             "members": team,
-            "obstacles_m": np.array([each["position_m"] for each in obstacles.values()]).ravel(),
+            "obstacles_m": np.array([each.position_m for each in obstacles.values()]).ravel(),
             "others": others.ravel(),
             "safe_m": apart.ravel(),
             "share": np.tile(share, len(team)),
             "mobility": np.array([SPATIAL if with_uav[i] else PLANAR for i in team]).ravel(),
             "max_speed_m_s": np.array([limit[robots[i]] for i in team]),
-            "sampling_s": np.array([control["period_s"], 0.0]),
-            "gain_1_s": control["avoidance_gain_1_s"],
-            "period_s": control["period_s"],
-            "sensing_range_m": control["sensing_range_m"],
+            "sampling_s": np.array([control.period_s, 0.0]),
+            "gain_1_s": control.avoidance_gain_1_s,
+            "period_s": control.period_s,
+            "sensing_range_m": control.sensing_range_m,
         }
-    of_run = scenario["runs"][trace.run]
-    found["ugv_controller"]["composition"] = of_run["composition"]
-    if of_run["method"] != NO_INTERVENTION:  # where none is accepted, their order says nothing
-        found["ugv_controller"]["intervention_on_top"] = of_run["method"] in ON_TOP
+    of_run = scenario.runs[trace.run]
+    found["ugv_controller"]["composition"] = of_run.composition
+    if of_run.method != NO_INTERVENTION:  # where none is accepted, their order says nothing
+        found["ugv_controller"]["intervention_on_top"] = of_run.method in ON_TOP
     return found
 
 
@@ -88,7 +88,7 @@ def differences(trace: Trace) -> Iterator[dict[str, Any]]:
 
 def _place(trace: Trace, wanted: dict[str, Any], parameter: str, k: int) -> dict[str, Any]:
     """Which robot, and beside what, the k-th number of a parameter is about."""
-    members, obstacles = wanted["members"], list(trace.scenario["obstacles"])
+    members, obstacles = wanted["members"], list(trace.scenario.obstacles)
     each = len(wanted[parameter]) // len(members)
     if parameter in ("safe_m", "share"):
         robot, column = divmod(k, each)

@@ -13,7 +13,7 @@ from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError
 from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S, TraceClaim
-from airground_drake.verify.engines.segments import corner_times, travelled
+from airground_drake.verify.engines.geometry import corner_times, travelled
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.control_law import (
     Asked,
@@ -25,7 +25,7 @@ from airground_drake.verify.runs.control_law import (
     spare,
     tracking,
 )
-from airground_drake.verify.runs.control_samples import chosen_at, samples_of
+from airground_drake.verify.runs.instants import chosen_at, samples_of
 from airground_drake.verify.runs.pairs import preset_of
 from airground_drake.verify.runs.proposals import Sent, accepted_at
 
@@ -124,7 +124,7 @@ class Exec(TraceClaim):
         """Compare every command with the law; the margin is the tolerance less the largest difference."""
         samples = samples_of(trace)
         judged = [_judge_ugv(trace, ugv, samples) for ugv in trace.ugvs]
-        formation = trace.scenario["uav"]["task"] == "formation"
+        formation = trace.scenario.uav.task == "formation"
         if formation:
             judged.append(_judge_uav(trace, samples))
         wrong = [entry for one in judged if (entry := _first_wrong(one)) is not None]
@@ -149,7 +149,7 @@ class Exec(TraceClaim):
                     }
                     for one in judged
                 },
-                "not_judged": [] if formation else [f"{trace.robots[-1]}: task {trace.scenario['uav']['task']}"],
+                "not_judged": [] if formation else [f"{trace.robots[-1]}: task {trace.scenario.uav.task}"],
                 "tolerance_m_s": COMMAND_TOLERANCE_M_S,
             },
             exercised=sum(int((one.executing | one.binding).sum()) for one in judged),
@@ -175,10 +175,10 @@ def _first_wrong(one: Judged) -> dict[str, Any] | None:
 
 def _judge_ugv(trace: Trace, ugv: str, samples: npt.NDArray[np.intp]) -> Judged:
     """A UGV's commands against the law, with whatever it has accepted."""
-    scenario, control, t = trace.scenario, trace.scenario["control"], trace.t[samples]
-    spec, chosen = scenario["ugvs"][ugv], chosen_at(trace, samples)
+    scenario, control, t = trace.scenario, trace.scenario.control, trace.t[samples]
+    spec, chosen = scenario.ugvs[ugv], chosen_at(trace, samples)
     position, recorded = trace.position(ugv)[samples], trace.command(ugv)[chosen]
-    given, limit = inequalities_of(trace, ugv, samples), np.full(len(samples), spec["max_speed_m_s"])
+    given, limit = inequalities_of(trace, ugv, samples), np.full(len(samples), spec.max_speed_m_s)
     accepted = accepted_at(trace, ugv)
     waypoints, speed = preset_of(trace, ugv)
     preset = travelled(waypoints, speed, t)
@@ -189,7 +189,7 @@ def _judge_ugv(trace: Trace, ugv: str, samples: npt.NDArray[np.intp]) -> Judged:
     away, law = np.full(len(t), np.inf), np.zeros((len(t), 3))
     # samples at a corner of a motion are evaluated with the rates on both sides of it, and the closer one counts
     for own_rate, wish in product(own_rates, asked):
-        own = tracking(position, preset, own_rate, control["motion_gain_1_s"], limit)
+        own = tracking(position, preset, own_rate, control.motion_gain_1_s, limit)
         ours = commanded(trace, position, own, given, rows, wish, limit)
         off = np.linalg.norm(recorded - ours, axis=1)
         closer = ~(off >= away)
@@ -231,16 +231,16 @@ def _asked(accepted: Sequence[Sent | None], t: Array) -> list[Asked]:
 
 def _judge_uav(trace: Trace, samples: npt.NDArray[np.intp]) -> Judged:
     """The UAV's commands against (9)-(11)."""
-    uav, control, chosen = trace.scenario["uav"], trace.scenario["control"], chosen_at(trace, samples)
-    name = uav["name"]
+    uav, control, chosen = trace.scenario.uav, trace.scenario.control, chosen_at(trace, samples)
+    name = uav.name
     if name != trace.robots[-1]:
         raise TraceError(f"the last robot is {trace.robots[-1]}, not the UAV {name}")
     position, recorded = trace.position(name)[samples], trace.command(name)[chosen]
     centroid = np.mean([trace.position(ugv)[samples] for ugv in trace.ugvs], axis=0)
     fed = np.mean([trace.command(ugv)[samples] for ugv in trace.ugvs], axis=0)
     fed[trace.t[samples] <= TIME_TOLERANCE_S] = 0.0  # nothing was commanded before the first sample
-    over = centroid + np.array([0.0, 0.0, uav["altitude_m"]])
-    below = limited(fed + control["formation_gain_1_s"] * (over - position), uav["max_speed_m_s"])
+    over = centroid + np.array([0.0, 0.0, uav.altitude_m])
+    below = limited(fed + control.formation_gain_1_s * (over - position), uav.max_speed_m_s)
     given = inequalities_of(trace, name, samples)
     law = avoiding(below, given, "augmented", planar=False)
     away = np.linalg.norm(recorded - law, axis=1)

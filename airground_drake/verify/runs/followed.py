@@ -9,7 +9,7 @@ import numpy as np
 from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.runs.beginnings import known_discs
-from airground_drake.verify.runs.control_samples import control_samples
+from airground_drake.verify.runs.instants import control_samples
 from airground_drake.verify.runs.proposals import accepted_at, proposals_of
 
 METHOD = "d"
@@ -52,16 +52,16 @@ def followed(trace: Trace) -> list[Followed]:
 
 def _followed(trace: Trace, given: dict[Any, Any]) -> Followed:
     ugv, t_s = str(given["robot"]), float(given["t_s"])
-    control, obstacles = trace.scenario["control"], trace.scenario["obstacles"]
+    control, obstacles = trace.scenario.control, trace.scenario.obstacles
     on = next(one for one in proposals_of(trace) if one.number == given["number"])
-    samples = control_samples(trace.t, control["period_s"])
+    samples = control_samples(trace.t, control.period_s)
     begin = int(np.searchsorted(trace.t[samples], t_s - TIME_TOLERANCE_S))
     executed = [one is on for one in accepted_at(trace, ugv)[begin:]]
     lasts = executed.index(False) if False in executed else len(executed)
     places = trace.position(ugv)[np.append(samples, len(trace.t) - 1)[begin : begin + lasts + 1]]
-    centres = np.array([each["position_m"] for each in obstacles.values()], dtype=np.float64).reshape(-1, 3)
+    centres = np.array([each.position_m for each in obstacles.values()], dtype=np.float64).reshape(-1, 3)
     known, _ = known_discs(trace, ugv, t_s, on)
-    sensed = (np.linalg.norm(places[:, None] - centres, axis=2) <= control["sensing_range_m"]).any(axis=0)
+    sensed = (np.linalg.norm(places[:, None] - centres, axis=2) <= control.sensing_range_m).any(axis=0)
     strange = (np.linalg.norm(centres[:, None] - known, axis=2) > SAME_M).all(axis=1)
     return Followed(
         ugv, t_s, [name for name, is_new in zip(obstacles, (sensed & strange).tolist(), strict=True) if is_new]

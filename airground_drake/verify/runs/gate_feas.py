@@ -10,8 +10,9 @@ import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
+from airground_drake.scenarios.schema import Gatekeeper
 from airground_drake.verify.claim import TIME_TOLERANCE_S
-from airground_drake.verify.engines.segments import interpolate, travelled
+from airground_drake.verify.engines.geometry import interpolate, travelled
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.beginnings import sensed
 from airground_drake.verify.runs.control_law import ON_TOP
@@ -23,7 +24,7 @@ from airground_drake.verify.runs.gate_record import (
     conclude,
     cost_tolerance,
 )
-from airground_drake.verify.runs.interventions import intervening
+from airground_drake.verify.runs.instants import intervening
 from airground_drake.verify.runs.pairs import preset_of
 from airground_drake.verify.runs.proposals import proposals_of
 from airground_drake.verify.runs.sum_up_rounding import (
@@ -142,7 +143,7 @@ def judge_compared(trace: Trace, rows: list[Row], compared: list[Off], **evidenc
 
 def compare_times(trace: Trace, rows: Sequence[Row]) -> Iterator[Off]:
     """The times of the decisions: the first within a period of the proposal, the others a period apart; all are due."""
-    period = trace.scenario["gatekeeper"]["period_s"]
+    period = trace.scenario.gatekeeper.period_s
     for ugv in trace.ugvs:
         last: Row | None = None
         for row in (row for row in rows if row.given["robot"] == ugv):
@@ -163,7 +164,7 @@ def compare_proposals(trace: Trace, rows: Sequence[Row]) -> Iterator[Off]:
     It does not if another one is sent meanwhile, if its motion is over, if neither the UGV nor the one that it is to
     make way for is intervened on all the time, or if the run ends.
     """
-    allowed = trace.scenario["intervention"]["period_s"] + trace.scenario["gatekeeper"]["period_s"] + TIME_TOLERANCE_S
+    allowed = trace.scenario.intervention.period_s + trace.scenario.gatekeeper.period_s + TIME_TOLERANCE_S
     decided = {row.given["number"] for row in rows}
     sent = proposals_of(trace)
     for one in sent:
@@ -179,14 +180,14 @@ def compare_proposals(trace: Trace, rows: Sequence[Row]) -> Iterator[Off]:
 
 def compare_situation(trace: Trace, row: Row) -> Iterator[Off]:
     """The data of (26) against the scenario and the signals at the time of the decision."""
-    gate = trace.scenario["gatekeeper"]
+    gate = trace.scenario.gatekeeper
     t = float(row.given["t_s"])
     robot = str(row.given["robot"])
-    after = gate["horizon_s"] / gate["stages"] * np.arange(1.0, gate["stages"] + 1.0)
+    after = gate.horizon_s / gate.stages * np.arange(1.0, gate.stages + 1.0)
     yield Off(row, "length of a stage, s", row.dt - after[0], TIME_TOLERANCE_S)
-    yield Off(row, "weight of task errors", row.error_weight - gate["error_weight_1_m2_s"], 0.0)
-    yield Off(row, "weight of slack", row.slack_weight - gate["slack_weight_1_m2_s"], 0.0)
-    yield Off(row, "weight of the terminal cost", row.terminal_weight - gate["terminal_weight_s"], 0.0)
+    yield Off(row, "weight of task errors", row.error_weight - gate.error_weight_1_m2_s, 0.0)
+    yield Off(row, "weight of slack", row.slack_weight - gate.slack_weight_1_m2_s, 0.0)
+    yield Off(row, "weight of the terminal cost", row.terminal_weight - gate.terminal_weight_s, 0.0)
     own = interpolate(trace.t, trace.position(robot), t)
     yield Off(row, "initial position, m", row["initial_m"] - own, POSITION_TOLERANCE_M, position_m=own.tolist())
     reference = travelled(*preset_of(trace, robot), t + after)
@@ -213,8 +214,8 @@ def compare_situation(trace: Trace, row: Row) -> Iterator[Off]:
 
 def compare_plan(trace: Trace, row: Row) -> Iterator[Off]:
     """(26b)-(26e), (25) and what was recorded about the plan."""
-    limit = trace.scenario["ugvs"][row.given["robot"]]["max_speed_m_s"]
-    period = trace.scenario["control"]["period_s"]
+    limit = trace.scenario.ugvs[row.given["robot"]].max_speed_m_s
+    period = trace.scenario.control.period_s
     refusing, accepting = row.constant
     clear_refusing, clear_accepting = _clear(row, refusing, period), _clear(row, accepting, period)
     ways = [("refusing throughout", refusing, clear_refusing), ("accepting throughout", accepting, clear_accepting)]
@@ -260,8 +261,8 @@ def _clear(row: Row, positions: Array, period: float) -> npt.NDArray[np.bool_]:
 
 def compare_answers(trace: Trace, rows: Sequence[Row]) -> Iterator[Off]:
     """The answers against the rules, decision by decision, and the times of the decisions."""
-    gate = trace.scenario["gatekeeper"]
-    literal = gate["rule"] == "first_stage"
+    gate = trace.scenario.gatekeeper
+    literal = gate.rule == "first_stage"
     yield from compare_times(trace, rows)
     for ugv in trace.ugvs:
         last: Row | None = None
@@ -280,9 +281,7 @@ def compare_answers(trace: Trace, rows: Sequence[Row]) -> Iterator[Off]:
             last = row
 
 
-def rule(
-    row: Row, standing: str | None, stood: float, gate: dict[str, Any], *, literal: bool = False
-) -> tuple[bool, str]:
+def rule(row: Row, standing: str | None, stood: float, gate: Gatekeeper, *, literal: bool = False) -> tuple[bool, str]:
     """Whether a proposal is accepted and why, from the recorded costs.
 
     Args:
@@ -304,10 +303,10 @@ def rule(
             return False, "waits" if gains else "not_cheaper"
         return gains, "cheaper" if gains else "no_difference"
     accepted = standing == "accept"
-    enough = (1.0 - gate["switching_margin"]) * given[f"{standing}_throughout"]
+    enough = (1.0 - gate.switching_margin) * given[f"{standing}_throughout"]
     cheaper = (row["plan"][0] == 1.0) != accepted and given["objective"] < enough
     if not cheaper:
         return accepted, "kept"
-    if stood < gate["min_dwell_s"] - TIME_TOLERANCE_S:
+    if stood < gate.min_dwell_s - TIME_TOLERANCE_S:
         return accepted, "dwell"
     return not accepted, "reversed"

@@ -11,13 +11,13 @@ from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError
 from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
-from airground_drake.verify.engines.segments import interpolate
+from airground_drake.verify.engines.geometry import interpolate
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.beginnings import scene, sensed
 from airground_drake.verify.runs.closed_loops import Scene, in_batches, roll_out, stacked
 from airground_drake.verify.runs.control_law import ON_TOP
-from airground_drake.verify.runs.control_samples import samples_of
 from airground_drake.verify.runs.gate_record import GateClaim, Off, Row, conclude
+from airground_drake.verify.runs.instants import samples_of
 from airground_drake.verify.runs.outcome_rolls import foreseen
 from airground_drake.verify.runs.proposals import accepted_at, proposals_of
 
@@ -91,7 +91,7 @@ class GateModel(GateClaim):
 def judge_outcomes(trace: Trace, rows: Sequence[Row]) -> Finding:
     """Method (d): what comes of either choice, rolled out again for every first decision about a proposal."""
     sent, compared, largest = proposals_of(trace), list[Off](), 0.0
-    speeds = {ugv: trace.scenario["ugvs"][ugv]["preset"]["speed_m_s"] for ugv in trace.ugvs}
+    speeds = {ugv: trace.scenario.ugvs[ugv].preset.speed_m_s for ugv in trace.ugvs}
     looked = [row for row in rows if row.given["accept_stalls"] >= 0.0]
     for row in looked:
         for choice, found in zip(("refuse", "accept"), foreseen(trace, row.given, sent), strict=True):
@@ -128,7 +128,7 @@ def predicted(trace: Trace, rows: Sequence[Row]) -> Iterator[tuple[Row, tuple[Ar
 
 def scene_of(trace: Trace, row: Row, plan: Array) -> Scene:
     """The closed loop of a decision under a plan (N,) of 0 (refused) and 1 (accepted): others move on as they do."""
-    control_s, horizon_s = trace.scenario["control"]["period_s"], trace.scenario["gatekeeper"]["horizon_s"]
+    control_s, horizon_s = trace.scenario.control.period_s, trace.scenario.gatekeeper.horizon_s
     t, each = float(row.given["t_s"]), round(horizon_s / row.stages / control_s)
     after = control_s * np.arange(each * row.stages + 1.0)
     on = next((one for one in proposals_of(trace) if one.number == row.given["number"]), None)

@@ -104,7 +104,7 @@ class GateOpt(ProblemClaim):
 
     def judge_rows(self, trace: Trace, rows: list[Row]) -> Finding:
         """Enclose every optimum; the margin is what is left of the largest gap allowed."""
-        route = trace.scenario["gatekeeper"]["route"]
+        route = trace.scenario.gatekeeper.route
         planned = [row for row in rows if row.planned]
         lacking = [row for row in planned if route in HALF_PLANE_ROUTES and row.data["normals"] is None]
         if cut := [row for row in lacking if row.given["status"] == "optimal"]:
@@ -114,7 +114,7 @@ class GateOpt(ProblemClaim):
             reason = f"route {route!r} has no bound that can be established again"
             open_ = Finding("inconclusive", evidence={"decisions": len(rows), "reason": reason}, exercised=len(planned))
             return conclude(open_, compared)
-        blocks = trace.scenario["gatekeeper"]["blocks"]
+        blocks = trace.scenario.gatekeeper.blocks
         bounded = bound([row for row in planned if row not in lacking], blocks)
         for each in bounded:
             compared += compare_bounds(each.row, each.optimum, blocks)
@@ -122,7 +122,7 @@ class GateOpt(ProblemClaim):
                 compared.append(compare_with_blocks(each, self.largest_gap))
         finding = self._finding(bounded, lacking)
         listed = {"decisions": len(rows), "without_a_plan": [row.label for row in rows if not row.planned]}
-        return conclude(replace(finding, evidence=listed | finding.evidence, exercised=len(planned)), compared)
+        return conclude(replace(finding, evidence={**listed, **finding.evidence}, exercised=len(planned)), compared)
 
     def _finding(self, bounded: Sequence[Bounded], lacking: Sequence[Row]) -> Finding:
         """What the gaps say, as long as nothing recorded is wrong; a gap that is too wide is open, not refuted."""

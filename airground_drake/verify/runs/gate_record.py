@@ -19,7 +19,7 @@ from airground_drake.run.trace import PROBLEM_ARRAYS, PROBLEM_SCALARS, Trace
 from airground_drake.verify.claim import TraceClaim
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.control_law import ON_TOP
-from airground_drake.verify.runs.interventions import GATED_METHODS, talk_is_due
+from airground_drake.verify.runs.instants import GATED_METHODS, talk_is_due
 
 POSITION_TOLERANCE_M = 1e-9
 """Recorded and recomputed positions may differ by this, m: rounding of N additions errs by 1e-13 m."""
@@ -157,14 +157,14 @@ def rows_of(trace: Trace) -> list[Row]:
 
 def _solved(trace: Trace, given: dict[str, Any], problem: dict[Any, Any]) -> Row:
     """A decision with its problem, a row of `Trace.problems`."""
-    gate = trace.scenario["gatekeeper"]
+    gate = trace.scenario.gatekeeper
     scalars = [float(problem[name]) for name in PROBLEM_SCALARS]
     dt, error, slack, terminal = scalars
     flat = {name: np.asarray(problem[name], dtype=np.float64).ravel() for name in PROBLEM_ARRAYS}
-    row = Row(given, dt, error, slack, terminal, _shaped(flat, int(gate["stages"])))
+    row = Row(given, dt, error, slack, terminal, _shaped(flat, int(gate.stages)))
     if not all(np.isfinite(values).all() for values in (np.array(scalars), *flat.values())):
         raise TraceError(f"{row.label}: its problem has numbers that are not finite")
-    if given["route"] != gate["route"]:
+    if given["route"] != gate.route:
         raise TraceError(f"{row.label}: not by the scenario's route")
     decided = given["status"] in ("optimal", "budget_spent", "solver_failed")
     if row.planned != decided or (decided and row.data["positions_m"] is None):
@@ -263,7 +263,7 @@ class GateClaim(TraceClaim):
             reason = "no UGV was intervened on: nothing to decide"
             return Finding("holds", evidence={"decisions": 0, "reason": reason}, exercised=0)
         finding = self.judge_rows(trace, rows)
-        return replace(finding, evidence=finding.evidence | {"without_decisions": without})
+        return replace(finding, evidence={**finding.evidence, "without_decisions": without})
 
     @abc.abstractmethod
     def judge_rows(self, trace: Trace, rows: list[Row]) -> Finding:

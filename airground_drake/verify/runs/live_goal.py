@@ -11,7 +11,7 @@ from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError
 from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TraceClaim
-from airground_drake.verify.engines.segments import interpolate
+from airground_drake.verify.engines.geometry import interpolate
 from airground_drake.verify.finding import Finding
 
 AT_REST_S = 1.0
@@ -50,7 +50,7 @@ class LiveGoal(TraceClaim):
 
     def check(self, trace: Trace) -> Finding:
         """Compare each robot's end with what its scenario declares; the least margin is reported."""
-        stalls = trace.scenario["runs"][trace.run]["stalls_m"]
+        stalls = trace.scenario.runs[trace.run].stalls_m
         if unknown := set(stalls) - set(trace.ugvs):
             raise TraceError(f"stalls_m names {sorted(unknown)}, which are not UGVs of the trace")
         judged = list(_conditions(trace, stalls))
@@ -78,23 +78,23 @@ class Condition(NamedTuple):
 
 def _conditions(trace: Trace, stalls: Mapping[str, Sequence[float]]) -> Iterator[Condition]:
     """What the scenario declares of each robot's end, with the margins, m; `stalls` has the stall points of UGVs, m."""
-    scenario, uav, arrival = trace.scenario, trace.scenario["uav"], float(trace.scenario["arrival_tolerance_m"])
+    scenario, uav, arrival = trace.scenario, trace.scenario.uav, float(trace.scenario.arrival_tolerance_m)
     for ugv in trace.ugvs:
-        target = scenario["ugvs"][ugv]["target_m"]
+        target = scenario.ugvs[ugv].target_m
         if ugv not in stalls:
             yield _within(trace, ugv, "at its target", target, arrival)
             continue
-        yield _within(trace, ugv, "at its stall point", stalls[ugv], scenario["stall_tolerance_m"])
+        yield _within(trace, ugv, "at its stall point", stalls[ugv], scenario.stall_tolerance_m)
         moved = _moved_at_the_end(trace, ugv)
         yield Condition({"robot": ugv, "condition": "stands", "moved_m": moved, "margin_m": AT_REST_M - moved})
         away = float(np.linalg.norm(trace.position(ugv)[-1] - target))
         yield Condition({"robot": ugv, "condition": "short of its target", "margin_m": away - arrival})
     if stalls:
         centroid = np.mean([trace.position(ugv)[-1] for ugv in trace.ugvs], axis=0)
-        over = centroid + np.array([0.0, 0.0, uav["altitude_m"]])
-        yield _within(trace, uav["name"], "over the centroid of the UGVs", over, arrival)
+        over = centroid + np.array([0.0, 0.0, uav.altitude_m])
+        yield _within(trace, uav.name, "over the centroid of the UGVs", over, arrival)
     else:
-        yield _within(trace, uav["name"], "at its target", uav["target_m"], arrival)
+        yield _within(trace, uav.name, "at its target", uav.target_m, arrival)
 
 
 def _within(trace: Trace, robot: str, condition: str, point: Array | Sequence[float], tolerance_m: float) -> Condition:

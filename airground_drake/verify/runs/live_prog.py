@@ -77,7 +77,7 @@ class LiveProg(GateClaim):
 
     def judge_rows(self, trace: Trace, rows: list[Row]) -> Finding:
         """Go through the decisions; the margin is what is left of the time that an intervention may last."""
-        sent, gate = {one.number: one for one in proposals_of(trace)}, trace.scenario["gatekeeper"]
+        sent, gate = {one.number: one for one in proposals_of(trace)}, trace.scenario.gatekeeper
         compared, ends, longest = list[Off](), Counter[str](), 0.0
         for ugv in trace.ugvs:
             patience, last = Patience(), None
@@ -99,7 +99,7 @@ class LiveProg(GateClaim):
         accepted = int((trace.decisions["decision"] == "accept").sum())
         finding = Finding(
             "holds",
-            margin=gate["longest_s"] - longest,
+            margin=gate.longest_s - longest,
             unit="s",
             quantity="time that an intervention may last, less the longest that one was executed",
             evidence={
@@ -119,7 +119,7 @@ def ending(trace: Trace, last: Row, on: Sent, ends: Counter[str]) -> Off:
 
     It was withdrawn before the next sample of the gatekeeper, or the run was over.
     """
-    after = float(last.given["t_s"]) + trace.scenario["gatekeeper"]["period_s"] + TIME_TOLERANCE_S
+    after = float(last.given["t_s"]) + trace.scenario.gatekeeper.period_s + TIME_TOLERANCE_S
     withdrawn, over = withdrawn_s(trace, on) <= after, after > trace.t[-1]
     ends["withdrawn" if withdrawn else "end of the run"] += 1
     return Off(last, "end of an accepted intervention", float(not (withdrawn or over)), 0.0)
@@ -127,12 +127,12 @@ def ending(trace: Trace, last: Row, on: Sent, ends: Counter[str]) -> Off:
 
 def judge_decision(trace: Trace, row: Row, last: Row | None, patience: Patience, on: Sent) -> Iterator[Off]:
     """A decision against the rules, from what is known of the UGV before; `patience` is brought up to date."""
-    gate, given, t = trace.scenario["gatekeeper"], row.given, float(row.given["t_s"])
+    gate, given, t = trace.scenario.gatekeeper, row.given, float(row.given["t_s"])
     same = last is not None and last.given["number"] == given["number"]
     standing = str(last.given["decision"]) if same and last is not None else None
     if patience.until is not None and standing != "accept" and last is not None:
-        patience.until, patience.since = None, float(last.given["t_s"]) + gate["period_s"]
-    on_its_own = t - patience.since - gate["rest_s"]
+        patience.until, patience.since = None, float(last.given["t_s"]) + gate.period_s
+    on_its_own = t - patience.since - gate.rest_s
     if patience.until is None and on_its_own >= -TIME_TOLERANCE_S:
         certain = on_its_own > TIME_TOLERANCE_S
         accepts = given["decision"] == "accept" and standing is None
@@ -146,14 +146,14 @@ def judge_decision(trace: Trace, row: Row, last: Row | None, patience: Patience,
     elif standing == "refuse":
         answer = ("refuse", "kept")
     else:
-        answer = ("refuse", "exhausted") if patience.tries >= gate["tries"] else _by_outcome(row, on)
+        answer = ("refuse", "exhausted") if patience.tries >= gate.tries else _by_outcome(row, on)
         if answer[0] == "accept":
-            end = min(float(on.times_s[-1]), t + gate["longest_s"])
+            end = min(float(on.times_s[-1]), t + gate.longest_s)
             patience.tries, patience.since, patience.until = patience.tries + 1, t, end
     theirs = (given["decision"], given["reason"])
     yield Off(row, "answer or reason", float(answer != theirs), 0.0, recomputed=list(answer), standing=standing)
     yield Off(row, "tries", given["tries"] - patience.tries, 0.0, recomputed=patience.tries)
-    yield Off(row, "tries: more than allowed", max(0.0, given["tries"] - gate["tries"]), 0.0)
+    yield Off(row, "tries: more than allowed", max(0.0, given["tries"] - gate.tries), 0.0)
 
 
 def _by_outcome(row: Row, on: Sent) -> tuple[str, str]:

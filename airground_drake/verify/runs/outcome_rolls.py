@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
+from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.runs.beginnings import Beginning, beginning
 from airground_drake.verify.runs.closed_loops import Scene, in_batches, roll_out, stacked
 from airground_drake.verify.runs.proposals import Sent
@@ -68,7 +69,7 @@ def _all_foreseen(
 
 def _rolled_out(trace: Trace, begun: Sequence[Beginning]) -> list[tuple[Foreseen, Foreseen]]:
     """What comes of refusing and of accepting, for some decisions."""
-    h, scenes = trace.scenario["control"]["period_s"], [each.refused for each in begun]
+    h, scenes = trace.scenario.control.period_s, [each.refused for each in begun]
     scenes += [each.accepted for each in begun]
     goal, settled = np.array([each.goal for each in begun] * 2), np.array([each.settled for each in begun] * 2)
     loops, lasting = stacked(scenes), np.array([len(one.executed) for one in scenes])
@@ -92,13 +93,13 @@ def _followed(trace: Trace, loops: Scene, goal: Array, settled: Counts, lasting:
         settled: periods after which each may be over, (R,).
         lasting: periods after which it is, (R,).
     """
-    second = max(1, round(1.0 / trace.scenario["control"]["period_s"]))
+    second = max(1, round(1.0 / trace.scenario.control.period_s))
     ways, done, still = [loops.here], lasting, np.minimum(STILL_M, loops.limit / 10.0)
     for k, place in enumerate(roll_out(trace, loops)):
         ways.append(place)
         if k < settled.min():
             continue
-        home = np.linalg.norm(goal - place, axis=1) < trace.scenario["arrival_tolerance_m"]
+        home = np.linalg.norm(goal - place, axis=1) < trace.scenario.arrival_tolerance_m
         moved = np.linalg.norm(place - ways[k + 1 - second], axis=1) if k + 1 >= second else np.full(len(place), np.inf)
         resting = (home | (moved < 0.1 * still)) & (k >= settled)
         done = np.where(resting, np.minimum(done, k + 1), done)
@@ -107,10 +108,10 @@ def _followed(trace: Trace, loops: Scene, goal: Array, settled: Counts, lasting:
     return np.array(ways), done
 
 
-def _concluded(scenario: dict[str, Any], begun: Beginning, places: Array, integral: float) -> Foreseen:
+def _concluded(scenario: Scenario, begun: Beginning, places: Array, integral: float) -> Foreseen:
     end = places[-1]
-    if np.linalg.norm(end - begun.goal) <= scenario["arrival_tolerance_m"]:
+    if np.linalg.norm(end - begun.goal) <= scenario.arrival_tolerance_m:
         return Foreseen(places, False, integral, 0.0, 0.0)
-    before = places[max(0, len(places) - 1 - max(1, round(1.0 / scenario["control"]["period_s"])))]
+    before = places[max(0, len(places) - 1 - max(1, round(1.0 / scenario.control.period_s)))]
     stalls = bool(np.linalg.norm(end - before) < min(STILL_M, float(begun.refused.limit) / 10.0))
     return Foreseen(places, stalls, integral, *bounds_of_way_left(end, begun.goal, *begun.known))

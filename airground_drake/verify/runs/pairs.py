@@ -10,8 +10,8 @@ import numpy as np
 
 from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
-from airground_drake.verify.engines.boxes import apart_at_least, boxes_of
-from airground_drake.verify.engines.segments import MERGE_S, interpolate
+from airground_drake.scenarios.plants import plant_of
+from airground_drake.verify.engines.geometry import MERGE_S, apart_at_least, boxes_of, interpolate
 
 
 class Pair(NamedTuple):
@@ -41,15 +41,15 @@ def pairs_of(trace: Trace) -> tuple[Pair, ...]:
 
 
 def _pairs_of(trace: Trace) -> Iterator[Pair]:
-    safe, uav, radius = trace.scenario["safe_distance"], trace.scenario["uav"]["name"], radii_of(trace)
-    limit, period = speed_limits(trace), float(trace.scenario["control"]["period_s"])
+    safe, uav, radius = trace.scenario.safe_distance, trace.scenario.uav.name, radii_of(trace)
+    limit, period = speed_limits(trace), trace.scenario.control.period_s
     for robot in trace.robots:
-        for obstacle in trace.scenario["obstacles"]:
-            distance = safe["obstacle_m"] + (radius[robot] + radius[obstacle])
+        for obstacle in trace.scenario.obstacles:
+            distance = safe.obstacle_m + (radius[robot] + radius[obstacle])
             yield Pair(robot, obstacle, distance, 1.0, limit[robot] * period)
     for robot, other in combinations(trace.robots, 2):
-        kind = "air_ground_m" if uav in (robot, other) else "ugv_m"
-        distance = safe[kind] + (radius[robot] + radius[other])
+        apart = safe.air_ground_m if uav in (robot, other) else safe.ugv_m
+        distance = apart + (radius[robot] + radius[other])
         yield Pair(robot, other, distance, 0.5, (limit[robot] + limit[other]) * period)
 
 
@@ -63,7 +63,16 @@ def _apart_of(trace: Trace) -> Array:
     number = {name: k for k, name in enumerate(places)}
     boxes = boxes_of(np.stack([np.broadcast_to(place, (len(trace.t), 3)) for place in places.values()]))
     first, second = (np.array([number[name] for name in names], dtype=np.intp) for names in _sides(pairs))
-    return apart_at_least(boxes, first, second)
+    off = np.array([off_m_of(trace, name) for name in places])
+    return apart_at_least(boxes, first, second) - (off[first] + off[second])
+
+
+def off_m_of(trace: Trace, name: str) -> float:
+    """How far a body may be from the straight line between its positions at two rows, m."""
+    if name not in trace.robots:
+        return 0.0
+    position = trace.position(name)
+    return plant_of(trace.scenario.robots[name]).motion(position[:-1], position[1:], np.diff(trace.t)).off_m
 
 
 def least_of(bounds: Array, most: int, value: Callable[[int], float]) -> list[int]:
@@ -89,7 +98,7 @@ def near_pairs(trace: Trace) -> tuple[Pair, ...]:
     """The pairs, in their order, that may come within sensing range of each other: no other has an inequality."""
 
     def chosen() -> tuple[Pair, ...]:
-        near = apart_of(trace) <= trace.scenario["control"]["sensing_range_m"]
+        near = apart_of(trace) <= trace.scenario.control.sensing_range_m
         return tuple(pair for pair, is_near in zip(pairs_of(trace), near.tolist(), strict=True) if is_near)
 
     return trace.derived("near", chosen)
@@ -111,28 +120,26 @@ def around(trace: Trace, robot: str) -> list[tuple[str, Pair]]:
 
 def radii_of(trace: Trace) -> dict[str, float]:
     """Radius of each robot and obstacle, m."""
-    robots = {**trace.scenario["ugvs"], trace.scenario["uav"]["name"]: trace.scenario["uav"]}
-    return {name: float(body["radius_m"]) for name, body in {**robots, **trace.scenario["obstacles"]}.items()}
+    return {name: body.radius_m for name, body in trace.scenario.bodies.items()}
 
 
 def speed_limits(trace: Trace) -> dict[str, float]:
     """Maximum speed of each robot, m/s."""
-    robots = {**trace.scenario["ugvs"], trace.scenario["uav"]["name"]: trace.scenario["uav"]}
-    return {name: float(robot["max_speed_m_s"]) for name, robot in robots.items()}
+    return {name: robot.max_speed_m_s for name, robot in trace.scenario.robots.items()}
 
 
 def preset_of(trace: Trace, ugv: str) -> tuple[Array, float]:
     """Corners of a UGV's preset trajectory, (m, 3), m, and its speed along them, m/s."""
-    preset = trace.scenario["ugvs"][ugv]["preset"]
-    return np.asarray(preset["waypoints_m"], dtype=np.float64), float(preset["speed_m_s"])
+    preset = trace.scenario.ugvs[ugv].preset
+    return np.asarray(preset.waypoints_m, dtype=np.float64), preset.speed_m_s
 
 
 def places_of(trace: Trace) -> dict[str, Array]:
     """Positions by name, m: (T, 3) of a robot, (3,) of an obstacle, whether the UAV knows it or not."""
 
     def found() -> dict[str, Array]:
-        obstacles = trace.scenario["obstacles"]
-        at_rest = {name: np.asarray(o["position_m"], dtype=np.float64) for name, o in obstacles.items()}
+        obstacles = trace.scenario.obstacles
+        at_rest = {name: np.asarray(o.position_m, dtype=np.float64) for name, o in obstacles.items()}
         return at_rest | {robot: trace.position(robot) for robot in trace.robots}
 
     return trace.derived("places", found)

@@ -11,10 +11,9 @@ from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError
 from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
-from airground_drake.verify.engines.segments import interpolate
+from airground_drake.verify.engines.geometry import interpolate
 from airground_drake.verify.runs.control_law import selected
-from airground_drake.verify.runs.control_samples import control_samples
-from airground_drake.verify.runs.interventions import GATED_METHODS
+from airground_drake.verify.runs.instants import GATED_METHODS, control_samples
 
 
 class Answer(NamedTuple):
@@ -164,7 +163,7 @@ def accepted_at(trace: Trace, ugv: str) -> list[Sent | None]:
 
 def _accepted_at(trace: Trace, ugv: str) -> list[Sent | None]:
     mine = [sent for sent in proposals_of(trace) if sent.ugv == ugv]
-    samples = trace.t[control_samples(trace.t, trace.scenario["control"]["period_s"])]
+    samples = trace.t[control_samples(trace.t, trace.scenario.control.period_s)]
     found: list[Sent | None] = []
     for now in samples.tolist():
         here = [sent for sent in mine if _in_force(trace, sent, now) and _is_executed(trace, sent, now)]
@@ -174,7 +173,7 @@ def _accepted_at(trace: Trace, ugv: str) -> list[Sent | None]:
 
 def _in_force(trace: Trace, sent: Sent, now: float) -> bool:
     """Whether a proposal was in force after the last planning instant up to `now`, s."""
-    period = trace.scenario["intervention"]["period_s"]
+    period = trace.scenario.intervention.period_s
     planned = period * np.floor(now / period + 1e-6) + TIME_TOLERANCE_S
     return bool(sent.issued_s <= planned < withdrawn_s(trace, sent))
 
@@ -192,7 +191,7 @@ def _is_executed(trace: Trace, sent: Sent, now: float) -> bool:
 
 def _answer_at(trace: Trace, sent: Sent, now: float) -> Answer | None:
     """What the last sample of the gatekeeper up to `now`, s, decided about a proposal, if anything."""
-    period = trace.scenario["gatekeeper"]["period_s"]
+    period = trace.scenario.gatekeeper.period_s
     asked = period * np.floor(now / period + 1e-6)
     answers = answers_to(trace, sent)
     k = int(np.searchsorted([answer.t_s for answer in answers], asked - TIME_TOLERANCE_S))
@@ -235,7 +234,7 @@ def withdrawn_s(trace: Trace, sent: Sent, *, unless_replaced: bool = False) -> f
 
 def _over(trace: Trace, sent: Sent, unless_replaced: bool = False) -> tuple[float, bool]:
     """When a proposal is taken back whatever becomes of other parts, s, and whether the UAV has its refusal then."""
-    t, period = trace.t, trace.scenario["intervention"]["period_s"]
+    t, period = trace.t, trace.scenario.intervention.period_s
     called = (trace.column(f"{sent.ugv}.mode") == 1.0) | (trace.column(f"{sent.cause}.mode") == 1.0)
     later = [one.issued_s for one in proposals_of(trace) if one.ugv == sent.ugv and one.issued_s > sent.issued_s]
     replaced = np.inf if unless_replaced else min(later, default=np.inf)

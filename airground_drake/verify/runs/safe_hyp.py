@@ -17,14 +17,15 @@ import numpy as np
 import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
+from airground_drake.base.exact import decimal
 from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S, TraceClaim
-from airground_drake.verify.engines.segments import interpolate
+from airground_drake.verify.engines.geometry import interpolate
 from airground_drake.verify.engines.shortfalls import SCREEN_M, rounded_up, shortage, shortfalls
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.control_law import inequalities_of, spare
-from airground_drake.verify.runs.control_samples import chosen_at, samples_of
 from airground_drake.verify.runs.demands import differences
+from airground_drake.verify.runs.instants import chosen_at, samples_of
 from airground_drake.verify.runs.pairs import (
     DISTANCE_TOLERANCE_M,
     Pair,
@@ -208,13 +209,8 @@ def _listed(trace: Trace, one: Guarantee) -> dict[str, Any]:
 
 def _gain(trace: Trace) -> Fraction:
     """a = min(A h, 1), of the numbers as they are written."""
-    control = trace.scenario["control"]
-    return min(_written(control["avoidance_gain_1_s"]) * _written(control["period_s"]), Fraction(1))
-
-
-def _written(number: float) -> Fraction:
-    """A number of the scenario as it is written: 0.1 is a tenth."""
-    return Fraction(repr(float(number)))
+    control = trace.scenario.control
+    return min(decimal(control.avoidance_gain_1_s) * decimal(control.period_s), Fraction(1))
 
 
 def guarantees(trace: Trace) -> list[Guarantee]:
@@ -226,7 +222,7 @@ def guarantees(trace: Trace) -> list[Guarantee]:
 
 
 def _guarantees(trace: Trace) -> Iterator[Guarantee]:
-    samples, period = np.append(samples_of(trace), len(trace.t) - 1), trace.scenario["control"]["period_s"]
+    samples, period = np.append(samples_of(trace), len(trace.t) - 1), trace.scenario.control.period_s
     lasting = float(trace.t[samples[-1]] - trace.t[samples[-2]])
     last = Fraction(1) if abs(lasting - period) <= TIME_TOLERANCE_S else Fraction(lasting) / Fraction(period)
     places = {name: p if p.ndim == 1 else p[samples] for name, p in places_of(trace).items()}
@@ -275,14 +271,14 @@ def _binding(trace: Trace) -> tuple[int, dict[str, int]]:
 
 def _static(trace: Trace) -> Iterator[_Hypothesis]:
     """Hypotheses on the scenario and the start: gain, sensing range, distances at t = 0."""
-    control, places, limit = trace.scenario["control"], places_of(trace), speed_limits(trace)
-    period, reach = _written(control["period_s"]), _written(control["sensing_range_m"])
-    stable = np.array([float(1 - _written(control["avoidance_gain_1_s"]) * period)])
+    control, places, limit = trace.scenario.control, places_of(trace), speed_limits(trace)
+    period, reach = decimal(control.period_s), decimal(control.sensing_range_m)
+    stable = np.array([float(1 - decimal(control.avoidance_gain_1_s) * period)])
     yield _Hypothesis("gain: A h <= 1", "1", trace.t[:1], stable, 0.0, {})
 
     @cache
     def room(safe: float, *speeds: float) -> float:
-        return float(reach - _written(safe) - sum(map(_written, speeds)) * period)
+        return float(reach - decimal(safe) - sum(map(decimal, speeds)) * period)
 
     order = {robot: k for k, robot in enumerate(trace.robots)}
     starts = {name: place if place.ndim == 1 else place[0] for name, place in places.items()}
@@ -300,7 +296,7 @@ def _static(trace: Trace) -> Iterator[_Hypothesis]:
 
 def _sampled(trace: Trace) -> Iterator[_Hypothesis]:
     """Hypotheses at the control samples: their spacing, straight motion between them, speed limits, planar motion."""
-    period, limits, t, samples = trace.scenario["control"]["period_s"], speed_limits(trace), trace.t, samples_of(trace)
+    period, limits, t, samples = trace.scenario.control.period_s, speed_limits(trace), trace.t, samples_of(trace)
     spacing = np.diff(np.append(t[samples], t[-1]))
     yield _Hypothesis("sampling", "s", t[samples], period - spacing, TIME_TOLERANCE_S, {})
     ends = np.append(samples, len(t) - 1)

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
 from functools import cache, partial
-from typing import Any
 
 import numpy as np
 
 from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TraceClaim
-from airground_drake.verify.engines.segments import closest_approach
+from airground_drake.verify.engines.geometry import closest_approach
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.pairs import (
     DISTANCE_TOLERANCE_M,
     Pair,
     apart_of,
     least_of,
+    off_m_of,
     pairs_of,
     places_of,
     snapshot,
@@ -60,40 +61,51 @@ class SafeTrace(TraceClaim):
     def check(self, trace: Trace) -> Finding:
         """Compare the minimum distance of each pair with its safe distance; the worst pair gives the margin."""
         pairs = pairs_of(trace)
-        entry = cache(partial(_entry, trace.t, places_of(trace), pairs))
+        entry = cache(partial(_entry, trace, places_of(trace), pairs))
         least = apart_of(trace) - np.array([pair.safe_m for pair in pairs])
-        listed = [entry(k) for k in least_of(least, MOST_LISTED, lambda k: float(entry(k)["margin_m"]))]
+        listed = [entry(k) for k in least_of(least, MOST_LISTED, lambda k: entry(k).margin_m)]
         close_by = np.flatnonzero(least < np.array([pair.reach_m for pair in pairs])).tolist()
-        worst = min(listed, key=lambda entry: float(entry["margin_m"]))
-        safe = worst["margin_m"] >= -DISTANCE_TOLERANCE_M
+        worst = min(listed, key=lambda entry: entry.margin_m)
+        safe = worst.margin_m >= -DISTANCE_TOLERANCE_M
+        both = (worst.first, worst.second)
         return Finding(
             "holds" if safe else "refuted",
-            margin=worst["margin_m"],
+            margin=worst.margin_m,
             unit="m",
             quantity="least distance of a pair less its safe distance",
-            where={key: worst[key] for key in ("first", "second", "t_s")},
-            counterexample=None if safe else worst | snapshot(trace, (worst["first"], worst["second"]), worst["t_s"]),
+            where={"first": worst.first, "second": worst.second, "t_s": worst.t_s},
+            counterexample=None if safe else asdict(worst) | snapshot(trace, both, worst.t_s),
             evidence={
-                "pairs": listed,
+                "pairs": [asdict(each) for each in listed],
                 "pairs_in_all": len(pairs),
                 "tolerance_m": DISTANCE_TOLERANCE_M,
             },
-            exercised=sum(entry(k)["exercised"] for k in close_by),
+            exercised=sum(entry(k).exercised for k in close_by),
         )
 
 
-def _entry(t: Array, places: Mapping[str, Array], pairs: Sequence[Pair], k: int) -> dict[str, Any]:
-    """What there is to say of the k-th pair."""
+@dataclass(frozen=True)
+class Distance:
+    """Where a pair was closest, in row `row`: distances of centres, m, and the time, s.
+
+    It was exercised if one control period at full speed would have broken the safe distance.
+    """
+
+    first: str
+    second: str
+    safe_distance_m: float
+    min_distance_m: float
+    margin_m: float
+    t_s: float
+    row: int
+    exercised: bool
+
+
+def _entry(trace: Trace, places: Mapping[str, Array], pairs: Sequence[Pair], k: int) -> Distance:
+    """Where the k-th pair was closest."""
     pair = pairs[k]
-    nearest = closest_approach(t, places[pair.first], places[pair.second])
+    off_m = off_m_of(trace, pair.first) + off_m_of(trace, pair.second)
+    nearest = closest_approach(trace.t, places[pair.first], places[pair.second], off_m)
     margin = nearest.distance_m - pair.safe_m
-    return {
-        "first": pair.first,
-        "second": pair.second,
-        "safe_distance_m": pair.safe_m,
-        "min_distance_m": nearest.distance_m,
-        "margin_m": margin,
-        "t_s": nearest.t_s,
-        "row": nearest.row,
-        "exercised": bool(margin < pair.reach_m),
-    }
+    reached = bool(margin < pair.reach_m)
+    return Distance(pair.first, pair.second, pair.safe_m, nearest.distance_m, margin, nearest.t_s, nearest.row, reached)

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from airground_drake.run.trace import Trace
+from airground_drake.scenarios.schema import Obstacle
 from airground_drake.verify.claim import TIME_TOLERANCE_S
-from airground_drake.verify.engines.segments import interpolate
+from airground_drake.verify.engines.geometry import interpolate
 from airground_drake.verify.runs.proposals import answers_to, parts_of, proposals_of, withdrawn_s
 
 SENSED_M = 1e-9
@@ -25,8 +26,8 @@ def map_conflicts(trace: Trace) -> Iterator[dict[str, Any]]:
     What comes with an answer the UAV knows from the next planning instant on, if the proposal is in force until then.
     """
     scenario = trace.scenario
-    known = [_disc(each) for each in scenario["obstacles"].values() if each["known_to_uav"]]
-    known += [(*map(float, place), 0.0) for place in scenario["uav"]["phantoms_m"]]
+    known = [_disc(each) for each in scenario.obstacles.values() if each.known_to_uav]
+    known += [(*map(float, place), 0.0) for place in scenario.uav.phantoms_m]
     surely, perhaps = _told(trace)
     for sent in proposals_of(trace):
         listed = [tuple(row) for row in np.column_stack([sent.mapped_m, sent.mapped_radius_m]).tolist()]
@@ -70,8 +71,8 @@ def _told(trace: Trace) -> tuple[dict[Disc, float], dict[Disc, float]]:
 
     At a planning instant the UAV reads the last answer before, if the proposal has been in force until then.
     """
-    reach, period = trace.scenario["control"]["sensing_range_m"], trace.scenario["intervention"]["period_s"]
-    discs = [_disc(each) for each in trace.scenario["obstacles"].values()]
+    reach, period = trace.scenario.control.sensing_range_m, trace.scenario.intervention.period_s
+    discs = [_disc(each) for each in trace.scenario.obstacles.values()]
     centres = np.array(discs).reshape(-1, 4)[:, :3]
     surely, perhaps = dict[Disc, float](), dict[Disc, float]()
     for sent in proposals_of(trace):
@@ -92,5 +93,6 @@ def _told(trace: Trace) -> tuple[dict[Disc, float], dict[Disc, float]]:
     return surely, perhaps
 
 
-def _disc(obstacle: dict[str, Any]) -> Disc:
-    return (*map(float, obstacle["position_m"]), float(obstacle["radius_m"]))
+def _disc(obstacle: Obstacle) -> Disc:
+    x, y, z = obstacle.position_m
+    return x, y, z, obstacle.radius_m

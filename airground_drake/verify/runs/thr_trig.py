@@ -12,8 +12,9 @@ import numpy as np
 
 from airground_drake.base.errors import TraceError
 from airground_drake.run.trace import Trace
+from airground_drake.scenarios.schema import Threshold
 from airground_drake.verify.claim import TraceClaim
-from airground_drake.verify.engines.segments import NormSignal
+from airground_drake.verify.engines.geometry import NormSignal
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.triggers import (
     Conflict,
@@ -39,11 +40,11 @@ EVENT_KINDS = {"trigger": "trigger", "release": "release", "refractory": "releas
 """Event that the trace has for a transition."""
 
 
-def _is_root(rule: dict[str, Any], zeta: float) -> bool:
+def _is_root(rule: Threshold, zeta: float) -> bool:
     """Whether zeta, m, solves (19), with c2/c1 on the right or as printed, by the signs of its residual beside it."""
-    ratio = rule["c2"] / rule["c1_1_s"] if rule["rule"] == "bayes" else rule["c1_1_s"] / rule["c2"]
-    level = ratio * (rule["drift_m_s"] / rule["noise_m_sqrt_s"]) ** 2
-    u = [2.0 * side * zeta * rule["drift_m_s"] / rule["noise_m_sqrt_s"] ** 2 for side in (1.0 - 1e-9, 1.0 + 1e-9)]
+    ratio = rule.c2 / rule.c1_1_s if rule.rule == "bayes" else rule.c1_1_s / rule.c2
+    level = ratio * (rule.drift_m_s / rule.noise_m_sqrt_s) ** 2
+    u = [2.0 * side * zeta * rule.drift_m_s / rule.noise_m_sqrt_s**2 for side in (1.0 - 1e-9, 1.0 + 1e-9)]
     return math.sinh(u[0]) + u[0] <= level <= math.sinh(u[1]) + u[1]
 
 
@@ -132,15 +133,15 @@ def levels_of(trace: Trace) -> Levels:
     Raises:
         TraceError: if the recorded threshold is not the scenario's, or not what its rule computes.
     """
-    decision, zeta = trace.scenario["decision"], float(trace.meta["zeta_m"])
-    rule = decision["threshold"]
-    if rule["rule"] == "fixed" and rule["zeta_m"] != zeta:
+    decision, zeta = trace.scenario.decision, float(trace.meta["zeta_m"])
+    rule = decision.threshold
+    if rule.rule == "fixed" and rule.zeta_m != zeta:
         raise TraceError(f"the threshold in force, {zeta} m, is not the scenario's")
-    if rule["rule"] != "fixed" and not _is_root(rule, zeta):
+    if rule.rule != "fixed" and not _is_root(rule, zeta):
         raise TraceError(f"the threshold in force, {zeta} m, is not what the scenario's rule computes")
-    if decision["trigger"] == "bare":
+    if decision.trigger == "bare":
         return Levels(zeta, zeta, 0.0)
-    return Levels(zeta, decision["release_m"], decision["min_inter_event_s"])
+    return Levels(zeta, decision.release_m, decision.min_inter_event_s)
 
 
 def _block(trace: Trace) -> str:

@@ -14,7 +14,7 @@ import numpy as np
 from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
-from airground_drake.verify.engines.segments import NormSignal, corner_times, interpolate, travelled
+from airground_drake.verify.engines.geometry import NormSignal, corner_times, interpolate, travelled
 from airground_drake.verify.runs.pairs import preset_of
 
 Transition = tuple[float, str]
@@ -92,13 +92,13 @@ def noise_conflict(trace: Trace, ugv: str) -> Conflict | None:
     It starts at 0. In each of its periods h one sample w, of standard normal size, is held: between rows n moves at the
     rate s w / sqrt(h) - leak n.
     """
-    given, t, n = trace.scenario["decision"], trace.t, trace.column(f"{ugv}.noise_m")
+    given, t, n = trace.scenario.decision, trace.t, trace.column(f"{ugv}.noise_m")
     if abs(n[0]) > NOISE_TOLERANCE_M:
         return {"t_s": float(t[0]), "what": "noise: does not start at 0", "noise_m": float(n[0])}
-    dt, h = np.diff(t), given["noise_period_s"]
-    moved = np.diff(n) + given["leak_1_s"] * n[:-1] * dt
+    dt, h = np.diff(t), given.noise_period_s
+    moved = np.diff(n) + given.leak_1_s * n[:-1] * dt
     due = dt * _rates(moved, dt, np.floor(0.5 * (t[1:] + t[:-1]) / h))
-    most = LARGEST_SAMPLE * given["noise_m_sqrt_s"] / np.sqrt(h) * dt
+    most = LARGEST_SAMPLE * given.noise_m_sqrt_s / np.sqrt(h) * dt
     off = np.maximum(np.abs(moved - due), np.abs(moved) - most)
     if not (off > NOISE_TOLERANCE_M).any():
         return None

@@ -35,7 +35,7 @@ class ZenoTrace(TraceClaim):
 
     def check(self, trace: Trace) -> Finding:
         """Compare the smallest gap of each UGV with the bound."""
-        bound = float(trace.scenario["decision"]["min_inter_event_s"])
+        bound = float(trace.scenario.decision.min_inter_event_s)
         if bound <= 0.0:
             return Finding("not_run", evidence={"reason": "min_inter_event_s is 0: no bound to compare with"})
         triggers: dict[str, list[float]] = {}
@@ -50,7 +50,7 @@ class ZenoTrace(TraceClaim):
         evidence = {
             "triggers": {ugv: {"count": len(times), "t_s": times} for ugv, times in triggers.items()},
             "bound_s": bound,
-            "most_triggers_possible": int(trace.scenario["duration_s"] / bound) + 1,
+            "most_triggers_possible": int(trace.scenario.duration_s / bound) + 1,
         }
         if not gaps:
             return Finding("holds", evidence=evidence | {"reason": "no UGV was triggered twice"}, exercised=0)

@@ -106,7 +106,7 @@ def claim_proofs(folder: Path, run: str, **distances: Any) -> None:
     of_run = load(trace(folder, run))
     exact = recorded(of_run)
     entry = {
-        "expected": "refuted" not in of_run.scenario["runs"][run]["expected"].get("SAFE-TRACE", ""),
+        "expected": "refuted" not in of_run.scenario.runs[run].expected.get("SAFE-TRACE", ""),
         "meta_sha256": hashlib.sha256((trace(folder, run) / "meta.json").read_bytes()).hexdigest(),
         "rows": len(of_run.t), "pairs": len(exact.demands),
         "distances": {"proved": True, "theorem": f"{exact.name}_keeps_its_distances", "file": f"{exact.name}.v"},

@@ -6,12 +6,12 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from builders.worlds import world
 from hypothesis import given
 from hypothesis import strategies as st
 
 from airground_drake.base.arrays import Array
-from airground_drake.nsbc.avoidance import Avoidance, limit_speed
-from airground_drake.nsbc.team import Team
+from airground_drake.nsbc.avoidance import Avoidance
 from airground_drake.verify.engines import shortfalls as module
 from airground_drake.verify.engines.shortfalls import shortage, shortfalls
 
@@ -97,13 +97,12 @@ def test_teams_under_the_running_law_miss_no_more_than_rounding(seed: int, ugvs:
     grid = rng.permutation([[2.5 * x, 2.5 * y, 0.0] for x in range(4) for y in range(4)])
     starts = np.concatenate([grid[:ugvs], grid[ugvs : ugvs + 1] + np.array([0.0, 0.0, 1.0])])
     obstacles = grid[ugvs + 1 : ugvs + 1 + rocks]
-    team = Team(tuple(f"u{i}" for i in range(ugvs)), "uav", obstacles, 2.0, 1.5, 1.0, rng.uniform(0.5, 5.0, ugvs + 1))
+    team = world(ugvs, obstacles, 2.0, 1.5, 1.0, max_speed=rng.uniform(0.5, 5.0, ugvs + 1).tolist())
     avoidance = Avoidance(gain=float(rng.uniform(1.0, 20.0)), period=h, sensing_range=4.0)
-    around, rows = team.neighbourhood(slice(0, ugvs + 1)), [starts]
+    near, rows = team.around(slice(0, ugvs + 1)), [starts]
     for _ in range(30):
-        spaces = avoidance.half_spaces(rows[-1], team.mobility, around.around(rows[-1]))
-        wish = limit_speed(rng.normal(0.0, 5.0, starts.shape) * team.mobility, team.max_speed)
-        rows.append(rows[-1] + h * avoidance.apply(wish, spaces))
+        wish = rng.normal(0.0, 5.0, starts.shape) * near.mobility
+        rows.append(rows[-1] + h * avoidance.command(wish, rows[-1], near))
     paths = np.stack(rows, axis=1)
     gain = Fraction(avoidance.gain) * Fraction(h)
     for i, path in enumerate(paths):

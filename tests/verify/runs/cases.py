@@ -21,14 +21,6 @@ def fractional_plan(row: dict[str, Any], problem: dict[str, Any]) -> None:
     problem["plan"][3] = 0.5
 
 
-def shift_initial(row: dict[str, Any], problem: dict[str, Any]) -> None:
-    problem["initial_m"][0] += 1e-6
-
-
-def shift_reference(row: dict[str, Any], problem: dict[str, Any]) -> None:
-    problem["reference_m"][-2] -= 1e-6
-
-
 def inflate_loser(row: dict[str, Any], problem: dict[str, Any]) -> None:
     other = {"accept": "refuse", "refuse": "accept"}[row["first_stage"]]
     row[f"objective_{other}"] *= 10.0

@@ -2,27 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
-from builders.misbuilt import MISBUILT, Patch
+from builders.misbuilt import MISBUILT, Patch, distances, neighbours
 
-from airground_drake.base.arrays import Array
 from airground_drake.nsbc.avoidance import Avoidance
-from airground_drake.nsbc.team import Neighbourhood, Team
 from airground_drake.run import simulation
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import load
 from airground_drake.systems import components
 from airground_drake.systems.diagram import Model
 from airground_drake.verify import verify
-
-
-def with_neighbours(change: Callable[[Neighbourhood], Neighbourhood]) -> Patch:
-    right = Team.neighbourhood
-    return lambda patch: patch.setattr(Team, "neighbourhood", lambda self, rows: change(right(self, rows)))
+from airground_drake.world.world import Neighbours
 
 
 def recursive(patch: pytest.MonkeyPatch) -> None:
@@ -31,8 +25,8 @@ def recursive(patch: pytest.MonkeyPatch) -> None:
 
 
 MUTANTS: dict[str, tuple[Patch, str]] = MISBUILT | {
-    "obstacles that are not there": (with_neighbours(lambda g: replace(g, obstacles=g.obstacles + 0.1)), "obstacles_m"),
-    "others in another order": (with_neighbours(lambda g: replace(g, others=g.others[:, ::-1])), "others"),
+    "obstacles that are not there": (neighbours(lambda g: g._replace(still=g.still + 0.1)), "obstacles_m"),
+    "others in another order": (neighbours(lambda g: g._replace(others=g.others[:, ::-1].copy())), "others"),
     "composition": (recursive, "composition"),
 }
 
@@ -56,14 +50,13 @@ def test_a_controller_that_was_built_otherwise_is_refuted(name: str, monkeypatch
 
 
 def test_the_robot_and_what_it_avoids_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    right = Team.pair_distance
+    def wrong(given: Neighbours) -> Neighbours:
+        distance = given.distance.copy()
+        if given.members[0] == 0:
+            distance[0, len(given.still) + np.flatnonzero(given.others[0] == 1)] *= 0.9
+        return given._replace(distance=distance)
 
-    def wrong(self: Team) -> Array:
-        found = right(self)
-        found[0, 1] *= 0.9
-        return found
-
-    found = judged(monkeypatch, lambda patch: patch.setattr(Team, "pair_distance", wrong), "case_b")
+    found = judged(monkeypatch, neighbours(wrong), "case_b")
     assert found == {
         "safe_m": {
             "controller": "ugv_controller", "parameter": "safe_m", "robot": "ugv1", "other": "ugv2", "built": 1.8,
@@ -74,8 +67,8 @@ def test_the_robot_and_what_it_avoids_are_named(monkeypatch: pytest.MonkeyPatch)
 
 def test_shorter_distances_between_robots_are_refuted_in_every_run_of_case_b(monkeypatch: pytest.MonkeyPatch) -> None:
     """In these runs no robots come near each other, so that no distance betrays it."""
-    right = Team.pair_distance
-    monkeypatch.setattr(Team, "pair_distance", lambda self: 0.9 * right(self))
+    distances(0.9, "ugv")(monkeypatch)
+    distances(0.9, "ugv", "uav")(monkeypatch)
     scenario = load("case_b")[0]
     for run in scenario.runs:
         verdict = {
@@ -99,7 +92,7 @@ def test_they_are_read_from_the_controllers_in_the_diagram(monkeypatch: pytest.M
     def wrong(*args: Any, **more: Any) -> Model:
         model = right(*args, **more)
         controller = model.diagram.GetSubsystemByName("task_planning").GetSubsystemByName("ugv_controller")
-        controller._max_speed = 2.0 * controller._max_speed
+        controller._near = controller._near._replace(max_speed=2.0 * controller._near.max_speed)
         return model
 
     monkeypatch.setattr(simulation, "build_model", wrong)

@@ -17,13 +17,12 @@ from airground_drake.intervention import database
 from airground_drake.intervention.messages import accepted_proposals
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc import law
-from airground_drake.nsbc.team import Neighbourhood
 from airground_drake.run.simulation import simulate
-from airground_drake.run.trace import Trace, save
-from airground_drake.run.trace import load as load_trace
+from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Obstacle, Policy, Scenario
 from airground_drake.systems import components, controllers, diagram
+from airground_drake.world.world import Kind, Neighbours, World
 
 Patch = Callable[[pytest.MonkeyPatch], None]
 
@@ -122,21 +121,30 @@ def executed_after_it_is_over(monkeypatch: pytest.MonkeyPatch) -> None:
 def no_avoidance_of_one_ugv(monkeypatch: pytest.MonkeyPatch) -> None:
     honest = law.UgvLaw.velocity
 
-    def velocity(self: Any, positions: Array, near: Neighbourhood, *rest: Any) -> Array:
+    def velocity(self: Any, positions: Array, near: Neighbours, *rest: Any) -> Array:
         distance = near.distance.copy()
         distance[1] = -1e6
-        return honest(self, positions, replace(near, distance=distance), *rest)
+        return honest(self, positions, near._replace(distance=distance), *rest)
 
     monkeypatch.setattr(law.UgvLaw, "velocity", velocity)
 
 
+def no_limit_of(monkeypatch: pytest.MonkeyPatch, kind: Kind) -> None:
+    honest = World.around
+
+    def around(self: World, rows: slice) -> Neighbours:
+        near = honest(self, rows)
+        return near._replace(max_speed=near.max_speed * (1e9 if rows == self.select(kind) else 1.0))
+
+    monkeypatch.setattr(World, "around", around)
+
+
 def no_speed_limit(monkeypatch: pytest.MonkeyPatch) -> None:
-    honest = law.UgvLaw.velocity
-    monkeypatch.setattr(law.UgvLaw, "velocity", lambda *given: honest(*given[:-1], 1e9 * given[-1]))
+    no_limit_of(monkeypatch, "ugv")
 
 
 def no_speed_limit_of_the_uav(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(controllers, "limit_speed", lambda velocity, limit: velocity)
+    no_limit_of(monkeypatch, "uav")
 
 
 def one_direction_only(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -303,10 +311,3 @@ def test_proposals_that_are_none_are_an_error(run: Callable[[str, str], Trace], 
 def test_scripted_motions_are_refuted() -> None:
     """The numpy simulation of the other tests has laws of its own."""
     assert judge("EXEC", run_of("a")).status == "refuted"
-
-
-def test_proposals_are_saved_and_loaded(run: Callable[[str, str], Trace], tmp_path: Any) -> None:
-    trace = run("case_b", "d")
-    save(trace, tmp_path)
-    assert (tmp_path / "proposals.parquet").is_file()
-    assert judge("EXEC", load_trace(tmp_path)) == judge("EXEC", trace)

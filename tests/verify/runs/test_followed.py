@@ -43,7 +43,7 @@ def test_an_obstacle_that_is_sensed_later_is_no_part_of_the_premise(run: Run) ->
     away = np.linalg.norm(trace.position("ugv1") - ahead, axis=1)
     assert away[: rows[0]].min() > 4.0 > away[rows].min()  # the sensing range
     late = {"position_m": ahead.tolist(), "radius_m": 0.0, "known_to_uav": False}
-    beside = with_scenario(trace, obstacles={**trace.scenario["obstacles"], "late": late})
+    beside = with_scenario(trace, obstacles={**trace.meta["scenario"]["obstacles"], "late": late})
     found = only(beside)
     assert (found.new, found.met) == (["late"], False)
 

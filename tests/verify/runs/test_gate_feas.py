@@ -19,8 +19,6 @@ from verify.runs.cases import (
     fractional_plan,
     lighter_slack,
     other_terminal_cost,
-    shift_initial,
-    shift_reference,
     standing_robot,
     task_error,
     without_point,
@@ -33,13 +31,12 @@ from airground_drake.gatekeeper.answer import Rules, settle
 from airground_drake.gatekeeper.solution import Solution
 from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT
 from airground_drake.run.trace import Trace
+from airground_drake.scenarios.schema import Gatekeeper
 from airground_drake.verify.runs import gate_feas
 from airground_drake.verify.runs.gate_record import Row, rows_of
 
 MUTANTS: list[tuple[DecisionEdit, str]] = [  # numbers that are off: test_tolerances.py
     (fractional_plan, "omega is not binary"),
-    (shift_initial, "initial position"),
-    (shift_reference, "reference"),
     (wrong_first_stage, "first stage"),
     (without_point(0), "rock is left out"),
     (without_point(1), "ugv2 is left out"),
@@ -134,7 +131,7 @@ def test_the_rules_are_those_of_the_running_gatekeeper(
     decision = Solution(accept <= refuse, status, objective=min(costs), plan=plan, rounded=first)
     given = {"objective": min(costs), "accept_throughout": kept[0], "refuse_throughout": kept[1]}
     row = Row(given, 1.0, 1.0, 1.0, 0.0, {"plan": plan, "rounded": first})
-    gate = {"switching_margin": margin, "min_dwell_s": 0.2}
+    gate = Gatekeeper(switching_margin=margin, min_dwell_s=0.2)
     stands = {SILENT: None, ACCEPT: "accept", REFUSE: "refuse"}[standing]
     rules = Rules(switching_margin=margin, min_dwell=0.2, first_stage=literal)
     assert gate_feas.rule(row, stands, stood, gate, literal=literal) == settle(decision, kept, standing, stood, rules)

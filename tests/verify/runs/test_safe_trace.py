@@ -33,8 +33,8 @@ def test_safe_trace_sees_every_robot_in_every_pair(robot: str) -> None:
             continue
         other = entry["second"] if robot == entry["first"] else entry["first"]
         row = int(np.searchsorted(trace.t, 9.0))
-        there = trace.scenario["obstacles"].get(other, {}).get("position_m")
-        there = trace.position(other)[row] if there is None else np.array(there)
+        obstacles = trace.scenario.obstacles
+        there = np.array(obstacles[other].position_m) if other in obstacles else trace.position(other)[row]
         offset = there + np.array([0.0, 0.0, entry["safe_distance_m"] - 1e-6]) - trace.position(robot)[row]
         finding = judge("SAFE-TRACE", moved(trace, robot, row, offset.tolist()))
         assert finding.status == "refuted", other

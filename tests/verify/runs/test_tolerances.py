@@ -56,7 +56,7 @@ def at_the_end(robot: str) -> Edit:
 
 def nearer_than_allowed(trace: Trace, by: float) -> Trace:
     """What was the least distance to an obstacle is too little."""
-    distance = trace.scenario["safe_distance"]["obstacle_m"] + of(trace, "SAFE-TRACE").margin + by
+    distance = trace.scenario.safe_distance.obstacle_m + of(trace, "SAFE-TRACE").margin + by
     return with_scenario(trace, safe_distance__obstacle_m=distance)
 
 
@@ -108,8 +108,8 @@ def moves_at_the_end(trace: Trace, by: float) -> Trace:
 
 def barely_in_sight(trace: Trace, by: float) -> Trace:
     """The sensing range does not reach what a refusal has taught the UAV."""
-    known = {tuple(o["position_m"]) for o in trace.scenario["obstacles"].values() if o["known_to_uav"]}
-    (hidden,) = {tuple(o["position_m"]) for o in trace.scenario["obstacles"].values()} - known
+    known = {tuple(o.position_m) for o in trace.scenario.obstacles.values() if o.known_to_uav}
+    (hidden,) = {tuple(o.position_m) for o in trace.scenario.obstacles.values()} - known
     said = [answer for sent in proposals_of(trace) if sent.ugv == "ugv1" for answer in answers_to(trace, sent)]
     refused = [answer.t_s for answer in said if not answer.accepted]
     places = [trace.position("ugv1")[np.argmin(np.abs(trace.t - when))] for when in refused]
@@ -175,7 +175,7 @@ def with_bound(worked_out: Callable[[gate_opt.Bounded, float], float]) -> Edit:
 def faster_than_allowed(trace: Trace, by: float) -> Trace:
     """The last step of the constant plan that refuses, by the speed limit and so much more."""
     row = rows_of(trace)[LATE]
-    limit = trace.scenario["ugvs"][row.given["robot"]]["max_speed_m_s"]
+    limit = trace.scenario.ugvs[row.given["robot"]].max_speed_m_s
 
     def change(given: dict[str, Any], problem: dict[str, Any]) -> None:
         velocity = problem["refuse_m_s"].reshape(-1, 3)
@@ -205,7 +205,7 @@ def longer_way_left(trace: Trace, by: float) -> Trace:
     k = int(np.argmax(decisions["accept_left_m"].to_numpy()))
     given = decisions.iloc[k].to_dict()
     most = foreseen(trace, given, proposals_of(trace))[1].most_left_m
-    speed = trace.scenario["ugvs"][given["robot"]]["preset"]["speed_m_s"]
+    speed = trace.scenario.ugvs[given["robot"]].preset.speed_m_s
     decisions.loc[k, "accept_left_m"] = most + by
     decisions.loc[k, "accept_outcome_m2_s"] += ((most + by) ** 3 - given["accept_left_m"] ** 3) / (3.0 * speed)
     return replace(trace, decisions=decisions)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from builders.worlds import world
 from pydrake.common import RandomGenerator
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import DiagramBuilder
@@ -82,12 +83,12 @@ def running_increments(experiment: PassageExperiment, rows: int) -> np.ndarray:
     given = Decision(noise_m_sqrt_s=experiment.noise, leak_1_s=0.0, noise_period_s=period)
     source, noise = map(builder.AddSystem, make_noise(CHANNELS, given))
     reference = builder.AddNamedSystem("reference", TrajectorySource(stack_presets([away] * CHANNELS), 1))
-    standing = builder.AddNamedSystem("team_position", ConstantVectorSource(np.zeros(3 * (CHANNELS + 1))))
-    variable = builder.AddNamedSystem("decision_variable", DecisionVariable(CHANNELS))
+    standing = builder.AddNamedSystem("bodies", ConstantVectorSource(np.zeros(3 * (CHANNELS + 1))))
+    variable = builder.AddNamedSystem("decision_variable", DecisionVariable(world(CHANNELS)))
     builder.Connect(source.get_output_port(), noise.get_input_port())
     builder.Connect(noise.get_output_port(), variable.GetInputPort("noise"))
     builder.Connect(reference.get_output_port(), variable.GetInputPort("reference"))
-    builder.Connect(standing.get_output_port(), variable.GetInputPort("team_position"))
+    builder.Connect(standing.get_output_port(), variable.GetInputPort("bodies"))
     log = LogVectorOutput(variable.GetOutputPort("decision_variable"), builder, period)
     diagram = builder.Build()
     simulator = Simulator(diagram)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from copy import deepcopy
 from typing import Any
 
 import pytest
+from builders.edits import with_scenario
 from builders.runs import run_of
 from verify.model.threshold.cases import INPUTS, TABLE_1
 
@@ -83,9 +83,9 @@ def test_the_drift_and_the_noise_that_a_run_of_case_a_had(run: Callable[[str, st
 
 
 def test_where_there_is_no_drift_or_noise_there_is_no_optimum() -> None:
-    trace = deepcopy(run_of("d"))
+    trace = run_of("d")
     assert of_run(trace)["d ugv1"]["optimum_for_this_drift_and_noise_m"] > 0.0
-    trace.meta["scenario"]["decision"]["noise_m_sqrt_s"] = 0.0
+    trace = with_scenario(trace, decision__noise_m_sqrt_s=0.0)
     row = of_run(trace)["d ugv1"]
     assert row["optimum_for_this_drift_m"] > 0.0
     assert row["optimum_for_this_drift_and_noise_m"] is None

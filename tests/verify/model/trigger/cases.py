@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from builders.worlds import world
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
 from pydrake.systems.primitives import ConstantVectorSource, Integrator, LogVectorOutput, ZeroOrderHold
@@ -20,12 +21,12 @@ def simulate(system: EventTrigger, noise: LeafSystem, until: float, step: float,
     builder = DiagramBuilder()
     builder.AddNamedSystem("noise", noise)
     builder.AddNamedSystem("event_trigger", system)
-    variable = builder.AddNamedSystem("decision_variable", DecisionVariable(noise.get_output_port().size()))
+    variable = builder.AddNamedSystem("decision_variable", DecisionVariable(world(noise.get_output_port().size())))
     for port in ("decision_variable", "decision_range"):
         builder.Connect(variable.GetOutputPort(port), system.GetInputPort(port))
     count = noise.get_output_port().size()
     reference = np.concatenate([[error_m, 0.0, 0.0] * count, np.zeros(3 * count)])
-    for name, value in (("team_position", np.zeros(3 * count + 3)), ("reference", reference)):
+    for name, value in (("bodies", np.zeros(3 * count + 3)), ("reference", reference)):
         constant = builder.AddNamedSystem(name, ConstantVectorSource(value))
         builder.Connect(constant.get_output_port(), variable.GetInputPort(name))
     builder.Connect(noise.get_output_port(), variable.GetInputPort("noise"))

@@ -17,7 +17,7 @@ from verify.model.trigger.cases import REFINE, simulate, trigger_times
 from airground_drake.decision.trigger import Trigger
 from airground_drake.systems.components import integrated_noise
 from airground_drake.systems.decision import EventTrigger
-from airground_drake.verify.engines.segments import NormSignal
+from airground_drake.verify.engines.geometry import NormSignal
 from airground_drake.verify.model import refined_paths
 from airground_drake.verify.model.refined_paths import experiment
 from airground_drake.verify.runs.triggers import transitions

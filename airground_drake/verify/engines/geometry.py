@@ -1,5 +1,7 @@
 """Exact geometry in continuous time of robots that move on straight lines between the rows of a trace.
 
+Boxes around blocks of rows bound distances from below, so that exact computations are needed for near pairs only.
+
 Times are in s, positions in m in one common frame; T is the number of rows. Row k ends segment k, which joins
 position[k-1] at t[k-1] to position[k] at t[k].
 """
@@ -7,11 +9,14 @@ position[k-1] at t[k-1] to position[k] at t[k].
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 from scipy.optimize import brentq
 
 from airground_drake.base.arrays import Array
+from airground_drake.world.motion import Motion
 
 MERGE_S = 1e-9
 """Rows closer than this are one instant, s: periods that are not binary fractions give simulator steps of
@@ -33,16 +38,14 @@ class Approach:
     row: int
 
 
-def closest_approach(t: Array, first: Array, second: Array) -> Approach:
+def closest_approach(t: Array, first: Array, second: Array, off_m: float = 0.0) -> Approach:
     """Minimum distance between two points that move at the same time on straight segments, as (7) defines D.
-
-    The relative position r(s) = r0 + s (r1 - r0), s in [0, 1], of a segment is closest to the origin at
-    s = clip(-r0.(r1 - r0) / ||r1 - r0||^2, 0, 1), because ||r(s)||^2 is a convex parabola.
 
     Args:
         t: times of the rows, (T,), T >= 1, s, not decreasing.
         first: positions, (T, 3), m.
         second: positions, (T, 3), m, or (3,), m, of a point at rest.
+        off_m: how far from the straight segments both may be, together, m: the minimum is then a lower bound.
 
     Returns:
         The minimum over [t[0], t[-1]], its time and its row.
@@ -50,11 +53,7 @@ def closest_approach(t: Array, first: Array, second: Array) -> Approach:
     relative = first - second
     if len(t) == 1:
         return Approach(float(np.linalg.norm(relative[0])), float(t[0]), 0)
-    begin, step = relative[:-1], np.diff(relative, axis=0)
-    squared = np.einsum("ki,ki->k", step, step)
-    along = -np.einsum("ki,ki->k", begin, step)
-    fraction = np.clip(np.divide(along, squared, out=np.zeros_like(squared), where=squared > 0.0), 0.0, 1.0)
-    distance = np.linalg.norm(begin + fraction[:, None] * step, axis=1)
+    distance, fraction = Motion(relative[:-1], relative[1:], off_m).least_distance()
     k = int(np.argmin(distance))
     instant = min(t[k] + fraction[k] * (t[k + 1] - t[k]), t[k + 1])
     return Approach(float(distance[k]), float(instant), k + 1)
@@ -156,3 +155,38 @@ def _minima(t: Array, parts: Array) -> Array:
     u = towards[inside] / whole[inside]
     found: Array = t[:-1][moving][inside] + u * np.diff(t)[moving][inside]
     return found[u < 1.0]
+
+
+ROWS = 32
+"""Of a block. Between rows a robot moves straight, so on a block it stays in the box around its rows."""
+AT_ONCE = 300_000
+"""Pairs of boxes that are compared together, so that they fit into the memory."""
+ROUNDING_M = 1e-9
+"""What a bound allows for rounding, m: distances up to 1e4 m err by 1e-12 m."""
+
+Indices = npt.NDArray[np.intp]
+
+
+class Boxes(NamedTuple):
+    """Around K things on B blocks: corners (K, B, 3), m."""
+
+    low: Array
+    high: Array
+
+
+def boxes_of(positions: Array) -> Boxes:
+    """Boxes around K things that are at places (K, T, 3), m, at the rows and on straight lines between them."""
+    starts = np.arange(0, max(positions.shape[1] - 1, 1), ROWS)
+    ends = positions[:, np.append(starts[1:], positions.shape[1] - 1)]  # the row at which the next block begins
+    low, high = (side.reduceat(positions, starts, axis=1) for side in (np.minimum, np.maximum))
+    return Boxes(np.minimum(low, ends), np.maximum(high, ends))
+
+
+def apart_at_least(boxes: Boxes, first: Indices, second: Indices) -> Array:
+    """Bounds from below of the distances of P pairs of things, given by their numbers (P,): (P,), m."""
+    found = np.empty(len(first))
+    for some in np.array_split(np.arange(len(first)), len(first) * boxes.low.shape[1] // AT_ONCE + 1):
+        one, other = first[some], second[some]
+        gap = np.maximum(boxes.low[one] - boxes.high[other], boxes.low[other] - boxes.high[one])
+        found[some] = np.sqrt(np.square(np.maximum(gap, 0.0)).sum(axis=2)).min(axis=1)
+    return found - ROUNDING_M

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.verify.model.patience.live_wait import LiveWait
+from airground_drake.verify.model.live_wait import LiveWait
 from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim
 
 

@@ -1,4 +1,4 @@
-"""The control samples of a run: rows at which the controllers chose velocities."""
+"""When things happened in a run: the control samples, and the intervals in which UGVs were intervened on."""
 
 from __future__ import annotations
 
@@ -8,7 +8,10 @@ import numpy.typing as npt
 from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
-from airground_drake.verify.engines.segments import MERGE_S
+from airground_drake.verify.engines.geometry import MERGE_S
+
+GATED_METHODS = ("c", "d")
+"""Methods with an optimising gatekeeper."""
 
 
 def control_samples(t: Array, period: float) -> npt.NDArray[np.intp]:
@@ -21,9 +24,22 @@ def control_samples(t: Array, period: float) -> npt.NDArray[np.intp]:
 
 def samples_of(trace: Trace) -> npt.NDArray[np.intp]:
     """Rows of the control samples of a run, (S,)."""
-    return control_samples(trace.t, trace.scenario["control"]["period_s"])
+    return control_samples(trace.t, trace.scenario.control.period_s)
 
 
 def chosen_at(trace: Trace, samples: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
     """Rows whose commands were chosen at the samples: the command of a row led to it, so it is the row after."""
     return np.searchsorted(trace.t, trace.t[samples] + MERGE_S)
+
+
+def intervening(trace: Trace, ugv: str) -> Array:
+    """Intervals of mode 1, (K, 2), s; the mode of a row is in force since the row before."""
+    inside = np.concatenate([[False], trace.column(f"{ugv}.mode")[1:] == 1.0, [False]])
+    edges = np.flatnonzero(np.diff(inside.astype(np.int8)))
+    return trace.t[edges].reshape(-1, 2)
+
+
+def talk_is_due(trace: Trace, ugv: str) -> bool:
+    """Whether a UGV is intervened on for longer than a proposal and a decision on it take."""
+    periods = trace.scenario.intervention.period_s + trace.scenario.gatekeeper.period_s
+    return bool((np.diff(intervening(trace, ugv)) > periods).any())

@@ -5,8 +5,9 @@ from __future__ import annotations
 from fractions import Fraction
 from typing import Any
 
+from airground_drake.base.exact import decimal
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim, decimal
+from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim
 
 
 class LiveWait(TheoremClaim):

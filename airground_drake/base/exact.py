@@ -1,0 +1,10 @@
+"""Numbers of a scenario as they are written."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+
+def decimal(number: float) -> Fraction:
+    """The decimal number that a float prints as, exactly: 0.1 is 1/10."""
+    return Fraction(repr(float(number)))

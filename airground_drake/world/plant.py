@@ -1,0 +1,49 @@
+"""How a robot moves under a velocity command that is held for a period. `systems.plant` makes its Drake system."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Protocol
+
+import numpy as np
+
+from airground_drake.base.arrays import Array
+from airground_drake.world.motion import Motion
+
+
+class Plant(Protocol):
+    """The motion of a robot, period by period; the leading dimensions (...) are periods.
+
+    Attributes:
+        kind: name under which a scenario and `systems.plant` know it.
+    """
+
+    kind: ClassVar[str]
+
+    def step(self, position: Array, velocity: Array, period_s: Array | float) -> Array:
+        """Where a velocity (..., 3), m/s, leads to in periods (...,), s, from positions (..., 3), m: (..., 3), m."""
+
+    def motion(self, start: Array, end: Array, period_s: Array | float) -> Motion:
+        """How it moves between its positions at the two ends of a period, (..., 3), m."""
+
+    def reach(self, speed_m_s: float, period_s: float) -> float:
+        """Largest distance from the straight line of the commanded velocity in a period, m."""
+
+
+@dataclass(frozen=True)
+class FirstOrder:
+    """p_dot = v: it moves as it is told, on a straight line."""
+
+    kind: ClassVar[str] = "first_order"
+
+    def step(self, position: Array, velocity: Array, period_s: Array | float) -> Array:
+        """Exact."""
+        return position + np.asarray(period_s)[..., None] * velocity
+
+    def motion(self, start: Array, end: Array, period_s: Array | float) -> Motion:
+        """Exact."""
+        return Motion(start, end)
+
+    def reach(self, speed_m_s: float, period_s: float) -> float:
+        """0."""
+        return 0.0

@@ -1,0 +1,44 @@
+"""What room a body takes up."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from airground_drake.base.arrays import Array
+from airground_drake.world.motion import Motion
+
+
+class Shape(Protocol):
+    """A closed convex set that a body fills around its centre."""
+
+    @property
+    def radius_m(self) -> float:
+        """Radius of the smallest ball around the centre that holds it, m."""
+
+    def distance(self, offset: Array) -> Array:
+        """Distance, (...,), m, of its surface from points at offsets (..., 3), m, from its centre."""
+
+    def least_distance(self, motion: Motion) -> Array:
+        """Least such distance, (...,), m, of a point that moves relative to its centre."""
+
+
+@dataclass(frozen=True)
+class Ball:
+    """A ball, of which a robot in the plane is a disc; a point with the default radius. Inside, distances are negative.
+
+    Attributes:
+        radius_m: m.
+    """
+
+    radius_m: float = 0.0
+
+    def distance(self, offset: Array) -> Array:
+        """See `Shape`."""
+        return np.asarray(np.linalg.norm(offset, axis=-1) - self.radius_m)
+
+    def least_distance(self, motion: Motion) -> Array:
+        """See `Shape`."""
+        return motion.least_distance()[0] - self.radius_m

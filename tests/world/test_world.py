@@ -1,0 +1,104 @@
+"""Who keeps what distance from whom, in which order, and how bodies move."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from builders.worlds import world
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from airground_drake.nsbc.avoidance import Avoidance
+from airground_drake.scenarios.load import load
+from airground_drake.scenarios.world import make_world
+from airground_drake.world.motion import Motion
+from airground_drake.world.plant import FirstOrder
+from airground_drake.world.shape import Ball
+from airground_drake.world.world import ROBOTS, World
+
+WORLD = world(
+    ("one", "two"), [[5.0, 0.0, 0.0], [9.0, 0.0, 0.0]], 2.0, 1.5, 1.0,
+    radius=np.array([0.5, 0.25, 0.125]), obstacle_radius=np.array([3.0, 0.0]),
+)  # fmt: skip
+VECTORS = arrays(np.float64, (4, 3), elements=st.floats(-9.0, 9.0))
+
+
+def test_distances_of_a_pair() -> None:
+    near = WORLD.around(WORLD.select(*ROBOTS))
+    assert near.distance.tolist() == [
+        [5.5, 2.5, 2.25, 1.625],  # shelf, point, two, UAV
+        [5.25, 2.25, 2.25, 1.375],
+        [5.125, 2.125, 1.625, 1.375],
+    ]
+    assert WORLD.around(slice(1, 2)).distance.tolist() == [near.distance[1].tolist()]
+    assert near.share.tolist() == [[1.0, 1.0, 0.5, 0.5]] * 3
+
+
+@given(st.lists(st.floats(0.0, 5.0), min_size=5, max_size=5))
+def test_both_of_a_pair_keep_the_same_to_the_bit_and_their_shares_make_one(radii: list[float]) -> None:
+    found = world(2, np.zeros((2, 3)), radius=np.array(radii[:3]), obstacle_radius=np.array(radii[3:]))
+    for one in found.robots:
+        for other in found.names():
+            if one != other:
+                pair = found.pair(one, other)
+                assert sum(pair.shares) == 1.0
+                if other in found.robots:
+                    assert pair.distance_m == found.pair(other, one).distance_m
+
+
+def test_the_world_of_a_scenario_has_its_bodies_in_order() -> None:
+    scenario = load("case_b")[0]
+    found = make_world(scenario)
+    assert found.names() == (*scenario.ugvs, scenario.uav.name, *scenario.obstacles)
+    assert [found.names()[found.select(kind)] for kind in ("ugv", "uav", "obstacle")] == [
+        tuple(scenario.ugvs), (scenario.uav.name,), tuple(scenario.obstacles),
+    ]  # fmt: skip
+    assert [body.name for body in found.moving] == [*scenario.ugvs, scenario.uav.name]
+
+
+@pytest.mark.parametrize(
+    ("bodies", "told"),
+    [
+        (WORLD.bodies[::-1], "in the order"),
+        (WORLD.bodies[:1] * 2, "same name"),
+        ((replace(WORLD.bodies[0], plant=None),), "needs a plant"),
+        ((*WORLD.bodies, replace(WORLD.bodies[-1], name="cart", plant=FirstOrder())), "in the order"),
+    ],
+)
+def test_a_world_in_another_order_is_refused(bodies: tuple, told: str) -> None:
+    with pytest.raises(ValueError, match=told):
+        World(bodies, {})
+
+
+def test_ugvs_stay_on_the_ground_whatever_is_above_them() -> None:
+    """Only the UAV has a third direction; what a UGV avoids from below pushes it sideways at most."""
+    places = np.array([[0.0, 0.0, 0.0], [40.0, 0.0, 0.0], [0.1, 0.0, 1.0]])
+    velocity = Avoidance(gain=3.0, period=0.05).command(np.zeros((3, 3)), places, WORLD.around(slice(0, 3)))
+    assert velocity[0, 0] < -0.1  # away from below the UAV
+    assert velocity[:2, 2].tolist() == [0.0, 0.0]
+    assert velocity[2, 2] > 0.1
+
+
+@given(VECTORS, VECTORS, VECTORS, VECTORS, st.floats(0.0, 2.0))
+def test_no_point_of_two_motions_is_nearer_than_the_least_distance(
+    start: np.ndarray, end: np.ndarray, other: np.ndarray, moved: np.ndarray, off: float
+) -> None:
+    apart = Motion(start, end, off).seen_from(Motion(other, moved))
+    least, share = apart.least_distance()
+    change = apart.end - apart.start
+    for s in np.linspace(0.0, 1.0, 9):
+        assert (np.maximum(np.linalg.norm(apart.start + s * change, axis=-1) - off, 0.0) >= least - 1e-9).all()
+    nearest = np.linalg.norm(apart.start + share[:, None] * change, axis=-1)
+    np.testing.assert_allclose(np.maximum(nearest - off, 0.0), least, atol=1e-12)
+    np.testing.assert_allclose(Ball(1.5).least_distance(apart), least - 1.5)
+
+
+@given(VECTORS, VECTORS, st.floats(1e-3, 1.0))
+def test_a_first_order_plant_moves_as_it_is_told(start: np.ndarray, velocity: np.ndarray, period: float) -> None:
+    plant = FirstOrder()
+    end = plant.step(start, velocity, period)
+    np.testing.assert_allclose(end, start + period * velocity, atol=1e-12)
+    assert plant.motion(start, end, period).off_m == plant.reach(6.0, period) == 0.0
