@@ -6,11 +6,9 @@ from mutation.mutant import Mutant
 
 WIRING = ("tests/hypotheses/test_wiring.py",)
 TRIGGER = (
-    "tests/hypotheses/test_transitions.py",
-    "tests/hypotheses/test_isolation.py",
-    "tests/decision",
+    "tests/hypotheses/test_transitions.py", "tests/hypotheses/test_isolation.py", "tests/decision",
     "tests/systems/test_decision.py",
-)
+)  # fmt: skip
 ATTACKS = ("tests/hypotheses/test_patience_attacks.py",)
 PLANNER = ("tests/intervention",)
 ROUTES = ("tests/gatekeeper/test_dual_bound.py", "tests/gatekeeper/routes/test_contract.py")
@@ -19,26 +17,28 @@ RUNS = "tests/verify/runs"
 WIRINGS = (
     Mutant(
         "safe distance air/ground at 0.9 of its value",
-        "systems/components.py",
-        "make_team",
-        "air_ground_distance=scenario.safe_distance.air_ground_m",
-        "air_ground_distance=0.9 * scenario.safe_distance.air_ground_m",
+        "scenarios/world.py",
+        "make_world",
+        'frozenset(("ugv", "uav")): safe.air_ground_m',
+        'frozenset(("ugv", "uav")): 0.9 * safe.air_ground_m',
     ),
-    Mutant("share 1 for robots", "nsbc/team.py", "Team.neighbourhood", "share[:, m:] = 0.5", "share[:, m:] = 1.0"),
+    Mutant(
+        "share 1 for robots", "world/world.py", "World._share", "np.where(robot, 0.5, 1.0)", "np.where(robot, 1.0, 1.0)"
+    ),
     Mutant(
         "UGVs may leave the ground",
-        "nsbc/team.py",
-        "Team.mobility",
-        "mobility[:-1, 2] = 0.0",
-        "mobility[:0, 2] = 0.0",
+        "world/world.py",
+        "Body.mobility",
+        'if self.kind == "ugv" else',
+        "if False else",
         tests=WIRING,
     ),
     Mutant(
         "robots avoid only what the UAV knows",
-        "systems/components.py",
-        "make_team",
-        "positions([obstacle.position_m for obstacle in scenario.obstacles.values()])",
-        "positions([obstacle.position_m for obstacle in scenario.obstacles.values() if obstacle.known_to_uav])",
+        "scenarios/world.py",
+        "make_world",
+        "for name, each in scenario.obstacles.items()",
+        "for name, each in scenario.obstacles.items() if each.known_to_uav",
     ),
     Mutant(
         "sensing range cut",
@@ -61,18 +61,18 @@ WIRINGS = (
 BODIES = (
     Mutant(
         "obstacles have no radius",
-        "nsbc/team.py",
-        "Team.distance_to",
-        "(self.radii[:, None] + obstacle_radii)",
-        "(self.radii[:, None] + 0.0 * obstacle_radii)",
+        "scenarios/world.py",
+        "make_world",
+        "Ball(each.radius_m)",
+        "Ball(0.0 * each.radius_m)",
         runs=("bodies d", "bodies c"),
     ),
     Mutant(
         "collisions are of centres",
         "run/events.py",
-        "_add_collisions.within",
-        '["collision_m"]) + float(own + body["radius_m"])',
-        '["collision_m"])',
+        "_add_collisions",
+        "within = collision_m + own.shape.radius_m",
+        "within = collision_m",
         runs=("bodies b",),
     ),
     Mutant(
@@ -259,7 +259,7 @@ PROTOCOL = (
 GATEKEEPER = (
     Mutant(
         "the bound is overstated",
-        "gatekeeper/dual_bound.py",
+        "gatekeeper/relaxation.py",
         "_dual_bound",
         "total -= pressure * pressure / (4.0 * ",
         "total -= pressure * pressure / (8.0 * ",
@@ -284,7 +284,7 @@ GATEKEEPER = (
         "obstacles out of sight are forgotten",
         "gatekeeper/outcome_gatekeeper.py",
         "OutcomeGatekeepers._remembered",
-        "return memory.sensed | within(points, own, reach)",
+        "return before.sensed | within(points, own, reach)",
         "return within(points, own, reach)",
         runs=("crowd d",),
         tests=("tests/gatekeeper/test_outcome_gatekeeper.py",),
@@ -302,7 +302,7 @@ GATEKEEPER = (
         "a withdrawal is not noticed before the next proposal",
         "gatekeeper/mpc_gatekeeper.py",
         "Gatekeepers.idle",
-        "return not any(proposals) and not any(memory.answers[::2])",
+        "return not any(proposals) and not any(before.answers[::2])",
         "return not any(proposals)",
         runs=("crowd d",),
         tests=ATTACKS,
@@ -320,8 +320,8 @@ GATEKEEPER = (
         "a UGV rests only where nothing is proposed",
         "gatekeeper/outcome_gatekeeper.py",
         "OutcomeGatekeepers.sample",
-        "            held[i] = self._patience.rested(held[i], t)\n            if proposal is None:\n",
-        "            if proposal is None:\n                held[i] = self._patience.rested(held[i], t)\n",
+        "            held[i] = self._patience.rested(held[i], now.t)\n            if proposal is None:\n",
+        "            if proposal is None:\n                held[i] = self._patience.rested(held[i], now.t)\n",
         runs=("crowd d",),
         tests=ATTACKS,
     ),
