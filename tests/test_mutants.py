@@ -12,7 +12,10 @@ from mutation.mutant import DoesNotApplyError, Mutant
 from mutation.probe import PROBES
 
 ROOT = Path(__file__).resolve().parents[1]
-CORE = {"nsbc", "systems", "decision", "intervention", "gatekeeper", "geometry", "run", "verify", "check"}
+CORE = {
+    "world", "nsbc", "systems", "decision", "intervention", "gatekeeper", "geometry", "run", "scenarios", "verify",
+    "check",
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("mutant", CHOSEN, ids=lambda mutant: mutant.name)

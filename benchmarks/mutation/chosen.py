@@ -11,7 +11,7 @@ TRIGGER = (
 )  # fmt: skip
 ATTACKS = ("tests/hypotheses/test_patience_attacks.py",)
 PLANNER = ("tests/intervention",)
-ROUTES = ("tests/gatekeeper/test_dual_bound.py", "tests/gatekeeper/routes/test_contract.py")
+ROUTES = ("tests/gatekeeper/test_relaxation.py", "tests/gatekeeper/routes/test_contract.py")
 RUNS = "tests/verify/runs"
 
 WIRINGS = (

@@ -19,7 +19,7 @@ from mutation.mutant import PACKAGE, Mutant
 
 RUNNING = (
     "base/arrays.py", "run/events.py", "run/simulation.py",
-    "decision", "gatekeeper", "geometry", "intervention", "nsbc", "systems",
+    "scenarios/world.py", "decision", "gatekeeper", "geometry", "intervention", "nsbc", "systems", "world",
 )  # fmt: skip
 """Files and folders of what produces a run."""
 PICTURES = ("systems/blocks.py", "systems/graphviz.py", "systems/schematic.py")
