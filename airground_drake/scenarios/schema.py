@@ -240,7 +240,7 @@ class Gatekeeper:
     iterations of the solver of a relaxation and 20,000 iterations of the search of `mixed_integer`. With budget
     'counted' that is all: a run is the same on every machine where a decision takes less than 10 s, ten times the
     usual. Budget 'wall_clock', for real time, adds the share `budget_share` of the sampling period by the clock.
-    `terminal_weight_s` is the w of a terminal cost w a ||rho_rd - rho_N||^2 besides (25); the paper has none.
+    `terminal_weight_s` is the w of a terminal cost w a ||rho_rd - rho_N||^2 besides (25); the paper has no such cost.
 
     Under method (d) outcomes are compared instead, `settling_s` past the end of motion and preset trajectory. An
     accepted proposal is executed for `longest_s` at most. A UGV accepts `tries` proposals, and then none until it has
