@@ -327,7 +327,7 @@ LAW = (
     Mutant(
         "the UAV without a speed limit",
         "nsbc/kernels.py",
-        "velocity, centre = limit_speed(lower, near.max_speed), ",
+        "velocity, centre = limit_speed(lower, max_speed), ",
         "velocity, centre = lower.copy(), ",
     ),
     Mutant(
