@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from weakref import ref
 
 from pydrake.systems.framework import Diagram, DiagramBuilder, InputPort, OutputPort, System
 from pydrake.systems.primitives import Demultiplexer, Multiplexer, TrajectorySource
@@ -107,7 +108,20 @@ def build_diagram(
         PluginError: if it names a policy, route or task that cannot be made, or a plant or the decision block has other
             ports.
     """
-    return build_model(validated(scenario), method, composition, plants, monitor, decision_block).diagram
+    diagram = build_model(validated(scenario), method, composition, plants, monitor, decision_block).diagram
+    of = ref(diagram)
+    vars(diagram)["_repr_html_"] = lambda: _picture(of())  # for notebooks
+    return diagram
+
+
+def _picture(diagram: Diagram | None) -> str:
+    """The picture of a diagram; '' once it is gone."""
+    if diagram is None:
+        return ""
+    from airground_drake.systems import graphviz  # which builds diagrams itself
+
+    drawn = graphviz.svg(graphviz.dot(diagram))
+    return drawn[drawn.index("<svg") :]
 
 
 def build_model(
