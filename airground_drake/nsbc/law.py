@@ -65,6 +65,8 @@ class UgvLaw:
 
     def with_gains(self, avoidance: float, motion: float, intervention: float) -> UgvLaw:
         """The law with other gains, 1/s."""
+        if (avoidance, motion, intervention) == (self.avoidance.gain, self.motion_gain, self.intervention_gain):
+            return self
         layer = replace(self.avoidance, gain=avoidance)
         return replace(self, avoidance=layer, motion_gain=motion, intervention_gain=intervention)
 
