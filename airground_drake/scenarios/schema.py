@@ -236,11 +236,11 @@ class Gatekeeper:
 
     Under method (c) a decision on a proposal is reversed only for a plan that is cheaper by the (relative) switching
     margin, and not before `min_dwell_s` have passed. That is ours: by the paper's own rule, `first_stage`, the first
-    stage of each plan is executed, whatever was answered before. A decision may take `budget_iterations` of the solver
-    of a relaxation and 20,000 iterations of the search of `mixed_integer` (budget 'counted': a run is the same on every
-    machine on which these take less than 10 s, ten times what they take), or besides the share `budget_share` of the
-    sampling period by the clock (budget 'wall_clock': for real time). `terminal_weight_s` is the w of a terminal cost
-    w a ||rho_rd - rho_N||^2 besides (25); the paper has none.
+    stage of each plan is executed, without regard to earlier answers. A decision may take `budget_iterations`
+    iterations of the solver of a relaxation and 20,000 iterations of the search of `mixed_integer`. With budget
+    'counted' that is all: a run is the same on every machine where a decision takes less than 10 s, ten times the
+    usual. Budget 'wall_clock', for real time, adds the share `budget_share` of the sampling period by the clock.
+    `terminal_weight_s` is the w of a terminal cost w a ||rho_rd - rho_N||^2 besides (25); the paper has no such cost.
 
     Under method (d) outcomes are compared instead, `settling_s` past the end of motion and preset trajectory. An
     accepted proposal is executed for `longest_s` at most. A UGV accepts `tries` proposals, and then none until it has
@@ -363,7 +363,7 @@ class Choice:
 class Scenario:
     """A scenario file. The order of `ugvs` and `obstacles` is the order of all arrays.
 
-    `expected` maps identifiers of claims about the model (proofs and experiments, whatever the run) to the
+    `expected` maps identifiers of claims about the model (proofs and experiments, the same for all runs) to the
     expected verdict; one that is not named must be proved, or supported if it is statistical. `claims` adds claims
     to those of the package: `module:Class` or `file.py:Class` by identifier.
     """
