@@ -41,8 +41,8 @@ CLAIMS = (
     Mutant(
         "claims forget radii",
         "verify/runs/pairs.py",
-        'float(body["radius_m"]) for name',
-        '0.0 * float(body["radius_m"]) for name',
+        "name: body.radius_m for name",
+        "name: 0.0 * body.radius_m for name",
         runs=("bodies d",),
     ),
     Mutant(
@@ -59,7 +59,7 @@ CLAIMS = (
         "held = gap >= bound - TIME_TOLERANCE_S",
         "held = gap >= 0.5 * bound",
         runs=BOTH,
-        tests=(f"{RUNS}/test_zeno_trace.py",),
+        tests=(f"{RUNS}/test_zeno_trace.py", f"{RUNS}/test_tolerances.py"),
     ),
     Mutant(
         "THR-TRIG allows 0.1 s",
@@ -67,7 +67,7 @@ CLAIMS = (
         "EVENT_TOLERANCE_S = 1e-5",
         "EVENT_TOLERANCE_S = 0.1",
         runs=BOTH,
-        tests=(f"{RUNS}/test_thr_trig.py",),
+        tests=(f"{RUNS}/test_thr_trig.py", f"{RUNS}/test_tolerances.py"),
     ),
     Mutant(
         "THR-TRIG ignores the mode",

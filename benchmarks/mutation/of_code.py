@@ -131,8 +131,8 @@ BODIES = (
     Mutant(
         "collisions are of centres",
         "run/events.py",
-        '["collision_m"]) + float(own + body["radius_m"])',
-        '["collision_m"])',
+        "safe_distance.collision_m + (own + body.radius_m)",
+        "safe_distance.collision_m",
         runs=("bodies b",),
     ),
     Mutant(
