@@ -1,4 +1,4 @@
-"""What can be named in a scenario or on the command line: each name is declared here, once.
+"""Every name that a scenario or command line can use, declared once.
 
 Validation, command line, report and documentation look names up here; what a name stands for is imported when it
 is used. A registry also knows what installed packages add through entry points, and takes `module:Class` for
@@ -76,11 +76,11 @@ class Registry:
         return name in self or is_plugin(name)
 
     def is_foreign(self, name: str) -> bool:
-        """Whether a name stands for code of others that is to be imported: neither the package's own nor added here."""
+        """Whether a name stands for third-party code: neither the package's own nor added here."""
         return name not in self._own and name not in self._added
 
     def says(self, name: str) -> str:
-        """What a registered class says of itself in a line; its module is read, not imported (packages above it are).
+        """One line about a registered class. Its module is read, not imported (packages above it are).
 
         Returns:
             Its `summary` if it is a claim that has one, else the first line of its docstring; '' if there is neither.
@@ -88,7 +88,7 @@ class Registry:
         if name in self._added:
             return (self._added[name].__doc__ or "").strip().partition("\n")[0]
         module, _, attribute = {**self._own, **_entry_points(self.group)}[name].partition(":")
-        with suppress(Exception):  # whatever an installed package does when it is looked for
+        with suppress(Exception):  # an installed package may raise anything
             spec = importlib.util.find_spec(module)
             tree = ast.parse(Path(spec.origin or "").read_bytes()) if spec else ast.Module([], [])
             for node in tree.body:
@@ -117,7 +117,7 @@ class Registry:
                 found = getattr(_imported(module), attribute)
             except KeyboardInterrupt:
                 raise
-            except BaseException as error:  # a module of others may raise anything when it is imported
+            except BaseException as error:  # a third-party module may raise anything when it is imported
                 looked = f"; looked in {_places()}" if isinstance(error, ModuleNotFoundError) else ""
                 raise PluginError(f"{self.kind} {name!r} cannot be imported: {described(error)}{looked}") from None
         if not (isinstance(found, type) and issubclass(found, of)):
@@ -142,7 +142,7 @@ class Registry:
 
     @contextmanager
     def adding(self, name: str, what: type) -> Iterator[None]:
-        """Have a class under a name for the time being (in a notebook, a benchmark or a test)."""
+        """Register a class under a name within a block (in a notebook, a benchmark or a test)."""
         before = self._added.get(name)
         self._added[name] = what
         try:
@@ -154,7 +154,7 @@ class Registry:
 
 
 def _misfit(kind: type, parameters: Mapping[str, Any]) -> str:
-    """Why a class does not take these parameters, and which it takes; '' if it takes them, or cannot be asked."""
+    """Why a class refuses these parameters, and which it takes; '' if it takes them, or has no signature."""
     try:
         signature = inspect.signature(kind)
     except (TypeError, ValueError):
@@ -177,7 +177,7 @@ def _imported(module: str) -> ModuleType:
     """A module by its name, or by that of a file in a folder of Python's path, the last of these first.
 
     Raises:
-        ModuleNotFoundError: if there is none.
+        ModuleNotFoundError: if it does not exist.
         BaseException: whatever the module raises.
     """
     if not module.endswith(".py"):
@@ -205,14 +205,14 @@ def _executed(path: Path) -> ModuleType:
 
 
 def _places() -> str:
-    """Python's path in words: the folders that somebody has added, the last of them first, then Python's own."""
+    """Python's path in words: added folders, the last one first, then Python's own."""
     own = tuple({sys.prefix, sys.base_prefix})
     added = [os.path.abspath(folder) for folder in reversed(sys.path) if not folder.startswith(own)]
     return ", ".join([*dict.fromkeys(added), "Python's own folders"])
 
 
 def _summary(of: ast.ClassDef) -> str:
-    """The text of `summary = "..."` in a class; '' if there is none."""
+    """The text of `summary = "..."` in a class; '' if it has none."""
     for node in of.body:
         if isinstance(node, ast.Assign) and [ast.unparse(target) for target in node.targets] == ["summary"]:
             return str(ast.literal_eval(node.value))
@@ -357,4 +357,4 @@ MODEL_CLAIMS = Registry(
         "THR-DDM": "airground_drake.verify.model.thr_ddm:ThrDdm",
     },
 )
-"""Claims about the model, whatever the run, in the order of the report: subclasses of `verify.claim.ModelClaim`."""
+"""Claims about the model, in the order of the report: subclasses of `verify.claim.ModelClaim`."""

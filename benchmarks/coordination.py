@@ -20,7 +20,7 @@ from airground_drake.base.arrays import Array
 from airground_drake.intervention.coordinate import warm_up
 from airground_drake.intervention.coordination.joint import plan
 from airground_drake.intervention.coordination.roadmap import RobotTask, Space
-from airground_drake.intervention.coordination.timed import at_rest, distance, distance_to_point
+from airground_drake.intervention.coordination.timed import at_rest, distance
 
 D = 2.0
 """Safe distance to obstacles and between robots, m."""
@@ -81,7 +81,7 @@ def main() -> int:
             orders, intervals = max(orders, found.orders), max(intervals, found.expansions)
             motions = [at_rest(e.start) if w is None else w.motion for w, e in zip(found.ways, tasks, strict=True)]
             apart = min(apart, *(distance(one, other) for one, other in combinations(motions, 2)))
-            clear = min(clear, *(distance_to_point(motion, point) for motion in motions for point in space.centres))
+            clear = min(clear, *(distance(motion, at_rest(point)) for motion in motions for point in space.centres))
         failed |= min(apart, clear) < D - TOLERANCE_M
         p50, p90 = np.quantile(times, [0.5, 0.9], method="higher")
         share = f"{moved}/{count * options.number}"

@@ -31,13 +31,11 @@ import cvxpy
 import numpy as np
 
 from airground_drake.gatekeeper.budget import Budget
-from airground_drake.gatekeeper.half_planes import normals_along
-from airground_drake.gatekeeper.outcome import Other, Outlook, outcomes
+from airground_drake.gatekeeper.outcome import Outlook, outcomes
 from airground_drake.gatekeeper.problem import Horizon, Problem, predicted_problem
-from airground_drake.gatekeeper.rollout import Scene
-from airground_drake.gatekeeper.rounding import sum_up_rounding
+from airground_drake.gatekeeper.relaxation import normals_along, sum_up_rounding
+from airground_drake.gatekeeper.rollout import View
 from airground_drake.gatekeeper.routes.mixed_integer import MixedIntegerRoute
-from airground_drake.gatekeeper.routes.nonlinear import NonlinearRoute
 from airground_drake.gatekeeper.routes.relaxed import RelaxedRoute
 from airground_drake.gatekeeper.routes.route import Route
 from airground_drake.gatekeeper.solution import ConstantPlans, Solution, cheapest
@@ -60,7 +58,7 @@ COLUMNS = ("problems", "ugvs", "points", "stages", "route", "decisions", "p50_ms
 DEFAULT = "mixed_integer"
 RULE = 1e-3
 """What the default route may miss, relative."""
-SLOW = {"nonlinear_ipopt": 60, "cvxpy+scip": 60}
+SLOW = {"cvxpy+scip": 60}
 """Most stages, and one in ten solutions, for what takes seconds."""
 SCIP_LIMIT_S = 10.0
 
@@ -98,16 +96,12 @@ def rolled_out(rng: np.random.Generator, ugvs: int, discs: int, stages: int, saf
     return sample
 
 
-def outcomes_of(situations: list[tuple[Scene, Proposal]], discs: int, safe: float) -> None:
+def outcomes_of(situations: list[tuple[View, Proposal]]) -> None:
     """What method (d) looks at, at one sample: both outcomes for every UGV."""
     motions = [proposal.motion for _, proposal in situations]
-    for i, (scene, proposal) in enumerate(situations):
-        asked = motions[:i] + motions[i + 1 :]
-        others = [
-            Other(scene.centres[discs + k], scene.velocities[discs + k], motion, False, safe, 0.5)
-            for k, motion in enumerate(asked)
-        ]
-        outcomes(scene, LAW, proposal, scene.centres[:discs], safe, others, Outlook(longest=30.0))
+    for i, (seen, proposal) in enumerate(situations):
+        asked = tuple((motion, False) for motion in motions[:i] + motions[i + 1 :])
+        outcomes(replace(seen, asked=asked), LAW, proposal, Outlook(longest=30.0))
 
 
 def cost_of_outcomes(count: int) -> None:
@@ -115,11 +109,11 @@ def cost_of_outcomes(count: int) -> None:
     for ugvs, discs in ((1, 4), (2, 4), (4, 4), (2, 16)):
         rng = np.random.default_rng([ugvs, discs])
         samples = [among(rng, ugvs, discs, 2.0 if discs < 16 else 1.0) for _ in range(count)]
-        outcomes_of(samples[0], discs, 2.0)
+        outcomes_of(samples[0])
         times = []
         for sample in samples:
             started = time.process_time()
-            outcomes_of(sample, discs, 2.0 if discs < 16 else 1.0)
+            outcomes_of(sample)
             times.append(1e3 * (time.process_time() - started))
         p50, p99 = np.percentile(times, [50, 99])
         print(
@@ -127,7 +121,7 @@ def cost_of_outcomes(count: int) -> None:
         )
 
 
-def among(rng: np.random.Generator, ugvs: int, discs: int, safe: float) -> list[tuple[Scene, Proposal]]:
+def among(rng: np.random.Generator, ugvs: int, discs: int, safe: float) -> list[tuple[View, Proposal]]:
     """UGVs among the same discs, all within sensing range of the first; each senses the others, which move."""
     angle, radius = rng.uniform(-np.pi, np.pi, discs), rng.uniform(safe + 0.1, 3.8, discs)
     centres = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), np.zeros(discs)])
@@ -141,7 +135,7 @@ def among(rng: np.random.Generator, ugvs: int, discs: int, safe: float) -> list[
         goal = starts[i] + rng.uniform(-6.0, 6.0, 3) * [1, 1, 0]
         preset = Motion.at_speed(np.array([starts[i], goal]), 0.56, start=-rng.uniform(0.0, 4.0))
         aim = goal if rng.random() < 0.7 else starts[i] + rng.uniform(-6.0, 6.0, 3) * [1, 1, 0]
-        scene = Scene(
+        scene = View(
             t=0.0,
             position=starts[i],
             preset=preset,
@@ -260,7 +254,6 @@ def contestants() -> dict[str, Callable[[], Any]]:
     """Every route, and the references that are installed."""
     routes: dict[str, Callable[[], Any]] = {name: ROUTES.load(name, of=Route) for name in ROUTES.own}
     routes["mixed_10"] = lambda: MixedIntegerRoute(10)
-    routes["nonlinear_ipopt"] = lambda: NonlinearRoute("ipopt")
     for name, module, make in (("casadi+ipopt", "casadi", CasadiRoute), ("cvxpy+scip", "pyscipopt", ScipRoute)):
         if find_spec(module) is None:
             print(f"{name}: {module} is not installed, left out")

@@ -30,7 +30,7 @@ from airground_drake.audit.companions import Believing
 from airground_drake.base.arrays import Array
 from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
 from airground_drake.gatekeeper.problem import Horizon, predicted_problem
-from airground_drake.gatekeeper.rollout import Scene
+from airground_drake.gatekeeper.rollout import View
 from airground_drake.gatekeeper.routes.relaxed import RelaxedRoute
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.planner import Planner
@@ -86,7 +86,7 @@ def at_decision_level(seed: int, proposals: int) -> tuple[float, int, int]:
         for on_top in (False, True):
             law = UgvLaw(avoidance, 2.0, 1.5, intervention_on_top=on_top)
             if on_top:
-                scene = Scene(t, start, presets[0], centres, np.zeros((4, 3)), np.full(4, d), np.ones(4), 3.0)
+                scene = View(t, start, presets[0], centres, np.zeros((4, 3)), np.full(4, d), np.ones(4), 3.0)
                 if not route.solve(predicted_problem(scene, law, proposal, horizon)).accept_first:
                     continue
                 accepted += 1

@@ -16,7 +16,7 @@ from airground_drake.base.arrays import Array
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.database import Negotiation
 from airground_drake.intervention.messages import ACCEPT, DONE, REFUSE, Reports, answer_to
-from airground_drake.intervention.planner import Planner, PlannerMemory
+from airground_drake.intervention.planner import Planner, PlannerState
 from airground_drake.intervention.policy import Proposal
 
 CHOICES: dict[str, tuple[Any, ...]] = {
@@ -90,24 +90,24 @@ class LyingPlanner(Planner):
     tactic: Tactic
     random: np.random.Generator
 
-    def idle(self, memory: PlannerMemory, intervening: Sequence[bool]) -> bool:
+    def idle(self, memory: PlannerState, intervening: Sequence[bool]) -> bool:
         """Speaks whether anybody is intervened on or not."""
         return False
 
     def plan(
         self,
-        memory: PlannerMemory,
+        memory: PlannerState,
         t: float,
         positions: Array,
         intervening: Sequence[bool],
         answers: Array,
         reports: Reports,
         standing: Sequence[bool] = (),
-    ) -> PlannerMemory:
+    ) -> PlannerState:
         """Speak, whoever stands or has said what."""
         return self._speak(memory, t, positions, answers)
 
-    def _speak(self, memory: PlannerMemory, t: float, positions: Array, answers: Array) -> PlannerMemory:
+    def _speak(self, memory: PlannerState, t: float, positions: Array, answers: Array) -> PlannerState:
         tactic, talks = self.tactic, list(memory.talks)
         for i, talk in enumerate(talks):
             before, answer = talk.proposal, answer_to(talk.proposal, answers, i)

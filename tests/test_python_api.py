@@ -43,18 +43,8 @@ def set_to(path: str, value: Any) -> Edit:
     ("edit", "said"),
     [
         (set_to("control.period_s", "fast"), "control.period_s: 'fast' is not allowed; wanted: a number in s"),
-        (set_to("control.period_s", float("nan")), "control.period_s: nan is not allowed"),
-        (set_to("control.period_s", -0.05), "control.period_s: -0.05 is not allowed"),
-        (set_to("ugvs.ugv1.start_m", [0.0, 0.0]), "ugvs.ugv1.start_m: .* is not allowed; wanted: 3 numbers in m"),
         (set_to("ugvs.ugv1.start_m", None), "ugvs.ugv1.start_m: no value is given"),
         (set_to("ugvs.ugv1", 3), "ugvs.ugv1: 3 is not allowed; wanted: a mapping"),
-        (set_to("seed", 1.5), "seed: 1.5 is not allowed; wanted: a whole number"),
-        (set_to("gatekeeper.route", "magic"), "gatekeeper.route: 'magic' is not allowed"),
-        (
-            set_to("uav.task", "hover"),
-            "uav.task: 'hover' is not allowed; one of formation, module:Class or",
-        ),
-        (set_to("runs.d.method", "e"), "runs.d.method: 'e' is not allowed"),
         (set_to("obstacles", {"o": object()}), "obstacles.o"),
         (set_to("uav.start_m", {0.0, 1.0, 2.0}), "uav.start_m: .* is not allowed; wanted: 3 numbers in m"),
     ],

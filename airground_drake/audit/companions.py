@@ -11,9 +11,9 @@ from pydrake.solvers import ClarabelSolver, MathematicalProgram
 
 from airground_drake.audit.item import Item
 from airground_drake.base.arrays import Array
-from airground_drake.gatekeeper.mpc_gatekeeper import View
 from airground_drake.gatekeeper.outcome import Outcome
 from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
+from airground_drake.gatekeeper.rollout import View
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.law import UgvLaw
 from airground_drake.report.figures.canvas import thin
@@ -38,9 +38,9 @@ LIGHT = "c, error weight 1"
 class Believing(OutcomeGatekeepers):
     """Takes every proposal for useful."""
 
-    def foresee(self, seen: View, i: int, proposal: Proposal) -> tuple[Outcome, Outcome]:
+    def foresee(self, seen: View, law: UgvLaw, proposal: Proposal) -> tuple[Outcome, Outcome]:
         """Refusing stalls, accepting does not."""
-        steps = np.arange(0.0, 2.0, self._law.avoidance.period)
+        steps = np.arange(0.0, 2.0, law.avoidance.period)
         follows = proposal.motion.sample(seen.t + steps)
         return Outcome(follows, True, 1.0, 1.0), Outcome(follows, False, 0.0, 0.0)
 

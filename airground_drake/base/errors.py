@@ -9,7 +9,7 @@ from traceback import walk_tb
 VALUE_WIDTH = 120
 """Longer values are cut in messages, characters."""
 FAULT_WIDTH = 300
-"""What code of others says of its failure is cut after so many characters."""
+"""What third-party code says of its failure is cut after so many characters."""
 
 
 class AirgroundError(Exception):
@@ -58,11 +58,11 @@ class LimitError(AirgroundError):
 
 
 class FolderError(AirgroundError):
-    """A folder or file that is to take what a command writes, and cannot, or has something that would be lost."""
+    """A command cannot write to a folder or file, or would overwrite what is in it."""
 
 
 class UnknownNameError(AirgroundError):
-    """A name that stands for nothing: of a run, a method, a route, a policy, a claim.
+    """An unknown name of a run, a method, a route, a policy or a claim.
 
     Attributes:
         kind: what it should name.
@@ -78,15 +78,15 @@ class UnknownNameError(AirgroundError):
 
 
 class PluginError(AirgroundError):
-    """A class named in a scenario that cannot be imported, is of another kind, or does not do what its kind does."""
+    """A class named in a scenario cannot be imported, is of another kind, or breaks the contract of its kind."""
 
 
 class PolicyError(AirgroundError):
-    """What went wrong in a policy's process, in words: the policy's own exception, or what became of the process."""
+    """A policy's process failed: the policy's own exception, or how the process ended, in words."""
 
 
 class ReportError(AirgroundError):
-    """A report that is not there, or differs from what was written, when it is read back."""
+    """A report is missing, or differs from what was written."""
 
 
 class ExportError(AirgroundError):
@@ -94,7 +94,7 @@ class ExportError(AirgroundError):
 
 
 class ReplayError(AirgroundError):
-    """A replay that cannot be made here: no port for Meshcat, no encoder for a video."""
+    """A replay cannot be made on this machine: no port for Meshcat, no encoder for a video."""
 
 
 class SimulationError(AirgroundError):
@@ -126,7 +126,7 @@ def short(text: str) -> str:
 
 
 def described(error: BaseException, function: object = None) -> str:
-    """An exception of somebody else's code as one printable line of bounded length, whatever its `__str__` does.
+    """An exception of third-party code as one printable line of bounded length. Its `__str__` may raise, too.
 
     Args:
         error: the exception.
@@ -135,13 +135,13 @@ def described(error: BaseException, function: object = None) -> str:
     """
     try:
         text = f"{_place(error, function)}{type(error).__name__}: {error}"[:FAULT_WIDTH]
-    except BaseException:  # its text is code of others, too
+    except BaseException:  # its text is third-party code, too
         text = "an exception that cannot be put into words"
     return one_line(text)
 
 
 def _place(error: BaseException, function: object) -> str:
-    """The last line of the function's file that the exception went through, and a space; '' if there is none."""
+    """The last line of the function's file that the exception passed, and a space; '' if it passed none."""
     file = getattr(getattr(function, "__code__", None), "co_filename", None)
     lines = [line for frame, line in walk_tb(error.__traceback__) if frame.f_code.co_filename == file]
     return f"{PurePath(str(file)).name}:{lines[-1]} " if lines else ""

@@ -1,4 +1,4 @@
-"""Writing files whole or not at all; reading what somebody else may have made; temporary folders."""
+"""Writing files whole or not at all, reading untrusted files, temporary folders."""
 
 from __future__ import annotations
 
@@ -54,18 +54,18 @@ def open_regular(path: Path) -> BinaryIO:
 
 
 def open_pipe(path: Path) -> BinaryIO:
-    """Open a file for reading, or a pipe such as `<(command)`; a pipe that nobody writes to is empty.
+    """Open a file for reading, or a pipe such as `<(command)`; a pipe without a writer is empty.
 
     Raises:
         OSError: if it cannot be opened.
     """
-    handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK)  # does not wait until somebody writes
+    handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK)  # does not wait for a writer
     os.set_blocking(handle, True)
     return open(handle, "rb")
 
 
 def read_bytes(path: Path, most: int = LARGEST_FILE) -> bytes:
-    """The content of a regular file that somebody else may have made.
+    """The content of a regular file that may be hostile.
 
     Raises:
         OSError: as `open_regular`, or if it has more than `most` bytes.
@@ -88,10 +88,10 @@ def read_text(path: Path) -> str:
 
 
 def read_table(content: bytes) -> pd.DataFrame:
-    """The table in a Parquet file that somebody else may have made: numbers, texts and lists of numbers.
+    """The table in a Parquet file that may be hostile: numbers, texts and lists of numbers.
 
-    What the file says of its types and sizes is looked at before it is unpacked. A few bytes may stand for a long text
-    in a million rows: texts are counted before they are copied into their rows.
+    Types and sizes that the file declares are checked before it is unpacked. A few bytes may stand for a long text in a
+    million rows: texts are counted before they are copied into their rows.
 
     Raises:
         ValueError: if it cannot be read, has values of other types, or is larger than the limits.
@@ -161,7 +161,7 @@ def write_bytes(path: Path, data: bytes) -> None:
 
 
 def _sync(folder: Path) -> None:
-    """See to it that what was renamed in a folder outlives a loss of power."""
+    """Make renames in a folder outlive a loss of power."""
     handle = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(handle)
@@ -180,7 +180,7 @@ def discard_partial() -> None:
 
 @contextmanager
 def temporary_folder() -> Iterator[Path]:
-    """A folder that is removed in the end, also where this process ends at once; if it is killed, by a later one.
+    """A folder that is removed with the block or this process; after a kill, by a later process.
 
     Raises:
         OSError: if it cannot be made.
@@ -202,7 +202,7 @@ def temporary_folder() -> Iterator[Path]:
 
 
 def sweep_temporary() -> None:
-    """Remove the temporary folders of this user's processes that were killed: nobody holds a lock on them any more."""
+    """Remove the temporary folders of this user's killed processes: those that no process holds a lock on."""
     for path in Path(tempfile.gettempdir()).glob(f"{_TEMPORARY}*"):
         with suppress(OSError):
             lock = os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
@@ -269,7 +269,7 @@ def try_to_create(path: Path) -> None:
 
 
 def sweep(folder: Path) -> None:
-    """Remove the temporary files in a folder, and below, of processes that were killed while they wrote."""
+    """Remove temporary files in and below a folder that killed processes have left."""
     for path in folder.rglob(".*.partial"):
         found = _PARTIAL.fullmatch(path.name)
         if found and not _runs(int(found["pid"])):

@@ -1,8 +1,8 @@
-"""Ending at once, and alone: what SIGINT and SIGTERM do to a command, and what becomes of its children.
+"""How SIGINT and SIGTERM end a command and its child processes at once.
 
-Nothing is unwound: an exception out of a signal handler may be lost in a callback, and `with` blocks wait for pools
-that still work. The handler kills every process that descends from this one, removes this process's temporary files,
-says so in one line, and leaves. A process that is killed itself cannot do that: those that it has forked end with it.
+The stack is not unwound: an exception out of a signal handler may be lost in a callback, and `with` blocks wait for
+busy pools. The handler kills every process that descends from this one, removes this process's temporary files, prints
+one line, and leaves. If a process is killed itself, the processes that it has forked end with it.
 
 On Linux a command works in a child of the process that was started (`begin`). The parent only waits. If the child is
 killed, the parent ends and removes what the child has left, and says so. If the parent is killed, the child gets
@@ -54,9 +54,9 @@ def begin() -> None:
 
 
 def _go_on_in_a_child() -> None:
-    """Return in a child process; the parent waits for it, cleans up after it, and leaves with its exit code.
+    """Return in a child process. The parent waits for it, cleans up after it, and leaves with its exit code.
 
-    The parent adopts what the child's descendants leave behind, so that it finds all of them if the child is killed.
+    The parent adopts orphans of the child's descendants, so that it finds all of them if the child is killed.
     """
     global _exit_code
     told, _exit_code = os.pipe()
@@ -91,7 +91,7 @@ def _go_on_in_a_child() -> None:
 
 
 def ended_how(code: int) -> str:
-    """What the exit code of a process says, negative for a signal, in words."""
+    """The exit code of a process in words; negative codes are signals."""
     return f"signal {-code}" if code < 0 else f"exit code {code}"
 
 
@@ -128,7 +128,7 @@ def end_on_signals() -> None:
 
 
 def _open_standard_streams() -> None:
-    """Point those that are closed to nowhere, or what is opened next takes their place."""
+    """Point closed ones to the null device: else the next file that is opened takes their place."""
     for name in ("stdin", "stdout", "stderr"):
         if getattr(sys, name) is None:
             nowhere = os.open(os.devnull, os.O_RDWR)  # the least descriptor that is free
@@ -137,9 +137,9 @@ def _open_standard_streams() -> None:
 
 
 def run(main: Callable[[], int]) -> NoReturn:
-    """Run a command and leave with its exit code; with 141, quietly, if whoever reads what it prints has gone.
+    """Run a command and leave with its exit code; with 141 and no message if the output pipe is closed.
 
-    What no command expects is shown with its traceback, and is the tool's fault.
+    An unexpected exception is shown with its traceback, as a fault of the tool.
     """
     try:
         code = main()
@@ -160,7 +160,7 @@ def run(main: Callable[[], int]) -> NoReturn:
 
 
 def leave(code: int) -> NoReturn:
-    """End this process with its work done: at once, as an interpreter that winds up has no handlers any more."""
+    """End this process at once, with its work done: an interpreter that shuts down has no signal handlers left."""
     for stream in (sys.stdout, sys.stderr):
         with suppress(OSError, ValueError):  # a reader that has gone, a stream that is closed
             stream.flush()
@@ -168,13 +168,13 @@ def leave(code: int) -> NoReturn:
 
 
 def _line(number: int, *, clear: bool) -> bytes:
-    """What is said of an interruption; over a line of progress, if there may be one."""
+    """The message of an interruption; it replaces a line of progress, if there may be one."""
     before = "\r\033[K" if clear else ""
     return f"{before}error: interrupted ({signal.Signals(number).name})\n".encode()
 
 
 def end_descendants() -> None:
-    """Kill every process that descends from this one, as far as /proc tells."""
+    """Kill every process below this one that /proc shows."""
     for _ in range(ROUNDS):
         found = _descendants()
         if not found:
@@ -201,7 +201,7 @@ def _descendants() -> list[int]:
 
 
 def end_with_parent(how: signal.Signals = signal.SIGKILL) -> None:
-    """From now on this process is sent a signal when the thread that has started it ends, on Linux."""
+    """Have Linux send this process a signal when the thread that started it ends."""
     if sys.platform == "linux":
         _prctl(_PR_SET_PDEATHSIG, how)
 
@@ -212,7 +212,7 @@ def _prctl(option: int, value: int) -> None:
 
 
 def end_with_pipe(reader: int) -> None:
-    """From now on this process is killed when the last writer of a pipe has gone, whatever it is doing, on Linux.
+    """Have Linux kill this process as soon as the last writer of a pipe has gone.
 
     The kernel sees to it, as in `end_with_parent`, but the pipe belongs to a process, not to one of its threads.
 
@@ -228,7 +228,7 @@ def end_with_pipe(reader: int) -> None:
 
 
 class _Forks:
-    """Sees to it that what is forked ends with the process that has forked it."""
+    """Makes forked processes end with the process that forked them."""
 
     def __init__(self) -> None:
         self.parent, self.from_main = 0, False
@@ -237,7 +237,7 @@ class _Forks:
         self.parent, self.from_main = os.getpid(), threading.current_thread() is threading.main_thread()
 
     def in_child(self) -> None:
-        """Not where another thread has forked, which may end before its time."""
+        """Only for forks by the main thread: another thread may end earlier than its process."""
         if self.from_main:
             end_with_parent()
             if os.getppid() != self.parent:

@@ -1,7 +1,7 @@
 """Independent pieces of work in processes forked from this one, as many at a time as there are processors.
 
-A piece sees everything that there was before the first one began, and leaves nothing behind but what it returns. A
-process does several pieces, one after the other: one for each piece would import and load anew what pieces share.
+A piece sees everything that existed before the first one began; only what it returns is kept. A process does several
+pieces, one after the other: they share what they import and load.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ MOST_JOBS = 1000
 """Processes at a time that may be asked for: all of them begin at once."""
 
 _pieces: Sequence[Callable[[], object]] = ()
-"""The work at hand: inherited, so that it need not be pickled."""
+"""The current work: forked processes inherit it, so that it need not be pickled."""
 
 
 def forks() -> bool:
@@ -49,10 +49,10 @@ def processors() -> int:
 
 @contextmanager
 def processes(jobs: int) -> Iterator[ProcessPoolExecutor]:
-    """So many processes that take calls; those that are still at work in the end are killed.
+    """A pool of so many processes. At the end of the block, those that still work are killed.
 
-    They are forked by the first call, and see everything that there is then. Where no process may be forked they begin
-    with nothing, and what is called is pickled there as elsewhere.
+    The first call forks them: they see everything that exists then. Where forking is not safe, they start empty. Calls
+    and results are pickled.
     """
     before = set(multiprocessing.active_children())
     context = multiprocessing.get_context("fork" if forks() else "spawn")
@@ -106,9 +106,9 @@ def run_parallel(
 
 
 def start_in_process(work: Callable[[], T]) -> Callable[[], T]:
-    """Start some work in a process of its own; what is returned waits for its result, and is to be called once.
+    """Start some work in a process of its own; returns a function that waits for the result, to be called once.
 
-    Where there is one processor, or no fork, the work is done when it is waited for.
+    With one processor, or without fork, the work is done when the result is asked for.
 
     Raises:
         AirgroundError: when it is waited for, if the process ends without having returned.

@@ -23,7 +23,7 @@ class Progress:
 
         Args:
             name: what is done in it.
-            amount: how much is to be done; 0: nobody knows.
+            amount: how much is to be done; 0: unknown.
             unit: of the amount.
         """
 

@@ -36,7 +36,7 @@ def outcome(status: str, exercised: float | None) -> str:
 
     Args:
         status: the verdict.
-        exercised: how often the claim was put to the test; None: nobody counted.
+        exercised: how often the claim was put to the test; None: it was not counted.
     """
     return NOT_EXERCISED if status in PASSING and exercised == 0 else status
 

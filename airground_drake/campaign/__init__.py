@@ -4,5 +4,5 @@
 
 `distributions.py` and `course.py` are pure functions of a draw's number, so that each draw can be made again alone;
 `spec.py` reads what is drawn; `work.py` does one draw; `pool.py` many, on this machine or on a cluster; `store.py`
-keeps what is finished, whatever is killed; `statistics.py` and `evidence.py` conclude; `page.py` shows.
+keeps finished draws through kills; `statistics.py` and `evidence.py` conclude; `page.py` shows.
 """

@@ -1,4 +1,4 @@
-"""A campaign from beginning to end: what is left is drawn and judged, kept, and concluded from."""
+"""A campaign from beginning to end: judge the draws that are left, keep them, write the evidence."""
 
 from __future__ import annotations
 
@@ -35,27 +35,25 @@ def conduct(
     resume: bool = False,
     stopping: Stopping | None = None,
     limits: Limits = DEFAULT_LIMITS,
-    allow_plugins: bool = False,
     progress: Progress = SILENT,
 ) -> dict[str, Any]:
-    """Do what is left of a campaign, and write the evidence and its page.
+    """Do the rest of a campaign, and write the evidence and its page.
 
     Args:
         spec: what is drawn.
         folder: new or empty; with `resume`, one that has a part of the same campaign.
-        pool: that does the work.
-        number: of draws; default: all combinations of what is gone through in turn.
+        pool: does the work.
+        number: of draws; default: all combinations of the grids.
         resume: go on with what the folder has.
         stopping: when to end early.
         limits: what the scenario of a draw may ask for.
-        allow_plugins: whether code of others may be imported and run.
         progress: is told how far it is.
 
     Returns:
         The evidence, strict JSON.
 
     Raises:
-        ScenarioError: if code of others is named that is not allowed.
+        ScenarioError: if third-party code is named that is not allowed.
         FolderError: if the folder cannot be used, or has draws beyond the number.
         LimitError: if the rows would be more than `MOST_ROWS`.
         ValueError: if there is a rule to stop, and draws that are not independent.
@@ -68,7 +66,7 @@ def conduct(
     if asked > MOST_ROWS:
         allowed = f"{MOST_ROWS:g} rows, one for each draw, run and claim"
         raise LimitError(spec.name, f"{wanted.stop:.3g} draws ({asked:.3g} rows)", allowed)
-    if not allow_plugins:
+    if not limits.plugins:
         spec.refuse_plugins()
     store = Store(folder, _manifest(spec, limits), resume=resume)
     try:
@@ -79,7 +77,7 @@ def conduct(
         left = [] if met else [index for index in wanted if index not in store.finished]
         progress.stage(spec.name, len(left), "draws")
         refuted = Counter[str]()
-        for index, judged in pool(partial(rows_of, spec, limits=limits, allow_plugins=allow_plugins), left):
+        for index, judged in pool(partial(rows_of, spec, limits=limits), left):
             rows = died(index) if judged is None else judged
             store.add(rows)
             refuted.update(row["claim"] for row in rows if row["status"] == "refuted")
@@ -104,7 +102,7 @@ def _refuted(counts: Counter[str]) -> str:
 
 
 def _known(store: Store) -> Iterator[tuple[int, list[Row]]]:
-    """What an earlier call has finished, draw by draw."""
+    """The draws that an earlier call has finished."""
     for _, rows in store.table().groupby("index"):
         yield (
             int(rows["index"].iloc[0]),
@@ -119,5 +117,5 @@ def _manifest(spec: Spec, limits: Limits) -> dict[str, Any]:
         "scenario_sha256": spec.base_digest(),
         "package": version("airground_drake"),
         "drake": version("drake"),
-        "limits": limits._asdict(),
+        "limits": {name: value for name, value in limits._asdict().items() if name != "plugins"},
     }

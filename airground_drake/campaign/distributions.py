@@ -17,7 +17,7 @@ from airground_drake.scenarios.limits import MAX_SEED
 
 
 class Distribution(abc.ABC):
-    """What a key is drawn from, by the inverse of its distribution function."""
+    """A distribution, by the inverse of its distribution function."""
 
     size: int = 1
     """Number of shares that a value takes."""
@@ -109,8 +109,8 @@ class Key:
 def values_of(drawn: Mapping[str, Key], seed: int, index: int) -> dict[str, Any]:
     """The values of one draw by key, in the order of the keys: a function of the seed and the index.
 
-    The random numbers of a key depend on the seed, the key and the index: another key more or less changes none. Keys
-    whose values are gone through in turn are so in all combinations.
+    The random numbers of a key depend on the seed, the key and the index: another key more or less changes none. Grids
+    are gone through in all combinations.
 
     Args:
         drawn: by dotted key.
@@ -218,7 +218,7 @@ def made(name: str, given: Any) -> Key:
     """How a key is drawn, from a name and parameters.
 
     Raises:
-        KeyError: if there is none of that name.
+        KeyError: if the name is unknown.
         ValueError: if the parameters are not what `KINDS` says.
     """
     wanted, make = KINDS[name]

@@ -42,7 +42,7 @@ class Counts(NamedTuple):
         tested: judged and exercised, or judged by a claim that does not count how often it was; or not finished.
         refuted: violations.
         undecided: of these, or not finished; they count as violations in every upper bound.
-        idle: judged, but nothing could have refuted the claim: these count for nothing.
+        idle: judged, but nothing could have refuted the claim: these are ignored.
     """
 
     tested: int
@@ -59,7 +59,10 @@ class Counts(NamedTuple):
         return cls(int(tested.sum()) + unfinished, refuted, undecided + unfinished, int((~tested).sum()))
 
     def interval(self, *, anytime: bool) -> tuple[float, float]:
-        """Bounds of the probability of a violation; what is undecided is none for the lower, one for the upper."""
+        """Bounds of the probability of a violation.
+
+        Undecided runs count as passes in the lower bound and as violations in the upper bound.
+        """
         bounds = confidence_sequence if anytime else clopper_pearson
         low = bounds(self.refuted, self.tested).low
         return low, bounds(self.refuted + self.undecided, self.tested).high
@@ -229,7 +232,7 @@ def _space(drawn: pd.DataFrame) -> Json:
 
 
 def strict(value: Any) -> Any:
-    """With None for what is no number, so that it is JSON."""
+    """The value with None for numbers that are not finite, as JSON."""
     if isinstance(value, dict):
         return {str(key): strict(each) for key, each in value.items()}
     if isinstance(value, list | tuple):

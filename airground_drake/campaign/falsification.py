@@ -33,13 +33,11 @@ class Search:
         spec: of the scenarios; the course, if there is one, is that of draw 0.
         objective: what is made least.
         limits: what a scenario may ask for.
-        allow_plugins: whether code of others may be imported and run.
     """
 
     spec: Spec
     objective: Objective
     limits: Limits
-    allow_plugins: bool = False
 
     def values(self, point: Array) -> dict[str, Any]:
         """By dotted key, at a point of the unit cube."""
@@ -47,7 +45,7 @@ class Search:
 
     def at(self, points: Array, k: int) -> tuple[float, bool]:
         """The objective at one of some points (., n), and whether it is a counterexample."""
-        return self._judge(rows_at(self.spec, self.values(points[k]), 0, self.limits, allow_plugins=self.allow_plugins))
+        return self._judge(rows_at(self.spec, self.values(points[k]), 0, self.limits))
 
     def fails(self, data: dict[str, Any]) -> bool:
         """Whether a scenario, as nested dicts and lists, is valid and a counterexample."""
@@ -55,7 +53,7 @@ class Search:
             scenario = from_data(data, "smaller scenario")
         except ScenarioError:
             return False
-        return self._judge(rows_of_scenario(self.spec, scenario, self.limits, allow_plugins=self.allow_plugins))[1]
+        return self._judge(rows_of_scenario(self.spec, scenario, self.limits))[1]
 
     def trace(self, data: dict[str, Any]) -> Trace | None:
         """Of the first run of a scenario; None if it is not valid, or cannot be simulated."""
@@ -63,7 +61,7 @@ class Search:
             scenario = from_data(data, "smaller scenario")
         except ScenarioError:
             return None
-        return trace_of(self.spec, scenario, self.limits, allow_plugins=self.allow_plugins)
+        return trace_of(self.spec, scenario, self.limits)
 
     def _judge(self, rows: list[Row]) -> tuple[float, bool]:
         return self.objective.value(rows), self.objective.found(rows)
@@ -71,12 +69,12 @@ class Search:
 
 @dataclass(frozen=True)
 class Best:
-    """What a search has come to.
+    """The result of a search.
 
     Attributes:
         tried: points.
-        value: the least of the objective; infinite if it could be measured nowhere.
-        point: where, (n,); (0,) if nowhere.
+        value: the least of the objective; infinite if it was never measured.
+        point: where, (n,); (0,) if it was never measured.
         found: whether it is a counterexample.
     """
 
@@ -120,7 +118,7 @@ def falsify(search: Search, sampler: Sampler, number: int, pool: Pool, progress:
 
 
 def _asked(sampler: Sampler, n: int) -> Array:
-    """The points (k, n) that a sampler, perhaps somebody else's, asks for.
+    """The points (k, n) that a sampler, perhaps a third-party one, asks for.
 
     Raises:
         PluginError: if it raises, or these are not one or more points in [0, 1).

@@ -1,4 +1,4 @@
-"""What a falsification makes least: the margin of a claim, or a time with the sign changed."""
+"""Objectives that a falsification minimises: the margin of a claim, or a negated time."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Most:
         return self.value(rows) < -self.limit
 
     def _of(self, row: Row) -> float:
-        """Of a row; who does not arrive is later than all others."""
+        """The value of a row; a UGV that does not arrive is later than all others."""
         never = self.column == "arrival_s" and row["arrived"] < row["ugvs"]
         return LATEST_S if never else float(row[self.column])
 
@@ -57,4 +57,4 @@ class Most:
 Objective = Margin | Most
 
 LATEST_S = 1e9
-"""In place of infinity, which stands for what was not measured."""
+"""In place of infinity, which means that nothing was measured."""

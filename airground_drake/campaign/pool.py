@@ -16,7 +16,7 @@ from airground_drake.base.errors import AirgroundError, one_line
 from airground_drake.base.parallel import processes
 
 DEATHS = 2
-"""An item in whose presence so many processes have died is given up."""
+"""An item is given up when so many of its processes have died."""
 AHEAD = 4
 """Items that are handed out beforehand for each process."""
 
@@ -27,7 +27,7 @@ class Pool(Protocol):
     """Does the same work for many items."""
 
     def __call__(self, work: Callable[[int], T], items: Iterable[int]) -> Iterator[tuple[int, T | None]]:
-        """What comes of each item, as it is finished; None where its process has died again and again.
+        """The result of each item, as it is finished; None if its process has died again and again.
 
         Args:
             work: for one item; goes to other processes, and so is pickled.
@@ -37,7 +37,7 @@ class Pool(Protocol):
 
 @contextmanager
 def local(jobs: int) -> Iterator[Pool]:
-    """So many processes of this machine, which end in the end."""
+    """A pool of so many processes of this machine."""
     with ExitStack() as alive:
         yield _Local(jobs, alive)
 
@@ -101,7 +101,7 @@ def _alone(call: Callable[[], T]) -> T | None:
 def cluster(scheduler: str, timeout_s: float = 10.0) -> Iterator[Pool]:
     """The workers of a Dask cluster, each of which must have this package installed.
 
-    A worker that dies is Dask's to notice: its items go to others; one that has killed several is given up.
+    Dask replaces workers that die, and gives up an item that has killed several.
 
     Raises:
         AirgroundError: if the scheduler cannot be reached, or Dask is not installed.
@@ -123,7 +123,7 @@ def cluster(scheduler: str, timeout_s: float = 10.0) -> Iterator[Pool]:
 def _on_cluster(
     dask: Any, client: Any, work: Callable[[int], T], items: Iterable[int]
 ) -> Iterator[tuple[int, T | None]]:
-    """See `Pool`. A scheduler has one name for each item of all its clients; workers may come at any time.
+    """See `Pool`. Names of items are unique to this client; workers may join at any time.
 
     Raises:
         AirgroundError: if the scheduler is lost.
@@ -149,7 +149,7 @@ def _on_cluster(
 
 
 def _result(dask: Any, future: Any) -> Any:
-    """Of an item that is finished; None if its workers have died.
+    """The result of a finished item; None if its workers have died.
 
     Raises:
         Exception: what the work has raised.

@@ -31,11 +31,11 @@ Row = dict[str, Any]
 
 
 def is_tested(status: str, exercised: float) -> bool:
-    """Whether something could have refuted the claim of a row; where nobody counted (NaN), it is taken to be so."""
+    """Whether something could have refuted the claim of a row; assumed where it was not counted (NaN)."""
     return outcome(status, exercised) != NOT_EXERCISED
 
 
 def blank() -> Row:
-    """A row of which nothing is known."""
+    """A row with empty values."""
     kinds: dict[str, Any] = {"int64": 0, "float64": float("nan"), "str": "", "bool": False}
     return {name: kinds[kind] for name, kind in COLUMNS.items()}

@@ -1,4 +1,4 @@
-"""Points of the unit cube, asked for and told about: at random, evenly, or by CMA-ES towards what is least."""
+"""Points of the unit cube, asked for and told about: at random, evenly, or by CMA-ES."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from scipy.stats import qmc
 from airground_drake.base.arrays import Array
 
 BATCH = 16
-"""Points at a time, of samplers that learn nothing from one to the next."""
+"""Points at a time, of samplers that do not learn."""
 WORTHLESS = 1e6
-"""What the strategy is told of a point at which nothing could be measured: it takes finite values only."""
+"""The value of points where nothing could be measured, for a strategy that takes finite values only."""
 
 
 @runtime_checkable
@@ -25,7 +25,7 @@ class Sampler(Protocol):
         """Points (k, n) in [0, 1)."""
 
     def tell(self, points: Array, values: Array) -> None:
-        """What was found there, (k,); less is better, infinite is where nothing could be measured."""
+        """The objective there, (k,): smaller is better, infinite means not measured."""
 
 
 class Uniform:

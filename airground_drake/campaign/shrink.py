@@ -6,6 +6,7 @@ Greedy: each change is kept if the scenario is still valid and still fails; unti
 from __future__ import annotations
 
 import copy
+import itertools
 from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any
@@ -43,7 +44,6 @@ def shrink(data: Json, fails: Fails, traced: Traced, tests: int) -> tuple[Json, 
     Returns:
         The smallest one found, and how many tests it took.
     """
-    used, changed = 0, True
     steps = (
         _without_policies,
         _without_robots,
@@ -52,20 +52,24 @@ def shrink(data: Json, fails: Fails, traced: Traced, tests: int) -> tuple[Json, 
         partial(_shorter, traced),
         _rounder,
     )
-    while changed and used < tests:
+    left = tests
+
+    def first(candidates: Iterator[Json]) -> Json | None:
+        """The first that fails, as long as tests are left."""
+        nonlocal left
+        for candidate in itertools.islice(candidates, left):
+            left -= 1
+            if fails(candidate):
+                return candidate
+        return None
+
+    changed = True
+    while changed:
         changed = False
         for smaller in steps:
-            again = True
-            while again and used < tests:
-                again = False
-                for candidate in smaller(data):
-                    used += 1
-                    if fails(candidate):
-                        data, again, changed = candidate, True, True
-                        break
-                    if used >= tests:
-                        break
-    return data, used
+            while (found := first(smaller(data))) is not None:
+                data, changed = found, True
+    return data, tests - left
 
 
 def _without_policies(data: Json) -> Iterator[Json]:

@@ -105,7 +105,7 @@ class Spec(File):
     Attributes:
         digest: SHA-256 of the file.
         source: its path.
-        data: what the scenario's file held when the campaign was read, without what is not judged.
+        data: content of the scenario's file when the campaign was read, without NOT_JUDGED.
     """
 
     digest: str
@@ -164,7 +164,7 @@ class Spec(File):
         return replace(scenario, name=f"{_identifier(self.name)[: MAX_NAME - 1 - len(str(index))]}_{index}", runs=runs)
 
     def refuse_plugins(self) -> None:
-        """Refuse code of others, in the scenario or in anything that may be drawn.
+        """Refuse third-party code in the scenario and in everything that may be drawn.
 
         Raises:
             ScenarioError: if any is named; says where, and how to allow it.
@@ -218,7 +218,7 @@ def load_spec(path: Path) -> Spec:
     try:
         spec.draw(0)
     except ScenarioError as error:
-        if error.value == UNKNOWN_KEY:  # no draw would be valid; whatever else is wrong may be so in this draw only
+        if error.value == UNKNOWN_KEY:  # no draw would be valid; other faults may be of this draw only
             raise _placed(error, document, "draw") from None
     return spec
 

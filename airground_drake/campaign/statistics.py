@@ -1,8 +1,8 @@
-"""How likely a violation is, from how many there were: bounds that hold whatever the distribution.
+"""How likely a violation is, from how many there were: bounds for any distribution.
 
 k of n runs that put a claim to the test violated it; the runs are independent draws. Both intervals contain the
 probability p of a violation with the stated confidence: the first for an n fixed beforehand, the second for all n at
-once, so that one may look at any time and stop when one has seen enough.
+once, so that a campaign may stop at any time.
 """
 
 from __future__ import annotations

@@ -1,12 +1,12 @@
-"""The folder of a campaign: what is finished stays finished, whatever is killed, and counts once.
+"""The folder of a campaign: finished draws survive a kill and count once.
 
-    campaign.json     what is run: whoever goes on must go on with the same
+    campaign.json     what is run; `--resume` needs the same
     parts/*.parquet   finished draws, written whole or not at all: a dataset that any reader of Parquet takes
     journal.jsonl     draws finished since the last part, a line of strict JSON each
 
 A draw is finished when its line is in the journal. From time to time the journal becomes a part; if the command is
-killed between the two, the same draws are in both, and the part counts. A last line that is torn is none. The rows of a
-draw carry a digest of the campaign and of them all: a draw whose rows were changed, repeated or removed is refused.
+killed between the two, the same draws are in both, and the part counts. A torn last line is dropped. The rows of a draw
+carry a digest of the campaign and of all rows of the draw: changed, repeated or removed rows are refused.
 """
 
 from __future__ import annotations
@@ -118,7 +118,7 @@ class Store:
         return both.sort_values("index", kind="stable", ignore_index=True)
 
     def close(self) -> None:
-        """Make a part of what is left, and let others have the folder."""
+        """Make a part of the rest of the journal, and release the folder."""
         try:
             self.flush()
         finally:
@@ -126,7 +126,7 @@ class Store:
 
 
 def read(folder: Path) -> tuple[dict[str, Any], pd.DataFrame]:
-    """What identifies a campaign, and all rows of its finished draws, also while it runs.
+    """The manifest of a campaign and all rows of its finished draws, also while it runs.
 
     Raises:
         FolderError: if the folder has no campaign, or rows that are not as they were written.
@@ -141,7 +141,7 @@ def read(folder: Path) -> tuple[dict[str, Any], pd.DataFrame]:
 
 
 def _is_nothing(path: Path) -> bool:
-    """What a command leaves that is killed before it has written the manifest."""
+    """Whether a command that was killed before it wrote the manifest may have left this file."""
     return files.is_partial(path) or (path.name == JOURNAL and path.stat().st_size == 0)
 
 

@@ -1,4 +1,4 @@
-"""One draw of a campaign: its scenario is simulated, its runs are judged, and what came of it are rows."""
+"""One draw of a campaign: simulate its scenario, judge its runs, make rows of the verdicts."""
 
 from __future__ import annotations
 
@@ -29,42 +29,39 @@ class DrawOutOfTime(BaseException):
     """A draw took longer than it may; neither an Exception nor an OutOfTime, which count as faults of policies."""
 
 
-def rows_of(spec: Spec, index: int, limits: Limits, *, allow_plugins: bool = False) -> list[Row]:
+def rows_of(spec: Spec, index: int, limits: Limits) -> list[Row]:
     """Simulate and judge one draw.
 
     Args:
         spec: of the campaign.
         index: of the draw.
         limits: what its scenario may ask for; one that asks for more is `invalid`, one that takes longer `stopped`.
-        allow_plugins: whether code of others may be imported and run.
 
     Returns:
         A row for each run and claim, with the columns of `rows.COLUMNS`.
     """
-    return rows_at(spec, spec.values(index), index, limits, allow_plugins=allow_plugins)
+    return rows_at(spec, spec.values(index), index, limits)
 
 
 @cache
 def _keep_what_is_loaded() -> None:
-    """Libraries and compiled code are no garbage: once they are loaded, collections need not look at them again."""
+    """Exempt libraries and compiled code from garbage collection, once they are loaded."""
     gc.collect()
     gc.freeze()
 
 
-def rows_at(
-    spec: Spec, values: Mapping[str, Any], index: int, limits: Limits, *, allow_plugins: bool = False
-) -> list[Row]:
+def rows_at(spec: Spec, values: Mapping[str, Any], index: int, limits: Limits) -> list[Row]:
     """The same for any values by dotted key, on the course of a draw."""
     common = blank() | {"index": index, "drawn": json.dumps(_strict(dict(values)), allow_nan=False)}
     try:
         scenario = spec.scenario_of(values, index)
     except ScenarioError as error:
         return [common | {"ended": INVALID, "what": one_line(str(error))}]
-    return rows_of_scenario(spec, scenario, limits, allow_plugins=allow_plugins, common=common)
+    return rows_of_scenario(spec, scenario, limits, common)
 
 
 def _strict(value: Any) -> Any:
-    """What is drawn as strict JSON: what is not finite, which no scenario takes, in words."""
+    """Drawn values as strict JSON; numbers that are not finite as text."""
     if isinstance(value, dict):
         return {name: _strict(each) for name, each in value.items()}
     if isinstance(value, list):
@@ -72,13 +69,11 @@ def _strict(value: Any) -> Any:
     return str(value) if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def rows_of_scenario(
-    spec: Spec, scenario: Scenario, limits: Limits, *, allow_plugins: bool = False, common: Row | None = None
-) -> list[Row]:
+def rows_of_scenario(spec: Spec, scenario: Scenario, limits: Limits, common: Row | None = None) -> list[Row]:
     """Simulate and judge the runs of a scenario by the claims of a campaign; `common`: what all rows have."""
     common = blank() if common is None else common
     try:
-        with _within(spec, scenario, limits, allow_plugins=allow_plugins):
+        with _within(spec, scenario, limits):
             return [row for run in scenario.runs for row in _rows_of_run(scenario, run, spec.claims, common)]
     except AirgroundError as error:
         return [common | {"ended": INVALID, "what": one_line(str(error))}]
@@ -89,18 +84,18 @@ def rows_of_scenario(
         gc.collect()  # Python does not see how large a diagram is, and would wait for hundreds
 
 
-def trace_of(spec: Spec, scenario: Scenario, limits: Limits, *, allow_plugins: bool = False) -> Trace | None:
-    """Of the first run of a scenario, alike; None if that cannot be simulated."""
+def trace_of(spec: Spec, scenario: Scenario, limits: Limits) -> Trace | None:
+    """The trace of a scenario's first run, within the same limits; None if it cannot be simulated."""
     try:
-        with _within(spec, scenario, limits, allow_plugins=allow_plugins):
+        with _within(spec, scenario, limits):
             return simulate(scenario, next(iter(scenario.runs)))
-    except (Exception, SystemExit, DrawOutOfTime):  # code of others
+    except (Exception, SystemExit, DrawOutOfTime):  # third-party code
         return None
 
 
 @contextmanager
-def _within(spec: Spec, scenario: Scenario, limits: Limits, *, allow_plugins: bool) -> Iterator[None]:
-    """Code of others is found, or refused; what takes too long is stopped.
+def _within(spec: Spec, scenario: Scenario, limits: Limits) -> Iterator[None]:
+    """Find or refuse third-party code; stop what takes too long.
 
     Raises:
         AirgroundError: if the scenario asks for more than it may.
@@ -108,8 +103,8 @@ def _within(spec: Spec, scenario: Scenario, limits: Limits, *, allow_plugins: bo
     """
     within(scenario, limits)
     with (
-        plugins.admitted(scenario, spec.scenario, allow=allow_plugins),
-        plugins.beside(spec.source, allow=allow_plugins),
+        plugins.admitted(scenario, spec.scenario, allow=limits.plugins),
+        plugins.beside(spec.source, allow=limits.plugins),
         time_limit(limits.time, DrawOutOfTime),
     ):
         yield
@@ -128,7 +123,7 @@ def _rows_of_run(scenario: Scenario, run: str, claims: Collection[str], common: 
 
 
 def died(index: int) -> list[Row]:
-    """What is known of a draw whose process ended again and again."""
+    """The row of a draw whose process died again and again."""
     return [blank() | {"index": index, "ended": DIED, "what": "the process that simulated it died", "drawn": "{}"}]
 
 
@@ -162,5 +157,5 @@ def _happened(trace: Trace) -> Row:
 
 
 def _intervened(trace: Trace, ugv: str) -> float:
-    """For how long a UGV did what the UAV asked for, s; each row's state is in force up to it."""
+    """How long a UGV followed the UAV, s; each row has the state of the interval before it."""
     return float(np.diff(trace.t) @ (trace.column(f"{ugv}.accepted")[1:] != 0.0))

@@ -53,7 +53,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command.
 
     Returns:
-        The command's exit code; 2 if there is none of that name.
+        The command's exit code; 2 if the command is unknown.
     """
     width = max(map(len, COMMANDS))
     parser = Parser(

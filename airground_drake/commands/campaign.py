@@ -65,7 +65,7 @@ def parser() -> argparse.ArgumentParser:
     )  # fmt: skip
     parser.add_argument(
         "--limit-time", type=positive, default=DEFAULT_LIMITS.time, metavar="S",
-        help="a draw that takes longer is stopped (default: %(default)g)",
+        help="stop a draw that takes longer (default: %(default)g)",
     )  # fmt: skip
     parser.add_argument("-q", "--quiet", action="store_true", help="no progress")
     parser.add_argument(plugins.OPTION, action="store_true", help=plugins.HELP)
@@ -109,7 +109,7 @@ def _all(spec: Spec, options: argparse.Namespace) -> int:
     ):
         found = conduct(
             spec, folder, processes, options.number, resume=options.resume, stopping=stopping,
-            limits=_limits(options), allow_plugins=options.allow_plugins, progress=progress,
+            limits=_limits(options), progress=progress,
         )  # fmt: skip
     print(f"{_summary(found, looked=bool(options.stop_when or options.resume))}\n{one_line(str(folder))}")
     return _code(found)
@@ -132,7 +132,7 @@ def _only(spec: Spec, options: argparse.Namespace) -> int:
         if not (path.is_file() and path.read_bytes() == text.encode()):  # the same draw may be asked for again
             files.try_to_create(path)
             files.write_text(path, text)
-    rows = rows_of(spec, options.only, _limits(options), allow_plugins=options.allow_plugins)
+    rows = rows_of(spec, options.only, _limits(options))
     for row in rows:
         margin = "" if math.isnan(row["margin"]) else f" {row['margin']:.6g} {row['unit']}"
         print(f"{row['run']:12} {row['claim'] or row['ended']:12} {row['status'] or row['what']}{margin}")
@@ -144,7 +144,7 @@ def _only(spec: Spec, options: argparse.Namespace) -> int:
 
 
 def _limits(options: argparse.Namespace) -> Limits:
-    return Limits(options.limit_steps, DEFAULT_LIMITS.memory, options.limit_time)
+    return Limits(options.limit_steps, DEFAULT_LIMITS.memory, options.limit_time, options.allow_plugins)
 
 
 def _code(found: dict[str, Any]) -> int:
@@ -154,7 +154,7 @@ def _code(found: dict[str, Any]) -> int:
 
 
 def _undecided(found: dict[str, Any]) -> list[str]:
-    """What is undecided, in words: what exit code 3 stands for."""
+    """What is undecided, in words: the reasons of exit code 3."""
     draws, ended = found["draws"], found["ended"]
     lines = [f"{ended[name]} of {draws} draws {name}" for name in UNFINISHED if name in ended]
     for claim in found["claims"]:
@@ -171,7 +171,7 @@ def _name(claim: dict[str, Any]) -> str:
 
 
 def _summary(found: dict[str, Any], *, looked: bool) -> str:
-    """As text; the bounds hold for a number of draws fixed beforehand, or, if somebody has looked, at any time."""
+    """As text. The bounds hold for a number of draws fixed beforehand; after intermediate looks, at any time."""
     ended = ", ".join(f"{count} {name}" for name, count in found["ended"].items())
     lines = [f"{found['name']}: {found['draws']} draws ({ended}), {found['simulated_s']:.0f} s simulated"]
     for claim in found["claims"]:

@@ -117,7 +117,8 @@ def _run(spec: Spec, options: argparse.Namespace) -> int:
     path: Path = options.output or Path(f"{spec.name}_{options.sampler.rpartition(':')[2]}.yaml")
     files.try_to_create(path)
     files.try_to_create(_small(path))
-    search = Search(replace(spec, claims=(options.claim,)), objective, DEFAULT_LIMITS, options.allow_plugins)
+    limits = DEFAULT_LIMITS._replace(plugins=options.allow_plugins)
+    search = Search(replace(spec, claims=(options.claim,)), objective, limits)
     jobs = min(options.jobs or processors(), options.number)
     with progress_bar(quiet=options.quiet) as progress, pool.local(jobs) as processes:
         _try(search, processes)
@@ -144,7 +145,7 @@ def _try(search: Search, pool: Pool) -> None:
     from airground_drake.campaign.work import rows_of
 
     spec = search.spec
-    for _, rows in pool(partial(rows_of, spec, limits=search.limits, allow_plugins=search.allow_plugins), [0]):
+    for _, rows in pool(partial(rows_of, spec, limits=search.limits), [0]):
         if rows and all(row["ended"] == JUDGED and not row["claim"] for row in rows):
             raise ScenarioError("--claim", "", spec.claims[0], f"wanted: one that applies to a run of {spec.source}")
 

@@ -45,7 +45,7 @@ def _write(place: Path) -> Path:
     """Write the page of a folder.
 
     Raises:
-        FolderError: if there are no reports in it, or a page of somebody else's.
+        FolderError: if there are no reports in it, or a foreign page.
         OSError: if it cannot be written.
     """
     from airground_drake.report import pages

@@ -1,4 +1,4 @@
-"""`airground judge POSITIONS --scenario NAME`: judge positions that come from elsewhere, such as a laboratory."""
+"""`airground judge POSITIONS --scenario NAME`: judge recorded positions, such as those of a laboratory."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ def parser() -> argparse.ArgumentParser:
     """What the command line takes."""
     parser = Parser(
         prog="airground judge",
-        description="Judge sampled positions of robots, wherever they come from: the distances that were kept, and by "
-        "how much the samples miss the avoidance law.",
+        description="Judge sampled positions of robots from any source: which distances were kept, and by how much "
+        "the samples miss the avoidance law.",
         epilog="exit codes: 0 every distance is kept, 1 one is not, 2 usage, or a file that cannot be used",
     )
     parser.add_argument(

@@ -32,7 +32,7 @@ def parser() -> argparse.ArgumentParser:
         action="append",
         default=[],
         metavar="NAME",
-        help="prove this run of DIR, whatever the scenario expects of it, and no other; may be repeated",
+        help="prove only this run of DIR, even if the scenario does not expect it to pass; may be repeated",
     )
     parser.add_argument(
         "--limit", type=positive, default=600.0, metavar="S", help="seconds for one call of Coq (default: %(default)g)"
@@ -99,7 +99,7 @@ def _runs(options: argparse.Namespace) -> int:
 
 
 def _lines(found: Proved) -> list[str]:
-    """What came of a run."""
+    """The lines about a run."""
     lines = []
     for what, answer in (
         (f"all {found.pairs} distances kept at all times", found.distances),

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 ELSEWHERE = "it is left alone; name another place, with -o"
 SLOWEST, SPEED, FASTEST = 0.1, 4.0, 100.0
-"""How fast a video may be, and is if nothing is said of it."""
+"""Limits and default of a video's speed."""
 
 
 def parser() -> argparse.ArgumentParser:
@@ -96,7 +96,7 @@ def _mark(folder: Path, run: str) -> str:
 
 
 def _has(path: Path, mark: str) -> bool:
-    """Whether a file ends with a mark; what is not a plain file has none."""
+    """Whether a path is a plain file that ends with a mark."""
     if not path.is_file():
         return False
     with path.open("rb") as file:

@@ -7,7 +7,7 @@
     REFRACTORY   -- dwell over, x >= zeta --------------------------> INTERVENING   (a trigger)
 
 The dwell is the minimum inter-event time since the last trigger, so two triggers are never closer than it,
-whatever the noise does. The paper's bare threshold is the same automaton with release = zeta and no dwell.
+for any noise. The paper's bare threshold is the same automaton with release = zeta and no dwell.
 """
 
 from __future__ import annotations

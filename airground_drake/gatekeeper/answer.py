@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
-from airground_drake.gatekeeper.budget import Budget, Clock
+from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.outcome import Outcome
 from airground_drake.gatekeeper.problem import Problem
 from airground_drake.gatekeeper.solution import ConstantPlans, Solution
@@ -27,30 +26,23 @@ class Rules:
         min_dwell: least time between opposite answers to a proposal, s.
         first_stage: the paper's own rule: the first stage of every plan is the answer, whatever was answered before.
         budget: of one solution, in counts.
-        budget_share: of the sampling period that all solutions of a sample may take by the clock; None: no limit.
-        clock: what that is measured with.
+        allowance_s: time by the budget's clock that all solutions of a sample may take, s; None: no limit.
     """
 
     switching_margin: float = 0.0
     min_dwell: float = 0.0
     first_stage: bool = False
     budget: Budget = field(default_factory=Budget)
-    budget_share: float | None = None
-    clock: Clock = time.monotonic
+    allowance_s: float | None = None
 
-    def budgets(self, count: int, period: float) -> Iterator[Budget]:
-        """The budget of each of `count` problems of one sample; the clock is read when the first is asked for.
-
-        Args:
-            count: of problems.
-            period: sampling period, s.
-        """
-        if self.budget_share is None:
+    def budgets(self, count: int) -> Iterator[Budget]:
+        """The budget of each of `count` problems of one sample; the clock is read when the first is asked for."""
+        if self.allowance_s is None:
             yield from [self.budget] * count
             return
-        begin, allowance = self.clock(), self.budget_share * period
+        begin = self.budget.clock()
         for i in range(count):
-            yield replace(self.budget, deadline_s=begin + allowance * (i + 1) / count, clock=self.clock)
+            yield replace(self.budget, deadline_s=begin + self.allowance_s * (i + 1) / count)
 
 
 Reason = Literal[
@@ -79,38 +71,10 @@ WORDS: dict[Reason, str] = {
 
 
 @dataclass(frozen=True)
-class Planned:
-    """What a decision by (26) rests on.
-
-    Attributes:
-        problem: (26) as predicted.
-        solution: the route's.
-        throughout: costs (25) of accepting and of refusing throughout; -1 without a plan.
-    """
-
-    problem: Problem
-    solution: Solution
-    throughout: tuple[float, float]
-
-
-@dataclass(frozen=True)
-class Foreseen:
-    """What a decision by outcomes rests on.
-
-    Attributes:
-        refuse: what comes of refusing; None unless it was looked at.
-        accept: what comes of accepting; None unless it was looked at.
-        tries: acceptances since the last rest, with this decision.
-    """
-
-    refuse: Outcome | None = None
-    accept: Outcome | None = None
-    tries: int = 0
-
-
-@dataclass(frozen=True)
 class Decision:
     """What the gatekeeper decided about one proposal at one sample: a row of the trace's table `decisions`.
+
+    By (26) it rests on `problem`, `solution` and `throughout`; by outcomes, on `refuse`, `accept` and `tries`.
 
     Attributes:
         t: when, s.
@@ -118,7 +82,12 @@ class Decision:
         proposal: on what.
         accepted: the answer.
         reason: why.
-        grounds: what it rests on.
+        problem: (26) as predicted.
+        solution: the route's.
+        throughout: costs (25) of accepting and of refusing throughout; -1 without a plan.
+        refuse: what comes of refusing; None unless it was looked at.
+        accept: what comes of accepting; None unless it was looked at.
+        tries: acceptances since the last rest, with this decision.
     """
 
     t: float
@@ -126,18 +95,23 @@ class Decision:
     proposal: Proposal
     accepted: bool
     reason: Reason
-    grounds: Planned | Foreseen
+    problem: Problem | None = None
+    solution: Solution | None = None
+    throughout: tuple[float, float] = (-1.0, -1.0)
+    refuse: Outcome | None = None
+    accept: Outcome | None = None
+    tries: int = 0
 
 
 def in_words(decision: Decision) -> str:
     """Why the answer is what it is, as a sentence for the UAV."""
-    words, grounds = WORDS[decision.reason], decision.grounds
-    if decision.reason == "waits" and isinstance(grounds, Planned):
-        accept, refuse = grounds.throughout
-        words += f": cost {grounds.solution.objective:.4g}, {accept:.4g} to accept throughout, {refuse:.4g} to refuse"
-    if decision.reason == "stalls" and isinstance(grounds, Foreseen) and grounds.accept is not None:
-        x, y, _ = grounds.accept.end
-        words += f": at ({x:.2f}, {y:.2f}) m, {grounds.accept.left:.2f} m short"
+    words = WORDS[decision.reason]
+    if decision.reason == "waits" and decision.solution is not None:
+        accept, refuse = decision.throughout
+        words += f": cost {decision.solution.objective:.4g}, {accept:.4g} to accept throughout, {refuse:.4g} to refuse"
+    if decision.reason == "stalls" and decision.accept is not None:
+        x, y, _ = decision.accept.end
+        words += f": at ({x:.2f}, {y:.2f}) m, {decision.accept.left:.2f} m short"
     return words
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,25 +9,17 @@ import numpy.typing as npt
 from pydrake.solvers import MathematicalProgram
 
 from airground_drake.base.arrays import Array
-from airground_drake.gatekeeper.blocks import block_of_stage
-from airground_drake.gatekeeper.half_planes import offsets
 from airground_drake.gatekeeper.problem import Problem
-from airground_drake.gatekeeper.reachable_box import within_reach
+from airground_drake.gatekeeper.relaxation import offsets, within_reach
 
 AXES = 2  # UGVs move in their plane
 
 
-@dataclass(frozen=True)
-class Size:
-    """What a program is built for; everything else are coefficients, see `BinaryProgram.update`.
-
-    Attributes:
-        stages: N.
-        blocks: B, accept variables, each for a block of stages; B <= N.
-    """
-
-    stages: int
-    blocks: int
+def block_of_stage(stages: int, blocks: int) -> npt.NDArray[np.int64]:
+    """Block (N,) that each stage belongs to: lengths differ by one stage at most, none is empty."""
+    used = min(blocks, stages)
+    block: npt.NDArray[np.int64] = np.arange(stages, dtype=np.int64) * used // stages
+    return block
 
 
 class BinaryProgram:
@@ -44,12 +35,13 @@ class BinaryProgram:
         error: cost of task errors in (25).
         slack: cost of slack in (25).
         half_planes: (26d), one row per half-plane that some plan can violate, over (omega, u).
+        within: which half-planes these are, (N, m).
         block: of each stage, (N,).
     """
 
-    def __init__(self, size: Size) -> None:
-        """A program without any problem's data."""
-        n, b = size.stages, size.blocks
+    def __init__(self, stages: int, blocks: int) -> None:
+        """A program without any problem's data, for N stages and B <= N accept variables, one per block of stages."""
+        n, b = stages, blocks
         self.program = MathematicalProgram()
         self.block = block_of_stage(n, b)
         self.omega: Any = self.program.NewBinaryVariables(b, "omega")
@@ -67,6 +59,7 @@ class BinaryProgram:
             ("(26e) slack", positive),
         ):
             binding.evaluator().set_description(description)
+        self.within = np.zeros((n, 0), dtype=bool)
         self._of_block = np.equal.outer(self.block, np.arange(b)).astype(np.float64)
 
     def update(self, problem: Problem, normals: Array) -> None:
@@ -87,6 +80,7 @@ class BinaryProgram:
         self.error.evaluator().UpdateCoefficients(hessian, gradient, constant, is_convex=True)
         of_slack = np.full(n, 2.0 * problem.dt * problem.slack_weight)
         self.slack.evaluator().UpdateCoefficients(np.diag(of_slack), np.zeros(n), is_convex=True)
+        self.within = within_reach(problem) & (problem.slack_weight > 0.0)
         rows, lower = self._rows(problem, normals, steps, refused - problem.reference)
         self.half_planes.evaluator().UpdateCoefficients(rows, lower, np.full(len(lower), np.inf))
 
@@ -102,7 +96,7 @@ class BinaryProgram:
             away: task errors of refusing throughout, (N, 3), m.
         """
         n, b = problem.stages, self._of_block.shape[1]
-        stage, point = np.nonzero(within_reach(problem) & (problem.slack_weight > 0.0))
+        stage, point = np.nonzero(self.within)
         if len(stage) == 0:
             return np.zeros((1, b + n)), np.full(1, -np.inf)
         normal = normals[stage, point]

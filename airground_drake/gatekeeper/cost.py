@@ -16,10 +16,12 @@ from airground_drake.base.arrays import Array
 
 
 class Terms(NamedTuple):
-    """The data of (25)-(26e) over N stages with m points; numba takes it as one argument.
+    """The data of (23) and (25)-(26e) over N stages with m points; numba takes it as one argument.
 
     Attributes:
         dt: length of a stage, s.
+        initial: position at the beginning, (3,), m.
+        velocities: of the modes, (2, N, 3), m/s, in the order of `rollout.REFUSED` and `ACCEPTED`.
         reference: preset trajectory at the ends of the stages, (N, 3), m.
         centres: points to keep away from at the ends of the stages, (N, m, 3), m.
         distances: safe distances d of (26d), (m,), m.
@@ -28,6 +30,8 @@ class Terms(NamedTuple):
     """
 
     dt: float
+    initial: Array
+    velocities: Array
     reference: Array
     centres: Array
     distances: Array

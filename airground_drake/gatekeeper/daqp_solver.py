@@ -14,8 +14,10 @@ from airground_drake.base.arrays import Array
 from airground_drake.gatekeeper.binary_program import BinaryProgram
 
 _BINARY, _SOFT, _NO_BOUND = 16, 8, 1e30
-_OPTIMAL, _TIME = (1, 2), (5, -7)
-"""Flags of DAQP; 5: stopped with a solution, -7: stopped without one."""
+_OPTIMAL, _SPENT = (1, 2), (5, -7, -4)
+"""Flags of DAQP; 5: stopped with a solution, -7: stopped without one, -4: too many iterations."""
+_ITERATIONS = 10_000
+"""DAQP's own limit."""
 
 _IDLE = 1e-7
 """A stage whose choice moves the ends less than this, relative to the largest, is no decision: with it the Hessian is
@@ -33,15 +35,22 @@ class Found:
         omega: values of the accept variables, (B,); None without a solution.
         ended: 'optimal' only with a proof.
         iterations: of the active-set method over all nodes; 0 if the solver does not say.
+        multipliers: of the relaxation's half-planes, one per row, 1/m.
     """
 
     omega: Array | None
     ended: Literal["optimal", "budget_spent", "solver_failed"]
     iterations: int = 0
+    multipliers: Array | None = None
 
 
 def minimise(
-    binary: BinaryProgram, *, relaxed: bool = False, known: float = math.inf, seconds: float = math.inf
+    binary: BinaryProgram,
+    *,
+    relaxed: bool = False,
+    known: float = math.inf,
+    seconds: float = math.inf,
+    iterations: int = _ITERATIONS,
 ) -> Found:
     """The optimum of the program, or of its relaxation.
 
@@ -53,6 +62,7 @@ def minimise(
         relaxed: shares of accepting in [0, 1] in place of binaries.
         known: cost that can be reached; branches above it are cut.
         seconds: how long the search may take by the clock; DAQP looks at it every 32 nodes.
+        iterations: of the active-set method at each node, at most.
     """
     error, soft, rows = (one.evaluator() for one in (binary.error, binary.slack, binary.half_planes))
     hessian, gradient, lower, matrix = error.Q(), error.b(), rows.lower_bound(), rows.GetDenseA()
@@ -79,6 +89,7 @@ def minimise(
     solver.settings = {
         "presolve": 0,
         "primal_tol": _TOLERANCE,
+        "iter_limit": min(iterations, _ITERATIONS),
         "time_limit": 0.0 if seconds == math.inf else max(seconds, 1e-6),
         "fval_bound": _NO_BOUND if known == math.inf else (known * (1.0 + 1e-7) - error.c()) / largest,
     }
@@ -90,10 +101,11 @@ def minimise(
         solver.soft_weights(rho_l=reciprocal, rho_u=reciprocal)
     x, _, flag, info = solver.solve()
     if flag not in _OPTIMAL:
-        return Found(None, "budget_spent" if flag in _TIME else "solver_failed")
+        return Found(None, "budget_spent" if flag in _SPENT else "solver_failed")
     omega[live] = np.clip(x[:count] / scale, 0.0, 1.0)
     omega = _with_idle(omega, live)
-    return Found(omega if relaxed else np.round(omega), "optimal", int(info["iterations"]))
+    multipliers = largest * np.abs(info["lam"][count:])
+    return Found(omega if relaxed else np.round(omega), "optimal", int(info["iterations"]), multipliers)
 
 
 def _with_idle(omega: Array, live: npt.NDArray[np.intp]) -> Array:

@@ -15,7 +15,6 @@ cost-to-go counts as infinite. Of two such the one that leaves less of the way i
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,12 +25,11 @@ from airground_drake.gatekeeper.rollout import (
     ACCEPTED,
     REFUSED,
     ClosedLoop,
-    Scene,
+    View,
     loop_among,
     velocity_of,
     workspace,
 )
-from airground_drake.geometry.motion import Motion
 from airground_drake.geometry.paths import NoPath, shortest_path
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.law import UgvLaw
@@ -91,85 +89,48 @@ class Outcome:
         return self.cost < (1.0 - USELESS) * other.cost
 
 
-@dataclass(frozen=True)
-class Other:
-    """A robot that is to be kept away from, as predicted.
-
-    Attributes:
-        position: now, (3,), m.
-        velocity: now, (3,), m/s.
-        asked: the motion that it has accepted or is asked for, if any: it is predicted to follow it.
-        accepted: whether it has accepted that.
-        distance: to keep from it, m.
-        share: of the avoidance inequality.
-    """
-
-    position: Array
-    velocity: Array
-    asked: Motion | None
-    accepted: bool
-    distance: float
-    share: float
-
-    def places(self, t: float, after: Array, coasting: float, *, together: bool) -> Array:
-        """Where it will be at times `after` from t, (S + 1, 3), m.
-
-        On the motion that it is asked to make, by as much beside it as it is now, less with every second: it tracks.
-        Without one: on as now for a while, then at rest. What it has not accepted yet counts only together with what
-        this UGV is asked: else each would refuse its part of a joint plan because the others free its way.
-        """
-        if self.asked is None or not (together or self.accepted):
-            return self.position + np.minimum(after, coasting)[:, None] * self.velocity
-        beside = self.position - self.asked.at(t)[0]
-        return self.asked.sample(t + after) + np.exp(-after)[:, None] * beside
-
-
-def outcomes(
-    scene: Scene,
-    law: UgvLaw,
-    proposal: Proposal,
-    discs: Array,
-    distances: Array | float,
-    others: Sequence[Other],
-    look: Outlook,
-) -> tuple[Outcome, Outcome]:
+def outcomes(seen: View, law: UgvLaw, proposal: Proposal, look: Outlook) -> tuple[Outcome, Outcome]:
     """What comes of refusing and of accepting.
 
     Args:
-        scene: time, own position, preset trajectory and speed limit.
+        seen: what the UGV knows; obstacles stand still, whatever their velocities.
         law: the UGV's control law.
         proposal: in question.
-        discs: centres of the obstacles that are known, (m, 3), m.
-        distances: safe distances to them, (m,), m, or one for all.
-        others: the other robots.
         look: how far to look.
     """
-    h = law.avoidance.period
-    look = replace(look, still=min(look.still, STILL_SHARE * scene.max_speed))
-    distances = np.broadcast_to(distances, len(discs))
-    until = min(proposal.motion.end, scene.t + look.longest)
-    ends = min(max(until, scene.preset.end), scene.t + look.longest) + look.past
-    after = h * np.arange(0.0, np.ceil((ends - scene.t) / h) + 1.0)
-    fixed = np.broadcast_to(discs, (len(after), len(discs), 3))
-    known = Scene(
-        scene.t, scene.position, scene.preset, scene.centres, scene.velocities,
-        np.concatenate([distances, [each.distance for each in others]]),
-        np.concatenate([np.ones(len(discs)), [each.share for each in others]]),
-        scene.max_speed,
-    )  # fmt: skip
-    goal = scene.preset.positions[-1]
-    settled = max(
-        until, scene.preset.end, scene.t + look.coasting, *(e.asked.end for e in others if e.asked is not None)
-    )
-    steps = int(np.ceil((settled - scene.t) / h - 1e-9))
+    h, t, m = law.avoidance.period, seen.t, len(seen.centres) - len(seen.asked)
+    look = replace(look, still=min(look.still, STILL_SHARE * seen.max_speed))
+    discs, distances = seen.centres[:m], seen.distances[:m]
+    until = min(proposal.motion.end, t + look.longest)
+    ends = min(max(until, seen.preset.end), t + look.longest) + look.past
+    after = h * np.arange(0.0, np.ceil((ends - t) / h) + 1.0)
+    fixed = np.broadcast_to(discs, (len(after), m, 3))
+    goal = seen.preset.positions[-1]
+    settled = max(until, seen.preset.end, t + look.coasting, *(asked[0].end for asked in seen.asked if asked))
+    steps = int(np.ceil((settled - t) / h - 1e-9))
     found = []
-    for together, accepted in ((False, 0), (True, max(0, int(np.ceil((until - scene.t) / h - 1e-9))))):
-        places = [each.places(scene.t, after, look.coasting, together=together)[:, None] for each in others]
+    for together, accepted in ((False, 0), (True, max(0, int(np.ceil((until - t) / h - 1e-9))))):
+        places = [robot_at(seen, j, after, look.coasting, together=together)[:, None] for j in range(len(seen.asked))]
         points = np.ascontiguousarray(np.concatenate([fixed, *places], axis=1))  # the layout that is compiled for
-        loop = loop_among(known, law, proposal, after, points)
+        loop = loop_among(seen, law, proposal, after, points)
         positions, cost = _rolled_out(loop, accepted, goal, steps, look.near, look.still)
-        found.append(_outcome(positions, cost, goal, scene.preset.max_speed, discs, distances, h, look))
+        found.append(_outcome(positions, cost, goal, seen.preset.max_speed, discs, distances, h, look))
     return found[0], found[1]
+
+
+def robot_at(seen: View, robot: int, after: Array, coasting: float, *, together: bool) -> Array:
+    """Where one of the other robots is predicted to be at times `after` from now, (S + 1,) s: (S + 1, 3), m.
+
+    A robot that is asked to make a motion tracks it: its distance from the motion decays with a time constant of 1 s.
+    Another robot keeps its velocity for `coasting`, s, then stands. What it has not accepted yet counts only `together`
+    with what this UGV is asked: else each would refuse its part of a joint plan because the others free its way.
+    """
+    k, asked = len(seen.centres) - len(seen.asked) + robot, seen.asked[robot]
+    if asked is None or not (together or asked[1]):
+        return seen.centres[k] + np.minimum(after, coasting)[:, None] * seen.velocities[k]
+    motion, _ = asked
+    beside = seen.centres[k] - motion.at(seen.t)[0]
+    return motion.sample(seen.t + after) + np.exp(-after)[:, None] * beside
 
 
 def _outcome(

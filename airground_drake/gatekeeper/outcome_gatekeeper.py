@@ -20,10 +20,11 @@ import numpy as np
 import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
-from airground_drake.gatekeeper.answer import Decision, Foreseen, Reason
-from airground_drake.gatekeeper.mpc_gatekeeper import Gatekeepers, Memory, View
-from airground_drake.gatekeeper.outcome import Other, Outcome, Outlook, outcomes
+from airground_drake.gatekeeper.answer import Decision, Reason
+from airground_drake.gatekeeper.mpc_gatekeeper import Gatekeepers, GatekeeperState, Inputs
+from airground_drake.gatekeeper.outcome import Outcome, Outlook, outcomes
 from airground_drake.gatekeeper.patience import Commitment, Patience
+from airground_drake.gatekeeper.rollout import View
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.messages import ACCEPT, DONE, REFUSE, SILENT, Proposals, Report, answer_to
 from airground_drake.intervention.policy import Proposal
@@ -50,129 +51,141 @@ class OutcomeGatekeepers(Gatekeepers):
         self._outlook, self._patience = outlook, patience
         self._ugvs = world.names("ugv")
 
-    def idle(self, proposals: Proposals, positions: Array, memory: Memory) -> bool:
+    def idle(self, proposals: Proposals, positions: Array, before: GatekeeperState) -> bool:
         """Whether a sample changes nothing."""
-        return super().idle(proposals, positions, memory) and memory.sensed is self._remembered(positions, memory)
+        return super().idle(proposals, positions, before) and before.sensed is self._remembered(positions, before)
 
-    def sample(self, t: float, proposals: Proposals, positions: Array, velocities: Array, memory: Memory) -> Memory:
+    def sample(self, now: Inputs, before: GatekeeperState) -> GatekeeperState:
         """Judge every proposal in force by its outcome if it is new; else keep to what was answered."""
-        sensed = self._remembered(positions, memory)
-        seen = View(t, proposals, positions, velocities, replace(memory, sensed=sensed))
+        sensed = self._remembered(now.positions, before)
+        known = replace(before, sensed=sensed)
         answers: list[float] = []
         reports: list[Report] = []
-        held = list(memory.commitments)
+        held = list(before.commitments)
         decisions: list[Decision] = []
-        for i, proposal in enumerate(proposals):
-            standing = answer_to(proposal, memory.answers, i)
+        for i, proposal in enumerate(now.proposals):
+            standing = answer_to(proposal, before.answers, i)
             if held[i].executing and standing != ACCEPT:  # withdrawn
-                held[i] = self._patience.stop(held[i], t)
-            held[i] = self._patience.rested(held[i], t)
+                held[i] = self._patience.stop(held[i], now.t)
+            held[i] = self._patience.rested(held[i], now.t)
             if proposal is None:
                 answers += [SILENT, -1.0]
                 reports.append(Report())
                 continue
             started = thread_time()
             if standing == ACCEPT:
-                again = self._discovers(sensed, memory, i, proposal)
-                decision, held[i] = self._go_on(seen, i, proposal, held[i], again=again)
+                again = self._discovers(sensed, before, i, proposal)
+                decision, held[i] = self._go_on(now, known, i, proposal, held[i], again=again)
             elif standing == SILENT:
-                decision, held[i] = self._judge(seen, i, proposal, held[i])
+                decision, held[i] = self._judge(now, known, i, proposal, held[i])
             else:
-                decision = Decision(t, i, proposal, False, "kept", Foreseen(tries=held[i].tries))
+                decision = Decision(now.t, i, proposal, False, "kept", tries=held[i].tries)
             self.times_s.append(thread_time() - started)
             decisions.append(decision)
             answers += [_answer(decision, standing), proposal.number]
-            reports.append(self._report(positions[i], decision))
+            reports.append(self._report(now.positions[i], decision))
         return replace(
-            memory, answers=tuple(answers), reports=tuple(reports),
-            decisions=tuple(decisions), commitments=tuple(held), sensed=sensed,
-        )  # fmt: skip
+            known, answers=tuple(answers), reports=tuple(reports), decisions=tuple(decisions), commitments=tuple(held)
+        )
 
-    def _remembered(self, positions: Array, memory: Memory) -> np.ndarray:
+    def _remembered(self, positions: Array, before: GatekeeperState) -> np.ndarray:
         """Which obstacles each UGV has sensed up to now, (n, m); the very same array if nothing is new."""
-        points, own, reach = self._near.still, positions[self._near.members], self._law.avoidance.sensing_range
-        if memory.sensed.shape != (len(own), len(points)):
+        points, own, reach = self._near.still, positions[self._near.members], self.law.avoidance.sensing_range
+        if before.sensed.shape != (len(own), len(points)):
             return within(points, own, reach)
-        if news_within(points, own, reach, memory.sensed):
-            return memory.sensed | within(points, own, reach)
-        return memory.sensed
+        if news_within(points, own, reach, before.sensed):
+            return before.sensed | within(points, own, reach)
+        return before.sensed
 
-    def _discovers(self, sensed: npt.NDArray[np.bool_], memory: Memory, i: int, proposal: Proposal) -> bool:
+    def _discovers(self, sensed: npt.NDArray[np.bool_], before: GatekeeperState, i: int, proposal: Proposal) -> bool:
         """Whether a UGV senses an obstacle for the first time that is not on the proposal's map."""
-        if sensed is memory.sensed:
+        if sensed is before.sensed:
             return False
-        new = self._near.still[sensed[i] & ~memory.sensed[i]]
+        new = self._near.still[sensed[i] & ~before.sensed[i]]
         apart = np.linalg.norm(new[:, None] - proposal.mapped, axis=2)
         return not (apart <= SAME_M).any(axis=1).all()
 
-    def _judge(self, seen: View, i: int, proposal: Proposal, held: Commitment) -> tuple[Decision, Commitment]:
+    def _judge(
+        self, now: Inputs, known: GatekeeperState, i: int, proposal: Proposal, held: Commitment
+    ) -> tuple[Decision, Commitment]:
         """The first decision about a proposal."""
         if self._patience.exhausted(held):
-            return Decision(seen.t, i, proposal, False, "exhausted", Foreseen(tries=held.tries)), held
-        reason, refuse, accept = self._weigh(seen, i, proposal)
+            return Decision(now.t, i, proposal, False, "exhausted", tries=held.tries), held
+        reason, refuse, accept = self._weigh(now, known, i, proposal)
         if reason in ACCEPTING:
-            held = self._patience.accept(held, seen.t, proposal.motion.end)
-        return Decision(seen.t, i, proposal, held.executing, reason, Foreseen(refuse, accept, held.tries)), held
-
-    def _weigh(self, seen: View, i: int, proposal: Proposal) -> tuple[Reason, Outcome, Outcome]:
-        """The reason for the answer, and what comes of refusing and of accepting."""
-        refuse, accept = self.foresee(seen, i, proposal)
-        favour = proposal.cause in self._ugvs and proposal.cause != self._ugvs[i]
-        return reason_of(refuse, accept, favour=favour), refuse, accept
+            held = self._patience.accept(held, now.t, proposal.motion.end)
+        made = Decision(now.t, i, proposal, held.executing, reason, refuse=refuse, accept=accept, tries=held.tries)
+        return made, held
 
     def _go_on(
-        self, seen: View, i: int, proposal: Proposal, held: Commitment, *, again: bool
+        self, now: Inputs, known: GatekeeperState, i: int, proposal: Proposal, held: Commitment, *, again: bool
     ) -> tuple[Decision, Commitment]:
         """A later decision about a proposal that is executed; `again`: look at both outcomes once more."""
         reason: Reason = "kept"
-        grounds = Foreseen(tries=held.tries)
-        if self._patience.over(held, seen.t):
+        refuse = accept = None
+        if self._patience.over(held, now.t):
             reason = "over"
         elif again:
-            reason, refuse, accept = self._weigh(seen, i, proposal)
-            grounds = Foreseen(refuse, accept, held.tries)
+            reason, refuse, accept = self._weigh(now, known, i, proposal)
         stays = reason == "kept" or reason in ACCEPTING
-        decision = Decision(seen.t, i, proposal, stays, reason, grounds)
-        return decision, held if stays else self._patience.stop(held, seen.t)
+        made = Decision(now.t, i, proposal, stays, reason, refuse=refuse, accept=accept, tries=held.tries)
+        return made, held if stays else self._patience.stop(held, now.t)
 
-    def foresee(self, seen: View, i: int, proposal: Proposal) -> tuple[Outcome, Outcome]:
-        """What comes of refusing and of accepting, with what the UGV knows."""
-        scene = self._scene(seen, i)
-        discs, distances = self._known(seen, i, proposal)
-        first = len(self._near.still)
-        others = []
-        for k, j in enumerate(self._near.others[i], start=first):
-            asked = seen.proposals[j] if j < len(seen.proposals) else None
-            answer = SILENT if asked is None else answer_to(asked, seen.before.answers, int(j))
-            others.append(
-                Other(
-                    scene.centres[k], scene.velocities[k],
-                    asked.motion if asked is not None and answer in (ACCEPT, SILENT) else None, answer == ACCEPT,
-                    float(scene.distances[k]), float(scene.shares[k]),
-                )
-            )  # fmt: skip
-        return outcomes(scene, self._law, proposal, discs, distances, others, self._outlook)
+    def _weigh(
+        self, now: Inputs, known: GatekeeperState, i: int, proposal: Proposal
+    ) -> tuple[Reason, Outcome, Outcome]:
+        """The reason for the answer, and what comes of refusing and of accepting."""
+        refuse, accept = self.foresee(self._view_of(now, known, i, proposal), now.law, proposal)
+        favour = proposal.cause in self._ugvs and proposal.cause != self._ugvs[i]
+        return reason_of(refuse, accept, favour=favour), refuse, accept
 
-    def _known(self, seen: View, i: int, proposal: Proposal) -> tuple[Array, Array]:
+    def foresee(self, seen: View, law: UgvLaw, proposal: Proposal) -> tuple[Outcome, Outcome]:
+        """What comes of refusing and of accepting, as far as a UGV sees."""
+        return outcomes(seen, law, proposal, self._outlook)
+
+    def _view_of(self, now: Inputs, known: GatekeeperState, i: int, proposal: Proposal) -> View:
+        """What a UGV knows: obstacles that it has sensed or been told of, other robots and what these are asked."""
+        around, m = self._view(now, i), len(self._near.still)
+        discs, distances = self._known(now.positions[i], known.sensed[i], i, proposal)
+        asked = []
+        for j in self._near.others[i].tolist():
+            other = now.proposals[j] if j < len(now.proposals) else None
+            answer = answer_to(other, known.answers, j)
+            asked.append((other.motion, answer == ACCEPT) if other and answer in (ACCEPT, SILENT) else None)
+        return replace(
+            around,
+            centres=np.concatenate([discs, around.centres[m:]]),
+            velocities=np.concatenate([np.zeros_like(discs), around.velocities[m:]]),
+            distances=np.concatenate([distances, around.distances[m:]]),
+            shares=np.concatenate([np.ones(len(discs)), around.shares[m:]]),
+            asked=tuple(asked),
+        )
+
+    def _known(self, position: Array, sensed: npt.NDArray[np.bool_], i: int, proposal: Proposal) -> tuple[Array, Array]:
         """Obstacles that a UGV has sensed, and those of the UAV's map that are out of its sight.
 
-        Of the latter the `MOST_CLAIMED` that are nearest, so that no map makes a decision take long; none whose radius
-        is no length.
+        Of the latter the `MOST_CLAIMED` that are nearest, so that no map makes a decision take long. Obstacles whose
+        radius is no length are left out.
+
+        Args:
+            position: of the UGV, (3,), m.
+            sensed: which obstacles it has sensed, (m,).
+            i: the UGV.
+            proposal: with the UAV's map.
 
         Returns:
             Centres, (k, 3), and safe distances, (k,), m.
         """
-        was = seen.before.sensed[i]
-        sensed, claimed = self._near.still[was], proposal.mapped
+        own, claimed = self._near.still[sensed], proposal.mapped
         radii = np.broadcast_to(proposal.mapped_radii, len(claimed))
-        hidden = np.linalg.norm(claimed - seen.positions[i], axis=1) > self._law.avoidance.sensing_range
-        apart = np.linalg.norm(claimed[:, None] - sensed, axis=2)
+        hidden = np.linalg.norm(claimed - position, axis=1) > self.law.avoidance.sensing_range
+        apart = np.linalg.norm(claimed[:, None] - own, axis=2)
         new = np.flatnonzero(hidden & (apart > SAME_M).all(axis=1) & np.isfinite(radii) & (radii >= 0.0))
-        nearest = np.argsort(np.linalg.norm(claimed[new] - seen.positions[i], axis=1), kind="stable")[:MOST_CLAIMED]
+        nearest = np.argsort(np.linalg.norm(claimed[new] - position, axis=1), kind="stable")[:MOST_CLAIMED]
         new = new[np.sort(nearest)]
         away = self._world.apart("ugv", "obstacle") + (self._world.radius[self._near.members[i]] + radii[new])
-        distances = np.concatenate([self._near.distance[i, : len(was)][was], away])
-        return np.concatenate([sensed, claimed[new]]), distances
+        distances = np.concatenate([self._near.distance[i, : len(sensed)][sensed], away])
+        return np.concatenate([own, claimed[new]]), distances
 
 
 def _answer(decision: Decision, standing: float) -> float:

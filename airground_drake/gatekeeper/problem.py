@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
 from airground_drake.base.arrays import Array
 from airground_drake.gatekeeper.cost import Terms, error_weights, half_plane_cost, plan_cost
-from airground_drake.gatekeeper.rollout import ClosedLoop, Scene, closed_loop
+from airground_drake.gatekeeper.rollout import ClosedLoop, View, closed_loop
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.law import UgvLaw
 
@@ -77,15 +76,11 @@ class Problem:
 
     @cached_property
     def terms(self) -> Terms:
-        """What (25) is made of, for compiled code."""
+        """What (23) and (25) are made of, for compiled code."""
         weights = error_weights(self.stages, self.dt, self.error_weight, self.terminal_weight)
-        data = self.reference, self.centres, self.distances
+        modes = np.stack([self.refuse, self.accept])
+        data = self.initial, modes, self.reference, self.centres, self.distances
         return Terms(float(self.dt), *data, weights, float(self.slack_weight))
-
-    @cached_property
-    def kinematics(self) -> Kinematics:
-        """(23), for compiled code."""
-        return Kinematics(float(self.dt), self.initial, np.stack([self.refuse, self.accept]))
 
     def is_finite(self) -> bool:
         """Whether all data are finite numbers."""
@@ -119,20 +114,6 @@ class Problem:
         return half_plane_cost(self.terms, positions, normals)
 
 
-class Kinematics(NamedTuple):
-    """(23) as numba takes it.
-
-    Attributes:
-        dt: length of a stage, s.
-        initial: (3,), m.
-        velocities: of the modes, (2, N, 3), m/s, in the order of `rollout.REFUSED` and `ACCEPTED`.
-    """
-
-    dt: float
-    initial: Array
-    velocities: Array
-
-
 @dataclass(frozen=True, eq=False)
 class Evaluation:
     """A plan omega (N,), its positions (N, 3), m, cost (25) and smallest clearance (distance minus d), m."""
@@ -143,28 +124,28 @@ class Evaluation:
     clearance: float
 
 
-def predicted_problem(scene: Scene, law: UgvLaw, proposal: Proposal, horizon: Horizon) -> Problem:
+def predicted_problem(seen: View, law: UgvLaw, proposal: Proposal, horizon: Horizon) -> Problem:
     """(26) for one UGV: roll out both choices and keep the points that it senses and might come near."""
-    scene = scene.restrict(np.linalg.norm(scene.centres - scene.position, axis=1) <= law.avoidance.sensing_range)
-    loop = closed_loop(scene, law, proposal, horizon.stages, horizon.substeps)
+    seen = seen.restrict(np.linalg.norm(seen.centres - seen.position, axis=1) <= law.avoidance.sensing_range)
+    loop = closed_loop(seen, law, proposal, horizon.stages, horizon.substeps)
     accept, refuse = loop.constant_plans()
     dt = horizon.substeps * law.avoidance.period
     after = dt * np.arange(1.0, horizon.stages + 1.0)
     squared = np.maximum(np.square(accept).sum(axis=1), np.square(refuse).sum(axis=1))
     # a plan that switches may be faster than both constant ones, but for a retreat not above the speed limit
-    reach = dt * np.cumsum(np.sqrt(np.maximum(squared, scene.max_speed**2)))
-    centres = scene.centres + after[:, None, None] * scene.velocities
-    gap = np.linalg.norm(centres - scene.position, axis=2) - scene.distances - reach[:, None]
-    height = np.abs(centres[:, :, 2] - scene.position[2]) - scene.distances
+    reach = dt * np.cumsum(np.sqrt(np.maximum(squared, seen.max_speed**2)))
+    centres = seen.centres + after[:, None, None] * seen.velocities
+    gap = np.linalg.norm(centres - seen.position, axis=2) - seen.distances - reach[:, None]
+    height = np.abs(centres[:, :, 2] - seen.position[2]) - seen.distances
     near = ((gap < 0.0) & (height < 0.0)).any(axis=0)
     return Problem(
         dt=dt,
-        initial=scene.position,
+        initial=seen.position,
         accept=accept,
         refuse=refuse,
         reference=np.ascontiguousarray(loop.preset[horizon.substeps :: horizon.substeps]),
         centres=np.ascontiguousarray(centres[:, near]),  # the layout that the kernels are compiled for
-        distances=scene.distances[near],
+        distances=seen.distances[near],
         error_weight=horizon.error_weight,
         slack_weight=horizon.slack_weight,
         terminal_weight=horizon.terminal_weight,

@@ -20,8 +20,8 @@ REFUSED, ACCEPTED = 0, 1
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
-    """What a UGV senses when it decides.
+class View:
+    """What a UGV sees when it decides: K points, obstacles first, then other robots.
 
     Attributes:
         t: time, s.
@@ -32,6 +32,8 @@ class Scene:
         distances: safe distances to them, (K,), m.
         shares: share of each avoidance inequality, (K,).
         max_speed: own speed limit, m/s.
+        asked: under method (d), per robot: the motion that it has accepted or is asked to make, and whether it has
+            accepted it; None without one.
     """
 
     t: float
@@ -42,9 +44,10 @@ class Scene:
     distances: Array
     shares: Array
     max_speed: float
+    asked: tuple[tuple[Motion, bool] | None, ...] = ()
 
-    def restrict(self, sensed: npt.NDArray[np.bool_]) -> Scene:
-        """The same scene with only the points (K,) that are marked as sensed."""
+    def restrict(self, sensed: npt.NDArray[np.bool_]) -> View:
+        """The same with only the points (K,) that are marked as sensed."""
         return replace(
             self,
             centres=self.centres[sensed],
@@ -114,45 +117,45 @@ class ClosedLoop(NamedTuple):
         return _follow(self, ACCEPTED * every)[1], _follow(self, REFUSED * every)[1]
 
 
-def closed_loop(scene: Scene, law: UgvLaw, proposal: Proposal, stages: int, substeps: int) -> ClosedLoop:
+def closed_loop(seen: View, law: UgvLaw, proposal: Proposal, stages: int, substeps: int) -> ClosedLoop:
     """The UGV's closed loop over `stages` of `substeps` control periods each.
 
     Args:
-        scene: what the UGV senses now.
+        seen: what the UGV sees now.
         law: its control law.
         proposal: the intervention in question.
         stages: N.
         substeps: control periods per stage.
     """
     after = law.avoidance.period * np.arange(0.0, stages * substeps + 1.0)
-    points = scene.centres + after[:, None, None] * scene.velocities
-    return loop_among(scene, law, proposal, after, points, substeps)
+    points = seen.centres + after[:, None, None] * seen.velocities
+    return loop_among(seen, law, proposal, after, points, substeps)
 
 
 def loop_among(
-    scene: Scene, law: UgvLaw, proposal: Proposal, after: Array, points: Array, substeps: int = 1
+    seen: View, law: UgvLaw, proposal: Proposal, after: Array, points: Array, substeps: int = 1
 ) -> ClosedLoop:
     """The UGV's closed loop among points that move in any way.
 
     Args:
-        scene: what the UGV knows; its `centres` and `velocities` are not looked at.
+        seen: what the UGV sees; its `centres` and `velocities` are not looked at.
         law: its control law.
         proposal: the intervention in question.
         after: control samples from now on, (S + 1,), s.
         points: where the points are at these, (S + 1, K, 3), m.
         substeps: control periods per stage.
     """
-    t = scene.t + after
+    t = seen.t + after
     return ClosedLoop(
         law=law.numbers,
-        start=scene.position,
-        preset=scene.preset.sample(t),
+        start=seen.position,
+        preset=seen.preset.sample(t),
         wanted=proposal.motion.sample(t),
         chosen=proposal.chosen,
         points=points,
-        distances=scene.distances,
-        shares=scene.shares,
-        max_speed=float(scene.max_speed),
+        distances=seen.distances,
+        shares=seen.shares,
+        max_speed=float(seen.max_speed),
         substeps=substeps,
     )
 

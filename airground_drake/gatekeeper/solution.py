@@ -10,7 +10,7 @@ import numpy as np
 
 from airground_drake.base.arrays import Array
 from airground_drake.gatekeeper.problem import Evaluation, Problem
-from airground_drake.gatekeeper.rounding import rounding_deviation
+from airground_drake.gatekeeper.relaxation import rounding_deviation
 
 Status = Literal["optimal", "budget_spent", "solver_failed", "refused_not_finite"]
 

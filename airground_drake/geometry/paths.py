@@ -266,7 +266,7 @@ def _entered(pieces: Array, c: Points, r: Array) -> NDArray[np.bool_]:
 
 
 def _route(p: complex, q: complex, c: Points, r: Array) -> Array | None:
-    """Return the pieces (see ``Path``) of the shortest path between free points; None if there is none."""
+    """Return the pieces (see ``Path``) of the shortest path between free points; None if no path exists."""
     if abs(q - p) <= _EPS:
         return np.empty((0, 6))
     a, b, on = _tangents(np.concatenate(([p, q], c)), np.concatenate(([0.0, 0.0], r)))

@@ -25,7 +25,7 @@ from airground_drake.intervention.policy import Answered, Observation, Proposal,
 
 
 @dataclass(frozen=True)
-class PlannerMemory:
+class PlannerState:
     """What the UAV remembers.
 
     Attributes:
@@ -50,7 +50,7 @@ class PlannerMemory:
         return tuple(talk.proposal for talk in self.talks)
 
 
-def sent_after(before: PlannerMemory, after: PlannerMemory, t: float) -> PlannerMemory:
+def sent_after(before: PlannerState, after: PlannerState, t: float) -> PlannerState:
     """Number the proposals that a planning instant has brought, and note them as sent.
 
     Every proposal that was not there before gets the next number and the time, whatever it came with: no planner can
@@ -110,24 +110,24 @@ class Planner:
         """Radii of the UGVs' bodies, (n,), m."""
         return np.broadcast_to(self.radius, len(self.ugvs))
 
-    def start(self) -> PlannerMemory:
+    def start(self) -> PlannerState:
         """What is remembered at the beginning: nothing."""
-        return PlannerMemory((Negotiation(),) * len(self.ugvs))
+        return PlannerState((Negotiation(),) * len(self.ugvs))
 
-    def idle(self, memory: PlannerMemory, intervening: Sequence[bool]) -> bool:
+    def idle(self, memory: PlannerState, intervening: Sequence[bool]) -> bool:
         """Whether a planning instant changes nothing: nobody is intervened on, and nothing of it is remembered."""
         return not any(intervening) and memory.talks == self.start().talks
 
     def plan(
         self,
-        memory: PlannerMemory,
+        memory: PlannerState,
         t: float,
         positions: Array,
         intervening: Sequence[bool],
         answers: Array,
         reports: Reports,
         standing: Sequence[bool] = (),
-    ) -> PlannerMemory:
+    ) -> PlannerState:
         """One planning period.
 
         Args:

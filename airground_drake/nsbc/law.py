@@ -7,7 +7,7 @@ Compiled, and written once: the controllers command by it (`UgvLaw.velocity`), a
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from typing import NamedTuple
 
@@ -62,6 +62,11 @@ class UgvLaw:
     motion_gain: float
     intervention_gain: float
     intervention_on_top: bool
+
+    def with_gains(self, avoidance: float, motion: float, intervention: float) -> UgvLaw:
+        """The law with other gains, 1/s."""
+        layer = replace(self.avoidance, gain=avoidance)
+        return replace(self, avoidance=layer, motion_gain=motion, intervention_gain=intervention)
 
     @cached_property
     def numbers(self) -> Numbers:

@@ -13,7 +13,7 @@ from airground_drake.run.trace import Trace
 Outcome = Literal["asked", "accepted", "refused"]
 
 LINGER_S = 1.0
-"""For so long a proposal is still shown that has been refused, or that nobody has answered."""
+"""How long a refused or unanswered proposal is still shown."""
 
 _ANSWERS: dict[str, Outcome] = {"accept": "accepted", "refuse": "refused"}
 

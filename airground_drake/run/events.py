@@ -10,7 +10,10 @@ import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
-from airground_drake.scenarios.schema import Obstacle, Uav, Ugv
+from airground_drake.scenarios.world import make_world
+from airground_drake.world.motion import Motion
+from airground_drake.world.shape import Shape
+from airground_drake.world.world import ROBOTS, Body
 
 
 def extract(trace: Trace, sent: Iterable[tuple[str, float, str]]) -> list[dict[str, Any]]:
@@ -41,7 +44,7 @@ def extract(trace: Trace, sent: Iterable[tuple[str, float, str]]) -> list[dict[s
             add(row["t_s"], row["robot"], row["decision"], policy=row["policy"], status=row["status"])
     for robot in trace.robots:
         _add_arrival(trace, robot, add)
-        _add_collisions(trace, robot, add)
+    _add_collisions(trace, add)
     return sorted(found, key=lambda event: (event["t_s"], order[event["robot"]]))
 
 
@@ -55,41 +58,46 @@ def _add_arrival(trace: Trace, robot: str, add: Any) -> None:
         add(trace.t[first], robot, "arrival")
 
 
-def _add_collisions(trace: Trace, robot: str, add: Any) -> None:
+def _add_collisions(trace: Trace, add: Any) -> None:
     """Visits within collision distance, from surface to surface, of obstacles and of robots that are listed later."""
-    scenario, position = trace.scenario, trace.position(robot)
-    bodies, own = scenario.robots, scenario.robots[robot].radius_m
-    low, high = position.min(axis=0), position.max(axis=0)  # the box around its way
-
-    def within(body: Ugv | Uav | Obstacle) -> float:
-        return scenario.safe_distance.collision_m + (own + body.radius_m)
-
-    names, there = list(scenario.obstacles), list(scenario.obstacles.values())
-    places = np.array([body.position_m for body in there], dtype=np.float64).reshape(-1, 3)
-    beside = np.linalg.norm(np.maximum(np.maximum(low - places, places - high), 0.0), axis=1)
-    for k in np.flatnonzero(beside <= [within(body) for body in there]):
-        for row in visits(position - places[k], within(there[k])):
-            add(trace.t[row], robot, "collision", obstacle=names[k])
-    for other in trace.robots[trace.robots.index(robot) + 1 :]:
-        way = trace.position(other)
-        apart = np.maximum(np.maximum(low - way.max(axis=0), way.min(axis=0) - high), 0.0)
-        if np.linalg.norm(apart) <= within(bodies[other]):
-            for row in visits(position - way, within(bodies[other])):
-                add(trace.t[row], robot, "collision", other=other)
+    world, collision_m = make_world(trace.scenario), trace.scenario.safe_distance.collision_m
+    ways = [_way(trace, body) for body in world.bodies]
+    low, high = (np.array(corners) for corners in zip(*map(_box, ways), strict=True))
+    for i, own in enumerate(world.bodies[world.select(*ROBOTS)]):
+        within = collision_m + own.shape.radius_m
+        gap = np.maximum(np.maximum(low[i] - high[i + 1 :], low[i + 1 :] - high[i]), 0.0)
+        near = i + 1 + np.flatnonzero(np.linalg.norm(gap, axis=1) <= within + world.radius[i + 1 :])
+        for k in sorted(near.tolist(), key=lambda k: world.bodies[k].kind in ROBOTS):
+            body = world.bodies[k]
+            role = "other" if body.kind in ROBOTS else "obstacle"
+            for row in visits(ways[i].seen_from(ways[k]), body.shape, within):
+                add(trace.t[row], own.name, "collision", **{role: body.name})
 
 
-def visits(apart: Array, within: float) -> npt.NDArray[np.intp]:
-    """Rows, (K,), at which visits within a distance begin, m.
+def _way(trace: Trace, body: Body) -> Motion:
+    """Where a body is between the rows: (T - 1, 3), or (3,) if it never moves."""
+    if body.plant is None:
+        return Motion(body.start_m, body.start_m)
+    position = trace.position(body.name)
+    return body.plant.motion(position[:-1], position[1:], np.diff(trace.t))
+
+
+def _box(way: Motion) -> tuple[Array, Array]:
+    """Two corners, (3,), m, of a box that holds a way."""
+    places = np.concatenate([way.start.reshape(-1, 3), way.end.reshape(-1, 3)])
+    return places.min(axis=0) - way.off_m, places.max(axis=0) + way.off_m
+
+
+def visits(apart: Motion, shape: Shape, within: float) -> npt.NDArray[np.intp]:
+    """Rows, (K,), at which visits of a centre within a distance of a shape begin.
 
     Args:
-        apart: relative positions, (T, 3), m; straight from row to row. A visit between two rows is given by the
+        apart: motion of the centre relative to the shape's, (T - 1, 3), m. A visit between two rows is given by the
             first of them.
+        shape: the shape.
         within: the distance, m.
     """
-    near = np.linalg.norm(apart, axis=1) < within
-    start, step = apart[:-1], np.diff(apart, axis=0)
-    length = np.maximum(np.square(step).sum(axis=1), np.finfo(np.float64).tiny)
-    share = np.clip(-(start * step).sum(axis=1) / length, 0.0, 1.0)
-    passes = np.linalg.norm(start + share[:, None] * step, axis=1) < within
+    near = shape.distance(np.concatenate([apart.start, apart.end[-1:]])) < within
+    passes = shape.least_distance(apart) < within
     enters = near & ~np.append(False, near[:-1])
     return np.flatnonzero(enters | np.append(passes & ~near[:-1] & ~near[1:], False))

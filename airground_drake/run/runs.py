@@ -1,7 +1,7 @@
 """The runs of a scenario, each simulated in a child process; what comes back is a saved trace, read with its checks.
 
 So nothing that a scenario's routes and tasks do to the process that they run in reaches the one in which verdicts are
-made; and a run that ends its process is a failure, not the end of whoever asked for it.
+made; and a run that ends its process is a failure that the caller survives.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ FAILURE = "failure.json"
 TOLD_S = 0.2
 """How often it is told how far the runs have come, s."""
 STANDSTILL_S = 600.0
-"""A run whose simulated time stands still for so long by the clock is ended, s: what hangs is code of others, for every
-step of the package's own is bounded in counts."""
+"""A run ends when its simulated time has stood still for so long by the clock, s. Only third-party code can hang: every
+step of the package is bounded in counts."""
 
 
 def simulate_all(
@@ -117,7 +117,7 @@ def _simulate(scenario: Scenario, run: str, folder: Path, clock: Any) -> None:
 
 
 def _end(*_: object) -> None:
-    """End this process and those of its policies at once, whatever code is just running."""
+    """End this process and those of its policies at once."""
     end_all()
     os._exit(128 + signal.SIGTERM)
 

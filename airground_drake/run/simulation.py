@@ -17,10 +17,10 @@ from pydrake.systems.primitives import LogVectorOutput, Multiplexer
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import SimulationError, UnknownNameError, described
-from airground_drake.gatekeeper.answer import Decision, Foreseen, Planned
+from airground_drake.gatekeeper.answer import Decision
 from airground_drake.gatekeeper.outcome import Outlook, outcomes
 from airground_drake.gatekeeper.problem import Horizon, predicted_problem
-from airground_drake.gatekeeper.rollout import Scene
+from airground_drake.gatekeeper.rollout import View
 from airground_drake.gatekeeper.routes.mixed_integer import MixedIntegerRoute
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.policy import Proposal
@@ -134,8 +134,10 @@ class Recorder:
         context.SetAccuracy(EVENT_ACCURACY)
         simulator = Simulator(self._root, context)
         period = self._scenario.control.period_s
-        config = SimulatorConfig(integration_scheme="explicit_euler", max_step_size=period, use_error_control=False)
-        ApplySimulatorConfig(config, simulator)  # velocities are held between samples: Euler's method is exact
+        # velocities are held between samples: for straight motion Euler's method is exact
+        scheme = "explicit_euler" if self._model.world.moves_straight(period) else "runge_kutta3"
+        config = SimulatorConfig(integration_scheme=scheme, max_step_size=period, use_error_control=False)
+        ApplySimulatorConfig(config, simulator)
         simulator.set_target_realtime_rate(speed)
         if self._model.gatekeeper is not None:
             self._model.gatekeeper.reset_timing()
@@ -214,10 +216,10 @@ def _decision(decision: Decision, robot: str, route: str) -> dict[str, Any]:
         "decision": "accept" if decision.accepted else "refuse",
         "reason": decision.reason,
     }
-    grounds = decision.grounds
-    if isinstance(grounds, Foreseen):
-        row |= {"tries": grounds.tries}
-        for choice, outcome in (("refuse", grounds.refuse), ("accept", grounds.accept)):
+    solution = decision.solution
+    if solution is None:
+        row |= {"tries": decision.tries}
+        for choice, outcome in (("refuse", decision.refuse), ("accept", decision.accept)):
             if outcome is not None:
                 row |= {
                     f"{choice}_outcome_m2_s": outcome.cost,
@@ -225,7 +227,6 @@ def _decision(decision: Decision, robot: str, route: str) -> dict[str, Any]:
                     f"{choice}_left_m": outcome.left,
                 }
         return row
-    solution = grounds.solution
     return row | {
         "status": solution.status,
         "route": route,
@@ -236,8 +237,8 @@ def _decision(decision: Decision, robot: str, route: str) -> dict[str, Any]:
         "gap": solution.gap,
         "objective_accept": solution.objective_accept,
         "objective_refuse": solution.objective_refuse,
-        "accept_throughout": grounds.throughout[0],
-        "refuse_throughout": grounds.throughout[1],
+        "accept_throughout": decision.throughout[0],
+        "refuse_throughout": decision.throughout[1],
         "rounding_deviation_s": solution.rounding_deviation,
         "predicted_clearance_m": solution.clearance,
     }
@@ -271,7 +272,7 @@ def _problems(decided: Sequence[Decision]) -> pd.DataFrame:
     def flat(array: Array | None) -> list[float]:
         return [] if array is None else array.ravel().tolist()
 
-    planned = [(r.grounds.problem, r.grounds.solution) for r in decided if isinstance(r.grounds, Planned)]
+    planned = [(r.problem, r.solution) for r in decided if r.problem is not None and r.solution is not None]
     rows = [
         (
             p.dt, p.error_weight, p.slack_weight, p.terminal_weight,
@@ -297,11 +298,11 @@ def warm_up() -> None:
     near = world.around(slice(0, 1))
     avoidance.command(one, world.starts, near)
     Surroundings.of(near, world.starts)
-    scene = Scene(0.0, one[0], motion, one, one, np.ones(1), np.ones(1), 1.0)
+    seen = View(0.0, one[0], motion, one, one, np.ones(1), np.ones(1), 1.0)
     law, horizon = UgvLaw(avoidance, 1.0, 1.0, False), Horizon(2, 1, 1.0, 1.0)
     law.velocity(world.starts, near, one, one, [None])
-    MixedIntegerRoute().solve(predicted_problem(scene, law, Proposal("", 0.0, motion), horizon))
-    outcomes(scene, law, Proposal("", 0.0, motion), one, 1.0, (), Outlook(longest=1.0))
+    MixedIntegerRoute().solve(predicted_problem(seen, law, Proposal("", 0.0, motion), horizon))
+    outcomes(seen, law, Proposal("", 0.0, motion), Outlook(longest=1.0))
 
 
 def simulate(

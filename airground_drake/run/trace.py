@@ -118,7 +118,7 @@ def no_proposals() -> pd.DataFrame:
 class Trace:
     """One run.
 
-    What is read from its tables is kept, so whoever changes them makes another run with `dataclasses.replace`;
+    Values read from its tables are cached. To change a table, make another run with `dataclasses.replace`;
     `verify` and `verify_all` read them anew.
 
     Attributes:

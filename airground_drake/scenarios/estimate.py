@@ -1,4 +1,4 @@
-"""How much work a scenario asks for, counted from its numbers before any of it is begun.
+"""How much work a scenario asks for, counted from its numbers before the work begins.
 
 Of a run of n UGVs and the UAV for T seconds, with control period h, among m obstacles and phantoms (K = n + m points
 that a UGV keeps away from):
@@ -51,12 +51,14 @@ class Limits(NamedTuple):
     Attributes:
         work: steps.
         memory: bytes.
-        time: by the clock, s, for a draw of a campaign, whatever was estimated: code of others may never end.
+        time: by the clock, s, for a draw of a campaign: third-party code may never end.
+        plugins: whether third-party code of a draw may be imported and run.
     """
 
     work: float = 1e7
     memory: float = 8.0 * GIB
     time: float = 3600.0
+    plugins: bool = False
 
 
 DEFAULT_LIMITS = Limits()
@@ -93,7 +95,7 @@ class Estimate(NamedTuple):
 
 
 def estimate(scenario: Scenario) -> Estimate:
-    """What all runs of a validated scenario ask for, from its numbers alone; takes no time whatever they are."""
+    """What all runs of a validated scenario ask for, from its numbers alone, at once."""
     from airground_drake.scenarios.load import own
 
     of_runs = [_of_run(own(scenario, name), run) for name, run in scenario.runs.items()]

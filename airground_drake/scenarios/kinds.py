@@ -8,7 +8,14 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BeforeValidator, Field, GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Field,
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
+    ValidationInfo,
+)
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from airground_drake.base.arrays import LARGEST
@@ -23,6 +30,8 @@ CLAIM_PATTERN = f"^[A-Z][A-Z0-9-]{{0,{MAX_NAME - 1}}}$"
 PLUG_IN = {"type": "string", "pattern": PLUGIN_PATTERN}
 EXPECTED = "x-expected"
 """Word for the registry of claims in the place of JSON Schema's words for their expected verdicts."""
+RECORDED = "recorded"
+"""Context in which pydantic reads the scenario of a run's metadata: rules of names are not checked again."""
 WANTED = "x-wanted"
 """Word of a JSON Schema for what messages say of a value, where types and bounds do not say it."""
 
@@ -96,8 +105,15 @@ class Rule:
     says: Callable[[], dict[str, Any]]
 
     def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
-        """Check what the annotations before this one have let pass."""
-        return core_schema.no_info_after_validator_function(self.check, handler(source))
+        """Check what the annotations before this one have let pass, except in the metadata of a run.
+
+        A run may be judged where a plug-in that it named is not installed.
+        """
+
+        def checked(value: Any, info: ValidationInfo) -> Any:
+            return value if info.context == RECORDED else self.check(value)
+
+        return core_schema.with_info_after_validator_function(checked, handler(source))
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         """What the annotations before this one say, and this."""

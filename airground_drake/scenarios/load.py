@@ -137,7 +137,7 @@ def _as_set(document: Document, run: str, settings: Mapping[str, Any]) -> Scenar
 
 
 def _checked(document: Document) -> Scenario:
-    """The scenario of a document, whatever its runs set."""
+    """The scenario of a document, without what its runs set."""
     scenario: Scenario = filled(Scenario, document)
     _complete(scenario)
     try:

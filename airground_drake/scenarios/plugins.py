@@ -1,4 +1,4 @@
-"""What of a scenario is code of others: `module:Class` and `file.py:Class`, which are imported when they are used."""
+"""Third-party code in a scenario: `module:Class` and `file.py:Class`, imported when used."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ if TYPE_CHECKING:  # pydantic, which the schema imports, would delay `report --l
 OPTION = "--allow-plugins"
 HELP = "import and run what is named as module:Class or file.py:Class; looked for beside the scenario or spec, too"
 _POLICY = re.compile(r"intervention\.policies\.\d+\.name")
-WANTED = f"code of others is imported and run only with {OPTION}"
+WANTED = f"third-party code is imported and run only with {OPTION}"
 
 
 def plugins(scenario: Scenario) -> dict[str, str]:
-    """Names of code of others in a scenario, by key; entry points of installed packages are none."""
+    """Names of third-party code in a scenario, by key, without entry points of installed packages."""
     named: list[tuple[str, str, Registry]] = [
         ("uav.task", scenario.uav.task, UAV_TASKS),
         ("gatekeeper.route", scenario.gatekeeper.route, ROUTES),
@@ -40,7 +40,7 @@ def plugins(scenario: Scenario) -> dict[str, str]:
 
 
 def refuse(scenario: Scenario, source: str, keys: Collection[str] | None = None) -> None:
-    """Refuse code of others.
+    """Refuse third-party code.
 
     Args:
         scenario: validated.
@@ -57,7 +57,7 @@ def refuse(scenario: Scenario, source: str, keys: Collection[str] | None = None)
 
 @contextmanager
 def admitted(scenario: Scenario, source: str, *, allow: bool, keys: Collection[str] | None = None) -> Iterator[None]:
-    """While a scenario is used, code of others is found in the folder of its file, too; or refused, if not allowed.
+    """While a scenario is used, third-party code is found in the folder of its file, too; or refused, if not allowed.
 
     The folder is the last one on Python's path, so that it takes the place of nothing, and only for the time being.
     Child processes have the path of the process that starts them.
@@ -65,7 +65,7 @@ def admitted(scenario: Scenario, source: str, *, allow: bool, keys: Collection[s
     Args:
         scenario: validated.
         source: name of a shipped scenario or path of a file, for messages too.
-        allow: whether code of others may be imported.
+        allow: whether third-party code may be imported.
         keys: as in `refuse`.
 
     Raises:
@@ -79,7 +79,7 @@ def admitted(scenario: Scenario, source: str, *, allow: bool, keys: Collection[s
 
 @contextmanager
 def beside(source: str, *, allow: bool) -> Iterator[None]:
-    """Have the folder of a file as the last one on Python's path for the time being, if code of others is allowed."""
+    """Have the folder of a file as the last one on Python's path for the time being, if third-party code is allowed."""
     before, path = list(sys.path), Path(source)
     if allow and path.is_file():
         importlib.invalidate_caches()

@@ -1,4 +1,4 @@
-"""The scenario that the metadata of a run hold, typed again. No rule of how values go together is checked here."""
+"""The scenario that the metadata of a run hold, typed again. Only types are checked here, no names, no values."""
 
 import copy
 import functools
@@ -8,6 +8,7 @@ from typing import Any
 from pydantic import TypeAdapter, ValidationError
 
 from airground_drake.base.errors import TraceError
+from airground_drake.scenarios.kinds import RECORDED
 from airground_drake.scenarios.schema import Scenario
 
 
@@ -22,9 +23,9 @@ def of_run(data: Mapping[str, Any], run: str) -> Scenario:
         TraceError: if they are no scenario; names the first key and what is wrong there.
     """
     try:
-        scenario: Scenario = adapter(Scenario).validate_python(data)
+        scenario: Scenario = adapter(Scenario).validate_python(data, context=RECORDED)
         if run in scenario.runs and scenario.runs[run].set:
-            scenario = adapter(Scenario).validate_python(_with(data, scenario.runs[run].set))
+            scenario = adapter(Scenario).validate_python(_with(data, scenario.runs[run].set), context=RECORDED)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         key = ".".join(map(str, first["loc"]))

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from airground_drake.scenarios.plants import plant_of
 from airground_drake.scenarios.schema import Scenario, Uav, Ugv
-from airground_drake.world.plant import FirstOrder
 from airground_drake.world.shape import Ball
 from airground_drake.world.world import Body, Kind, World
 
@@ -30,4 +30,4 @@ def make_world(scenario: Scenario) -> World:
 
 def _robot(name: str, kind: Kind, given: Ugv | Uav) -> Body:
     start = np.array(given.start_m, dtype=np.float64)
-    return Body(name, kind, start, Ball(given.radius_m), FirstOrder(), given.max_speed_m_s)
+    return Body(name, kind, start, Ball(given.radius_m), plant_of(given), given.max_speed_m_s)

@@ -21,6 +21,7 @@ UNITS = {
     "noise": "m",
     "decision_variable": "m",
     "decision_range": "m",
+    "gains": "1/s",
 }
 """Of ports by name, or by its part before a robot's; what is not here is of several units or has none."""
 

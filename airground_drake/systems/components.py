@@ -17,7 +17,7 @@ from airground_drake.decision.trigger import Trigger
 from airground_drake.gatekeeper.answer import Rules
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.drake_solvers import SOLVERS, lacking
-from airground_drake.gatekeeper.mpc_gatekeeper import Gatekeepers, Judging, PaperGatekeepers
+from airground_drake.gatekeeper.mpc_gatekeeper import Gatekeepers, PaperGatekeepers
 from airground_drake.gatekeeper.outcome import Outlook
 from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
 from airground_drake.gatekeeper.patience import Patience
@@ -136,7 +136,7 @@ def make_rules(scenario: Scenario) -> Rules:
         min_dwell=gate.min_dwell_s,
         first_stage=gate.rule == "first_stage",
         budget=Budget(gate.budget_iterations),
-        budget_share=gate.budget_share if gate.budget == "wall_clock" else None,
+        allowance_s=gate.budget_share * gate.period_s if gate.budget == "wall_clock" else None,
     )
 
 
@@ -165,8 +165,7 @@ def make_gatekeepers(scenario: Scenario, law: UgvLaw) -> Gatekeepers:
     world, presets = make_world(scenario), make_presets(scenario)
     if not law.intervention_on_top:
         return OutcomeGatekeepers(world, law, presets, make_outlook(scenario), make_patience(scenario))
-    judging = Judging(make_route(scenario), make_horizon(scenario), make_rules(scenario), scenario.gatekeeper.period_s)
-    return PaperGatekeepers(world, law, presets, judging)
+    return PaperGatekeepers(world, law, presets, make_route(scenario), make_horizon(scenario), make_rules(scenario))
 
 
 def make_trigger(scenario: Scenario, zeta: float) -> Trigger:

@@ -43,7 +43,8 @@ class UgvController(LeafSystem):
     Ports (n UGVs, M bodies that move, world frame):
         in  `bodies` (3M) m; `reference` (6n): preset positions m, then velocities m/s;
             `proposals` abstract, n of Proposal or None; `answers` (2n), see `messages`.
-        out `command` (3n) m/s; `accepted` (n), 1 while an intervention is executed. Both held.
+        out `command` (3n) m/s; `accepted` (n), 1 while an intervention is executed; both held. `gains`, the
+            `UgvGains` in force, for whoever predicts the command.
     Parameters: `UgvGains`; by default those of the law.
     Rate: one update per control period, from t = 0.
 
@@ -69,6 +70,8 @@ class UgvController(LeafSystem):
         gains = [law.avoidance.gain, law.motion_gain, law.intervention_gain]
         self._gains = self.DeclareNumericParameter(BasicVector(gains))
         self._law = _cached(self, law, weakly(self._calc_law), self._gains)
+        given = {self.numeric_parameter_ticket(NumericParameterIndex(self._gains))}
+        self.DeclareVectorOutputPort("gains", len(gains), weakly(self._calc_gains), prerequisites_of_calc=given)
         self.DeclarePeriodicDiscreteUpdateEvent(law.avoidance.period, 0.0, weakly(self._update))
 
     def gains(self, context: Context) -> Any:
@@ -91,9 +94,10 @@ class UgvController(LeafSystem):
         return {**found, "composition": law.avoidance.composition, "intervention_on_top": law.intervention_on_top}
 
     def _calc_law(self, context: Context, output: AbstractValue) -> None:
-        avoidance, motion, intervention = context.get_numeric_parameter(self._gains).value().tolist()
-        layer = replace(self.law.avoidance, gain=avoidance)
-        output.set_value(replace(self.law, avoidance=layer, motion_gain=motion, intervention_gain=intervention))
+        output.set_value(self.law.with_gains(*context.get_numeric_parameter(self._gains).value().tolist()))
+
+    def _calc_gains(self, context: Context, output: BasicVector) -> None:
+        output.SetFromVector(context.get_numeric_parameter(self._gains).value())
 
     def _update(self, context: Context, discrete: DiscreteValues) -> None:
         positions = _finite(self._bodies.Eval(context)).reshape(-1, 3)

@@ -207,6 +207,7 @@ def _task_planning(
         "proposals": planner.GetOutputPort("proposals"),
         "ugv_command": ugvs.GetOutputPort("command"),
         "accepted": ugvs.GetOutputPort("accepted"),
+        "gains": ugvs.GetOutputPort("gains"),
         "uav_command": uav.GetOutputPort("command"),
     }
     return _assembled("task_planning", systems, named)

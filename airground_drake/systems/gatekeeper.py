@@ -8,10 +8,10 @@ from pydrake.common.value import AbstractValue, Value
 from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSystem, State, ValueProducer
 
 from airground_drake.gatekeeper.answer import Decision
-from airground_drake.gatekeeper.mpc_gatekeeper import Gatekeepers, Memory
+from airground_drake.gatekeeper.mpc_gatekeeper import Gatekeepers, GatekeeperState, Inputs
 from airground_drake.intervention.messages import ACCEPT, SILENT, Report
 from airground_drake.systems.lifetime import weakly
-from airground_drake.systems.signals import Answer, declare_bodies, laid_out, no_proposals, no_reports
+from airground_drake.systems.signals import Answer, UgvGains, declare_bodies, laid_out, no_proposals, no_reports
 from airground_drake.systems.ticks import Ticks
 from airground_drake.world.world import World
 
@@ -33,10 +33,10 @@ class Gatekeeper(LeafSystem):
     to the UAV.
 
     Ports (n UGVs, r robots, M bodies that move):
-        in  `bodies` (3M) m; `team_command` (3r) m/s, for the predicted motion of the other robots; `proposals`
-            abstract, n of Proposal or None.
+        in  `bodies` (3M) m; `team_command` (3r) m/s, for the predicted motion of the other robots; `gains`, the
+            `UgvGains` that the controllers run with; `proposals` abstract, n of Proposal or None.
         out `answers` (2n), an `Answer` per UGV, and `reports` (abstract), see `messages`; held.
-    State: abstract, a `Memory`.
+    State: abstract, a `GatekeeperState`.
     Rate: one update per gatekeeper period, from t = 0. What it decides there is published at the end of the
     simulator's step: put into a log that the Context holds, as Drake's loggers do. The log decides nothing.
     """
@@ -48,8 +48,9 @@ class Gatekeeper(LeafSystem):
         self._gatekeepers = gatekeepers
         self._bodies = declare_bodies(self, world)
         self._command = self.DeclareVectorInputPort("team_command", 3 * len(world.robots))
+        self._gains = self.DeclareVectorInputPort("gains", len(UgvGains.get_fields()))
         self._proposals = self.DeclareAbstractInputPort("proposals", no_proposals(n))
-        state = self.DeclareAbstractState(Value(Memory.empty(n)))
+        state = self.DeclareAbstractState(Value(GatekeeperState.empty(n)))
         self._state = int(state)
         held = {self.abstract_state_ticket(state)}
         self.DeclareVectorOutputPort("answers", 2 * n, weakly(self._calc_answers), prerequisites_of_calc=held)
@@ -85,8 +86,8 @@ class Gatekeeper(LeafSystem):
         log: DecisionLog = entry.get_mutable_cache_entry_value(context).GetMutableValueOrThrow()
         return log
 
-    def _memory(self, context: Context) -> Memory:
-        memory: Memory = context.get_abstract_state(self._state).get_value()
+    def _memory(self, context: Context) -> GatekeeperState:
+        memory: GatekeeperState = context.get_abstract_state(self._state).get_value()
         return memory
 
     def _calc_answers(self, context: Context, output: BasicVector) -> None:
@@ -105,13 +106,14 @@ class Gatekeeper(LeafSystem):
     def _update(self, context: Context, state: State) -> EventStatus:
         if not self._ticks.due(context.get_time()):
             return EventStatus.DidNothing()
-        proposals, memory = self._proposals.Eval(context), self._memory(context)
+        proposals, before = self._proposals.Eval(context), self._memory(context)
         positions = self._bodies.Eval(context).reshape(-1, 3)
-        if self._gatekeepers.idle(proposals, positions, memory):
+        if self._gatekeepers.idle(proposals, positions, before):
             return EventStatus.DidNothing()
         velocities = self._command.Eval(context).reshape(-1, 3)
-        new = self._gatekeepers.sample(context.get_time(), proposals, positions, velocities, memory)
-        state.get_mutable_abstract_state(self._state).set_value(new)
+        law = self._gatekeepers.law.with_gains(*self._gains.Eval(context).tolist())
+        now = Inputs(context.get_time(), proposals, positions, velocities, law)
+        state.get_mutable_abstract_state(self._state).set_value(self._gatekeepers.sample(now, before))
         return EventStatus.Succeeded()
 
 

@@ -9,7 +9,7 @@ from pydrake.systems.framework import Context, DiscreteValues, EventStatus, Leaf
 from airground_drake.base.arrays import Array
 from airground_drake.decision.excursion import INTERVENING
 from airground_drake.intervention.halts import NOT_WATCHED, room, standing, watched
-from airground_drake.intervention.planner import Planner, PlannerMemory, sent_after
+from airground_drake.intervention.planner import Planner, PlannerState, sent_after
 from airground_drake.systems.lifetime import weakly
 from airground_drake.systems.signals import FIELDS, components_of, declare_bodies, no_proposals, no_reports
 from airground_drake.systems.ticks import Ticks
@@ -25,7 +25,7 @@ class InterventionPlanner(LeafSystem):
         in  `bodies` (3M) m; `status` (4n) from EventTrigger; `answers` (2n) and `reports`
             (abstract), see `messages`.
         out `proposals` abstract, n of Proposal or None.
-    State: where each UGV has been since when, see `halts`; abstract, a `PlannerMemory`.
+    State: where each UGV has been since when, see `halts`; abstract, a `PlannerState`.
     Rate: one update per planning period, from t = 0. A proposal can act one period after it is made.
     """
 
@@ -54,9 +54,9 @@ class InterventionPlanner(LeafSystem):
         self.DeclarePeriodicDiscreteUpdateEvent(self._ticks.period, 0.0, weakly(self._watch))
         self.DeclarePeriodicUnrestrictedUpdateEvent(self._ticks.period, 0.0, weakly(self._update))
 
-    def memory(self, context: Context) -> PlannerMemory:
+    def memory(self, context: Context) -> PlannerState:
         """What was sent and what went wrong, up to the context's time."""
-        memory: PlannerMemory = context.get_abstract_state(self._memory).get_value()
+        memory: PlannerState = context.get_abstract_state(self._memory).get_value()
         return memory
 
     def close(self) -> None:

@@ -20,7 +20,7 @@ class ClaimError(AssertionError):
     """Claims that did not come out as asserted.
 
     Attributes:
-        verdicts: theirs, of which `finding.status` says whether they were refuted, could not be decided
+        verdicts: of the claims; `finding.status` says whether they were refuted, could not be decided
             (`inconclusive`), or something kept them from being decided (`error`, `not_run`).
     """
 
@@ -35,7 +35,7 @@ class NotExercisedWarning(UserWarning):
 
 
 def assert_holds(trace: Trace, *claims: str | TraceClaim, exercised: bool = False) -> None:
-    """Assert that claims about a run hold, whatever its scenario expects of them.
+    """Assert that claims about a run hold, without regard to what its scenario expects.
 
     Args:
         trace: the run.

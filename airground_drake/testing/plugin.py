@@ -1,4 +1,4 @@
-"""The pytest plugin: `airground_trace`, a simulation that a session makes once, whatever its workers.
+"""The pytest plugin: `airground_trace`, a simulation that a session makes once for all workers.
 
 It is loaded into every session of pytest where the package is installed, and imports Drake only when the fixture is
 called.

@@ -202,7 +202,7 @@ def _places(draw: DrawFn, free: list[Cell], pitch: float, besides: Cell | None =
 
 
 def _middles(cells: list[Cell], pitch: float, at_most: int) -> SearchStrategy[list[Vector]]:
-    """Some middles of cells, m, whoever is there."""
+    """Some middles of cells, m, occupied or not."""
     return st.lists(first_of(*cells).map(lambda cell: [pitch * cell[0], pitch * cell[1], 0.0]), max_size=at_most)
 
 
@@ -241,7 +241,7 @@ def _uavs(
 
 
 def _distinct(points: list[Vector]) -> list[Vector]:
-    """Points of which none is where the one before it is."""
+    """The points without immediate repetitions."""
     return [point for before, point in zip([None, *points], points, strict=False) if point != before]
 
 

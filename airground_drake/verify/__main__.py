@@ -83,7 +83,7 @@ def _judge(target: str, wanted: Sequence[str], progress: Progress, *, allow_plug
 
     Raises:
         UnknownNameError: if there is no such claim.
-        ScenarioError: if code of others is named that is not allowed.
+        ScenarioError: if third-party code is named that is not allowed.
     """
     from airground_drake.run import trace
     from airground_drake.scenarios.load import from_data, load

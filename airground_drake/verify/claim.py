@@ -13,6 +13,7 @@ import numpy as np
 from airground_drake.base.errors import TraceError, described
 from airground_drake.base.statuses import PASSING, STATUSES, Status, meets, outcome
 from airground_drake.run.trace import Trace
+from airground_drake.scenarios.plants import plant_of
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.finding import Finding
 
@@ -207,7 +208,7 @@ def require_count(claim: Claim, finding: Finding) -> None:
 
 
 def require_motion(trace: Trace) -> None:
-    """Check that the trace is of the shape that its docstring states: position[k] = position[k-1] + dt command[k].
+    """Check that each position follows from the one before and the command by the robot's plant, as the trace says.
 
     Raises:
         TraceError: if time runs backwards, the run or the robots are not those of the scenario, or a step does
@@ -221,10 +222,11 @@ def require_motion(trace: Trace) -> None:
     if len(t) < 2 or (np.diff(t) < 0.0).any():
         raise TraceError("the trace has fewer than two rows, or its time runs backwards")
     for robot in trace.robots:
-        predicted = np.diff(t)[:, None] * trace.command(robot)[1:]
-        off = np.abs(np.diff(trace.position(robot), axis=0) - predicted).max(axis=1)
+        given, position = scenario.robots[robot], trace.position(robot)
+        plant = plant_of(given)
+        off = np.abs(position[1:] - plant.step(position[:-1], trace.command(robot)[1:], np.diff(t))).max(axis=1)
         k = int(np.argmax(off))
-        if off[k] > MOTION_TOLERANCE_M:
+        if off[k] > MOTION_TOLERANCE_M + plant.reach(given.max_speed_m_s, scenario.control.period_s):
             raise TraceError(f"{robot} at t = {t[k + 1]} s is {off[k]:.3g} m from where its command leads to")
 
 

@@ -16,30 +16,31 @@ class Motion(NamedTuple):
 
     Attributes:
         start: position at the beginning of the period, (..., 3), m.
-        change: from there to the position at its end, (..., 3), m.
+        end: position at its end, (..., 3), m.
         off_m: largest distance from the straight line, m.
     """
 
     start: Array
-    change: Array
+    end: Array
     off_m: float = 0.0
 
     def seen_from(self, other: Motion) -> Motion:
         """The same motion relative to another centre that moves during the same periods."""
-        return Motion(self.start - other.start, self.change - other.change, self.off_m + other.off_m)
+        return Motion(self.start - other.start, self.end - other.end, self.off_m + other.off_m)
 
     def least_distance(self) -> tuple[Array, Array]:
         """The least distance from the origin.
 
         The squared distance is a convex parabola of the share s of the period that has passed. It is least at
-        s = clip(-start.change / ||change||^2, 0, 1).
+        s = clip(-start.w / ||w||^2, 0, 1) with w = end - start.
 
         Returns:
             A lower bound of the distance, (...,), m, exact if `off_m` is 0, and the first share of the period, (...,),
             at which the straight motion is nearest.
         """
-        squared = np.einsum("...i,...i->...", self.change, self.change)
-        along = -np.einsum("...i,...i->...", self.start, self.change)
+        change = self.end - self.start
+        squared = np.einsum("...i,...i->...", change, change)
+        along = -np.einsum("...i,...i->...", self.start, change)
         share = np.clip(np.divide(along, squared, out=np.zeros_like(squared), where=squared > 0.0), 0.0, 1.0)
-        distance = np.linalg.norm(self.start + share[..., None] * self.change, axis=-1)
+        distance = np.linalg.norm(self.start + share[..., None] * change, axis=-1)
         return (np.maximum(distance - self.off_m, 0.0) if self.off_m else distance), share

@@ -42,7 +42,7 @@ class FirstOrder:
 
     def motion(self, start: Array, end: Array, period_s: Array | float) -> Motion:
         """Exact."""
-        return Motion(start, end - start)
+        return Motion(start, end)
 
     def reach(self, speed_m_s: float, period_s: float) -> float:
         """0."""

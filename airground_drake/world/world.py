@@ -153,6 +153,10 @@ class World:
         """Radii of all bodies, (B,), m."""
         return np.array([body.shape.radius_m for body in self.bodies])
 
+    def moves_straight(self, period_s: float) -> bool:
+        """Whether all bodies move on straight lines while their commands are held for a period."""
+        return not any(body.plant and body.plant.reach(body.max_speed_m_s, period_s) for body in self.moving)
+
     def apart(self, first: Kind, second: Kind) -> float:
         """Safe distance between the surfaces of bodies of two kinds, m; 0 if none is declared."""
         return self.apart_m.get(frozenset((first, second)), 0.0)

@@ -41,8 +41,8 @@ CLAIMS = (
     Mutant(
         "claims forget radii",
         "verify/runs/pairs.py",
-        "name: body.radius_m for name",
-        "name: 0.0 * body.radius_m for name",
+        "{name: body.radius_m for name",
+        "{name: 0.0 * body.radius_m for name",
         runs=("bodies d",),
     ),
     Mutant(

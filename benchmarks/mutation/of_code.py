@@ -131,8 +131,8 @@ BODIES = (
     Mutant(
         "collisions are of centres",
         "run/events.py",
-        "safe_distance.collision_m + (own + body.radius_m)",
-        "safe_distance.collision_m",
+        "scenario.safe_distance.collision_m + (own + body.radius_m)",
+        "scenario.safe_distance.collision_m",
         runs=("bodies b",),
     ),
     Mutant(
@@ -537,8 +537,8 @@ INTERVENTION = (
     Mutant(
         "UGVs report what is out of their sight",
         "gatekeeper/mpc_gatekeeper.py",
-        "away <= self._law.avoidance.sensing_range",
-        "away >= self._law.avoidance.sensing_range",
+        "away <= self.law.avoidance.sensing_range",
+        "away >= self.law.avoidance.sensing_range",
     ),
     Mutant(
         "proposals are not withdrawn after a release",
@@ -648,8 +648,7 @@ INTERVENTION = (
 
 ROUTES = (
     "tests/gatekeeper/test_answer.py",
-    "tests/gatekeeper/test_dual_bound.py",
-    "tests/gatekeeper/test_rounding.py",
+    "tests/gatekeeper/test_relaxation.py",
     "tests/gatekeeper/routes/test_relaxed.py",
     "tests/gatekeeper/routes/test_contract.py",
 )
@@ -670,16 +669,16 @@ GATEKEEPER = (
     ),
     Mutant(
         "normals are not of unit length",
-        "gatekeeper/half_planes.py",
+        "gatekeeper/relaxation.py",
         "        return offset / norm\n",
         "        return offset\n",
         runs=("case_b d",),
         tests=ROUTES,
     ),
-    Mutant("rounding forgets a tenth", "gatekeeper/rounding.py", "deficit -= 1.0", "deficit -= 0.9", tests=ROUTES),
+    Mutant("rounding forgets a tenth", "gatekeeper/relaxation.py", "deficit -= 1.0", "deficit -= 0.9", tests=ROUTES),
     Mutant(
         "the bound is overstated",
-        "gatekeeper/dual_bound.py",
+        "gatekeeper/relaxation.py",
         "total -= pressure * pressure / (4.0 * ",
         "total -= pressure * pressure / (8.0 * ",
         runs=("case_b d",),
@@ -687,7 +686,7 @@ GATEKEEPER = (
     ),
     Mutant(
         "the bound is understated",
-        "gatekeeper/dual_bound.py",
+        "gatekeeper/relaxation.py",
         "total -= pressure * pressure / (4.0 * ",
         "total -= pressure * pressure / (2.0 * ",
         runs=("case_b d",),
@@ -715,8 +714,8 @@ GATEKEEPER = (
     Mutant(
         "other robots are predicted to stand",
         "gatekeeper/mpc_gatekeeper.py",
-        "seen.velocities[near.others[i]]]),",
-        "0.0 * seen.velocities[near.others[i]]]),",
+        "now.velocities[near.others[i]]]),",
+        "0.0 * now.velocities[near.others[i]]]),",
     ),
     Mutant(
         "points are predicted to stand where they are",
@@ -752,8 +751,8 @@ GATEKEEPER = (
     Mutant(
         "an answer is always new",
         "gatekeeper/mpc_gatekeeper.py",
-        "since.append(memory.since[i] if answer == answer_to(proposal, memory.answers, i) else t)",
-        "since.append(t)",
+        "since.append(before.since[i] if answer == answer_to(proposal, before.answers, i) else now.t)",
+        "since.append(now.t)",
     ),
     Mutant(
         "no gain counts as a gain",
@@ -883,7 +882,7 @@ MIX_UPS = (
     Mutant(
         "obstacles out of sight are forgotten",
         "gatekeeper/outcome_gatekeeper.py",
-        "return memory.sensed | within(points, own, reach)",
+        "return before.sensed | within(points, own, reach)",
         "return within(points, own, reach)",
         runs=("crowd d",),
         tests=("tests/gatekeeper/test_outcome_gatekeeper.py",),
@@ -891,24 +890,24 @@ MIX_UPS = (
     Mutant(
         "what is sensed is kept only while something is proposed",
         "gatekeeper/outcome_gatekeeper.py",
-        "return super().idle(proposals, positions, memory) and memory.sensed is self._remembered(positions, memory)",
-        "return super().idle(proposals, positions, memory)",
+        "return super().idle(proposals, positions, before) and before.sensed is self._remembered(positions, before)",
+        "return super().idle(proposals, positions, before)",
         runs=("crowd d",),
         tests=("tests/gatekeeper/test_outcome_gatekeeper.py",),
     ),
     Mutant(
         "a roll-out lasts as long as the preset trajectory",
         "gatekeeper/outcome.py",
-        "ends = min(max(until, scene.preset.end), scene.t + look.longest) + look.past",
-        "ends = max(until, scene.preset.end) + look.past",
+        "ends = min(max(until, seen.preset.end), t + look.longest) + look.past",
+        "ends = max(until, seen.preset.end) + look.past",
         runs=("crowd d",),
         tests=("tests/gatekeeper/test_outcome.py",),
     ),
     Mutant(
         "the dwell of an answer runs on over proposals",
         "gatekeeper/mpc_gatekeeper.py",
-        "answer == answer_to(proposal, memory.answers, i) else t",
-        "answer == memory.answers[2 * i] else t",
+        "answer == answer_to(proposal, before.answers, i) else now.t",
+        "answer == before.answers[2 * i] else now.t",
         runs=("crowd c",),
         tests=("tests/gatekeeper/test_mpc_gatekeeper.py",),
     ),
@@ -937,7 +936,7 @@ MIX_UPS = (
     Mutant(
         "a withdrawal is not noticed before the next proposal",
         "gatekeeper/mpc_gatekeeper.py",
-        "return not any(proposals) and not any(memory.answers[::2])",
+        "return not any(proposals) and not any(before.answers[::2])",
         "return not any(proposals)",
         runs=("crowd d",),
         tests=ATTACKS,
@@ -953,9 +952,41 @@ MIX_UPS = (
     Mutant(
         "a UGV rests only where nothing is proposed",
         "gatekeeper/outcome_gatekeeper.py",
-        "            held[i] = self._patience.rested(held[i], t)\n            if proposal is None:\n",
-        "            if proposal is None:\n                held[i] = self._patience.rested(held[i], t)\n",
+        "            held[i] = self._patience.rested(held[i], now.t)\n            if proposal is None:\n",
+        "            if proposal is None:\n                held[i] = self._patience.rested(held[i], now.t)\n",
         runs=("crowd d",),
         tests=ATTACKS,
+    ),
+    Mutant(
+        "a try is over a sample late",
+        "gatekeeper/outcome_gatekeeper.py",
+        "if self._patience.over(held, now.t):",
+        "if self._patience.over(held, now.t - 0.1):",
+        runs=("crowd d",),
+        tests=ATTACKS,
+    ),
+    Mutant(
+        "no rest after too many tries",
+        "gatekeeper/patience.py",
+        "t >= now.since + self.rest:",
+        "t >= now.since:",
+        runs=("crowd d",),
+        tests=ATTACKS,
+    ),
+    Mutant(
+        "one party of a joint plan is not waited for",
+        "intervention/messages.py",
+        "stopped = {p.joint for p, answer in zip(proposals, said, strict=True) if p",
+        "stopped = {p.joint for p, answer in zip(proposals[1:], said[1:], strict=True) if p",
+        runs=("crowd d",),
+        tests=("tests/intervention/test_planner.py",),
+    ),
+    Mutant(
+        "one party of a joint plan is not named",
+        "intervention/database.py",
+        "party = tuple(sorted(motions)) if",
+        "party = tuple(sorted(motions))[:-1] if",
+        runs=("crowd d",),
+        tests=("tests/intervention/test_planner.py",),
     ),
 )

@@ -7,7 +7,7 @@ from copy import copy
 import numpy as np
 
 from airground_drake.gatekeeper.problem import Horizon, Problem, predicted_problem
-from airground_drake.gatekeeper.rollout import ClosedLoop, Scene, closed_loop
+from airground_drake.gatekeeper.rollout import ClosedLoop, View, closed_loop
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
@@ -49,7 +49,7 @@ class Instance:
         selection = np.eye(3) if rng.random() < 0.7 else np.array([[rng.normal(), rng.normal(), 0.0]])
         self.proposal = Proposal("way", 0.0, travel(4, 2.8), selection)
         near = self.world.around(slice(0, 1))
-        self.scene = Scene(
+        self.scene = View(
             0.0, np.zeros(3), self.preset, np.vstack([discs, self.other, FAR]),
             np.vstack([np.zeros_like(discs), self.drift, np.zeros(3)]), near.distance[0], near.share[0], 3.0,
         )  # fmt: skip

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from airground_drake.gatekeeper.problem import Horizon, Problem, predicted_problem
-from airground_drake.gatekeeper.rollout import Scene
+from airground_drake.gatekeeper.rollout import View
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.detour import Detour
 from airground_drake.intervention.policy import Observation, Proposal
@@ -44,13 +44,13 @@ def rolled_out(seed: int) -> Problem:
     away = rng.uniform(-4.0, 4.0, (2, 3)) * [1, 1, 0]
     home = Motion.at_speed(np.array([np.zeros(3), away[0]]), 0.6, start=-rng.uniform(0.0, 3.0))
     round_about = Motion.at_speed(np.array([np.zeros(3), away[1], away[0]]), 2.8, start=0.0)
-    scene = Scene(
+    scene = View(
         0.0, np.zeros(3), home, centres, np.zeros((points, 3)), np.full(points, 2.0), np.ones(points), 3.0
     )  # fmt: skip
     return by_velocities(scene, LAW, Proposal("way round", 0.0, round_about))
 
 
-def by_velocities(scene: Scene, law: UgvLaw, proposal: Proposal) -> Problem:
+def by_velocities(scene: View, law: UgvLaw, proposal: Proposal) -> Problem:
     """The problem of (23): mode velocities, and nothing of the closed loop that they come from."""
     return replace(predicted_problem(scene, law, proposal, Horizon(60, 1, 1.0, 1000.0)), loop=None)
 
@@ -63,7 +63,7 @@ def case_a_problem(
     here = np.array([*position, 0.0])
     motion = Motion.at_speed(np.array([here, *([x, y, 0.0] for x, y in ways)]), 2.85, start=t)
     centres = np.array([[1.7, 4.0, 0.0], [4.0, 7.0, 0.0], [-0.5, 5.0, 0.0]])
-    scene = Scene(t, here, preset, centres, np.zeros((3, 3)), np.full(3, 2.0), np.ones(3), 3.0)
+    scene = View(t, here, preset, centres, np.zeros((3, 3)), np.full(3, 2.0), np.ones(3), 3.0)
     law = replace(LAW, intervention_on_top=on_top)
     return by_velocities(scene, law, Proposal("detour", t, motion))
 
@@ -108,7 +108,7 @@ INSTANCES = instances()
 STALL_POSITION = np.array([3.36888, 5.10219, 0.0])
 
 
-def case_a_proposal() -> tuple[Scene, UgvLaw, Proposal, Horizon]:
+def case_a_proposal() -> tuple[View, UgvLaw, Proposal, Horizon]:
     scenario = load("case_a")[0]
     preset, obstacles = make_presets(scenario)[0], make_world(scenario).around(slice(0, 1)).still
     t = 14.5
@@ -118,7 +118,7 @@ def case_a_proposal() -> tuple[Scene, UgvLaw, Proposal, Horizon]:
     )  # fmt: skip
     motion = Detour(speed_m_s=2.85).propose(seen)
     assert motion is not None
-    scene = Scene(t + 0.05, STALL_POSITION, preset, obstacles, np.zeros((3, 3)), np.full(3, 2.0), np.ones(3), 3.0)
+    scene = View(t + 0.05, STALL_POSITION, preset, obstacles, np.zeros((3, 3)), np.full(3, 2.0), np.ones(3), 3.0)
     law = UgvLaw(Avoidance(3.0, 0.05, 4.0), 2.0, 1.5, intervention_on_top=False)
     return scene, law, Proposal("detour", t, motion), Horizon(60, 1, 1.0, 1000.0)
 

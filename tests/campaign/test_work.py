@@ -63,7 +63,7 @@ def test_numbers_that_are_none_and_runs_that_are_not_there_make_no_scenario_eith
 def test_code_of_others_is_not_imported(spec: Spec) -> None:
     own = replace(spec, fixed={"intervention.policies": [{"name": "no_such_module:Policy"}]})
     (row,) = work.rows_of(own, 0, DEFAULT_LIMITS)
-    assert (row["ended"], "code of others" in row["what"]) == (INVALID, True)
+    assert (row["ended"], "third-party code" in row["what"]) == (INVALID, True)
 
 
 def test_a_run_that_stops_is_a_row(spec: Spec, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -85,7 +85,7 @@ SLOW = """
 
 
 def test_a_draw_that_never_ends_is_stopped(spec: Spec, tmp_path: Path) -> None:
-    """By code of others that is found beside the spec."""
+    """By third-party code that is found beside the spec."""
     (tmp_path / "slow.py").write_text(dedent(SLOW), encoding="utf-8")
     changes = {
         "gatekeeper.route": "slow.py:Route",
@@ -94,9 +94,9 @@ def test_a_draw_that_never_ends_is_stopped(spec: Spec, tmp_path: Path) -> None:
         "decision.release_m": 0.2,
     }
     hangs = replace(spec, fixed=changes)
-    (row,) = work.rows_of(hangs, 0, Limits(time=1.0), allow_plugins=True)
-    assert (row["ended"], row["what"]) == (STOPPED, "not done after 1 s")
-    assert work.trace_of(hangs, hangs.draw(0), Limits(time=1.0), allow_plugins=True) is None
+    (row,) = work.rows_of(hangs, 0, Limits(time=0.5, plugins=True))
+    assert (row["ended"], row["what"]) == (STOPPED, "not done after 0.5 s")
+    assert work.trace_of(hangs, hangs.draw(0), Limits(time=0.5, plugins=True)) is None
 
 
 IDLE = """
@@ -109,7 +109,7 @@ IDLE = """
 def test_what_is_made_small_is_simulated_with_code_beside_the_spec(spec: Spec, tmp_path: Path) -> None:
     (tmp_path / "idle.py").write_text(dedent(IDLE), encoding="utf-8")
     own = replace(spec, fixed={"intervention.policies": [{"name": "idle.py:Policy"}]})
-    trace = work.trace_of(own, own.draw(0), DEFAULT_LIMITS, allow_plugins=True)
+    trace = work.trace_of(own, own.draw(0), Limits(plugins=True))
     assert trace is not None
     assert trace.run == next(iter(own.draw(0).runs))
     assert work.trace_of(own, own.draw(0), DEFAULT_LIMITS) is None

@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 from typing import Any
 
+import pytest
 from report.cases import GOING_ROUND, SUCCESS, make_scenario, make_trace
 
 from airground_drake.commands.figures import FORMATS, STYLES
@@ -31,6 +32,7 @@ def written(folder: Path, style: str) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in paths}
 
 
+@pytest.mark.slow
 def test_each_figure_in_each_format_twice_the_same(tmp_path: Path) -> None:
     first, again = written(tmp_path / "one", "ieee"), written(tmp_path / "two", "ieee")
     assert first == again

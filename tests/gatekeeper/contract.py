@@ -11,8 +11,7 @@ import pytest
 
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.problem import Evaluation, Problem
-from airground_drake.gatekeeper.rounding import sum_up_rounding
-from airground_drake.gatekeeper.routes.nonlinear import NonlinearRoute
+from airground_drake.gatekeeper.relaxation import sum_up_rounding
 from airground_drake.gatekeeper.routes.route import Route
 from airground_drake.gatekeeper.solution import Solution, Status
 from airground_drake.registry import ROUTES
@@ -41,9 +40,7 @@ def same(one: Solution, other: Solution) -> bool:
     return all(np.array_equal(a, b) for a, b in zip(vars(one).values(), vars(other).values(), strict=True))
 
 
-MAKERS = {name: ROUTES.load(name, of=Route) for name in ROUTES.own} | {
-    "nonlinear_ipopt": lambda: NonlinearRoute("ipopt")
-}
+MAKERS = {name: ROUTES.load(name, of=Route) for name in ROUTES.own}
 
 
 @cache

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from airground_drake.gatekeeper.blocks import block_of_stage
+from airground_drake.gatekeeper.binary_program import block_of_stage
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.problem import Evaluation, Problem
 from airground_drake.gatekeeper.solution import Solution, cheapest

@@ -10,7 +10,7 @@ from builders.problems import STALL_POSITION, case_a_proposal, random_problem
 from hypothesis import given
 from hypothesis import strategies as st
 
-from airground_drake.gatekeeper.answer import Decision, Planned, Rules, in_words, settle
+from airground_drake.gatekeeper.answer import Decision, Rules, in_words, settle
 from airground_drake.gatekeeper.problem import predicted_problem
 from airground_drake.gatekeeper.routes.relaxed import RelaxedRoute
 from airground_drake.gatekeeper.solution import Solution
@@ -44,7 +44,7 @@ def test_a_plan_that_accepts_later_is_named_as_such_with_its_cost() -> None:
     assert settle(later, throughout, SILENT, 0.0, RULES) == (False, "waits")
     never = replace(later, objective=throughout[1] * (1.0 - 1e-9))
     assert settle(never, throughout, SILENT, 0.0, RULES) == (False, "not_cheaper")
-    words = in_words(Decision(0.0, 0, proposal, False, "waits", Planned(random_problem(0), later, throughout)))
+    words = in_words(Decision(0.0, 0, proposal, False, "waits", random_problem(0), later, throughout))
     assert words == (
         "the best plan refuses now and accepts later: cost 350, 350.3 to accept throughout, 468.8 to refuse"
     )

@@ -1,4 +1,4 @@
-"""The closed loop under switching answers."""
+"""The closed loop under switching answers is the running controller's; which points count."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from builders.closed_loop import FAR, H, Instance, run_controller
+from builders.closed_loop import AVOIDANCE, FAR, H, Instance, run_controller
 from hypothesis import given
 from hypothesis import strategies as st
 from properties import examples
@@ -15,8 +15,12 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource, Integrator, Multiplexer, TrajectorySource
 
+from airground_drake.gatekeeper.problem import Horizon, predicted_problem
+from airground_drake.gatekeeper.rollout import View
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.messages import ACCEPT, REFUSE
+from airground_drake.intervention.policy import Proposal
+from airground_drake.nsbc.law import UgvLaw
 from airground_drake.systems import components
 
 
@@ -93,3 +97,13 @@ def test_what_is_no_plan_is_an_error(omega: np.ndarray) -> None:
         problem.evaluate_closed_loop(omega)
     with pytest.raises(ValueError, match="no closed loop"):
         replace(problem, loop=None).evaluate_closed_loop(np.ones(12))
+
+
+@pytest.mark.parametrize(("max_speed", "kept"), [(3.0, 1), (0.9, 0)])
+def test_points_are_kept_that_any_plan_might_reach(max_speed: float, kept: int) -> None:
+    """A disc 1.5 m away, 1.5 s, and both constant plans at rest."""
+    one, rest = np.ones(1), Motion(np.zeros(1), np.zeros((1, 3)))
+    scene = View(0.0, np.zeros(3), rest, np.array([[3.5, 0.0, 0.0]]), np.zeros((1, 3)), 2 * one, one, max_speed)
+    law = UgvLaw(AVOIDANCE, 2.0, 1.5, intervention_on_top=False)
+    problem = predicted_problem(scene, law, Proposal("stay", 0.0, rest), Horizon(24, 1, 1.0, 200.0))
+    assert len(problem.distances) == kept

@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from airground_drake.gatekeeper.half_planes import normals_along
 from airground_drake.gatekeeper.problem import Horizon, predicted_problem
-from airground_drake.gatekeeper.rollout import Scene
+from airground_drake.gatekeeper.relaxation import normals_along
+from airground_drake.gatekeeper.rollout import View
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.policy import Proposal
 
@@ -53,7 +53,7 @@ def tail_over_square(error: float, angle: float) -> float:
     preset = Motion.at_speed(np.array([[0.0, 0.0, 0.0], [100.0, 0.0, 0.0]]), SPEED, start=0.0)
     start = preset.at(1.0)[0] + error * np.array([np.cos(angle), np.sin(angle), 0.0])
     none = np.empty((0, 3))
-    scene = Scene(1.0, start, preset, none, none, np.empty(0), np.empty(0), LIMIT)
+    scene = View(1.0, start, preset, none, none, np.empty(0), np.empty(0), LIMIT)
     problem = predicted_problem(scene, LAW, Proposal("none", 1.0, preset), Horizon(400, 1, 1.0, 1.0))
     return problem.evaluate(np.zeros(400)).objective / error**2
 

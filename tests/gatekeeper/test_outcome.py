@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from airground_drake.gatekeeper.outcome import Other, Outcome, Outlook, outcomes, way_left
-from airground_drake.gatekeeper.rollout import Scene
+from airground_drake.gatekeeper.outcome import Outcome, Outlook, outcomes, robot_at, way_left
+from airground_drake.gatekeeper.rollout import View
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.avoidance import Avoidance
@@ -16,14 +16,13 @@ from airground_drake.nsbc.law import UgvLaw
 
 LAW = UgvLaw(Avoidance(3.0, 0.05, 4.0), 2.0, 1.5, intervention_on_top=False)
 LOOK = Outlook(longest=20.0)
-NONE = np.empty((0, 3))
 
 
-def situation(*discs: tuple[float, float]) -> tuple[Scene, np.ndarray]:
+def situation(*discs: tuple[float, float]) -> View:
     """A UGV at the origin that is to go to (8, 0), and discs of 2 m."""
     preset = Motion.at_speed(np.array([[0.0, 0.0, 0.0], [8.0, 0.0, 0.0]]), 1.0)
-    scene = Scene(0.0, np.zeros(3), preset, NONE, NONE, np.empty(0), np.empty(0), 3.0)
-    return scene, np.array([[x, y, 0.0] for x, y in discs]).reshape(-1, 3)
+    centres, one = np.array([[x, y, 0.0] for x, y in discs]).reshape(-1, 3), np.ones(len(discs))
+    return View(0.0, np.zeros(3), preset, centres, 0.0 * centres, 2.0 * one, one, 3.0)
 
 
 def along(*corners: tuple[float, float], speed: float = 2.0) -> Proposal:
@@ -34,8 +33,8 @@ ROUND = along((0.0, 0.0), (1.0, 3.5), (5.0, 3.5), (8.0, 0.0))
 
 
 def test_a_way_round_a_wall_is_better_than_standing_in_front_of_it() -> None:
-    scene, discs = situation((4.0, 1.0), (4.0, -1.0))
-    refuse, accept = outcomes(scene, LAW, ROUND, discs, 2.0, (), LOOK)
+    scene = situation((4.0, 1.0), (4.0, -1.0))
+    refuse, accept = outcomes(scene, LAW, ROUND, LOOK)
     assert refuse.stalls
     assert not accept.stalls
     assert accept.left == 0.0
@@ -45,35 +44,35 @@ def test_a_way_round_a_wall_is_better_than_standing_in_front_of_it() -> None:
 
 
 def test_where_the_own_task_gets_there_a_detour_is_not_taken() -> None:
-    scene, discs = situation()
-    refuse, accept = outcomes(scene, LAW, ROUND, discs, 2.0, (), LOOK)
+    scene = situation()
+    refuse, accept = outcomes(scene, LAW, ROUND, LOOK)
     assert not refuse.stalls
     assert refuse.cost < 1e-9
     assert not accept.better_than(refuse)
 
 
 def test_a_slow_robot_that_goes_on_does_not_stall() -> None:
-    scene, _ = situation()
+    scene = situation()
     slow = replace(scene, preset=Motion.at_speed(scene.preset.positions, 0.02), max_speed=0.02)
     way = along((0.0, 0.0), (4.0, 1.0), (8.0, 0.0), speed=0.02)
-    for outcome in outcomes(slow, LAW, way, NONE, 2.0, (), LOOK):
+    for outcome in outcomes(slow, LAW, way, LOOK):
         assert not outcome.stalls
         assert np.isfinite(outcome.cost)
 
 
 def test_a_slow_robot_stalls_in_front_of_a_wall() -> None:
-    scene, discs = situation((2.5, 1.0), (2.5, -1.0))
+    scene = situation((2.5, 1.0), (2.5, -1.0))
     slow = replace(scene, preset=Motion.at_speed(scene.preset.positions, 0.04), max_speed=0.04)
     way = along((0.0, 0.0), (0.0, 4.0), (8.0, 4.0), speed=0.04)
-    refuse, accept = outcomes(slow, LAW, way, discs, 2.0, (), replace(LOOK, longest=60.0))
+    refuse, accept = outcomes(slow, LAW, way, replace(LOOK, longest=60.0))
     assert refuse.stalls
     assert not accept.stalls
     assert accept.better_than(refuse)
 
 
 def test_a_proposal_to_stay_makes_no_difference_to_a_stall() -> None:
-    scene, discs = situation((4.0, 1.0), (4.0, -1.0))
-    refuse, accept = outcomes(scene, LAW, along((0.0, 0.0), (0.01, 0.0)), discs, 2.0, (), LOOK)
+    scene = situation((4.0, 1.0), (4.0, -1.0))
+    refuse, accept = outcomes(scene, LAW, along((0.0, 0.0), (0.01, 0.0)), LOOK)
     assert refuse.stalls
     assert accept.stalls
     assert not accept.better_than(refuse)
@@ -81,19 +80,19 @@ def test_a_proposal_to_stay_makes_no_difference_to_a_stall() -> None:
 
 def test_no_roll_out_takes_longer_than_the_longest_try_and_what_comes_past_it() -> None:
     """However long the preset trajectory is."""
-    scene, discs = situation()
+    scene = situation()
     endless = replace(scene, preset=Motion.at_speed(np.array([[0.0, 0.0, 0.0], [8.0, 0.0, 0.0]]), 1e-3))
-    for outcome in outcomes(endless, LAW, ROUND, discs, 2.0, (), LOOK):
+    for outcome in outcomes(endless, LAW, ROUND, LOOK):
         assert len(outcome.positions) == round((LOOK.longest + LOOK.past) / LAW.avoidance.period) + 1
 
 
 def test_what_is_under_way_at_the_end_costs_the_way_that_is_left_as_well() -> None:
     """Squared distances to the preset trajectory, and the cost-to-go along the way left: L^3 / (3 v)."""
-    scene, _ = situation()
+    scene = situation()
     speed, look = 0.2, Outlook(longest=4.0, past=2.0)
     slow = replace(scene, preset=Motion.at_speed(scene.preset.positions, speed), max_speed=1.0)
     away = along((0.0, 0.0), (4.0, 0.0))
-    for outcome in outcomes(slow, LAW, away, NONE, 2.0, (), look):
+    for outcome in outcomes(slow, LAW, away, look):
         t = LAW.avoidance.period * np.arange(1.0, len(outcome.positions))
         error = np.square(slow.preset.sample(t) - outcome.positions[1:]).sum()
         assert not outcome.stalls
@@ -104,32 +103,32 @@ def test_what_is_under_way_at_the_end_costs_the_way_that_is_left_as_well() -> No
 
 
 def test_what_is_not_known_is_not_avoided_and_a_map_that_lies_costs_no_more_than_usefulness() -> None:
-    scene, discs = situation((4.0, 1.0), (4.0, -1.0))
-    assert not outcomes(scene, LAW, ROUND, NONE, 2.0, (), LOOK)[0].stalls
-    walled = np.concatenate([discs, [[3.0, 3.5, 0.0]]])
-    assert outcomes(scene, LAW, ROUND, walled, 2.0, (), LOOK)[1].stalls
+    assert not outcomes(situation(), LAW, ROUND, LOOK)[0].stalls
+    assert outcomes(situation((4.0, 1.0), (4.0, -1.0), (3.0, 3.5)), LAW, ROUND, LOOK)[1].stalls
+
+
+AWAY = Motion.at_speed(np.array([[4.0, 0.0, 0.0], [4.0, 9.0, 0.0]]), 2.0)
+
+
+def beside(asked: tuple[Motion, bool] | None) -> View:
+    """Another robot stands on the way of the UGV."""
+    return replace(situation((4.0, 0.0)), asked=(asked,), shares=np.array([0.5]))
 
 
 def test_another_robot_is_predicted_on_the_motion_that_it_is_asked_for() -> None:
-    scene, discs = situation()
-    away = Motion.at_speed(np.array([[4.0, 0.0, 0.0], [4.0, 9.0, 0.0]]), 2.0)
-    standing = Other(np.array([4.0, 0.0, 0.0]), np.zeros(3), None, False, 2.0, 0.5)
-    assert outcomes(scene, LAW, ROUND, discs, 2.0, (standing,), LOOK)[0].stalls
-    going = replace(standing, asked=away, accepted=True)
-    assert not outcomes(scene, LAW, ROUND, discs, 2.0, (going,), LOOK)[0].stalls
+    standing, going = beside(None), beside((AWAY, True))
+    assert outcomes(standing, LAW, ROUND, LOOK)[0].stalls
+    assert not outcomes(going, LAW, ROUND, LOOK)[0].stalls
     after = np.array([0.0, 1.0, 10.0])
-    passing = replace(standing, velocity=np.array([1.0, 0.0, 0.0]))
-    np.testing.assert_allclose(passing.places(0.0, after, 3.0, together=True)[:, 0], [4.0, 5.0, 7.0])
-    beside = replace(going, position=np.array([3.0, 0.0, 0.0])).places(0.0, after, 3.0, together=False)
-    np.testing.assert_allclose(beside[:, 0], 4.0 - np.exp(-after))
+    passing = replace(standing, velocities=np.array([[1.0, 0.0, 0.0]]))
+    np.testing.assert_allclose(robot_at(passing, 0, after, 3.0, together=True)[:, 0], [4.0, 5.0, 7.0])
+    off = replace(going, centres=np.array([[3.0, 0.0, 0.0]]))
+    np.testing.assert_allclose(robot_at(off, 0, after, 3.0, together=False)[:, 0], 4.0 - np.exp(-after))
 
 
 def test_nobody_refuses_his_part_of_a_joint_plan_because_the_others_would_free_his_way() -> None:
     """What another robot has not accepted yet is no reason to refuse."""
-    scene, discs = situation()
-    away = Motion.at_speed(np.array([[4.0, 0.0, 0.0], [4.0, 9.0, 0.0]]), 2.0)
-    asked = Other(np.array([4.0, 0.0, 0.0]), np.zeros(3), away, False, 2.0, 0.5)
-    refuse, accept = outcomes(scene, LAW, ROUND, discs, 2.0, (asked,), LOOK)
+    refuse, accept = outcomes(beside((AWAY, False)), LAW, ROUND, LOOK)
     assert refuse.stalls
     assert not accept.stalls
     assert accept.better_than(refuse)
@@ -164,15 +163,15 @@ def test_of_very_many_circles_those_beside_the_way_count() -> None:
 
 def test_the_cost_to_go_falls_along_the_way_by_what_is_left_squared() -> None:
     """The condition of the stability theory: dV = -L^2 dt, and L is no less than the distance to the goal."""
-    scene, discs = situation((4.0, 0.0))
+    scene = situation((4.0, 0.0))
     goal, v, step = scene.preset.positions[-1], 1.0, 1e-4
     here = np.array([1.0, 0.5, 0.0])
-    left = way_left(here, goal, discs, 2.0)
+    left = way_left(here, goal, scene.centres, 2.0)
     ahead = here + step * np.array([*np.array([2.9, 1.7]) / np.hypot(2.9, 1.7), 0.0])
     gains = (left**3 - (left - step) ** 3) / (3.0 * v)
     assert gains == pytest.approx(left**2 * step / v, rel=1e-3)
     assert left >= np.linalg.norm(goal - here)
-    assert way_left(ahead, goal, discs, 2.0) >= left - step
+    assert way_left(ahead, goal, scene.centres, 2.0) >= left - step
 
 
 def test_outcomes_are_compared_by_stalling_first() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from builders.worlds import world
 
-from airground_drake.gatekeeper.mpc_gatekeeper import Memory, View
+from airground_drake.gatekeeper.mpc_gatekeeper import GatekeeperState, Inputs
 from airground_drake.gatekeeper.outcome import Outcome, Outlook
 from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers, reason_of
 from airground_drake.gatekeeper.patience import Commitment, Patience
@@ -28,24 +28,25 @@ def gatekeepers(*ugvs: str, rocks: np.ndarray = ROCK) -> OutcomeGatekeepers:
     return OutcomeGatekeepers(world(ugvs, rocks), law, [preset] * len(ugvs), Outlook(5.0), patience)
 
 
-def sampled(gate: OutcomeGatekeepers, t: float, x: float, proposal: Proposal | None, memory: Memory) -> Memory:
+def sampled(
+    gate: OutcomeGatekeepers, t: float, x: float, proposal: Proposal | None, memory: GatekeeperState
+) -> GatekeeperState:
     places = np.array([[x, 0.0, 0.0], [x, 0.0, 2.0]])
-    return gate.sample(t, (proposal,), places, np.zeros((2, 3)), memory)
+    return gate.sample(Inputs(t, (proposal,), places, np.zeros((2, 3)), gate.law), memory)
 
 
 @pytest.mark.parametrize(("passed", "known"), [(True, 1), (False, 0)])
 def test_an_obstacle_that_was_in_sight_is_known_when_it_is_out_of_it(passed: bool, known: int) -> None:
     gate, proposal = gatekeepers("ugv"), Proposal("way", 0.0, STAYS)
-    memory = sampled(gate, 0.0, 0.0 if passed else 20.0, None, Memory.empty(1))
+    memory = sampled(gate, 0.0, 0.0 if passed else 20.0, None, GatekeeperState.empty(1))
     memory = sampled(gate, 0.05, 20.0, None, memory)
-    places = np.array([[20.0, 0.0, 0.0], [20.0, 0.0, 2.0]])
-    discs, _ = gate._known(View(0.1, (proposal,), places, np.zeros((2, 3)), memory), 0, proposal)
+    discs, _ = gate._known(np.array([20.0, 0.0, 0.0]), memory.sensed[0], 0, proposal)
     assert discs.tolist() == ROCK[:known].tolist()
 
 
 def test_what_was_in_sight_before_anything_was_proposed_is_known() -> None:
     """The gatekeepers are called as their system calls them."""
-    gate, memory = gatekeepers("ugv"), Memory.empty(1)
+    gate, memory = gatekeepers("ugv"), GatekeeperState.empty(1)
     called = []
     for k, x in enumerate((-20.0, -20.0, 0.0, 0.0, 20.0)):
         places = np.array([[x, 0.0, 0.0], [x, 0.0, 2.0]])
@@ -58,7 +59,7 @@ def test_what_was_in_sight_before_anything_was_proposed_is_known() -> None:
 
 def test_what_comes_into_sight_does_not_replace_what_was() -> None:
     rocks = np.concatenate([ROCK, [[22.0, 3.0, 0.0]]])
-    gate, memory = gatekeepers("ugv", rocks=rocks), Memory.empty(1)
+    gate, memory = gatekeepers("ugv", rocks=rocks), GatekeeperState.empty(1)
     for t, x, known in ((0.0, 0.0, [True, False]), (0.05, 20.0, [True, True]), (0.1, 40.0, [True, True])):
         memory = sampled(gate, t, x, None, memory)
         assert memory.sensed.tolist() == [known]
@@ -66,7 +67,7 @@ def test_what_comes_into_sight_does_not_replace_what_was() -> None:
 
 def test_the_first_sample_decides_and_what_makes_no_difference_is_refused() -> None:
     """The motion keeps the UGV where it stands anyway."""
-    memory = sampled(gatekeepers("ugv"), 0.05, 20.0, Proposal("way", 0.0, STAYS), Memory.empty(1))
+    memory = sampled(gatekeepers("ugv"), 0.05, 20.0, Proposal("way", 0.0, STAYS), GatekeeperState.empty(1))
     assert [decision.reason for decision in memory.decisions] == ["not_cheaper"]
     assert memory.answers == (REFUSE, -1.0)
 
@@ -76,14 +77,14 @@ def test_an_obstacle_that_nobody_knew_is_a_reason_to_look_again_and_costs_no_try
     way = Motion(np.array([0.0, 3.0, 6.0]), np.array([[0.0, 0.0, 0.0], [3.0, 3.0, 0.0], [20.0, 3.0, 0.0]]))
     rocks = np.concatenate([ROCK, [[7.0, 1.0, 0.0]]])
     for mapped, looked in ((rocks[:1], [True, False, True, False]), (rocks, [True, False, False, False])):
-        gate, memory = gatekeepers("ugv", rocks=rocks), Memory.empty(1)
+        gate, memory = gatekeepers("ugv", rocks=rocks), GatekeeperState.empty(1)
         proposal = Proposal("way", 0.0, way, mapped=mapped, mapped_radii=np.zeros(len(mapped)), number=0)
         decisions = []
         for k, x in enumerate((0.0, 0.1, 3.5, 3.6)):
             memory = sampled(gate, 0.05 * k, x, proposal, memory)
             decisions += memory.decisions
-        assert [decision.grounds.accept is not None for decision in decisions] == looked
-        assert [decision.grounds.tries for decision in decisions] == [1, 1, 1, 1]
+        assert [decision.accept is not None for decision in decisions] == looked
+        assert [decision.tries for decision in decisions] == [1, 1, 1, 1]
         assert memory.commitments[0].tries == 1
 
 
@@ -100,7 +101,7 @@ def test_only_another_ugv_is_made_way_for(cause: str, answer: float) -> None:
     gate = gatekeepers("ugv", "other")
     places = np.array([[20.0, 0.0, 0.0], [0.0, 9.0, 0.0], [20.0, 0.0, 9.0]])
     proposal = Proposal("way", 0.0, STAYS, cause=cause)
-    memory = gate.sample(0.05, (proposal, None), places, np.zeros((3, 3)), Memory.empty(2))
+    memory = gate.sample(Inputs(0.05, (proposal, None), places, np.zeros((3, 3)), gate.law), GatekeeperState.empty(2))
     assert memory.answers[0] == answer
 
 
@@ -115,12 +116,13 @@ class Pair:
     def __init__(self) -> None:
         self.gate = gatekeepers("ugv", "other")
         self.places = np.array([[20.0, 0.0, 0.0], [0.0, 9.0, 0.0], [20.0, 0.0, 9.0]])
-        self.memory, self.t = Memory.empty(2), 0.0
+        self.memory, self.t = GatekeeperState.empty(2), 0.0
 
     def sees(self, proposal: Proposal | None) -> Commitment:
         self.t += 0.05
         if not self.gate.idle((proposal, None), self.places, self.memory):
-            self.memory = self.gate.sample(self.t, (proposal, None), self.places, np.zeros((3, 3)), self.memory)
+            now = Inputs(self.t, (proposal, None), self.places, np.zeros((3, 3)), self.gate.law)
+            self.memory = self.gate.sample(now, self.memory)
         return self.memory.commitments[0]
 
 

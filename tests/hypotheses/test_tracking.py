@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 from builders.worlds import world
 
-from airground_drake.gatekeeper.mpc_gatekeeper import Memory, View
+from airground_drake.gatekeeper.mpc_gatekeeper import GatekeeperState, Inputs
 from airground_drake.gatekeeper.outcome import Outcome, Outlook
 from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers
 from airground_drake.gatekeeper.patience import Commitment, Patience
+from airground_drake.gatekeeper.rollout import View
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.messages import ACCEPT
 from airground_drake.intervention.policy import Proposal
@@ -31,9 +32,9 @@ FAR = np.array([0.0, -1e3, 0.0])
 class Stalled(OutcomeGatekeepers):
     """Takes its own way for stalled, so that every proposal is worth it; predicts acceptance as always."""
 
-    def foresee(self, seen: View, i: int, proposal: Proposal) -> tuple[Outcome, Outcome]:
+    def foresee(self, seen: View, law: UgvLaw, proposal: Proposal) -> tuple[Outcome, Outcome]:
         """Refusing stalls; the way of accepting is the real one."""
-        _, accept = super().foresee(seen, i, proposal)
+        _, accept = super().foresee(seen, law, proposal)
         return Outcome(accept.positions, True, 1.0, 1.0), Outcome(accept.positions, False, 0.0, 0.0)
 
 
@@ -60,13 +61,13 @@ def _run(rng: np.random.Generator, patience: Patience, inputs: dict[str, Any]) -
     preset = Motion(np.zeros(1), np.zeros((1, 3)))
     gatekeepers = Stalled(around, law, [preset], Outlook(patience.longest), patience)
     controller = UgvController(around, law)
-    memory, proposal = Memory.empty(1), Proposal("way", 0.0, motion)
+    memory, proposal = GatekeeperState.empty(1), Proposal("way", 0.0, motion)
     place, largest, over = np.zeros(3), 0.0, -1.0
     push = np.zeros(3)
     for k in range(count * LEGS + 2 * every + 1):
         t = k * h
         if k % every == 0:
-            memory = gatekeepers.sample(t, (proposal,), np.stack([place, FAR]), np.zeros((2, 3)), memory)
+            memory = gatekeepers.sample(Inputs(t, (proposal,), np.stack([place, FAR]), np.zeros((2, 3)), law), memory)
             if not memory.decisions[-1].accepted:
                 over = t
                 break

@@ -14,7 +14,7 @@ from airground_drake.base.arrays import Array
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.database import BehaviourDatabase
 from airground_drake.intervention.messages import ACCEPT, DONE, REFUSE, SILENT, Report, accepted_proposals, answer_to
-from airground_drake.intervention.planner import Planner, PlannerMemory, sent_after
+from airground_drake.intervention.planner import Planner, PlannerState, sent_after
 from airground_drake.intervention.policy import Observation, Policy
 from airground_drake.registry import METHODS
 from airground_drake.systems import components
@@ -50,12 +50,12 @@ def planner(policy: Policy) -> Planner:
 
 def step(
     uav: Planner,
-    memory: PlannerMemory,
+    memory: PlannerState,
     t: float,
     intervening: str,
     answers: Mapping[str, float] | None = None,
     report: Report = NOBODY[0],
-) -> PlannerMemory:
+) -> PlannerState:
     """One planning instant; who is intervened on, and answers to the proposals in force, by name."""
     given = []
     for name, talk in zip(UGVS, memory.talks, strict=True):
@@ -65,7 +65,7 @@ def step(
     return sent_after(memory, uav.plan(memory, t, PLACES, called, np.array(given), (report,) * 3), t)
 
 
-def in_force(memory: PlannerMemory) -> dict[str, tuple[float, str]]:
+def in_force(memory: PlannerState) -> dict[str, tuple[float, str]]:
     """Time of issue and cause of what is in force."""
     pairs = zip(UGVS, memory.proposals, strict=True)
     return {name: (proposal.issued, proposal.cause) for name, proposal in pairs if proposal is not None}
@@ -184,7 +184,7 @@ def test_a_motion_that_changes_is_a_new_proposal() -> None:
 class Swaps(Planner):
     """Puts another motion into what a UGV has accepted, under the old number and time of issue."""
 
-    def plan(self, memory: PlannerMemory, t: float, positions: Array, *given: Any) -> PlannerMemory:
+    def plan(self, memory: PlannerState, t: float, positions: Array, *given: Any) -> PlannerState:
         planned = super().plan(memory, t, positions, *given)
         talks = list(planned.talks)
         for i, talk in enumerate(talks):

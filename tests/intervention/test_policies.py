@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +14,7 @@ from timeline import kinds
 
 from airground_drake.base.errors import PluginError, UnknownNameError
 from airground_drake.geometry.motion import Motion
-from airground_drake.intervention.database import make_policy
+from airground_drake.intervention.database import BehaviourDatabase, Negotiation, make_policy
 from airground_drake.intervention.policy import Observation, Policy
 from airground_drake.intervention.wrong import Hostile
 from airground_drake.registry import POLICIES
@@ -29,58 +31,46 @@ class Raises(Policy):
         raise RuntimeError("no plan")
 
 
-class Nonsense(Policy):
-    """A policy that returns something else than a motion."""
+class Returns(Policy):
+    """A policy that returns whatever it is given, or what that makes of the observation."""
 
-    def propose(self, seen: Observation) -> Motion | None:
-        return "left"  # type: ignore[return-value]
+    def __init__(self, found: object) -> None:
+        self.found = found
 
-
-class NotFinite(Policy):
-    """A policy whose numbers are not finite."""
-
-    def propose(self, seen: Observation) -> Motion | None:
-        return Motion(np.array([seen.start]), np.full((1, 3), np.nan))
+    def propose(self, seen: Observation) -> Any:
+        return self.found(seen) if callable(self.found) else self.found
 
 
-class NoTime(Policy):
-    """A policy whose motion has a leg that lasts as long as the times of a run are rounded."""
-
-    def propose(self, seen: Observation) -> Motion | None:
-        times = np.array([seen.start, np.nextafter(seen.start, 1e9), seen.start + 1.0])
-        return Motion(times, seen.position + np.array([[0.0, 0.0, 0.0], [1e-15, 0.0, 0.0], [1.0, 0.0, 0.0]]))
+def along(end: float, lasts: float) -> Callable[[Observation], Motion]:
+    """Straight from where the UGV is, to a place on the x-axis, m, in so many s."""
+    return lambda seen: Motion(seen.start + np.array([0.0, lasts]), np.array([seen.position, [end, 0.0, 0.0]]))
 
 
-class TooFar(Policy):
-    """A policy whose motion ends where squares lose all digits, or overflow."""
-
-    END_M, LASTS_S = 1e308, 1.0
-
-    def propose(self, seen: Observation) -> Motion | None:
-        return Motion(seen.start + np.array([0.0, self.LASTS_S]), np.array([seen.position, [self.END_M, 0.0, 0.0]]))
-
-
-class Far(TooFar):
-    END_M = 1e155
-
-
-class JustTooFar(TooFar):
-    END_M = -1e10
-
-
-class TooLate(TooFar):
-    END_M, LASTS_S = 1.0, 1e10
+@pytest.mark.parametrize(
+    "found",
+    [
+        "left",
+        lambda seen: Motion(np.array([seen.start]), np.full((1, 3), np.nan)),
+        along(1.0, 1e-12),  # a leg as short as times of a run are rounded
+        along(1e308, 1.0), along(1e155, 1.0), along(-1e10, 1.0), along(1.0, 1e10),
+    ],
+)  # fmt: skip
+def test_what_is_no_motion_counts_as_no_intervention(found: object) -> None:
+    sight = seen([mate("a", (0, 0), (10, 0))])
+    talks, faults = BehaviourDatabase([("broken", Returns(found))]).plan(Negotiation(), sight)
+    assert [talk.proposal for talk in talks.values()] == [None]
+    assert [fault.policy for fault in faults] == ["broken"]
 
 
-@pytest.mark.parametrize("kind", [Raises, Nonsense, NotFinite, NoTime, TooFar, Far, JustTooFar, TooLate])
-def test_a_broken_policy_counts_as_no_intervention_and_is_reported(case_a: Scenario, kind: type[Policy]) -> None:
+def test_a_broken_policy_is_reported_and_endangers_nobody(case_a: Scenario) -> None:
     case_a.intervention.policies = [PolicyEntry("broken", {})]
     case_a.duration_s = 16.0
-    with POLICIES.adding("broken", kind):
+    with POLICIES.adding("broken", Raises):
         of_run = simulate(case_a, "d")
+        verdicts = verify(of_run)
     assert kinds(of_run, "ugv1") == ["trigger"]
     assert of_run.meta["faults"][0]["policy"] == "broken"
-    assert next(v for v in verify(of_run) if v.claim.id == "SAFE-TRACE").finding.status == "holds"
+    assert next(v for v in verdicts if v.claim.id == "SAFE-TRACE").finding.status == "holds"
 
 
 def test_after_a_failure_the_next_policy_is_asked(case_a: Scenario) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from base64 import b64encode
 from collections.abc import Callable
@@ -22,7 +23,7 @@ from airground_drake.scenarios.schema import Run, Scenario
 from airground_drake.verify.claim import Verdict
 from airground_drake.verify.finding import Finding
 
-HOSTILE = "<script>alert('$x$')</script>"
+HOSTILE, PLACEHOLDER = "<script>alert('$x$')</script>", "placeholder"
 
 
 class Page(HTMLParser):
@@ -58,14 +59,14 @@ DIAGRAM = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9"><text>plant
 
 @pytest.fixture(scope="module")
 def hostile_page() -> str:
-    """Everything that a user can name is hostile."""
-    scenario = make_scenario(HOSTILE)
-    scenario = replace(scenario, name=HOSTILE, title=HOSTILE, description=HOSTILE)
+    """Everything in report.json that somebody could have written there is hostile: also names, in a forged report."""
+    scenario = make_scenario(PLACEHOLDER)
+    scenario = replace(scenario, name=PLACEHOLDER, title=HOSTILE, description=HOSTILE)
     scenario.choices[0].reason = scenario.reproduction[0].why = HOSTILE
-    scenario.runs[HOSTILE] = Run("b")
+    scenario.runs[PLACEHOLDER] = Run("b")
     traces = make_traces(scenario)
-    traces[HOSTILE] = make_trace(scenario, HOSTILE, events=[event(1.0, HOSTILE, HOSTILE)])
-    traces[HOSTILE].meta["faults"].append({"t_s": 1.0, "robot": HOSTILE, "policy": HOSTILE, "what": HOSTILE})
+    traces[PLACEHOLDER] = make_trace(scenario, PLACEHOLDER, events=[event(1.0, PLACEHOLDER, PLACEHOLDER)])
+    traces[PLACEHOLDER].meta["faults"].append({"t_s": 1.0, "robot": HOSTILE, "policy": HOSTILE, "what": HOSTILE})
     claim = type(
         "Hostile",
         (Kept,),
@@ -76,9 +77,11 @@ def hostile_page() -> str:
         },
     )
     finding = Finding("refuted", -1.0, HOSTILE, {HOSTILE: HOSTILE}, {"x": HOSTILE}, {HOSTILE: [HOSTILE]})
-    report = built(scenario, traces, [*FINE, Verdict(claim(), HOSTILE, finding, "holds")])
+    report = built(scenario, traces, [*FINE, Verdict(claim(), PLACEHOLDER, finding, "holds")])
+    figures = [*draw.draw(scenario, traces), *moments.draw(report, traces)]
+    report = json.loads(json.dumps(report).replace(PLACEHOLDER, HOSTILE))
     report["provenance"][HOSTILE] = report["provenance"]["command"] = HOSTILE
-    return html.render(report, [*draw.draw(scenario, traces), *moments.draw(report, traces)], DIAGRAM)
+    return html.render(report, figures, DIAGRAM)
 
 
 def test_faults_are_told_once_each_cut_and_without_what_turns_or_breaks_lines() -> None:

@@ -1,4 +1,4 @@
-"""Code of others on the command line: only where it is allowed, and whatever it does, the exit code is right."""
+"""Third-party code on the command line: only where it is allowed, and whatever it does, the exit code is right."""
 
 from __future__ import annotations
 
@@ -112,7 +112,7 @@ def test_a_diagram_is_drawn_without_code_of_others(
 
 
 def _only() -> str:
-    return "code of others is imported and run only with --allow-plugins"
+    return "third-party code is imported and run only with --allow-plugins"
 
 
 @pytest.mark.parametrize("name", ["..:x", ".a:x", "a.:x", "a b:x", "a:x:y", "a/b:x", ":x", "a:", "a:x()", "1:2"])

@@ -1,4 +1,4 @@
-"""What of a scenario is code of others."""
+"""What of a scenario is third-party code."""
 
 from __future__ import annotations
 

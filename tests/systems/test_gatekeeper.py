@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 from builders.problems import random_problem
 from gatekeeper.oracles import Enumeration
+from pydrake.common import RandomGenerator
+from pydrake.systems.analysis import Simulator
 
 from airground_drake.gatekeeper import mpc_gatekeeper
 from airground_drake.gatekeeper.answer import Rules
@@ -23,6 +25,7 @@ from airground_drake.run.simulation import Recorder, simulate
 from airground_drake.scenarios.load import load
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.systems import components
+from airground_drake.systems.diagram import build_model
 from airground_drake.verify.judge import verify
 
 
@@ -70,6 +73,7 @@ def test_a_failing_solver_withdraws_no_acceptance_and_is_recorded(case_a: Scenar
     case_a.gatekeeper.route = "failing"
     with ROUTES.adding("failing", FailingLater):
         trace = simulate(case_a, "c")
+        verdicts = verify(trace, ["GATE-FEAS"])
     decisions = trace.decisions
     failed = decisions[decisions["status"] == "solver_failed"]
     assert len(failed) == len(decisions) // 2 > 10
@@ -77,7 +81,7 @@ def test_a_failing_solver_withdraws_no_acceptance_and_is_recorded(case_a: Scenar
     assert metrics.of_run(trace)["gatekeeper"]["solver_failures"] == len(failed)
     constant = failed[["accept_throughout", "refuse_throughout"]].min(axis=1)
     assert (failed["objective"] <= constant * (1.0 + 1e-9)).all()
-    assert [(v.claim.id, v.finding.status) for v in verify(trace, ["GATE-FEAS"])] == [("GATE-FEAS", "holds")]
+    assert [(v.claim.id, v.finding.status) for v in verdicts] == [("GATE-FEAS", "holds")]
 
 
 def test_after_a_failure_the_rest_of_the_plan_before_counts(case_a: Scenario, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -132,6 +136,32 @@ def test_a_proposal_that_leads_nowhere_is_refused_under_d_and_the_uav_is_told_wh
     assert first["accept_left_m"] > 5.0
 
 
+@pytest.mark.parametrize("run", ["c", "d"])
+def test_gains_changed_in_a_context_count_in_the_prediction(run: str) -> None:
+    """What is decided is what a scenario with these gains decides from the beginning."""
+    gains = {"avoidance_gain_1_s": 2.0, "motion_gain_1_s": 1.0, "intervention_gain_1_s": 3.0}
+    decided = []
+    for changed in (True, False):
+        scenario = load("case_b", () if changed else [f"control.{name}={value}" for name, value in gains.items()])[0]
+        model = build_model(scenario, scenario.runs[run].method, disturbed=False)
+        simulator = Simulator(model.diagram)
+        context = simulator.get_mutable_context()
+        context.SetAccuracy(1e-6)
+        model.diagram.SetRandomContext(context, RandomGenerator(1))
+        for controller in model.controllers if changed else ():
+            view = controller.mutable_gains(controller.GetMyMutableContextFromRoot(context))
+            for name in set(gains) & set(view.get_fields()):
+                setattr(view, name, gains[name])
+        simulator.AdvanceTo(16.0)
+        assert model.gatekeeper is not None
+        decided.append(model.gatekeeper.decisions(model.gatekeeper.GetMyContextFromRoot(context)))
+    assert len(decided[0]) > 10
+    for one, other in zip(*decided, strict=True):
+        assert (one.t, one.reason, one.throughout) == (other.t, other.reason, other.throughout)
+        for mine, theirs in ((one.accept, other.accept), (one.refuse, other.refuse)):
+            assert mine is None or mine.positions.tolist() == theirs.positions.tolist()
+
+
 @dataclass
 class Clock:
     """Advances by `tick` s at each reading."""
@@ -142,6 +172,11 @@ class Clock:
     def __call__(self) -> float:
         self.now += self.tick
         return self.now
+
+
+def timed(rules: Rules, clock: Clock) -> Rules:
+    """The same by another clock."""
+    return replace(rules, budget=replace(rules.budget, clock=clock))
 
 
 class Watching:
@@ -159,7 +194,7 @@ def recorded_budgets(scenario: Scenario, monkeypatch: pytest.MonkeyPatch, clock:
     scenario.gatekeeper.route = "watching"
     if clock is not None:
         make = components.make_rules
-        monkeypatch.setattr(components, "make_rules", lambda s: Rules(**{**make(s).__dict__, "clock": clock}))
+        monkeypatch.setattr(components, "make_rules", lambda s: timed(make(s), clock))
     with ROUTES.adding("watching", Watching):
         Recorder(scenario, "c").simulate(duration=16.0)
     return Watching.given
@@ -193,7 +228,7 @@ def test_with_no_time_left_the_better_constant_plan_decides(
     """A clock that jumps a whole sampling period at each reading: no solver is ever called."""
     case_a.gatekeeper.budget, case_a.gatekeeper.route = "wall_clock", route
     make = components.make_rules
-    monkeypatch.setattr(components, "make_rules", lambda s: Rules(**{**make(s).__dict__, "clock": Clock(tick=0.05)}))
+    monkeypatch.setattr(components, "make_rules", lambda s: timed(make(s), Clock(tick=0.05)))
     decisions = simulate(case_a, "c").decisions
     assert set(decisions["status"]) == {"budget_spent"}
     best = decisions[["accept_throughout", "refuse_throughout"]].min(axis=1)

@@ -14,14 +14,20 @@ import airground_drake
 
 PACKAGE = Path(airground_drake.__file__).parent
 ALLOWED: dict[str, set[str]] = {
-    "engines": {"base.arrays", "base.interruption", "base.statuses", "verify.engines", "verify.finding"},
+    "engines": {
+        "base.arrays", "base.interruption", "base.statuses", "verify.engines", "verify.finding", "world.motion",
+    },
     "runs": {
-        "base.arrays", "base.errors", "base.exact", "run.trace", "scenarios.schema", "verify.engines", "verify.runs",
-        "verify.claim", "verify.finding",
+        "base.arrays", "base.errors", "base.exact", "run.trace", "scenarios.plants", "scenarios.schema",
+        "verify.engines", "verify.runs", "verify.claim", "verify.finding",
     },
 }  # fmt: skip
 """By folder of verify/, beginnings of what its modules may import of this package."""
-JUDGED = {"geometry", "nsbc", "gatekeeper", "systems", "decision", "run.simulation", "intervention"}
+JUDGED = {
+    "geometry", "nsbc", "gatekeeper", "systems", "decision", "run.simulation", "intervention", "world.world",
+    "scenarios.world",
+}  # fmt: skip
+"""Also the pair table of the World: claims read distances and shares from the scenario."""
 
 
 def imported(path: Path) -> Iterator[str]:

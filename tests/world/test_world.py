@@ -84,13 +84,14 @@ def test_ugvs_stay_on_the_ground_whatever_is_above_them() -> None:
 
 @given(VECTORS, VECTORS, VECTORS, VECTORS, st.floats(0.0, 2.0))
 def test_no_point_of_two_motions_is_nearer_than_the_least_distance(
-    start: np.ndarray, change: np.ndarray, other: np.ndarray, moved: np.ndarray, off: float
+    start: np.ndarray, end: np.ndarray, other: np.ndarray, moved: np.ndarray, off: float
 ) -> None:
-    apart = Motion(start, change, off).seen_from(Motion(other, moved))
+    apart = Motion(start, end, off).seen_from(Motion(other, moved))
     least, share = apart.least_distance()
-    for s in [*np.linspace(0.0, 1.0, 9), *share]:
-        assert (np.maximum(np.linalg.norm(apart.start + s * apart.change, axis=-1) - off, 0.0) >= least - 1e-9).all()
-    nearest = np.linalg.norm(apart.start + share[:, None] * apart.change, axis=-1)
+    change = apart.end - apart.start
+    for s in np.linspace(0.0, 1.0, 9):
+        assert (np.maximum(np.linalg.norm(apart.start + s * change, axis=-1) - off, 0.0) >= least - 1e-9).all()
+    nearest = np.linalg.norm(apart.start + share[:, None] * change, axis=-1)
     np.testing.assert_allclose(np.maximum(nearest - off, 0.0), least, atol=1e-12)
     np.testing.assert_allclose(Ball(1.5).least_distance(apart), least - 1.5)
 
@@ -99,6 +100,5 @@ def test_no_point_of_two_motions_is_nearer_than_the_least_distance(
 def test_a_first_order_plant_moves_as_it_is_told(start: np.ndarray, velocity: np.ndarray, period: float) -> None:
     plant = FirstOrder()
     end = plant.step(start, velocity, period)
-    motion = plant.motion(start, end, period)
-    np.testing.assert_allclose(motion.start + motion.change, start + period * velocity, atol=1e-12)
-    assert motion.off_m == plant.reach(6.0, period) == 0.0
+    np.testing.assert_allclose(end, start + period * velocity, atol=1e-12)
+    assert plant.motion(start, end, period).off_m == plant.reach(6.0, period) == 0.0

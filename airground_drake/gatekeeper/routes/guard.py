@@ -9,7 +9,7 @@ from pydrake.solvers import MathematicalProgramResult, SolutionResult
 from airground_drake.base.arrays import Array
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.problem import Problem
-from airground_drake.gatekeeper.reachable_box import remaining_cost
+from airground_drake.gatekeeper.relaxation import remaining_cost
 from airground_drake.gatekeeper.solution import ConstantPlans, Solution, Status, cut_short
 
 Search = Callable[[Problem, ConstantPlans, Budget], Solution]
@@ -35,7 +35,11 @@ def guarded(problem: Problem, budget: Budget, search: Search) -> Solution:
 
 
 def without_optimum(
-    problem: Problem, constants: ConstantPlans, budget: Budget, normals: Array | None = None
+    problem: Problem,
+    constants: ConstantPlans,
+    budget: Budget,
+    normals: Array | None = None,
+    ended: Status = "solver_failed",
 ) -> Solution:
     """The better constant plan, when a solver gave nothing: for want of time, or because it failed.
 
@@ -44,8 +48,9 @@ def without_optimum(
         constants: its constant plans.
         budget: if it is spent, the solver wanted time.
         normals: of half-planes that stand for (26d), (N, m, 3).
+        ended: how the solver says that it ended.
     """
-    status: Status = "budget_spent" if budget.spent() else "solver_failed"
+    status: Status = "budget_spent" if budget.spent() else ended
     return cut_short(problem, constants.both, unavoidable_cost(problem), status=status, normals=normals)
 
 

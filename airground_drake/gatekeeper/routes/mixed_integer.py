@@ -10,15 +10,13 @@ import numpy.typing as npt
 from numba import njit
 
 from airground_drake.base.arrays import Array
-from airground_drake.gatekeeper.binary_program import BinaryProgram, Size
+from airground_drake.gatekeeper.binary_program import BinaryProgram
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.cost import Terms, half_plane_cost
 from airground_drake.gatekeeper.daqp_solver import Found, minimise
 from airground_drake.gatekeeper.drake_solvers import DrakeSearch
-from airground_drake.gatekeeper.dual_bound import dual_bound, multipliers_at
-from airground_drake.gatekeeper.half_planes import normals_along
-from airground_drake.gatekeeper.problem import Kinematics, Problem
-from airground_drake.gatekeeper.rounding import sum_up_rounding
+from airground_drake.gatekeeper.problem import Problem
+from airground_drake.gatekeeper.relaxation import dual_bound, multipliers_at, normals_along, sum_up_rounding
 from airground_drake.gatekeeper.routes.guard import guarded, unavoidable_cost
 from airground_drake.gatekeeper.solution import ConstantPlans, Solution, Status, cheapest
 
@@ -58,7 +56,7 @@ class MixedIntegerRoute:
             raise ValueError(f"blocks: {blocks}, allowed: 1 or more")
         self._blocks = blocks
         self._search: Callable[..., Found] = minimise if solver == "daqp" else DrakeSearch(solver).minimise
-        self._programs: dict[Size, BinaryProgram] = {}
+        self._programs: dict[tuple[int, int], BinaryProgram] = {}
 
     def solve(self, problem: Problem, budget: Budget = Budget()) -> Solution:  # noqa: B008 (immutable)
         """See `Route`."""
@@ -71,7 +69,7 @@ class MixedIntegerRoute:
         bound, known_plans = _known(binary, problem, normals)
         costs = [problem.evaluate_half_planes(problem.positions(plan), normals) for plan in known_plans]
         start = known_plans[int(np.argmin(costs))]
-        incumbent = _improved(problem.kinematics, problem.terms, normals, binary.block, start)
+        incumbent = _improved(problem.terms, normals, binary.block, start)
         known = problem.evaluate_half_planes(problem.positions(incumbent), normals)
         found = self._search(binary, known=known, seconds=min(budget.search_s, budget.left_s()))
         status: Status = found.ended if found.iterations <= budget.search_iterations else "budget_spent"
@@ -95,9 +93,9 @@ class MixedIntegerRoute:
 
     def _program(self, problem: Problem) -> BinaryProgram:
         stages = problem.stages
-        size = Size(stages, stages if self._blocks is None else min(self._blocks, stages))
+        size = stages, stages if self._blocks is None else min(self._blocks, stages)
         if size not in self._programs:
-            self._programs[size] = BinaryProgram(size)
+            self._programs[size] = BinaryProgram(*size)
         return self._programs[size]
 
 
@@ -116,12 +114,11 @@ def _known(binary: BinaryProgram, problem: Problem, normals: Array) -> tuple[flo
 
 
 @njit(cache=True)
-def _improved(motion: Kinematics, terms: Terms, normals: Array, block: npt.NDArray[np.int64], start: Array) -> Array:
+def _improved(terms: Terms, normals: Array, block: npt.NDArray[np.int64], start: Array) -> Array:
     """A plan (N,) that no change of a single block makes cheaper, with distances along the half-planes.
 
     Args:
-        motion: (23).
-        terms: (25).
+        terms: of the problem.
         normals: (N, m, 3).
         block: that each stage belongs to, (N,).
         start: where to begin, (N,), constant on each block.
@@ -131,12 +128,12 @@ def _improved(motion: Kinematics, terms: Terms, normals: Array, block: npt.NDArr
     while changed:
         changed = False
         for turned in range(-1, block[-1] + 1):
-            x, y, z = motion.initial[0], motion.initial[1], motion.initial[2]
+            x, y, z = terms.initial[0], terms.initial[1], terms.initial[2]
             for k in range(len(plan)):
                 mode = int(plan[k]) if block[k] != turned else 1 - int(plan[k])
-                x += motion.dt * motion.velocities[mode, k, 0]
-                y += motion.dt * motion.velocities[mode, k, 1]
-                z += motion.dt * motion.velocities[mode, k, 2]
+                x += terms.dt * terms.velocities[mode, k, 0]
+                y += terms.dt * terms.velocities[mode, k, 1]
+                z += terms.dt * terms.velocities[mode, k, 2]
                 positions[k, 0], positions[k, 1], positions[k, 2] = x, y, z
             cost = half_plane_cost(terms, positions, normals)
             if cost < best * (1.0 - 1e-12):

@@ -3,45 +3,24 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import Any
 
 import numpy as np
-from pydrake.solvers import (
-    IpoptSolver,
-    MathematicalProgram,
-    QuadraticConstraint,
-    SnoptSolver,
-    SolverOptions,
-)
+from pydrake.solvers import MathematicalProgram, QuadraticConstraint, SnoptSolver, SolverOptions
 
 from airground_drake.base.arrays import Array
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.problem import Evaluation, Problem
-from airground_drake.gatekeeper.reachable_box import within_reach
-from airground_drake.gatekeeper.rounding import sum_up_rounding
+from airground_drake.gatekeeper.relaxation import sum_up_rounding, within_reach
 from airground_drake.gatekeeper.routes.guard import guarded, how_it_ended, unavoidable_cost, without_optimum
 from airground_drake.gatekeeper.solution import ConstantPlans, Solution, Status, cheapest, cut_short
 
-NlpSolver = Literal["snopt", "ipopt"]
-
 _AXES = 2  # UGVs move in their plane
 
-_SOLVERS = {"snopt": SnoptSolver, "ipopt": IpoptSolver}
-
-_OPTIONS: dict[str, dict[str, float | int]] = {
-    "snopt": {
-        "Major optimality tolerance": 1e-5,
-        "Major feasibility tolerance": 1e-6,
-    },
-    "ipopt": {"tol": 1e-6},
-}
-
-_LIMITS: dict[str, tuple[dict[str, int], str]] = {
-    "snopt": ({"Major iterations limit": 1, "Iterations limit": 100}, "Time limit"),
-    "ipopt": ({"max_iter": 1}, "max_wall_time"),
-}
-"""Per solver: options that are this multiple of the budget's iterations, and the one that is its time left, s."""
+_OPTIONS = {"Major optimality tolerance": 1e-5, "Major feasibility tolerance": 1e-6}
+"""Of SNOPT."""
+_LIMITS = {"Major iterations limit": 1, "Iterations limit": 100}
+"""Its options that are this multiple of the budget's iterations."""
 
 
 class NonlinearRoute:
@@ -59,23 +38,13 @@ class NonlinearRoute:
     The start is the cheaper constant plan. The plan returned is the cheapest, by the exact cost (25), of the
     rounded one and the two constant ones. A local optimum bounds nothing: `route_bound` and `gap` are -1.
 
-    Budget: iterations (SNOPT: major ones) and the time left go to the solver. An iterate that it stops at is
+    Budget: major iterations and the time left go to the solver. An iterate that it stops at is
     rounded like an optimum; the status is 'budget_spent' and the bound then that of `remaining_cost`.
     """
 
-    def __init__(self, solver: NlpSolver = "snopt") -> None:
-        """Choose the solver; both come with Drake and need no licence.
-
-        Raises:
-            ValueError: if the solver is unknown or not in this build of Drake.
-        """
-        if solver not in _SOLVERS:
-            raise ValueError(f"solver: {solver!r}, allowed: {', '.join(get_args(NlpSolver))}")
-        self._solver = _SOLVERS[solver]()
-        if not (self._solver.available() and self._solver.enabled()):
-            raise ValueError(f"solver: {solver!r} is not available in this build of Drake")
-        self._name = solver
-        self._id = self._solver.solver_id()
+    def __init__(self) -> None:
+        """Take SNOPT, which comes with Drake and needs no licence."""
+        self._solver = SnoptSolver()
 
     def solve(self, problem: Problem, budget: Budget = Budget()) -> Solution:  # noqa: B008 (immutable)
         """See `Route`."""
@@ -94,40 +63,34 @@ class NonlinearRoute:
 
     def _relax(self, problem: Problem, start: Evaluation, budget: Budget) -> tuple[Array | None, Status]:
         """Omega (N,) where the solver ended, None if that is no number; how it ended."""
-        nlp = relaxation(problem, start)
+        program, omega, guess = relaxation(problem, start)
         try:
-            result = self._solver.Solve(nlp.program, nlp.guess, self._options(budget))
+            result = self._solver.Solve(program, guess, _options(budget))
         except RuntimeError:
             return None, "solver_failed"
-        omega = np.clip(result.GetSolution(nlp.omega), 0.0, 1.0)
-        return omega if np.isfinite(omega).all() else None, how_it_ended(result, budget)
-
-    def _options(self, budget: Budget) -> SolverOptions:
-        options = SolverOptions()
-        limits, seconds = _LIMITS[self._name]
-        values = _OPTIONS[self._name] | {name: factor * budget.iterations for name, factor in limits.items()}
-        if budget.left_s() < math.inf:
-            values[seconds] = max(budget.left_s(), 1e-3)
-        for name, value in values.items():
-            options.SetOption(self._id, name, value)
-        return options
+        relaxed = np.clip(result.GetSolution(omega), 0.0, 1.0)
+        return relaxed if np.isfinite(relaxed).all() else None, how_it_ended(result, budget)
 
 
-@dataclass(frozen=True, eq=False)
-class Relaxation:
-    """(27) as a program: its variables omega (N,) and an initial guess for all of its variables."""
+def _options(budget: Budget) -> SolverOptions:
+    options = SolverOptions()
+    values: dict[str, float | int] = {name: factor * budget.iterations for name, factor in _LIMITS.items()}
+    if budget.left_s() < math.inf:
+        values["Time limit"] = max(budget.left_s(), 1e-3)
+    for name, value in {**_OPTIONS, **values}.items():
+        options.SetOption(SnoptSolver.id(), name, value)
+    return options
 
-    program: MathematicalProgram
-    omega: Any
-    guess: Array
 
-
-def relaxation(problem: Problem, start: Evaluation) -> Relaxation:
+def relaxation(problem: Problem, start: Evaluation) -> tuple[MathematicalProgram, Any, Array]:
     """Multiple shooting in the task errors e = p - reference, (2N,), omega (N,), u (N,) and one r per pair.
 
     Args:
         problem: data of (26).
         start: the plan whose states are the initial guess.
+
+    Returns:
+        The program, its variables omega (N,), and an initial guess for all of its variables.
     """
     stages, dt = problem.stages, problem.dt
     size = _AXES * stages
@@ -180,4 +143,4 @@ def relaxation(problem: Problem, start: Evaluation) -> Relaxation:
     np.maximum.at(slack, stage, lacking)
     errors = (start.positions - problem.reference)[:, :_AXES].ravel()
     guess = np.concatenate([errors, start.omega, slack, np.maximum(0.0, distance - slack[stage])])
-    return Relaxation(program, omega, guess)
+    return program, omega, guess

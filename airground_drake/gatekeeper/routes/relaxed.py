@@ -2,32 +2,18 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
-from pydrake.solvers import ClarabelSolver, SolverOptions
 
-from airground_drake.base.arrays import Array
+from airground_drake.gatekeeper.binary_program import BinaryProgram
 from airground_drake.gatekeeper.budget import Budget
-from airground_drake.gatekeeper.convex_program import Shape, TeamProgram, empty_program
-from airground_drake.gatekeeper.dual_bound import dual_bound, multipliers_at
-from airground_drake.gatekeeper.half_planes import normals_along
+from airground_drake.gatekeeper.daqp_solver import minimise
 from airground_drake.gatekeeper.problem import Problem
-from airground_drake.gatekeeper.rounding import sum_up_rounding
-from airground_drake.gatekeeper.routes.guard import guarded, how_it_ended, unavoidable_cost, without_optimum
-from airground_drake.gatekeeper.solution import ConstantPlans, Solution, Status, cheapest
+from airground_drake.gatekeeper.relaxation import dual_bound, multipliers_at, normals_along, sum_up_rounding
+from airground_drake.gatekeeper.routes.guard import guarded, unavoidable_cost, without_optimum
+from airground_drake.gatekeeper.solution import ConstantPlans, Solution, cheapest
 
-_TOLERANCE = 1e-6
-
-_OPTIONS = {
-    "tol_gap_abs": 1e-9,
-    "tol_gap_rel": _TOLERANCE,
-    "tol_feas": _TOLERANCE,
-    "iterative_refinement_enable": 0,
-    "equilibrate_enable": 0,
-    "presolve_enable": 0,
-}
-"""Of Clarabel: optima to 1e-6 in two thirds of the time that its defaults take."""
+ACTIVE_SETS = 100
+"""Active sets that DAQP may try for each iteration of the budget: they are as quick as that."""
 
 
 class RelaxedRoute:
@@ -43,84 +29,47 @@ class RelaxedRoute:
     tried and taken out: it changed no answer of any shipped case, and plans that switch are predicted to no better
     than 0.3 m.)
 
-    `route_bound` is computed from the multipliers by weak duality (`dual_bound`), so that it is a bound whatever
-    the solver's tolerances, and also when its iterations ran out.
+    `route_bound` is computed from multipliers by weak duality (`dual_bound`), so that it is a bound whatever the
+    solver's tolerances.
 
-    Budget: iterations and the time left go to the solver; there is no tree to search. If the solver fails, the omega
-    where it ended is rounded all the same: plans are evaluated exactly, whatever they come from.
+    Budget: iterations (active sets: `ACTIVE_SETS` times as many) and the time left go to the solver; there is no tree
+    to search. Without an optimum the better constant plan decides.
 
-    The program is built once for a number of stages and the weights, then only its coefficients change.
+    The program is that of `MixedIntegerRoute` with shares in place of binaries. It is built once for a number of
+    stages, then only its coefficients change.
     """
 
     def __init__(self) -> None:
         """Start without any program."""
-        self._programs: dict[Shape, TeamProgram] = {}
-        self._solver = ClarabelSolver()
+        self._programs: dict[int, BinaryProgram] = {}
 
     def solve(self, problem: Problem, budget: Budget = Budget()) -> Solution:  # noqa: B008 (immutable)
         """See `Route`."""
         return guarded(problem, budget, self._solve)
 
     def _solve(self, problem: Problem, constants: ConstantPlans, budget: Budget) -> Solution:
+        stages = problem.stages
         normals = normals_along(problem, constants.better.positions)
-        relaxed, bound, status = self._relax(problem, normals, constants.better.objective, budget)
+        if stages not in self._programs:
+            self._programs[stages] = BinaryProgram(stages, stages)
+        program = self._programs[stages]
+        program.update(problem, normals)
+        found = minimise(program, relaxed=True, seconds=budget.left_s(), iterations=ACTIVE_SETS * budget.iterations)
+        relaxed = found.omega
         if relaxed is None:
-            return without_optimum(problem, constants, budget, normals)
+            return without_optimum(problem, constants, budget, normals, ended=found.ended)
+        bound = dual_bound(problem, normals, relaxed, multipliers_at(problem, normals, problem.positions(relaxed)))
+        if found.multipliers is not None and program.within.any():  # better where half-planes share the slack
+            multipliers = np.zeros(program.within.shape)
+            multipliers[program.within] = found.multipliers
+            bound = max(bound, dual_bound(problem, normals, relaxed, multipliers))
         rounded = sum_up_rounding(relaxed)
         other = np.append(1.0 - rounded[0], rounded[1:])
         return cheapest(
             problem,
             (constants.accept, constants.refuse, problem.evaluate(rounded), problem.evaluate(other)),
-            status=status,
             route_bound=max(bound, unavoidable_cost(problem)),
             normals=normals,
             relaxed=relaxed,
             rounded=rounded,
         )
-
-    def _relax(
-        self, problem: Problem, normals: Array, cost: float, budget: Budget
-    ) -> tuple[Array | None, float, Status]:
-        """Omega (N,) where the solver ended, None if that is no number; the bound that follows; how it ended."""
-        scale = _scale(cost)
-        shape = Shape.of(problem, scale=scale)
-        if shape not in self._programs:
-            self._programs[shape] = empty_program([shape])
-        team = self._programs[shape]
-        (ugv,) = team.ugvs
-        rows = ugv.update(problem, normals)
-        result = self._solver.Solve(team.program, None, _options(budget))
-        omega = np.clip(result.GetSolution(ugv.omega), 0.0, 1.0)
-        status = how_it_ended(result, budget)
-        usable = np.isfinite(omega).all()
-        if not usable or status == "solver_failed":
-            del self._programs[shape]  # a fresh workspace after a failure
-        if not usable:
-            return None, -math.inf, status
-        bound = dual_bound(problem, normals, omega, multipliers_at(problem, normals, problem.positions(omega)))
-        if status == "solver_failed":  # its multipliers and its cost are not to be relied on
-            return omega, bound, status
-        if bound < (1.0 - 2.0 * _TOLERANCE) * scale * result.get_optimal_cost() and rows.any():
-            multipliers = np.zeros(rows.shape)
-            multipliers[rows] = scale * result.GetDualSolution(ugv.avoidance)
-            bound = max(bound, dual_bound(problem, normals, omega, multipliers))
-        return omega, bound, status
-
-
-def _scale(cost: float) -> float:
-    """Cost that is 1 in the program: `cost` to a power of ten, so that few programs are kept.
-
-    Clarabel's relative gap is absolute below 1: unscaled, it would mean nothing where there is little to pay.
-    """
-    return float(10.0 ** min(12, max(-12, math.floor(math.log10(max(cost, 1e-300))))))
-
-
-def _options(budget: Budget) -> SolverOptions:
-    options = SolverOptions()
-    solver = ClarabelSolver.id()
-    for name, value in _OPTIONS.items():
-        options.SetOption(solver, name, value)
-    options.SetOption(solver, "max_iter", min(budget.iterations, 10_000))
-    if budget.left_s() < math.inf:
-        options.SetOption(solver, "time_limit", max(budget.left_s(), 1e-6))
-    return options

@@ -14,9 +14,8 @@ from scipy.spatial import cKDTree
 
 from airground_drake.base.arrays import Array
 from airground_drake.geometry.paths import NoPath, shortest_path
-from airground_drake.intervention.coordination import kernels
-
-Indices = kernels.Indices
+from airground_drake.intervention.coordination.intervals import Grid, Indices
+from airground_drake.intervention.coordination.timed import free_points, free_segments
 
 PITCH = 0.2
 """Spacing of the lattice as a share of the distance that robots keep."""
@@ -89,11 +88,11 @@ class Space:
 
         So a segment that begins too near to a disc is free if it only leads away.
         """
-        return kernels.free_segments(begin, end, self.discs, ROUNDING_M)
+        return free_segments(begin, end, self.discs, ROUNDING_M)
 
     def points_are_free(self, points: Array, clearance: float) -> npt.NDArray[np.bool_]:
         """Which of the points (K, 2), m, keep every distance, and this clearance, m, beyond it."""
-        return kernels.free_points(points, self._discs(clearance - ROUNDING_M))
+        return free_points(points, self._discs(clearance - ROUNDING_M))
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +127,7 @@ class Roadmap:
         robots: one entry per robot.
     """
 
-    grid: kernels.Grid
+    grid: Grid
     first_edge: Indices
     heads: Indices
     lengths: Array
@@ -326,11 +325,11 @@ def _in_rows(points: Array, pairs: Indices) -> tuple[Indices, Indices, Array]:
     return first, np.ascontiguousarray(heads), lengths
 
 
-def _grid(points: Array, low: Array, size: float) -> kernels.Grid:
+def _grid(points: Array, low: Array, size: float) -> Grid:
     """A grid over the nodes (N, 2), m, with its lowest corner, (2,), m, and the size of a cell, m."""
     at = np.maximum(np.floor((points - low) / size).astype(np.int64), 0)
     shape = at.max(axis=0) + 1
     cell = at[:, 0] * shape[1] + at[:, 1]
     members = np.argsort(cell, kind="stable").astype(np.int64)
     first = np.searchsorted(cell[members], np.arange(int(np.prod(shape)) + 1)).astype(np.int64)
-    return kernels.Grid(points, first, members, low, size, shape)
+    return Grid(points, first, members, low, size, shape)

@@ -11,9 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
-from airground_drake.intervention.coordination import kernels
+from airground_drake.intervention.coordination import intervals
 from airground_drake.intervention.coordination.roadmap import Indices, Roadmap, RobotNodes, RobotTask, Space
-from airground_drake.intervention.coordination.timed import distance, timed, without_repeats
+from airground_drake.intervention.coordination.timed import distance, free_pieces, timed, without_repeats
 
 ROUNDING_M = 1e-9
 """Robots may be nearer to each other than asked for by this, m."""
@@ -106,10 +106,10 @@ def find(
     blocked = [_blocked_times(mover, other) for other in [*fixed, *brief]]
     nodes = np.concatenate([np.zeros(0, np.int64), *(nodes for nodes, _ in blocked)])
     times = np.concatenate([np.zeros((0, 2)), *(times for _, times in blocked)])
-    intervals = kernels.safe_intervals(len(roadmap.nodes), nodes, times)
-    edges = kernels.Edges(roadmap.first_edge, roadmap.heads, roadmap.lengths / mover.speed)
+    free = intervals.safe_intervals(len(roadmap.nodes), nodes, times)
+    edges = intervals.Edges(roadmap.first_edge, roadmap.heads, roadmap.lengths / mover.speed)
     joins = _joins(mover, fixed, follow)
-    route, arrivals, joined, spent = kernels.search(edges, intervals, own.start, joins, mover.to_go, budget)
+    route, arrivals, joined, spent = intervals.search(edges, free, own.start, joins, mover.to_go, budget)
     return (_way(roadmap, mover, route, arrivals, joined) if len(route) else None), int(spent)
 
 
@@ -122,17 +122,17 @@ def _blocked_times(mover: Mover, other: Body) -> tuple[Indices, Array]:
     near = np.minimum([at_first, at_last], space.apart + other.radius) - ROUNDING_M
     ends = np.array([mover.own.start, mover.own.target])
     radius = space.wide(roadmap.longest, other.radius)
-    nodes, times = kernels.blocked_times(other.motion, roadmap.grid, radius, ends, near)
+    nodes, times = intervals.blocked_times(other.motion, roadmap.grid, radius, ends, near)
     return nodes, np.minimum(times, other.until)
 
 
 def _joins(mover: Mover, fixed: Sequence[Body], follow: float) -> Array:
-    """First and last time at which the preset can be joined at each node, (N, 2), s; see `kernels.join_time`."""
+    """First and last time at which the preset can be joined at each node, (N, 2), s; see `intervals.join_time`."""
     own, roadmap, space = mover.own, mover.roadmap, mover.space
     times, places = own.preset_times, roadmap.nodes[own.preset]
     preset, clear = timed(times, places), mover.clear.copy()
     for other in fixed:
-        clear &= kernels.free_pieces(preset, other.motion, _wished(space, other) - ROUNDING_M)
+        clear &= free_pieces(preset, other.motion, _wished(space, other) - ROUNDING_M)
     stays = preset[-1:]
     in_the_end = np.array([np.hypot(*(places[-1] - other.motion[-1, 1:])) for other in fixed])
     held = all(

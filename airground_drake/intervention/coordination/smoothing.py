@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from airground_drake.intervention.coordination import kernels
 from airground_drake.intervention.coordination.roadmap import Space
 from airground_drake.intervention.coordination.single import Body, Way
+from airground_drake.intervention.coordination.timed import straightened
 
 ROUNDS = 2
 """How often every way is straightened among the others."""
@@ -43,5 +43,5 @@ def _straightened(space: Space, way: Way, others: Sequence[Body]) -> Way:
     stacked = np.concatenate([np.zeros((0, 3)), *(other.motion for other in others)])
     begins = np.concatenate([[0], np.cumsum([len(other.motion) for other in others])]).astype(np.int64)
     apart = np.array([space.apart + other.radius + space.spacing for other in others])
-    motion = kernels.straightened(way.motion, way.rows, space.discs, stacked, begins, apart)
+    motion = straightened(way.motion, way.rows, space.discs, stacked, begins, apart)
     return Way(motion, way.joined, way.rows - (len(way.motion) - len(motion)))

@@ -16,6 +16,7 @@ import numpy.typing as npt
 from scipy.optimize import brentq
 
 from airground_drake.base.arrays import Array
+from airground_drake.world.motion import Motion
 
 MERGE_S = 1e-9
 """Rows closer than this are one instant, s: periods that are not binary fractions give simulator steps of
@@ -37,16 +38,14 @@ class Approach:
     row: int
 
 
-def closest_approach(t: Array, first: Array, second: Array) -> Approach:
+def closest_approach(t: Array, first: Array, second: Array, off_m: float = 0.0) -> Approach:
     """Minimum distance between two points that move at the same time on straight segments, as (7) defines D.
-
-    The relative position r(s) = r0 + s (r1 - r0), s in [0, 1], of a segment is closest to the origin at
-    s = clip(-r0.(r1 - r0) / ||r1 - r0||^2, 0, 1), because ||r(s)||^2 is a convex parabola.
 
     Args:
         t: times of the rows, (T,), T >= 1, s, not decreasing.
         first: positions, (T, 3), m.
         second: positions, (T, 3), m, or (3,), m, of a point at rest.
+        off_m: how far from the straight segments both may be, together, m: the minimum is then a lower bound.
 
     Returns:
         The minimum over [t[0], t[-1]], its time and its row.
@@ -54,11 +53,7 @@ def closest_approach(t: Array, first: Array, second: Array) -> Approach:
     relative = first - second
     if len(t) == 1:
         return Approach(float(np.linalg.norm(relative[0])), float(t[0]), 0)
-    begin, step = relative[:-1], np.diff(relative, axis=0)
-    squared = np.einsum("ki,ki->k", step, step)
-    along = -np.einsum("ki,ki->k", begin, step)
-    fraction = np.clip(np.divide(along, squared, out=np.zeros_like(squared), where=squared > 0.0), 0.0, 1.0)
-    distance = np.linalg.norm(begin + fraction[:, None] * step, axis=1)
+    distance, fraction = Motion(relative[:-1], relative[1:], off_m).least_distance()
     k = int(np.argmin(distance))
     instant = min(t[k] + fraction[k] * (t[k + 1] - t[k]), t[k + 1])
     return Approach(float(distance[k]), float(instant), k + 1)

@@ -10,6 +10,7 @@ import numpy as np
 
 from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
+from airground_drake.scenarios.plants import plant_of
 from airground_drake.verify.engines.geometry import MERGE_S, apart_at_least, boxes_of, interpolate
 
 
@@ -62,7 +63,16 @@ def _apart_of(trace: Trace) -> Array:
     number = {name: k for k, name in enumerate(places)}
     boxes = boxes_of(np.stack([np.broadcast_to(place, (len(trace.t), 3)) for place in places.values()]))
     first, second = (np.array([number[name] for name in names], dtype=np.intp) for names in _sides(pairs))
-    return apart_at_least(boxes, first, second)
+    off = np.array([off_m_of(trace, name) for name in places])
+    return apart_at_least(boxes, first, second) - (off[first] + off[second])
+
+
+def off_m_of(trace: Trace, name: str) -> float:
+    """How far a body may be from the straight line between its positions at two rows, m."""
+    if name not in trace.robots:
+        return 0.0
+    position = trace.position(name)
+    return plant_of(trace.scenario.robots[name]).motion(position[:-1], position[1:], np.diff(trace.t)).off_m
 
 
 def least_of(bounds: Array, most: int, value: Callable[[int], float]) -> list[int]:

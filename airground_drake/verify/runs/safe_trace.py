@@ -18,6 +18,7 @@ from airground_drake.verify.runs.pairs import (
     Pair,
     apart_of,
     least_of,
+    off_m_of,
     pairs_of,
     places_of,
     snapshot,
@@ -60,7 +61,7 @@ class SafeTrace(TraceClaim):
     def check(self, trace: Trace) -> Finding:
         """Compare the minimum distance of each pair with its safe distance; the worst pair gives the margin."""
         pairs = pairs_of(trace)
-        entry = cache(partial(_entry, trace.t, places_of(trace), pairs))
+        entry = cache(partial(_entry, trace, places_of(trace), pairs))
         least = apart_of(trace) - np.array([pair.safe_m for pair in pairs])
         listed = [entry(k) for k in least_of(least, MOST_LISTED, lambda k: entry(k).margin_m)]
         close_by = np.flatnonzero(least < np.array([pair.reach_m for pair in pairs])).tolist()
@@ -100,10 +101,11 @@ class Distance:
     exercised: bool
 
 
-def _entry(t: Array, places: Mapping[str, Array], pairs: Sequence[Pair], k: int) -> Distance:
+def _entry(trace: Trace, places: Mapping[str, Array], pairs: Sequence[Pair], k: int) -> Distance:
     """Where the k-th pair was closest."""
     pair = pairs[k]
-    nearest = closest_approach(t, places[pair.first], places[pair.second])
+    off_m = off_m_of(trace, pair.first) + off_m_of(trace, pair.second)
+    nearest = closest_approach(trace.t, places[pair.first], places[pair.second], off_m)
     margin = nearest.distance_m - pair.safe_m
     reached = bool(margin < pair.reach_m)
     return Distance(pair.first, pair.second, pair.safe_m, nearest.distance_m, margin, nearest.t_s, nearest.row, reached)

@@ -20,7 +20,7 @@ from pydrake.solvers import SolutionResult
 
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.problem import Problem
-from airground_drake.gatekeeper.reachable_box import remaining_cost
+from airground_drake.gatekeeper.relaxation import remaining_cost
 from airground_drake.gatekeeper.solution import ConstantPlans, Solution
 from airground_drake.registry import ROUTES
 
@@ -89,7 +89,8 @@ def test_a_budget_that_is_spent_leaves_the_best_plan_so_far(
 
 
 @pytest.mark.parametrize("name", [name for name in MAKERS if name != "mixed_integer"])
-def test_one_iteration_is_not_enough(name: str) -> None:
+def test_one_iteration_is_not_enough(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("airground_drake.gatekeeper.routes.relaxed.ACTIVE_SETS", 1)
     problem, budget = INSTANCES["rolled out 1"], Budget(1)
     solution = check_contract(used(name), problem, budget=budget)
     assert solution.status == "budget_spent"

@@ -11,10 +11,10 @@ from pydrake.solvers import ClarabelSolver, MixedIntegerBranchAndBound, Solution
 
 from airground_drake.base.errors import ScenarioError
 from airground_drake.gatekeeper import drake_solvers
-from airground_drake.gatekeeper.binary_program import BinaryProgram, Size
+from airground_drake.gatekeeper.binary_program import BinaryProgram
 from airground_drake.gatekeeper.daqp_solver import minimise
 from airground_drake.gatekeeper.drake_solvers import SOLVERS, DrakeSearch, lacking
-from airground_drake.gatekeeper.half_planes import normals_along
+from airground_drake.gatekeeper.relaxation import normals_along
 from airground_drake.gatekeeper.routes.mixed_integer import MixedIntegerRoute
 from airground_drake.gatekeeper.solution import ConstantPlans
 from airground_drake.report.__main__ import main as report
@@ -66,7 +66,7 @@ def gurobi(monkeypatch: pytest.MonkeyPatch) -> type[BranchAndBound]:
 @pytest.mark.parametrize("seed", range(6))
 @pytest.mark.usefixtures("gurobi")
 def test_a_solver_of_drake_takes_the_program_as_it_is(seed: int) -> None:
-    problem, binary = random_problem(seed, 12, 1 + seed % 3), BinaryProgram(Size(12, 12))
+    problem, binary = random_problem(seed, 12, 1 + seed % 3), BinaryProgram(12, 12)
     normals = normals_along(problem, ConstantPlans.of(problem).better.positions)
     binary.update(problem, normals)
     cost = []

@@ -15,12 +15,11 @@ from gatekeeper.oracles import every_plan
 from pydrake.solvers import MathematicalProgram
 
 from airground_drake.gatekeeper import daqp_solver
-from airground_drake.gatekeeper.binary_program import BinaryProgram, Size
-from airground_drake.gatekeeper.blocks import block_of_stage
+from airground_drake.gatekeeper.binary_program import BinaryProgram, block_of_stage
 from airground_drake.gatekeeper.budget import UNLIMITED, Budget
 from airground_drake.gatekeeper.daqp_solver import minimise
-from airground_drake.gatekeeper.half_planes import normals_along
 from airground_drake.gatekeeper.problem import Problem
+from airground_drake.gatekeeper.relaxation import normals_along
 from airground_drake.gatekeeper.routes.mixed_integer import MixedIntegerRoute
 from airground_drake.gatekeeper.solution import ConstantPlans
 from airground_drake.run.simulation import simulate, warm_up
@@ -70,7 +69,7 @@ def test_no_block_is_an_error() -> None:
 @pytest.mark.parametrize("blocks", [12, 5])
 def test_the_program_is_the_problem(blocks: int) -> None:
     """Costs and rows of the program at random plans, with the slack that they need, against the formulas."""
-    binary, rng = BinaryProgram(Size(12, blocks)), np.random.default_rng(0)
+    binary, rng = BinaryProgram(12, blocks), np.random.default_rng(0)
     for seed in range(8):
         problem = random_problem(seed, 12, 2)
         normals = normals_along(problem, ConstantPlans.of(problem).better.positions)
@@ -151,7 +150,7 @@ def test_without_a_proof_the_incumbent_decides(
 def test_a_search_of_too_many_iterations_is_not_used() -> None:
     """So it does not matter which machine came to its end."""
     problem = rolled_out(1)
-    binary = BinaryProgram(Size(problem.stages, problem.stages))
+    binary = BinaryProgram(problem.stages, problem.stages)
     binary.update(problem, normals_along(problem, ConstantPlans.of(problem).better.positions))
     count = minimise(binary).iterations
     assert count > 1

@@ -1,8 +1,9 @@
-"""The default route."""
+"""The paper's route."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import cvxpy
 import numpy as np
@@ -13,13 +14,13 @@ from gatekeeper.formulas import cost
 from hypothesis import example, given
 from hypothesis import strategies as st
 from properties import examples
-from pydrake.solvers import SolutionResult
 
-from airground_drake.gatekeeper.budget import Budget
-from airground_drake.gatekeeper.half_planes import normals_along
+from airground_drake.gatekeeper.daqp_solver import Found
 from airground_drake.gatekeeper.problem import Problem, predicted_problem
+from airground_drake.gatekeeper.relaxation import normals_along
+from airground_drake.gatekeeper.routes import relaxed
 from airground_drake.gatekeeper.routes.relaxed import RelaxedRoute
-from airground_drake.gatekeeper.solution import Solution
+from airground_drake.gatekeeper.solution import ConstantPlans
 
 
 def in_reach(problem: Problem) -> np.ndarray:
@@ -116,38 +117,16 @@ def test_numbers_that_are_not_finite_are_refused(field: str) -> None:
     assert solution.status == "refused_not_finite"
 
 
-@pytest.mark.parametrize("ended", [np.nan, 0.7])
-def test_a_failing_solver_leaves_the_best_plan_known(ended: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    """With the omega where it ended among them, if that is a number."""
-
-    class Failed:
-        def is_success(self) -> bool:
-            return False
-
-        def get_solution_result(self) -> SolutionResult:
-            return SolutionResult.kSolverSpecificError
-
-        def GetSolution(self, variables: np.ndarray) -> np.ndarray:
-            return np.full(len(variables), ended)
-
-        def get_optimal_cost(self) -> float:
-            return float("inf")
-
-    class Solver:
-        def Solve(self, *arguments: object) -> Failed:
-            return Failed()
-
-    class Fails:
-        def solve(self, problem: Problem, budget: Budget) -> Solution:
-            route = RelaxedRoute()
-            monkeypatch.setattr(route, "_solver", Solver())
-            return route.solve(problem, budget)
-
+@pytest.mark.parametrize("ended", ["solver_failed", "budget_spent"])
+def test_without_an_optimum_the_better_constant_plan_decides(ended: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     problem = random_problem(0)
-    solution = check_contract(Fails(), problem)
-    assert solution.status == "solver_failed"
-    assert (solution.rounded is None) == bool(np.isnan(ended))
-    assert RelaxedRoute().solve(random_problem(0)).status == "optimal"
+    with monkeypatch.context() as patch:
+        patch.setattr(relaxed, "minimise", lambda *_, **__: Found(None, ended))
+        solution = check_contract(RelaxedRoute(), problem)
+    assert solution.status == ended
+    assert solution.objective == ConstantPlans.of(problem).better.objective
+    assert solution.rounded is None
+    assert RelaxedRoute().solve(problem).status == "optimal"
 
 
 def test_the_detour_of_case_a_is_accepted() -> None:

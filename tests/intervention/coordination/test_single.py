@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from airground_drake.intervention.coordination.kernels import free_pieces
 from airground_drake.intervention.coordination.roadmap import Space
 from airground_drake.intervention.coordination.single import Body, _wished
+from airground_drake.intervention.coordination.timed import free_pieces
 
 
 @pytest.mark.parametrize(("radius", "beside", "free"), [(0.0, 0.5, True), (1.0, 0.5, False), (1.0, 1.1, True)])

@@ -1,7 +1,6 @@
-"""Compiled inner loops of joint planning (numba): blocked times, safe intervals, search, closest approaches.
+"""Safe intervals, compiled (numba): when motions block the nodes of a roadmap, and the search among free times.
 
-A timed motion is an array (M, 3) of times, s, and places, m. It is straight between its rows, and rests at the last
-place. There is no fast-math: results are those of IEEE arithmetic in the order written.
+There is no fast-math: results are those of IEEE arithmetic in the order written.
 """
 
 from __future__ import annotations
@@ -62,53 +61,6 @@ class Intervals(NamedTuple):
 
     first: Indices
     times: Array
-
-
-@njit(cache=True)
-def approach(x: float, y: float, vx: float, vy: float, duration: float) -> float:
-    """Least distance from the origin, m, of a point at (x, y) moving with (vx, vy) for a duration, s."""
-    squared = vx * vx + vy * vy
-    s = 0.0
-    if squared > 0.0 and duration > 0.0:
-        s = min(max(-(x * vx + y * vy) / squared, 0.0), duration)
-    return float(np.hypot(x + s * vx, y + s * vy))
-
-
-@njit(cache=True)
-def place(motion: Array, t: float, hint: int) -> tuple[float, float, int]:
-    """Place of a timed motion at time t, s, and the row before it; the search begins at row `hint`."""
-    k = hint
-    while k + 1 < len(motion) and motion[k + 1, 0] <= t:
-        k += 1
-    if k + 1 == len(motion) or t <= motion[k, 0]:
-        return motion[k, 1], motion[k, 2], k
-    share = (t - motion[k, 0]) / (motion[k + 1, 0] - motion[k, 0])
-    x = motion[k, 1] + share * (motion[k + 1, 1] - motion[k, 1])
-    return x, motion[k, 2] + share * (motion[k + 1, 2] - motion[k, 2]), k
-
-
-@njit(cache=True)
-def closest(one: Array, other: Array, begin: float, end: float) -> float:
-    """Least distance of two timed motions over [begin, end], m; `end` may be infinite."""
-    i, j = 0, 0
-    ax, ay, i = place(one, begin, 0)
-    bx, by, j = place(other, begin, 0)
-    least = float(np.hypot(ax - bx, ay - by))
-    t = begin
-    while t < end:
-        until = end
-        if i + 1 < len(one):
-            until = min(until, one[i + 1, 0])
-        if j + 1 < len(other):
-            until = min(until, other[j + 1, 0])
-        if until == np.inf:
-            break
-        cx, cy, i = place(one, until, i)
-        dx, dy, j = place(other, until, j)
-        x, y = ax - bx, ay - by
-        least = min(least, approach(x, y, (cx - dx) - x, (cy - dy) - y, 1.0))
-        ax, ay, bx, by, t = cx, cy, dx, dy, until
-    return least
 
 
 @njit(cache=True)
@@ -366,113 +318,3 @@ def traced_back(last: int, before: Indices, node_of: Indices, arrival: Array) ->
         nodes[k], arrivals[k] = node_of[i], arrival[i]
         i = before[i]
     return nodes, arrivals
-
-
-@njit(cache=True)
-def free_pieces(preset: Array, other: Array, apart: float) -> npt.NDArray[np.bool_]:
-    """Which pieces between the rows of a timed motion (K, 3) stay so far, m, from another one; shape (K - 1,)."""
-    free = np.empty(len(preset) - 1, np.bool_)
-    for k in range(len(free)):
-        free[k] = closest(preset[k : k + 2], other, preset[k, 0], preset[k + 1, 0]) >= apart
-    return free
-
-
-@njit(cache=True)
-def free_points(points: Array, discs: Array) -> npt.NDArray[np.bool_]:
-    """Which points (K, 2), m, are outside all discs (m, 3) of centre and radius, m."""
-    free = np.ones(len(points), np.bool_)
-    for k in range(len(points)):
-        for m in range(len(discs)):
-            x, y = points[k, 0] - discs[m, 0], points[k, 1] - discs[m, 1]
-            if np.sqrt(x * x + y * y) < discs[m, 2]:
-                free[k] = False
-                break
-    return free
-
-
-@njit(cache=True)
-def free_segments(begin: Array, end: Array, discs: Array, slack: float) -> npt.NDArray[np.bool_]:
-    """Which segments (K, 2)-(K, 2), m, come nearer to no disc than its radius or than one of their ends is.
-
-    Args:
-        begin: (K, 2), m.
-        end: (K, 2), m.
-        discs: (m, 3) of centre and radius, m.
-        slack: distances may fall short by this, m.
-    """
-    free = np.ones(len(begin), np.bool_)
-    for k in range(len(begin)):
-        sx, sy = end[k, 0] - begin[k, 0], end[k, 1] - begin[k, 1]
-        squared = max(sx * sx + sy * sy, 1e-300)
-        reach = 1.001 * np.sqrt(squared)
-        for m in range(len(discs)):
-            ax, ay = begin[k, 0] - discs[m, 0], begin[k, 1] - discs[m, 1]
-            to_begin = np.sqrt(ax * ax + ay * ay)
-            if to_begin > discs[m, 2] + reach:
-                continue
-            bx, by = end[k, 0] - discs[m, 0], end[k, 1] - discs[m, 1]
-            share = min(max(-(ax * sx + ay * sy) / squared, 0.0), 1.0)
-            x, y = ax + share * sx, ay + share * sy
-            allowed = min(discs[m, 2], to_begin, np.sqrt(bx * bx + by * by))
-            if np.sqrt(x * x + y * y) < allowed - slack:
-                free[k] = False
-                break
-    return free
-
-
-@njit(cache=True)
-def straight_is_free(motion: Array, i: int, j: int, discs: Array, others: Array, begins: Indices, apart: Array) -> bool:
-    """Whether a timed motion may go straight from row i to row j.
-
-    It may come no nearer to anything than the allowed distance, or than it is at one of the two rows.
-
-    Args:
-        motion: (M, 3).
-        i: row at which the straight piece begins.
-        j: row at which it ends.
-        discs: (m, 3) of centre and radius, m.
-        others: other timed motions, stacked, (R, 3).
-        begins: first row of each of the others, and R, (B + 1,).
-        apart: distances to keep from the others, (B,), m.
-    """
-    t, x, y = motion[i, 0], motion[i, 1], motion[i, 2]
-    until, u, v = motion[j, 0], motion[j, 1], motion[j, 2]
-    for k in range(len(discs)):
-        ax, ay, bx, by = x - discs[k, 0], y - discs[k, 1], u - discs[k, 0], v - discs[k, 1]
-        least = min(discs[k, 2], np.hypot(ax, ay), np.hypot(bx, by))
-        if approach(ax, ay, bx - ax, by - ay, 1.0) < least - 1e-9:
-            return False
-    straight = np.empty((2, 3))
-    straight[0, 0], straight[0, 1], straight[0, 2] = t, x, y
-    straight[1, 0], straight[1, 1], straight[1, 2] = until, u, v
-    for k in range(len(begins) - 1):
-        other = others[begins[k] : begins[k + 1]]
-        ax, ay, h = place(other, t, 0)
-        bx, by, h = place(other, until, h)
-        least = min(apart[k], np.hypot(x - ax, y - ay), np.hypot(u - bx, v - by))
-        if closest(straight, other, t, until) < least - 1e-9:
-            return False
-    return True
-
-
-@njit(cache=True)
-def straightened(motion: Array, upto: int, discs: Array, others: Array, begins: Indices, apart: Array) -> Array:
-    """The timed motion without needless detours between its first `upto` rows.
-
-    From each row that is kept the motion goes straight, at constant speed, to a later row that `straight_is_free`
-    allows: it tries the farthest row first, then three quarters of the way, again and again. Times of rows stay as
-    they are. The other arguments are those of `straight_is_free`.
-    """
-    kept = np.empty(len(motion), np.int64)
-    kept[0], count, i = 0, 1, 0
-    while i + 1 < upto:
-        j = upto - 1
-        while j > i + 1 and not straight_is_free(motion, i, j, discs, others, begins, apart):
-            j = i + max(1, (j - i) * 3 // 4)
-        kept[count] = j
-        count += 1
-        i = j
-    for i in range(upto, len(motion)):
-        kept[count] = i
-        count += 1
-    return motion[kept[:count]]
