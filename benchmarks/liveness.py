@@ -1,4 +1,4 @@
-"""Who arrives on courses that nobody tuned: `python benchmarks/liveness.py --ugvs 4 --maps 200 --jobs 2 -o four.jsonl`.
+"""Who arrives on random courses: `python benchmarks/liveness.py --ugvs 4 --maps 200 --jobs 2 -o four.jsonl`.
 
 Draws random courses (`maps.py`), keeps those for which a planner of the benchmark's own has a plan (`feasible.py`),
 and simulates methods (a) to (d) and ORCA on each, with the same speed limits. Every run becomes a line of JSON in the

@@ -1,4 +1,4 @@
-"""Random courses that nobody tuned: robots on both sides of a field of discs, each with a target on the other side.
+"""Random courses: robots on both sides of a field of discs, each with a target on the other side.
 
 A course is drawn from its seed, the number of UGVs and the density alone, so that every method gets the same one.
 """

@@ -1,15 +1,11 @@
 """Every mutant, and what catches it: `python benchmarks/mutants.py [--only WORD] [--jobs 1] [--json FILE]`.
 
-A mutant is one edit of the package (`benchmarks/mutation/of_*.py`), made in a temporary copy; one that does not apply
-is an error. On each copy short runs are simulated; those that go another way than on the package as it is are judged by
-their claims and by the independent checker, until one says something else; only if none does, the proofs that are about
-the edited code, tampered reports (for the checker), and at last the tests that concern the file. Prints a line for
-each. `--json` keeps the results in a file, to which a later call adds. Exit code 1 if a mutant survives that is not
-known to be equivalent.
-
-`--drawn N --seed S` judges N mutants that nobody has written, drawn at random from the code that produces a run
-(`benchmarks/mutation/drawn.py`), in place of the list. What survives is for a person to look at: most of it is
-equivalent, or within what is specified.
+A mutant is one edit of the package, made in a temporary copy. `benchmarks/mutation/chosen.py` lists the ones that
+matter. `--drawn N --seed S` draws N others at random from the code that produces a run (`mutation/drawn.py`). On each
+copy short runs are simulated. Those that differ from the runs of the unchanged package are judged by their claims and
+by the independent checker. If nothing notices, the tests that concern the file run. Prints a line for each mutant;
+`--json` keeps the results. Exit code 1 if one survives. Most drawn ones that survive are equivalent, or within what is
+specified: a person has to look at them.
 """
 
 from __future__ import annotations
@@ -30,21 +26,17 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import closing
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
 
-from mutation import drawn, of_checkers, of_code
+from mutation import drawn
+from mutation.chosen import CHOSEN
 from mutation.mutant import PACKAGE, Mutant
 
 ROOT = Path(__file__).resolve().parents[1]
 COPIED = (PACKAGE, "tests", "benchmarks", "docs", "pyproject.toml", "README.md")
-MUTANTS: tuple[Mutant, ...] = (
-    *of_code.TEAM, *of_code.BODIES, *of_code.KERNELS, *of_code.LAW, *of_code.DECISION, *of_code.INTERVENTION,
-    *of_code.GATEKEEPER, *of_code.MIX_UPS, *of_checkers.CLAIMS, *of_checkers.CHECKER,
-)  # fmt: skip
 LONGEST_S = 900
-"""Time of a command, s: a mutant may run for ever."""
+"""Time that a command may take, s: a mutant may run for ever."""
 RUNS_STAY = ("check", "report", "verify")
-"""Folders of what judges: whatever is edited there, runs go the same way."""
+"""Folders of the code that judges: an edit there leaves the runs as they are."""
 
 
 @dataclass
@@ -52,25 +44,20 @@ class Result:
     """What became of a mutant.
 
     Attributes:
-        name, path, old, new: as in the list.
-        stage: what caught it: claim, checker, proof, tampering, test, nothing.
+        name: of the mutant.
+        stage: what caught it: claim, checker, test, nothing.
         by: the claims, rules or tests.
-        equivalent: why nothing can, if nothing did.
-        seconds: that it took.
-        commit: of the code on which it was judged; empty if that was not kept.
-        changed: the probes whose runs went another way than on the package as it is.
+        changed: the probes whose runs differ from those of the unchanged package.
+        seconds: how long it took.
+        commit: of the code; empty if unknown.
     """
 
     name: str
-    path: str
-    old: str
-    new: str
     stage: str = "nothing"
     by: list[str] = field(default_factory=list)
-    equivalent: str = ""
+    changed: list[str] = field(default_factory=list)
     seconds: float = 0.0
     commit: str = ""
-    changed: list[str] = field(default_factory=list)
 
 
 class Copy:
@@ -96,7 +83,7 @@ class Copy:
         self._server.wait()
 
     def run(self, *command: str) -> subprocess.CompletedProcess[str]:
-        """A command in the copy, on its package; the test that does not end in time has failed."""
+        """Run a command in the copy; a test that does not end in time has failed."""
         try:
             return subprocess.run(
                 command, cwd=self.folder, env=self._environment, capture_output=True, text=True, check=False,
@@ -107,7 +94,7 @@ class Copy:
             return subprocess.CompletedProcess(command, 1, f"FAILED {begun.strip()}", "")
 
     def probe(self, kind: str, *what: str) -> list[list[str]]:
-        """Findings of `mutation/probe.py`; one that says so where its process ends otherwise."""
+        """Findings of `mutation/probe.py`; a single one if its process ends with an error."""
         out = self.folder / "probe.json"
         out.unlink(missing_ok=True)
         assert self._server.stdin is not None
@@ -122,7 +109,7 @@ class Copy:
         return [["run", " ".join(what), "stops", last[:160]]]
 
     def compiled_with(self, path: str) -> list[Path]:
-        """Files whose compiled functions have those of `path` inside, itself first."""
+        """The file, and those whose compiled functions call functions of it."""
         found = [self.folder / PACKAGE / path]
         for file in found:
             module = ".".join(file.relative_to(self.folder).with_suffix("").parts)
@@ -133,13 +120,13 @@ class Copy:
         return found
 
     def forget_compiled(self, files: Sequence[Path]) -> None:
-        """Delete what numba keeps of these files."""
+        """Delete what numba has compiled of these files."""
         for file in files:
             for kept in (file.parent / "__pycache__").glob(f"{file.stem}.*.nb*"):
                 kept.unlink()
 
     def restore(self, files: Sequence[Path]) -> None:
-        """As they were, compiled functions included."""
+        """Put back the original files and their compiled functions."""
         self.forget_compiled(files)
         for file in files:
             original = self.pristine / file.relative_to(self.folder)
@@ -149,13 +136,13 @@ class Copy:
 
 
 class Bench:
-    """The package as it is, what it gives, and copies to break."""
+    """The unchanged package, what its runs give, and copies to break."""
 
-    def __init__(self, folder: Path, mutants: Sequence[Mutant], jobs: int, report: Path | None = None) -> None:
-        """Copy the package, and run everything once on it; the report of case B is made unless there is one.
+    def __init__(self, folder: Path, mutants: Sequence[Mutant], jobs: int) -> None:
+        """Copy the package, and run every probe once on it.
 
         Raises:
-            SystemExit: if the package as it is does not pass.
+            SystemExit: if a run of the unchanged package stops, or its claims and the checker disagree.
         """
         first = folder / "as_it_is"
         first.mkdir()
@@ -165,7 +152,6 @@ class Bench:
             else:
                 shutil.copy2(ROOT / name, first / name)
         here = Copy(first, folder / "baseline")
-        self.report = folder / "report" if report is None else report.resolve()
         described = ("git", "describe", "--always", "--dirty", "--exclude", "*")
         self.commit = subprocess.run(described, cwd=ROOT, capture_output=True, text=True, check=False).stdout.strip()
         probes = sorted({run for mutant in mutants for run in mutant.runs})
@@ -173,10 +159,6 @@ class Bench:
         if wrong := [each for each in found if each[2] in ("stops", "disagrees", "error")]:
             sys.exit(f"the package as it is does not pass: {wrong}")
         self.baseline = {(source, where): status for source, where, status, _ in found}
-        if report is None and any(mutant.tamperings for mutant in mutants):
-            made = here.probe("report", str(self.report))
-            if made[0][2] != "0":
-                sys.exit(f"no report of the package as it is: {made}")
         for kept in (here.folder / PACKAGE).rglob("*.nb*"):  # what was compiled meanwhile
             there = first / kept.relative_to(here.folder)
             there.parent.mkdir(exist_ok=True)
@@ -191,25 +173,23 @@ class Bench:
         for copy in (self.unbroken, *self.copies.queue):
             copy.close()
 
-    def judge(self, mutant: Mutant, quick: bool = False) -> Result:
-        """Make the edit in a free copy, and see what catches it; `quick`: no more than runs."""
+    def judge(self, mutant: Mutant) -> Result:
+        """Make the edit in a free copy, and see what catches it."""
         copy, started = self.copies.get(), time.perf_counter()
-        result = Result(mutant.name, mutant.path, mutant.old, mutant.new, commit=self.commit)
+        result = Result(mutant.name, commit=self.commit)
         edited = copy.compiled_with(mutant.path)
         try:
             if mutant.compiled(copy.folder):
                 copy.forget_compiled(edited)
             mutant.apply(copy.folder)
-            result.stage, result.by = self._caught(mutant, copy, result.changed, quick)
+            result.stage, result.by = self._caught(mutant, copy, result.changed)
         finally:
             copy.restore(edited)
             self.copies.put(copy)
-        if result.stage == "nothing":
-            result.equivalent = mutant.equivalent
         result.seconds = round(time.perf_counter() - started, 1)
         return result
 
-    def _caught(self, mutant: Mutant, copy: Copy, changed: list[str], quick: bool) -> tuple[str, list[str]]:
+    def _caught(self, mutant: Mutant, copy: Copy, changed: list[str]) -> tuple[str, list[str]]:
         names = list(mutant.runs)
         if not mutant.path.startswith(RUNS_STAY):
             if by := self._differences(found := copy.probe("ways", *names), "run"):
@@ -220,18 +200,10 @@ class Bench:
             if by := self._differences(copy.probe("runs", name)):
                 claims = [each for each in by if not each.startswith("checker")]
                 return ("claim" if claims else "checker"), by
-        if quick:
-            return "nothing", []
-        if mutant.proofs and (by := self._differences(copy.probe("proofs", *mutant.proofs))):
-            return "proof", by
-        if mutant.tamperings:
-            found = copy.probe("tamperings", str(self.report), *mutant.tamperings)
-            if found:
-                return "tampering", [f"{each[0]}: {each[2]}" for each in found]
         return ("test", [failed]) if mutant.tests and (failed := self._failing(mutant, copy)) else ("nothing", [])
 
     def _differences(self, found: list[list[str]], only: str = "") -> list[str]:
-        """What is not as on the package as it is; of one source, if it is named."""
+        """What differs from the unchanged package; of one source, if it is named."""
         by = []
         for source, where, status, rule in found:
             if only in ("", source) and status != self.baseline.get((source, where)):
@@ -239,7 +211,7 @@ class Bench:
         return by
 
     def _failing(self, mutant: Mutant, copy: Copy) -> str:
-        """The first test that fails on the copy and passes on the package as it is; '' if there is none."""
+        """The first test that fails on the copy and passes on the unchanged package; '' if there is none."""
         options = ("-m", "", "-n", "0", "-x", "-v", "--no-header", "-p", "no:cacheprovider")
         done = copy.run(sys.executable, "-m", "pytest", *options, *mutant.tests)
         failed = re.findall(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", done.stdout, flags=re.MULTILINE)
@@ -254,38 +226,25 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--only", action="append", default=[], metavar="WORD", help="mutants with this in name or path")
     parser.add_argument("--jobs", type=int, default=1, help="copies that are judged side by side (default: 1)")
-    parser.add_argument("--json", type=Path, help="file for the results; those in it of other mutants are kept")
-    parser.add_argument("--missing", action="store_true", help="only those that the file of --json does not have")
-    parser.add_argument("--quick", action="store_true", help="runs only; what survives of the list is left out")
+    parser.add_argument("--json", type=Path, help="file for the results")
     parser.add_argument("--drawn", type=int, metavar="N", help="N mutants drawn at random; --only: words in paths")
     parser.add_argument("--seed", type=int, default=0, help="of the drawing (default: 0)")
-    parser.add_argument("--report", type=Path, help="a report of case B to tamper with (default: made)")
     options = parser.parse_args()
-    mutants = MUTANTS if options.drawn is None else drawn.draw(ROOT, options.drawn, options.seed, options.only)
-    kept: dict[str, Any] = {}
-    if options.json and options.json.exists():
-        kept = {each["name"]: each for each in json.loads(options.json.read_text(encoding="utf-8"))}
-    edits = {mutant.name: (mutant.path, mutant.old, mutant.new) for mutant in mutants}
-    kept = {name: each for name, each in kept.items() if edits.get(name) == (each["path"], each["old"], each["new"])}
-    wanted = [m for m in mutants if not options.only or any(w in f"{m.name} {m.path}" for w in options.only)]
-    wanted = [m for m in wanted if not (options.missing and m.name in kept)]
-    wanted.sort(key=lambda m: m.compiled(ROOT))  # those last whose callers are compiled again
-    if wanted:
-        with tempfile.TemporaryDirectory() as name:
-            bench = Bench(Path(name), wanted, options.jobs, options.report)
-            with ThreadPoolExecutor(options.jobs) as pool, closing(bench):
-                for done in as_completed([pool.submit(bench.judge, mutant, options.quick) for mutant in wanted]):
-                    result = done.result()
-                    if options.quick and result.stage == "nothing" and options.drawn is None:
-                        continue
-                    says = "; ".join(result.by) or result.equivalent or f"runs changed: {', '.join(result.changed)}"
-                    print(f"{result.name}: {result.stage}: {says}", flush=True)
-                    kept[result.name] = asdict(result)
-                    if options.json:
-                        options.json.write_text(json.dumps([*kept.values()], indent=1), encoding="utf-8")
-    results = [kept[mutant.name] for mutant in mutants if mutant.name in kept]
-    print(dict(Counter(each["stage"] for each in results)))
-    return int(any(each["stage"] == "nothing" and not each["equivalent"] for each in results))
+    mutants = CHOSEN if options.drawn is None else drawn.draw(ROOT, options.drawn, options.seed, options.only)
+    mutants = [m for m in mutants if not options.only or any(w in f"{m.name} {m.path}" for w in options.only)]
+    mutants.sort(key=lambda m: m.compiled(ROOT))  # those last whose callers are compiled again
+    results = []
+    with tempfile.TemporaryDirectory() as name:
+        bench = Bench(Path(name), mutants, options.jobs)
+        with ThreadPoolExecutor(options.jobs) as pool, closing(bench):
+            for done in as_completed([pool.submit(bench.judge, mutant) for mutant in mutants]):
+                results.append(result := done.result())
+                says = "; ".join(result.by) or f"runs changed: {', '.join(result.changed)}"
+                print(f"{result.name}: {result.stage}: {says}", flush=True)
+                if options.json:
+                    options.json.write_text(json.dumps([*map(asdict, results)], indent=1), encoding="utf-8")
+    print(dict(Counter(each.stage for each in results)))
+    return int(any(each.stage == "nothing" for each in results))
 
 
 if __name__ == "__main__":

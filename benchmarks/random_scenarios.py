@@ -1,4 +1,4 @@
-"""Scenarios that nobody tuned: `python benchmarks/random_scenarios.py -n 500 [--crowded] [--only 17] [--rows FILE]`.
+"""Random scenarios: `python benchmarks/random_scenarios.py -n 500 [--crowded] [--only 17] [--rows FILE]`.
 
 Draws scenarios (1 to 6 UGVs, 0 to 12 obstacles, all methods, compositions, periods, triggers, thresholds, routes and
 policies), simulates those that are valid, and judges each run by its claims (cross-checked as signal temporal logic)

@@ -12,11 +12,12 @@ import json
 import re
 import textwrap
 from collections import defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import Any, get_args
 
+from airground_drake import load, simulate
 from airground_drake.audit.equations import DEVIATIONS, Kind
 from airground_drake.base import files
 from airground_drake.commands import COMMANDS
@@ -32,7 +33,9 @@ from airground_drake.registry import (
     UAV_TASKS,
     Registry,
 )
+from airground_drake.report.figures import thumbnail
 from airground_drake.scenarios import json_schema
+from airground_drake.scenarios.shipped import shipped
 from airground_drake.verify.claim import Claim
 
 DOCS = Path(__file__).parent
@@ -66,6 +69,26 @@ def parts() -> dict[str, Callable[[], str]]:
         "claims": claims, "commands": commands, "equations": equations, "keys": scenario, "names": names,
         "theorems": theorems,
     }  # fmt: skip
+
+
+def gallery(scenarios: Sequence[str] = ()) -> str:
+    """What each of some scenarios (default: all) shows, pictures of its first and last run, and the command."""
+    lines = [
+        "# Gallery",
+        "",
+        "The shipped scenarios, each with the paths of its first and of its last run. A line is the way of a UGV and "
+        "ends in a dot, a cross is a target, grey is an obstacle in its safe circle.",
+    ]
+    for name in scenarios or shipped():
+        scenario, _ = load(name)
+        runs = [run for run, spec in scenario.runs.items() if spec.composition == "augmented"]
+        lines += ["", f"## {html.escape(scenario.title or name, quote=False)}", "", '<div class="gallery">']
+        for run in dict.fromkeys((runs[0], runs[-1])):
+            drawn = thumbnail.draw(simulate(scenario, run), f"{name}-{run}")
+            says = METHODS[scenario.runs[run].method].says
+            lines.append(f"<figure>{drawn}<figcaption>Run {run}: {says}</figcaption></figure>")
+        lines += ["</div>", "", f"    airground report {name}"]
+    return "\n".join([*lines, ""])
 
 
 def extending() -> str:

@@ -34,7 +34,8 @@ ALWAYS = ("CHANGELOG.md", "SECURITY.md", "examples/README.md")
 LANGUAGES = {".py": "python", ".yaml": "yaml", ".toml": "toml", ".sh": "bash"}
 SAMPLES = os.environ.get("AIRGROUND_SAMPLES", "")
 
-PARTS = runpy.run_path(str(Path(__file__).with_name("generate.py")))["parts"]()
+GENERATE = runpy.run_path(str(Path(__file__).with_name("generate.py")))
+PARTS = GENERATE["parts"]()
 
 _MARK = re.compile(r"<!-- (\w+): made when the site is built.*?-->")
 _LINK = re.compile(r"(?<=\]\()(?!https?:|#|mailto:)([^)#\s]+)(#[^)\s]*)?(?=\))")
@@ -56,6 +57,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
                 content = shown(ROOT / found if (ROOT / found).exists() else ROOT / found.removesuffix(".md"))
                 files.append(File.generated(config, uri, content=content, inclusion=InclusionLevel.NOT_IN_NAV))
                 to_look_at.append((found, content))
+    files.append(File.generated(config, "gallery.md", content=GENERATE["gallery"]()))
     files.append(File.generated(config, "samples.md", content=samples(files, config)))
     return files
 
@@ -91,7 +93,7 @@ def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
         target = page_of(posixpath.normpath(posixpath.join(beside, link[1])))
         return posixpath.relpath(target, posixpath.dirname(uri) or ".") + (link[2] or "")
 
-    return _LINK.sub(turned, markdown) if uri != "samples.md" else markdown
+    return _LINK.sub(turned, markdown) if uri not in ("gallery.md", "samples.md") else markdown
 
 
 def on_page_content(html: str, **_: Any) -> str:

@@ -62,6 +62,12 @@ def test_a_reader_learns_what_the_model_leaves_out(name: str) -> None:
     assert re.search(r"arrive instantly,\s+and\s+none\s+is\s+lost", text)
 
 
+def test_the_gallery_draws_a_run_and_names_the_command() -> None:
+    text = runpy.run_path(str(ROOT / "docs" / "generate.py"))["gallery"](["minimal"])
+    assert text.count("<polyline") == 2  # one UGV in two runs
+    assert "    airground report minimal\n" in text
+
+
 def test_the_readme_shows_the_scenario_that_init_writes() -> None:
     shipped = (ROOT / "airground_drake" / "scenarios" / "minimal.yaml").read_text(encoding="utf-8")
     assert blocks(ROOT / "README.md", "yaml") == [re.sub(r"^#.*\n", "", shipped, flags=re.MULTILINE)]

@@ -1,52 +1,48 @@
-"""The list of mutants fits the code: every edit applies, once. `benchmarks/mutants.py` says what catches each."""
+"""The chosen mutants fit the code: every edit applies, once. `benchmarks/mutants.py` says what catches each."""
 
 from __future__ import annotations
 
-import sys
 from collections import Counter
-from importlib import import_module
 from pathlib import Path
-from typing import Any
 
 import pytest
-
-from airground_drake.registry import MODEL_CLAIMS
+from mutation import drawn
+from mutation.chosen import CHOSEN
+from mutation.mutant import DoesNotApplyError, Mutant
+from mutation.probe import PROBES
 
 ROOT = Path(__file__).resolve().parents[1]
+CORE = {
+    "world", "nsbc", "systems", "decision", "intervention", "gatekeeper", "geometry", "run", "scenarios", "verify",
+    "check",
+}  # fmt: skip
 
 
-@pytest.fixture(scope="module")
-def listed() -> Any:
-    """The modules `mutants` and `mutation.probe` of the benchmarks."""
-    sys.path.insert(0, str(ROOT / "benchmarks"))
-    yield import_module("mutants"), import_module("mutation.probe")
-    sys.path.remove(str(ROOT / "benchmarks"))
+@pytest.mark.parametrize("mutant", CHOSEN, ids=lambda mutant: mutant.name)
+def test_every_edit_applies_once(mutant: Mutant) -> None:
+    text = (ROOT / "airground_drake" / mutant.path).read_text(encoding="utf-8")
+    edited = mutant.edited(text)
+    assert edited != text
+    compile(edited, mutant.path, "exec")
+    assert set(mutant.runs) <= set(PROBES)
+    assert [test for test in mutant.tests if not (ROOT / test.partition("::")[0]).exists()] == []
 
 
-def test_every_edit_applies_once(listed: Any) -> None:
-    mutants, _ = listed
-    texts = {m.path: (ROOT / "airground_drake" / m.path).read_text(encoding="utf-8") for m in mutants.MUTANTS}
-    assert [m.name for m in mutants.MUTANTS if texts[m.path].count(m.old) != 1] == []
-    assert [m.name for m in mutants.MUTANTS if m.old == m.new] == []
-    for path in texts:
-        edited = [texts[path].replace(m.old, m.new) for m in mutants.MUTANTS if m.path == path]
-        for text in edited:
-            compile(text, path, "exec")
+def test_each_room_of_the_core_has_some_and_no_name_is_there_twice() -> None:
+    assert {mutant.path.partition("/")[0] for mutant in CHOSEN} == CORE
+    assert [name for name, count in Counter(m.name for m in CHOSEN).items() if count > 1] == []
 
 
-def test_names_are_unique_and_what_is_run_exists(listed: Any) -> None:
-    mutants, probe = listed
-    assert [name for name, count in Counter(m.name for m in mutants.MUTANTS).items() if count > 1] == []
-    assert len(mutants.MUTANTS) >= 100
-    for mutant in mutants.MUTANTS:
-        assert set(mutant.runs) <= set(probe.PROBES)
-        assert set(mutant.proofs) <= set(MODEL_CLAIMS)
-        assert [test for test in mutant.tests if not (ROOT / test).exists()] == []
+def test_an_edit_is_made_in_its_function_only() -> None:
+    text = "class A:\n    def f(self):\n        return 1\n\n    def g(self):\n        return 1\n"
+    assert Mutant("x", "", "A.g", "return 1", "return 2").edited(text) == text[:-2] + "2\n"
+    for function in ("", "A", "A.h"):
+        with pytest.raises(DoesNotApplyError):
+            Mutant("x", "", function, "return 1", "return 2").edited(text)
 
 
 @pytest.mark.slow
-def test_drawn_mutants_apply_once_and_are_the_same_for_a_seed(listed: Any) -> None:
-    drawn = import_module("mutation.drawn")
+def test_drawn_mutants_apply_once_and_are_the_same_for_a_seed() -> None:
     found = drawn.draw(ROOT, 200, seed=0)
     assert found == drawn.draw(ROOT, 200, seed=0)
     assert len({m.name for m in found}) == 200
@@ -59,8 +55,7 @@ def test_drawn_mutants_apply_once_and_are_the_same_for_a_seed(listed: Any) -> No
         assert [test for test in mutant.tests if not (ROOT / test).exists()] == []
 
 
-def test_what_is_edited_at_random_is_code_and_nothing_else(listed: Any) -> None:
-    drawn = import_module("mutation.drawn")
+def test_what_is_edited_at_random_is_code_and_nothing_else() -> None:
     text = 'def f(x: float = 1.0) -> "int":\n    """1 + 1."""\n    if x < 2:\n        raise ValueError("2 + 2")\n'
     found = {text[: e.start] + e.new + text[e.end :] for e in drawn.Source(text).edits()}
     assert found == {

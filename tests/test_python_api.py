@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -272,6 +273,19 @@ def test_a_trace_as_a_table_and_in_a_notebook() -> None:
     found = verdicts_to_pandas(verdicts)
     assert found.loc[0, ["claim", "run", "status"]].tolist() == ["SAFE-TRACE", "b", "holds"]
     assert found.loc[0, "margin"] == verdicts[0].finding.margin
+
+
+def test_a_scenario_and_a_diagram_in_a_notebook() -> None:
+    scenario, _ = load("case_b")
+    assert repr(scenario) == "<Scenario 'case_b': 2 UGVs, the UAV, 4 obstacles, runs b, c, c_literal, d>"
+    shown = scenario._repr_html_()
+    drawing = ElementTree.fromstring(shown[shown.index("<svg") : shown.index("</svg>") + 6])
+    tags = [element.tag.rpartition("}")[2] for element in drawing]
+    assert tags.count("circle") == 2 * len(scenario.obstacles) + len(scenario.ugvs)
+    assert tags.count("polyline") == len(scenario.ugvs)
+    assert all(f"run {name}: ({run.method})" in shown for name, run in scenario.runs.items())
+    diagram = build_diagram(scenario)
+    assert ElementTree.fromstring(diagram._repr_html_()).tag == "{http://www.w3.org/2000/svg}svg"
 
 
 def test_a_trace_is_drawn_on_axes_of_ones_own() -> None:

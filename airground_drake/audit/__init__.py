@@ -1,7 +1,7 @@
-"""The paper's audit: each finding with the paper's formula, ours, and evidence made by a run, a proof or a computation.
+"""The audit of the paper: each finding with the paper's formula, ours, and evidence by a run, a proof or a computation.
 
-`of_runs` needs nothing but the runs of a report. `whole` adds what takes runs of other scenarios and what follows
-from the formulas alone: `python -m airground_drake.report audit`.
+`of_runs` makes the findings that the runs of a report show. `whole` makes the others, which rest on runs of other
+scenarios or on formulas alone: `python -m airground_drake.report audit`.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ __all__ = ["of_runs", "whole"]
 
 
 def of_runs(scenario: Scenario, traces: Mapping[str, Trace]) -> list[dict[str, Any]]:
-    """The findings that the runs demonstrate by themselves."""
+    """The findings that the runs of a report show."""
     return typeset(findings(scenario, traces))
 
 

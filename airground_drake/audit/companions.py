@@ -1,4 +1,4 @@
-"""Findings that take runs of other scenarios than the report's own: simulated here, with what was changed."""
+"""Findings that rest on runs of other scenarios than the report's own. They are simulated here."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ from airground_drake.systems.components import make_outlook, make_patience, make
 PAPERS_ROUTE = "gatekeeper.route=relaxed"
 """The paper's own way to decide, (27)-(29), whatever the default of a scenario."""
 WAY_POINTS = 120
-"""Points of a line that a finding keeps for its picture."""
+"""Points of a line that a finding keeps for its figure."""
 EVERYTHING = "d, all accepted"
 LIGHT = "c, error weight 1"
 
 
 class Believing(OutcomeGatekeepers):
-    """Takes every proposal for useful."""
+    """Gatekeepers that take every proposal for useful."""
 
     def foresee(self, seen: View, law: UgvLaw, proposal: Proposal) -> tuple[Outcome, Outcome]:
         """Refusing stalls, accepting does not."""
@@ -46,7 +46,7 @@ class Believing(OutcomeGatekeepers):
 
     @classmethod
     def of(cls, scenario: Scenario, law: UgvLaw) -> Believing:
-        """In place of the gatekeepers of a scenario."""
+        """Make them for a scenario."""
         return cls(make_world(scenario), law, make_presets(scenario), make_outlook(scenario), make_patience(scenario))
 
 
@@ -93,7 +93,7 @@ def _sign() -> Item:
 
 
 def _soft_gate() -> Item:
-    """Item 10: an intervention that (c) accepts with a predicted distance below d, and (d) renders harmless."""
+    """Item 10: (c) accepts an intervention although it predicts a distance below d; (d) makes it harmless."""
     evidence: dict[str, Any] = {}
     traces = {name: _run("soft_gate", name, (PAPERS_ROUTE,)) for name in ("c", "d")} | {
         EVERYTHING: Recorder(load("soft_gate")[0], "d", make_gatekeepers=Believing.of).simulate()
@@ -119,10 +119,10 @@ def _soft_gate() -> Item:
         "where": "(26d)-(26e)",
         "finding": "The soft constraint is no safety guarantee: a large enough gain in task error buys an intrusion, "
         "and the gatekeeper accepts it knowingly. Under (d) the same proposals, "
-        "even if each is accepted and executed, leave every distance at least d. It takes an error weight of "
+        "keep every distance at least d, even if each is accepted and executed. This takes an error weight of "
         f"{gate.error_weight_1_m2_s:g} beside a slack weight of {gate.slack_weight_1_m2_s:g}; with an error weight of "
         f"1 {'nothing is accepted' if not evidence[LIGHT]['accepted'] else 'it happens, too'}. The paper gives neither "
-        "weight, nor a bound on them.",
+        "the weights nor a bound on them.",
         "paper": {"min_distance_m": paper["min_distance_m"], "predicted_clearance_m": predicted},
         "ours": {"min_distance_m": ours["min_distance_m"]},
         "unit": "m",
@@ -196,8 +196,8 @@ def _method_b(direct: Trace, gated: Trace) -> Item:
         "where": "section 5, Figures 6 and 10",
         "finding": "Method (b) is not the same in both cases. Section 5 introduces it with an effective intervention. "
         "In 5.1 the UGV accepts that 'after the MPC intervention task decision maker'. In 5.2 it executes a wrong one, "
-        "and only method (c) has the decision maker. Our case B refuses with it and collides without it, after the "
-        "same trigger: (b) cannot have it there. Here (b) has none in either case.",
+        "and only method (c) has the decision maker. In our case B the UGV refuses with a gatekeeper and collides "
+        "without one, after the same trigger, so (b) cannot have one there. Here (b) never has a gatekeeper.",
         "paper": "5.1: (b) with the MPC; 5.2: (b) without",
         "ours": {"distance_without_m": least["without"], "first_answer_with": str(answer["decision"])},
         "unit": "",
@@ -211,7 +211,7 @@ def _method_b(direct: Trace, gated: Trace) -> Item:
 
 
 def _proper_tasks(direct: Trace) -> Item:
-    """Item 24: proper and bidirectional interventions are words that nothing in the paper bears out."""
+    """Item 24: the paper calls interventions proper and bidirectional, but no equation says so."""
     asked = direct.proposals.iloc[0]
     ends = np.asarray(asked["positions_m"]).reshape(-1, 3)[-1]
     obstacle = np.asarray(load("case_b")[0].obstacles["sudden"].position_m)
@@ -221,9 +221,9 @@ def _proper_tasks(direct: Trace) -> Item:
         "where": "sections 1, 3.2, 5.2 and 6",
         "finding": "Section 6 says 'it is assumed that UAVs can give proper intervention tasks', while section 4 and "
         "case B are about one that is not proper: in ours it ends at the obstacle. Assumption 1 itself only says that "
-        "the UAV can give interventions; which are proper, the paper does not define. Section 1 claims 'bidirectional "
-        "interventions'. That is in no equation: in (14), (20) and (23) the UAV intervenes on a UGV, and what goes "
-        "back to the UAV are the UGVs' positions, in (9) and (15).",
+        "the UAV can give interventions; the paper does not define which are proper. Section 1 claims 'bidirectional "
+        "interventions'. No equation has them: in (14), (20) and (23) the UAV intervenes on a UGV, and only the UGVs' "
+        "positions go back to the UAV, in (9) and (15).",
         "paper": "interventions are proper and bidirectional",
         "ours": {"wrong_intervention_to_obstacle_m": away, "safe_distance_m": d},
         "unit": "",
@@ -233,7 +233,7 @@ def _proper_tasks(direct: Trace) -> Item:
 
 
 def _literal_rule() -> Item:
-    """Item 25: executing the first stage of each rounded plan gives no lasting acceptance."""
+    """Item 25: if the first stage of each rounded plan is executed, no acceptance lasts."""
     answers: dict[str, dict[str, list[Any]]] = {}
     for name, duration_s in (("case_a", 18), ("case_b", 16)):
         changes = f"duration_s={duration_s}.0", "reproduction=[]", PAPERS_ROUTE
@@ -250,9 +250,10 @@ def _literal_rule() -> Item:
     return {
         "id": 25,
         "where": "(28)-(29), Figures 6 and 10",
-        "finding": "The paper's rule to the letter, the first stage of the rounded plan at every sample, takes an "
-        "acceptance back about a second later, in both cases, and accepts again: the UGV's own task has become the "
-        "cheaper one for a moment. Figures 6 and 10 are described as one lasting acceptance. Here an answer changes "
+        "finding": "The paper's rule, taken literally, executes the first stage of the rounded plan at every sample. "
+        "In both cases it takes an acceptance back about a second later and then accepts again, because the UGV's own "
+        "task is cheaper for a moment. Figures 6 and 10 are described as one lasting acceptance. Here an answer "
+        "changes "
         "only by a margin and after a dwell. That holds for our choice of weights and speeds, which the paper does "
         "not give.",
         "paper": {"acceptances_taken_back": reversals["literal"]},

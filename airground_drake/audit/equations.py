@@ -1,4 +1,4 @@
-"""The paper, place by place: what realises it here, whether that is faithful to it, and why where it is not.
+"""The paper, place by place: the code that realises it, and where and why this code differs from the paper.
 
 `docs/generate.py` makes a part of docs/paper.md of this table. A test imports every name in it, and requires that the
 code named for an equation names the equation in its documentation.
@@ -12,12 +12,12 @@ Kind = Literal["faithful", "changed", "not realised"]
 
 
 class Deviation(NamedTuple):
-    """One equation, table, figure or remark of the paper, and what has become of it.
+    """One equation, table, figure or remark of the paper, and how the package realises it.
 
     Attributes:
         place: where in the paper, such as "(6)" or "Table 1".
         says: what it is about, in words.
-        realised_in: the code, `module:name` below the package; none if it is not realised.
+        realised_in: the code, `module:name` below the package; empty if it is not realised.
         kind: faithful, changed or not realised.
         here: what the code does, where it differs from the paper or the paper leaves it open.
         why: the reason for a difference; '' for what is faithful.
@@ -164,7 +164,7 @@ DEVIATIONS: tuple[Deviation, ...] = (
     Deviation(
         "(25)", "gatekeeper: cost", ("gatekeeper.cost:plan_cost", "gatekeeper.problem:Problem"), "changed",
         "The integral is a sum over the ends of the stages, times their length. One slack per stage serves all "
-        "points. A terminal cost can be added; by default there is none.",
+        "points. A terminal cost can be added; its weight is 0 by default.",
         "As (27a) has it, the sum lacks the length. The paper does not give a_i and b_i.", (10, 14, 22),
     ),
     Deviation(
@@ -237,7 +237,7 @@ DEVIATIONS: tuple[Deviation, ...] = (
         "methods (a) to (c)", "what is compared in section 5", ("registry:METHODS",), "changed",
         "(a) no intervention, (b) every intervention is executed, (c) the MPC gatekeeper, in both cases. "
         "Method (d), avoidance on top with an outcome gatekeeper, is ours.",
-        "Method (b) has the MPC in section 5.1 and none in 5.2.", (23,),
+        "Method (b) has the MPC in section 5.1, but not in 5.2.", (23,),
     ),
     Deviation(
         "section 6", "Zeno behaviour, left open", ("decision.trigger:Trigger",), "changed",

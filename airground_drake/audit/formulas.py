@@ -15,7 +15,7 @@ from airground_drake.scenarios.schema import Scenario
 
 
 def formula_findings(scenario: Scenario) -> list[Item]:
-    """Items 8 and 12 to 17; each is computed, none is quoted."""
+    """Items 8 and 12 to 17; all are computed."""
     return [
         _task_and_configuration(),
         _feed_forward(scenario),
@@ -79,7 +79,7 @@ def _feed_forward(scenario: Scenario) -> Item:
 
 
 def _solutions(slope: float, right: float) -> list[float]:
-    """All x with slope * x = right, where the slope is not 0; nothing where it is."""
+    """All x with slope * x = right; [] if the slope is 0."""
     return [right / slope] if slope else []
 
 
@@ -179,9 +179,10 @@ def _one_speed(scenario: Scenario) -> Item:
         f"One Table 1 serves both cases, but triggers at 14.45 s and at 10.6 s need reference speeds of "
         f"{speed['case_a']:g} and {speed['case_b']:g} m/s: with the other case's speed case A would trigger about "
         f"{crossed['case_a']:.1f} s, case B about {crossed['case_b']:.1f} s. The caption of Figure 10 has wrong "
-        f"interventions 'after {late_s:g} s' in one method and at 10.6 s in the other. If they begin there, it needs a "
-        f"third speed, {third:.4f} m/s, though before the trigger the methods of a case do not differ. It may only say "
-        f"that they still go on then.",
+        f"interventions 'after {late_s:g} s' in one method and at 10.6 s in the other. If they begin at that time, "
+        f"this needs a third speed, {third:.4f} m/s, although the methods of a case do not differ before the "
+        f"trigger. The "
+        f"caption may only mean that they still go on then.",
         {"trigger_s": {"case_a": 14.45, "case_b": 10.6}, "speed_m_s": 1.0}, {"speed_m_s": speed},
         abs(travelled["case_a"] - travelled["case_b"]) < 0.1 and abs(speed["case_a"] - speed["case_b"]) > 0.1,
         {

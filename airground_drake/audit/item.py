@@ -16,7 +16,7 @@ CONVERSION = {
     12: "The subscripts m and md, j and d are easily mistaken for each other.",
     22: "Some of the indices may have been other letters: n and N, j and r.",
 }
-"""By number: findings that a fault of the text conversion which we have of the paper could explain, and how."""
+"""Findings, by number, that a fault in our text conversion of the paper could explain, and how."""
 
 
 def item(

@@ -1,4 +1,4 @@
-"""Findings about what the text of the paper says and its formulas or numbers do not bear out."""
+"""Findings about statements of the paper that its formulas or numbers do not support."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def reading_findings(scenario: Scenario) -> list[Item]:
 
 
 def _intervention_rate(scenario: Scenario) -> Item:
-    """Item 19: (14) with (13) put in has a solution only without error, and then not one solution."""
+    """Item 19: with (13), (14) has a solution only if the error is 0, and then it has many."""
     gain, error = scenario.control.intervention_gain_1_s, 1.0
     tasks = {"J = I": np.eye(3), "J = one row": np.array([[0.0, 1.0, 0.0]])}
     found = {}
@@ -81,7 +81,7 @@ def _uav_target(scenario: Scenario) -> Item:
 def _indices() -> Item:
     """Item 22: what the indices of (5) and (22)-(29) allow, counted."""
     tasks, dimension = 2, 3
-    choices = [  # omega^1 and omega^2, each a pair of which (24) takes the sum
+    choices = [  # omega^1 and omega^2 are pairs; (24) adds the two numbers of a pair
         (first, second)
         for first, second in product(product((0, 1), repeat=2), repeat=2)
         if sum(first) == sum(second) == 1
@@ -91,7 +91,7 @@ def _indices() -> Item:
         22, "(5), (22)-(29)",
         "The indices do not fit. (5) goes through N tasks and sets v^(n+1) = 0, where n is the dimension of the "
         "velocity: it needs v^(N+1). In (22)-(24) the choice is there twice, as the superscript j and as the second "
-        f"subscript: (24) admits {len(choices)} choices for each UGV, of which {len(two_velocities)} give (23) two "
+        f"subscript: (24) admits {len(choices)} choices for each UGV, and {len(two_velocities)} of them give (23) two "
         "velocities at once. In (28)-(29) j alone is the choice, and the UGV's index i is missing; r is a stage in "
         "(28) and a choice in (29). (25) and (26) use i in a sum and as a free index.",
         {"choices": len(choices)}, {"choices": 2},

@@ -1,4 +1,4 @@
-"""Findings about the paper that the runs of a report demonstrate by themselves (numbered as in docs/paper.md)."""
+"""Findings about the paper that the runs of a report show (numbered as in docs/paper.md)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from airground_drake.scenarios.schema import Preset, Reproduction, Scenario
 PRINTED_SPEED_M_S = 1.0
 """Reference speed of Table 1, [3.3, 1t, 0]."""
 REFERENCE_POINTS = 121
-"""Points of the reference's way that a finding keeps for its picture."""
+"""Points of the reference's way that a finding keeps for its figure."""
 
 
 def findings(scenario: Scenario, traces: Mapping[str, Trace]) -> list[dict[str, Any]]:
@@ -152,7 +152,7 @@ def _leaves_ball(preset: Preset, centre: list[float], radius: float) -> float | 
 
 
 def _distances(preset: Preset, travelled: Array, centre: list[float]) -> list[float]:
-    """Distances (T,) from a point, m, along a preset trajectory, by the way travelled (T,), m; it ends at its end."""
+    """Distances (T,), m, of a point from a preset trajectory after the travelled lengths (T,), m."""
     points = np.array(preset.waypoints_m)[:, :2]
     ends = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     at = np.stack([np.interp(travelled, ends, points[:, axis]) for axis in (0, 1)], axis=1)

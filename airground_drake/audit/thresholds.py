@@ -18,8 +18,8 @@ from airground_drake.verify import Finding
 DRIFT, NOISE, C1, C2 = 1.0, 1.0, 0.5, 1.0
 """A textbook case with the paper's c1 and c2: drift 1 m/s, noise 1 m/sqrt(s)."""
 TABLE_1 = Threshold(rule="fixed", zeta_m=3.0, c1_1_s=C1, c2=C2, drift_m_s=6.05, noise_m_sqrt_s=10.0)
-"""What the paper's table says of the threshold, whatever a scenario says. The drift is not in the table: we assume it,
-so that its zeta is optimal."""
+"""What the paper's table says about the threshold. The table gives no drift: we assume the one for which its zeta is
+optimal."""
 ASSUMED = "Table 1, drift assumed"
 """How item 18 calls these numbers."""
 REPORTED_TRIGGER_S = 14.45
@@ -170,9 +170,10 @@ def _zeno(proofs: Mapping[str, Finding]) -> Item:
     shown = found == {"ZENO-REFINE": "supported", "ZENO-PROOF": "proved"}
     return item(
         9, "(15), (20), section 6",
-        "Zeno behaviour, the paper's open question: with the error at the threshold, a bare threshold on (15) triggers "
-        "like one over the square root of the noise step, without bound. Hysteresis and a minimum inter-event time "
-        "exclude that, whatever the noise.",
+        "Zeno behaviour, the paper's open question: if the error is at the threshold, a bare threshold on (15) "
+        "triggers without bound: the number of triggers grows like one over the square root of the noise step. "
+        "Hysteresis and a "
+        "minimum inter-event time exclude that, whatever the noise.",
         {"triggers": refined["bare"]["mean"] if shown else None},
         {"triggers": refined["automaton"]["mean"] if shown else None},
         shown,
@@ -206,10 +207,11 @@ def _one_threshold() -> Item:
     return item(
         18, "(16)-(20)",
         "(17) and (18) are the decision time and error rate of two thresholds, +zeta and -zeta; the trigger (20) has "
-        "only +zeta. Such a trigger never decides wrongly while the drift is positive, it only takes longer, zeta over "
-        "drift on average: with no error to trade against, (16) would be least at zeta = 0. And (20) compares a "
-        "difference of positions with a number; its norm, which the trigger needs, cannot reach -zeta. The numbers are "
-        f"Table 1's, but for the drift of {rule.drift_m_s:g} m/s: the table has none.",
+        "only +zeta. While the drift is positive, such a trigger never decides wrongly. It only takes longer, zeta "
+        "over drift on average. So there is no error to trade against time, and (16) would be least at zeta = 0. And "
+        "(20) compares a difference of positions with a number; its norm, which the trigger needs, cannot reach -zeta. "
+        f"The numbers are those of Table 1. The drift of {rule.drift_m_s:g} m/s is assumed, because the table "
+        f"does not give it.",
         {"time_s": ours["time_17_s"], "error_rate": ours["error_rate_18"]},
         {"time_s": ours["time_of_one_threshold_s"], "error_rate": 0.0},
         shown, table,

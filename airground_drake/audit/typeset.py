@@ -1,4 +1,4 @@
-"""The formulas that the findings about the paper are about, as LaTeX: as printed, and corrected; a row each."""
+"""The formulas of the findings about the paper as LaTeX, as printed and corrected."""
 
 from __future__ import annotations
 
@@ -97,11 +97,11 @@ FORMULAS: dict[int, tuple[tuple[str, ...], tuple[str, ...]]] = {
         (r"v_{int} = J^+ (\dot\sigma_d + \Lambda (\sigma_d - \sigma))",),
     ),
 }
-"""By number of the finding; what is about numbers alone has none."""
+"""By number of the finding; findings about numbers alone are left out."""
 
 
 def typeset(items: Iterable[Item]) -> list[dict[str, Any]]:
-    """The items with their formulas, `latex`: rows as printed and corrected; and what a `conversion` may have done."""
+    """The items with their formulas (`latex`) and what a fault of the text conversion could explain (`conversion`)."""
     found = []
     for item in items:
         paper, ours = FORMULAS.get(item["id"], ((), ()))

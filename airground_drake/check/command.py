@@ -1,4 +1,4 @@
-"""The command line of the checker; what it needs to check is imported once there is something to check."""
+"""The command line of the checker. It imports what checks need only when there is something to check."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ Each line says what was checked, on which run, and
   cannot be checked   a file cannot be read, or the report itself decides nothing
 Exit codes: 0 all agree; 1 not all; 2 usage, or no report; 4 a fault of the checker."""
 LIMIT_S = 300.0
-"""CPU time that a check may take, s: those of a report of minutes take seconds."""
+"""CPU time that a check may take, s. Checks of a run of minutes take seconds."""
 MOST_S = 1e6
-"""CPU time that may be allowed for a check, s: far more does not fit a timer."""
+"""Largest limit of the CPU time, s: far more does not fit a timer."""
 LONGEST_INTEGER = 10_000
-"""Bits of an integer that is written: Python writes none of more than 4300 digits."""
+"""Bits of an integer that is written: Python refuses to write more than 4300 digits."""
 
 
 class UsageError(Exception):
@@ -37,7 +37,7 @@ class UsageError(Exception):
 
 
 class _Parser(argparse.ArgumentParser):
-    """Raises in place of printing and exiting."""
+    """Raises instead of printing and exiting."""
 
     def error(self, message: str) -> NoReturn:
         raise UsageError(message)
@@ -97,7 +97,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def checked(folder: Path, limit_s: float) -> list[Line]:
-    """All checks of a report, with warnings of numpy off.
+    """All checks of a report, without warnings of numpy.
 
     Raises:
         UsageError: if the folder is no report.
@@ -139,7 +139,7 @@ def _refuse(why: str) -> int:
 
 
 def _printable(text: str) -> str:
-    """One line that upsets no terminal and no encoding, whatever names are in it."""
+    """Make one line without control characters, whatever names are in it."""
     return "".join(c if c.isprintable() else " " if c.isspace() else c.encode("unicode_escape").decode() for c in text)
 
 
@@ -168,7 +168,7 @@ def _document(folder: Path, lines: Sequence[Line]) -> dict[str, Any]:
 
 
 def _strict(value: Any) -> Any:
-    """Plain JSON: a number that is not finite, and whatever else JSON has no word for, as text."""
+    """Plain JSON; numbers that are not finite and other values that JSON does not have become text."""
     if isinstance(value, dict):
         return {str(key): _strict(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):

@@ -11,21 +11,11 @@ import numpy as np
 
 from .files import Json
 from .rules import SMALL, Array, Disagreement, close, holds, same
-from .run import Run
+from .run import OF_MPC, OF_OUTCOMES, OF_SOLUTIONS, Run
 from .scenario import apart_m
 
 UNUSED = -1.0
 """Value of a column of decisions that does not belong to the run's method."""
-OF_PROBLEMS = (
-    "relaxed_first_stage", "objective", "route_bound", "gap", "objective_accept", "objective_refuse",
-    "accept_throughout", "refuse_throughout", "rounding_deviation_s", "predicted_clearance_m",
-)  # fmt: skip
-"""Columns of decisions that method (c) fills: it solves problem (26)."""
-OF_OUTCOMES = (
-    "refuse_outcome_m2_s", "accept_outcome_m2_s", "refuse_stalls", "accept_stalls", "refuse_left_m", "accept_left_m",
-    "tries",
-)  # fmt: skip
-"""Columns of decisions that method (d) fills: it compares outcomes."""
 
 
 class Event(NamedTuple):
@@ -174,9 +164,12 @@ def _decisions_are_on_proposals(run: Run) -> None:
     same("proposals are numbered as they are sent", numbers.tolist(), list(range(len(numbers))))
     key = ["number", "robot", "issued_s", "policy"]
     sent = set(run.proposals[key].itertuples(index=False, name=None))
-    unused = OF_OUTCOMES if run.method == "c" else OF_PROBLEMS
+    unused = OF_OUTCOMES if run.method == "c" else OF_MPC
     for row in run.decisions.to_dict("records"):
         about, on = f"decision of {row['robot']}", tuple(row[name] for name in key)
         holds("a decision is on a proposal", on in sent, str(on), "one that was sent", about=about, t_s=row["t_s"])
-        for name in unused:
+        kept = OF_OUTCOMES[:-1] if run.method == "d" and row["reason"] == "kept" else ()  # nothing is weighed again
+        for name in (*unused, *kept):
             same(f"column {name} is unused", row[name], UNUSED, about=about, t_s=row["t_s"])
+        for name in OF_SOLUTIONS if run.method == "d" else ():
+            same(f"column {name} is unused", row[name], "", about=about, t_s=row["t_s"])

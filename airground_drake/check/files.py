@@ -1,7 +1,6 @@
-"""Strict reading of a report's files, whoever wrote them: nothing but regular files of the folder, of a bounded size.
+"""Strict reading of the files of a report, which may be hostile: regular files in the folder, of bounded size.
 
-What is read depends on the content alone, so contents that were read before are not parsed again. Nothing that is
-returned here may be changed.
+A content that was read before is not parsed again, so nothing that is returned here may be changed.
 """
 
 from __future__ import annotations
@@ -42,7 +41,7 @@ THRIFT = 10_000_000
 
 
 def is_plain(name: Any) -> bool:
-    """Whether it is the name of a file or a folder that stays in its folder."""
+    """Whether it is a name of a file or folder without a path."""
     return isinstance(name, str) and name not in ("", ".", "..") and not {*"/\\\0"} & {*name} and name.isprintable()
 
 
@@ -70,7 +69,7 @@ def read_bytes(path: Path) -> bytes:
     """The content of a regular file.
 
     Raises:
-        NotEstablished: if it cannot be read, is none, or is too large.
+        NotEstablished: if it cannot be read, is not a regular file, or is too large.
     """
     try:
         handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOFOLLOW", 0))
@@ -160,11 +159,11 @@ def _is_deep(value: Any) -> bool:
 def parse_table(content: bytes, name: str) -> pd.DataFrame:
     """The table in a Parquet file, rows numbered from 0: numbers, texts and lists of numbers.
 
-    What the file says of its size and types is looked at before any of it is unpacked. Texts stay in dictionaries
-    until then, so that one that is there a million times takes the room of one.
+    Sizes and types in the header of the file are checked before the data are unpacked. Texts are read as dictionaries,
+    so that a text that is repeated a million times takes the room of one.
 
     Raises:
-        NotEstablished: if it is none.
+        NotEstablished: if it is not a table, or too large.
     """
     try:
         limits = {"thrift_string_size_limit": THRIFT, "thrift_container_size_limit": THRIFT}

@@ -1,4 +1,4 @@
-"""What keeps a report that somebody has made for it from taking for ever: sizes of a scenario, and a clock."""
+"""Limits that keep a hostile report from taking for ever: sizes of a scenario, and CPU time."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ MOST = {
 
 
 def is_of_a_size(scenario: Json) -> None:
-    """Its numbers are ones that a run can have, so that what is computed from them ends.
+    """Refuse a scenario whose numbers would make the check endless.
 
-    What is missing or of another type is left to the rules that look at it.
+    The rules that use a value find out whether it is missing or of another type.
 
     Raises:
         NotEstablished: if one is not.
@@ -59,7 +59,7 @@ def _number(scenario: Json, part: str, name: str) -> float | None:
 
 
 def _samples(scenario: Json) -> Iterator[float]:
-    """Instants that the times of a scenario have by its periods; infinitely many where a period is none."""
+    """Number of instants in the duration of a scenario, for each of its periods; infinite if a period is 0."""
     duration = scenario.get("duration_s")
     looked_ahead = [_number(scenario, "gatekeeper", name) or 0.0 for name in ("horizon_s", "longest_s", "settling_s")]
     time = sum(looked_ahead) + (duration if isinstance(duration, (int, float)) else 0.0)
@@ -71,10 +71,10 @@ def _samples(scenario: Json) -> Iterator[float]:
 
 @contextmanager
 def at_most_s(limit_s: float) -> Iterator[None]:
-    """Stop what is inside after so much CPU time, where the system can: in the main thread, and not on Windows.
+    """Stop the block after so much CPU time. This works in the main thread, and not on Windows.
 
     Raises:
-        NotEstablished: in place of what is inside.
+        NotEstablished: if the block takes longer.
     """
 
     def over(_signal: int, _frame: FrameType | None) -> None:

@@ -1,4 +1,4 @@
-"""Which things come near each other at all in a run, so that the others need not be looked at pair by pair."""
+"""Lower bounds of distances in a run, so that only pairs that come near each other are looked at closely."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from .rules import Array
 from .scenario import Pair
 
 ROWS = 50
-"""Of a slice of a run."""
+"""Rows of a slice of a run."""
 ROUNDING_M = 1e-6
-"""What a bound leaves to rounding."""
+"""Bounds are lowered by this, because of rounding."""
 
 
 def least_apart_m(position_m: dict[str, Array], pairs: list[Pair]) -> Array:
-    """Bounds from below of the distances of pairs over a whole run, (P,).
+    """Lower bounds of the distances of pairs over a whole run, (P,).
 
-    On a slice of the run a thing stays in a ball around the places that it is at or moves straight between; the
-    distance of two things is no less than that of their balls.
+    On a slice of the run each body stays in a ball around its positions. Two bodies are at least as far apart as their
+    balls.
     """
     number = {name: k for k, name in enumerate(position_m)}
     one = np.array([number[pair.robot] for pair in pairs], dtype=np.intp)

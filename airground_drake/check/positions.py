@@ -1,6 +1,6 @@
-"""Positions from elsewhere, judged by the checker: the distances that were kept, and what is missed of the law.
+"""Judges positions from elsewhere: the distances that were kept, and by how much the samples miss the law.
 
-A table of sampled positions and a scenario are all that this needs: nothing has to come from this package's simulator.
+It needs a table of sampled positions and a scenario, nothing from the simulator of this package.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ NOT_JUDGED = (
 
 
 class UnusableError(Exception):
-    """The table cannot be judged for this scenario; says why, and what was wanted."""
+    """The table cannot be judged for this scenario; the message says why, and what was wanted."""
 
 
 class Judged(NamedTuple):

@@ -43,7 +43,7 @@ class Line:
         outcome: AGREES, DISAGREES or OPEN.
         text: what was found, or why nothing was.
         rule: the rule that is broken or cannot be applied; '' if all agrees.
-        about: of which robot, pair, event, decision or obligation.
+        about: the robot, pair, event, decision or file.
         t_s: when in the run; None where there is no time.
         recorded: what the files say, of a broken rule.
         recomputed: what follows from them.
@@ -80,7 +80,7 @@ def check_report(folder: Path, limit_s: float = LIMIT_S) -> list[Line]:
 
 
 def _is_shaped_like_a_report(report: Any) -> None:
-    """Objects are objects, lists are lists of objects."""
+    """Refuse a document whose parts have other types than those of a report."""
     if not isinstance(report, dict):
         raise NotEstablished("it is a report", f"it is a {type(report).__name__}", "report.json")
     if "mutants" in report or report.get("schema") in EARLIER:
@@ -156,7 +156,7 @@ def _judge(claim: Json, scenario: Json, loaded: Callable[[str], Run]) -> str:
 
 
 def _counted_as_here(claim: Json, found: Found) -> None:
-    """How often the claim was exercised is what is counted here, if it is."""
+    """Compare how often the claim was exercised, if it is counted here."""
     recorded, rule = claim["exercised"], "how often the claim was exercised"
     if found.exercised is None:
         return
@@ -166,7 +166,7 @@ def _counted_as_here(claim: Json, found: Found) -> None:
 
 
 def _attempt(limit_s: float, claim: str, run: str, check: Callable[[], str]) -> Line:
-    """What a check says, as a line; whatever goes wrong in it is not agreement."""
+    """The line of a check; an exception in it is not agreement."""
     try:
         with at_most_s(limit_s):
             return Line(str(claim), str(run), AGREES, check())

@@ -1,7 +1,7 @@
-"""What a rule says when it is broken: the rule, where, when, and the values on both sides.
+"""Rules, and what is said of a broken one: the rule, where, when, and both values.
 
-A rule is a call of `same`, `agrees`, `close`, `at_most` or `holds`, with its name first, what is recorded second and
-what it should be third. So nothing is rejected without saying why.
+A rule is a call of `same`, `agrees`, `close`, `at_most` or `holds` with its name, the recorded and the recomputed
+value. So nothing is rejected without a reason.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class Disagreement(Exception):  # noqa: N818 - what the program is for, not an e
         rule: its name.
         recorded: what the files say.
         recomputed: what follows from them.
-        about: of which robot, pair, event, decision or obligation.
+        about: the robot, pair, event, decision or file.
         t_s: when in the run, s; None where there is no time.
     """
 
@@ -41,11 +41,11 @@ class Disagreement(Exception):  # noqa: N818 - what the program is for, not an e
 
 @dataclass(eq=False)
 class NotEstablished(Exception):  # noqa: N818
-    """A rule that cannot be applied: a file cannot be read, or no way is known here.
+    """A rule that cannot be applied, because a file cannot be read or something is missing.
 
     Attributes:
         rule: its name.
-        why: what keeps it from being applied.
+        why: the reason.
         about: as above.
     """
 
@@ -119,7 +119,7 @@ def close(
 def at_most(
     rule: str, recorded: Any, limit: Any, *, within: float = 0.0, about: str = "", t_s: float | Array | None = None
 ) -> None:
-    """Raise Disagreement where a number is above its limit by more than `within`, or is none.
+    """Raise Disagreement where a number is above its limit by more than `within`, or is not a number.
 
     Raises:
         Disagreement: with the first entry along the first axis that is.

@@ -1,4 +1,4 @@
-"""A run as its trace has it: of the run that it claims to be, complete, and obeying its own law of motion."""
+"""A recorded run: it belongs to the run of the scenario, is complete, and obeys its law of motion."""
 
 from __future__ import annotations
 
@@ -20,6 +20,43 @@ from .scenario import Levels, Pair, Preset, as_run, levels_of, pairs_of, preset_
 Rows = npt.NDArray[np.intp]
 SCHEMA = "airground_drake.trace/7"
 TABLES = ("signals.parquet", "decisions.parquet", "problems.parquet", "proposals.parquet")
+OF_ROBOT = ("x_m", "y_m", "z_m", "vx_m_s", "vy_m_s", "vz_m_s")
+OF_UGV = (
+    "ref_x_m", "ref_y_m", "ref_z_m", "noise_m", "decision_variable_m", "mode", "triggers", "triggered_at_s",
+    "released_at_s", "accepted",
+)  # fmt: skip
+"""Signals of each robot, and of each UGV besides."""
+OF_SOLUTIONS = ("status", "route", "first_stage")
+"""Columns of decisions that only method (c) fills, in words."""
+OF_MPC = (
+    "relaxed_first_stage", "objective", "route_bound", "gap", "objective_accept", "objective_refuse",
+    "accept_throughout", "refuse_throughout", "rounding_deviation_s", "predicted_clearance_m",
+)  # fmt: skip
+"""Columns of decisions that method (c) fills: it solves problem (26)."""
+OF_OUTCOMES = (
+    "refuse_outcome_m2_s", "accept_outcome_m2_s", "refuse_stalls", "accept_stalls", "refuse_left_m", "accept_left_m",
+    "tries",
+)  # fmt: skip
+"""Columns of decisions that method (d) fills: it compares outcomes."""
+COLUMNS = {
+    "decisions.parquet": (
+        "t_s", "robot", "policy", "number", "issued_s", "decision", "reason",
+        *OF_SOLUTIONS, *OF_MPC, *OF_OUTCOMES,
+    ),
+    "problems.parquet": (
+        "dt_s", "error_weight_1_m2_s", "slack_weight_1_m2_s", "terminal_weight_s", "initial_m", "accept_m_s",
+        "refuse_m_s", "reference_m", "centres_m", "distances_m", "plan", "positions_m", "relaxed", "rounded", "normals",
+    ),
+    "proposals.parquet": (
+        "number", "robot", "policy", "issued_s", "times_s", "positions_m", "selection", "mapped_m", "mapped_radius_m",
+        "cause", "party",
+    ),
+}  # fmt: skip
+"""Columns of the tables other than the signals."""
+META = (
+    "schema", "run", "method", "composition", "seed", "robots", "ugvs", "scenario", "events", "zeta_m", "controllers",
+    "decision_block", "faults", "files",
+)  # fmt: skip
 SHARED = ("method", "composition", "seed", "zeta_m", "events", "faults")
 """What meta.json and the run's entry in report.json both say."""
 INTERVENING = 1.0
@@ -74,12 +111,12 @@ class Run:
 
     @cached_property
     def pairs(self) -> list[Pair]:
-        """What is to be kept apart."""
+        """Pairs of bodies and the distances that they must keep."""
         return pairs_of(self.scenario)
 
     @cached_property
     def apart_m(self) -> dict[tuple[str, str], float]:
-        """What each pair keeps apart at least, by both names in either order."""
+        """Lower bound of the distance of each pair, by both names in either order, m."""
         least = least_apart_m(self.position_m, self.pairs).tolist()
         found = {(pair.robot, pair.other): apart for pair, apart in zip(self.pairs, least, strict=True)}
         return found | {(other, robot): apart for (robot, other), apart in found.items()}
@@ -140,7 +177,7 @@ class Run:
 
     @cached_property
     def _columns(self) -> dict[str, Array]:
-        """Those that were asked for."""
+        """Columns that were read before."""
         return {}
 
     def vector(self, robot: str, stem: str, unit: str) -> Array:
@@ -162,7 +199,7 @@ class Run:
 
 
 def read_run(folder: Path, name: str, report: Json) -> Run:
-    """Read a trace and apply every rule that any claim about it rests on; equal files give the same Run.
+    """Read a trace and apply the rules that all claims about it rest on; equal files give the same Run.
 
     Args:
         folder: of the trace.
@@ -183,10 +220,15 @@ def _run(name: str, scenario_text: str, entry_text: str, contents: tuple[bytes, 
     scenario, entry = json.loads(scenario_text), json.loads(entry_text)
     meta, timings = parse_json(contents[0], "meta.json"), parse_json(contents[1], "timings.json")
     same("files of the trace", sorted(meta["files"]), sorted(TABLES))
+    same("what meta.json says", sorted(meta), sorted(META))
+    same("what timings.json says", sorted(timings), ["decision_times_s", "wall_s"])
     tables = []
     for file, content in zip(TABLES, contents[2:], strict=True):
         same("SHA-256 of a table", meta["files"][file], sha256(content), about=file)
         tables.append(parse_table(content, file))
+        columns = COLUMNS.get(file) or _signals_of(scenario)
+        strange = sorted({*tables[-1].columns} - {*columns})
+        same("no column but those of a trace", strange, [], about=file)
     _is_of_the_run(meta, entry, scenario, name)
     run = Run(name, as_run(scenario, name), meta["events"], timings["decision_times_s"], timings["wall_s"], *tables)
     same("a time for each decision", len(run.decision_times_s), len(run.decisions))
@@ -200,6 +242,12 @@ def _run(name: str, scenario_text: str, entry_text: str, contents: tuple[bytes, 
     _nothing_is_commanded_before_the_start(run)
     _flags_are_0_or_1(run)
     return run
+
+
+def _signals_of(scenario: Json) -> list[str]:
+    """Columns of the signals."""
+    of_robots = [f"{robot}.{name}" for robot in robots_of(scenario) for name in OF_ROBOT]
+    return ["t_s", *of_robots, *(f"{ugv}.{name}" for ugv in scenario["ugvs"] for name in OF_UGV)]
 
 
 def _is_of_the_run(meta: Json, entry: Json, scenario: Json, name: str) -> None:
@@ -218,7 +266,7 @@ def _is_of_the_run(meta: Json, entry: Json, scenario: Json, name: str) -> None:
 
 
 def _decisions_come_by_time(run: Run) -> None:
-    """What a decision rests on is before it in the table, too."""
+    """The decisions of a UGV are in the order of time."""
     for ugv in run.ugvs:
         times = run.decisions.loc[run.decisions["robot"] == ugv, "t_s"].to_numpy(dtype=np.float64)
         later = times[1:]
@@ -252,7 +300,7 @@ def _robots_are_where_their_commands_lead(run: Run) -> None:
 
 
 def _nothing_is_commanded_before_the_start(run: Run) -> None:
-    """The first row is the start, to which no command has led."""
+    """The first row is the start, so its command is 0."""
     for robot in run.robots:
         first = run.command_m_s[robot][0]
         close("command before the start", first, np.zeros(3), within=0.0, about=robot, t_s=float(run.t_s[0]))

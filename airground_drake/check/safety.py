@@ -1,4 +1,4 @@
-"""SAFE-TRACE and SAFE-HYP: the distances of a run, and the hypotheses of the invariance proof along it."""
+"""SAFE-TRACE and SAFE-HYP: the distances of a run, and the hypotheses of the safety theorem."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .run import Run
 from .scenario import Pair, written
 
 FAR_M = 1e-6
-"""Distances of floating-point numbers are this wrong at most, m; farther pairs need no exact arithmetic."""
+"""Largest error of a distance in floating point, m; pairs that are farther apart need no exact arithmetic."""
 
 
 def least_distance_m(own_m: Array, other_m: Array) -> float:
@@ -107,7 +107,7 @@ def shortfall_m(own_m: Array, other_m: Array, pair: Pair, gain: Fraction, last: 
 
 
 def lost_m(missed: Fraction, gain: Fraction, samples: int) -> float:
-    """What a shortfall costs of the safe distance at most: e / (A h), or without a gain all that is missed."""
+    """The largest loss of distance that follows from a shortfall: e / (A h), or the sum of all if the gain is 0."""
     return float(missed / gain if gain else missed * samples)
 
 

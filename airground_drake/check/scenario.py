@@ -1,4 +1,4 @@
-"""What a resolved scenario declares: pairs to keep apart, presets, the trigger and its threshold."""
+"""What a resolved scenario declares: pairs and their safe distances, presets, the trigger and its threshold."""
 
 from __future__ import annotations
 

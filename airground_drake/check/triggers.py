@@ -19,12 +19,12 @@ VARIABLE_M = 1e-6
 NOISE_M = 1e-8
 """Noise moves by less within 1e-9 s, and rows closer than that are one."""
 LARGEST_SAMPLE = 9.0
-"""Of normal samples, in standard deviations: one in 1e19 is larger."""
+"""Largest noise sample, in standard deviations: one in 1e19 normal samples is larger."""
 SUPERVISING, INTERVENING, REFRACTORY = 0.0, 1.0, 2.0
 
 
 class Step(NamedTuple):
-    """A change of the trigger's mode; `event` is what the trace has for it: trigger, release or nothing."""
+    """A change of the trigger's mode; `event` is its name in the trace: trigger, release or ''."""
 
     t_s: float
     event: str

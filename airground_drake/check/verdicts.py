@@ -1,7 +1,8 @@
-"""Which claims a report must have, what is expected of each, and the verdict that follows from all of them."""
+"""The claims that a report must have, the expected verdict of each, and the verdict over all."""
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
@@ -38,7 +39,7 @@ KNOWN = {*EVERY_RUN, *(claim for claims in BY_METHOD.values() for claim in claim
 """Identifiers of the claims of this package."""
 
 UNDECIDED = ("inconclusive", "error", "not_run")
-"""Statuses that say nothing about a claim."""
+"""Statuses that leave a claim open."""
 PASSING = ("proved", "holds", "supported")
 """Statuses with which a claim was established."""
 EXERCISED = "exercised"
@@ -50,8 +51,8 @@ NOT_EXERCISED = "not_exercised"
 def expectations(scenario: Json, recorded: Sequence[Json]) -> dict[tuple[str, str], str]:
     """The verdict that a scenario declares for each claim of this package, by run ('': about the model) and claim.
 
-    A claim about the model may have been judged again for a run that sets values of its own. Which ones must be is
-    decided where their constants are known, when the report is judged again.
+    A claim about the model may have been judged again for a run that sets values of its own. The checker does not know
+    which ones must be; `airground check` finds out when it judges the report again.
     """
     wanted = {("", name): status for name, status in ABOUT_THE_MODEL.items()}
     for run, about in scenario["runs"].items():
@@ -140,7 +141,7 @@ def check_overall(folder: Path, report: Json) -> str:
 
 
 def check_files(folder: Path, there: Sequence[str], recorded: Json) -> str:
-    """Every file that is named is there with its SHA-256, and no other but those that commands add later.
+    """Every file that is named is there with its SHA-256, and no file is there that no report has.
 
     Returns:
         What was found, in words.
@@ -149,6 +150,8 @@ def check_files(folder: Path, there: Sequence[str], recorded: Json) -> str:
         Disagreement: if a rule is broken.
         NotEstablished: if a file cannot be read.
     """
+    for name in there:
+        holds("a report has such a file", OF_A_REPORT.fullmatch(name) is not None, "a file", "nothing", about=name)
     found = {name for name in there if name != "report.json" and not name.startswith(ADDED_LATER)}
     for name in sorted({*recorded} | found):
         holds("a file that is named is there", name in found, "nothing", "a file", about=name)
@@ -159,10 +162,15 @@ def check_files(folder: Path, there: Sequence[str], recorded: Json) -> str:
 
 ADDED_LATER = "proofs/"
 """Folder of the files that `airground prove` adds to a report."""
+OF_A_REPORT = re.compile(
+    r"report\.json|report\.html|junit\.xml|diagram\.(dot|svg)|proofs/(proofs\.json|run_\w+\.v)"
+    r"|trace/[^/]+/((meta|timings)\.json|(signals|decisions|problems|proposals)\.parquet)"
+)
+"""Files that a report may have."""
 
 
 def _overall(report: Json) -> Json:
-    """The verdict over all claims, and what stands in its way; findings about the paper count if all were made."""
+    """The verdict over all claims, and the claims that prevent it; findings about the paper count if all are there."""
     claims, audit = report["claims"], report["audit"]
     keys = ("id", "run", "status", "expected", "exercised")
     unexpected = [{key: claim[key] for key in keys} for claim in claims if not meets(claim["expected"], claim)]

@@ -57,7 +57,7 @@ def parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster, such as tcp://host:8786")
     parser.add_argument(
-        "--stop-when", metavar="RULE", help="end early, such as at 'SAFE-TRACE < 1e-2': the anytime-valid bound"
+        "--stop-when", metavar="RULE", help="end when the anytime-valid bound meets RULE: 'SAFE-TRACE < 1e-2'"
     )
     parser.add_argument(
         "--limit-steps", type=positive, default=DEFAULT_LIMITS.work, metavar="N",

@@ -1,4 +1,4 @@
-"""`airground falsify SPEC --claim SAFE-TRACE`: look for a scenario that violates a claim, and make it small."""
+"""`airground falsify SPEC --claim SAFE-TRACE`: search for a scenario that violates a claim, and shrink it."""
 
 from __future__ import annotations
 
@@ -43,14 +43,14 @@ def parser() -> argparse.ArgumentParser:
     """What the command line takes."""
     parser = Parser(
         prog="airground falsify",
-        description="Search the space of a campaign for a scenario that violates a claim, and make it small.",
+        description="Search the space of a campaign for a scenario that violates a claim, and shrink it.",
         epilog="exit codes: 0 no counterexample, 1 one was found, 2 usage, bad spec or output, 3 nothing was judged, "
         "4 tool error, 130 and 143 interrupted",
     )
     parser.add_argument("spec", type=Path, help="YAML file of a campaign")
     parser.add_argument("--claim", default="SAFE-TRACE", metavar="ID", help="claim about runs (default: %(default)s)")
-    parser.add_argument("--most", choices=TIMES, help="make this time as long as can be, instead of a margin small")
-    parser.add_argument("--limit", type=positive, metavar="S", help="of --most: longer is a counterexample")
+    parser.add_argument("--most", choices=TIMES, help="maximise this time instead of minimising a margin")
+    parser.add_argument("--limit", type=positive, metavar="S", help="with --most: a longer time is a counterexample")
     parser.add_argument(
         "--sampler", default="cma", metavar="NAME", help=f"{', '.join(SAMPLERS.allowed)} (default: %(default)s)"
     )
@@ -59,7 +59,7 @@ def parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--shrink", type=whole(0), default=300, metavar="N",
-        help="runs to make a counterexample small (default: %(default)s)",
+        help="runs for shrinking a counterexample (default: %(default)s)",
     )  # fmt: skip
     parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="new; default: <name>_<sampler>.yaml")
     parser.add_argument(

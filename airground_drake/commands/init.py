@@ -27,12 +27,12 @@ def parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("file", type=Path, nargs="?", default=Path("scenario.yaml"), help="default: %(default)s")
     parser.add_argument(
-        "--fleet", type=whole(1, MAX_UGVS), metavar="N", help="so many UGVs that cross a field of obstacles instead"
+        "--fleet", type=whole(1, MAX_UGVS), metavar="N", help="N UGVs that cross a field of obstacles instead"
     )
     parser.add_argument(
-        "--obstacles", type=whole(1, MOST_OBSTACLES), metavar="M", help="of the field (default: 5 a UGV)"
+        "--obstacles", type=whole(1, MOST_OBSTACLES), metavar="M", help="with --fleet: obstacles (default: 5 a UGV)"
     )
-    parser.add_argument("--seed", type=whole(0, MAX_SEED), metavar="S", help="of the field (default: 1)")
+    parser.add_argument("--seed", type=whole(0, MAX_SEED), metavar="S", help="with --fleet: seed (default: 1)")
     return parser
 
 
@@ -45,7 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     of_command = parser()
     options = of_command.parse_args(arguments)
     if options.fleet is None and (options.obstacles, options.seed) != (None, None):
-        of_command.error("--obstacles and --seed are of a fleet: give --fleet, too")
+        of_command.error("--obstacles and --seed need --fleet")
     path: Path = options.file
     try:
         files.try_to_create(path)
@@ -54,7 +54,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     name = re.sub(r"^[\W\d_]+|[\W_]+$", "", re.sub(r"\W+", "_", path.stem, flags=re.ASCII))[:MAX_NAME] or MODEL
     if options.fleet is None:
         text = shipped_files()[MODEL].read_text(encoding="utf-8")
-        # what stands before the name is so of the shipped file only
+        # the lines before the name are about the shipped file
         text = text[text.index("name:") :].replace(f"name: {MODEL}", f'name: "{name}"', 1)
     else:
         seed = 1 if options.seed is None else options.seed

@@ -51,9 +51,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     options = parser().parse_args(arguments)
     if options.report and options.record:
-        return refuse("--record is about the package's theorems; allowed: without DIR")
+        return refuse("--record goes without DIR: it records the package's theorems")
     if options.run and not options.report:
-        return refuse("--run is about the runs of a report; allowed: with DIR")
+        return refuse("--run needs DIR: it names a run of a report")
     try:
         return _runs(options) if options.report else _theorems(record=options.record, limit_s=options.limit)
     except CoqError as error:

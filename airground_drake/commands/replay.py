@@ -34,7 +34,7 @@ def parser() -> argparse.ArgumentParser:
     )
     to.add_argument("--live", action="store_true", help="write nothing; serve the pages on this machine")
     to.add_argument("--video", type=Path, metavar="FILE", help="write RUN as a video instead: .webp or .mp4")
-    parser.add_argument("--speed", type=_speed, metavar="X", help=f"of the video (default: {SPEED:g})")
+    parser.add_argument("--speed", type=_speed, metavar="X", help=f"with --video: its speed (default: {SPEED:g})")
     return parser
 
 
@@ -47,9 +47,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     of_command = parser()
     options = of_command.parse_args(arguments)
     if options.video and not options.run:
-        of_command.error("a video is of one RUN: name it")
+        of_command.error("--video needs a RUN")
     if options.speed and not options.video:
-        of_command.error("--speed is of a video: give --video, too")
+        of_command.error("--speed needs --video")
     from airground_drake.replay import live, video
     from airground_drake.replay.page import page
 

@@ -27,7 +27,7 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument("scenario", help="name of a shipped scenario, or path to a YAML file")
     parser.add_argument("run", nargs="?", metavar="RUN", help="default: the run with the most complete method")
     parser.add_argument("--meshcat", action="store_true", help="show the robots in a browser while they move")
-    parser.add_argument("--speed", type=positive, metavar="X", help=f"of what --meshcat shows (default: {SPEED:g})")
+    parser.add_argument("--speed", type=positive, metavar="X", help=f"with --meshcat: its speed (default: {SPEED:g})")
     parser.add_argument("-o", "--output", type=Path, metavar="DIR", help="save the trace in this folder, too")
     overridable(parser)
     parser.add_argument("--seed", type=int, metavar="N", help="seed of the decision noise")
@@ -44,7 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     of_command = parser()
     options = of_command.parse_args(arguments)
     if options.speed and not options.meshcat:
-        of_command.error("--speed is of what --meshcat shows: give --meshcat, too")
+        of_command.error("--speed needs --meshcat")
     from airground_drake.scenarios.load import load
 
     overrides = [*options.set, *([] if options.seed is None else [f"seed={options.seed}"])]

@@ -50,7 +50,7 @@ Reason = Literal[
     "first_stage",
     "stalls", "makes_way", "exhausted", "over",
 ]  # fmt: skip
-"""Why an answer is what it is: see `settle` for method (c), `outcome_gatekeeper` for method (d)."""
+"""Reasons of answers: see `settle` for method (c), `outcome_gatekeeper` for method (d)."""
 
 WORDS: dict[Reason, str] = {
     "cheaper": "the proposal leads to a better outcome than the UGV's own task",
@@ -63,11 +63,11 @@ WORDS: dict[Reason, str] = {
     "first_stage": "the best plan begins with this answer",
     "no_plan": "no outcome could be computed",
     "stalls": "with the proposal the UGV would come to rest short of its goal, no nearer than without",
-    "makes_way": "the UGV makes way for the one whose trigger the proposal is for, and gets to its goal all the same",
-    "exhausted": "the UGV has gone along as often as it does without a rest on its own",
+    "makes_way": "the UGV makes way for another one and still reaches its goal",
+    "exhausted": "the UGV has used all of its tries and has not rested since",
     "over": "the time for which the proposal was accepted is over",
 }
-"""The same as sentences."""
+"""The reasons in words."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ class Decision:
 
 
 def in_words(decision: Decision) -> str:
-    """Why the answer is what it is, as a sentence for the UAV."""
+    """The reason as a sentence for the UAV."""
     words = WORDS[decision.reason]
     if decision.reason == "waits" and decision.solution is not None:
         accept, refuse = decision.throughout

@@ -1,4 +1,4 @@
-"""(26) of one UGV as a mixed-integer quadratic program: binary accept variables, positions eliminated."""
+"""(26) of one UGV as a mixed-integer quadratic program, positions eliminated; with shares of accepting it is (27)."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class BinaryProgram:
 
     Attributes:
         program: what a solver takes.
-        omega: binary variables (24), (26c), (B,): 1 accepts, and 1 - omega is the other mode.
+        omega: binary variables (24), (26c), (B,): 1 accepts, and 1 - omega is the other mode; in (27), shares.
         u: slack (26e), (N,), m.
         error: cost of task errors in (25).
         slack: cost of slack in (25).

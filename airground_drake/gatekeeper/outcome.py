@@ -1,4 +1,4 @@
-"""What comes of accepting a proposal, and of refusing it: both rolled out to the end and past it, eq (25).
+"""Outcomes of accepting and of refusing a proposal: both rolled out until nothing moves any more, eq (25).
 
 Two choices only, never and now: follow the proposed motion until it is over and then the own task, or the own task all
 along. "Wait, then accept" is not among them; it looks cheaper at every sample and never comes to an acceptance.
@@ -63,7 +63,7 @@ class Outlook:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What comes of one choice.
+    """The outcome of one choice.
 
     Attributes:
         positions: at the control samples, (S + 1, 3), m.
@@ -83,7 +83,7 @@ class Outcome:
         return np.asarray(self.positions[-1])
 
     def better_than(self, other: Outcome) -> bool:
-        """Whether it is better, by more than what makes no difference."""
+        """Whether it is better by more than `USELESS`; stalling is worse than any cost."""
         if self.stalls != other.stalls:
             return other.stalls
         return self.cost < (1.0 - USELESS) * other.cost

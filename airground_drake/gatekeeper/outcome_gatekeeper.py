@@ -1,13 +1,13 @@
 """Method (d)'s gatekeeper: proposals are judged by their outcome, once.
 
-At the first sample at which a UGV sees a proposal it rolls out what comes of accepting it now and of refusing it for
-ever (`outcome`), and takes the better one. That answer stands: a refusal for good, an acceptance until the proposal is
-withdrawn, its motion is over, or it has been executed for as long as it may be. It is never reversed because waiting
+At the first sample at which a UGV sees a proposal it rolls out both outcomes (`outcome`): accepting it now, and
+refusing it for ever. It takes the better one. That answer stands: a refusal for good, an acceptance until the proposal
+is withdrawn, its motion is over, or it has been executed for as long as it may be. It is never reversed because waiting
 looks cheaper, nor because the other choice does, with one exception: when the UGV senses an obstacle that it did not
 know at the acceptance, it looks at both outcomes again. That is no new try: how often a UGV goes along is bounded
 (`patience`).
 
-Nothing here has a part in safety: whatever is accepted is executed below the avoidance inequalities.
+Safety does not rest on this: whatever is accepted is executed below the avoidance inequalities.
 """
 
 from __future__ import annotations

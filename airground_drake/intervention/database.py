@@ -137,7 +137,8 @@ class BehaviourDatabase:
     def plan(self, held: Negotiation, seen: Observation) -> tuple[dict[str, Negotiation], list[Fault]]:
         """Next proposal for a UGV that needs one, and those to others that go with it.
 
-        A UGV that gets no proposal rests for `retry`; while no policy has one for anybody, twice as long each time.
+        A UGV without a proposal is planned for again after `retry`. Each time in a row that no policy proposes
+        anything to anybody, that time doubles.
 
         Args:
             held: with this UGV.

@@ -1,4 +1,4 @@
-"""Which UGVs stand: where each has been since when, as it is watched at every planning instant."""
+"""Which UGVs stand: the planner notes at every instant where each UGV came to a halt, and when."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the UAV plans for a team: which UGV needs a proposal, on which map, and what came of the last one."""
+"""The UAV's planner: it finds the UGVs that need a proposal, asks the policies, and takes answers into account."""
 
 from __future__ import annotations
 

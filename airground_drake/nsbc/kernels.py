@@ -14,19 +14,19 @@ from airground_drake.base.arrays import Array
 from airground_drake.world.world import Neighbours
 
 MARGIN_M_S = 1e-12
-"""Added to every bound in the projection, m/s. Without it the velocity of a robot in contact misses the bound, which is
-0 there, by rounding every other time, and `_scale_back` stops a robot that should slide along."""
+"""Added to every bound in the projection, m/s. The bound of a robot in contact is 0. Without the margin
+rounding misses it every other time, and `_scale_back` stops a robot that should slide along."""
 CONTRADICTION_M_S = 1e-9
 """Constraints contradict each other if one is missed by more where the others are met, m/s; by less, it is rounding."""
 ABOVE_LEAST = 1e-9
-"""A violation larger than the least by this, relatively, is as good: no speed is spent on what is rounding."""
+"""Violations within this relative distance of the least one count as equal, so that no speed is spent on rounding."""
 ABOVE_LEAST_M_S = 1e-11
 """So is one that is larger by this, m/s: between two points in opposite directions but for rounding, a velocity along
 both boundaries, as fast as the nearest far obstacle allows, would be better by what rounding makes of that speed."""
 DEPENDENT = 1e-20
-"""Square of the sine of the angle below which opposite normals leave no way between their boundaries: 1e-10 rad."""
+"""Normals within 1e-10 rad of linear dependence count as dependent: the square of the sine of that angle."""
 ROUNDING = 1e-15
-"""A constraint is met if it is missed by this, relative to the terms of its sum."""
+"""Relative rounding error up to which a constraint counts as met."""
 
 AUGMENTED, RECURSION_NEAREST, RECURSION_LISTED = 0, 1, 2
 
@@ -64,7 +64,7 @@ def fill_half_spaces(
 
 @njit(cache=True)
 def distances(points: Array, position: Array) -> Array:
-    """Of points (m, 3) from a position (3,), m: (m,), m."""
+    """Distances, (m,), m, of points (m, 3), m, from a position (3,), m."""
     found = np.empty(len(points))
     for k in range(len(points)):
         x, y, z = points[k, 0] - position[0], points[k, 1] - position[1], points[k, 2] - position[2]
@@ -74,7 +74,7 @@ def distances(points: Array, position: Array) -> Array:
 
 @njit(cache=True)
 def within(points: Array, positions: Array, reach: float) -> npt.NDArray[np.bool_]:
-    """Which of the points (m, 3) are no farther than that, m, from each of n positions (n, 3): (n, m)."""
+    """Which points (m, 3), m, are within `reach`, m, of each of n positions (n, 3), m: (n, m)."""
     found = np.empty((len(positions), len(points)), dtype=np.bool_)
     for i in range(len(positions)):
         found[i] = distances(points, positions[i]) <= reach
@@ -83,7 +83,7 @@ def within(points: Array, positions: Array, reach: float) -> npt.NDArray[np.bool
 
 @njit(cache=True)
 def news_within(points: Array, positions: Array, reach: float, known: npt.NDArray[np.bool_]) -> bool:
-    """Whether `within` would find a point that is not among the known ones, (n, m)."""
+    """Whether `within` would find a point that is not known yet; `known` is (n, m)."""
     for i in range(len(positions)):
         for k in range(len(points)):
             if not known[i, k]:

@@ -106,7 +106,7 @@ class UgvLaw:
 
 @cache
 def _nothing_asked(count: int) -> tuple[npt.NDArray[np.bool_], Intervention]:
-    """Nobody executes anything: flags (n,), and arrays that are not looked at then; not written to."""
+    """No UGV executes an intervention: flags (n,), and arrays that the law does not read then. Do not write to them."""
     zero = np.zeros((count, 3))
     return np.zeros(count, dtype=np.bool_), Intervention(zero, zero, np.zeros((count, 3, 3)))
 

@@ -24,7 +24,7 @@ class CoqError(AirgroundError):
     """Coq does not accept a file, or a theorem rests on more than is allowed.
 
     Attributes:
-        line: of the file, from 1; 0 if it is about none.
+        line: of the file, from 1; 0 if unknown.
     """
 
     def __init__(self, message: str, line: int = 0) -> None:
@@ -41,7 +41,7 @@ def version() -> str:
     """The version of the installed Coq, such as "8.16.1".
 
     Raises:
-        NoCoqError: if there is none.
+        NoCoqError: if Coq is not installed.
     """
     for tool in ("coqc", "coqchk"):
         if shutil.which(tool) is None:

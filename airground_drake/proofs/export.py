@@ -55,7 +55,7 @@ class Recorded:
 
     @property
     def unit(self) -> int:
-        """Parts of a metre and of a second of which every number is a multiple."""
+        """Common denominator of all numbers, in parts of a metre and of a second."""
         numbers: Iterable[Fraction] = (
             *self.times,
             *(demand.safe_m for demand in self.demands),

@@ -23,7 +23,7 @@ SCHEMA = "airground_drake.proofs/1"
 PLACE = "proofs"
 """Folder of a report for what is proved about it."""
 FOUND = "proofs.json"
-"""File in that folder that says what came of it."""
+"""File in that folder with the results."""
 COMPUTED = "is expected to have type"
 """In Coq's complaint where a checker has computed `false`, and the proof says `true`."""
 CHECKERS = ("DistanceChecker.v", "LawChecker.v")
@@ -38,9 +38,9 @@ class Answer:
         theorem: its name.
         file: it is in.
         why: if it is not proved, in words.
-        refused: the first pair of which Coq computes that it is false.
+        refused: the first pair that Coq refuses.
         too_near: pairs that do not keep their distance, where that is why.
-        axioms: that it rests on.
+        axioms: on which the proof rests.
         seconds: how long Coq took, s.
     """
 
@@ -56,7 +56,7 @@ class Answer:
 
 @dataclass(frozen=True)
 class Proved:
-    """What came of one run.
+    """The result for one run.
 
     Attributes:
         run: its identifier.

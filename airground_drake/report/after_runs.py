@@ -5,22 +5,20 @@ from __future__ import annotations
 import platform
 import subprocess
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from datetime import datetime
 from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 from airground_drake import audit
 from airground_drake.base import files
 from airground_drake.base.parallel import start_in_process
 from airground_drake.base.progress import Progress
-from airground_drake.report import document, folder, html, junit
-from airground_drake.report.figures import moments, threshold, zeno_refine
+from airground_drake.report import document, folder, junit
 from airground_drake.report.figures.draw import draw
-from airground_drake.report.figures.findings import draw as draw_findings
 from airground_drake.report.figures.panels import Figure
+from airground_drake.report.page import page
 from airground_drake.run import trace
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios import plugins
@@ -28,8 +26,6 @@ from airground_drake.scenarios.schema import Scenario
 from airground_drake.systems import graphviz
 from airground_drake.systems.diagram import build_diagram, most_complete
 from airground_drake.verify import Verdict, verify_all
-from airground_drake.verify.model.thr_choice import Choice
-from airground_drake.verify.model.zeno_refine import Series
 from airground_drake.verify.registry import model_claims
 
 PACKAGES = ("airground_drake", "drake", "numpy", "scipy", "numba", "pandas", "matplotlib", "daqp")
@@ -97,32 +93,12 @@ def write(
         files.write_text(output / "junit.xml", junit.render(report))
         written.append("junit.xml")
     if "html" in formats:
-        plates = [*judged.figures, *_refinement(judged.verdicts, bool(judged.findings)), *_threshold(judged.verdicts)]
-        plates += moments.draw(report, traces)
-        plates += draw_findings(report["audit"])
-        files.write_text(output / "report.html", html.render(report, plates, drawn))
+        files.write_text(output / "report.html", page(report, judged.figures, traces, drawn))
         written.append("report.html")
     report = document.sealed(report, output, written)
     if "json" in formats:
         files.write_json(output / "report.json", report)
     return report
-
-
-def _refinement(verdicts: Sequence[Verdict], audited: bool) -> list[Figure]:
-    """The figure of ZENO-REFINE, if there is such a verdict: beside finding 9, where that is in the report."""
-    drawn = [
-        zeno_refine.draw(cast("Series", each.finding.evidence))
-        for each in verdicts
-        if (each.claim.id, each.run) == ("ZENO-REFINE", "")
-    ]
-    return [replace(figure, beside="audit-9") if audited else figure for figure in drawn if figure is not None]
-
-
-def _threshold(verdicts: Sequence[Verdict]) -> list[Figure]:
-    """The figure of THR-CHOICE, if there is such a verdict about the model of all runs."""
-    chosen = [verdict for verdict in verdicts if (verdict.claim.id, verdict.run) == ("THR-CHOICE", "")]
-    drawn = [threshold.draw(verdict.inputs, cast("Choice", verdict.finding.evidence)) for verdict in chosen]
-    return [figure for figure in drawn if figure is not None]
 
 
 def provenance(scenario: Scenario, started: datetime, command: str) -> dict[str, Any]:

@@ -51,12 +51,17 @@ def write(folder: Path) -> bool:
             raise ReportError(
                 one_line(f"{folder / name} is not the file that report.json names: the page stays as it is")
             )
-    runs = {run: _line(entry, found["coq"]) for run, entry in found["runs"].items()}
-    text = _PLACES.sub(lambda at: place({"id": CLAIM, "run": at[1]}, runs.get(at[1], Markup())), text)
+    text = filled(text, found)
     report["files"][page.name] = files.sha256(text.encode())
     files.write_text(page, text)
     files.write_json(record, report)
     return True
+
+
+def filled(page: str, found: Mapping[str, Any]) -> str:
+    """A page with its places filled from proofs.json; those of other runs are emptied."""
+    runs = {run: _line(entry, found["coq"]) for run, entry in found["runs"].items()}
+    return _PLACES.sub(lambda at: place({"id": CLAIM, "run": at[1]}, runs.get(at[1], Markup())), page)
 
 
 def _line(entry: Mapping[str, Any], coq: str) -> Markup:

@@ -8,23 +8,33 @@ simulated, and only the code of the claims and of the report runs. It prints wha
 from __future__ import annotations
 
 import json
+import re
 import resource
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from importlib.metadata import version
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
 WITHIN = 1e-8
 """Numbers agree to this, relative to 1 plus their size: versions of numpy, scipy and solvers round differently."""
+WITHIN_PX = 0.02
+"""Coordinates in drawings agree to this: they are rounded to 0.01."""
 OTHERWISE_CHECKED = ("provenance", "files")
 """Parts of report.json that do not follow from its traces: the clock, versions, and the digests of files."""
 
+_DRAWING = re.compile(r"(<svg\b.*?</svg>)", re.DOTALL)
+_TEXT = re.compile(r">\s*([^<>\s][^<>]*)<")
+_NUMBER = re.compile(r"(-?\d+(?:\.\d+)?)")
+Line = dict[str, Any]
+"""What is printed of a check: `claim`, `run`, `outcome`, `text`, and of a difference where it is and both values."""
 Judge = Callable[[Any, Sequence[Any]], Sequence[Any]]
 """From a scenario and its traces to verdicts, as `verify_all`."""
 
 
-def lines(folder: Path, judge: Judge | None = None) -> Iterator[dict[str, Any]]:
+def lines(folder: Path, judge: Judge | None = None) -> Iterator[Line]:
     """Everything that report.json says, built again and compared: a line for each claim and each other part.
 
     Args:
@@ -58,6 +68,19 @@ def lines(folder: Path, judge: Judge | None = None) -> Iterator[dict[str, Any]]:
         report["provenance"],
         audit=_from_other_runs(report, scenario, traces),
     )
+    yield from (parts := list(_parts(report, again, third_party)))
+    if any(line["outcome"] == "DISAGREES" for line in parts):
+        return  # pages show report.json, which is not what it should be
+    try:
+        yield from _pages(folder, report, scenario, traces)
+    except Exception as error:  # parts of report.json that are taken as recorded may be anything
+        why = f"{type(error).__name__}: {error}"
+        text = f"the pages cannot be made again: {_short(why)}"
+        yield {"claim": "report.html", "run": "", "outcome": "cannot be checked", "text": text, "rule": "pages"}
+
+
+def _parts(report: Mapping[str, Any], again: Mapping[str, Any], third_party: Mapping[str, Any]) -> Iterator[Line]:
+    """Each claim and each other part of report.json, compared with what was built again."""
     recorded = {(entry["id"], entry["run"]): entry for entry in report["claims"]}
     rebuilt = {(entry["id"], entry["run"]): entry for entry in again["claims"]}
     for claim, run in recorded:
@@ -76,6 +99,63 @@ def lines(folder: Path, judge: Judge | None = None) -> Iterator[dict[str, Any]]:
         yield _compared(part, "", report.get(part), again.get(part))
 
 
+def _pages(folder: Path, report: Mapping[str, Any], scenario: Any, traces: Mapping[str, Any]) -> Iterator[Line]:
+    """Files that follow from report.json and the traces: the page, junit.xml, and what `airground prove` has added."""
+    from airground_drake.proofs.compare import broken_rules
+    from airground_drake.report import junit, proved
+    from airground_drake.report.figures.draw import draw
+    from airground_drake.report.page import page
+
+    made = {**report, "files": {}}
+    found: Any = None
+    if (folder / "proofs").is_dir():
+        try:
+            found, broken = broken_rules(folder / "proofs", traces)
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            broken = [("proofs.json", "what `airground prove` writes", repr(error))]
+        for about, ours, theirs in broken:
+            yield _different("proofs", "", about, theirs, ours)
+        if broken:
+            return
+        yield {"claim": "proofs", "run": "", "outcome": "agrees", "text": "the files are about the recorded runs"}
+    if "junit.xml" in report["files"]:
+        yield _same_text("junit.xml", folder, junit.render(made))
+    if "report.html" in report["files"]:
+        text = page(made, draw(scenario, traces), traces, (folder / "diagram.svg").read_text(encoding="utf-8"))
+        text = text if found is None else proved.filled(text, found)
+        drawn_by = report["provenance"]["packages"]["matplotlib"]
+        yield _same_text("report.html", folder, text, other_drawings=drawn_by != version("matplotlib"))
+
+
+def _same_text(name: str, folder: Path, rebuilt: str, *, other_drawings: bool = False) -> Line:
+    """Compare a file with what it should be: exactly, but for drawings.
+
+    Args:
+        name: of the file.
+        folder: of the report.
+        rebuilt: the text that it should have.
+        other_drawings: whether another version of matplotlib made the drawings: then only their texts are compared.
+    """
+    recorded = (folder / name).read_text(encoding="utf-8")
+    for k, (theirs, ours) in enumerate(zip_longest(_DRAWING.split(recorded), _DRAWING.split(rebuilt))):
+        drawings = bool(k % 2) and theirs is not None and ours is not None
+        if theirs == ours or (drawings and _is_same_drawing(theirs, ours, shapes=not other_drawings)):
+            continue
+        both = zip_longest((theirs or "").splitlines(), (ours or "").splitlines(), fillvalue="")
+        return _different(name, "", "the page", *next(lines for lines in both if lines[0] != lines[1]))
+    how = "; of drawings by another version of matplotlib only the texts were compared" if other_drawings else ""
+    return {"claim": name, "run": "", "outcome": "agrees", "text": f"as recorded{how}"}
+
+
+def _is_same_drawing(theirs: str, ours: str, *, shapes: bool) -> bool:
+    """Whether two drawings have the same texts and, with `shapes`, the same elements at the same places."""
+    if _TEXT.findall(theirs) != _TEXT.findall(ours) or not shapes:
+        return _TEXT.findall(theirs) == _TEXT.findall(ours)
+    one, other = _NUMBER.split(theirs), _NUMBER.split(ours)  # every second part is a number
+    words = one[::2] == other[::2]
+    return words and all(abs(float(a) - float(b)) <= WITHIN_PX for a, b in zip(one[1::2], other[1::2], strict=True))
+
+
 def _from_other_runs(report: Mapping[str, Any], scenario: Any, traces: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Findings about the paper that rest on runs and computations beyond those of the report: as recorded."""
     from airground_drake.audit import of_runs
@@ -84,15 +164,19 @@ def _from_other_runs(report: Mapping[str, Any], scenario: Any, traces: Mapping[s
     return [item for item in report["audit"] if item.get("id") not in here]
 
 
-def _compared(claim: str, run: str, recorded: Any, rebuilt: Any) -> dict[str, Any]:
-    line: dict[str, Any] = {"claim": claim, "run": run}
+def _compared(claim: str, run: str, recorded: Any, rebuilt: Any) -> Line:
     for about, theirs, ours in differences(recorded, rebuilt):
-        text = f"judged again, {about or 'it'} is {_short(ours)}; recorded {_short(theirs)}"
-        broken = {"rule": "the files give what is recorded", "about": about, "recorded": theirs, "recomputed": ours}
-        return {**line, "outcome": "DISAGREES", "text": text, **broken}
+        return _different(claim, run, about, theirs, ours)
     status = rebuilt.get("status", "as recorded") if isinstance(rebuilt, dict) else "as recorded"
     exactly = "exactly" if recorded == rebuilt else f"numbers to {WITHIN:g}"
-    return {**line, "outcome": "agrees", "text": f"{status}, {exactly}"}
+    return {"claim": claim, "run": run, "outcome": "agrees", "text": f"{status}, {exactly}"}
+
+
+def _different(claim: str, run: str, about: str, theirs: Any, ours: Any) -> Line:
+    """A line about a value that is not as recorded."""
+    text = f"judged again, {about or 'it'} is {_short(ours)}; recorded {_short(theirs)}"
+    broken = {"rule": "the files give what is recorded", "about": about, "recorded": theirs, "recomputed": ours}
+    return {"claim": claim, "run": run, "outcome": "DISAGREES", "text": text, **broken}
 
 
 def differences(recorded: Any, rebuilt: Any, path: str = "") -> Iterator[tuple[str, Any, Any]]:

@@ -31,7 +31,7 @@ def tracks(drawing: Drawing, trace: Trace, ugvs: Sequence[str]) -> dict[str, Any
         ugvs: their names, in the order of their looks.
     """
     t = np.linspace(0.0, float(trace.t[-1]), SAMPLES)
-    robots = [*zip(ugvs, map(look, range(len(ugvs))), strict=True), (trace.robots[-1], UAV_LOOK)]
+    robots = [*zip(ugvs, map(look, range(len(ugvs))), strict=True), *((uav, UAV_LOOK) for uav in trace.uavs)]
     return {
         "end": round(float(trace.t[-1]), 3),
         "scale": PER_UNIT,

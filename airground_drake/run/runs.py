@@ -35,7 +35,7 @@ from airground_drake.scenarios.schema import Scenario
 
 FAILURE = "failure.json"
 TOLD_S = 0.2
-"""How often it is told how far the runs have come, s."""
+"""Period of progress messages, s."""
 STANDSTILL_S = 600.0
 """A run ends when its simulated time has stood still for so long by the clock, s. Only third-party code can hang: every
 step of the package is bounded in counts."""

@@ -161,6 +161,11 @@ class Trace:
         return list(self.meta["ugvs"])
 
     @property
+    def uavs(self) -> list[str]:
+        """Names of the UAVs: the robots that are no UGVs."""
+        return [name for name in self.robots if name not in self.ugvs]
+
+    @property
     def scenario(self) -> Scenario:
         """The resolved scenario as this run had it, made from the metadata once.
 

@@ -91,7 +91,7 @@ def resolved(scenario: Scenario) -> dict[str, Any]:
     """The scenario as nested dicts and lists, defaults filled in.
 
     Raises:
-        TypeError: if it is none.
+        TypeError: if it is something else.
     """
     if not isinstance(scenario, Scenario):
         raise TypeError(f"{type(scenario).__name__} is no Scenario")

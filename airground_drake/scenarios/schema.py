@@ -6,7 +6,9 @@ needed in a file. Positions are in the world frame, z up, the ground at z = 0.
 """
 
 # No `from __future__ import annotations` here: pydantic needs the types themselves, not their names.
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from html import escape
 from typing import Annotated, ClassVar
 
 from pydantic import ConfigDict, Field
@@ -33,6 +35,7 @@ from airground_drake.scenarios.kinds import (
     settings_of,
 )
 from airground_drake.scenarios.limits import MAX_STAGES, MAX_UGVS
+from airground_drake.scenarios.picture import picture
 
 Vector = list[float]
 
@@ -233,11 +236,11 @@ class Gatekeeper:
 
     Under method (c) a decision on a proposal is reversed only for a plan that is cheaper by the (relative) switching
     margin, and not before `min_dwell_s` have passed. That is ours: by the paper's own rule, `first_stage`, the first
-    stage of each plan is executed, whatever was answered before. A decision may take `budget_iterations` of the solver
-    of a relaxation and 20,000 iterations of the search of `mixed_integer` (budget 'counted': a run is the same on every
-    machine on which these take less than 10 s, ten times what they take), or besides the share `budget_share` of the
-    sampling period by the clock (budget 'wall_clock': for real time). `terminal_weight_s` is the w of a terminal cost
-    w a ||rho_rd - rho_N||^2 besides (25); the paper has none.
+    stage of each plan is executed, without regard to earlier answers. A decision may take `budget_iterations`
+    iterations of the solver of a relaxation and 20,000 iterations of the search of `mixed_integer`. With budget
+    'counted' that is all: a run is the same on every machine where a decision takes less than 10 s, ten times the
+    usual. Budget 'wall_clock', for real time, adds the share `budget_share` of the sampling period by the clock.
+    `terminal_weight_s` is the w of a terminal cost w a ||rho_rd - rho_N||^2 besides (25); the paper has no such cost.
 
     Under method (d) outcomes are compared instead, `settling_s` past the end of motion and preset trajectory. An
     accepted proposal is executed for `longest_s` at most. A UGV accepts `tries` proposals, and then none until it has
@@ -360,7 +363,7 @@ class Choice:
 class Scenario:
     """A scenario file. The order of `ugvs` and `obstacles` is the order of all arrays.
 
-    `expected` maps identifiers of claims about the model (proofs and experiments, whatever the run) to the
+    `expected` maps identifiers of claims about the model (proofs and experiments, the same for all runs) to the
     expected verdict; one that is not named must be proved, or supported if it is statistical. `claims` adds claims
     to those of the package: `module:Class` or `file.py:Class` by identifier.
     """
@@ -419,3 +422,22 @@ class Scenario:
     def bodies(self) -> dict[str, Ugv | Uav | Obstacle]:
         """The robots and then the obstacles, by name."""
         return {**self.robots, **self.obstacles}
+
+    def __repr__(self) -> str:
+        """In one line: how many robots and obstacles there are, and the runs."""
+        things = f"{len(self.ugvs)} UGVs, the UAV, {len(self.obstacles)} obstacles"
+        return f"<Scenario {self.name!r}: {things}, runs {', '.join(self.runs)}>"
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: title, map with the preset trajectories, robots and runs."""
+        ugvs = [
+            f"{name} from {_place(ugv.start_m)} to {_place(ugv.target_m)}, at most {ugv.max_speed_m_s:g} m/s"
+            for name, ugv in self.ugvs.items()
+        ]
+        told = [f"run {name}: ({run.method}) {METHODS[run.method].says}" for name, run in self.runs.items()]
+        listed = "".join(f"<li>{escape(line)}</li>" for line in (*ugvs, f"{self.uav.name}, the UAV", *told))
+        return f"<p><b>{escape(self.title or self.name)}</b> {escape(repr(self))}</p>{picture(self)}<ul>{listed}</ul>"
+
+
+def _place(at: Sequence[float]) -> str:
+    return f"({at[0]:g}, {at[1]:g}) m"

@@ -23,7 +23,7 @@ UNITS = {
     "decision_range": "m",
     "gains": "1/s",
 }
-"""Of ports by name, or by its part before a robot's; what is not here is of several units or has none."""
+"""Units of ports, by the port's name or by its part before a robot's name. Other ports have several units or none."""
 
 FONT_PT = 10
 SHADE, OUTSIDE, PLAIN = "#dfe8f1", "#0060a8", "#444444"
@@ -33,7 +33,7 @@ LEGEND = (
     "solid wires: numbers; dashed: messages; shaded: has a diagram inside",
 )
 _NUMBERED = re.compile(r"[uy]\d+|output")
-"""Names that Drake gives to ports that have none."""
+"""Names that Drake gives to ports without a name."""
 
 
 class End(NamedTuple):
@@ -44,7 +44,7 @@ class End(NamedTuple):
 
 
 class Ports(NamedTuple):
-    """What is told of ports beside their names.
+    """What a picture says about ports beside their names.
 
     Attributes:
         outside: names of those (side, 'i' or 'o', and end) that are ports of the whole diagram.

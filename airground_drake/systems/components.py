@@ -1,4 +1,4 @@
-"""From a scenario to the objects that the diagram is made of: one factory each, used by whoever judges them, too."""
+"""From a scenario to the objects that the diagram is made of: one factory each. Tests and audits use them, too."""
 
 from __future__ import annotations
 

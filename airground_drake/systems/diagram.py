@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from weakref import ref
 
 from pydrake.systems.framework import Diagram, DiagramBuilder, InputPort, OutputPort, System
 from pydrake.systems.primitives import Demultiplexer, Multiplexer, TrajectorySource
@@ -107,7 +108,20 @@ def build_diagram(
         PluginError: if it names a policy, route or task that cannot be made, or a plant or the decision block has other
             ports.
     """
-    return build_model(validated(scenario), method, composition, plants, monitor, decision_block).diagram
+    diagram = build_model(validated(scenario), method, composition, plants, monitor, decision_block).diagram
+    of = ref(diagram)
+    vars(diagram)["_repr_html_"] = lambda: _picture(of())  # for notebooks
+    return diagram
+
+
+def _picture(diagram: Diagram | None) -> str:
+    """The picture of a diagram; '' once it is gone."""
+    if diagram is None:
+        return ""
+    from airground_drake.systems import graphviz  # which builds diagrams itself
+
+    drawn = graphviz.svg(graphviz.dot(diagram))
+    return drawn[drawn.index("<svg") :]
 
 
 def build_model(
@@ -134,8 +148,8 @@ def build_model(
     block = _checked_block(n, decision_block(world, presets))
     trigger = EventTrigger(n, components.make_trigger(scenario, components.threshold(scenario)))
     decision = _decision_making(scenario, n, block, trigger)
-    made = {body.name: _plant(body) if plants is None else plants(body.name, body.start_m) for body in world.moving}
-    vehicles = _vehicles(world, {name: _checked(name, plant) for name, plant in made.items()}, disturbed=disturbed)
+    made = {body.name: _plant(body, plants, scenario.control.period_s) for body in world.moving}
+    vehicles = _vehicles(world, made, disturbed=disturbed)
     planner = InterventionPlanner(components.make_planner(scenario, chosen), world, scenario.control.period_s)
     gatekeeper = None
     if chosen.gated:
@@ -163,7 +177,7 @@ def most_complete(scenario: Scenario) -> str:
 
 
 def _chosen(scenario: Scenario, method: str | None, composition: str | None) -> tuple[Method, Composition]:
-    """The method and the composition that are asked for; without a method, those of the scenario's last run.
+    """The requested method and composition; without a method, those of the scenario's last run.
 
     Raises:
         UnknownNameError: if there is no such method or composition.
@@ -327,18 +341,16 @@ def _uav_controller(scenario: Scenario, world: World) -> UavController:
     )
 
 
-def _plant(body: Body) -> System:
-    """The Drake system of a body that moves."""
-    assert body.plant is not None
-    return PLANTS[body.plant.kind](body)
-
-
-def _checked(robot: str, plant: System) -> System:
-    """The plant of a robot, if it has the ports of one.
+def _plant(body: Body, plants: PlantFactory | None, period_s: float) -> System:
+    """The Drake system of a body that moves: the user's, else that of its plant.
 
     Raises:
-        PluginError: if not.
+        PluginError: if the user's system does not have the ports of a plant.
     """
+    if plants is None:
+        assert body.plant is not None
+        return PLANTS[body.plant.kind](body, period_s)
+    robot, plant = body.name, plants(body.name, body.start_m)
     ports = [plant.get_input_port(i).size() for i in range(plant.num_input_ports())]
     outputs = [plant.get_output_port(i).size() for i in range(plant.num_output_ports())]
     if ports[:1] != [3] or outputs[:1] != [3]:

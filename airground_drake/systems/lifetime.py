@@ -26,7 +26,7 @@ def weakly(method: Any) -> Callable[..., Any]:
 def untie(diagram: Diagram) -> None:
     """Let a diagram be freed with the last reference to it: its systems no longer keep it, it keeps its systems.
 
-    Whoever keeps a system of it, or a port of one, must then keep the diagram, too.
+    Code that keeps one of its systems or ports must then keep the diagram, too.
     """
     for system in diagram.GetSystems():
         if isinstance(system, Diagram):

@@ -22,10 +22,10 @@ def first_order_plant(robot: str, start: Array) -> LinearSystem:
     return plant
 
 
-PLANTS: dict[str, Callable[[Body], System]] = {
-    FirstOrder.kind: lambda body: first_order_plant(body.name, body.start_m),
+PLANTS: dict[str, Callable[[Body, float], System]] = {
+    FirstOrder.kind: lambda body, period_s: first_order_plant(body.name, body.start_m),
 }
-"""Makes the Drake system of a body, by the kind of its plant."""
+"""Makes the Drake system of a body from the control period, s; by the kind of the body's plant."""
 
 
 class VelocityDisturbance(LeafSystem):

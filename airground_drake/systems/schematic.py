@@ -82,7 +82,7 @@ def graph(diagram: Diagram) -> str:
     """Graphviz text of a diagram that `build_diagram` has made, with a place for everything (layout `nop2`)."""
     systems = {path.rpartition("/")[2]: system for path, system in blocks(diagram, 2).items()}
     layers = {part.get_name(): [each.get_name() for each in part.GetSystems()] for part in _parts(diagram)}
-    plants = [name for name in layers["vehicles"] if name.endswith("_plant")]
+    plants = [name for name in layers["vehicles"] if name.endswith("_plant")]  # the last is the UAV's
     shown = plants if len(plants) <= MOST_PLANTS else [*plants[: MOST_PLANTS - 2], plants[-1]]
     boxes = _places(systems, shown)
     frames = _frames(boxes, shown)

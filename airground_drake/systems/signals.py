@@ -14,10 +14,10 @@ from airground_drake.intervention.messages import Report
 from airground_drake.world.world import Kind, World
 
 Status = namedview("Status", ["mode", "triggers", "triggered_at_s", "released_at_s"])
-"""Of one UGV, from the trigger: its `decision.trigger.Mode`, how often it triggered, when it last did and was released
-(-1 before)."""
+"""Trigger state of one UGV: `decision.trigger.Mode`, number of triggers, times of the last trigger and the last release
+(-1 before the first)."""
 Answer = namedview("Answer", ["answer", "number"])
-"""Of one UGV, from the gatekeeper: ACCEPT, REFUSE or SILENT of `messages`, and the number of the proposal."""
+"""Answer of one UGV: ACCEPT, REFUSE or SILENT of `messages`, and the number of the proposal."""
 UgvGains = namedview("UgvGains", ["avoidance_gain_1_s", "motion_gain_1_s", "intervention_gain_1_s"])
 """Parameters of `UgvController`: A of (8), B of (6), Lambda of (14)."""
 UavGains = namedview("UavGains", ["avoidance_gain_1_s", "formation_gain_1_s"])
@@ -45,13 +45,13 @@ def components_of(world: World, *kinds: Kind) -> slice:
 
 
 def of_ugv(view: Any, values: Array, index: int) -> Any:
-    """The named vector of one UGV in those of all."""
+    """The named vector of one UGV, from the values of all UGVs."""
     size = len(view.get_fields())
     return view(values[size * index : size * (index + 1)])
 
 
 def laid_out(view: Any, rows: list[list[float]]) -> Array:
-    """Named vectors of all UGVs, one row each, as a port has them."""
+    """Named vectors of all UGVs, one row each, flattened for a port."""
     return np.array(rows, dtype=np.float64).reshape(-1, len(view.get_fields())).ravel()
 
 

@@ -11,7 +11,7 @@ class Ticks:
     Drake ticks at k times the period, rounded. Where a period is a multiple of the control period only up to rounding
     (0.3 s and 0.1 s), the two ticks of one instant are a unit in the last place apart, and which comes first changes
     from tick to tick: a controller would act on the message of the sample before. There the system ticks with the
-    controllers, and most ticks are none of its own.
+    controllers and does nothing at most ticks.
 
     Attributes:
         period: with which to declare the periodic event, s.

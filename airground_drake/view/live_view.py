@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 from pydrake.geometry import Meshcat
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, LeafSystem
 
-from airground_drake.decision.trigger import Mode
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.scenarios.world import make_world
 from airground_drake.systems.lifetime import weakly
 from airground_drake.systems.signals import FIELDS, declare_bodies
 from airground_drake.view.draw import draw, robot_path, shadow_path, state_path
-from airground_drake.view.stage import INTERVENED, OWN, STATES, TRIGGERED, stage
+from airground_drake.view.stage import STATES, stage, states_of
 from airground_drake.world.world import ROBOTS
 
 
@@ -63,7 +61,6 @@ class LiveView(LeafSystem):
             self._meshcat.SetTransform(robot_path(k), RigidTransform(position), t)
         for k, above in enumerate(positions[self._uavs], start=self._uavs.start):
             self._meshcat.SetTransform(shadow_path(k), RigidTransform(above * [1.0, 1.0, 0.0]), t)
-        states = np.where(accepted > 0, INTERVENED, np.where(modes == Mode.INTERVENING, TRIGGERED, OWN))
-        for k, state in enumerate(states):
+        for k, state in enumerate(states_of(accepted, modes)):
             for each in range(len(STATES)):
                 self._meshcat.SetProperty(state_path(k, each), "visible", bool(each == state), t)

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
+from airground_drake.decision.trigger import Mode
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Obstacle, Scenario, Uav, Ugv
 
@@ -93,8 +94,12 @@ def safe_m(scenario: Scenario, obstacle: Obstacle) -> float:
 def states(trace: Trace, ugv: str, times: Array) -> npt.NDArray[np.intp]:
     """Indices of STATES (F,) at times (F,), s: what was in force just before each."""
     rows = np.minimum(np.searchsorted(trace.t, times - 1e-9), len(trace.t) - 1)
-    accepted, mode = trace.column(f"{ugv}.accepted")[rows], trace.column(f"{ugv}.mode")[rows]
-    return np.where(accepted > 0, INTERVENED, np.where(mode == 1, TRIGGERED, OWN))
+    return states_of(trace.column(f"{ugv}.accepted")[rows], trace.column(f"{ugv}.mode")[rows])
+
+
+def states_of(accepted: Array, mode: Array) -> npt.NDArray[np.intp]:
+    """Indices of STATES: from whether a proposal is accepted, 1 or 0, and the mode of the trigger, of equal shapes."""
+    return np.where(accepted > 0, INTERVENED, np.where(mode == Mode.INTERVENING, TRIGGERED, OWN))
 
 
 def _bounds(scenario: Scenario, visited_m: Array) -> tuple[Array, Array]:

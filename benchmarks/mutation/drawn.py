@@ -1,4 +1,4 @@
-"""Mutants that nobody has written: edits of the running code, drawn at random from its syntax trees.
+"""Random mutants: edits of the code that produces a run, drawn from its syntax trees.
 
 A line is drawn first, of all lines of the code in question on which there is something to edit, then a kind of edit
 that is possible there, then the edit. Docstrings, messages, strings, annotations and what is raised are left alone.
@@ -19,11 +19,11 @@ from mutation.mutant import PACKAGE, Mutant
 
 RUNNING = (
     "base/arrays.py", "run/events.py", "run/simulation.py",
-    "decision", "gatekeeper", "geometry", "intervention", "nsbc", "systems",
+    "scenarios/world.py", "decision", "gatekeeper", "geometry", "intervention", "nsbc", "systems", "world",
 )  # fmt: skip
 """Files and folders of what produces a run."""
 PICTURES = ("systems/blocks.py", "systems/graphviz.py", "systems/schematic.py")
-"""Files in them that only draw."""
+"""Files in these folders that only draw diagrams."""
 PROBES = ("crowd d", "crowd c", "bodies d", "case_b d", "soft_gate c", "crowd b")
 HYPOTHESES = {
     "systems/components.py": ("test_wiring.py",),
@@ -234,4 +234,4 @@ def mutant(root: Path, path: str, text: str, edit: Edit) -> Mutant:
         tests = ["tests/test_simulation.py", "tests/test_diagram.py"]
     tests = [*(f"tests/hypotheses/{name}" for name in ours), *tests]
     what = f"{path}:{edit.line}:{edit.start - first}: {edit.kind}: {was[:60]!r} becomes {edit.new[:60]!r}"
-    return Mutant(what, path, old, new, PROBES, tests=tuple(tests))
+    return Mutant(what, path, "", old, new, PROBES, tuple(tests))

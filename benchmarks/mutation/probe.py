@@ -1,13 +1,11 @@
-"""What claims and the checker find on short runs of the package that is on the path.
+"""What claims and the checker say of short runs of the package that is on the path.
 
     python probe.py
 
-reads requests from standard input, a line of JSON each: [file, "ways" | "runs" | "proofs" | "tamperings" | "report",
-names].
-Each is answered by a child process, which imports the package as it is then and writes its findings to the file: lists
-of source, where, status and rule, the source being a claim, `checker: <claim>`, `run` or a tampering. A line with the
-child's exit code follows on standard output. Other packages are imported once, before. A child that needs too much time
-or memory is ended.
+It reads requests from standard input, a line of JSON each: [file, "ways" | "runs", names of probes]. A child process
+answers each: it imports the package as it is then, and writes its findings to the file as lists of source, where,
+status and rule. The source is a claim, `checker: <claim>` or `run`. A line with the child's exit code follows on
+standard output. Other packages are imported once, before. A child that needs too much time or memory is ended.
 """
 
 from __future__ import annotations
@@ -43,7 +41,7 @@ Findings = list[list[Any]]
 
 
 def ways(names: list[str]) -> Findings:
-    """Runs alone: a digest of all that each leaves behind."""
+    """Runs alone: a digest of the trace of each."""
     from airground_drake.base import files
     from airground_drake.base.errors import AirgroundError
     from airground_drake.run import trace
@@ -100,34 +98,6 @@ def _simulated(name: str) -> tuple[Any, Any]:
     return scenario, simulate(scenario, run)
 
 
-def proofs(names: list[str]) -> Findings:
-    """Verdicts about the model of case A that are not what the scenario expects."""
-    from airground_drake.scenarios.load import load
-    from airground_drake.verify import verify_model
-
-    verdicts = verify_model(load("case_a")[0], claims=names)
-    return [[v.claim.id, "case_a", v.finding.status, ""] for v in verdicts if not v.as_expected]
-
-
-def tamperings(names: list[str]) -> Findings:
-    """Tamperings that are not refused; the first name is the folder of a report."""
-    from check.tampering import TAMPERINGS, attempt
-
-    found: Findings = []
-    for name, tampering in TAMPERINGS.items():
-        outcome = attempt(Path(names[0]), tampering.edit, mended=tampering.mended)
-        if not outcome.is_of(tampering):
-            found.append([f"tampering {name}", "case_b", "accepted" if outcome.code == 0 else "otherwise", ""])
-    return found
-
-
-def report(names: list[str]) -> Findings:
-    """Write the report of case B to the folder that is named, for `tamperings`."""
-    from airground_drake.report.__main__ import main
-
-    return [["report", names[0], str(main(["case_b", "-o", names[0], "--format", "json"])), ""]]
-
-
 OTHERS = (
     "cvxpy", "flint", "jinja2", "matplotlib", "numba", "pandas", "pyarrow.parquet", "pydrake.all", "scipy.optimize",
     "yaml",
@@ -135,7 +105,7 @@ OTHERS = (
 """Packages that every child needs."""
 LONGEST_CPU_S, MOST_BYTES = 300, 12 << 30
 """Of a child: a mutant may run for ever, or remember everything."""
-KINDS = {"ways": ways, "runs": runs, "proofs": proofs, "tamperings": tamperings, "report": report}
+KINDS = {"ways": ways, "runs": runs}
 
 
 def serve() -> None:

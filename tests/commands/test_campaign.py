@@ -71,28 +71,6 @@ def test_a_file_that_is_something_else_is_not_replaced_by_a_draw(
     assert mine.read_text(encoding="utf-8") == "mine"
 
 
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        "-n 0",
-        "--only x",
-        "--only -1",
-        "--only 99999999999999999999",
-        "-n 2 --jobs -1",
-        "-n 2 --jobs 1000000",
-        "--limit-steps nan",
-        "--limit-steps 0",
-        "--limit-time 0",
-        "--only 2 --resume",
-        "--only 2 -n 3",
-    ],
-)
-def test_usage(spec: Path, arguments: str) -> None:
-    with pytest.raises(SystemExit) as end:
-        main([str(spec), *arguments.split()])
-    assert end.value.code == 2
-
-
 def test_more_draws_than_memory_holds_are_refused_before_anything_is_written(
     spec: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

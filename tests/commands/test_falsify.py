@@ -161,23 +161,6 @@ def test_where_nothing_is_judged_nothing_is_said_of_a_margin(
     assert not (tmp_path / "found.yaml").exists()
 
 
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        *(["-n", number] for number in ("0", "-3", "x")),
-        ["--shrink", "-1"],
-        ["--jobs", "0"],
-        ["--jobs", "1001"],
-        ["--limit", "1"],
-        *(["--most", "intervened_s", "--limit", limit] for limit in ("0", "-1", "nan", "inf")),
-    ],
-)
-def test_numbers(arguments: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit, match="2"):
-        falsified(tmp_path, "b", *arguments)
-    assert capsys.readouterr().err.count("\n") == 1
-
-
 def test_usage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert falsified(tmp_path, "b", "--claim", "SAFE-INV") == 2
     assert falsified(tmp_path, "b", "--sampler", "nothing") == 2

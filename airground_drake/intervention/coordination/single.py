@@ -12,7 +12,8 @@ import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
 from airground_drake.intervention.coordination import intervals
-from airground_drake.intervention.coordination.roadmap import Indices, Roadmap, RobotNodes, RobotTask, Space
+from airground_drake.intervention.coordination.intervals import Indices
+from airground_drake.intervention.coordination.roadmap import Roadmap, RobotNodes, RobotTask, Space
 from airground_drake.intervention.coordination.timed import distance, free_pieces, timed, without_repeats
 
 ROUNDING_M = 1e-9

@@ -147,7 +147,7 @@ def _trajectories(chosen: _Selection) -> Figure:
         f"{_ends(chosen)}○ start, \N{MULTIPLICATION SIGN} target, ▲ trigger, □ stands still, ✖ collision. Hexagon: "
         f"obstacle (hollow: not on the UAV's map), {circles}. Thin dashed line: the UAV.{thin}"
     )
-    robots = [*chosen.team, first.robots[-1]]
+    robots = [*chosen.team, *first.uavs]
     panels = []
     for position, (heading, trace) in enumerate(chosen.shown.items()):
         drawing = maps.plane(trace, chosen.team, frame, width_in)

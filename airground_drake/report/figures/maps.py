@@ -69,7 +69,7 @@ def plane(trace: Trace, ugvs: Sequence[str], frame: Frame, width_in: float) -> F
     """
     figure, axes = _map(trace, frame, width_in)
     labels = list[Label]()
-    uav = trace.robots[-1]
+    (uav,) = trace.uavs
     for robot in trace.ugvs:
         if robot not in ugvs:
             axes.plot(*trace.position(robot)[:, :2].T, color=MUTED, linewidth=0.7, zorder=1)

@@ -75,7 +75,7 @@ def _map(trace: Trace, at: Mapping[str, Array], t_s: float) -> Drawing:
             axes.plot(x, y, marker="h", markersize=6, color=marked)
     before = trace.t <= t_s
     for position, robot in enumerate(trace.robots):
-        look = canvas.UAV_LOOK if robot == trace.robots[-1] else canvas.look(position)
+        look = canvas.UAV_LOOK if robot in trace.uavs else canvas.look(position)
         path = trace.position(robot)[before, :2]
         rows = canvas.thin(path, 200)
         axes.plot(*path[rows].T, color=look.color, linestyle=look.dash, linewidth=1.2)

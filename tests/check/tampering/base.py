@@ -68,6 +68,16 @@ def refused_as_a_whole(why: str) -> Callable[[Edit], Edit]:
     return tampering(no_report=why)
 
 
+def named(name: str, edit: Edit) -> Edit:
+    """An edit that is made by another function, under a name of its own."""
+
+    def renamed(folder: Path) -> None:
+        edit(folder)
+
+    renamed.__name__ = name
+    return renamed
+
+
 # ------------------------------------------------------------------------------------- files
 
 
@@ -118,6 +128,19 @@ def edited_scenarios(folder: Path) -> Iterator[list[Any]]:
         report = stack.enter_context(edited_report(folder))
         metas = [stack.enter_context(edited_json(path)) for path in sorted(folder.glob("trace/*/meta.json"))]
         yield [report["scenario"]["resolved"], *(meta["scenario"] for meta in metas)]
+
+
+def set_everywhere(*path: str, value: Any) -> Edit:
+    """Put a value into the resolved scenario, in all places."""
+
+    def edit(folder: Path) -> None:
+        with edited_scenarios(folder) as scenarios:
+            for part in scenarios:
+                for key in path[:-1]:
+                    part = part[key]
+                part[path[-1]] = value
+
+    return edit
 
 
 @contextlib.contextmanager

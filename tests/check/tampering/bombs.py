@@ -15,26 +15,15 @@ from check.tampering.base import (
     edited_claim,
     edited_report,
     edited_scenarios,
+    named,
     read_table,
     refused_as_a_whole,
     seal,
+    set_everywhere,
     tampering,
     trace,
     write,
 )
-
-
-@tampering()
-def threshold_of_a_billion_digits(folder: Path) -> None:
-    with edited_claim(folder, "THR-ROOT", "") as claim:
-        claim["evidence"]["running_threshold_m"] = "1e1000000000"
-
-
-@tampering()
-def duration_of_a_billion_digits(folder: Path) -> None:
-    with edited_scenarios(folder) as scenarios:
-        for scenario in scenarios:
-            scenario["duration_s"] = "1e1000000000"
 
 
 @refused_as_a_whole("regular files")
@@ -130,24 +119,12 @@ MARGINS = {
     "margin_of_no_characters": ("the file is JSON", b'"\xff\xfe"'),
 }
 for _name, (_rule, _content) in MARGINS.items():
-    _edit = _margin(_content)
-    _edit.__name__ = _name
-    refused_as_a_whole(_rule)(_edit)
+    refused_as_a_whole(_rule)(named(_name, _margin(_content)))
 
 
-def _sized(value: Any, *path: str) -> Callable[[Path], None]:
-    def edit(folder: Path) -> None:
-        with edited_scenarios(folder) as scenarios:
-            for scenario in scenarios:
-                part = scenario
-                for key in path[:-1]:
-                    part = part[key]
-                part[path[-1]] = value
-
-    return edit
-
-
-SIZES = {
+STONE = {"position_m": [0.0, 0.0, 0.0], "radius_m": 0.0, "known_to_uav": True}
+SIZES: dict[str, tuple[Any, ...]] = {
+    "obstacles_without_end": ({f"o{k}": STONE for k in range(3000)}, "obstacles"),
     "period_of_nothing": (0.0, "control", "period_s"),
     "period_of_a_nanosecond": (1e-9, "control", "period_s"),
     "proposals_without_end": (1e-12, "intervention", "period_s"),
@@ -157,17 +134,8 @@ SIZES = {
     "stages_without_end": (10**9, "gatekeeper", "stages"),
 }
 for _name, (_value, *_path) in SIZES.items():
-    _edit = _sized(_value, *_path)
-    _edit.__name__ = _name
-    refused_as_a_whole("the scenario is of a size")(_edit)
-
-
-@refused_as_a_whole("the scenario is of a size")
-def obstacles_without_end(folder: Path) -> None:
-    with edited_scenarios(folder) as scenarios:
-        for scenario in scenarios:
-            one = next(iter(scenario["obstacles"].values()))
-            scenario["obstacles"] = {f"o{k}": one for k in range(3000)}
+    refused_as_a_whole("the scenario is of a size")(named(_name, set_everywhere(*_path, value=_value)))
+tampering()(named("duration_of_a_billion_digits", set_everywhere("duration_s", value="1e1000000000")))
 
 
 def _signals(change: Callable[[pa.Table], pa.Table]) -> Callable[[Path], None]:
@@ -202,6 +170,4 @@ TABLES = {
     "no_rows": ("the rows cover the run", lambda table: table.slice(0, 0)),
 }
 for _name, (_rule, _change) in TABLES.items():
-    _edit = _signals(_change)
-    _edit.__name__ = _name
-    tampering()(_edit)
+    tampering()(named(_name, _signals(_change)))

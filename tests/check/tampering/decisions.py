@@ -63,13 +63,6 @@ def decisions_on_a_proposal_removed(folder: Path) -> None:
 
 
 @tampering()
-def decision_on_no_proposal(folder: Path) -> None:
-    with edited_table(folder, "decisions") as frame:
-        issued = frame["issued_s"].iloc[0]
-        frame.loc[frame["issued_s"] == issued, "issued_s"] = issued + 0.05
-
-
-@tampering()
 def messages_all_removed(folder: Path) -> None:
     keep_decisions(folder, [])
     with edited_entries(folder) as entries:
@@ -134,18 +127,6 @@ def obstacles_left_out_of_a_problem(folder: Path) -> None:
 def decision_times_lowered(folder: Path) -> None:
     with edited_timings(folder) as timings:
         timings["decision_times_s"] = [0.1 * value for value in timings["decision_times_s"]]
-
-
-@tampering()
-def proposal_for_another_ugv(folder: Path) -> None:
-    with base.edited_table(folder, "proposals") as frame:
-        frame["cause"] = [next(ugv for ugv in ("ugv1", "ugv2") if ugv != robot) for robot in frame["robot"]]
-
-
-@tampering()
-def last_predicted_velocity_changed(folder: Path) -> None:
-    with edited_table(folder, "problems") as frame:
-        frame["accept_m_s"] = [np.append(np.array(v)[:-3], np.array(v)[-3:] + 1e-5) for v in frame["accept_m_s"]]
 
 
 @tampering()

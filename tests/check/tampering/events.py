@@ -3,10 +3,21 @@
 from __future__ import annotations
 
 import shutil
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from check.tampering.base import RUN, UGV, edited_entries, edited_json, edited_report, read_table, tampering, trace
+from check.tampering.base import (
+    RUN,
+    UGV,
+    edited_entries,
+    edited_json,
+    edited_report,
+    named,
+    read_table,
+    tampering,
+    trace,
+)
 
 
 def first(entry: Any, kind: str) -> Any:
@@ -33,11 +44,6 @@ def exchange_traces(folder: Path) -> None:
 
 
 @tampering()
-def traces_exchanged(folder: Path) -> None:
-    exchange_traces(folder)
-
-
-@tampering()
 def traces_exchanged_and_renamed(folder: Path) -> None:
     exchange_traces(folder)
     for name in ("b", RUN):
@@ -53,29 +59,11 @@ def crash_replaced_by_a_safe_run(folder: Path) -> None:
         meta.update(run="b", method="b")
 
 
-@tampering()
-def trigger_removed(folder: Path) -> None:
-    without_event(folder, "trigger")
-
-
-@tampering()
-def proposal_removed(folder: Path) -> None:
-    without_event(folder, "proposal")
-
-
-@tampering()
-def collision_removed(folder: Path) -> None:
-    without_event(folder, "collision", "b")
-
-
-@tampering()
-def refusal_removed(folder: Path) -> None:
-    without_event(folder, "refuse")
-
-
-@tampering()
-def arrival_removed(folder: Path) -> None:
-    without_event(folder, "arrival")
+REMOVED = {"trigger": RUN, "proposal": RUN, "collision": "b", "refuse": RUN, "arrival": RUN}
+"""Kinds of events, and a run that has one."""
+for _kind, _run in REMOVED.items():
+    _edit = named(f"{_kind}_removed", partial(without_event, kind=_kind, run=_run))
+    tampering()(_edit)
 
 
 @tampering()

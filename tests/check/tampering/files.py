@@ -52,12 +52,6 @@ def trace_folder_added(folder: Path) -> None:
 
 
 @tampering()
-def trace_of_another_schema(folder: Path) -> None:
-    with edited_json(trace(folder) / "meta.json") as meta:
-        meta["schema"] = "airground_drake.trace/1"
-
-
-@tampering()
 def digest_of_a_table_removed(folder: Path) -> None:
     with edited_json(trace(folder) / "meta.json") as meta:
         del meta["files"]["problems.parquet"]

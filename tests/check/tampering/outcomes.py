@@ -82,3 +82,13 @@ def proposal_replaced_while_in_force(folder: Path) -> None:
         for entry in entries:
             sent = next(e for e in entry["events"] if e["kind"] == "proposal" and e["t_s"] == issued_s)
             entry["events"] = sorted([*entry["events"], {**sent, "t_s": replaced_s}], key=lambda event: event["t_s"])
+
+
+@tampering()
+def outcome_invented_where_none_was_weighed(folder: Path) -> None:
+    change(folder, lambda frame: frame["reason"] == "kept", accept_outcome_m2_s=5.0)
+
+
+@tampering()
+def solver_invented_for_outcomes(folder: Path) -> None:
+    change(folder, lambda frame: frame["reason"] == "kept", status="optimal", route="mixed_integer")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from pathlib import Path
+from typing import Any
 
 from check.tampering.base import (
     RUN,
@@ -13,6 +14,8 @@ from check.tampering.base import (
     edited_entries,
     edited_report,
     edited_scenarios,
+    named,
+    set_everywhere,
     tampering,
     trace,
 )
@@ -68,76 +71,22 @@ def method_unknown(folder: Path) -> None:
 
 
 @tampering()
-def run_removed(folder: Path) -> None:
+def run_removed_everywhere_but_in_the_scenario(folder: Path) -> None:
     with edited_report(folder) as report:
         del report["runs"]["b"]
         report["claims"] = [claim for claim in report["claims"] if claim["run"] != "b"]
-
-
-@tampering()
-def run_removed_everywhere_but_in_the_scenario(folder: Path) -> None:
-    run_removed(folder)
     shutil.rmtree(trace(folder, "b"))
 
 
-@tampering()
-def safe_distance_changed_everywhere(folder: Path) -> None:
-    with edited_scenarios(folder) as scenarios:
-        for scenario in scenarios:
-            scenario["safe_distance"]["obstacle_m"] = 1.5
-
-
-@tampering()
-def obstacle_made_larger_everywhere(folder: Path) -> None:
-    with edited_scenarios(folder) as scenarios:
-        for scenario in scenarios:
-            scenario["obstacles"]["obstacle_1"]["radius_m"] = 0.01
-
-
-@tampering()
-def robot_made_larger_everywhere(folder: Path) -> None:
-    with edited_scenarios(folder) as scenarios:
-        for scenario in scenarios:
-            scenario["ugvs"]["ugv1"]["radius_m"] = 0.01
-
-
-@tampering()
-def gain_changed_everywhere(folder: Path) -> None:
-    with edited_scenarios(folder) as scenarios:
-        for scenario in scenarios:
-            scenario["control"]["avoidance_gain_1_s"] = 5.0
-
-
-@tampering()
-def gain_changed_everywhere_and_in_the_inputs(folder: Path) -> None:
-    gain_changed_everywhere(folder)
-    with edited_report(folder) as report:
-        for claim in ("SAFE-INV", "SAFE-GATE", "SAFE-DIST"):
-            inputs = claim_of(report, claim, "")["inputs"]
-            inputs["avoidance_gain_1_s"] = 5.0
-            if "scenario" in inputs:
-                inputs["scenario"]["control"]["avoidance_gain_1_s"] = 5.0
-
-
-@tampering()
-def drift_changed_everywhere_and_in_the_inputs(folder: Path) -> None:
-    with edited_scenarios(folder) as scenarios:
-        for scenario in scenarios:
-            scenario["decision"]["threshold"]["drift_m_s"] = 5.0
-    with edited_report(folder) as report:
-        for claim in ("THR-ROOT", "THR-OPT", "THR-DDM"):
-            claim_of(report, claim, "")["inputs"]["drift_m_s"] = 5.0
-
-
-@tampering()
-def obstacle_removed_everywhere(folder: Path) -> None:
-    with edited_scenarios(folder) as scenarios:
-        for scenario in scenarios:
-            del scenario["obstacles"]["sudden"]
-
-
-@tampering()
-def stall_declared_where_none_was(folder: Path) -> None:
-    with edited_scenarios(folder) as scenarios:
-        for scenario in scenarios:
-            scenario["runs"][RUN]["stalls_m"] = {UGV: [3.3, 13.0, 0.0]}
+EVERYWHERE: dict[str, tuple[Any, ...]] = {
+    "safe_distance_changed_everywhere": ("safe_distance", "obstacle_m", 1.5),
+    "obstacle_made_larger_everywhere": ("obstacles", "obstacle_1", "radius_m", 0.01),
+    "obstacle_moved_everywhere": ("obstacles", "sudden", "position_m", [9.0, 9.0, 0.0]),
+    "robot_made_larger_everywhere": ("ugvs", "ugv1", "radius_m", 0.01),
+    "gain_changed_everywhere": ("control", "avoidance_gain_1_s", 5.0),
+    "drift_changed_everywhere": ("decision", "threshold", "drift_m_s", 5.0),
+    "stall_declared_where_none_was": ("runs", RUN, "stalls_m", {UGV: [3.3, 13.0, 0.0]}),
+}
+"""Values of the scenario that are changed in all its places, and nothing else."""
+for _name, (*_path, _value) in EVERYWHERE.items():
+    tampering()(named(_name, set_everywhere(*_path, value=_value)))

@@ -24,12 +24,6 @@ def position_changed(folder: Path) -> None:
 
 
 @tampering()
-def position_and_commands_changed(folder: Path) -> None:
-    with edited_table(folder) as frame:
-        moved(frame, UGV, middle(frame), 1e-4)
-
-
-@tampering()
 def position_commands_and_decision_variable_changed(folder: Path) -> None:
     with edited_table(folder) as frame:
         moved(frame, UGV, middle(frame), 1e-3)
@@ -81,23 +75,10 @@ def decision_variable_changed(folder: Path) -> None:
 
 
 @tampering()
-def noise_and_decision_variable_changed(folder: Path) -> None:
-    with edited_table(folder) as frame:
-        frame[f"{UGV}.decision_variable_m"] += 0.01
-        frame[f"{UGV}.noise_m"] += 0.01
-
-
-@tampering()
 def noise_from_elsewhere(folder: Path) -> None:
     with edited_table(folder) as frame:
         for column in ("decision_variable_m", "noise_m"):
             frame[f"{UGV}.{column}"] += 1e-7
-
-
-@tampering()
-def executed_without_a_proposal(folder: Path) -> None:
-    with edited_table(folder, run="b") as frame:
-        frame.loc[50, f"{UGV}.accepted"] = 1.0
 
 
 @tampering()

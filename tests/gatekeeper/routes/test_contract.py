@@ -22,27 +22,17 @@ from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.problem import Problem
 from airground_drake.gatekeeper.relaxation import remaining_cost
 from airground_drake.gatekeeper.solution import ConstantPlans, Solution
-from airground_drake.registry import ROUTES
-
-SMALL = 30
-"""Stages that IPOPT is tried with: Drake gives it no Hessians, it needs seconds for 60, and gives up on some."""
-
 
 BROKEN = {"not a number", "infinite"}
 
 
-ENOUGH = Budget(iterations=300, search_s=math.inf)
-"""IPOPT needs more iterations than the default, and a busy machine more time for a search."""
-
-
-def tried_with(name: str) -> dict[str, Problem]:
-    """The instances that a route is tried with."""
-    return {key: p for key, p in INSTANCES.items() if name in ROUTES.own or p.stages <= SMALL}
+ENOUGH = Budget(search_s=math.inf)
+"""A busy machine needs more time for a search."""
 
 
 @pytest.mark.parametrize("name", MAKERS)
 def test_contract(name: str) -> None:
-    for instance, problem in tried_with(name).items():
+    for instance, problem in INSTANCES.items():
         solution = check_contract(used(name), problem, instance in BROKEN, ENOUGH)
         assert instance in BROKEN or solution.status == "optimal", instance
         assert same(solution, used(name).solve(problem, ENOUGH)), instance  # deterministic
@@ -76,10 +66,10 @@ class Ticking:
 def test_a_budget_that_is_spent_leaves_the_best_plan_so_far(
     data: st.DataObject, name: str, iterations: int, ticks: int
 ) -> None:
-    instance, problem = data.draw(st.sampled_from([*tried_with(name).items()]))
+    instance, problem = data.draw(st.sampled_from([*INSTANCES.items()]))
     budget = Budget(iterations, deadline_s=float(ticks), clock=Ticking())
     solution = check_contract(used(name), problem, instance in BROKEN, budget)
-    if ticks == 0 and instance not in BROKEN and name in ROUTES.own:
+    if ticks == 0 and instance not in BROKEN:
         assert solution.status == "budget_spent"
         assert solution.objective == ConstantPlans.of(problem).better.objective
         assert solution.route_bound == min(remaining_cost(problem)[0], solution.objective)
@@ -129,7 +119,7 @@ def test_routes_agree() -> None:
     for make, count in ((rolled_out, 40), (random_problem, 20)):
         for seed in range(count):
             problem = make(seed)
-            solutions = {name: used(name).solve(problem) for name in ROUTES.own}
+            solutions = {name: used(name).solve(problem) for name in MAKERS}
             constants = ConstantPlans.of(problem)
             assert all(solution.objective <= constants.better.objective for solution in solutions.values())
             relaxed, proved = solutions["relaxed"], solutions["mixed_integer"]

@@ -1,0 +1,74 @@
+"""The folder `proofs` of a report against its traces, without Coq: what was proved must be about the recorded runs."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from airground_drake.base import files
+from airground_drake.proofs.export import distances_file, law_file, recorded
+from airground_drake.proofs.runs import FOUND, SCHEMA, expects_kept
+from airground_drake.proofs.too_near import too_near
+from airground_drake.run.trace import Trace
+
+Broken = tuple[str, Any, Any]
+"""What is wrong, what it should be, and what is recorded."""
+
+
+def broken_rules(folder: Path, traces: Mapping[str, Trace]) -> tuple[dict[str, Any], list[Broken]]:
+    """Compare proofs.json and the Coq files with the traces of the report.
+
+    Whether every distance is kept is computed here in exact arithmetic, so no run can be called proved that is not
+    safe. Whether Coq has accepted a file is taken as recorded: `airground check --coq` asks it again.
+
+    Args:
+        folder: `proofs` of the report.
+        traces: of the report's runs, by name; in the folder `trace` beside `folder`.
+
+    Returns:
+        proofs.json, and what is broken.
+
+    Raises:
+        KeyError, TypeError, ValueError, AttributeError: if proofs.json is not what `airground prove` writes.
+        OSError: if a file cannot be read.
+    """
+    found: dict[str, Any] = json.loads(files.read_text(folder / FOUND))
+    return found, [*_broken(folder, found, traces)]
+
+
+def _broken(folder: Path, found: Mapping[str, Any], traces: Mapping[str, Trace]) -> Iterator[Broken]:
+    texts: dict[str, str] = {}
+    yield from _unless(FOUND, SCHEMA, found["schema"])
+    yield from _unless(FOUND, [], sorted({*found["runs"]} - {*traces}))
+    for name, trace in traces.items():
+        exact = recorded(trace)
+        of_run = {f"{exact.name}.v": distances_file(exact), f"{exact.name}_law.v": law_file(exact)}
+        texts |= of_run
+        if name not in found["runs"]:
+            continue
+        entry, near = found["runs"][name], too_near(exact)
+        meta = files.sha256((folder.parent / "trace" / name / "meta.json").read_bytes())
+        kept = entry["distances"]["proved"]
+        expected = {
+            "meta_sha256": meta, "expected": expects_kept(trace), "rows": len(trace.t), "pairs": len(exact.demands),
+        }  # fmt: skip
+        for key, value in expected.items():
+            yield from _unless(f"{name}.{key}", value, entry[key])
+        yield from _unless(f"{name}.distances.proved", kept and not near, kept)
+        yield from _unless(f"{name}.law.proved", kept and entry["law"]["proved"], entry["law"]["proved"])
+        for answer, file in zip((entry["distances"], entry["law"]), of_run, strict=True):
+            yield from _unless(f"{name}: file", file, answer["file"])
+            if answer["proved"] and not (folder / file).is_file():
+                yield f"{name}: {file}", "a file", "nothing"
+    for path in sorted(folder.iterdir()):
+        if path.name != FOUND:
+            known = path.name in texts and files.read_text(path) == texts[path.name]
+            yield from _unless(f"{path.name} is about the recorded run", True, known)
+
+
+def _unless(about: str, wanted: Any, recorded: Any) -> Iterator[Broken]:
+    """A broken rule, unless both are equal."""
+    if recorded != wanted:
+        yield about, wanted, recorded

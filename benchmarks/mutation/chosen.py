@@ -1,0 +1,400 @@
+"""The mutants that matter: faults that once were real, or that would break a claim; every room of the core has some."""
+
+from __future__ import annotations
+
+from mutation.mutant import Mutant
+
+WIRING = ("tests/hypotheses/test_wiring.py",)
+TRIGGER = (
+    "tests/hypotheses/test_transitions.py", "tests/hypotheses/test_isolation.py", "tests/decision",
+    "tests/systems/test_decision.py",
+)  # fmt: skip
+ATTACKS = ("tests/hypotheses/test_patience_attacks.py",)
+PLANNER = ("tests/intervention",)
+ROUTES = ("tests/gatekeeper/test_relaxation.py", "tests/gatekeeper/routes/test_contract.py")
+RUNS = "tests/verify/runs"
+
+WIRINGS = (
+    Mutant(
+        "safe distance air/ground at 0.9 of its value",
+        "scenarios/world.py",
+        "make_world",
+        'frozenset(("ugv", "uav")): safe.air_ground_m',
+        'frozenset(("ugv", "uav")): 0.9 * safe.air_ground_m',
+    ),
+    Mutant(
+        "share 1 for robots", "world/world.py", "World._share", "np.where(robot, 0.5, 1.0)", "np.where(robot, 1.0, 1.0)"
+    ),
+    Mutant(
+        "UGVs may leave the ground",
+        "world/world.py",
+        "Body.mobility",
+        'if self.kind == "ugv" else',
+        "if False else",
+        tests=WIRING,
+    ),
+    Mutant(
+        "robots avoid only what the UAV knows",
+        "scenarios/world.py",
+        "make_world",
+        "for name, each in scenario.obstacles.items()",
+        "for name, each in scenario.obstacles.items() if each.known_to_uav",
+    ),
+    Mutant(
+        "sensing range cut",
+        "systems/components.py",
+        "make_avoidance",
+        "control.period_s, control.sensing_range_m, composition)",
+        "control.period_s, 0.6 * control.sensing_range_m, composition)",
+    ),
+    Mutant(
+        "the disturbance is subtracted",
+        "systems/plant.py",
+        "VelocityDisturbance._calc",
+        "velocity[3 * i : 3 * i + 3] += port.Eval(context)",
+        "velocity[3 * i : 3 * i + 3] -= port.Eval(context)",
+        tests=(*WIRING, "tests/test_simulation.py", "tests/test_python_api.py"),
+    ),
+)
+"""Wiring: who keeps what distance, with which share, on which plants."""
+
+BODIES = (
+    Mutant(
+        "obstacles have no radius",
+        "scenarios/world.py",
+        "make_world",
+        "Ball(each.radius_m)",
+        "Ball(0.0 * each.radius_m)",
+        runs=("bodies d", "bodies c"),
+    ),
+    Mutant(
+        "collisions are of centres",
+        "run/events.py",
+        "_add_collisions",
+        "within = collision_m + own.shape.radius_m",
+        "within = collision_m",
+        runs=("bodies b",),
+    ),
+    Mutant(
+        "plans take robots for points",
+        "intervention/coordination/single.py",
+        "_wished",
+        "return space.apart + other.radius + space.spacing",
+        "return space.apart + space.spacing",
+        runs=(),
+        tests=("tests/intervention/coordination",),
+    ),
+)
+"""Bodies: radii count."""
+
+LAW = (
+    Mutant(
+        "no scaling back",
+        "nsbc/kernels.py",
+        "avoid_one",
+        "return _scale_back(_closest_feasible(lower, normal, bound), normal, bound)",
+        "return _closest_feasible(lower, normal, bound)",
+        runs=("crowd d",),
+        tests=(*WIRING, "tests/nsbc/test_avoidance.py"),
+    ),
+    Mutant(
+        "contradictions are not looked for",
+        "nsbc/kernels.py",
+        "_closest_feasible",
+        "return velocity if missed == 0.0 else _least_violation(normal, bound + MARGIN_M_S)",
+        "return velocity",
+        runs=("crowd b", "crowd d"),
+        tests=(*WIRING, "tests/nsbc/test_projection.py"),
+    ),
+    Mutant(
+        "interventions not filtered under (d)",
+        "nsbc/law.py",
+        "command",
+        "return task if law.intervention_on_top else avoid_one(task,",
+        "return task if not law.intervention_on_top else avoid_one(task,",
+    ),
+    Mutant(
+        "own task not filtered",
+        "nsbc/law.py",
+        "command",
+        "        return avoid_one(own, normal, bound, law.composition)\n",
+        "        return own\n",
+    ),
+    Mutant(
+        "UGVs sampled at half the rate",
+        "systems/controllers.py",
+        "UgvController.__init__",
+        "self.DeclarePeriodicDiscreteUpdateEvent(law.avoidance.period, 0.0, weakly(self._update))",
+        "self.DeclarePeriodicDiscreteUpdateEvent(2.0 * law.avoidance.period, 0.0, weakly(self._update))",
+    ),
+    Mutant(
+        "executed whatever the answer, the answer recorded",
+        "systems/controllers.py",
+        "UgvController._update",
+        "velocity = self.velocity(context.get_time(), positions, reference, rate, proposals, law)",
+        "velocity = self.velocity(context.get_time(), positions, reference, rate, self._proposals.Eval(context), law)",
+    ),
+    Mutant(
+        "presets end with a jump to the target",
+        "geometry/motion.py",
+        "Motion.at",
+        "return self.positions[max(k, 0)], np.zeros(3)",
+        "return self.positions[-1], np.zeros(3)",
+        runs=("crowd b", "crowd d"),
+        tests=("tests/geometry/test_motion.py",),
+    ),
+)
+"""The avoidance law and the controllers."""
+
+TRIGGERS = (
+    Mutant(
+        "the dwell is 10 % short",
+        "decision/trigger.py",
+        "Trigger.dwell_end",
+        "state.triggered_at + self.dwell if",
+        "state.triggered_at + 0.9 * self.dwell if",
+        tests=TRIGGER,
+    ),
+    Mutant(
+        "releases at the threshold",
+        "decision/trigger.py",
+        "Trigger.step",
+        "x <= self.release and x < self.zeta:",
+        "x <= self.zeta and x < self.zeta:",
+        tests=TRIGGER,
+    ),
+    Mutant(
+        "events come at the ends of steps",
+        "systems/decision.py",
+        "EventTrigger.nothing_due",
+        "return -1.0 if anything_due(",
+        "return 1.0 if anything_due(",
+        tests=TRIGGER,
+    ),
+    Mutant(
+        "corners of presets are not looked at",
+        "systems/decision.py",
+        "DecisionBlock._calc_range",
+        "self._corner_times[first] < now[0]:",
+        "self._corner_times[first] < begun[0]:",
+        tests=TRIGGER,
+    ),
+    Mutant(
+        "c1 and c2 of the Bayes risk exchanged",
+        "decision/bayes.py",
+        "optimal_threshold",
+        "level = c2 / c1 * drift**2 / noise**2",
+        "level = c1 / c2 * drift**2 / noise**2",
+        tests=("tests/verify/model/threshold/test_thr_root.py",),
+    ),
+    Mutant(
+        "the noise is 5 % too strong",
+        "systems/components.py",
+        "integrated_noise",
+        "B=intensity / np.sqrt(period) * eye",
+        "B=1.05 * intensity / np.sqrt(period) * eye",
+        tests=("tests/systems/test_noise.py",),
+    ),
+)
+"""The trigger: dwell, release, events, threshold, noise."""
+
+PROTOCOL = (
+    Mutant(
+        "an answer to another proposal counts",
+        "intervention/messages.py",
+        "answer_to",
+        "if proposal is None or answers[2 * robot + 1] != proposal.number:",
+        "if proposal is None:",
+        tests=WIRING,
+    ),
+    Mutant(
+        "answers are decided on and not sent",
+        "systems/gatekeeper.py",
+        "Gatekeeper._calc_answers",
+        "output.SetFromVector(self._memory(context).answers)",
+        "pass",
+    ),
+    Mutant(
+        "proposals are not withdrawn after a release",
+        "intervention/planner.py",
+        "Planner._after_answers",
+        "            if name not in called and talk.cause not in called:\n",
+        "            if False:\n",
+    ),
+    Mutant(
+        "a part of a joint plan outlives another UGV's refusal",
+        "intervention/planner.py",
+        "Planner._after_answers",
+        "(party_refused or answer == DONE",
+        "(answer == DONE",
+        tests=PLANNER,
+    ),
+    Mutant(
+        "detours inside the safe distance",
+        "intervention/detour.py",
+        "Detour._in_the_way",
+        "reach = np.clip(from_target, least, least + self.clearance)",
+        "reach = 0.8 * least",
+        tests=PLANNER,
+    ),
+    Mutant(
+        "messages of ticks that differ by rounding come late",
+        "systems/ticks.py",
+        "Ticks.__init__",
+        "exact = Fraction(period) == self._every * Fraction(control)",
+        "exact = True",
+        tests=("tests/systems/test_ticks.py",),
+    ),
+    Mutant(
+        "the monitor's inequalities are never broken",
+        "systems/monitor.py",
+        "Monitor._first",
+        "if not amount[robot] <= INEQUALITY_TOLERANCE_M_S:",
+        "if not amount[robot] <= 10.0:",
+        tests=("tests/systems/test_monitor.py",),
+    ),
+)
+"""Proposals, answers and what becomes of them."""
+
+GATEKEEPER = (
+    Mutant(
+        "the bound is overstated",
+        "gatekeeper/relaxation.py",
+        "_dual_bound",
+        "total -= pressure * pressure / (4.0 * ",
+        "total -= pressure * pressure / (8.0 * ",
+        runs=("case_b d",),
+        tests=ROUTES,
+    ),
+    Mutant(
+        "the prediction has no avoidance",
+        "gatekeeper/rollout.py",
+        "velocity_of",
+        "mode == ACCEPTED, Intervention(loop.wanted[k], asked, loop.chosen),\n        normal, bound,",
+        "mode == ACCEPTED, Intervention(loop.wanted[k], asked, loop.chosen),\n        0.0 * normal, 0.0 * bound,",
+    ),
+    Mutant(
+        "a first stage that refuses is accepted",
+        "gatekeeper/answer.py",
+        "_first_answer",
+        "    if solution.accept_first:",
+        "    if True:",
+    ),
+    Mutant(
+        "obstacles out of sight are forgotten",
+        "gatekeeper/outcome_gatekeeper.py",
+        "OutcomeGatekeepers._remembered",
+        "return before.sensed | within(points, own, reach)",
+        "return within(points, own, reach)",
+        runs=("crowd d",),
+        tests=("tests/gatekeeper/test_outcome_gatekeeper.py",),
+    ),
+    Mutant(
+        "what makes no difference is accepted",
+        "gatekeeper/outcome_gatekeeper.py",
+        "reason_of",
+        "if accept.better_than(refuse):",
+        "if not refuse.better_than(accept):",
+        runs=("crowd d",),
+        tests=("tests/gatekeeper/test_outcome_gatekeeper.py",),
+    ),
+    Mutant(
+        "a withdrawal is not noticed before the next proposal",
+        "gatekeeper/mpc_gatekeeper.py",
+        "Gatekeepers.idle",
+        "return not any(proposals) and not any(before.answers[::2])",
+        "return not any(proposals)",
+        runs=("crowd d",),
+        tests=ATTACKS,
+    ),
+    Mutant(
+        "a replaced proposal does not end its try",
+        "gatekeeper/outcome_gatekeeper.py",
+        "OutcomeGatekeepers.sample",
+        "if held[i].executing and standing != ACCEPT:  # withdrawn",
+        "if held[i].executing and proposal is None:  # withdrawn",
+        runs=("crowd d",),
+        tests=ATTACKS,
+    ),
+    Mutant(
+        "a UGV rests only where nothing is proposed",
+        "gatekeeper/outcome_gatekeeper.py",
+        "OutcomeGatekeepers.sample",
+        "            held[i] = self._patience.rested(held[i], now.t)\n            if proposal is None:\n",
+        "            if proposal is None:\n                held[i] = self._patience.rested(held[i], now.t)\n",
+        runs=("crowd d",),
+        tests=ATTACKS,
+    ),
+)
+"""The gatekeepers."""
+
+JUDGES = (
+    Mutant(
+        "SAFE-TRACE allows 5 cm",
+        "verify/runs/safe_trace.py",
+        "SafeTrace.check",
+        ">= -DISTANCE_TOLERANCE_M",
+        ">= -0.05",
+        runs=("case_b d", "soft_gate c", "crowd b"),
+        tests=(f"{RUNS}/test_safe_trace.py",),
+    ),
+    Mutant(
+        "SAFE-HYP gives every robot the whole share",
+        "verify/engines/shortfalls.py",
+        "_shortfall",
+        "max(part * bound - ",
+        "max(bound - ",
+        runs=("case_b d", "soft_gate c", "crowd b"),
+        tests=("tests/verify/engines/test_shortfalls.py",),
+    ),
+    Mutant(
+        "THR-TRIG allows 0.1 s",
+        "verify/runs/thr_trig.py",
+        "",
+        "EVENT_TOLERANCE_S = 1e-5",
+        "EVENT_TOLERANCE_S = 0.1",
+        runs=("case_b d", "soft_gate c", "crowd b"),
+        tests=(f"{RUNS}/test_thr_trig.py",),
+    ),
+    Mutant(
+        "EXEC believes the signal",
+        "verify/runs/exec.py",
+        "_first_wrong",
+        "| (one.executing != one.said)",
+        "| (one.executing != one.executing)",
+        runs=("case_b d", "soft_gate c", "crowd b"),
+        tests=(f"{RUNS}/test_exec.py",),
+    ),
+    Mutant(
+        "half a run is enough",
+        "verify/claim.py",
+        "TraceClaim.judge",
+        "            if finding.status in PASSING:\n",
+        "            if False:\n",
+        runs=(),
+        tests=("tests/verify/test_claim.py",),
+    ),
+    Mutant(
+        "checker: digests are not compared",
+        "check/run.py",
+        "_run",
+        'same("SHA-256 of a table", meta["files"][file], sha256(content), about=file)',
+        "pass",
+        runs=(),
+        tests=(
+            "tests/check/test_tampering.py::test_the_checker_itself_names_the_broken_rule[table_in_other_bytes_digest_left]",
+        ),
+    ),
+    Mutant(
+        "checker: commands need not lead anywhere",
+        "check/run.py",
+        "_robots_are_where_their_commands_lead",
+        'close("law of motion", run.position_m[robot][1:], led, within=SMALL,',
+        'close("law of motion", run.position_m[robot][1:], led, within=1e9,',
+        runs=(),
+        tests=("tests/check/test_tampering.py::test_the_checker_itself_names_the_broken_rule[position_changed]",),
+    ),
+)
+"""What judges: claims and the checker. On honest runs one that demands less says the same."""
+
+CHOSEN = (*WIRINGS, *BODIES, *LAW, *TRIGGERS, *PROTOCOL, *GATEKEEPER, *JUDGES)
