@@ -34,7 +34,7 @@ def test_every_entry_is_the_claim_of_that_identifier_in_the_file_of_that_name(na
 def test_every_claim_in_the_folders_is_registered() -> None:
     tables = [(getattr(airground_drake.registry, name), kind) for name, kind in TABLES.items()]
     registered = {table.load(identifier, of=kind) for table, kind in tables for identifier in table.own}
-    for path in [*FOLDER.glob("runs/*.py"), *FOLDER.glob("model/*/*.py")]:
+    for path in FOLDER.glob("*/*.py"):
         module = import_module(".".join(["airground_drake.verify", *path.relative_to(FOLDER).with_suffix("").parts]))
         for kind in vars(module).values():
             if isinstance(kind, type) and issubclass(kind, (TraceClaim, ModelClaim)) and "id" in vars(kind):
