@@ -23,7 +23,7 @@ REFUSED = {
     "first_stage": "the best plan began by refusing",
     "no_plan": "no outcome could be computed",
     "stalls": "with the proposal it would have come to rest short of its goal, no nearer than without",
-    "exhausted": "it had gone along as often as it does without a rest",
+    "exhausted": "it had used all of its tries and had not rested since",
 }
 """Why a proposal was refused, for a reader who knows no reason's name."""
 _NAMES = ("first", "second", "robot", "other")

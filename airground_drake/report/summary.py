@@ -37,7 +37,7 @@ WORDS_OF_REFUSALS = {
     "no_difference": "it would have changed nothing",
     "no_plan": "no outcome could be computed",
     "stalls": "it would have stalled on the way",
-    "exhausted": "it had gone along as often as it does",
+    "exhausted": "it had used all of its tries",
 }
 """Why a proposal was refused, in a few words."""
 

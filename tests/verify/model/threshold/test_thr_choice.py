@@ -121,7 +121,7 @@ def test_the_figure_marks_three_thresholds_and_says_what_the_runs_had() -> None:
     assert "best for that drift: 0.28 m with the assumed noise." in figure.caption
     none = threshold.draw(TABLE_1, finding.evidence)
     assert none is not None
-    assert none.caption.endswith("No run triggered, so that none shows a drift.")
+    assert none.caption.endswith("No run triggered: the real drift is not known.")
     assert threshold.draw(TABLE_1, {"error": "failed"}) is None
 
 
