@@ -117,11 +117,11 @@ def test_the_figure_marks_three_thresholds_and_says_what_the_runs_had() -> None:
     assert figure.id == "threshold-choice"
     rows = {row[0]: row[1:] for row in figure.panels[0].table.rows[-3:]}
     assert rows == {"in force": ("3", "0.4547"), "optimal": ("2.992", "0.4547"), "(19) as printed": ("0.7557", "0.48")}
-    assert "In run b, ugv1, the drift really was 0.5606 m/s" in figure.caption
-    assert "optimal for this drift: 0.28 m with the assumed noise." in figure.caption
+    assert "In run b, ugv1 had a drift of 0.5606 m/s" in figure.caption
+    assert "best for that drift: 0.28 m with the assumed noise." in figure.caption
     none = threshold.draw(TABLE_1, finding.evidence)
     assert none is not None
-    assert none.caption.endswith("No run triggered, so that none shows a drift.")
+    assert none.caption.endswith("No run triggered: the real drift is not known.")
     assert threshold.draw(TABLE_1, {"error": "failed"}) is None
 
 
