@@ -200,27 +200,37 @@ def load_spec(path: Path) -> Spec:
     scenario = found.scenario if found.scenario in shipped() else str(path.parent / found.scenario)
     given = vars(found) | {"scenario": scenario}
     spec = Spec(**given, digest=files.sha256(content), source=str(path), data=_judged_part(scenario))
+    _check_overrides(spec, document)
+    _check_names(spec, document)
+    return spec
+
+
+def _check_overrides(spec: Spec, document: Document) -> None:
+    """Refuse values under `set` that are not valid or that a course replaces, and unknown keys under `draw`."""
     for key in spec.fixed if spec.course is not None else ():
         if f"{key}.".startswith(tuple(f"{each}." for each in REPLACES)):
             wanted = "wanted: a key that the course does not draw; one under draw comes after the course"
             raise ScenarioError(document.where("set", key), f"set.{key}", Fault("the course would replace it"), wanted)
     try:
-        base = spec.base()
+        spec.base()
     except ScenarioError as error:
         raise _placed(error, document, "set") from None
-    for key, names, allowed in (("runs", spec.runs, base.runs), ("claims", spec.claims, RUN_CLAIMS)):
+    try:
+        spec.draw(0)
+    except ScenarioError as error:
+        if error.value == UNKNOWN_KEY:  # no draw would be valid; other faults may be of this draw only
+            raise _placed(error, document, "draw") from None
+
+
+def _check_names(spec: Spec, document: Document) -> None:
+    """Refuse runs, claims and columns of times that do not exist."""
+    for key, names, allowed in (("runs", spec.runs, spec.base().runs), ("claims", spec.claims, RUN_CLAIMS)):
         for index, name in enumerate(names):
             if name not in allowed:
                 raise _unknown(document.where(key, str(index)), key, name, allowed)
     for name in spec.marks:
         if name not in TIMES:
             raise _unknown(document.where("marks", name, key=True), f"marks.{name}", name, TIMES)
-    try:
-        spec.draw(0)
-    except ScenarioError as error:
-        if error.value == UNKNOWN_KEY:  # no draw would be valid; other faults may be of this draw only
-            raise _placed(error, document, "draw") from None
-    return spec
 
 
 def _placed(error: ScenarioError, document: Document, part: str) -> ScenarioError:

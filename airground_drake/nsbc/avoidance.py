@@ -111,7 +111,7 @@ class Avoidance:
             positions: of all bodies that move, (M, 3), m, world frame.
             near: the robots and what is around them.
         """
-        return kernels.commands(lower, positions, near, self.gain, self.period, self.sensing_range, self.code)
+        return kernels.commands(lower, positions, *near, self.gain, self.period, self.sensing_range, self.code)
 
 
 def limit_speed(velocity: Array, max_speed: Array) -> Array:

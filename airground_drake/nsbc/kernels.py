@@ -11,7 +11,6 @@ import numpy.typing as npt
 from numba import njit
 
 from airground_drake.base.arrays import Array
-from airground_drake.world.world import Neighbours
 
 MARGIN_M_S = 1e-12
 """Added to every bound in the projection, m/s. The bound of a robot in contact is 0. Without the margin
@@ -180,19 +179,25 @@ def gather(positions: Array, obstacles: Array, others: npt.NDArray[np.intp]) -> 
 def commands(
     lower: Array,
     positions: Array,
-    near: Neighbours,
+    members: npt.NDArray[np.intp],
+    others: npt.NDArray[np.intp],
+    still: Array,
+    distance: Array,
+    share: Array,
+    mobility: Array,
+    max_speed: Array,
     gain: float,
     period: float,
     sensing_range: float,
     composition: int,
 ) -> Array:
-    """Velocities of k robots, (k, 3), m/s; see `Avoidance.command`."""
-    velocity, centre = limit_speed(lower, near.max_speed), gather(positions, near.still, near.others)
+    """Velocities of k robots, (k, 3), m/s; see `Avoidance.command`, with the fields of `Neighbours` one by one."""
+    velocity, centre = limit_speed(lower, max_speed), gather(positions, still, others)
     normal, bound = np.empty(centre.shape[1:]), np.empty(centre.shape[1])
     for i in range(len(velocity)):
         fill_half_spaces(
-            positions[near.members[i]], centre[i], near.distance[i], near.share[i], gain, period, near.mobility[i],
-            sensing_range, normal, bound,
+            positions[members[i]], centre[i], distance[i], share[i], gain, period, mobility[i], sensing_range,
+            normal, bound,
         )  # fmt: skip
         velocity[i] = avoid_one(velocity[i], normal, bound, composition)
     return velocity

@@ -238,8 +238,8 @@ def test_what_cannot_be_proved_for_want_of_coq_or_of_files_is_said(
     for arguments, why in (
         ([str(tmp_path)], "wanted: the folder of a report"),
         ([str(report), "--run", "e"], "unknown run of .* 'e'; allowed: d"),
-        (["--run", "d"], "allowed: with DIR"),
-        ([str(report), "--record"], "allowed: without DIR"),
+        (["--run", "d"], "--run needs DIR"),
+        ([str(report), "--record"], "--record goes without DIR"),
     ):
         assert main(["prove", *arguments]) == 2
         said = capsys.readouterr().err
