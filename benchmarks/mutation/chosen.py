@@ -354,7 +354,7 @@ JUDGES = (
         "EVENT_TOLERANCE_S = 1e-5",
         "EVENT_TOLERANCE_S = 0.1",
         runs=("case_b d", "soft_gate c", "crowd b"),
-        tests=(f"{RUNS}/test_thr_trig.py",),
+        tests=(f"{RUNS}/test_thr_trig.py", f"{RUNS}/test_tolerances.py"),
     ),
     Mutant(
         "EXEC believes the signal",

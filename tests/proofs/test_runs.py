@@ -128,7 +128,7 @@ def test_tiny_coordinates_are_rounded_and_it_is_said_by_how_much(run: Simulation
 @pytest.mark.slow
 def test_names_that_mean_something_in_coq_are_replaced(run: Simulations, workshop: Workshop) -> None:
     few = short(run("case_a", "d"))
-    names = {"ugv1": "norm", "ugv2": "ugv1_and_uav", "obstacle_2": "forall", "obstacle_3": "Größe"}
+    names = {"ugv1": "norm", "ugv2": "ugv1_and_uav", "obstacle_2": "forall", "obstacle_3": "Type"}
     meta = json.dumps(few.meta, ensure_ascii=False)
     signals = few.signals
     for old, new in names.items():
