@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import platform
-import subprocess
 from collections.abc import Mapping, Sequence
 from datetime import datetime
 from functools import partial
@@ -116,7 +115,7 @@ def provenance(scenario: Scenario, started: datetime, command: str) -> dict[str,
         "packages": versions,
         "solver": _solver(scenario, versions["daqp"]),
         "platform": platform.platform(),
-        "git": _git(),
+        "git": document.commit(),
         "seed": scenario.seed,
         "started": started.isoformat(timespec="seconds"),
         "command": command,
@@ -129,17 +128,3 @@ def _solver(scenario: Scenario, daqp: str) -> str:
     if route != "mixed_integer":
         return f"that of the route {route}"
     return f"DAQP {daqp}, one thread" if solver == "daqp" else f"{solver}, through Drake, one thread"
-
-
-def _git() -> str:
-    """Commit of the checkout that the package is imported from, with '+changes', or 'not a checkout'."""
-    here = ["git", "-C", str(Path(__file__).parent)]
-    try:
-        tracked = subprocess.run([*here, "ls-files", "--error-unmatch", __file__], capture_output=True, check=False)
-        if tracked.returncode != 0:
-            return "not a checkout"
-        commit = subprocess.run([*here, "rev-parse", "HEAD"], capture_output=True, text=True, check=True).stdout.strip()
-        changed = subprocess.run([*here, "status", "--porcelain"], capture_output=True, text=True, check=True).stdout
-    except (OSError, subprocess.CalledProcessError):
-        return "not a checkout"
-    return commit + ("+changes" if changed else "")

@@ -68,15 +68,33 @@ def lines(folder: Path, judge: Judge | None = None) -> Iterator[Line]:
         report["provenance"],
         audit=_from_other_runs(report, scenario, traces),
     )
-    yield from (parts := list(_parts(report, again, third_party)))
+    other_code = _other_code(report["provenance"])
+    parts = [_with_note(line, other_code) for line in _parts(report, again, third_party)]
+    yield from parts
     if any(line["outcome"] == "DISAGREES" for line in parts):
         return  # pages show report.json, which is not what it should be
     try:
-        yield from _pages(folder, report, scenario, traces)
+        for line in _pages(folder, report, scenario, traces):
+            yield _with_note(line, other_code)
     except Exception as error:  # parts of report.json that are taken as recorded may be anything
         why = f"{type(error).__name__}: {error}"
         text = f"the pages cannot be made again: {_short(why)}"
         yield {"claim": "report.html", "run": "", "outcome": "cannot be checked", "text": text, "rule": "pages"}
+
+
+def _other_code(provenance: Any) -> str:
+    """That other code wrote the report, which may word or draw things otherwise; empty if it was this code."""
+    from airground_drake.report.document import commit
+
+    found = provenance if isinstance(provenance, dict) else {}
+    written, here = (found.get("package"), found.get("git")), (version("airground_drake"), commit())
+    if written == here:
+        return ""
+    return "; other code wrote the report ({}, {}); this is {}, {}".format(*written, *here)
+
+
+def _with_note(line: Line, note: str) -> Line:
+    return line | {"text": line["text"] + note} if line["outcome"] == "DISAGREES" else line
 
 
 def _parts(report: Mapping[str, Any], again: Mapping[str, Any], third_party: Mapping[str, Any]) -> Iterator[Line]:

@@ -84,6 +84,19 @@ def test_third_party_claims_are_counted_and_not_judged_again(report: Path, tmp_p
     ]  # fmt: skip
 
 
+def test_a_difference_says_where_other_code_wrote_the_report(report: Path, tmp_path: Path) -> None:
+    """An older version may have drawn the page otherwise; the reader must not take it for a forgery."""
+    said = []
+    for k, commit in enumerate((None, "c933ccd")):
+        copy(report, folder := tmp_path / str(k))
+        page = folder / "report.html"
+        page.write_text(page.read_text(encoding="utf-8").replace("<title>", "<title>Old: "), encoding="utf-8")
+        with edited_report(folder) as document:
+            document["provenance"]["git"] = commit or document["provenance"]["git"]
+        said += [line["text"] for line in rebuild.lines(folder, judge=judged) if line["claim"] == "report.html"]
+    assert ["; other code wrote the report (0.1.0, c933ccd); this is" in text for text in said] == [False, True]
+
+
 def test_what_is_expected_of_a_claim_of_others_is_the_scenarios(
     report: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
