@@ -220,10 +220,10 @@ def _proper_tasks(direct: Trace) -> Item:
         "id": 24,
         "where": "sections 1, 3.2, 5.2 and 6",
         "finding": "Section 6 says 'it is assumed that UAVs can give proper intervention tasks'. Assumption 1 only "
-        "says that the UAV can give interventions, and the paper does not define 'proper'. Section 4 and case B are about "
-        "an intervention that is not proper; in our case B it ends at the obstacle. Section 1 claims 'bidirectional "
-        "interventions'. No equation contains them: in (14), (20) and (23) the UAV intervenes on a UGV, and only the "
-        "UGVs' positions go back to the UAV, in (9) and (15).",
+        "says that the UAV can give interventions, and the paper does not define 'proper'. Section 4 and case B are "
+        "about an intervention that is not proper; in our case B it ends at the obstacle. Section 1 claims "
+        "'bidirectional interventions'. No equation contains them: in (14), (20) and (23) the UAV intervenes on a UGV, "
+        "and only the UGVs' positions go back to the UAV, in (9) and (15).",
         "paper": "interventions are proper and bidirectional",
         "ours": {"wrong_intervention_to_obstacle_m": away, "safe_distance_m": d},
         "unit": "",
