@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
-from airground_drake.registry import METHODS
+from airground_drake.base.errors import TraceError, one_line
+from airground_drake.registry import method_of
 from airground_drake.report.figures import canvas, comparison, maps, svg, timelines
 from airground_drake.report.figures.panels import MAX_TABLE_ROWS, Figure, Panel, Table, series
 from airground_drake.report.metrics import Nearby, close_by, events_of, gap_m, radius_m
@@ -68,10 +69,15 @@ def draw(scenario: Scenario, traces: Mapping[str, Trace], settings: Mapping[str,
         settings: of matplotlib (rcParams), in place of a report's.
 
     Raises:
-        TraceError: if a trace lacks a column or holds numbers that are not finite.
+        TraceError: if a trace lacks a column, holds numbers that are not finite, or has other robots than its scenario.
+        UnknownNameError: if its metadata name a method that there is not.
     """
     if not traces:
         return []
+    for trace in traces.values():
+        if trace.robots != (known := [*trace.scenario.robots]):
+            wrong = f"its robots are {', '.join(trace.robots)}; those of its scenario: {', '.join(known)}"
+            raise TraceError(one_line(f"run {trace.run}: {wrong}"))
     numbers = next((paper for name, paper in _PAPER.items() if scenario.name.startswith(name)), ())
     with canvas.style(settings):
         chosen = _select(scenario, traces)
@@ -125,7 +131,7 @@ def _heading(group: list[str], runs: Mapping[str, Trace]) -> str:
     if len(group) > 1:
         return f"Runs {' = '.join(group)}: identical paths"
     method = str(runs[group[0]].meta["method"])
-    return f"Run {group[0]}: method ({method}), {METHODS[method].says}"
+    return f"Run {group[0]}: method ({method}), {method_of(method).says}"
 
 
 def _runs(heading: str) -> str:
