@@ -344,11 +344,11 @@ def _choice(found: Mapping[str, Any], assumed: Mapping[str, Any]) -> Iterator[Li
     if found["kind"] != "declared":
         yield Line("yes", f"{zeta:.4g} m is the Bayes optimum for the assumed drift and noise.")
     elif excess < NEGLIGIBLE:
-        told = f"it is as good as the Bayes optimum for the assumed drift, {best:.4g} m"
-        yield Line("yes", f"{zeta:.4g} m was chosen by hand; {told}.")
+        told = f"is as good as the Bayes optimum {best:.4g} m for the assumed drift"
+        yield Line("yes", f"{zeta:.4g} m, set by hand, {told}, {assumed['drift_m_s']:.4g} m/s.")
     else:
-        told = f"the Bayes optimum for the assumed drift is {best:.4g} m: the risk is {100 * excess:.2g} % higher"
-        yield Line("partly", f"{zeta:.4g} m was chosen by hand; {told}.")
+        told = f"the Bayes optimum for the assumed drift of {assumed['drift_m_s']:.4g} m/s is {best:.4g} m"
+        yield Line("partly", f"{zeta:.4g} m was chosen by hand; {told}, and the risk is {100 * excess:.2g} % higher.")
     real = {
         name: (abs(log(row["optimum_for_this_drift_m"] / zeta)), row)
         for name, row in found.get("runs", {}).items()
@@ -359,11 +359,9 @@ def _choice(found: Mapping[str, Any], assumed: Mapping[str, Any]) -> Iterator[Li
         run, _, robot = name.partition(" ")
         row = real[name][1]
         wanted = row["optimum_for_this_drift_m"]
-        drifts = f"{robot} drifted at {row['drift_m_s']:.2g} m/s, not at the assumed {assumed['drift_m_s']:.4g} m/s"
-        late = "late" if zeta > wanted else "early"
-        yield Line(
-            "partly", f"In run {run}, {drifts}. {wanted:.2g} m is best for that: {zeta:.4g} m calls the UAV {late}."
-        )
+        late = f"{zeta:.4g} m calls the UAV {'late' if zeta > wanted else 'early'}"
+        told = f"{robot} drifted at {row['drift_m_s']:.2g} m/s: for that, {wanted:.2g} m is best, and {late}"
+        yield Line("partly", f"In run {run}, {told}.")
 
 
 def _paper(document: Document) -> Iterator[Line]:
