@@ -27,8 +27,9 @@ class Near(NamedTuple):
     t_s: float
 
     def told(self) -> str:
-        """The distance and from whom."""
-        return f"{distance(self.value_m, self.required_m)} ({self.robot} to {self.other})"
+        """The distance, of whom, and whether it was there from the start."""
+        start = ", at the start" if self.t_s == 0.0 else ""
+        return f"{distance(self.value_m, self.required_m)} ({self.robot} to {self.other}{start})"
 
 
 @dataclass
