@@ -82,8 +82,8 @@ def _sign() -> Item:
     return {
         "id": 7,
         "where": "Table 1",
-        "finding": "UGV2's preset trajectory prints x = 1.3 m; there UGV2 stalls, though the paper says that it "
-        "completes on its own. With x = -1.3 m it completes.",
+        "finding": "The paper prints x = 1.3 m for UGV2's preset trajectory and says that UGV2 arrives on its own. "
+        "With x = 1.3 m it stalls; with x = -1.3 m it arrives.",
         "paper": {"x_m": 1.3, "arrives": evidence["printed"]["arrives"]},
         "ours": {"x_m": -1.3, "arrives": evidence["ours"]["arrives"]},
         "unit": "m",
@@ -117,10 +117,10 @@ def _soft_gate() -> Item:
     return {
         "id": 10,
         "where": "(26d)-(26e)",
-        "finding": "The soft constraint is no safety guarantee: a large enough gain in task error buys an intrusion, "
-        "and the gatekeeper accepts it knowingly. Under (d) the same proposals, "
-        "keep every distance at least d, even if each is accepted and executed. This takes an error weight of "
-        f"{gate.error_weight_1_m2_s:g} beside a slack weight of {gate.slack_weight_1_m2_s:g}; with an error weight of "
+        "finding": "The soft constraint is no safety guarantee: a large enough gain in task error outweighs its "
+        "violation, and the gatekeeper accepts although it predicts the violation. Under (d) every distance stays at "
+        "least d, even if each of these proposals is accepted and executed. The failure needs an error weight of "
+        f"{gate.error_weight_1_m2_s:g} and a slack weight of {gate.slack_weight_1_m2_s:g}; with an error weight of "
         f"1 {'nothing is accepted' if not evidence[LIGHT]['accepted'] else 'it happens, too'}. The paper gives neither "
         "the weights nor a bound on them.",
         "paper": {"min_distance_m": paper["min_distance_m"], "predicted_clearance_m": predicted},
@@ -168,8 +168,8 @@ def _no_dynamics(trace: Trace) -> Item:
         "id": 11,
         "where": "(26), (27)",
         "finding": "Neither (26) nor (27) lists the kinematics (23) among its constraints. As printed the states are "
-        "free and, task errors alone counted, follow the reference exactly: accepting costs as much as refusing. "
-        f"With (23) the task errors of the two differ by {ours:.3f}, and with the price of the slack the costs (25) "
+        "free. If only task errors count, they follow the reference exactly, and accepting costs as much as refusing. "
+        f"With (23) the task errors of the two differ by {ours:.3f}. With the price of the slack, the costs (25) "
         f"differ by {with_slack:.0f}.",
         "paper": {"cost_accept_minus_refuse": printed},
         "ours": {"cost_accept_minus_refuse": ours, "cost_with_slack_accept_minus_refuse": with_slack},
@@ -219,11 +219,11 @@ def _proper_tasks(direct: Trace) -> Item:
     return {
         "id": 24,
         "where": "sections 1, 3.2, 5.2 and 6",
-        "finding": "Section 6 says 'it is assumed that UAVs can give proper intervention tasks', while section 4 and "
-        "case B are about one that is not proper: in ours it ends at the obstacle. Assumption 1 itself only says that "
-        "the UAV can give interventions; the paper does not define which are proper. Section 1 claims 'bidirectional "
-        "interventions'. No equation has them: in (14), (20) and (23) the UAV intervenes on a UGV, and only the UGVs' "
-        "positions go back to the UAV, in (9) and (15).",
+        "finding": "Section 6 says 'it is assumed that UAVs can give proper intervention tasks'. Assumption 1 only "
+        "says that the UAV can give interventions, and the paper does not define 'proper'. Section 4 and case B are "
+        "about an intervention that is not proper; in our case B it ends at the obstacle. Section 1 claims "
+        "'bidirectional interventions'. No equation contains them: in (14), (20) and (23) the UAV intervenes on a UGV, "
+        "and only the UGVs' positions go back to the UAV, in (9) and (15).",
         "paper": "interventions are proper and bidirectional",
         "ours": {"wrong_intervention_to_obstacle_m": away, "safe_distance_m": d},
         "unit": "",
@@ -252,10 +252,9 @@ def _literal_rule() -> Item:
         "where": "(28)-(29), Figures 6 and 10",
         "finding": "The paper's rule, taken literally, executes the first stage of the rounded plan at every sample. "
         "In both cases it takes an acceptance back about a second later and then accepts again, because the UGV's own "
-        "task is cheaper for a moment. Figures 6 and 10 are described as one lasting acceptance. Here an answer "
-        "changes "
-        "only by a margin and after a dwell. That holds for our choice of weights and speeds, which the paper does "
-        "not give.",
+        "task is cheaper for a moment. The paper describes one lasting acceptance in Figures 6 and 10. Here an answer "
+        "changes only by a margin and after a dwell. The finding holds for our weights and speeds; the paper gives "
+        "none.",
         "paper": {"acceptances_taken_back": reversals["literal"]},
         "ours": {"acceptances_taken_back": reversals["ours"]},
         "unit": "",

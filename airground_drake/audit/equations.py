@@ -41,12 +41,12 @@ DEVIATIONS: tuple[Deviation, ...] = (
     Deviation(
         "(3)", "velocity by the pseudoinverse", ("nsbc.task:pseudoinverse",), "changed",
         "J^+ is applied to the rate of the task, not of the configuration. It is the Moore-Penrose inverse.",
-        "The sizes fit only so. J^T (J J^T)^-1 does not exist where a task is singular.", (8,),
+        "Otherwise the sizes do not match. J^T (J J^T)^-1 does not exist where a task is singular.", (8,),
     ),
     Deviation(
         "(4)", "the same in closed loop", ("nsbc.task:Task.velocity",), "changed",
         "Error and rate are those of the task, sigma_d - sigma, not of the configuration.",
-        "The sizes fit only so.", (8,),
+        "Otherwise the sizes do not match.", (8,),
     ),
     Deviation(
         "(5)", "composition by null-space projection",
@@ -110,9 +110,10 @@ DEVIATIONS: tuple[Deviation, ...] = (
     ),
     Deviation(
         "(15)", "drift-diffusion model", ("systems.decision:DecisionVariable",), "changed",
-        "The decision variable is the norm of the task error plus integrated noise. The noise intensity of a run is "
-        "the scenario's own, and the noise may leak.",
-        "A threshold needs a number, and the error is a vector. With Table 1's 10 noise alone would trigger at once.",
+        "The decision variable is the norm of the task error plus integrated noise. The scenario sets the noise "
+        "intensity of a run; the noise may leak.",
+        "A threshold needs a number, and the error is a vector. With Table 1's intensity of 10, noise alone would "
+        "trigger at once.",
         (5,),
     ),
     Deviation("(16)", "Bayes risk", ("decision.bayes:bayes_risk",), "faithful"),
@@ -123,13 +124,13 @@ DEVIATIONS: tuple[Deviation, ...] = (
     ),
     Deviation(
         "(18)", "decision error", ("decision.bayes:error_rate",), "changed",
-        "As (17). Both are about two thresholds, where the trigger has one.", "As (17).", (3, 18),
+        "As (17). Both assume two thresholds; the trigger has one.", "As (17).", (3, 18),
     ),
     Deviation(
         "(19)", "optimal threshold", ("decision.bayes:optimal_threshold",), "changed",
         "The right-hand side is c2/c1. By default the threshold is Table 1's 3 m and (19) is not used; "
         "`decision.threshold.rule: bayes` uses it.",
-        "(16) is least there, not where (19) has c1/c2. The paper does not give the drift that its 3 m is for.",
+        "The root of (19) with c2/c1 minimises (16); the printed one does not. The paper gives no drift for its 3 m.",
         (2, 4),
     ),
     Deviation(
@@ -147,14 +148,14 @@ DEVIATIONS: tuple[Deviation, ...] = (
     Deviation(
         "(22)", "gatekeeper: choice of each UGV", _PROGRAM, "changed",
         "One number omega per stage, 1 to accept. Refusing is 1 - omega. The superscript j is left out.",
-        "The choice is there twice, as j and as the second subscript.", (22,),
+        "The paper indexes the choice twice, by j and by the second subscript.", (22,),
     ),
     Deviation(
         "(23)", "gatekeeper: predicted motion under both choices",
         ("gatekeeper.problem:Problem", "gatekeeper.problem:predicted_problem"), "changed",
         "The two velocities of a stage are taken along two roll-outs of the UGV's closed loop, accepting throughout "
         "and refusing throughout, not at the position that the plan has reached. A stage is one Euler step.",
-        "So the motion is linear in omega, as the integer program needs it. It is exact for the two constant plans.",
+        "The integer program needs a motion that is linear in omega. The motion is exact for the two constant plans.",
         (11,),
     ),
     Deviation(
@@ -165,14 +166,14 @@ DEVIATIONS: tuple[Deviation, ...] = (
         "(25)", "gatekeeper: cost", ("gatekeeper.cost:plan_cost", "gatekeeper.problem:Problem"), "changed",
         "The integral is a sum over the ends of the stages, times their length. One slack per stage serves all "
         "points. A terminal cost can be added; its weight is 0 by default.",
-        "As (27a) has it, the sum lacks the length. The paper does not give a_i and b_i.", (10, 14, 22),
+        "The sum in (27a) lacks the length. The paper does not give a_i and b_i.", (10, 14, 22),
     ),
     Deviation(
         "(26)", "gatekeeper: mixed-integer optimal control problem",
         (*_PROGRAM, "gatekeeper.mpc_gatekeeper:PaperGatekeepers"), "changed",
         "The kinematics (23) are among the constraints. (26d) is a half-plane for each point and stage, which implies "
         "the distance; the route `nonlinear` has the circles.",
-        "Without kinematics the decision does not matter. Half-planes make the program convex but for omega.",
+        "Without kinematics the decision does not matter. With half-planes only the binary omega is not convex.",
         (10, 11, 22),
     ),
     Deviation(
@@ -184,9 +185,8 @@ DEVIATIONS: tuple[Deviation, ...] = (
     ),
     Deviation(
         "(28)", "sum-up rounding: accumulated deficit", ("gatekeeper.relaxation:sum_up_rounding",), "changed",
-        "Computed under the routes `relaxed` and `nonlinear`, but not decisive: the plan is the cheapest by (25) of "
-        "the rounded one and others, such as the two constant ones. A standing answer changes only by a margin and "
-        "after a dwell.",
+        "The routes `relaxed` and `nonlinear` compute it. They return the cheapest plan by (25) among the rounded "
+        "one and others, such as the two constant ones. A standing answer changes only by a margin and after a dwell.",
         "The rounded plan can cost more than refusing throughout. The first stage alone reverses answers.", (22, 25),
     ),
     Deviation(
@@ -201,15 +201,15 @@ DEVIATIONS: tuple[Deviation, ...] = (
     Deviation(
         "Assumption 1, Remark 1", "where interventions come from",
         ("intervention.policy:Policy", "registry:POLICIES"), "changed",
-        "Interventions come from policies: a detour, a coordinated plan, and wrong ones that put the rest to the test. "
-        "Fuzzy logic, reinforcement learning and neural networks are not among them; a policy can be added.",
-        "The paper gives no intervention task, and its case B takes one that Assumption 1 excludes.", (24,),
+        "Interventions come from policies: a detour, a coordinated plan, and wrong ones for tests. None uses fuzzy "
+        "logic, reinforcement learning or neural networks; you can add a policy.",
+        "The paper gives no intervention task. Its case B uses an intervention that is not proper.", (24,),
     ),
     Deviation(
         "Table 1", "parameters", ("scenarios.load:load",), "changed",
         "`case_a`, `case_a_table1` and `case_b`; each lists under `choices` the values that are not the paper's. "
         "[How we read the table](paper.md#table-1).",
-        "Rows are scrambled in the text that we have, and one preset speed cannot give the reported times.",
+        "Rows are scrambled in our text of the paper, and no single preset speed gives the reported times.",
         (4, 5, 6, 7, 17, 21),
     ),
     Deviation("Figure 1", "geometry of the composition", (), "not realised", "A sketch; see (5)."),
@@ -244,4 +244,4 @@ DEVIATIONS: tuple[Deviation, ...] = (
         "A minimum inter-event time excludes it.", "As (20).", (9,),
     ),
 )  # fmt: skip
-"""All of the paper that a model can realise, in the paper's order."""
+"""Every place of the paper that a model can realise, in the paper's order."""

@@ -39,10 +39,10 @@ def _task_and_configuration() -> Item:
         fits = False
     return item(
         8, "(3), (27c), caption of Figure 10",
-        "(3) and (4) write rho (the configuration) where sigma (the task) is meant: for the avoidance task J^+ is 3 x "
-        "1 and rho has 3 components. Besides, (27c) still says {0, 1} where the text relaxes to [0, 1] (as printed the "
-        "rounding (28)-(29) would have nothing to round), and the caption of Figure 10 names methods (b) "
-        "and (c) the wrong way round: the text of 5.2 has the refusal under (c).",
+        "(3) and (4) write rho (the configuration) where sigma (the task) is meant. For the avoidance task J^+ is 3 x "
+        "1 and rho has 3 components, so the product is not defined. (27c) says {0, 1} where the text relaxes to "
+        "[0, 1]; as printed, the rounding (28)-(29) has nothing to round. The caption of Figure 10 swaps methods (b) "
+        "and (c): in the text of 5.2 the UGV refuses under (c).",
         "v = J^+ d(rho_d)/dt", "v = J^+ d(sigma_d)/dt",
         not fits and pseudo_inverse.shape == (3, 1),
         {
@@ -68,7 +68,7 @@ def _feed_forward(scenario: Scenario) -> Item:
     return item(
         12, "(6)",
         "(6) feeds forward the rate of the task itself, sigma_m, instead of the desired sigma_md. With J = I it reads "
-        "v = v + B error, which no velocity satisfies unless the error is 0.",
+        "v = v + B error. No velocity satisfies that unless the error is 0.",
         "v = J^+ (d(sigma_m)/dt + B error)", "v = J^+ (d(sigma_md)/dt + B error)",
         solutions == [0.0] and [len(found) for found in velocities.values()] == [0, 1],
         {
@@ -96,8 +96,8 @@ def _centroid(scenario: Scenario) -> Item:
     printed, ours = (task(1.0) - task(0.0) for task in tasks.values())  # linear: the difference is the slope
     return item(
         13, "(9)-(10)",
-        "The task value (9) is the centroid of the UGVs, which does not depend on the UAV's position: its Jacobian is "
-        "0, and so is the velocity (10). The UAV would never move.",
+        "The task value (9) is the centroid of the UGVs, which does not depend on the UAV's position. So its Jacobian "
+        "is 0, and so is the velocity (10). The UAV would never move.",
         {"task": "centroid of the UGVs", "jacobian": int(printed)},
         {"task": "own position minus the centroid", "jacobian": int(ours)},
         printed == 0 and ours == 1,
@@ -118,8 +118,8 @@ def _grid_points() -> Item:
     printed, ours = as_printed[stages], corrected[stages]
     return item(
         14, "(27a)",
-        "(27a) discretises the integral (25) over N intervals by a sum over k = 0..N, N + 1 terms, without the "
-        "interval's length: for the integrand 1 it gives 61 where the integral is 3 s.",
+        "(27a) replaces the integral (25) over N intervals by a sum over k = 0..N. That has N + 1 terms, and lacks "
+        "the length of an interval. For the integrand 1 it gives 61; the integral is 3 s.",
         printed, ours, not math.isclose(printed, horizon) and math.isclose(ours, horizon),
         {"integrand": 1.0, "horizon_s": horizon, "stages": stages, "integral_s": horizon, "sums": sums},
     )  # fmt: skip
@@ -137,8 +137,8 @@ def _rule_three() -> Item:
     return item(
         15, "section 3.1.3, rule (3)",
         "Rule (3) lets the lowest task's dimension exceed what the higher ones leave, 'so that n is ensured to be "
-        "greater than the total dimension': it then is smaller. And the introduction to section 3 says that an "
-        "intervention is triggered when the threshold is *not* reached, against (20).",
+        "greater than the total dimension'. Then n is smaller. Besides, the introduction to section 3 says that an "
+        "intervention is triggered when the threshold is *not* reached. That contradicts (20).",
         "m_r > n - sum of the others, so that n > the total", "m_r > n - sum of the others means n < the total",
         lowest > n - others and not n > others + lowest and all(smaller),
         {
@@ -156,10 +156,9 @@ def _null_space() -> Item:
     partly = np.eye(3) - np.linalg.pinv(one_axis) @ one_axis
     return item(
         16, "(20), (23)",
-        "Where the intervention is a position, J_int = I, (20) executes nothing of the UGV's own task, avoidance "
-        "included, although the text says that it is partly executed. The paper does not say what J_int is: the "
-        "identity is our choice, and the reason why UGV1 crashes in our case B, method (b). Under an intervention in "
-        "one direction something of the own task is left.",
+        "If the intervention is a position (J_int = I), (20) executes nothing of the UGV's own task, nor avoidance. "
+        "The text says that the own task is partly executed. The paper does not define J_int. We use the identity, "
+        "so UGV1 crashes in our case B, method (b). An intervention in one direction leaves part of the own task.",
         {"rank_of_the_null_space": int(np.linalg.matrix_rank(left))},
         {"rank_for_an_intervention_in_one_direction": int(np.linalg.matrix_rank(partly))},
         not left.any() and bool(partly.any()),
@@ -176,13 +175,12 @@ def _one_speed(scenario: Scenario) -> Item:
     third = travelled["case_b"] / late_s
     return item(
         17, "Table 1, section 5, Figure 10",
-        f"One Table 1 serves both cases, but triggers at 14.45 s and at 10.6 s need reference speeds of "
-        f"{speed['case_a']:g} and {speed['case_b']:g} m/s: with the other case's speed case A would trigger about "
-        f"{crossed['case_a']:.1f} s, case B about {crossed['case_b']:.1f} s. The caption of Figure 10 has wrong "
-        f"interventions 'after {late_s:g} s' in one method and at 10.6 s in the other. If they begin at that time, "
-        f"this needs a third speed, {third:.4f} m/s, although the methods of a case do not differ before the "
-        f"trigger. The "
-        f"caption may only mean that they still go on then.",
+        f"Table 1 has one speed for both cases, but triggers at 14.45 s and 10.6 s need reference speeds of "
+        f"{speed['case_a']:g} and {speed['case_b']:g} m/s. With the other case's speed, case A would trigger at about "
+        f"{crossed['case_a']:.1f} s and case B at about {crossed['case_b']:.1f} s. The caption of Figure 10 mentions "
+        f"wrong interventions 'after {late_s:g} s' in one method and at 10.6 s in the other. If the first begin at "
+        f"{late_s:g} s, that needs a third speed, {third:.4f} m/s, although the methods of a case do not differ "
+        f"before the trigger. The caption may only mean that they still last at {late_s:g} s.",
         {"trigger_s": {"case_a": 14.45, "case_b": 10.6}, "speed_m_s": 1.0}, {"speed_m_s": speed},
         abs(travelled["case_a"] - travelled["case_b"]) < 0.1 and abs(speed["case_a"] - speed["case_b"]) > 0.1,
         {

@@ -32,10 +32,10 @@ def _intervention_rate(scenario: Scenario) -> Item:
         }
     return item(
         19, "(12)-(14)",
-        "(13) gives the rate of the intervention task as J_int v_int, with the velocity that (14) is to find. Put into "
-        "(14), v = J^+ (J v + gain error): no velocity solves it unless the error is 0, and then every velocity along "
-        "the task does. Besides, (12) makes the desired task a function of the UGV's own position, so that the error "
-        "is 0. What is meant: a desired place with its own rate.",
+        "(13) gives the rate of the intervention task as J_int v_int, which contains the velocity that (14) defines. "
+        "(14) then reads v = J^+ (J v + gain error). No velocity solves it unless the error is 0; then every velocity "
+        "along the task does. Besides, (12) makes the desired task a function of the UGV's own position, so the error "
+        "is 0. The paper must mean a desired position with its own rate.",
         "v_int = J^+ (J v_int + gain error)", "v_int = J^+ (d(sigma_d)/dt + gain error)",
         all(each["least_residual_m_s"] > 0.1 and each["free_dimensions_without_error"] > 0 for each in found.values()),
         {"gain_1_s": gain, "error_m": error, "by_task": found, "(12)": "by reading"},
@@ -53,9 +53,9 @@ def _stall(scenario: Scenario) -> Item:
     point = min(middle + across, middle - across, key=lambda p: dist(p, printed))
     return item(
         20, "section 5.1, Figure 5",
-        f"UGV1 is said to stall at ({printed[0]:g}, {printed[1]:g}), at a distance 'constant at 2 m'. From that point "
-        f"the obstacles are {away[0]:.3f} and {away[1]:.3f} m away. The point {d:g} m from both is "
-        f"({point[0]:.3f}, {point[1]:.3f}), where x would round to {point[0]:.1f}. 3.3 m is the x of the preset "
+        f"The paper says that UGV1 stalls at ({printed[0]:g}, {printed[1]:g}), at a distance 'constant at 2 m'. The "
+        f"obstacles are {away[0]:.3f} and {away[1]:.3f} m from that point. The point {d:g} m from both is "
+        f"({point[0]:.3f}, {point[1]:.3f}); its x would be printed as {point[0]:.1f}. 3.3 m is the x of the preset "
         f"trajectory.",
         {"stall_m": list(printed), "distances_m": away},
         {"stall_m": point.tolist(), "distances_m": [dist(point, centre) for centre in centres]},
@@ -72,8 +72,8 @@ def _uav_target(scenario: Scenario) -> Item:
     away = dist(target, centroid)
     return item(
         21, "Table 1, (9)",
-        f"Table 1 sends the UAV to x = {target[0]:g} m, but its formation task keeps it over the centroid of the UGVs, "
-        f"which ends at {centroid[0]:g} m. The UAV has no task that moves it to a target of its own.",
+        f"Table 1 gives the UAV a target at x = {target[0]:g} m. Its formation task keeps it over the centroid of the "
+        f"UGVs, which ends at {centroid[0]:g} m. No task moves the UAV to its target.",
         {"target_m": target}, {"centroid_m": centroid}, away > 1e-6, {"apart_m": away}, unit="m",
     )  # fmt: skip
 
@@ -89,11 +89,11 @@ def _indices() -> Item:
     two_velocities = [choice for choice in choices if choice[0] != choice[1]]
     return item(
         22, "(5), (22)-(29)",
-        "The indices do not fit. (5) goes through N tasks and sets v^(n+1) = 0, where n is the dimension of the "
-        "velocity: it needs v^(N+1). In (22)-(24) the choice is there twice, as the superscript j and as the second "
+        "The indices do not fit. (5) runs over N tasks, so it needs v^(N+1) = 0, but it sets v^(n+1) = 0, where n is "
+        "the dimension of the velocity. (22)-(24) index the choice twice, by the superscript j and by the second "
         f"subscript: (24) admits {len(choices)} choices for each UGV, and {len(two_velocities)} of them give (23) two "
-        "velocities at once. In (28)-(29) j alone is the choice, and the UGV's index i is missing; r is a stage in "
-        "(28) and a choice in (29). (25) and (26) use i in a sum and as a free index.",
+        "velocities at once. (28)-(29) index the choice by j alone and lack the UGV's index i; r is a stage in (28) "
+        "and a choice in (29). (25) and (26) use i both as a summation index and as a free index.",
         {"choices": len(choices)}, {"choices": 2},
         len(choices) == 4 and len(two_velocities) == 2 and dimension != tasks,
         {

@@ -43,7 +43,7 @@ def _recursion(scenario: Scenario, traces: Mapping[str, Trace]) -> dict[str, Any
         )
         if nearest is None:
             return None
-        (value, t_s, obstacle), robot = nearest
+        (value, t_s, obstacle, _), robot = nearest
         stalled = {ugv: at for ugv in trace.ugvs if (at := MEASURES["stall_position"](trace, ugv))}
         kind = "printed" if name in printed else "augmented"
         margin_m[kind] = min(margin_m[kind], value - d)

@@ -46,7 +46,7 @@ def _upside_down(proofs: Mapping[str, Finding]) -> Item:
     shown = abs(found.x - ours) < 1e-6 and risk["printed"] > risk["ours"] and status(proofs, "THR-OPT") == "proved"
     return item(
         2, "(19)",
-        "The right-hand side of (19) is upside down: the Bayes risk (16) is least where the left-hand side is c2/c1.",
+        "The right-hand side of (19) is inverted: the Bayes risk (16) is least where the left-hand side is c2/c1.",
         {"root_m": printed, "risk": risk["printed"]},
         {"root_m": ours, "risk": risk["ours"]},
         shown,
@@ -71,8 +71,8 @@ def _seconds(proofs: Mapping[str, Finding]) -> Item:
     unbiased = optimal_threshold(drift, noise, C1, C2)
     return item(
         3, "(17)-(19)",
-        "(17) and (18) take the initial deviation in seconds (metres over drift); in metres they are wrong. (19), with "
-        "c2/c1 too, is stationary for (16) only without initial deviation.",
+        "(17) and (18) need the initial deviation in seconds (metres over drift); with metres they are wrong. The root "
+        "of (19), even with c2/c1, minimises (16) only without initial deviation.",
         {"decision_time_s": printed}, {"decision_time_s": ours},
         abs(ours - exact) < 1e-6 and abs(printed - exact) > 1e-2 and abs(biased.x - unbiased) > 1e-3,
         {
@@ -107,8 +107,8 @@ def _optimal_drift(scenario: Scenario) -> Item:
         f"zeta = {zeta:g} m is the root of (19) as printed (with sigma = {noise:g}) for drifts of {_listed(printed)} "
         f"m/s only, and the Bayes-optimal threshold (with c2/c1) for {_listed(drifts)} m/s only. In case A the "
         f"reference leaves the stalled UGV at {own:g} m/s, for which {by_drift[own]:.2f} m would be optimal. The paper "
-        f"gives no drift. Of the four, {drifts[0]:.3f} m/s is about the motion gain times the task error at the "
-        f"threshold, {gain_times_error:g} m/s.",
+        f"gives no drift. One of the four, {drifts[0]:.3f} m/s, is close to the motion gain times the task error at "
+        f"the threshold, {gain_times_error:g} m/s.",
         {"zeta_m": zeta, "drift_m_s": printed}, {"drift_m_s": drifts},
         len(drifts) == len(printed) == 2
         and all(abs(optimal_threshold(a, noise, c1, c2) - zeta) < 1e-9 for a in drifts)
@@ -148,10 +148,10 @@ def _intensity(scenario: Scenario) -> Item:
     before = 2.0 * float(norm.sf(zeta / (noise * math.sqrt(REPORTED_TRIGGER_S))))
     return item(
         5, "Table 1, (15)",
-        f"sigma_j = {noise:g} cannot be the noise intensity of (15): noise alone would reach +{zeta:g} m, the one "
-        f"threshold of the trigger (20), in {1e3 * half:.0f} ms in half of all runs, and in {100.0 * before:.0f} % "
-        f"before the reported {REPORTED_TRIGGER_S:g} s (the mean is infinite). The two thresholds of (17)-(18) it "
-        f"would reach in {1e3 * both:.0f} ms on average.",
+        f"sigma_j = {noise:g} cannot be the noise intensity of (15). Noise alone would reach +{zeta:g} m, the "
+        f"threshold of the trigger (20), within {1e3 * half:.0f} ms in half of all runs, and before the reported "
+        f"{REPORTED_TRIGGER_S:g} s in {100.0 * before:.0f} % (the mean time is infinite). With the two thresholds of "
+        f"(17)-(18), the mean time would be {1e3 * both:.0f} ms.",
         {"trigger_s": REPORTED_TRIGGER_S}, {"median_first_passage_s": half, "mean_of_two_thresholds_s": both},
         abs(both - exact) < 1e-6 and both < half < 0.02 * REPORTED_TRIGGER_S and before > 0.9,
         {
@@ -170,10 +170,9 @@ def _zeno(proofs: Mapping[str, Finding]) -> Item:
     shown = found == {"ZENO-REFINE": "supported", "ZENO-PROOF": "proved"}
     return item(
         9, "(15), (20), section 6",
-        "Zeno behaviour, the paper's open question: if the error is at the threshold, a bare threshold on (15) "
-        "triggers without bound: the number of triggers grows like one over the square root of the noise step. "
-        "Hysteresis and a "
-        "minimum inter-event time exclude that, whatever the noise.",
+        "The paper leaves Zeno behaviour open. If the error is at the threshold, a bare threshold on (15) triggers "
+        "without bound: the number of triggers grows like one over the square root of the noise step. Hysteresis and "
+        "a minimum inter-event time exclude that, whatever the noise.",
         {"triggers": refined["bare"]["mean"] if shown else None},
         {"triggers": refined["automaton"]["mean"] if shown else None},
         shown,
@@ -207,9 +206,9 @@ def _one_threshold() -> Item:
     return item(
         18, "(16)-(20)",
         "(17) and (18) are the decision time and error rate of two thresholds, +zeta and -zeta; the trigger (20) has "
-        "only +zeta. While the drift is positive, such a trigger never decides wrongly. It only takes longer, zeta "
-        "over drift on average. So there is no error to trade against time, and (16) would be least at zeta = 0. And "
-        "(20) compares a difference of positions with a number; its norm, which the trigger needs, cannot reach -zeta. "
+        "only +zeta. While the drift is positive, such a trigger never decides wrongly; it takes zeta over drift on "
+        "average. Without errors, (16) is least at zeta = 0. Besides, (20) compares a difference of positions with a "
+        "number; its norm, which the trigger needs, cannot reach -zeta. "
         f"The numbers are those of Table 1. The drift of {rule.drift_m_s:g} m/s is assumed, because the table "
         f"does not give it.",
         {"time_s": ours["time_17_s"], "error_rate": ours["error_rate_18"]},

@@ -62,8 +62,6 @@ def write(
     for figure in draw.draw(scenario, traces, settings):
         names = []
         for number, panel in enumerate(figure.panels, start=1):
-            if panel.drawing is None:
-                continue
             names.append(f"{figure.id}_{number}" if len(figure.panels) > 1 else figure.id)
             for kind in formats:
                 buffer = io.BytesIO()
@@ -71,8 +69,7 @@ def write(
                     panel.drawing.savefig(buffer, format=kind, metadata=_undated(kind))
                 files.write_bytes(folder / f"{names[-1]}.{kind}", buffer.getvalue())
                 yield folder / f"{names[-1]}.{kind}"
-        if names:
-            texts.append(_environment(figure, names, WIDTHS[style], report))
+        texts.append(_environment(figure, names, WIDTHS[style], report))
     tables = {"verdicts.tex": latex.verdicts(report)}
     if report["reproduction"]:
         tables["reproduction.tex"] = latex.reproduction(report)

@@ -1,8 +1,8 @@
 """Cost (25) of one UGV with the soft constraint (26d)-(26e): the one place where its form is written.
 
-Everything that evaluates a plan, a stage or a branch of a search does so by `add_stage`. What reasons about (25)
-without evaluating it stands on the same form, and changes with it: the quadratic costs of `convex_program` and
-`routes.nonlinear`, weak duality in `dual_bound`, and the task error that cannot be avoided in `reachable_box`.
+All code that evaluates a plan, a stage or a branch of a search calls `add_stage`. Some code assumes the form of (25)
+without evaluating it, and must change with it: the quadratic costs of `binary_program` and `routes.nonlinear`, and in
+`relaxation` the weak duality of `dual_bound` and the unavoidable task error of `remaining_cost`.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
-from airground_drake.registry import METHODS
+from airground_drake.registry import method_of
 from airground_drake.replay.proposals import Sent, sent
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
@@ -53,6 +53,7 @@ def scene(trace: Trace, scenario: Scenario) -> Scene:
 
     Raises:
         TraceError: if the trace lacks a column or holds numbers that are not finite.
+        UnknownNameError: if its metadata name a method that there is not.
     """
     times = frame_times(trace.t)
     still = stage(scenario, np.concatenate([trace.position(robot) for robot in trace.robots]))
@@ -69,7 +70,7 @@ def scene(trace: Trace, scenario: Scenario) -> Scene:
         **{**vars(still), "robots": bodies},
         scenario=scenario.name,
         run=trace.run,
-        says=f"method ({method}), {METHODS[method].says}",
+        says=f"method ({method}), {method_of(method).says}",
         times_s=times,
         proposals=sent(trace),
         events=tuple(trace.events),

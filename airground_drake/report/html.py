@@ -19,6 +19,7 @@ from markupsafe import Markup
 
 from airground_drake.base.statuses import PASSING, outcome
 from airground_drake.report import attention, evidence, summary
+from airground_drake.report.compare import is_rounding
 from airground_drake.report.figures import svg
 from airground_drake.report.figures.canvas import DARK
 from airground_drake.report.figures.panels import Figure, Table
@@ -92,11 +93,14 @@ def render(document: Mapping[str, Any], figures: Sequence[Figure], diagram_svg: 
     distances = _distances(document["runs"])
     claims = document["claims"]
     plates: dict[str, list[Figure]] = {}
+    beside: dict[str, list[Figure]] = {}
     for figure in figures:
-        if not figure.beside:
+        if figure.beside:
+            beside.setdefault(figure.beside, []).append(figure)
+        else:
             plates.setdefault(PLACES.get(figure.id, "happened"), []).append(figure)
     diagram = _diagram(diagram_svg, str(document["scenario"]["name"]))
-    shown = {
+    sections = {
         "happened": bool(document["runs"]),
         "safe": bool(distances),
         "intervened": "intervened" in plates or any(r["metrics"]["gatekeeper"] for r in document["runs"].values()),
@@ -105,7 +109,7 @@ def render(document: Mapping[str, Any], figures: Sequence[Figure], diagram_svg: 
         "audit": bool(document["audit"]),
         "diagram": bool(diagram),
     }
-    return _environment().get_template("report.html.j2").render(
+    return environment().get_template("report.html.j2").render(
         report=document,
         headline=summary.headline(document),
         answers=summary.answers(document),
@@ -114,28 +118,31 @@ def render(document: Mapping[str, Any], figures: Sequence[Figure], diagram_svg: 
         beware=summary.do_not_conclude(document),
         declared=summary.as_declared(document),
         legend=summary.legend(document),
-        sections=[(name, title) for name, title in SECTIONS.items() if shown.get(name, True)],
+        sections=[(name, title) for name, title in SECTIONS.items() if sections.get(name, True)],
         plates=plates,
-        beside=_beside(figures),
+        beside=beside,
         diagram=diagram,
         groups=_by_claim(claims),
         outcomes=list(dict.fromkeys(map(_shown, claims))),
         attention=attention.items(document),
         assumptions=_assumptions(claims),
-        distances=sorted(distances, key=_margin)[:MAX_DISTANCE_ROWS],
+        distances=sorted(distances, key=lambda row: float(row["margin"]))[:MAX_DISTANCE_ROWS],
         left_out=max(0, len(distances) - MAX_DISTANCE_ROWS),
     )  # fmt: skip
 
 
 @cache
-def _environment() -> Environment:
+def environment() -> Environment:
+    """The environment of the report's page and of those beside it."""
     environment = environment_of("airground_drake.report")
     style = stylesheet()
     scripts = [_template(name) for name in SCRIPTS]
     environment.filters.update(
         num=number, value=value, yaml=as_yaml, together=attention.faults_together, inline=Markup, mathml=mathml,
         evidence=evidence_tables, proof=place, records=partial(evidence.tables, number=number), brief=brief,
+        shown=shown,
     )  # fmt: skip
+    environment.tests["rounding"] = is_rounding
     environment.globals.update(
         chips=CHIPS, shown=_shown, refused=attention.REFUSED, max_faults=MAX_FAULTS,
         marks=summary.MARKS, kinds=LOOKS, names=summary.MEANINGS,
@@ -191,15 +198,6 @@ def evidence_tables(claim: Mapping[str, Any]) -> list[Table]:
     ]
 
 
-def _beside(figures: Sequence[Figure]) -> dict[str, list[Figure]]:
-    """Figures by what they are shown beside."""
-    found: dict[str, list[Figure]] = {}
-    for figure in figures:
-        if figure.beside:
-            found.setdefault(figure.beside, []).append(figure)
-    return found
-
-
 def number(x: Any, digits: int = 4) -> str:
     """A number for reading, a dash for none."""
     if x is None:
@@ -232,6 +230,17 @@ def brief(x: Any, unit: str = "") -> str:
     if isinstance(x, bool):
         return "yes" if x else "no"
     return f"{number(x, 5)} {unit}".strip() if isinstance(x, int | float) else str(x)
+
+
+def shown(x: Any) -> str:
+    """What a change between two reports has on one side, for reading."""
+    if isinstance(x, dict):
+        return ", ".join(f"{name} {shown(item)}" for name, item in x.items())
+    if isinstance(x, list):
+        return f"({', '.join(map(shown, x))})"
+    if isinstance(x, bool):
+        return "yes" if x else "no"
+    return number(x, 6) if isinstance(x, int | float) else str(x or "none").replace("_", " ")
 
 
 def as_yaml(x: Any) -> str:
@@ -306,7 +315,3 @@ def _distances(runs: Mapping[str, Mapping[str, Any]]) -> list[dict[str, Any]]:
         for robot, others in entry["metrics"][kind].items()
         for other, found in others.items()
     ]
-
-
-def _margin(row: Mapping[str, Any]) -> float:
-    return float(row["margin"])

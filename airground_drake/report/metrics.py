@@ -11,8 +11,10 @@ import numpy as np
 
 from airground_drake.base.arrays import Array
 from airground_drake.run.trace import Trace
+from airground_drake.scenarios.world import make_world
 from airground_drake.verify.engines.geometry import Approach, closest_approach
 from airground_drake.verify.runs.pairs import apart_of, least_of, pairs_of
+from airground_drake.world.world import World
 
 MOST_OBSTACLES = 20
 """Maximum number of obstacles listed per robot."""
@@ -22,16 +24,8 @@ NEAR_OBSTACLES, NEAR_ROBOTS = 3, 1
 """Numbers of obstacles and robots that count as close by."""
 
 
-class Closest(NamedTuple):
-    """Smallest distance of surfaces over continuous time: its value in m, when (s), and to what."""
-
-    value: float
-    t_s: float
-    other: str
-
-
 class Nearby(NamedTuple):
-    """The same, and the distance of surfaces that is required, m."""
+    """Smallest distance of surfaces over continuous time, m, when, s, to what, and the distance required, m."""
 
     value: float
     t_s: float
@@ -151,10 +145,9 @@ def _closest_call(trace: Trace) -> dict[str, Any] | None:
     }
 
 
-def closest_obstacle(trace: Trace, robot: str) -> Closest | None:
+def closest_obstacle(trace: Trace, robot: str) -> Nearby | None:
     """Smallest distance of a robot to any obstacle over continuous time, exact; None without obstacles."""
-    near = _surfaces(trace, robot, _to_obstacles(trace, robot))
-    return min((Closest(*found[:3]) for found in near), default=None)
+    return min(_surfaces(trace, robot, _to_obstacles(trace, robot)), default=None)
 
 
 def close_by(trace: Trace, robot: str) -> list[Nearby]:
@@ -170,14 +163,14 @@ def _surfaces(trace: Trace, robot: str, found: dict[str, dict[str, float]]) -> l
     return [
         Nearby(at["value"] - radii, at["t_s"], other, at["safe_distance_m"] - radii)
         for other, at in found.items()
-        for radii in [radii_m(trace, robot, other)]
+        for radii in [radius_m(trace, robot) + radius_m(trace, other)]
     ]
 
 
 def gap_m(trace: Trace, robot: str, other: str) -> Array:
     """Distance of the surfaces of a robot and an obstacle or another robot at the rows, (T,), m."""
     apart: Array = np.linalg.norm(trace.position(robot) - place(trace, other), axis=1)
-    return apart - radii_m(trace, robot, other)
+    return apart - (radius_m(trace, robot) + radius_m(trace, other))
 
 
 def place(trace: Trace, name: str) -> Array:
@@ -189,15 +182,8 @@ def place(trace: Trace, name: str) -> Array:
 
 def safe_distance_m(trace: Trace, robot: str, other: str) -> float:
     """The safe distance of centres that the scenario sets for a robot and an obstacle or another robot, m."""
-    scenario, safe = trace.scenario, trace.scenario.safe_distance
-    if other in scenario.obstacles:
-        return safe.obstacle_m + radii_m(trace, robot, other)
-    return (safe.air_ground_m if scenario.uav.name in (robot, other) else safe.ugv_m) + radii_m(trace, robot, other)
-
-
-def radii_m(trace: Trace, one: str, other: str) -> float:
-    """Both radii of a robot or an obstacle and another one, m."""
-    return radius_m(trace, one) + radius_m(trace, other)
+    world: World = trace.derived("world", lambda: make_world(trace.scenario))
+    return world.pair(robot, other).distance_m
 
 
 def radius_m(trace: Trace, name: str) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from math import dist
 from typing import Any, NamedTuple
 
 from airground_drake.base.statuses import PASSING, UNDECIDED
@@ -26,8 +27,9 @@ class Near(NamedTuple):
     t_s: float
 
     def told(self) -> str:
-        """The distance and from whom."""
-        return f"{distance(self.value_m, self.required_m)} ({self.robot} to {self.other})"
+        """The distance, of whom, and whether it was there from the start."""
+        start = ", at the start" if self.t_s == 0.0 else ""
+        return f"{distance(self.value_m, self.required_m)} ({self.robot} to {self.other}{start})"
 
 
 @dataclass
@@ -108,7 +110,7 @@ def _course(document: Document, name: str, spec: Mapping[str, Any]) -> Course:
     off = {
         robot: ends[robot]
         for robot, target in targets.items()
-        if robot not in ends or _apart(ends[robot], target) > resolved["arrival_tolerance_m"]
+        if robot not in ends or dist(ends[robot], target) > resolved["arrival_tolerance_m"]
     }
     if len(off) > 1:
         off.pop(uav["name"], None)  # it follows the UGVs: where they are not home, neither is it
@@ -161,7 +163,3 @@ def distance(value_m: float, required_m: float) -> str:
     while value_m < required_m - SLACK_M and float(f"{value_m:.{decimals}f}") >= required_m and decimals < 9:
         decimals += 1
     return f"{value_m:.{decimals}f} m"
-
-
-def _apart(one: Sequence[float], other: Sequence[float]) -> float:
-    return float(sum((a - b) ** 2 for a, b in zip(one, other, strict=True)) ** 0.5)

@@ -6,6 +6,7 @@ Marks follow what happened in the runs. Whether the scenario declared it so is a
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from math import log
 from textwrap import wrap
 from typing import Any, NamedTuple
 
@@ -33,7 +34,7 @@ MAX_NAMES = 3
 WORDS_OF_REFUSALS = {
     "waits": "waiting looked cheaper",
     "first_stage": "waiting looked cheaper",
-    "not_cheaper": "its own task looked as good",
+    "not_cheaper": "the UGV's own task looked as good",
     "no_difference": "it would have changed nothing",
     "no_plan": "no outcome could be computed",
     "stalls": "it would have stalled on the way",
@@ -134,9 +135,12 @@ def do_not_conclude(document: Document) -> list[str]:
     said = ["real vehicles are safe: the model is first-order, its sensing perfect"]
     seen = [course for course in every if course.safe and not (course.method == "d" and proved_for_d(document, every))]
     if seen:
-        said.append(f"{_methods(seen)} {'is' if _one(seen) else 'are'} safe elsewhere: seen in these runs only")
+        said.append(
+            f"{_methods(seen)} {'is' if _one(seen) else 'are'} also safe elsewhere: that was only seen in these runs"
+        )
     if any(course.away == {} for course in every):
-        said.append("all arrive from other starts or with other seeds: arrival is seen, not proved")
+        who = "all" if all(course.away == {} for course in every) else "those that arrive here"
+        said.append(f"{who} also arrive from other starts or with other seeds: arrival is seen, not proved")
     if document["runs"] and not _triggers(document):
         said.append("the UAV helps: it was never called")
     if any(course.safe is None for course in every):
@@ -150,9 +154,11 @@ def as_declared(document: Document) -> Line:
     if overall["status"] != "as_expected":
         return Line("no" if overall["status"] == "not_as_expected" else "open", str(overall["why"]))
     failed = sum(claim["status"] == "refuted" and not admits_either(claim["expected"]) for claim in claims)
+    open_ones = sum(claim["status"] in UNDECIDED for claim in claims)
     idle = sum(outcome(claim["status"], claim["exercised"]) == NOT_EXERCISED for claim in claims)
     parts = [
         f"{failed} deliberate failure{'s' * (failed != 1)}" if failed else "",
+        f"{open_ones} undecided" if open_ones else "",
         f"{idle} not tested" if idle else "",
         f"{len(overall['either'])} allowed either way" if overall["either"] else "",
     ]
@@ -178,7 +184,7 @@ def text(document: Document) -> str:
 
 def _table(rows: Sequence[Row], required: str) -> list[str]:
     """The table of methods in columns of equal width."""
-    cells = [["", "method", f"safe? ({required})", "arrived?", "interventions"]]
+    cells = [["", "method", f"safe? ({required})", "arrived?", "UAV proposals"]]
     for row in rows:
         safe, arrived = (f"[{MARKS[mark]}] {says}" for mark, says in (row.safe, row.arrived))
         cells.append([row.run, row.method, safe, arrived, row.interventions])
@@ -232,7 +238,9 @@ def _safe(document: Document, every: Sequence[Course]) -> Iterator[Line]:
     if printed:
         worst = min(printed, key=lambda course: course.near[:1])
         declared = "".join(dict.fromkeys(_declared(document, course) for course in printed))
-        yield Line("no", f"Recursion (5) as printed: {_intrusion(worst)}{declared}.")
+        runs = "1 run" if len(printed) == 1 else f"{len(printed)} runs"
+        home = "all arrive, but " if all(course.away == {} for course in printed) else ""
+        yield Line("no", f"{runs} with recursion (5) as printed: {home}{_intrusion(worst)}{declared}.")
 
 
 def _proof(document: Document, every: Sequence[Course]) -> Line:
@@ -303,8 +311,8 @@ def _zeno(document: Document) -> Iterator[Line]:
         smallest = f"; the smallest is {least:.3f} s" if least is not None else ""
         yield Line("", f"Seen: {sum(claim['exercised'] for claim in seen)} gaps between triggers{smallest}.")
     elif claims and not bad:
-        most = "at most one trigger per UGV and run" if _triggers(document) else "nothing triggered"
-        yield Line("", f"Not tested here: {most} (see scenario dwell).")
+        why = "no UGV triggers twice" if _triggers(document) else "nothing triggered"
+        yield Line("", f"These runs cannot show it: {why}. Scenario dwell does.")
 
 
 def _threshold(document: Document) -> Iterator[Line]:
@@ -326,27 +334,34 @@ def _threshold(document: Document) -> Iterator[Line]:
         yield Line("yes", f"Fired at {zeta} m, {when}; none missed, none spurious.")
     for claim in document["claims"]:
         if claim["id"] == "THR-CHOICE" and "optimal_threshold_m" in claim["evidence"]:
-            yield from _choice(claim["evidence"])
+            yield from _choice(claim["evidence"], claim["inputs"])
 
 
-def _choice(found: Mapping[str, Any]) -> Iterator[Line]:
-    """How good the threshold is: for the assumed drift, and for that of the first robot that triggered."""
+def _choice(found: Mapping[str, Any], assumed: Mapping[str, Any]) -> Iterator[Line]:
+    """How good the threshold is: for the assumed drift, and for the drift in the runs that calls for another most."""
     zeta, best = found["threshold_in_force_m"], found["optimal_threshold_m"]
     excess = found["extra_risk"] / found["least_risk"]
     if found["kind"] != "declared":
         yield Line("yes", f"{zeta:.4g} m is the Bayes optimum for the assumed drift and noise.")
     elif excess < NEGLIGIBLE:
-        yield Line("yes", f"{zeta:.4g} m is as good as the Bayes optimum for the assumed drift, {best:.4g} m.")
+        told = f"is as good as the Bayes optimum {best:.4g} m for the assumed drift"
+        yield Line("yes", f"{zeta:.4g} m, set by hand, {told}, {assumed['drift_m_s']:.4g} m/s.")
     else:
-        told = f"the Bayes optimum for the assumed drift is {best:.4g} m: the risk is {100 * excess:.2g} % higher"
-        yield Line("partly", f"{zeta:.4g} m was chosen by hand; {told}.")
-    for name, row in found.get("runs", {}).items():
+        told = f"the Bayes optimum for the assumed drift of {assumed['drift_m_s']:.4g} m/s is {best:.4g} m"
+        yield Line("partly", f"{zeta:.4g} m was chosen by hand; {told}, and the risk is {100 * excess:.2g} % higher.")
+    real = {
+        name: (abs(log(row["optimum_for_this_drift_m"] / zeta)), row)
+        for name, row in found.get("runs", {}).items()
+        if row.get("optimum_for_this_drift_m")
+    }
+    if real:
+        name = max(real, key=lambda each: real[each][0])
         run, _, robot = name.partition(" ")
-        real = row.get("optimum_for_this_drift_m")
-        if real is not None:
-            told = f"In run {run}, {robot} drifted at {row['drift_m_s']:.2g} m/s; for that drift, {real:.2g} m is best"
-            yield Line("partly", f"{told}: {zeta:.4g} m calls the UAV {'late' if zeta > real else 'early'}.")
-        return
+        row = real[name][1]
+        wanted = row["optimum_for_this_drift_m"]
+        late = f"{zeta:.4g} m calls the UAV {'late' if zeta > wanted else 'early'}"
+        told = f"{robot} drifted at {row['drift_m_s']:.2g} m/s: for that, {wanted:.2g} m is best, and {late}"
+        yield Line("partly", f"In run {run}, {told}.")
 
 
 def _paper(document: Document) -> Iterator[Line]:
@@ -377,7 +392,8 @@ def _row(document: Document, course: Course) -> Row:
         safe = Line("open", f"not known, {course.why}")
     elif not course.safe:
         near = course.near[0] if course.near else None
-        safe = Line("no", f"{distance(near.value_m, near.required_m)}, {near.other}" if near else course.why)
+        more = _more(course, "; {} more pair{}")
+        safe = Line("no", f"{near.told()}{more}" if near else course.why)
     elif course.near:
         told = f"{distance(course.near[0].value_m, course.near[0].required_m)}{proved or ', not proved'}"
         safe = Line("yes" if course.tested else "none", told if course.tested else f"{told}; not tested")
@@ -413,14 +429,19 @@ def _intrusion(course: Course, *, brief: bool = False) -> str:
         hit = course.collisions[0] if course.collisions else None
         return f"{hit['robot']} collides at {hit['t_s']:.2f} s" if hit else course.why
     least = course.near[0]
-    short = sum(near.margin_m < -SLACK_M for near in course.near) - 1
-    told = f"{least.robot} comes to {distance(least.value_m, least.required_m)} of {least.other}"
+    told = f"{least.robot} comes within {distance(least.value_m, least.required_m)} of {least.other}"
     if brief:
         return told
     if course.collisions:
         told = f"{_colliding(course)}, {distance(least.value_m, least.required_m)} from {least.other}"
     told += f" at {least.t_s:.2f} s, required {least.required_m:g} m"
-    return told + (f"; {short} more pair{'s' * (short > 1)} too close" if short else "")
+    return told + _more(course, "; {} more pair{} too close")
+
+
+def _more(course: Course, told: str) -> str:
+    """How many pairs besides the first were too near, in words with places for the number and a plural's s."""
+    short = sum(near.margin_m < -SLACK_M for near in course.near) - 1
+    return told.format(short, "s" * (short > 1)) if short > 0 else ""
 
 
 def _colliding(course: Course) -> str:
@@ -433,11 +454,7 @@ def _declared(document: Document, course: Course) -> str:
     claim = next(
         c for c in [*document["claims"], None] if c is None or (c["id"], c["run"]) == ("SAFE-TRACE", course.name)
     )
-    return (
-        " (a failure that the scenario declares)"
-        if claim and claim["as_expected"] and claim["status"] == "refuted"
-        else ""
-    )
+    return " (expected)" if claim and claim["as_expected"] and claim["status"] == "refuted" else ""
 
 
 def _failures(unsafe: Sequence[Course], short: Sequence[Course]) -> str:
@@ -452,12 +469,19 @@ def _trouble(those: Sequence[Course]) -> str:
     """What became of those who did not arrive, or came too near."""
     unsafe = next((course for course in those if course.safe is False), None)
     if unsafe is not None:
-        return _colliding(unsafe) if unsafe.crashed else _intrusion(unsafe, brief=True)
+        told = _colliding(unsafe) if unsafe.crashed else _intrusion(unsafe, brief=True)
+        hit = {event["robot"] for event in unsafe.collisions}
+        away = [robot for robot in unsafe.away or () if robot not in hit]
+        return f"{told}, and {_absent(away)}" if away else told
     away = list(dict.fromkeys(robot for course in those for robot in course.away or {}))
     stuck = all(robot in course.stuck for course in those for robot in course.away or {})
     if stuck:
         return f"{_some(away)} {'is' if len(away) == 1 else 'are'} stuck"
-    return f"{_some(away)} {'does' if len(away) == 1 else 'do'} not arrive"
+    return _absent(away)
+
+
+def _absent(names: Sequence[str]) -> str:
+    return f"{_some(names)} {'does' if len(names) == 1 else 'do'} not arrive"
 
 
 def _unless_one_crashed(every: Iterable[Course], told: str) -> Line:

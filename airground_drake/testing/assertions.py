@@ -87,7 +87,7 @@ def assert_proved(
 
 
 def _require(verdicts: Iterable[Verdict], place: str, *, exercised: bool) -> None:
-    """Raise if a verdict is none to pass with; warn of those that are hollow."""
+    """Raise for failing verdicts; warn about claims that nothing tested."""
     __tracebackhide__ = True
     failed = []
     for verdict in verdicts:

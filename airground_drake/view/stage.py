@@ -69,26 +69,21 @@ def stage(scenario: Scenario, visited_m: Array | None = None) -> Stage:
     apart = min(scenario.safe_distance.obstacle_m, scenario.safe_distance.ugv_m)
     mark = min(max(SMALLEST * extent, OF_SAFE_DISTANCE * apart), LARGEST * extent)
     robots = tuple(
-        Robot(name, "UGV" if name in scenario.ugvs else "UAV", max(mark, radius_m(spec)), np.array(spec.target_m))
+        Robot(name, "UGV" if name in scenario.ugvs else "UAV", max(mark, spec.radius_m), np.array(spec.target_m))
         for name, spec in specs.items()
     )
     obstacles = tuple(
         Pillar(
-            name, np.array(spec.position_m), max(mark, radius_m(spec)), safe_m(scenario, spec), spec.known_to_uav
+            name, np.array(spec.position_m), max(mark, spec.radius_m), safe_m(scenario, spec), spec.known_to_uav
         )
         for name, spec in scenario.obstacles.items()
     )  # fmt: skip
     return Stage(robots, obstacles, np.reshape(scenario.uav.phantoms_m, (-1, 3)), low, high, mark)
 
 
-def radius_m(spec: object) -> float:
-    """Radius of a robot or an obstacle, m; 0 for a point."""
-    return float(getattr(spec, "radius_m", 0.0))
-
-
 def safe_m(scenario: Scenario, obstacle: Obstacle) -> float:
     """How far UGVs have to stay from the centre of an obstacle, with their whole bodies, m: d and its radius."""
-    return scenario.safe_distance.obstacle_m + radius_m(obstacle)
+    return scenario.safe_distance.obstacle_m + obstacle.radius_m
 
 
 def states(trace: Trace, ugv: str, times: Array) -> npt.NDArray[np.intp]:

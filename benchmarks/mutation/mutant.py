@@ -21,7 +21,7 @@ class Mutant:
     Attributes:
         name: what is broken, in words; unique.
         path: file, below the package.
-        function: function, method or class in which the text is looked for, such as `Team.mobility`; '': in the file.
+        function: function, method or class in which the text is looked for, such as `Body.mobility`; '': in the file.
         old: text that is there exactly once.
         new: what takes its place.
         runs: short runs that are judged, in this order, until one catches it; see `probe.PROBES`.

@@ -181,9 +181,7 @@ def first(text: str) -> str:
 
 def test_the_first_screen_answers_and_is_in_the_title(page: str) -> None:
     assert "What needs attention" not in page
-    assert first(page).startswith(
-        "✗ No method brings everyone home safely. Under (a) and (c), ugv1 comes to 1.99999 m of"
-    )
+    assert first(page).startswith("✗ No method brings everyone home safely. Under (a), ugv1 comes within 1.99999 m of")
     assert "3 checks as declared: 1 deliberate failure." in first(page)
     assert page.index("Do not conclude") < page.index('id="happened"') < page.index('id="claims"')
     assert "refuted, as declared" in page

@@ -110,13 +110,13 @@ def test_case_a_in_short() -> None:
     ]
     assert lines(found, "Zeno-free?") == [
         ("yes", "Proved: triggers are at least 0.5 s apart."),
-        ("", "Not tested here: at most one trigger per UGV and run (see scenario dwell)."),
+        ("", "These runs cannot show it: no UGV triggers twice. Scenario dwell does."),
     ]
     assert lines(found, "Threshold?") == [("yes", "Fired at 3 m, at 14.479 s; none missed, none spurious.")]
     assert lines(found, "Paper?") == [
         ("partly", "2 of 3 results match: 1 without tuning, 1 after calibration; not reproduced: A8.")
     ]
-    assert "method (a) is safe elsewhere: seen in these runs only" in summary.do_not_conclude(found)
+    assert "method (a) is also safe elsewhere: that was only seen in these runs" in summary.do_not_conclude(found)
     assert summary.legend(found) == "✓ yes, ≈ in part, \N{EN DASH} neither good nor bad"
     printed = " ".join(summary.text(found).split())
     assert all(each.text in printed for answer in summary.answers(found) for each in answer.lines)
@@ -139,7 +139,7 @@ def test_a_crash_is_never_green_whatever_was_declared(declared: str) -> None:
     first = lines(found, "Safe?")[0]
     assert first.mark == "no"
     assert first.text.startswith("b: ugv1 collides, 0.000 m from rock at 11.35 s, required 2 m")
-    assert ("(a failure that the scenario declares)" in first.text) == (declared == "refuted")
+    assert ("(expected)" in first.text) == (declared == "refuted")
     assert lines(found, "Arrived?")[1] == ("no", "b: ugv1 collided, ended at (3.37, 5.10) m.")
     assert summary.as_declared(found).mark == ("yes" if declared == "refuted" else "no")
 
@@ -156,7 +156,9 @@ def test_a_crash_in_a_compared_recursion_is_not_green_either() -> None:
     assert summary.headline(found) == ("partly", "All arrive safely. In run printed, ugv1 collides.")
     found["runs"]["printed"] = run("a", 1.78)
     assert summary.headline(found) == ("yes", "All arrive safely.")
-    assert lines(found, "Safe?")[-1].text.startswith("Recursion (5) as printed: ugv1 comes to 1.780 m of rock")
+    assert lines(found, "Safe?")[-1].text.startswith(
+        "1 run with recursion (5) as printed: all arrive, but ugv1 comes within 1.780 m of rock"
+    )
 
 
 def test_a_robot_that_does_not_arrive() -> None:
@@ -174,7 +176,7 @@ def test_the_uav_has_three_coordinates_and_counts_where_all_ugvs_are_home() -> N
 def test_a_claim_that_is_refuted_although_the_distances_are_kept() -> None:
     found = document({"d": run("d")}, claim("SAFE-TRACE", "d", "refuted"))
     assert summary.headline(found).mark == "no"
-    assert lines(found, "Safe?")[0] == ("no", "d: SAFE-TRACE is refuted (a failure that the scenario declares).")
+    assert lines(found, "Safe?")[0] == ("no", "d: SAFE-TRACE is refuted (expected).")
 
 
 @pytest.mark.parametrize("status", ["inconclusive", "error", "not_run"])
@@ -204,7 +206,7 @@ def test_nothing_triggered_and_nothing_came_near() -> None:
     assert safe.mark == "none"
     assert "not tested" in safe.text
     assert lines(found, "Threshold?") == [("none", "Not tested here: nothing reached the 3 m.")]
-    assert lines(found, "Zeno-free?") == [("", "Not tested here: nothing triggered (see scenario dwell).")]
+    assert lines(found, "Zeno-free?") == [("", "These runs cannot show it: nothing triggered. Scenario dwell does.")]
     assert "the UAV helps: it was never called" in summary.do_not_conclude(found)
 
 
@@ -243,7 +245,9 @@ def test_a_threshold_is_good_or_bad_for_the_assumed_drift_and_for_that_of_the_ru
         "kind": "declared", "threshold_in_force_m": 3.0, "optimal_threshold_m": 2.992, "extra_risk": extra,
         "least_risk": 0.4, "runs": {"a ugv1": {"optimum_for_this_drift_m": real, "drift_m_s": 0.56}},
     }  # fmt: skip
-    found = document({"a": run("a", events=(trigger(),))}, claim("THR-CHOICE", evidence=evidence))
+    found = document(
+        {"a": run("a", events=(trigger(),))}, claim("THR-CHOICE", evidence=evidence, inputs={"drift_m_s": 6.05})
+    )
     assert [line.mark for line in lines(found, "Threshold?")] == marks
     assert told in lines(found, "Threshold?")[-1].text
 
@@ -265,12 +269,12 @@ def test_a_scenario_without_a_counterpart_has_a_table_of_methods() -> None:
     found["runs"]["c"]["metrics"]["gatekeeper"] = waits
     assert summary.headline(found) == (
         "partly",
-        "Only method (d) is safe and brings everyone home. Under (b), ugv1 comes to 0.495 m of rock; under (a) and "
+        "Only method (d) is safe and brings everyone home. Under (b), ugv1 comes within 0.495 m of rock; under (a) and "
         "(c), ugv1 does not arrive.",
     )
     assert [(each.run, *each.safe, each.arrived.text, each.interventions) for each in summary.methods(found)] == [
         ("a", "yes", "2.000 m, not proved", "0 of 1", "none"),
-        ("b", "no", "0.495 m, rock", "1 of 1", "1 obeyed"),
+        ("b", "no", "0.495 m (ugv1 to rock)", "1 of 1", "1 obeyed"),
         ("c", "yes", "2.000 m, not proved", "0 of 1", "2 refused: waiting looked cheaper"),
         ("d", "yes", "2.000 m, proved", "1 of 1", "1 accepted"),
     ]

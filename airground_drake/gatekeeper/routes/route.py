@@ -29,7 +29,7 @@ class Route(Protocol):
       `accept_first` says whose.
     - `route_bound`, `gap`: a valid bound of what `Solution` says that it bounds, or -1. Never a guess: the
       verifier computes it again.
-    - `relaxed`, `rounded`: both or none, `rounded` by `rounding.sum_up_rounding`.
+    - `relaxed`, `rounded`: both or none, `rounded` by `relaxation.sum_up_rounding`.
     """
 
     def solve(self, problem: Problem, budget: Budget, /) -> Solution:

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from airground_drake.base.arrays import Array
-from airground_drake.report.figures import canvas, maps, svg, timelines
-from airground_drake.report.figures.panels import Figure, Panel, series
+from airground_drake.report.figures import maps, timelines
+from airground_drake.report.figures.panels import Figure, panel, series
 from airground_drake.report.metrics import closest_obstacle, place
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
@@ -46,14 +46,12 @@ def draw(scenario: Scenario, traces: Mapping[str, Trace]) -> Figure | None:
         {f"run {name}": np.interp(first.t, runs[name].t, gap) for name, gap in gaps.items()},
     )
     panels = tuple(
-        Panel(
-            heading,
-            svg.inline(canvas.svg(drawing), f"recursion-{key}", f"{heading} of {robot}, {' and '.join(runs)}", text),
+        panel(
+            drawing, f"recursion-{key}", f"{heading} of {robot}, {' and '.join(runs)}", text, heading,
             series(first, f"{heading} of {robot}, m", columns),
-            drawing=drawing,
         )
         for (key, heading, drawing), columns in zip(drawings, tables, strict=True)
-    )
+    )  # fmt: skip
     return Figure("recursion", "Recursion (5) against the augmented projector", text, panels, beside="audit-1")
 
 

@@ -12,11 +12,11 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure as Drawing
 
-from airground_drake.registry import METHODS
-from airground_drake.report.figures import canvas, comparison, maps, svg, timelines
-from airground_drake.report.figures.panels import MAX_TABLE_ROWS, Figure, Panel, Table, series
+from airground_drake.base.errors import TraceError, one_line
+from airground_drake.registry import method_of
+from airground_drake.report.figures import canvas, comparison, maps, timelines
+from airground_drake.report.figures.panels import MAX_TABLE_ROWS, Figure, Panel, Table, panel, series
 from airground_drake.report.metrics import Nearby, close_by, events_of, gap_m, radius_m
 from airground_drake.report.outcomes import SLACK_M, distance
 from airground_drake.report.reproduction import MEASURES
@@ -68,10 +68,15 @@ def draw(scenario: Scenario, traces: Mapping[str, Trace], settings: Mapping[str,
         settings: of matplotlib (rcParams), in place of a report's.
 
     Raises:
-        TraceError: if a trace lacks a column or holds numbers that are not finite.
+        TraceError: if a trace lacks a column, holds numbers that are not finite, or has other robots than its scenario.
+        UnknownNameError: if its metadata name a method that there is not.
     """
     if not traces:
         return []
+    for trace in traces.values():
+        if trace.robots != (known := [*trace.scenario.robots]):
+            wrong = f"its robots are {', '.join(trace.robots)}; those of its scenario: {', '.join(known)}"
+            raise TraceError(one_line(f"run {trace.run}: {wrong}"))
     numbers = next((paper for name, paper in _PAPER.items() if scenario.name.startswith(name)), ())
     with canvas.style(settings):
         chosen = _select(scenario, traces)
@@ -125,7 +130,7 @@ def _heading(group: list[str], runs: Mapping[str, Trace]) -> str:
     if len(group) > 1:
         return f"Runs {' = '.join(group)}: identical paths"
     method = str(runs[group[0]].meta["method"])
-    return f"Run {group[0]}: method ({method}), {METHODS[method].says}"
+    return f"Run {group[0]}: method ({method}), {method_of(method).says}"
 
 
 def _runs(heading: str) -> str:
@@ -155,7 +160,7 @@ def _trajectories(chosen: _Selection) -> Figure:
         finals = ", ".join(f"{r} ({x:.2f}, {y:.2f}) m" for r in robots for x, y, _ in [trace.position(r)[-1]])
         says = f"Paths of {', '.join(robots)} in the ground plane; final positions: {finals}."
         table, ways = series(trace, "Positions, m", columns), tracks(drawing, trace, chosen.team)
-        panels.append(_panel(drawing, f"trajectories-{position}", f"Map of {heading}", says, heading, table, ways))
+        panels.append(panel(drawing, f"trajectories-{position}", f"Map of {heading}", says, heading, table, ways))
     return Figure("trajectories", "Maps", caption, tuple(panels), look="" if roomy else "narrow")
 
 
@@ -178,7 +183,7 @@ def _distances(chosen: _Selection) -> Figure | None:
         drawing = timelines.distances(trace, of_ugvs, looks, top)
         table, says = series(trace, "Distances, m", gaps), f"Smallest distances: {smallest}."
         name = f"distances-{len(panels)}"
-        panels.append(_panel(drawing, name, f"Distances, {heading}", says, _runs(heading), table))
+        panels.append(panel(drawing, name, f"Distances, {heading}", says, _runs(heading), table))
     pairs = [(*each[0], ugv, heading) for (heading, ugv), each in near.items() if each]
     value, t_s, other, needed, ugv, heading = min(pairs, key=lambda pair: pair[0] - pair[3])
     least = "Too close" if value < needed - SLACK_M else "Closest"
@@ -208,7 +213,7 @@ def _decision(chosen: _Selection) -> Figure:
         table = series(trace, "Decision variables, m", columns[heading])
         says = f"Largest values: {largest}; threshold {float(trace.meta['zeta_m']):.3g} m."
         name = f"decision-{position}"
-        panels.append(_panel(drawing, name, f"Decision variables, {heading}", says, _runs(heading), table))
+        panels.append(panel(drawing, name, f"Decision variables, {heading}", says, _runs(heading), table))
     caption = (
         f"{_first_triggers(chosen)} A UGV that stands still falls behind its reference and "
         f"triggers (▲) at the threshold.{_left_out(chosen, chosen.team)}"
@@ -231,13 +236,13 @@ def _events(chosen: _Selection) -> Figure | None:
     some = "" if len(listed) <= MAX_TABLE_ROWS else f", the first {MAX_TABLE_ROWS} of {len(listed)}"
     table = Table(f"Events{some}", ("run", "t, s", "robot", "event", "position x, y, z, m"), cells)
     words = "; ".join(f"run {trace.run}, {ugv}: {timelines.told(trace, ugv)}" for trace, ugv in drawn)
-    panel = _panel(timelines.events(drawn), "events-0", "Events over time", f"{words}.", "", table, scale=canvas.SCALE)
+    row = panel(timelines.events(drawn), "events-0", "Events over time", f"{words}.", "", table, scale=canvas.SCALE)
     more = f" {len(rows) - len(drawn)} more rows are in the trace." if len(rows) > len(drawn) else ""
     caption = (
         f"{_accepted(chosen)} ▲ trigger, ▼ release; grey bar: the UAV is called. "
         f"◆ proposal, ● accepted, ✖ refused; hatched bar: the UGV follows the UAV.{more}"
     )
-    return Figure("events", "Triggers, proposals, decisions", caption, (panel,), look="wide")
+    return Figure("events", "Triggers, proposals, decisions", caption, (row,), look="wide")
 
 
 def _gaps(chosen: _Selection) -> Figure | None:
@@ -259,7 +264,7 @@ def _gaps(chosen: _Selection) -> Figure | None:
     rows = [(name, f"{t:.3f}", f"{gap:.4f}") for name, found in gaps.items() for t, gap in found]
     table = Table("Gaps between triggers", ("run", "t, s", "gap, s"), tuple(rows[:MAX_TABLE_ROWS]))
     drawing, title = timelines.gaps(gaps, bound, chosen.first), "Gaps between triggers"
-    return Figure("gaps", title, caption, (_panel(drawing, "gaps-0", title, caption, "", table),))
+    return Figure("gaps", title, caption, (panel(drawing, "gaps-0", title, caption, "", table),))
 
 
 def _team(chosen: _Selection) -> Figure:
@@ -290,26 +295,12 @@ def _team(chosen: _Selection) -> Figure:
             f"run {name}: {least} to {largest}, median {middle}" for name, _, least, middle, largest in rows
         )
         drawing, heading = timelines.histogram(what, of_runs), f"UGVs by {what.partition(',')[0]}"
-        panels.append(_panel(drawing, f"team-{position}", f"UGVs by {what}", says, heading, table))
+        panels.append(panel(drawing, f"team-{position}", f"UGVs by {what}", says, heading, table))
     there = []
     for name, of in quantities["time of arrival, s"].items():
         called = sum(bool(events_of(chosen.runs[name], ugv, "trigger")) for ugv in ugvs)
         there.append(f"Run {name}: {len(of)} of {len(ugvs)} UGVs arrive, {called} triggered.")
     return Figure("team", "The whole team", f"{' '.join(there)} Each bar counts UGVs.", tuple(panels))
-
-
-def _panel(
-    drawing: Drawing,
-    name: str,
-    title: str,
-    says: str,
-    heading: str,
-    table: Table,
-    ways: Mapping[str, Any] | None = None,
-    scale: float = 0.0,
-) -> Panel:
-    """A panel of a drawing; `name` is unique in the page, `title` and `says` are for those who cannot see it."""
-    return Panel(heading, svg.inline(canvas.svg(drawing), name, title, says, scale=scale), table, ways, drawing)
 
 
 def _ends(chosen: _Selection) -> str:

@@ -28,7 +28,8 @@ from airground_drake.report.figures.labels import Label, place
 from airground_drake.report.metrics import events_of, radius_m
 from airground_drake.report.reproduction import MEASURES
 from airground_drake.run.trace import Trace
-from airground_drake.scenarios.schema import Obstacle, Scenario
+from airground_drake.scenarios.schema import Scenario
+from airground_drake.view.stage import safe_m
 
 MAX_NAMED_OBSTACLES = 12
 _LEFT_IN, _BESIDE_IN = 0.5, 0.65
@@ -54,7 +55,7 @@ def frame_of(traces: Sequence[Trace], robots: Sequence[str]) -> Frame:
     ways = [(trace.position(robot)[:, :2], radius_m(trace, robot)) for trace in traces for robot in robots]
     points = [way + side * radius for way, radius in ways for side in ((-1.0, 1.0) if radius else (0.0,))]
     points += [np.array([scenario.ugvs[robot].target_m[:2] for robot in robots if robot in scenario.ugvs])]
-    reach = np.array([_safe_circle_m(scenario, obstacle) for obstacle in scenario.obstacles.values()])[:, None]
+    reach = np.array([safe_m(scenario, obstacle) for obstacle in scenario.obstacles.values()])[:, None]
     centres = np.array([obstacle.position_m[:2] for obstacle in scenario.obstacles.values()])
     points += [centres - reach, centres + reach] if len(centres) else []
     every = np.concatenate(points)
@@ -125,9 +126,7 @@ def _map(trace: Trace, frame: Frame, width_in: float, above_in: float = 0.1) -> 
     axes.set_aspect("equal")
     rule(axes, "x, m", "y, m")
     obstacles = list(trace.scenario.obstacles.values())
-    circles = [
-        Circle((each.position_m[0], each.position_m[1]), _safe_circle_m(trace.scenario, each)) for each in obstacles
-    ]
+    circles = [Circle((each.position_m[0], each.position_m[1]), safe_m(trace.scenario, each)) for each in obstacles]
     dashes = (0, (2, 2))
     axes.add_collection(
         PatchCollection(circles, facecolor="#f3f3f3", edgecolor=MUTED, linestyle=dashes, linewidth=1.0, zorder=1.0)
@@ -155,11 +154,6 @@ def _obstacles(scenario: Scenario) -> list[Label]:
         *((at, "(only on the UAV's map)") for at in scenario.uav.phantoms_m),
     ]
     return [Label(np.array(at), text, size_pt=7.5) for at, text in places]
-
-
-def _safe_circle_m(scenario: Scenario, obstacle: Obstacle) -> float:
-    """Radius of the circle round an obstacle that no robot's surface may enter, m."""
-    return scenario.safe_distance.obstacle_m + obstacle.radius_m
 
 
 def _body(axes: Axes, at: Sequence[float] | Array, radius: float, color: str) -> None:

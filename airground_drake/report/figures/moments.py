@@ -11,8 +11,8 @@ from matplotlib.patches import Circle
 
 from airground_drake.base.arrays import Array
 from airground_drake.report import attention
-from airground_drake.report.figures import canvas, svg
-from airground_drake.report.figures.panels import Figure, Panel, Table
+from airground_drake.report.figures import canvas
+from airground_drake.report.figures.panels import Figure, Table, panel
 from airground_drake.report.metrics import place, safe_distance_m
 from airground_drake.run.trace import Trace
 
@@ -40,9 +40,9 @@ def _figure(position: int, trace: Trace, bodies: list[str], t_s: float) -> Figur
     at = {body: _where(trace, body, t_s) for body in bodies}
     caption = f"{' and '.join(bodies)} at {t_s:.3f} s, and the ways of the robots until then."
     rows = tuple((body, *(f"{x:.3f}" for x in where)) for body, where in at.items())
-    drawn = svg.inline(canvas.svg(_map(trace, at, t_s)), name, f"Run {trace.run} at {t_s:.3f} s", caption)
-    panel = Panel(trace.run, drawn, Table("Positions, m", ("", "x", "y", "z"), rows))
-    return Figure(name, "The moment", caption, (panel,), beside=name)
+    table, title = Table("Positions, m", ("", "x", "y", "z"), rows), f"Run {trace.run} at {t_s:.3f} s"
+    drawn = panel(_map(trace, at, t_s), name, title, caption, trace.run, table)
+    return Figure(name, "The moment", caption, (drawn,), beside=name)
 
 
 def _where(trace: Trace, body: str, t_s: float) -> Array:

@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 from matplotlib.lines import Line2D
 
-from airground_drake.report.figures import canvas, svg
+from airground_drake.report.figures import canvas
 from airground_drake.report.figures.canvas import INK, LOOKS, MUTED, WIDE_IN, look, rule, short, size_in, thin
-from airground_drake.report.figures.panels import Figure, Panel, Table
+from airground_drake.report.figures.panels import Figure, Table, panel
 from airground_drake.run.trace import Trace
 
 _BEFORE: dict[str, Any] = {"linewidth": 1.0, "linestyle": (0, (3, 2)), "alpha": 0.9, "zorder": 2.0}
@@ -38,16 +38,14 @@ def draw(run: str, position: int, before: Trace, after: Trace) -> Figure:
     tops = _largest(before, after, drawn)
     largest = Table("Largest decision variables", ("UGV", "before, m", "after, m"), tops)
     says = "Before dashed, after solid."
+    paths, variables = f"Paths of run {run}", f"Decision variables of run {run}"
     with canvas.style():
-        paths, variables = canvas.svg(_paths(before, after, drawn)), canvas.svg(_decision(before, after, drawn))
-    panels = (
-        Panel("Paths, from above", svg.inline(paths, f"paths-{position}", f"Paths of run {run}", says), where),
-        Panel(
-            "Decision variables",
-            svg.inline(variables, f"decision-{position}", f"Decision variables of run {run}", says),
-            largest,
-        ),
-    )
+        panels = (
+            panel(_paths(before, after, drawn), f"paths-{position}", paths, says, "Paths, from above", where),
+            panel(
+                _decision(before, after, drawn), f"decision-{position}", variables, says, "Decision variables", largest
+            ),
+        )
     caption = f"Before dashed and thin, after solid and thick.{left_out}"
     return Figure(f"run-{position}", f"Run {run}", caption, panels)
 

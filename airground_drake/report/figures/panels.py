@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure as Drawing
 
 from airground_drake.base.arrays import Array
+from airground_drake.report.figures import canvas, svg
 from airground_drake.run.trace import Trace
 
 MAX_TABLE_ROWS = 31
@@ -32,10 +33,10 @@ class Panel:
     heading: str
     svg: str
     table: Table
+    drawing: Drawing = field(compare=False, repr=False)
+    """What the SVG was made of, for files of other formats."""
     tracks: Mapping[str, Any] | None = None
     """Of a drawing of the ground plane: where the robots are in it, see `report.scrubber`."""
-    drawing: Drawing | None = field(default=None, compare=False, repr=False)
-    """What the SVG was made of, for files of other formats."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +59,23 @@ class Figure:
     panels: tuple[Panel, ...]
     beside: str = ""
     look: str = ""
+
+
+def panel(
+    drawing: Drawing,
+    name: str,
+    title: str,
+    says: str,
+    heading: str,
+    table: Table,
+    tracks: Mapping[str, Any] | None = None,
+    scale: float = 0.0,
+) -> Panel:
+    """A panel of a drawing; call it inside `canvas.style`.
+
+    `name` is unique in the page, `title` and `says` are for those who cannot see it.
+    """
+    return Panel(heading, svg.inline(canvas.svg(drawing), name, title, says, scale=scale), table, drawing, tracks)
 
 
 def series(trace: Trace, caption: str, columns: Mapping[str, Array]) -> Table:

@@ -7,8 +7,8 @@ from typing import Any, Literal
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
-from airground_drake.report.figures import canvas, svg
-from airground_drake.report.figures.panels import Figure, Panel, Table
+from airground_drake.report.figures import canvas
+from airground_drake.report.figures.panels import Figure, Table, panel
 from airground_drake.verify.model.zeno_refine import Series
 
 _SERIES: dict[Literal["bare", "automaton"], str] = {"bare": "bare threshold", "automaton": "automaton"}
@@ -34,19 +34,18 @@ def draw(evidence: Series) -> Figure | None:
         )
         for k, step in enumerate(steps)
     )
-    with canvas.style():
-        drawn = canvas.svg(_counts(steps, evidence))
-    title = "Triggers under refinement of the noise step"
-    panel = Panel(
+    title, heading = (
+        "Triggers under refinement of the noise step",
         f"Mean of {evidence['paths']} paths of {evidence['duration_s']:.3g} s",
-        svg.inline(drawn, "refinement", title, text),
-        Table(f"{title}, triggers per path", columns, rows),
     )
+    table = Table(f"{title}, triggers per path", columns, rows)
+    with canvas.style():
+        drawn = panel(_counts(steps, evidence), "refinement", title, text, heading, table)
     caption = (
         "The task error stays at the threshold; each step to the right halves the noise step. The bare threshold's "
         f"count grows like one over the square root of the step, ours levels off. {text[0].upper()}{text[1:]}."
     )
-    return Figure("refinement", title, caption, (panel,), beside="ZENO-REFINE")
+    return Figure("refinement", title, caption, (drawn,), beside="ZENO-REFINE")
 
 
 def _counts(steps: Any, evidence: Series) -> Drawing:

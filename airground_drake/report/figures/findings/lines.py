@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
 from airground_drake.base.arrays import Array
-from airground_drake.report.figures import canvas, svg
-from airground_drake.report.figures.panels import MAX_TABLE_ROWS, Figure, Panel, Table
+from airground_drake.report.figures import canvas
+from airground_drake.report.figures.panels import MAX_TABLE_ROWS, Figure, Table, panel
 
 NAME_CHARS = 24
 """What fits beside the lines."""
@@ -49,12 +49,9 @@ class Lines(NamedTuple):
             chosen = np.unique(np.linspace(0, len(x) - 1, MAX_TABLE_ROWS // len(self.lines)).round().astype(int))
             rows += [(line, f"{x[k]:.4g}", f"{y[k]:.4g}") for k in chosen]
         rows += [(mark, f"{x:.4g}", f"{y:.4g}") for mark, (x, y) in self.marks.items()]
-        panel = Panel(
-            heading,
-            svg.inline(canvas.svg(_drawing(self)), name, self.title, text),
-            Table(f"{self.title}, some of its points", ("line", self.x, self.y), tuple(rows)),
-        )
-        return Figure(name, self.title, caption, (panel,), beside=beside)
+        table = Table(f"{self.title}, some of its points", ("line", self.x, self.y), tuple(rows))
+        drawn = panel(_drawing(self), name, self.title, text, heading, table)
+        return Figure(name, self.title, caption, (drawn,), beside=beside)
 
     def _marked(self) -> str:
         return "; ".join(f"{mark}: ({x:.3g}, {y:.3g})" for mark, (x, y) in self.marks.items())

@@ -11,8 +11,8 @@ from matplotlib.figure import Figure as Drawing
 from matplotlib.patches import Rectangle
 
 from airground_drake.base.arrays import Array
-from airground_drake.report.figures import canvas, svg
-from airground_drake.report.figures.panels import Figure, Panel, Table
+from airground_drake.report.figures import canvas
+from airground_drake.report.figures.panels import Figure, Table, panel
 
 CELL_IN = 0.36
 
@@ -46,9 +46,9 @@ class Products(NamedTuple):
             f"{each}: {left} ({size}) times {right} ({of}) is {says}" for each, left, size, right, of, says in rows
         )
         columns = ("formula", "first factor", "rows x columns", "second factor", "rows x columns", "product")
-        drawn = svg.inline(canvas.svg(_drawing(self)), name, self.title, text)
-        panel = Panel(f"Finding {number}", drawn, Table(f"{self.title}, sizes", columns, rows))
-        return Figure(name, self.title, f"{text}.", (panel,), beside=name)
+        table = Table(f"{self.title}, sizes", columns, rows)
+        drawn = panel(_drawing(self), name, self.title, text, f"Finding {number}", table)
+        return Figure(name, self.title, f"{text}.", (drawn,), beside=name)
 
 
 def _says(left: Factor, right: Factor) -> str:

@@ -1,0 +1,60 @@
+"""Metadata of a run that somebody forged: a name in them is refused in one line, or it is text wherever it is shown."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from report.cases import FINE, GOING_ROUND, SUCCESS, built, make_scenario, make_trace, make_traces
+
+from airground_drake.commands import main
+from airground_drake.run import trace
+from airground_drake.scenarios.load import resolved
+
+HOSTILE = "<script>alert(1)</script>"
+FORGED = {
+    "robots": {"index": 0, "compare": 0, "replay": 2, "figures": 2},
+    "events": {"index": 0, "compare": 0, "replay": 0, "figures": 0},
+    "run": {"index": 0, "compare": 0, "replay": 0, "figures": 0},
+    "method": {"index": 0, "compare": 0, "replay": 2, "figures": 2},
+    "scenario": {"index": 0, "compare": 2, "replay": 2, "figures": 2},
+}
+"""Exit codes of the commands that draw a saved run, by the part of its metadata that has the name."""
+
+
+def forge(part: str, folder: Path) -> None:
+    """A report with a run whose metadata, and columns with them, have a hostile name."""
+    scenario = make_scenario()
+    made = make_trace(scenario, "c", GOING_ROUND, SUCCESS)
+    meta: dict[str, Any] = {**made.meta, "scenario": resolved(scenario), "schema": trace.SCHEMA}
+    for key in {"robots": ("robots", "ugvs")}.get(part, (part,)):
+        text = json.dumps(meta[key])
+        for name in ("ugv1", "trigger", "c"):
+            text = text.replace(json.dumps(name), json.dumps(HOSTILE))
+        meta[key] = json.loads(text)
+    columns = {name: name.replace("ugv1.", f"{HOSTILE}.") for name in made.signals if part == "robots"}
+    trace.save(replace(made, meta=meta, signals=made.signals.rename(columns=columns)), folder / "trace" / "c")
+    (folder / "report.json").write_text(json.dumps(built(scenario, make_traces(scenario), FINE)))
+
+
+@pytest.mark.parametrize("part", FORGED)
+def test_a_name_in_forged_metadata_is_refused_or_text(
+    part: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    report = str(tmp_path / "report")
+    forge(part, tmp_path / "report")
+    drawn = {
+        "index": [str(tmp_path)],
+        "compare": [report, report, "--html", str(tmp_path / "compare.html")],
+        "replay": [report, "c", "-o", str(tmp_path / "replay.html")],
+        "figures": [report, "-o", str(tmp_path / "figures"), "--format", "svg"],
+    }
+    for command, arguments in drawn.items():
+        assert main([command, *arguments]) == FORGED[part][command], command
+        assert capsys.readouterr().err.count("\n") == bool(FORGED[part][command])
+    pages = [path.read_text("utf-8") for path in tmp_path.rglob("*") if path.suffix in (".html", ".svg", ".tex")]
+    assert not any(HOSTILE in page for page in pages)
+    assert any("&lt;script&gt;" in page for page in pages) == (part in ("robots", "events", "run"))
