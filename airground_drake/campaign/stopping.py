@@ -43,7 +43,7 @@ class Stopping:
             claims: identifiers of those that are judged; empty: all about runs.
 
         Raises:
-            ValueError: if it is none.
+            ValueError: if it is not one of these.
             UnknownNameError: if no such claim is judged.
         """
         found = _RULE.fullmatch(text)

@@ -65,7 +65,7 @@ INTERVENING = 1.0
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """One run; T rows, each of which ends a segment on which every robot moves straight.
+    """One run; T rows. Every robot moves straight from row to row.
 
     Attributes:
         name: of the run in its scenario.

@@ -98,7 +98,7 @@ def _side(value: Any) -> str:
 def _page(
     folders: tuple[Path, Path], before: compare.Document, after: compare.Document, found: Mapping[str, Any]
 ) -> str:
-    """The comparison as a page, with the runs of which both reports have a trace."""
+    """The comparison as a page, with the runs that both reports have traces of."""
     from airground_drake.report import pages
     from airground_drake.report.figures import overlay
     from airground_drake.run import trace

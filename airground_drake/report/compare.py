@@ -53,7 +53,7 @@ def read(folder: Path) -> Document:
     """The report.json of a folder.
 
     Raises:
-        ReportError: if there is none that can be used.
+        ReportError: if no report can be read there.
     """
     path = folder / PAGES["json"]
     try:

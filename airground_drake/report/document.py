@@ -49,7 +49,7 @@ def build(
         provenance: versions, seed, time, `command` and the like.
         audit: findings about the paper from elsewhere, added to those that the runs show; with any, all must be
             demonstrated.
-        required: claims about the model of which there must be a verdict.
+        required: claims about the model that must have a verdict.
 
     Returns:
         Strict JSON; numbers that are not finite have become None.

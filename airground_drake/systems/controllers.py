@@ -44,7 +44,7 @@ class UgvController(LeafSystem):
         in  `bodies` (3M) m; `reference` (6n): preset positions m, then velocities m/s;
             `proposals` abstract, n of Proposal or None; `answers` (2n), see `messages`.
         out `command` (3n) m/s; `accepted` (n), 1 while an intervention is executed; both held. `gains`, the
-            `UgvGains` in force, for whoever predicts the command.
+            `UgvGains` in force, for the gatekeeper, which predicts the command.
     Parameters: `UgvGains`; by default those of the law.
     Rate: one update per control period, from t = 0.
 

@@ -48,7 +48,7 @@ COUNTED: dict[str, Callable[[Trace], Count]] = {
 
 
 def counts(trace: Trace) -> dict[str, Count]:
-    """The counts of a run, by claim. Where records are missing or wrong there is none: claims about runs say so."""
+    """The counts of a run, by claim; no counts where records are missing or wrong, which claims about runs report."""
     found = {}
     for claim, count in COUNTED.items():
         try:

@@ -196,7 +196,7 @@ def require_count(claim: Claim, finding: Finding) -> None:
     """Check that a claim that says what exercises it has counted that, so that no pass is taken for more than it is.
 
     Raises:
-        ValueError: if its status is none, if it passes without a count, or the count is none.
+        ValueError: if its status is unknown, if it passes without a count, or if the count is no whole number from 0.
     """
     if finding.status not in STATUSES:
         raise ValueError(f"{claim.id} found {finding.status!r}; allowed: {', '.join(STATUSES)}")

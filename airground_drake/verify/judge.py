@@ -141,7 +141,7 @@ def verify_all(
 
 
 class _Asked(NamedTuple):
-    """A claim about the model, of which run ('': all of them), and its constants."""
+    """A claim about the model, its run ('': all runs), and its constants."""
 
     claim: ModelClaim
     run: str

@@ -27,7 +27,7 @@ class Shape(Protocol):
 
 @dataclass(frozen=True)
 class Ball:
-    """A ball, of which a robot in the plane is a disc; a point with the default radius. Inside, distances are negative.
+    """A ball; for a robot in the plane, a disc; with the default radius, a point. Inside, distances are negative.
 
     Attributes:
         radius_m: m.

@@ -41,7 +41,7 @@ def without_optimum(
     normals: Array | None = None,
     ended: Status = "solver_failed",
 ) -> Solution:
-    """The better constant plan, when a solver gave nothing: for want of time, or because it failed.
+    """The better constant plan, when a solver gave nothing because it ran out of time or failed.
 
     Args:
         problem: what they are plans of.
@@ -55,7 +55,7 @@ def without_optimum(
 
 
 def how_it_ended(result: MathematicalProgramResult, budget: Budget) -> Status:
-    """How a solver ended: with an optimum, for want of budget, or by failing."""
+    """How a solver ended: with an optimum, out of budget, or by failing."""
     if result.is_success():
         return "optimal"
     stopped = budget.spent() or result.get_solution_result() == SolutionResult.kIterationLimit

@@ -38,7 +38,7 @@ def decoded(data: bytes, kinds: tuple[type, ...]) -> Any:
 
     Args:
         data: the bytes.
-        kinds: classes of which objects may be made. The data cannot name any other code.
+        kinds: classes whose objects may be made. The data cannot name any other code.
 
     Raises:
         Exception: of any kind, if the data are malformed.

@@ -103,7 +103,7 @@ class NormSignal:
 
     @classmethod
     def of(cls, t: Array, parts: Array) -> NormSignal:
-        """From times (T,) and parts (T, 4) of which x is convex between rows: its minima become knots too."""
+        """From times (T,) and parts (T, 4) whose x is convex between rows: its minima become knots too."""
         knots = np.union1d(t, _minima(t, parts))
         refined = interpolate(t, parts, knots)
         return cls(knots, refined, norm_sum(refined))

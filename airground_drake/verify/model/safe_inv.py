@@ -1,4 +1,4 @@
-"""SAFE-INV: whoever obeys the avoidance inequalities and starts at a safe distance keeps it (proofs/Safety.v).
+"""SAFE-INV: a robot that starts at a safe distance and obeys the avoidance inequalities keeps it (proofs/Safety.v).
 
 Symbols: D is the distance of a pair, d its safe distance, n the unit vector away from the other body, v a velocity, A
 the gain, h the control period, q the share of an inequality, c the closing speed and R the sensing range.

@@ -36,7 +36,7 @@ def enclose(rows: Sequence[Row]) -> list[Enclosure]:
     """Bounds of the optimum over omega in [0, 1]^N of the cost with distances along the half-planes' normals.
 
     For any multipliers l_kj >= 0 of u_k >= d_j - n_kj.(rho_k - o_kj), minimising the Lagrangian over u leaves
-    q(omega) - sum_k (sum_j l_kj)^2 / (4 dt b), q convex and quadratic, of which the tangent at any omega* is below
+    q(omega) - sum_k (sum_j l_kj)^2 / (4 dt b), q convex and quadratic, whose tangent at any omega* is below
     it everywhere, and least at a corner of the box. Both l and omega* are the solver's; neither need be good. Where
     costs are tiny the solver's omega* is no minimiser to so many digits, and q's own is taken besides.
     """

@@ -65,7 +65,7 @@ class Row:
 
     @property
     def planned(self) -> bool:
-        """Whether it rests on a plan; otherwise it is a refusal for want of one."""
+        """Whether it rests on a plan; otherwise it is a refusal without a plan."""
         return self.data["plan"] is not None
 
     @property

@@ -115,7 +115,7 @@ class LiveProg(GateClaim):
 
 
 def ending(trace: Trace, last: Row, on: Sent, ends: Counter[str]) -> Off:
-    """How a proposal ended of which the last decision accepts it, counted in `ends`.
+    """How a proposal ended whose last decision accepts it, counted in `ends`.
 
     It was withdrawn before the next sample of the gatekeeper, or the run was over.
     """

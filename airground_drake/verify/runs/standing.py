@@ -41,7 +41,7 @@ def map_conflicts(trace: Trace) -> Iterator[dict[str, Any]]:
 
 
 def standing_conflicts(trace: Trace) -> Iterator[dict[str, Any]]:
-    """Joint plans of which a part was not sent, decisions on what was withdrawn, and replacements for no reason.
+    """Joint plans with a part that was not sent, decisions on withdrawn proposals, replacements without a reason.
 
     A proposal in force is replaced only by a part of a joint plan, or while another UGV is intervened on, for which the
     policies may have been asked.

@@ -145,7 +145,7 @@ def levels_of(trace: Trace) -> Levels:
 
 
 def _block(trace: Trace) -> str:
-    """Another block than that of (15) which computes the decision variable; '' if there is none."""
+    """The block that computes the decision variable in place of (15); '' for (15) itself."""
     return str(trace.meta.get("decision_block", ""))
 
 
