@@ -96,7 +96,7 @@ class Monitor(LeafSystem):
         in  `bodies` (3M) m; `team_command` (3r) m/s; for the laws: `reference` (6n): preset positions m,
             then velocities m/s; `proposals` abstract, n of Proposal or None; `answers` (2n), see `messages`.
         out `violation` (5): 1 from the first violation on, else 0; then its control sample, s, the robot's index in
-            the order of the world, the `Rule`, the amount, m/s (-1 each where there is none).
+            the order of the world, the `Rule`, the amount, m/s (-1 each before a violation).
     State: abstract, a `Memory`.
     Rate: one update per control period, from t = 0. What is chosen at a tick is judged at the next one, when it can be
     seen; so the last command of a simulation is not judged.

@@ -200,5 +200,5 @@ class World:
 
 
 def _rows(points: Sequence[Array]) -> Array:
-    """Points as rows, (n, 3), also where there are none."""
+    """Points as rows, (n, 3), also if n is 0."""
     return np.array(points, dtype=np.float64).reshape(-1, 3)
