@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
-from check.tampering.base import copy, mend, seal, write
+from check.forging import copy, mend, seal, write
 from hypothesis import given
 from hypothesis import strategies as st
 from properties import examples
