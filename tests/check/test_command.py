@@ -43,7 +43,7 @@ def test_anything_else_is_no_report(content: str, tmp_path: Path, capsys: pytest
 
 
 def test_a_check_that_takes_too_long_is_no_agreement() -> None:
-    with pytest.raises(rules.NotEstablished) as stopped, limits.at_most_s(0.01):
+    with pytest.raises(rules.NotEstablished) as stopped, limits.at_most_s(0.01):  # noqa: PT012
         while True:
             pass
     assert (stopped.value.rule, stopped.value.why) == ("the check comes to an end", "not within 0.01 s")
