@@ -12,13 +12,13 @@ import numpy as np
 import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
-from airground_drake.gatekeeper.answer import Decision, Rules, costs_throughout, in_words, settle
+from airground_drake.gatekeeper.answer import Decision, Rules, in_words, settle
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.patience import Commitment
 from airground_drake.gatekeeper.problem import Horizon, predicted_problem
 from airground_drake.gatekeeper.rollout import View
 from airground_drake.gatekeeper.routes.route import Route
-from airground_drake.gatekeeper.solution import after_failure
+from airground_drake.gatekeeper.solution import ConstantPlans, after_failure
 from airground_drake.geometry.motion import Motion
 from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT, Disc, Proposals, Report, Reports, answer_to
 from airground_drake.intervention.policy import Proposal
@@ -104,14 +104,9 @@ class Gatekeepers(abc.ABC):
         """Whether a sample changes nothing: no proposal, no answer to take back, nothing new to remember."""
         return not any(proposals) and not any(before.answers[::2])
 
-    def _sensed(self, position: Array) -> npt.NDArray[np.bool_]:
-        """Which obstacles are within sensing range, (m,)."""
-        away = distances(self._near.still, position)
-        return np.asarray(away <= self.law.avoidance.sensing_range)
-
     def _report(self, position: Array, decision: Decision) -> Report:
-        """What goes with an answer."""
-        near = self._sensed(position)
+        """What goes with an answer: the obstacles within sensing range, and the reason."""
+        near = distances(self._near.still, position) <= self.law.avoidance.sensing_range
         discs: tuple[Disc, ...] = tuple((x, y, z, radius) for x, y, z, radius in self._discs[near].tolist())
         return Report(discs, decision.reason, in_words(decision))
 
@@ -183,7 +178,8 @@ class PaperGatekeepers(Gatekeepers):
             solution = after_failure(problem, solution)
         self.times_s.append(thread_time() - started)
         standing, stood = answer_to(proposal, before.answers, i), now.t - before.since[i]
-        throughout = costs_throughout(problem, solution)
+        constants = ConstantPlans.of(problem)
+        throughout = (constants.accept.objective, constants.refuse.objective) if solution.has_plan else (-1.0, -1.0)
         accepted, reason = settle(solution, throughout, standing, stood, self._rules)
         return Decision(now.t, i, proposal, accepted, reason, problem, solution, throughout)
 

@@ -21,15 +21,7 @@ import numpy as np
 from numba import njit
 
 from airground_drake.base.arrays import Array
-from airground_drake.gatekeeper.rollout import (
-    ACCEPTED,
-    REFUSED,
-    ClosedLoop,
-    View,
-    loop_among,
-    velocity_of,
-    workspace,
-)
+from airground_drake.gatekeeper.rollout import ACCEPTED, REFUSED, ClosedLoop, View, advance, closed_loop, workspace
 from airground_drake.geometry.paths import NoPath, shortest_path
 from airground_drake.intervention.policy import Proposal
 from airground_drake.nsbc.law import UgvLaw
@@ -112,7 +104,7 @@ def outcomes(seen: View, law: UgvLaw, proposal: Proposal, look: Outlook) -> tupl
     for together, accepted in ((False, 0), (True, max(0, int(np.ceil((until - t) / h - 1e-9))))):
         places = [robot_at(seen, j, after, look.coasting, together=together)[:, None] for j in range(len(seen.asked))]
         points = np.ascontiguousarray(np.concatenate([fixed, *places], axis=1))  # the layout that is compiled for
-        loop = loop_among(seen, law, proposal, after, points)
+        loop = closed_loop(seen, law, proposal, after, points)
         positions, cost = _rolled_out(loop, accepted, goal, steps, look.near, look.still)
         found.append(_outcome(positions, cost, goal, seen.preset.max_speed, discs, distances, h, look))
     return found[0], found[1]
@@ -179,22 +171,21 @@ def _rolled_out(
     It ends when nothing moves any more: after `settled` periods, at the goal or at rest for a second.
     """
     steps = len(loop.preset) - 1
-    second = max(1, round(1.0 / loop.law.period))
+    second = max(1, round(1.0 / loop.law.layer.period))
     positions = np.empty((steps + 1, 3))
     positions[0] = loop.start
     position, work = loop.start.copy(), workspace(loop)
     cost = 0.0
     for k in range(steps):
-        velocity = velocity_of(loop, ACCEPTED if k < accepted else REFUSED, k, position, work)
+        advance(loop, ACCEPTED if k < accepted else REFUSED, k, position, work)
         squared, left, moved = 0.0, 0.0, 0.0
         for a in range(3):
-            position[a] += loop.law.period * velocity[a]
             positions[k + 1, a] = position[a]
             squared += (loop.preset[k + 1, a] - position[a]) ** 2
             left += (goal[a] - position[a]) ** 2
             if k + 1 >= second:
                 moved += (position[a] - positions[k + 1 - second, a]) ** 2
-        cost += loop.law.period * squared
+        cost += loop.law.layer.period * squared
         if k >= settled and (left < near**2 or (k + 1 >= second and moved < (0.1 * still) ** 2)):
             return positions[: k + 2], cost
     return positions, cost

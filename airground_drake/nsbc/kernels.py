@@ -6,6 +6,8 @@ times. No fast-math: results are those of IEEE arithmetic in the order written.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import numpy.typing as npt
 from numba import njit
@@ -30,35 +32,43 @@ ROUNDING = 1e-15
 AUGMENTED, RECURSION_NEAREST, RECURSION_LISTED = 0, 1, 2
 
 
+class Layer(NamedTuple):
+    """The numbers of `Avoidance`."""
+
+    gain: float
+    period: float
+    sensing_range: float
+    composition: int
+
+
+class Points(NamedTuple):
+    """What one robot must keep away from: centres, (K, 3), m, safe distances, (K,), m, and shares, (K,)."""
+
+    centre: Array
+    distance: Array
+    share: Array
+
+
 @njit(cache=True)
 def fill_half_spaces(
-    position: Array,
-    centre: Array,
-    distance: Array,
-    share: Array,
-    gain: float,
-    period: float,
-    mobility: Array,
-    sensing_range: float,
-    normal: Array,
-    bound: Array,
+    position: Array, mobility: Array, points: Points, layer: Layer, normal: Array, bound: Array
 ) -> None:
-    """Write the velocity constraints of one robot: normal (K, 3), bound (K,); see `half_spaces`."""
+    """Write the velocity constraints of one robot: normal (K, 3), bound (K,); see `Avoidance.half_spaces`."""
     for k in range(len(bound)):
         squared = 0.0
         for a in range(3):
-            normal[k, a] = position[a] - centre[k, a]
+            normal[k, a] = position[a] - points.centre[k, a]
             squared += normal[k, a] ** 2
         reach = np.sqrt(squared)
         for a in range(3):
             normal[k, a] = mobility[a] * normal[k, a] / reach if reach > 0.0 else 0.0
-        excess = reach - distance[k]
-        if reach > sensing_range:
+        excess = reach - points.distance[k]
+        if reach > layer.sensing_range:
             bound[k] = -np.inf
         elif excess <= 0.0:
-            bound[k] = -share[k] * gain * excess
+            bound[k] = -points.share[k] * layer.gain * excess
         else:
-            bound[k] = -share[k] * excess / period
+            bound[k] = -points.share[k] * excess / layer.period
 
 
 @njit(cache=True)
@@ -133,22 +143,12 @@ def _recursion(lower: Array, normal: Array, bound: Array, nearest_first: bool) -
 
 
 @njit(cache=True)
-def team_half_spaces(
-    position: Array,
-    centre: Array,
-    distance: Array,
-    share: Array,
-    gain: float,
-    period: float,
-    mobility: Array,
-    sensing_range: float,
-) -> tuple[Array, Array]:
-    """Constraints of n robots: normal (n, K, 3), bound (n, K)."""
-    normal, bound = np.empty(centre.shape), np.empty(distance.shape)
+def team_half_spaces(position: Array, mobility: Array, points: Points, layer: Layer) -> tuple[Array, Array]:
+    """Constraints of n robots, with a leading dimension n in `points`: normal (n, K, 3), bound (n, K)."""
+    normal, bound = np.empty(points.centre.shape), np.empty(points.distance.shape)
     for i in range(len(position)):
-        fill_half_spaces(
-            position[i], centre[i], distance[i], share[i], gain, period, mobility[i], sensing_range, normal[i], bound[i]
-        )
+        around = Points(points.centre[i], points.distance[i], points.share[i])
+        fill_half_spaces(position[i], mobility[i], around, layer, normal[i], bound[i])
     return normal, bound
 
 
@@ -191,14 +191,14 @@ def commands(
     sensing_range: float,
     composition: int,
 ) -> Array:
-    """Velocities of k robots, (k, 3), m/s; see `Avoidance.command`, with the fields of `Neighbours` one by one."""
+    """Velocities of k robots, (k, 3), m/s; see `Avoidance.command`, with the fields of `Neighbours` and of `Layer`."""
+    # one by one, because numba takes 1.5 us to unpack a named tuple that Python passes, and 0.04 us for an array
+    layer = Layer(gain, period, sensing_range, composition)
     velocity, centre = limit_speed(lower, max_speed), gather(positions, still, others)
     normal, bound = np.empty(centre.shape[1:]), np.empty(centre.shape[1])
     for i in range(len(velocity)):
-        fill_half_spaces(
-            positions[members[i]], centre[i], distance[i], share[i], gain, period, mobility[i], sensing_range,
-            normal, bound,
-        )  # fmt: skip
+        around = Points(centre[i], distance[i], share[i])
+        fill_half_spaces(positions[members[i]], mobility[i], around, layer, normal, bound)
         velocity[i] = avoid_one(velocity[i], normal, bound, composition)
     return velocity
 
@@ -274,29 +274,15 @@ def _closest(lower: Array, normal: Array, bound: Array, contradiction: float) ->
         force[size] = 0.0
         while True:
             _split(normal[p], across, share, size)
-            across_squared, squared, missed = 0.0, 0.0, bound[p]
-            for a in range(d):
-                across_squared += across[size, a] ** 2
-                squared += normal[p, a] ** 2
-                missed -= normal[p, a] * velocity[a]
-            step, leaving = np.inf, -1
-            pull[:size] = share[size, :size]
-            for m in range(size - 1, -1, -1):  # normal[p] = across[size] + sum over m of pull[m] * normal[active[m]]
-                for n in range(m):
-                    pull[n] -= pull[m] * share[m, n]
-                if pull[m] > 0.0 and force[m] < step * pull[m]:
-                    step, leaving = max(force[m], 0.0) / pull[m], m
-            if leaving < 0 and (across_squared <= DEPENDENT * squared or squared < 1e-18):
+            step, leaving = _first_release(force, share, pull, size)
+            missed, free, squared = _missed(velocity, normal, bound, p), _squared(across, size), _squared(normal, p)
+            if leaving < 0 and (free <= DEPENDENT * squared or squared < 1e-18):
                 if missed <= contradiction:
                     break
-                weight, total = 1.0, bound[p]  # no velocity changes this sum of what is missed
-                for m in range(size):
-                    weight -= pull[m]
-                    total -= pull[m] * bound[active[m]]
-                return velocity, total / weight
-            joins = missed < step * across_squared
+                return velocity, _certain_violation(bound, p, pull, active[:size])
+            joins = missed < step * free
             if joins:
-                step = missed / across_squared
+                step = missed / free
             for a in range(d):
                 velocity[a] += step * across[size, a]
             for m in range(size):
@@ -308,23 +294,35 @@ def _closest(lower: Array, normal: Array, bound: Array, contradiction: float) ->
                 _meet(velocity, normal, bound, active[:size], across)
                 break
             settled[active[leaving]] = False
-            for m in range(leaving, size):
-                force[m] = force[m + 1]
             size -= 1
-            for m in range(leaving, size):
-                active[m] = active[m + 1]
-                _split(normal[active[m]], across, share, m)
+            _remove(leaving, normal, active[: size + 1], force, across, share)
     return velocity, 0.0
 
 
 @njit(cache=True)
+def _missed(velocity: Array, normal: Array, bound: Array, k: int) -> float:
+    """By how much a velocity misses a constraint, m/s."""
+    missed = bound[k]
+    for a in range(len(velocity)):
+        missed -= normal[k, a] * velocity[a]
+    return missed
+
+
+@njit(cache=True)
+def _squared(vectors: Array, k: int) -> float:
+    """Squared length of a row."""
+    squared = 0.0
+    for a in range(vectors.shape[1]):
+        squared += vectors[k, a] ** 2
+    return squared
+
+
+@njit(cache=True)
 def _most_missed(velocity: Array, normal: Array, bound: Array, settled: npt.NDArray[np.bool_]) -> int:
-    """Index of the constraint that is missed most, by more than rounding, among those not settled; -1 if none is."""
+    """Index of the constraint that is missed most, by more than rounding, among those not settled; -1 without one."""
     found, worst = -1, 0.0
     for k in range(len(bound)):
-        missed = bound[k]
-        for a in range(len(velocity)):
-            missed -= normal[k, a] * velocity[a]
+        missed = _missed(velocity, normal, bound, k)
         if missed > worst and not settled[k]:
             terms = abs(bound[k])
             for a in range(len(velocity)):
@@ -332,6 +330,45 @@ def _most_missed(velocity: Array, normal: Array, bound: Array, settled: npt.NDAr
             if missed > ROUNDING * terms:
                 found, worst = k, missed
     return found
+
+
+@njit(cache=True)
+def _first_release(force: Array, share: Array, pull: Array, size: int) -> tuple[float, int]:
+    """How far the velocity can move before the force of an active constraint falls to 0, and which one that is.
+
+    Writes into `pull` the weights of the active normals in the new one, which is across[size] + sum of pull * normal.
+    Without such a constraint: inf and -1.
+    """
+    step, leaving = np.inf, -1
+    pull[:size] = share[size, :size]
+    for m in range(size - 1, -1, -1):
+        for n in range(m):
+            pull[n] -= pull[m] * share[m, n]
+        if pull[m] > 0.0 and force[m] < step * pull[m]:
+            step, leaving = max(force[m], 0.0) / pull[m], m
+    return step, leaving
+
+
+@njit(cache=True)
+def _certain_violation(bound: Array, p: int, pull: Array, active: npt.NDArray[np.int64]) -> float:
+    """What every velocity misses p or an active constraint by, m/s: no velocity changes this sum of what is missed."""
+    weight, total = 1.0, bound[p]
+    for m in range(len(active)):
+        weight -= pull[m]
+        total -= pull[m] * bound[active[m]]
+    return total / weight
+
+
+@njit(cache=True)
+def _remove(
+    leaving: int, normal: Array, active: npt.NDArray[np.int64], force: Array, across: Array, share: Array
+) -> None:
+    """Close the gap that an active constraint leaves, in the forces, too, and split the normals behind it again."""
+    for m in range(leaving, len(active)):
+        force[m] = force[m + 1]
+    for m in range(leaving, len(active) - 1):
+        active[m] = active[m + 1]
+        _split(normal[active[m]], across, share, m)
 
 
 @njit(cache=True)
@@ -362,9 +399,8 @@ def _meet(velocity: Array, normal: Array, bound: Array, active: npt.NDArray[np.i
     """
     for _ in range(2):
         for m in range(len(active)):
-            missed, along = bound[active[m]], 0.0
+            missed, along = _missed(velocity, normal, bound, active[m]), 0.0
             for a in range(len(velocity)):
-                missed -= normal[active[m], a] * velocity[a]
                 along += normal[active[m], a] * across[m, a]
             for a in range(len(velocity)):
                 velocity[a] += missed / along * across[m, a]

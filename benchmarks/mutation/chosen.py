@@ -117,7 +117,7 @@ LAW = (
         "own task not filtered",
         "nsbc/law.py",
         "command",
-        "        return avoid_one(own, normal, bound, law.composition)\n",
+        "        return avoid_one(own, normal, bound, composition)\n",
         "        return own\n",
     ),
     Mutant(
@@ -269,9 +269,9 @@ GATEKEEPER = (
     Mutant(
         "the prediction has no avoidance",
         "gatekeeper/rollout.py",
-        "velocity_of",
-        "mode == ACCEPTED, Intervention(loop.wanted[k], asked, loop.chosen),\n        normal, bound,",
-        "mode == ACCEPTED, Intervention(loop.wanted[k], asked, loop.chosen),\n        0.0 * normal, 0.0 * bound,",
+        "_command",
+        "mode == ACCEPTED, normal, bound)",
+        "mode == ACCEPTED, 0.0 * normal, 0.0 * bound)",
     ),
     Mutant(
         "a first stage that refuses is accepted",

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from pydrake.solvers import MathematicalProgramResult, SolutionResult
-
 from airground_drake.base.arrays import Array
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.problem import Problem
-from airground_drake.gatekeeper.relaxation import remaining_cost
+from airground_drake.gatekeeper.relaxation import unavoidable_cost
 from airground_drake.gatekeeper.solution import ConstantPlans, Solution, Status, cut_short
 
 Search = Callable[[Problem, ConstantPlans, Budget], Solution]
@@ -51,17 +49,4 @@ def without_optimum(
         ended: how the solver says that it ended.
     """
     status: Status = "budget_spent" if budget.spent() else ended
-    return cut_short(problem, constants.both, unavoidable_cost(problem), status=status, normals=normals)
-
-
-def how_it_ended(result: MathematicalProgramResult, budget: Budget) -> Status:
-    """How a solver ended: with an optimum, out of budget, or by failing."""
-    if result.is_success():
-        return "optimal"
-    stopped = budget.spent() or result.get_solution_result() == SolutionResult.kIterationLimit
-    return "budget_spent" if stopped else "solver_failed"
-
-
-def unavoidable_cost(problem: Problem) -> float:
-    """Lower bound of (25) over all plans, relaxed or not, for which no solver is needed."""
-    return float(remaining_cost(problem)[0])
+    return cut_short(problem, constants.both, unavoidable_cost(problem), status, normals=normals)

@@ -6,13 +6,13 @@ import math
 from typing import Any
 
 import numpy as np
-from pydrake.solvers import MathematicalProgram, QuadraticConstraint, SnoptSolver, SolverOptions
+from pydrake.solvers import MathematicalProgram, QuadraticConstraint, SnoptSolver, SolutionResult, SolverOptions
 
 from airground_drake.base.arrays import Array
 from airground_drake.gatekeeper.budget import Budget
 from airground_drake.gatekeeper.problem import Evaluation, Problem
-from airground_drake.gatekeeper.relaxation import sum_up_rounding, within_reach
-from airground_drake.gatekeeper.routes.guard import guarded, how_it_ended, unavoidable_cost, without_optimum
+from airground_drake.gatekeeper.relaxation import sum_up_rounding, unavoidable_cost, within_reach
+from airground_drake.gatekeeper.routes.guard import guarded, without_optimum
 from airground_drake.gatekeeper.solution import ConstantPlans, Solution, Status, cheapest, cut_short
 
 _AXES = 2  # UGVs move in their plane
@@ -39,7 +39,7 @@ class NonlinearRoute:
     rounded one and the two constant ones. A local optimum bounds nothing: `route_bound` and `gap` are -1.
 
     Budget: major iterations and the time left go to the solver. An iterate that it stops at is
-    rounded like an optimum; the status is 'budget_spent' and the bound then that of `remaining_cost`.
+    rounded like an optimum; the status is 'budget_spent' and the bound then that of `unavoidable_cost`.
     """
 
     def __init__(self) -> None:
@@ -57,8 +57,7 @@ class NonlinearRoute:
         rounded = sum_up_rounding(relaxed)
         plans = (problem.evaluate(rounded), *constants.both)
         if status != "optimal":
-            bound = unavoidable_cost(problem)
-            return cut_short(problem, plans, bound, status=status, relaxed=relaxed, rounded=rounded)
+            return cut_short(problem, plans, unavoidable_cost(problem), status, relaxed=relaxed, rounded=rounded)
         return cheapest(problem, plans, relaxed=relaxed, rounded=rounded)
 
     def _relax(self, problem: Problem, start: Evaluation, budget: Budget) -> tuple[Array | None, Status]:
@@ -69,7 +68,9 @@ class NonlinearRoute:
         except RuntimeError:
             return None, "solver_failed"
         relaxed = np.clip(result.GetSolution(omega), 0.0, 1.0)
-        return relaxed if np.isfinite(relaxed).all() else None, how_it_ended(result, budget)
+        stopped = budget.spent() or result.get_solution_result() == SolutionResult.kIterationLimit
+        ended: Status = "optimal" if result.is_success() else "budget_spent" if stopped else "solver_failed"
+        return relaxed if np.isfinite(relaxed).all() else None, ended
 
 
 def _options(budget: Budget) -> SolverOptions:
