@@ -16,15 +16,7 @@ from airground_drake.nsbc.law import UgvLaw
 
 @dataclass(frozen=True)
 class Horizon:
-    """Discretisation and weights of (25)-(27).
-
-    Attributes:
-        stages: N.
-        substeps: control periods per stage.
-        error_weight: a_i of (25), 1/(m^2 s).
-        slack_weight: b_i of (25), 1/(m^2 s).
-        terminal_weight: of the terminal cost, see `Problem.terms`, s.
-    """
+    """N stages of (25)-(27), control periods per stage, and weights as in `Problem`."""
 
     stages: int
     substeps: int

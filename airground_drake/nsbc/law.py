@@ -118,8 +118,9 @@ class UgvLaw:
                 if one is not None:
                     executing[i] = True
                     together.wanted[i], together.rate[i], together.chosen[i] = one
-        law = self.numbers
-        return _commands(*law[:3], *law.layer, *near, *together, positions, target, rate, executing)
+        own = self.numbers
+        numbers = (own.motion_gain, own.intervention_gain, own.intervention_on_top, *own.layer)
+        return _commands(*numbers, *near, *together, positions, target, rate, executing)
 
 
 @cache
