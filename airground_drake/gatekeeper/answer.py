@@ -130,8 +130,8 @@ def settle(
     Args:
         solution: the route's.
         throughout: costs (25) of accepting and of refusing throughout the horizon.
-        standing: ACCEPT, REFUSE or SILENT.
-        stood: for how long that has been the answer, s.
+        standing: the answer now, ACCEPT, REFUSE or SILENT.
+        stood: for how long it has stood, s.
         rules: margins and limits.
     """
     if not solution.has_plan:

@@ -51,14 +51,7 @@ class BinaryProgram:
         self.half_planes = self.program.AddLinearConstraint(
             np.zeros((1, b + n)), np.full(1, -np.inf), np.full(1, np.inf), np.concatenate([self.omega, self.u])
         )
-        positive = self.program.AddBoundingBoxConstraint(0.0, np.inf, self.u)
-        for description, binding in (
-            ("(25) task error", self.error),
-            ("(25) slack", self.slack),
-            ("(26d) as half-planes", self.half_planes),
-            ("(26e) slack", positive),
-        ):
-            binding.evaluator().set_description(description)
+        self.program.AddBoundingBoxConstraint(0.0, np.inf, self.u)  # (26e)
         self.within = np.zeros((n, 0), dtype=bool)
         self._of_block = np.equal.outer(self.block, np.arange(b)).astype(np.float64)
 

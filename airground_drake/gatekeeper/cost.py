@@ -16,17 +16,11 @@ from airground_drake.base.arrays import Array
 
 
 class Terms(NamedTuple):
-    """The data of (23) and (25)-(26e) over N stages with m points; numba takes it as one argument.
+    """The data of a `Problem` as numba takes them.
 
     Attributes:
-        dt: length of a stage, s.
-        initial: position at the beginning, (3,), m.
         velocities: of the modes, (2, N, 3), m/s, in the order of `rollout.REFUSED` and `ACCEPTED`.
-        reference: preset trajectory at the ends of the stages, (N, 3), m.
-        centres: points to keep away from at the ends of the stages, (N, m, 3), m.
-        distances: safe distances d of (26d), (m,), m.
         error_weights: a_i of (25) at the ends of the stages, (N,), 1/(m^2 s); the last one includes the terminal cost.
-        slack_weight: b_i of (25), 1/(m^2 s).
     """
 
     dt: float

@@ -83,8 +83,7 @@ class Gatekeepers(abc.ABC):
 
     Attributes:
         law: their control law, with the scenario's gains.
-        times_s: CPU time of every prediction and decision so far (what it costs, not what else the machine did
-            meanwhile).
+        times_s: CPU time of every prediction and decision so far.
     """
 
     def __init__(self, world: World, law: UgvLaw, presets: Sequence[Motion]) -> None:
@@ -131,16 +130,7 @@ class PaperGatekeepers(Gatekeepers):
     def __init__(
         self, world: World, law: UgvLaw, presets: Sequence[Motion], route: Route, horizon: Horizon, rules: Rules
     ) -> None:
-        """Of the UGVs of a world.
-
-        Args:
-            world: who keeps what distance from whom.
-            law: their control law.
-            presets: their preset trajectories.
-            route: solves (26).
-            horizon: grid and weights of (25)-(27).
-            rules: from the solution to the answer.
-        """
+        """As `Gatekeepers`; the route solves (26) over the horizon, and the rules lead to the answer."""
         super().__init__(world, law, presets)
         self._route, self._horizon, self._rules = route, horizon, rules
 
@@ -185,10 +175,7 @@ class PaperGatekeepers(Gatekeepers):
 
 
 def _rest_of_plan(before: GatekeeperState, t: float, i: int, proposal: Proposal) -> Array | None:
-    """What the plan that was decided on at the sample before says from time t, s, on, (N,); None without one.
-
-    It ends earlier by a sampling period; its last choice stands for the rest.
-    """
+    """The rest of the last sample's plan from time t, s, on, (N,), its last choice repeated; None without a plan."""
     for decision in before.decisions:
         if decision.robot == i and decision.proposal is proposal and decision.problem and decision.solution:
             plan = decision.solution.plan

@@ -60,8 +60,7 @@ class View:
 class ClosedLoop(NamedTuple):
     """All that the motion of one UGV over the horizon depends on, besides the answers to the proposal.
 
-    N stages of `substeps` control periods each, S = N * substeps in all. A named tuple because that is what
-    numba takes as one argument; the arrays are never written to.
+    N stages of `substeps` control periods each, S = N * substeps in all. The arrays are never written to.
 
     Attributes:
         law: the numbers of its control law.
@@ -91,15 +90,10 @@ class ClosedLoop(NamedTuple):
 def closed_loop(
     seen: View, law: UgvLaw, proposal: Proposal, after: Array, points: Array, substeps: int = 1
 ) -> ClosedLoop:
-    """The UGV's closed loop among points that move in any way.
+    """The UGV's closed loop among points that move in any way, with `substeps` control periods per stage.
 
-    Args:
-        seen: what the UGV sees; its `centres` and `velocities` are not looked at.
-        law: its control law.
-        proposal: the intervention in question.
-        after: control samples from now on, (S + 1,), s.
-        points: where the points are at these, (S + 1, K, 3), m.
-        substeps: control periods per stage.
+    `after` are control samples from now on, (S + 1,), s, and `points` the places of the points then, (S + 1, K, 3), m.
+    The `centres` and `velocities` of the view do not count.
     """
     t = seen.t + after
     return ClosedLoop(
@@ -117,14 +111,10 @@ def closed_loop(
 
 
 class Workspace(NamedTuple):
-    """Arrays that one control period writes to: those of the K inequalities, and velocities of two motions.
+    """Arrays that one control period writes to, and the UGV's mobility.
 
-    Attributes:
-        mobility: (3,), 1 where the UGV can move, 0 where it cannot; not written to.
-        normal: of the avoidance inequalities, (K, 3).
-        bound: of the avoidance inequalities, (K,), m/s.
-        rate: velocity of the preset trajectory, (3,), m/s.
-        asked: velocity of the proposed motion, (3,), m/s.
+    The avoidance inequalities are `normal`, (K, 3), and `bound`, (K,), m/s; `rate` and `asked` are the velocities of
+    the preset trajectory and of the proposed motion, (3,), m/s.
     """
 
     mobility: Array
@@ -149,12 +139,7 @@ def advance(loop: ClosedLoop, mode: int, k: int, position: Array, work: Workspac
     Only here do predictions assume a plant, the first-order one: it moves straight at its command. A test holds this
     step against `world.plant.FirstOrder`. Another plant replaces it here.
 
-    Args:
-        loop: the closed loop.
-        mode: REFUSED or ACCEPTED.
-        k: control period, from 0.
-        position: of the UGV, (3,), m; at the beginning of the period, then, overwritten, at its end.
-        work: overwritten.
+    `mode` is REFUSED or ACCEPTED. `position`, (3,), m, is that at the beginning of the period, then that at its end.
     """
     velocity = _command(loop, mode, k, position, work)
     for a in range(3):

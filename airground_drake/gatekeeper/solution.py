@@ -103,14 +103,7 @@ def cheapest(
 ) -> Solution:
     """The cheapest of some evaluated plans, among them both constant ones; the first on a tie.
 
-    Args:
-        problem: what they are plans of.
-        plans: at least one that starts by accepting and one that starts by refusing.
-        status: any but a refusal.
-        route_bound: of the cost (25), with distances measured along `normals` if there are any; -1: none.
-        normals: of half-planes, (N, m, 3).
-        relaxed: omega of the relaxation, (N,), if it was solved.
-        rounded: the same after sum-up rounding, (N,).
+    The other arguments are those of `Solution`. With `normals`, the bound and the gap are about distances along them.
     """
     best = min(plans, key=lambda plan: plan.objective)
     reached = best.objective
@@ -141,24 +134,14 @@ def cut_short(
 ) -> Solution:
     """The solution when the budget is spent or a solver failed: the best plan so far, and a bound without a solver.
 
-    Args:
-        problem: what they are plans of.
-        plans: as for `cheapest`.
-        bound: lower bound of every plan.
-        status: 'budget_spent' or 'solver_failed'.
-        evidence: `normals`, `relaxed` and `rounded`, as for `cheapest`.
+    As `cheapest`, which takes `evidence`; `bound` is a lower bound of every plan.
     """
     bound = min(bound, *(plan.objective for plan in plans))
     return cheapest(problem, plans, status=status, route_bound=bound, **evidence)
 
 
 def after_failure(problem: Problem, solution: Solution) -> Solution:
-    """The solution after a solver failure: the cheapest of its own plan, the constant plans and the previous one.
-
-    Args:
-        problem: what they are plans of.
-        solution: the route's, with or without a plan.
-    """
+    """The solution after a solver failure: the cheapest of its own plan, the constant plans and the previous one."""
     constants = ConstantPlans.of(problem)
     if not (problem.is_finite() and constants.are_finite()):
         return Solution(False, "refused_not_finite")

@@ -102,8 +102,9 @@ def shortest_path(start: ArrayLike, goal: ArrayLike, centres: ArrayLike, radii: 
             discs) and the goal are in different components of the free space.
         ValueError: if a number is not finite.
     """
-    if not all(np.isfinite(numbers).all() for numbers in (start, goal, centres, radii)):
-        raise ValueError(f"a path needs finite numbers, got {start}, {goal}, {centres}, {radii}")
+    given = start, goal, centres, radii
+    if not all(np.isfinite(numbers).all() for numbers in given):
+        raise ValueError(f"a path needs finite numbers, got {given}")
     p, q = complex(*np.asarray(start)), complex(*np.asarray(goal))
     c, r = np.reshape(centres, (-1, 2)) @ np.array((1.0, 1.0j)), np.asarray(radii, dtype=np.float64)
     c, r = _outermost(c, r)

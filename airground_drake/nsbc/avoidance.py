@@ -75,10 +75,10 @@ class Avoidance:
         gain: A of (8), 1/s.
         period: control period h, s; gain * period <= 1 keeps the recovery from overshooting.
         sensing_range: farther points are not seen, m.
-        composition: 'augmented' is the KKT point of min ||v - lower||^2 under all constraints, that is the
-            augmented null-space projection over the active set, shortened to be exact in floating point.
-            'recursion_nearest' and 'recursion_listed' apply (5) as printed to the same constraints, with the
-            nearest or the first listed obstacle as highest priority; they are not safe, and here to show it.
+        composition: 'augmented' is the KKT point of min ||v - lower||^2 under all constraints: the augmented null-space
+            projection over the active set, shortened to be exact in floating point. 'recursion_nearest' and
+            'recursion_listed' apply (5) as printed to the same constraints, with the nearest or the first listed
+            obstacle as highest priority. They are there to show that (5) is not safe.
     """
 
     gain: float
@@ -98,7 +98,8 @@ class Avoidance:
 
     def apply(self, lower: Array, spaces: HalfSpaces) -> Array:
         """Put the avoidance tasks above lower-priority velocities: (n, 3) m/s to (n, 3) m/s."""
-        return kernels.team_avoid(lower, spaces.normal, spaces.bound, self.layer.composition)
+        rows = zip(lower, spaces.normal, spaces.bound, strict=True)
+        return np.array([kernels.avoid_one(*row, self.layer.composition) for row in rows])
 
     def command(self, lower: Array, positions: Array, near: Neighbours) -> Array:
         """Commands of k robots, (k, 3), m/s: lower-priority velocities (k, 3), limited in speed, below avoidance.

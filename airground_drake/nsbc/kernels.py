@@ -1,7 +1,7 @@
 """Compiled inner loops of set-based avoidance (numba); `avoidance.py` explains and wraps them.
 
-Scalar code without temporaries, because the gatekeeper rolls the closed loop out hundreds of thousands of
-times. No fast-math: results are those of IEEE arithmetic in the order written.
+Scalar code without temporaries, because the gatekeeper computes the command of hundreds of thousands of periods. No
+fast-math: results are those of IEEE arithmetic in the order written.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ MARGIN_M_S = 1e-12
 """Added to every bound in the projection, m/s. The bound of a robot in contact is 0. Without the margin
 rounding misses it every other time, and `_scale_back` stops a robot that should slide along."""
 CONTRADICTION_M_S = 1e-9
-"""Constraints contradict each other if one is missed by more where the others are met, m/s; by less, it is rounding."""
+"""Constraints contradict each other if one is missed by more than this where the others are met, m/s."""
 ABOVE_LEAST = 1e-9
-"""Violations within this relative distance of the least one count as equal, so that no speed is spent on rounding."""
+"""Violations that exceed the least one by no more than this share count as least: no speed is spent on rounding."""
 ABOVE_LEAST_M_S = 1e-11
-"""So is one that is larger by this, m/s: between two points in opposite directions but for rounding, a velocity along
-both boundaries, as fast as the nearest far obstacle allows, would be better by what rounding makes of that speed."""
+"""So do violations that exceed it by this, m/s. Between two points in opposite directions but for rounding, a fast
+velocity along both boundaries would otherwise win by its rounding error."""
 DEPENDENT = 1e-20
 """Normals within 1e-10 rad of linear dependence count as dependent: the square of the sine of that angle."""
 ROUNDING = 1e-15
@@ -153,15 +153,6 @@ def team_half_spaces(position: Array, mobility: Array, points: Points, layer: La
 
 
 @njit(cache=True)
-def team_avoid(lower: Array, normal: Array, bound: Array, composition: int) -> Array:
-    """Velocities of n robots, (n, 3) m/s."""
-    velocity = np.empty(lower.shape)
-    for i in range(len(lower)):
-        velocity[i] = avoid_one(lower[i], normal[i], bound[i], composition)
-    return velocity
-
-
-@njit(cache=True)
 def gather(positions: Array, obstacles: Array, others: npt.NDArray[np.intp]) -> Array:
     """Points around k robots: (k, m + n, 3) from obstacles (m, 3) and positions of the others (k, n)."""
     m = len(obstacles)
@@ -235,11 +226,11 @@ def _closest_feasible(lower: Array, normal: Array, bound: Array) -> Array:
 
 @njit(cache=True)
 def _least_violation(normal: Array, bound: Array) -> Array:
-    """Slowest velocity among those whose largest violation is least, but for `ABOVE_LEAST` of it and `ABOVE_LEAST_M_S`.
+    """Slowest velocity whose largest violation is least, up to `ABOVE_LEAST` and `ABOVE_LEAST_M_S`.
 
-    Constraints contradict each other only where a robot is inside several safe distances at once. What the
-    lower priorities ask for then has no say: they might be hostile. The least violation is found from below: each
-    contradiction proves that every velocity misses a constraint by so much, and the bounds are lowered by that.
+    Constraints contradict each other only where a robot is inside several safe distances at once. The wishes of lower
+    priorities then have no say: they might be hostile. The least violation is found from below: each contradiction
+    proves that every velocity misses some constraint by a certain amount, and the bounds are lowered by that.
     """
     still = np.zeros(normal.shape[1])
     least, more = 0.0, np.inf
@@ -253,13 +244,13 @@ def _least_violation(normal: Array, bound: Array) -> Array:
 def _closest(lower: Array, normal: Array, bound: Array, contradiction: float) -> tuple[Array, float]:
     """Closest velocity to `lower` (d,) with normal (K, d) . v >= bound (K,), and the violation that is certain, m/s.
 
-    The dual active-set method of Goldfarb and Idnani (Mathematical Programming 27, 1983) in any number of dimensions
-    d. The velocity is always the closest one under the active constraints, each of which pushes with a force >= 0. The
-    constraint that is missed most joins them; one whose force falls to 0 on the way leaves.
+    The dual active-set method of Goldfarb and Idnani (Mathematical Programming 27, 1983) in d dimensions. The velocity
+    is always the closest one under the active constraints; each of these pushes with a force >= 0. The constraint that
+    is missed most joins them; a constraint whose force falls to 0 on the way leaves.
 
     A constraint that the active ones contradict is left out if it is missed by no more than `contradiction`, m/s.
-    Otherwise the certain violation is above 0: every velocity misses a constraint by as much, and the velocity returned
-    means nothing.
+    Otherwise the certain violation is above 0: every velocity misses some constraint by at least that much, and the
+    velocity returned means nothing.
     """
     count, d = normal.shape
     velocity, settled = lower.copy(), np.zeros(count, dtype=np.bool_)  # active or left out
@@ -351,7 +342,7 @@ def _first_release(force: Array, share: Array, pull: Array, size: int) -> tuple[
 
 @njit(cache=True)
 def _certain_violation(bound: Array, p: int, pull: Array, active: npt.NDArray[np.int64]) -> float:
-    """What every velocity misses p or an active constraint by, m/s: no velocity changes this sum of what is missed."""
+    """Every velocity misses p or an active constraint by this, m/s: no velocity changes this mean of their misses."""
     weight, total = 1.0, bound[p]
     for m in range(len(active)):
         weight -= pull[m]
@@ -375,7 +366,7 @@ def _remove(
 def _split(vector: Array, across: Array, share: Array, k: int) -> None:
     """Write the part of a vector that is orthogonal to across[:k] into across[k], and into share[k, :k] its shares.
 
-    Gram-Schmidt, twice: once leaves, of nearly parallel ones, a part along the others that is as large as the rest.
+    Gram-Schmidt, twice: of nearly parallel vectors, one pass leaves a part along the others as large as the rest.
     """
     across[k] = vector
     share[k, :k] = 0.0
@@ -394,8 +385,8 @@ def _split(vector: Array, across: Array, share: Array, k: int) -> None:
 def _meet(velocity: Array, normal: Array, bound: Array, active: npt.NDArray[np.int64], across: Array) -> None:
     """Take a velocity, in place, the shortest way to where the active constraints hold with equality.
 
-    Twice: of nearly parallel ones the first pass leaves rounding, divided by the sine of their angle, which is more
-    than what counts as met; the second one starts beside the goal, and what it leaves is rounding again.
+    Twice: with nearly parallel normals the first pass misses by the rounding error over the sine of their angle, which
+    is too much. The second pass starts beside the goal and misses by the rounding error only.
     """
     for _ in range(2):
         for m in range(len(active)):
@@ -410,7 +401,7 @@ def _meet(velocity: Array, normal: Array, bound: Array, active: npt.NDArray[np.i
 def _scale_back(velocity: Array, normal: Array, bound: Array) -> Array:
     """Shorten a velocity, in place, until every constraint that v = 0 satisfies holds in floating point.
 
-    A robot in contact is at the safe distance but for rounding, on either side of it: it counts as there.
+    A robot that is inside the safe distance by rounding only counts as being at it.
     """
     while True:
         scale = 1.0

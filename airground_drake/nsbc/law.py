@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -45,13 +45,7 @@ class Numbers(NamedTuple):
 
 
 class Ugv(NamedTuple):
-    """Where one UGV is and how it may move.
-
-    Attributes:
-        position: (3,), m, world frame.
-        mobility: (3,), 1 where it can move, else 0.
-        max_speed: m/s.
-    """
+    """A UGV's position, (3,), m, mobility, (3,), 1 where it can move, else 0, and speed limit, m/s."""
 
     position: Array
     mobility: Array
@@ -67,7 +61,7 @@ class Tracking(NamedTuple):
 
 @dataclass(frozen=True)
 class UgvLaw:
-    """The numbers of the UGVs' control law, and the law.
+    """The UGVs' control law.
 
     Attributes:
         avoidance: the set-based layer.
@@ -95,12 +89,7 @@ class UgvLaw:
         return Numbers(*gains, self.intervention_on_top, self.avoidance.layer)
 
     def velocity(
-        self,
-        positions: Array,
-        near: Neighbours,
-        target: Array,
-        rate: Array,
-        asked: Sequence[Intervention | None],
+        self, positions: Array, near: Neighbours, target: Array, rate: Array, asked: Sequence[Intervention | None]
     ) -> Array:
         """Commands of n UGVs, (n, 3), m/s: `command` for each.
 
@@ -111,23 +100,16 @@ class UgvLaw:
             rate: velocity of the target, (n, 3), m/s.
             asked: per UGV, what the accepted intervention asks for, or None.
         """
-        executing, together = _nothing_asked(len(target))
-        if any(one is not None for one in asked):
-            executing, together = executing.copy(), Intervention(*(array.copy() for array in together))
-            for i, one in enumerate(asked):
-                if one is not None:
-                    executing[i] = True
-                    together.wanted[i], together.rate[i], together.chosen[i] = one
+        count = len(target)
+        executing, chosen = np.zeros(count, dtype=np.bool_), np.zeros((count, 3, 3))
+        wanted, wanted_rate = np.zeros((2, count, 3))
+        for i, one in enumerate(asked):
+            if one is not None:
+                executing[i] = True
+                wanted[i], wanted_rate[i], chosen[i] = one
         own = self.numbers
         numbers = (own.motion_gain, own.intervention_gain, own.intervention_on_top, *own.layer)
-        return _commands(*numbers, *near, *together, positions, target, rate, executing)
-
-
-@cache
-def _nothing_asked(count: int) -> tuple[npt.NDArray[np.bool_], Intervention]:
-    """No UGV executes an intervention: flags (n,), and arrays that the law does not read then. Do not write to them."""
-    zero = np.zeros((count, 3))
-    return np.zeros(count, dtype=np.bool_), Intervention(zero, zero, np.zeros((count, 3, 3)))
+        return _commands(*numbers, *near, wanted, wanted_rate, chosen, positions, target, rate, executing)
 
 
 @njit(cache=True)
@@ -140,14 +122,8 @@ def command(
     composite, as (20) does; otherwise it is the task below avoidance, and tracking fills its null space, so that no
     intervention can break an avoidance inequality.
 
-    Args:
-        law: its numbers.
-        ugv: which UGV.
-        track: what its own task asks for.
-        asked: what the intervention asks for; not looked at unless it is executed.
-        executing: whether an intervention is accepted.
-        normal: of the avoidance inequalities at this position, (K, 3).
-        bound: of the avoidance inequalities, (K,), m/s.
+    `asked` counts only if `executing`. The avoidance inequalities at this position are `normal`, (K, 3), and `bound`,
+    (K,), m/s.
     """
     own, composition = np.empty(3), law.layer.composition
     for a in range(3):

@@ -15,13 +15,7 @@ Search = Callable[[Problem, ConstantPlans, Budget], Solution]
 
 
 def guarded(problem: Problem, budget: Budget, search: Search) -> Solution:
-    """Search, unless the problem or its costs are not finite, or the budget is spent.
-
-    Args:
-        problem: data of (26).
-        budget: asked when the constant plans are evaluated: there is always one of them to go by.
-        search: what to do then.
-    """
+    """Search, unless the problem or its costs are not finite, or the budget is spent once constant plans are known."""
     if not problem.is_finite():
         return Solution(False, "refused_not_finite")
     constants = ConstantPlans.of(problem)
@@ -39,14 +33,6 @@ def without_optimum(
     normals: Array | None = None,
     ended: Status = "solver_failed",
 ) -> Solution:
-    """The better constant plan, when a solver gave nothing because it ran out of time or failed.
-
-    Args:
-        problem: what they are plans of.
-        constants: its constant plans.
-        budget: if it is spent, the solver wanted time.
-        normals: of half-planes that stand for (26d), (N, m, 3).
-        ended: how the solver says that it ended.
-    """
+    """The better constant plan, when a solver gave no solution; whatever it says, a spent budget is the reason."""
     status: Status = "budget_spent" if budget.spent() else ended
     return cut_short(problem, constants.both, unavoidable_cost(problem), status, normals=normals)
