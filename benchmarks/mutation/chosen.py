@@ -193,7 +193,7 @@ TRIGGERS = (
         "integrated_noise",
         "B=intensity / np.sqrt(period) * eye",
         "B=1.05 * intensity / np.sqrt(period) * eye",
-        tests=("tests/systems/test_noise.py",),
+        tests=("tests/systems/test_decision.py",),
     ),
 )
 """The trigger: dwell, release, events, threshold, noise."""
