@@ -131,8 +131,8 @@ LAW = (
         "executed whatever the answer, the answer recorded",
         "systems/controllers.py",
         "UgvController._update",
-        "velocity = self.velocity(context.get_time(), positions, reference, rate, proposals, law)",
-        "velocity = self.velocity(context.get_time(), positions, reference, rate, self._proposals.Eval(context), law)",
+        "reference, rate, proposals, self._in_force(context))",
+        "reference, rate, self._proposals.Eval(context), self._in_force(context))",
     ),
     Mutant(
         "presets end with a jump to the target",
@@ -193,7 +193,7 @@ TRIGGERS = (
         "integrated_noise",
         "B=intensity / np.sqrt(period) * eye",
         "B=1.05 * intensity / np.sqrt(period) * eye",
-        tests=("tests/systems/test_noise.py",),
+        tests=("tests/systems/test_decision.py",),
     ),
 )
 """The trigger: dwell, release, events, threshold, noise."""
