@@ -336,7 +336,7 @@ JUDGES = (
         ">= -DISTANCE_TOLERANCE_M",
         ">= -0.05",
         runs=("case_b d", "soft_gate c", "crowd b"),
-        tests=(f"{RUNS}/test_safe_trace.py",),
+        tests=(f"{RUNS}/test_distances.py",),
     ),
     Mutant(
         "SAFE-HYP gives every robot the whole share",
@@ -354,7 +354,7 @@ JUDGES = (
         "EVENT_TOLERANCE_S = 1e-5",
         "EVENT_TOLERANCE_S = 0.1",
         runs=("case_b d", "soft_gate c", "crowd b"),
-        tests=(f"{RUNS}/test_thr_trig.py", f"{RUNS}/test_tolerances.py"),
+        tests=(f"{RUNS}/test_tolerances.py",),
     ),
     Mutant(
         "EXEC believes the signal",
@@ -363,7 +363,7 @@ JUDGES = (
         "| (one.executing != one.said)",
         "| (one.executing != one.executing)",
         runs=("case_b d", "soft_gate c", "crowd b"),
-        tests=(f"{RUNS}/test_exec.py",),
+        tests=(f"{RUNS}/test_breakages.py",),
     ),
     Mutant(
         "half a run is enough",
