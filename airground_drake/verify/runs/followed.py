@@ -1,4 +1,4 @@
-"""Accepted interventions of a run, and whether an obstacle was sensed meanwhile that was new: LIVE-GATE's premise."""
+"""Accepted interventions of a run, and whether a new obstacle was sensed meanwhile: the premise of LIVE-GATE."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.runs.beginnings import known_discs
-from airground_drake.verify.runs.instants import control_samples
-from airground_drake.verify.runs.proposals import accepted_at, proposals_of
+from airground_drake.verify.runs.instants import samples_of
+from airground_drake.verify.runs.proposals import accepted_at, proposal_of
 
 METHOD = "d"
 """Only this method predicts where an accepted intervention leads."""
@@ -24,7 +24,7 @@ class Followed(NamedTuple):
     Attributes:
         ugv: which UGV.
         t_s: when it was accepted.
-        new: obstacles that were sensed meanwhile and not known at the acceptance.
+        new: obstacles that were sensed meanwhile and were not known at the acceptance.
     """
 
     ugv: str
@@ -38,7 +38,7 @@ class Followed(NamedTuple):
 
 
 def followed(trace: Trace) -> list[Followed]:
-    """All accepted interventions of a run under method (d), by time; of another method none.
+    """All accepted interventions of a run under method (d), by time; [] for another method.
 
     Raises:
         TraceError: if a decision is on a proposal that was not sent.
@@ -51,10 +51,9 @@ def followed(trace: Trace) -> list[Followed]:
 
 
 def _followed(trace: Trace, given: dict[Any, Any]) -> Followed:
-    ugv, t_s = str(given["robot"]), float(given["t_s"])
+    ugv, t_s, on = str(given["robot"]), float(given["t_s"]), proposal_of(trace, given["number"])
     control, obstacles = trace.scenario.control, trace.scenario.obstacles
-    on = next(one for one in proposals_of(trace) if one.number == given["number"])
-    samples = control_samples(trace.t, control.period_s)
+    samples = samples_of(trace)
     begin = int(np.searchsorted(trace.t[samples], t_s - TIME_TOLERANCE_S))
     executed = [one is on for one in accepted_at(trace, ugv)[begin:]]
     lasts = executed.index(False) if False in executed else len(executed)

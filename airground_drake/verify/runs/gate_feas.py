@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any
+from dataclasses import asdict, dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -23,6 +23,8 @@ from airground_drake.verify.runs.gate_record import (
     Row,
     conclude,
     cost_tolerance,
+    in_turn,
+    reasons_of,
 )
 from airground_drake.verify.runs.instants import intervening
 from airground_drake.verify.runs.pairs import preset_of
@@ -41,6 +43,35 @@ INSIDE_M = 1e-6
 they ask for less than 1e-5 m/s per point before, at gains up to 10 1/s."""
 NO_DIFFERENCE = 1e-6
 """Relative gain from which on a new proposal makes a difference."""
+
+
+@dataclass(frozen=True)
+class Compared:
+    """The evidence: numbers of decisions, of comparisons and of wrong ones, and of decisions by reason."""
+
+    decisions: int
+    comparisons: int
+    wrong: int
+    reasons: dict[str, int]
+
+
+@dataclass(frozen=True)
+class ComparedPlans(Compared):
+    """The evidence where plans are recorded.
+
+    Attributes:
+        without_a_plan: decisions without a plan.
+        largest_slack_m: how far a plan leads inside a safe distance.
+        plans_with_slack: plans that do.
+        rounded_plans: plans that were rounded.
+        largest_rounding_error_s: largest integrated error of rounding.
+    """
+
+    without_a_plan: list[str]
+    largest_slack_m: float
+    plans_with_slack: int
+    rounded_plans: int
+    largest_rounding_error_s: float
 
 
 class GateFeas(GateClaim):
@@ -104,65 +135,65 @@ class GateFeas(GateClaim):
 
     def judge_rows(self, trace: Trace, rows: list[Row]) -> Finding:
         """Compare everything recorded with what it should be; the margin is the part of a tolerance left."""
-        if trace.meta["method"] not in ON_TOP:
-            return judge_compared(trace, rows, [*compare_times(trace, rows)])
-        compared = [one for row in rows for one in (*compare_situation(trace, row), *compare_plan(trace, row))]
-        compared += compare_answers(trace, rows)
-        rounded = [row for row in rows if is_rounded(row)]
-        compared += [one for row in rounded for one in compare_rounding(row)]
-        compared += [one for row in rows if row.planned for one in compare_without_rounding(row)]
-        slack = [float(np.maximum(0.0, -row.clearance(row["positions_m"])).max()) for row in rows if row.planned]
-        return judge_compared(
-            trace, rows, compared,
-            without_a_plan=[row.label for row in rows if not row.planned],
-            largest_slack_m=max(slack, default=0.0),
-            plans_with_slack=sum(value > 0.0 for value in slack),
-            rounded_plans=len(rounded),
-            largest_rounding_error_s=max(map(integrated_error_s, rounded), default=0.0),
-        )  # fmt: skip
+        solved = trace.meta["method"] in ON_TOP
+        rounded = [row for row in rows if is_rounded(row)] if solved else []
+        compared = list(_compare_problems(trace, rows, rounded) if solved else compare_times(trace, rows))
+        counts = len(rows), len(compared), sum(one.wrong for one in compared), reasons_of(trace)
+        slack = [
+            float(np.maximum(0.0, -row.clearance(row["positions_m"])).max()) for row in rows if solved and row.planned
+        ]
+        evidence = (
+            Compared(*counts)
+            if not solved
+            else ComparedPlans(
+                *counts,
+                without_a_plan=[row.label for row in rows if not row.planned],
+                largest_slack_m=max(slack, default=0.0),
+                plans_with_slack=sum(value > 0.0 for value in slack),
+                rounded_plans=len(rounded),
+                largest_rounding_error_s=max(map(integrated_error_s, rounded), default=0.0),
+            )
+        )
+        finding = Finding(
+            "holds",
+            margin=min((1.0 - one.off / one.allowed for one in compared if one.allowed > 0.0), default=None),
+            unit="of the tolerance",
+            quantity="part left of the tolerance of a recorded number",
+            evidence=asdict(evidence),
+            exercised=len(rows),
+        )
+        return conclude(finding, compared)
 
 
-def judge_compared(trace: Trace, rows: list[Row], compared: list[Off], **evidence: Any) -> Finding:
-    """The finding of these comparisons; the margin is the part of a tolerance left."""
-    finding = Finding(
-        "holds",
-        margin=min((1.0 - one.off / one.allowed for one in compared if one.allowed > 0.0), default=None),
-        unit="of the tolerance",
-        quantity="part left of the tolerance of a recorded number",
-        evidence={
-            "decisions": len(rows),
-            "comparisons": len(compared),
-            "wrong": sum(one.wrong for one in compared),
-            "reasons": {str(k): int(v) for k, v in trace.decisions["reason"].value_counts().items()},
-            **evidence,
-        },
-        exercised=len(rows),
-    )
-    return conclude(finding, compared)
+def _compare_problems(trace: Trace, rows: Sequence[Row], rounded: Sequence[Row]) -> Iterator[Off]:
+    """All numbers of decisions that rest on problem (26); `rounded` are those with a rounded plan."""
+    for row in rows:
+        yield from compare_situation(trace, row)
+        yield from compare_plan(trace, row)
+    yield from compare_answers(trace, rows)
+    for row in rounded:
+        yield from compare_rounding(row)
+    for row in rows:
+        if row.planned:
+            yield from compare_without_rounding(row)
 
 
 def compare_times(trace: Trace, rows: Sequence[Row]) -> Iterator[Off]:
     """The times of the decisions: the first within a period of the proposal, the others a period apart; all are due."""
     period = trace.scenario.gatekeeper.period_s
-    for ugv in trace.ugvs:
-        last: Row | None = None
-        for row in (row for row in rows if row.given["robot"] == ugv):
-            if last is not None and last.given["number"] != row.given["number"]:
-                last = None
-            early = row.given["issued_s"] if last is None else last.given["t_s"] + period
-            late = row.given["issued_s"] + period if last is None else early
-            t = float(row.given["t_s"])
-            yield Off(row, "a decision is missing before this one, s", max(0.0, t - late), TIME_TOLERANCE_S)
-            yield Off(row, "a decision too many, s", max(0.0, early - t), TIME_TOLERANCE_S)
-            last = row
+    for row, last in in_turn(trace, rows):
+        early = row.given["issued_s"] if last is None else last.t_s + period
+        late = early + period if last is None else early
+        yield Off(row, "a decision is missing before this one, s", max(0.0, row.t_s - late), TIME_TOLERANCE_S)
+        yield Off(row, "a decision too many, s", max(0.0, early - row.t_s), TIME_TOLERANCE_S)
     yield from compare_proposals(trace, rows)
 
 
 def compare_proposals(trace: Trace, rows: Sequence[Row]) -> Iterator[Off]:
     """A proposal that stands for a period of the planner and one of the gatekeeper is decided on.
 
-    It does not if another one is sent meanwhile, if its motion is over, if neither the UGV nor the one that it is to
-    make way for is intervened on all the time, or if the run ends.
+    It does not stand so long if another one is sent meanwhile, if its motion is over, if neither the UGV nor its cause
+    is intervened on all the time, or if the run ends.
     """
     allowed = trace.scenario.intervention.period_s + trace.scenario.gatekeeper.period_s + TIME_TOLERANCE_S
     decided = {row.given["number"] for row in rows}
@@ -181,8 +212,7 @@ def compare_proposals(trace: Trace, rows: Sequence[Row]) -> Iterator[Off]:
 def compare_situation(trace: Trace, row: Row) -> Iterator[Off]:
     """The data of (26) against the scenario and the signals at the time of the decision."""
     gate = trace.scenario.gatekeeper
-    t = float(row.given["t_s"])
-    robot = str(row.given["robot"])
+    t, robot = row.t_s, row.robot
     after = gate.horizon_s / gate.stages * np.arange(1.0, gate.stages + 1.0)
     yield Off(row, "length of a stage, s", row.dt - after[0], TIME_TOLERANCE_S)
     yield Off(row, "weight of task errors", row.error_weight - gate.error_weight_1_m2_s, 0.0)
@@ -214,7 +244,7 @@ def compare_situation(trace: Trace, row: Row) -> Iterator[Off]:
 
 def compare_plan(trace: Trace, row: Row) -> Iterator[Off]:
     """(26b)-(26e), (25) and what was recorded about the plan."""
-    limit = trace.scenario.ugvs[row.given["robot"]].max_speed_m_s
+    limit = trace.scenario.ugvs[row.robot].max_speed_m_s
     period = trace.scenario.control.period_s
     refusing, accepting = row.constant
     clear_refusing, clear_accepting = _clear(row, refusing, period), _clear(row, accepting, period)
@@ -262,23 +292,14 @@ def _clear(row: Row, positions: Array, period: float) -> npt.NDArray[np.bool_]:
 def compare_answers(trace: Trace, rows: Sequence[Row]) -> Iterator[Off]:
     """The answers against the rules, decision by decision, and the times of the decisions."""
     gate = trace.scenario.gatekeeper
-    literal = gate.rule == "first_stage"
     yield from compare_times(trace, rows)
-    for ugv in trace.ugvs:
-        last: Row | None = None
-        since = 0.0
-        for row in (row for row in rows if row.given["robot"] == ugv):
-            given = row.given
-            t = float(row.given["t_s"])
-            if last is not None and last.given["number"] != given["number"]:
-                last = None
-            standing = None if last is None else str(last.given["decision"])
-            accept, reason = rule(row, standing, t - since, gate, literal=literal)
-            ours = ("accept" if accept else "refuse", reason)
-            theirs = (given["decision"], given["reason"])
-            yield Off(row, "answer or reason", float(ours != theirs), 0.0, recomputed=list(ours), standing=standing)
-            since = since if given["decision"] == standing else t
-            last = row
+    since = 0.0
+    for row, last in in_turn(trace, rows):
+        standing = None if last is None else str(last.given["decision"])
+        accept, reason = rule(row, standing, row.t_s - since, gate, literal=gate.rule == "first_stage")
+        ours, theirs = ("accept" if accept else "refuse", reason), (row.given["decision"], row.given["reason"])
+        yield Off(row, "answer or reason", float(ours != theirs), 0.0, recomputed=list(ours), standing=standing)
+        since = since if row.given["decision"] == standing else row.t_s
 
 
 def rule(row: Row, standing: str | None, stood: float, gate: Gatekeeper, *, literal: bool = False) -> tuple[bool, str]:

@@ -7,8 +7,9 @@ and convexity gives bounds that need no trust in any solver: see `convex_bounds.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -46,6 +47,32 @@ PROVED_ROUTES = ("mixed_integer",)
 
 HALF_PLANE_ROUTES = (*PROVED_ROUTES, "relaxed")
 """Routes that bound the cost with distances along recorded normals; the others know no bound."""
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """The evidence.
+
+    Attributes:
+        decisions: their number.
+        without_a_plan, without_a_bound, gap_too_wide_to_decide: decisions that are not decided, and why.
+        bounded: number of decisions with a lower bound.
+        largest_gap, median_gap: costs above the lower bound, relative to the cheaper constant plan.
+        widest_enclosure: of an optimum, in the same units.
+        first_stage_certified: plans that are cheaper than every plan with the other first stage.
+        largest_gaps: where the five largest gaps are.
+    """
+
+    decisions: int
+    without_a_plan: list[str]
+    bounded: int
+    without_a_bound: list[str]
+    gap_too_wide_to_decide: list[str]
+    largest_gap: float | None
+    median_gap: float | None
+    widest_enclosure: float
+    first_stage_certified: int
+    largest_gaps: list[dict[str, Any]]
 
 
 class GateOpt(ProblemClaim):
@@ -91,74 +118,68 @@ class GateOpt(ProblemClaim):
         "With `gatekeeper.blocks`, the route 'mixed_integer' chooses one mode for each block of stages.",
     )
     does_not_establish = (
-        "It is about the route's own problem, of which mode velocities and half-planes are data: no plan of that "
-        "problem is much cheaper; it does not mean that none is on the closed loop, or with the exact distances of "
-        "(26d), whose optimum may be below the bound (GATE-MODEL says what the data are worth). Not established: "
-        "optimality for the exact distances of (26d) (half-planes are conservative: another choice of normals may "
-        "allow a cheaper plan), for another dwell, or for the nonlinear closed loop; nor that the first stage is the "
-        "optimal one, unless counted as certified. Where the plan is the better by exact distances, it may cost less "
-        "than the bound, and the gap is negative. Refusals for want of a plan are only listed."
+        "The claim is about the route's own problem. Mode velocities and half-planes are data of that problem "
+        "(GATE-MODEL says what they are worth). Not established: optimality for the exact distances of (26d) "
+        "(half-planes are conservative: another choice of normals may allow a cheaper plan), for another dwell, or "
+        "for the nonlinear closed loop; nor that the first stage is the optimal one, unless counted as certified. A "
+        "plan may cost less by exact distances than the bound; its gap is then negative. Refusals for want of a plan "
+        "are only listed."
     )
 
     exercised_by = "decisions that rest on a plan"
 
     def judge_rows(self, trace: Trace, rows: list[Row]) -> Finding:
         """Enclose every optimum; the margin is what is left of the largest gap allowed."""
-        route = trace.scenario.gatekeeper.route
+        gate = trace.scenario.gatekeeper
         planned = [row for row in rows if row.planned]
-        lacking = [row for row in planned if route in HALF_PLANE_ROUTES and row.data["normals"] is None]
+        lacking = [row for row in planned if gate.route in HALF_PLANE_ROUTES and row.data["normals"] is None]
         if cut := [row for row in lacking if row.given["status"] == "optimal"]:
             raise TraceError(f"{cut[0].label} claims to be complete, but has no normals")
         compared = [one for row in planned for one in compare_with_constant_plans(row)]
-        if route not in HALF_PLANE_ROUTES:
-            reason = f"route {route!r} has no bound that can be established again"
+        if gate.route not in HALF_PLANE_ROUTES:
+            reason = f"route {gate.route!r} has no bound that can be established again"
             open_ = Finding("inconclusive", evidence={"decisions": len(rows), "reason": reason}, exercised=len(planned))
             return conclude(open_, compared)
-        blocks = trace.scenario.gatekeeper.blocks
-        bounded = bound([row for row in planned if row not in lacking], blocks)
+        bounded = bound([row for row in planned if row not in lacking], gate.blocks)
         for each in bounded:
-            compared += compare_bounds(each.row, each.optimum, blocks)
-            if each.gap > self.largest_gap and not blocks:
+            compared += compare_bounds(each.row, each.optimum, gate.blocks)
+            if each.gap > self.largest_gap and not gate.blocks:
                 compared.append(compare_with_blocks(each, self.largest_gap))
-        finding = self._finding(bounded, lacking)
-        listed = {"decisions": len(rows), "without_a_plan": [row.label for row in rows if not row.planned]}
-        return conclude(replace(finding, evidence={**listed, **finding.evidence}, exercised=len(planned)), compared)
-
-    def _finding(self, bounded: Sequence[Bounded], lacking: Sequence[Row]) -> Finding:
-        """What the gaps say, as long as nothing recorded is wrong; a gap that is too wide is open, not refuted."""
-        too_wide = [each.row.label for each in bounded if each.gap > self.largest_gap]
-        width = max((each.width for each in bounded), default=0.0)
-        decided = bool(bounded) and not lacking and not too_wide and width <= self.widest
-        gaps = [each.gap for each in bounded]
-        largest = [bounded[i] for i in np.argsort(gaps)[:-6:-1]]
-        worst = [{**{name: each.row.given[name] for name in ("t_s", "robot")}, "gap": each.gap} for each in largest]
-        return Finding(
-            "holds" if decided else "inconclusive",
-            margin=self.largest_gap - worst[0]["gap"] if decided else None,
+        evidence = self._bounds(rows, bounded, lacking)
+        undecided = not bounded or lacking or evidence.gap_too_wide_to_decide
+        decided = not undecided and evidence.widest_enclosure <= self.widest
+        worst = evidence.largest_gaps[0] if bounded else {}
+        finding = Finding(
+            "holds" if decided else "inconclusive",  # a gap that is too wide is open, not refuted
+            margin=self.largest_gap - worst["gap"] if decided else None,
             unit="of the cheaper constant plan's cost",
             quantity="largest gap allowed less the largest gap",
-            where={name: worst[0][name] for name in ("robot", "t_s")} if worst else {},
-            evidence={
-                "bounded": len(bounded),
-                "without_a_bound": [row.label for row in lacking],
-                "gap_too_wide_to_decide": too_wide,
-                "largest_gap": worst[0]["gap"] if worst else None,
-                "median_gap": float(np.median(gaps)) if gaps else None,
-                "widest_enclosure": width,
-                "first_stage_certified": sum(each.first_stage_certified for each in bounded),
-                "largest_gaps": worst,
-            },
+            where={name: worst[name] for name in ("robot", "t_s") if worst},
+            evidence=asdict(evidence),
+            exercised=len(planned),
+        )
+        return conclude(finding, compared)
+
+    def _bounds(self, rows: Sequence[Row], bounded: Sequence[Bounded], lacking: Sequence[Row]) -> Bounds:
+        gaps = [each.gap for each in bounded]
+        largest = [bounded[i] for i in np.argsort(gaps)[:-6:-1]]
+        return Bounds(
+            decisions=len(rows),
+            without_a_plan=[row.label for row in rows if not row.planned],
+            bounded=len(bounded),
+            without_a_bound=[row.label for row in lacking],
+            gap_too_wide_to_decide=[each.row.label for each in bounded if each.gap > self.largest_gap],
+            largest_gap=max(gaps, default=None),
+            median_gap=float(np.median(gaps)) if gaps else None,
+            widest_enclosure=max((each.width for each in bounded), default=0.0),
+            first_stage_certified=sum(each.first_stage_certified for each in bounded),
+            largest_gaps=[{"t_s": each.row.t_s, "robot": each.row.robot, "gap": each.gap} for each in largest],
         )
 
 
 @dataclass(frozen=True)
 class Bounded:
-    """A decision with a plan, and bounds of the optimum of the problem that its route solves.
-
-    Attributes:
-        row: the decision.
-        optimum: its bounds.
-    """
+    """A decision with a plan, and bounds of the optimum of the problem that its route solves."""
 
     row: Row
     optimum: Enclosure
@@ -170,7 +191,7 @@ class Bounded:
 
     @property
     def width(self) -> float:
-        """Of the enclosure, in the same units."""
+        """Width of the enclosure, in the same units."""
         return (self.optimum.upper - self.optimum.lower) / self.row.scale
 
     @property
@@ -205,8 +226,7 @@ def compare_bounds(row: Row, found: Enclosure, blocks: int) -> Iterator[Off]:
     """The recorded normals, lower bound and gap; `blocks`: binaries of the route, 0: one per stage."""
     given, normals = row.given, row.half_planes
     proved = given["route"] in PROVED_ROUTES
-    lower = float(row.given["route_bound"])
-    scale = row.scale
+    lower, scale = float(given["route_bound"]), row.scale
     own = float(row.cost(row["positions_m"], normals))
     known = [*row.constant, *([row.positions(row["rounded"])] if row.data["rounded"] is not None else [])]
     # the losing choice's plan is not recorded, but along normals it costs no less than by exact distances
@@ -240,7 +260,7 @@ def neighbours(plan: Array, blocks: int) -> Array:
 
 def cheapest_of_blocks(row: Row, blocks: int) -> Enclosure:
     """The cheapest along the half-planes of all plans that are constant on blocks, by evaluating each."""
-    stages = len(row["reference_m"])
+    stages = row.stages
     blocks = min(blocks, stages)
     modes = (np.arange(2**blocks)[:, None] >> np.arange(blocks)) % 2
     omega = modes[:, np.arange(stages) * blocks // stages].astype(np.float64)

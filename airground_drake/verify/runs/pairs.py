@@ -21,7 +21,7 @@ class Pair(NamedTuple):
         first: the robot.
         second: the obstacle or other robot.
         safe_m: safe distance of the centres: that of the kind of pair, and both radii.
-        share: part of the avoidance inequality that each robot takes.
+        share: part of the avoidance inequality that each robot takes: all beside an obstacle, half beside a robot.
         reach_m: by how much they can approach each other in one control period, at most.
     """
 

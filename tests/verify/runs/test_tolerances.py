@@ -155,7 +155,7 @@ def longer_way_left(trace: Trace, by: float) -> Trace:
     decisions = trace.decisions.copy()
     k = int(np.argmax(decisions["accept_left_m"].to_numpy()))
     given = decisions.iloc[k].to_dict()
-    left = foreseen(trace, given, proposals_of(trace))[1].most_left_m + by
+    left = foreseen(trace)[given["t_s"], given["number"]][1].most_left_m + by
     speed = trace.scenario.ugvs[given["robot"]].preset.speed_m_s
     decisions.loc[k, "accept_left_m"] = left
     decisions.loc[k, "accept_outcome_m2_s"] += (left**3 - given["accept_left_m"] ** 3) / (3.0 * speed)
