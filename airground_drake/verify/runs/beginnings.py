@@ -12,7 +12,7 @@ from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.geometry import corner_times, interpolate, travelled
 from airground_drake.verify.runs.closed_loops import Scene
 from airground_drake.verify.runs.instants import row_at
-from airground_drake.verify.runs.pairs import Pair, around, pairs_of, places_of, preset_of, radii_of, speed_limits
+from airground_drake.verify.runs.pairs import Pair, around, centres_of, pairs_of, places_of, preset_of
 from airground_drake.verify.runs.proposals import Sent, answers_to, proposal_of, proposals_of
 
 MOST_CLAIMED = 64
@@ -90,7 +90,7 @@ def scene(
         wanted=on.place(t + after),
         executed=np.arange(len(after) - 1) < periods,
         chosen=on.chosen,
-        limit=np.array(speed_limits(trace)[on.ugv]),
+        limit=np.array(trace.scenario.ugvs[on.ugv].max_speed_m_s),
         points=points,
         safe=safe,
         share=share,
@@ -139,18 +139,17 @@ def known_discs(trace: Trace, robot: str, t: float, on: Sent) -> tuple[Array, Ar
     sensing, gate_s = trace.scenario.control.sensing_range_m, trace.scenario.gatekeeper.period_s
     samples = gate_s * np.arange(round(t / gate_s) + 1.0)
     was = interpolate(trace.t, trace.position(robot), np.minimum(samples, t))
-    places = [o.position_m for o in trace.scenario.obstacles.values()]
-    obstacles = np.array(places, dtype=np.float64).reshape(-1, 3)
+    obstacles = centres_of(trace)
     seen = (np.linalg.norm(was[:, None] - obstacles, axis=2) <= sensing).any(axis=0)
     hidden = np.linalg.norm(on.mapped_m - was[-1], axis=1) > sensing
     told = np.column_stack([on.mapped_m, on.mapped_radius_m])[hidden & (on.mapped_radius_m >= 0.0)]
     apart = np.linalg.norm(told[:, None, :3] - obstacles[seen], axis=2)
     new = told[(apart > 1e-9).all(axis=1)]
     order = np.linalg.norm(new[:, :3] - was[-1], axis=1).argsort(kind="stable")
-    radius = radii_of(trace)
-    own = np.array([radius[name] for name in trace.scenario.obstacles])
-    known = np.concatenate([np.column_stack([obstacles, own])[seen], new[order.argsort() < MOST_CLAIMED]])
-    return known[:, :3], trace.scenario.safe_distance.obstacle_m + (radius[robot] + known[:, 3])
+    radii = np.array([each.radius_m for each in trace.scenario.obstacles.values()])
+    known = np.concatenate([np.column_stack([obstacles, radii])[seen], new[order.argsort() < MOST_CLAIMED]])
+    own = trace.scenario.ugvs[robot].radius_m
+    return known[:, :3], trace.scenario.safe_distance.obstacle_m + (own + known[:, 3])
 
 
 def discovers(trace: Trace, robot: str, t: float, on: Sent) -> bool:
@@ -163,8 +162,7 @@ def discovers(trace: Trace, robot: str, t: float, on: Sent) -> bool:
         on: the proposal.
     """
     first = trace.derived(f"first sensed by {robot}", lambda: _first_sensed(trace, robot))
-    obstacles = np.array([o.position_m for o in trace.scenario.obstacles.values()]).reshape(-1, 3)
-    new = obstacles[np.abs(first - t) <= TIME_TOLERANCE_S]
+    new = centres_of(trace)[np.abs(first - t) <= TIME_TOLERANCE_S]
     shown = (np.linalg.norm(new[:, None] - on.mapped_m, axis=2) <= 1e-9).any(axis=1)
     return bool((~shown).any())
 
@@ -174,12 +172,9 @@ def _first_sensed(trace: Trace, robot: str) -> Array:
     period_s = trace.scenario.gatekeeper.period_s
     samples = period_s * np.arange(np.floor(trace.t[-1] / period_s + 1e-9) + 1.0)
     was = interpolate(trace.t, trace.position(robot), np.minimum(samples, trace.t[-1]))
-    first = []
-    for obstacle in trace.scenario.obstacles.values():
-        away = np.linalg.norm(was - np.asarray(obstacle.position_m), axis=1)
-        seen = np.flatnonzero(away <= trace.scenario.control.sensing_range_m)
-        first.append(samples[seen[0]] if seen.size else np.inf)
-    return np.array(first)
+    away = np.linalg.norm(was[:, None] - centres_of(trace), axis=2)
+    seen = away <= trace.scenario.control.sensing_range_m
+    return np.where(seen.any(axis=0), samples[seen.argmax(axis=0)], np.inf)
 
 
 def _other(

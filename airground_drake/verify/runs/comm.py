@@ -29,15 +29,9 @@ class Message(NamedTuple):
 
 @dataclass(frozen=True)
 class Spent:
-    """The evidence, by kind of message where it counts.
+    """The evidence: messages by kind, of the run and of a scheme without a trigger, and the fraction saved.
 
-    Attributes:
-        spent: messages of the run.
-        always_on: messages of a scheme without a trigger.
-        saved: the fraction saved against that.
-        ugvs: by UGV: its messages, and the intervals in which it was intervened on, s.
-        outside_interventions: messages while nobody concerned was intervened on.
-        without_proposals, without_decisions: UGVs that were intervened on for long enough, but got none.
+    `ugvs` has the messages of each UGV and the intervals in which it was intervened on.
     """
 
     spent: dict[str, int]

@@ -13,7 +13,7 @@ import numpy as np
 
 from airground_drake.run.trace import Trace
 from airground_drake.verify.runs.control_law import ON_TOP
-from airground_drake.verify.runs.pairs import pairs_of, speed_limits
+from airground_drake.verify.runs.pairs import pairs_of
 
 CONTROLLERS = ("ugv_controller", "uav_controller")
 NO_INTERVENTION = "a"
@@ -28,7 +28,7 @@ def demanded(trace: Trace) -> dict[str, dict[str, Any]]:
     Every robot avoids all obstacles, then all other robots in team order.
     """
     scenario, robots = trace.scenario, trace.robots
-    control, obstacles, limit = scenario.control, scenario.obstacles, speed_limits(trace)
+    control, obstacles = scenario.control, scenario.obstacles
     everybody, m = np.arange(len(robots)), len(obstacles)
     number = {name: k for k, name in enumerate([*obstacles, *robots])}
     safe, share = np.zeros((2, len(robots), len(number)))
@@ -48,7 +48,7 @@ def demanded(trace: Trace) -> dict[str, dict[str, Any]]:
             "safe_m": np.take_along_axis(safe[team], beside, axis=1).ravel(),
             "share": np.take_along_axis(share[team], beside, axis=1).ravel(),
             "mobility": np.array([SPATIAL if with_uav[i] else PLANAR for i in team]).ravel(),
-            "max_speed_m_s": np.array([limit[robots[i]] for i in team]),
+            "max_speed_m_s": np.array([scenario.robots[robots[i]].max_speed_m_s for i in team]),
             "sampling_s": np.array([control.period_s, 0.0]),
             "gain_1_s": control.avoidance_gain_1_s,
             "period_s": control.period_s,

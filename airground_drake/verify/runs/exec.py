@@ -11,7 +11,6 @@ import numpy as np
 import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
-from airground_drake.base.errors import TraceError
 from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S, TraceClaim
 from airground_drake.verify.engines.geometry import corner_times, travelled
@@ -42,10 +41,7 @@ BINDING_M_S = 1e-9
 
 @dataclass(frozen=True)
 class Robot:
-    """Evidence about a robot: the largest difference, m/s, and counts of samples.
-
-    At these an accepted proposal was executed, an inequality bound, or both.
-    """
+    """Evidence about a robot, with counts of samples: an accepted proposal was executed, an inequality bound, both."""
 
     largest_difference_m_s: float
     executing: int
@@ -254,8 +250,6 @@ def _judge_uav(trace: Trace, samples: npt.NDArray[np.intp]) -> Judged:
     """The UAV's commands against (9)-(11)."""
     uav, control, chosen = trace.scenario.uav, trace.scenario.control, chosen_at(trace, samples)
     name = uav.name
-    if name != trace.robots[-1]:
-        raise TraceError(f"the last robot is {trace.robots[-1]}, not the UAV {name}")
     position, recorded = trace.position(name)[samples], trace.command(name)[chosen]
     centroid = np.mean([trace.position(ugv)[samples] for ugv in trace.ugvs], axis=0)
     fed = np.mean([trace.command(ugv)[samples] for ugv in trace.ugvs], axis=0)

@@ -57,15 +57,7 @@ class Compared:
 
 @dataclass(frozen=True)
 class ComparedPlans(Compared):
-    """The evidence where plans are recorded.
-
-    Attributes:
-        without_a_plan: decisions without a plan.
-        largest_slack_m: how far a plan leads inside a safe distance.
-        plans_with_slack: plans that do.
-        rounded_plans: plans that were rounded.
-        largest_rounding_error_s: largest integrated error of rounding.
-    """
+    """The evidence where plans are recorded; slack is how far a plan leads inside a safe distance."""
 
     without_a_plan: list[str]
     largest_slack_m: float

@@ -33,14 +33,7 @@ the recorded one."""
 
 @dataclass(frozen=True)
 class Predicted:
-    """The evidence under method (c).
-
-    Attributes:
-        decisions: their number.
-        largest_difference_m_s: of a recorded and a recomputed mode velocity.
-        answers_that_stood_to_the_horizon: decisions that the whole prediction applied to.
-        farthest_from_predicted: where a UGV was farthest from its prediction while the answer stood.
-    """
+    """The evidence under method (c); a prediction applies to the run while its answer stands."""
 
     decisions: int
     largest_difference_m_s: float

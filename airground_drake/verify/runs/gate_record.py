@@ -297,11 +297,3 @@ class GateClaim(TraceClaim):
     @abc.abstractmethod
     def judge_rows(self, trace: Trace, rows: list[Row]) -> Finding:
         """Decide the claim about at least one decision."""
-
-
-class ProblemClaim(GateClaim):
-    """A claim about problem (26): of method (c) alone."""
-
-    def applies(self, trace: Trace) -> bool:
-        """Method (d) compares outcomes and solves no problem (26)."""
-        return super().applies(trace) and trace.meta.get("method") in ON_TOP

@@ -111,12 +111,7 @@ class ThrTrig(TraceClaim):
             quantity="time left by which an event may differ from the crossing",
             where={"robot": worst[1]} if worst else {},
             counterexample=min(wrong, key=lambda conflict: float(conflict["t_s"])) if wrong else None,
-            evidence={
-                "ugvs": [asdict(one) for one in replayed],
-                "decision_block": _block(trace) or "that of (15)",
-                **levels._asdict(),
-                "transitions_due": dict(due),
-            },
+            evidence=asdict(Replay(replayed, _block(trace) or "that of (15)", *levels, dict(due))),
             exercised=due.total(),
         )
 
@@ -161,21 +156,25 @@ def _of_strangers(trace: Trace) -> Iterator[Conflict]:
 
 @dataclass(frozen=True)
 class Replayed:
-    """Evidence about the trigger of a UGV.
-
-    Attributes:
-        robot: the UGV.
-        events: those that the trace must have, `t_s` and `kind`.
-        worst_time_difference_s: largest time difference of the recorded events that agree.
-        largest_decision_variable_m: over the run.
-        port_against_15: how the recorded variable compares with (15).
-    """
+    """Evidence about the trigger of a UGV: `events` are those that the trace must have, with `t_s` and `kind`."""
 
     robot: str
     events: list[dict[str, Any]]
     worst_time_difference_s: float
     largest_decision_variable_m: float
     port_against_15: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Replay:
+    """The evidence: the trigger of each UGV, the block of x, the levels in force, transitions that were due by kind."""
+
+    ugvs: list[Replayed]
+    decision_block: str
+    zeta_m: float
+    release_m: float
+    dwell_s: float
+    transitions_due: dict[str, int]
 
 
 class Judged(NamedTuple):
