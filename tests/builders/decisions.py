@@ -9,7 +9,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from airground_drake.base.arrays import Array
-from airground_drake.verify.runs.gate_record import Row
+from airground_drake.verify.runs.gate_record import DecisionRecord
 
 STAGES = 8
 ALL_PLANS = np.array(list(product((0.0, 1.0), repeat=STAGES)))
@@ -19,7 +19,7 @@ WEIGHTS = ("dt", "error_weight", "slack_weight", "terminal_weight")
 
 @dataclass
 class GateData:
-    """The data of a problem, in units and shapes of `gate_record.Row`; costs of plans and of positions."""
+    """The data of a problem, in units and shapes of `gate_record.DecisionRecord`; costs of plans and of positions."""
 
     initial_m: Array
     accept_m_s: Array
@@ -34,14 +34,16 @@ class GateData:
     terminal_weight: float
 
     @classmethod
-    def of(cls, row: Row) -> GateData:
+    def of(cls, row: DecisionRecord) -> GateData:
         """The problem of a recorded decision, with the half-planes that ask for something."""
         return cls(*(row[name] for name in ARRAYS[:-1]), row.half_planes, *(getattr(row, name) for name in WEIGHTS))
 
-    def row(self, plan: Array) -> Row:
+    def row(self, plan: Array) -> DecisionRecord:
         """A record of a decision for a plan, with this problem."""
         arrays: dict[str, Array | None] = {name: getattr(self, name) for name in ARRAYS}
-        return Row({"robot": "ugv1", "t_s": 0.0}, *(getattr(self, name) for name in WEIGHTS), arrays | {"plan": plan})
+        return DecisionRecord(
+            {"robot": "ugv1", "t_s": 0.0}, *(getattr(self, name) for name in WEIGHTS), arrays | {"plan": plan}
+        )
 
     def positions(self, omega: Array) -> Array:
         """Ends of the stages under a plan, (N, 3), m."""

@@ -13,7 +13,7 @@ from airground_drake.verify.engines.geometry import corner_times, interpolate, t
 from airground_drake.verify.runs.closed_loops import Scene
 from airground_drake.verify.runs.instants import row_at
 from airground_drake.verify.runs.pairs import Pair, around, centres_of, pairs_of, places_of, preset_of
-from airground_drake.verify.runs.proposals import Sent, answers_to, proposal_of, proposals_of
+from airground_drake.verify.runs.proposals import ProposalRecord, answers_to, proposal_of, proposals_of
 
 MOST_CLAIMED = 64
 """Obstacles of a message that a UGV takes into account."""
@@ -70,7 +70,7 @@ def beginning(trace: Trace, t: float, number: int) -> Beginning:
 
 
 def scene(
-    trace: Trace, on: Sent, t: float, after: Array, periods: int, points: Array, safe: Array, share: Array
+    trace: Trace, on: ProposalRecord, t: float, after: Array, periods: int, points: Array, safe: Array, share: Array
 ) -> Scene:
     """The closed loop of the UGV that a proposal is for.
 
@@ -128,7 +128,7 @@ def _among_robots(trace: Trace) -> list[Pair]:
     return trace.derived("robots", lambda: [pair for pair in pairs_of(trace) if pair.second in robots])
 
 
-def known_discs(trace: Trace, robot: str, t: float, on: Sent) -> tuple[Array, Array]:
+def known_discs(trace: Trace, robot: str, t: float, on: ProposalRecord) -> tuple[Array, Array]:
     """Obstacles that a UGV has sensed up to a time, and those of the message that it would not sense.
 
     At most the `MOST_CLAIMED` nearest ones of the message count, and those with a negative radius are left out.
@@ -152,7 +152,7 @@ def known_discs(trace: Trace, robot: str, t: float, on: Sent) -> tuple[Array, Ar
     return known[:, :3], trace.scenario.safe_distance.obstacle_m + (own + known[:, 3])
 
 
-def discovers(trace: Trace, robot: str, t: float, on: Sent) -> bool:
+def discovers(trace: Trace, robot: str, t: float, on: ProposalRecord) -> bool:
     """Whether a UGV senses, at a sample of the gatekeeper, an obstacle that is new and not on the message's map.
 
     Args:
@@ -195,7 +195,7 @@ def _other(
     return (goes if accepted else coasting, goes), pair.safe_m, pair.share, float(asked.times_s[-1])
 
 
-def asked_of(trace: Trace, ugv: str, t: float) -> tuple[Sent | None, bool]:
+def asked_of(trace: Trace, ugv: str, t: float) -> tuple[ProposalRecord | None, bool]:
     """The proposal in force for a UGV at a sample of the gatekeeper, unless it has refused it by the sample before.
 
     A proposal is in force if the UGV decides about it at that sample. Besides: whether it has accepted it by then.

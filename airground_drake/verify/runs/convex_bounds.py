@@ -12,7 +12,7 @@ from scipy.optimize import lsq_linear
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError
-from airground_drake.verify.runs.gate_record import Row
+from airground_drake.verify.runs.gate_record import DecisionRecord
 
 WIDE = 1e-5
 """Relative width of an enclosure above which a better omega* is looked for."""
@@ -32,7 +32,7 @@ class Enclosure:
         return Enclosure(lower, upper, max(self.other_first, other.other_first))
 
 
-def enclose(rows: Sequence[Row]) -> list[Enclosure]:
+def enclose(rows: Sequence[DecisionRecord]) -> list[Enclosure]:
     """Bounds of the optimum over omega in [0, 1]^N of the cost with distances along the half-planes' normals.
 
     For any multipliers l_kj >= 0 of u_k >= d_j - n_kj.(rho_k - o_kj), minimising the Lagrangian over u leaves
@@ -52,7 +52,7 @@ def enclose(rows: Sequence[Row]) -> list[Enclosure]:
     return found
 
 
-def _bounds(row: Row, omega: Array, multiplier: Array) -> Enclosure:
+def _bounds(row: DecisionRecord, omega: Array, multiplier: Array) -> Enclosure:
     """The bounds of `enclose` for a plan (N,) and multipliers (N, m), 1/m."""
     dt, slack, normals = row.dt, row.slack_weight, row.half_planes
     error = row.error_weight * row.lasting[:, None]
@@ -68,7 +68,7 @@ def _bounds(row: Row, omega: Array, multiplier: Array) -> Enclosure:
     return Enclosure(float(value + corner.sum()), float(row.cost(positions, normals)), float(other))
 
 
-def _minimiser(row: Row, multiplier: Array) -> Array:
+def _minimiser(row: DecisionRecord, multiplier: Array) -> Array:
     """Minimiser of q in the box, by bounded least squares; the multipliers' forces shift the reference."""
     n = row.stages
     weight = row.error_weight * row.lasting[:, None]
@@ -81,8 +81,8 @@ def _minimiser(row: Row, multiplier: Array) -> Array:
     return np.clip(np.asarray(fitted.x), 0.0, 1.0)
 
 
-def _solve(rows: Sequence[Row]) -> tuple[list[Array], list[Array]]:
-    """Relaxed plans (N,) and multipliers (N, m) >= 0, costs relative to `Row.scale`, of all rows as one program.
+def _solve(rows: Sequence[DecisionRecord]) -> tuple[list[Array], list[Array]]:
+    """Relaxed plans (N,) and multipliers (N, m) >= 0, costs relative to each scale, of all rows as one program.
 
     Variables, stage by stage of row by row: task errors e = rho - reference, omega and u.
 

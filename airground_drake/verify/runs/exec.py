@@ -27,7 +27,7 @@ from airground_drake.verify.runs.control_law import (
 )
 from airground_drake.verify.runs.instants import chosen_at, samples_of
 from airground_drake.verify.runs.pairs import preset_of
-from airground_drake.verify.runs.proposals import Sent, accepted_at
+from airground_drake.verify.runs.proposals import ProposalRecord, accepted_at
 
 Flags = npt.NDArray[np.bool_]
 
@@ -237,7 +237,7 @@ def _preset_rates(waypoints: Array, speed: float, t: Array) -> list[Array]:
     return [slopes[np.searchsorted(times, t + shift)] for shift in (-TIME_TOLERANCE_S, TIME_TOLERANCE_S)]
 
 
-def _asked(accepted: Sequence[Sent | None], t: Array) -> list[Asked]:
+def _asked(accepted: Sequence[ProposalRecord | None], t: Array) -> list[Asked]:
     """What the E executed proposals ask for, once with the rates before each instant and once with those after it."""
     executed = [(sent, now) for sent, now in zip(accepted, t.tolist(), strict=True) if sent is not None]
     wanted = np.array([sent.place(now) for sent, now in executed]).reshape(-1, 3)

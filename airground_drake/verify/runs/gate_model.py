@@ -16,10 +16,10 @@ from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.beginnings import scene, sensed
 from airground_drake.verify.runs.closed_loops import Scene, in_batches, roll_out, stacked
 from airground_drake.verify.runs.control_law import ON_TOP
-from airground_drake.verify.runs.gate_record import GateClaim, Off, Row, conclude
+from airground_drake.verify.runs.gate_record import DecisionRecord, Deviation, GateClaim, conclude
 from airground_drake.verify.runs.instants import samples_of
 from airground_drake.verify.runs.outcome_rolls import foreseen
-from airground_drake.verify.runs.proposals import accepted_at, proposal_of
+from airground_drake.verify.runs.proposals import accepted_at, proposal_of, proposals_of
 
 VELOCITY_TOLERANCE_M_S = 1e-6
 """Recorded and recomputed mode velocities may differ by this, m/s: rounding of two algorithms, which the closed loop
@@ -77,16 +77,16 @@ class GateModel(GateClaim):
 
     exercised_by = "decisions that were rolled out again"
 
-    def judge_rows(self, trace: Trace, rows: list[Row]) -> Finding:
+    def judge_rows(self, trace: Trace, rows: list[DecisionRecord]) -> Finding:
         """Roll out both choices of every decision; the margin is the tolerance less the largest difference."""
         if trace.meta["method"] not in ON_TOP:
             return judge_outcomes(trace, rows)
-        compared, largest = list[Off](), 0.0
+        compared, largest = list[Deviation](), 0.0
         for row, both in predicted(trace, rows):
             for name, places in zip(("refuse", "accept"), both, strict=True):
                 off = row[f"{name}_m_s"] - velocities(places, row)
                 largest = max(largest, float(np.abs(off).max()))
-                compared.append(Off(row, f"velocity of mode {name}, m/s", off, VELOCITY_TOLERANCE_M_S))
+                compared.append(Deviation(row, f"velocity of mode {name}, m/s", off, VELOCITY_TOLERANCE_M_S))
         finding = Finding(
             "holds",
             margin=VELOCITY_TOLERANCE_M_S - largest,
@@ -98,9 +98,10 @@ class GateModel(GateClaim):
         return conclude(finding, compared)
 
 
-def judge_outcomes(trace: Trace, rows: Sequence[Row]) -> Finding:
+def judge_outcomes(trace: Trace, rows: Sequence[DecisionRecord]) -> Finding:
     """Method (d): the outcome of either choice, rolled out again for every first decision about a proposal."""
-    compared, largest = list[Off](), 0.0
+    proposals_of(trace)  # raises if a decision is on a proposal that was never sent
+    compared, largest = list[Deviation](), 0.0
     speeds = {ugv: trace.scenario.ugvs[ugv].preset.speed_m_s for ugv in trace.ugvs}
     looked = [row for row in rows if row.given["accept_stalls"] >= 0.0]
     for row in looked:
@@ -108,13 +109,17 @@ def judge_outcomes(trace: Trace, rows: Sequence[Row]) -> Finding:
             cost, left = (float(row.given[f"{choice}_{name}"]) for name in ("outcome_m2_s", "left_m"))
             ahead = left**3 / (3.0 * speeds[row.robot])
             due = ahead if found.stalls else found.integral_m2_s + ahead
-            compared.append(Off(row, f"{choice}: stalls", row.given[f"{choice}_stalls"] - float(found.stalls), 0.0))
+            compared.append(
+                Deviation(row, f"{choice}: stalls", row.given[f"{choice}_stalls"] - float(found.stalls), 0.0)
+            )
             allowed = OUTCOME_TOLERANCE * max(1.0, due)
-            compared.append(Off(row, f"{choice}: outcome, m^2 s", cost - due, allowed, recomputed=due, recorded=cost))
+            compared.append(
+                Deviation(row, f"{choice}: outcome, m^2 s", cost - due, allowed, recomputed=due, recorded=cost)
+            )
             largest = max(largest, abs(cost - due) / allowed)
             short = max(0.0, found.least_left_m - left, left - found.most_left_m)
             within = max(LEFT_TOLERANCE_M, OUTCOME_TOLERANCE * left)
-            compared.append(Off(row, f"{choice}: way left, m", short, within, recorded=left))
+            compared.append(Deviation(row, f"{choice}: way left, m", short, within, recorded=left))
     finding = Finding(
         "holds",
         margin=1.0 - largest,
@@ -126,7 +131,7 @@ def judge_outcomes(trace: Trace, rows: Sequence[Row]) -> Finding:
     return conclude(finding, compared)
 
 
-def predicted(trace: Trace, rows: Sequence[Row]) -> Iterator[tuple[Row, tuple[Array, Array]]]:
+def predicted(trace: Trace, rows: Sequence[DecisionRecord]) -> Iterator[tuple[DecisionRecord, tuple[Array, Array]]]:
     """Each decision with the places that refusing and accepting throughout lead to, (S + 1, 3) each, m."""
     begun = ((row, [scene_of(trace, row, np.full(row.stages, choice)) for choice in (0.0, 1.0)]) for row in rows)
     for batch in in_batches(begun, lambda each: each[1]):
@@ -136,7 +141,7 @@ def predicted(trace: Trace, rows: Sequence[Row]) -> Iterator[tuple[Row, tuple[Ar
             yield row, (ways[2 * k], ways[2 * k + 1])
 
 
-def scene_of(trace: Trace, row: Row, plan: Array) -> Scene:
+def scene_of(trace: Trace, row: DecisionRecord, plan: Array) -> Scene:
     """The closed loop of a decision under a plan (N,) of 0 (refused) and 1 (accepted): others move on as they do."""
     control_s, horizon_s = trace.scenario.control.period_s, trace.scenario.gatekeeper.horizon_s
     each = round(horizon_s / row.stages / control_s)
@@ -149,12 +154,12 @@ def scene_of(trace: Trace, row: Row, plan: Array) -> Scene:
     return loop._replace(executed=np.repeat(plan == 1.0, each))
 
 
-def velocities(places: Array, row: Row) -> Array:
+def velocities(places: Array, row: DecisionRecord) -> Array:
     """Mean velocities over the stages of a decision, (N, 3), m/s, from places at the control samples, (S + 1, 3), m."""
     return np.diff(places[:: (len(places) - 1) // row.stages], axis=0) / row.dt
 
 
-def _realised(trace: Trace, rows: Sequence[Row]) -> tuple[int, dict[str, Any]]:
+def _realised(trace: Trace, rows: Sequence[DecisionRecord]) -> tuple[int, dict[str, Any]]:
     """How many answers stood to the horizon, and where a UGV was farthest from its prediction while one stood."""
     t, accepted = trace.t[samples_of(trace)], {ugv: accepted_at(trace, ugv) for ugv in trace.ugvs}
     farthest: dict[str, Any] = {}

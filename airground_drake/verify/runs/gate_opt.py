@@ -20,9 +20,9 @@ from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.convex_bounds import Enclosure, enclose
 from airground_drake.verify.runs.gate_record import (
     POSITION_TOLERANCE_M,
+    DecisionRecord,
+    Deviation,
     GateClaim,
-    Off,
-    Row,
     conclude,
     cost_tolerance,
 )
@@ -125,7 +125,7 @@ class GateOpt(GateClaim):
         """Only method (c) solves problem (26); method (d) compares outcomes."""
         return trace.meta.get("method") == "c"
 
-    def judge_rows(self, trace: Trace, rows: list[Row]) -> Finding:
+    def judge_rows(self, trace: Trace, rows: list[DecisionRecord]) -> Finding:
         """Enclose every optimum; the margin is what is left of the largest gap allowed."""
         gate = trace.scenario.gatekeeper
         planned = [row for row in rows if row.planned]
@@ -157,7 +157,9 @@ class GateOpt(GateClaim):
         )
         return conclude(finding, compared)
 
-    def _bounds(self, rows: Sequence[Row], bounded: Sequence[Bounded], lacking: Sequence[Row]) -> Bounds:
+    def _bounds(
+        self, rows: Sequence[DecisionRecord], bounded: Sequence[Bounded], lacking: Sequence[DecisionRecord]
+    ) -> Bounds:
         gaps = [each.gap for each in bounded]
         largest = [bounded[i] for i in np.argsort(gaps)[:-6:-1]]
         return Bounds(
@@ -178,7 +180,7 @@ class GateOpt(GateClaim):
 class Bounded:
     """A decision with a plan, and bounds of the optimum of the problem that its route solves."""
 
-    row: Row
+    row: DecisionRecord
     optimum: Enclosure
 
     @cached_property
@@ -197,29 +199,29 @@ class Bounded:
         return self.optimum.other_first > self.optimum.lower + self.gap * self.row.scale
 
 
-def bound(rows: Sequence[Row], blocks: int) -> list[Bounded]:
+def bound(rows: Sequence[DecisionRecord], blocks: int) -> list[Bounded]:
     """Bounds for each decision: of the relaxation, or of all plans if `blocks` are few (0: one per stage)."""
     optima = [cheapest_of_blocks(row, blocks) for row in rows] if 0 < blocks <= MOST_BLOCKS else enclose(rows)
     return [Bounded(*one) for one in zip(rows, optima, strict=True)]
 
 
-def compare_with_blocks(each: Bounded, allowed: float) -> Off:
+def compare_with_blocks(each: Bounded, allowed: float) -> Deviation:
     """A gap that is too wide is wrong only if the route's problem has a cheaper plan: rounding may cost that much."""
     row = each.row
     shown = (float(row.cost(row["positions_m"])) - cheapest_of_blocks(row, BLOCKS).lower) / row.scale
-    return Off(row, "a plan of blocks is cheaper", max(0.0, shown), allowed)
+    return Deviation(row, "a plan of blocks is cheaper", max(0.0, shown), allowed)
 
 
-def compare_with_constant_plans(row: Row) -> Iterator[Off]:
+def compare_with_constant_plans(row: DecisionRecord) -> Iterator[Deviation]:
     """The plan against the constant ones, by the exact cost; each choice against the constant plan that makes it."""
     for name, constant in zip(("refuse", "accept"), row.cost(row.constant).tolist(), strict=True):
         tolerance = cost_tolerance(constant)
         for column in ("objective", f"objective_{name}"):
             excess = max(0.0, row.given[column] - constant)
-            yield Off(row, f"{column} above {name} throughout", excess, tolerance, constant_plan=constant)
+            yield Deviation(row, f"{column} above {name} throughout", excess, tolerance, constant_plan=constant)
 
 
-def compare_bounds(row: Row, found: Enclosure, blocks: int) -> Iterator[Off]:
+def compare_bounds(row: DecisionRecord, found: Enclosure, blocks: int) -> Iterator[Deviation]:
     """The recorded normals, lower bound and gap; `blocks`: binaries of the route, 0: one per stage."""
     given, normals = row.given, row.half_planes
     proved = given["route"] in PROVED_ROUTES
@@ -234,17 +236,17 @@ def compare_bounds(row: Row, found: Enclosure, blocks: int) -> Iterator[Off]:
         best = min(best, given["objective"])
         upper = float(row.cost(row.positions(neighbours(row["plan"], blocks)), normals).min())
     lengths = np.linalg.norm(row["normals"], axis=2)
-    yield Off(row, "length of a normal, minus 1", lengths - 1.0, POSITION_TOLERANCE_M)
+    yield Deviation(row, "length of a normal, minus 1", lengths - 1.0, POSITION_TOLERANCE_M)
     more = {"route_bound": lower, "optimum_at_least": found.lower, "optimum_at_most": upper}
-    yield Off(row, "lower bound above the plan's cost", max(0.0, lower - own) / scale, OVERSTATED, cost=own)
-    yield Off(row, "lower bound overstated", max(0.0, lower - upper) / scale, OVERSTATED, **more)
+    yield Deviation(row, "lower bound above the plan's cost", max(0.0, lower - own) / scale, OVERSTATED, cost=own)
+    yield Deviation(row, "lower bound overstated", max(0.0, lower - upper) / scale, OVERSTATED, **more)
     if given["status"] == "optimal":
-        yield Off(row, "lower bound understated", max(0.0, found.lower - lower) / scale, UNDERSTATED, **more)
+        yield Deviation(row, "lower bound understated", max(0.0, found.lower - lower) / scale, UNDERSTATED, **more)
     if given["status"] == "optimal" and proved:
-        yield Off(row, "optimal, but with a gap", max(0.0, given["gap"]), GAP_TOLERANCE)
+        yield Deviation(row, "optimal, but with a gap", max(0.0, given["gap"]), GAP_TOLERANCE)
     least, most = ((cost - lower) / max(cost, 1e-12) for cost in (best, own))
     beyond = max(0.0, least - given["gap"], given["gap"] - most)
-    yield Off(row, "recorded gap", beyond, GAP_TOLERANCE, recorded=given["gap"], at_least=least, at_most=most)
+    yield Deviation(row, "recorded gap", beyond, GAP_TOLERANCE, recorded=given["gap"], at_least=least, at_most=most)
 
 
 def neighbours(plan: Array, blocks: int) -> Array:
@@ -255,7 +257,7 @@ def neighbours(plan: Array, blocks: int) -> Array:
     return np.vstack([plan, np.where(turned, 1.0 - plan, plan), np.zeros(stages), np.ones(stages)])
 
 
-def cheapest_of_blocks(row: Row, blocks: int) -> Enclosure:
+def cheapest_of_blocks(row: DecisionRecord, blocks: int) -> Enclosure:
     """The cheapest along the half-planes of all plans that are constant on blocks, by evaluating each."""
     stages = row.stages
     blocks = min(blocks, stages)

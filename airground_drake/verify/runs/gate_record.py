@@ -30,7 +30,7 @@ MAY_BE_EMPTY = ("plan", "positions_m", "relaxed", "rounded", "normals")
 
 
 @dataclass(frozen=True, eq=False)
-class Row:
+class DecisionRecord:
     """One decision, and its problem if it has one: a row of `Trace.decisions` and of `Trace.problems`.
 
     Attributes:
@@ -146,7 +146,7 @@ class Row:
         return max(LEAST_COST, float(self.cost(self.constant).min()))
 
 
-def rows_of(trace: Trace) -> list[Row]:
+def rows_of(trace: Trace) -> list[DecisionRecord]:
     """All decisions, with their problems (26); method (d) has no problems.
 
     Raises:
@@ -163,7 +163,11 @@ def rows_of(trace: Trace) -> list[Row]:
         if not (np.diff(times.to_numpy(dtype=np.float64)) >= 0.0).all():
             raise TraceError(f"the decisions of {ugv} are not in order of their times")
     problems = trace.problems.to_dict("records")
-    rows = [_solved(trace, *both) for both in zip(given, problems, strict=True)] if due else [Row(one) for one in given]
+    rows = (
+        [_solved(trace, *both) for both in zip(given, problems, strict=True)]
+        if due
+        else [DecisionRecord(one) for one in given]
+    )
     for row in rows:
         if not np.isfinite([value for value in row.given.values() if isinstance(value, float)]).all():
             raise TraceError(f"{row.label}: it has numbers that are not finite")
@@ -172,11 +176,11 @@ def rows_of(trace: Trace) -> list[Row]:
     return rows
 
 
-def in_turn(trace: Trace, rows: Iterable[Row]) -> Iterator[tuple[Row, Row | None]]:
+def in_turn(trace: Trace, rows: Iterable[DecisionRecord]) -> Iterator[tuple[DecisionRecord, DecisionRecord | None]]:
     """Each decision, by UGV and time, with the one before it on the same proposal, if there is one."""
     rows = list(rows)
     for ugv in trace.ugvs:
-        last: Row | None = None
+        last: DecisionRecord | None = None
         for row in (row for row in rows if row.robot == ugv):
             yield row, last if last and last.number == row.number else None
             last = row
@@ -187,13 +191,13 @@ def reasons_of(trace: Trace) -> dict[str, int]:
     return {str(reason): int(count) for reason, count in trace.decisions["reason"].value_counts().items()}
 
 
-def _solved(trace: Trace, given: dict[str, Any], problem: dict[Any, Any]) -> Row:
+def _solved(trace: Trace, given: dict[str, Any], problem: dict[Any, Any]) -> DecisionRecord:
     """A decision with its problem, a row of `Trace.problems`."""
     gate = trace.scenario.gatekeeper
     scalars = [float(problem[name]) for name in PROBLEM_SCALARS]
     dt, error, slack, terminal = scalars
     flat = {name: np.asarray(problem[name], dtype=np.float64).ravel() for name in PROBLEM_ARRAYS}
-    row = Row(given, dt, error, slack, terminal, _shaped(flat, int(gate.stages)))
+    row = DecisionRecord(given, dt, error, slack, terminal, _shaped(flat, int(gate.stages)))
     if not all(np.isfinite(values).all() for values in (np.array(scalars), *flat.values())):
         raise TraceError(f"{row.label}: its problem has numbers that are not finite")
     if given["route"] != gate.route:
@@ -220,10 +224,10 @@ def _shaped(flat: dict[str, Array], n: int) -> dict[str, Array | None]:
     return shaped
 
 
-class Off:
+class Deviation:
     """A comparison: how far a recorded value is from what it should be, and how far it may be."""
 
-    def __init__(self, row: Row, what: str, by: Any, allowed: float, **more: Any) -> None:
+    def __init__(self, row: DecisionRecord, what: str, by: Any, allowed: float, **more: Any) -> None:
         """Compare.
 
         Args:
@@ -255,7 +259,7 @@ def cost_tolerance(cost: float) -> float:
     return 1e-9 * max(cost, LEAST_COST)
 
 
-def conclude(finding: Finding, compared: Iterable[Off]) -> Finding:
+def conclude(finding: Finding, compared: Iterable[Deviation]) -> Finding:
     """The finding, or a refutation by the first wrong comparison in time."""
     first = min((one for one in compared if one.wrong), key=lambda one: one.row.t_s, default=None)
     if first is None:
@@ -295,5 +299,5 @@ class GateClaim(TraceClaim):
         return replace(finding, evidence={**finding.evidence, "without_decisions": without})
 
     @abc.abstractmethod
-    def judge_rows(self, trace: Trace, rows: list[Row]) -> Finding:
+    def judge_rows(self, trace: Trace, rows: list[DecisionRecord]) -> Finding:
         """Decide the claim about at least one decision."""

@@ -11,8 +11,8 @@ from airground_drake.run.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.beginnings import discovers
-from airground_drake.verify.runs.gate_record import GateClaim, Off, Row, conclude, reasons_of
-from airground_drake.verify.runs.proposals import Sent, proposal_of, withdrawn_s
+from airground_drake.verify.runs.gate_record import DecisionRecord, Deviation, GateClaim, conclude, reasons_of
+from airground_drake.verify.runs.proposals import ProposalRecord, proposal_of, withdrawn_s
 
 NO_DIFFERENCE = 1e-6
 """Relative gain from which on an outcome is better."""
@@ -87,9 +87,9 @@ class LiveProg(GateClaim):
         """Only method (d) judges by outcomes."""
         return trace.meta.get("method") == METHOD
 
-    def judge_rows(self, trace: Trace, rows: list[Row]) -> Finding:
+    def judge_rows(self, trace: Trace, rows: list[DecisionRecord]) -> Finding:
         """Go through the decisions; the margin is what is left of the time that an intervention may last."""
-        compared, ends, longest = list[Off](), Counter[str](), 0.0
+        compared, ends, longest = list[Deviation](), Counter[str](), 0.0
         for ugv in trace.ugvs:
             patience, mine = Patience(), [row for row in rows if row.robot == ugv]
             for last, row in zip_longest([None, *mine], mine):
@@ -118,7 +118,7 @@ class LiveProg(GateClaim):
         return conclude(finding, compared)
 
 
-def ending(trace: Trace, last: Row, ends: Counter[str]) -> Off:
+def ending(trace: Trace, last: DecisionRecord, ends: Counter[str]) -> Deviation:
     """How a proposal ended after a last decision that accepts it, counted in `ends`.
 
     It was withdrawn before the next sample of the gatekeeper, or the run was over.
@@ -126,10 +126,12 @@ def ending(trace: Trace, last: Row, ends: Counter[str]) -> Off:
     after = last.t_s + trace.scenario.gatekeeper.period_s + TIME_TOLERANCE_S
     withdrawn, over = withdrawn_s(trace, proposal_of(trace, last.number)) <= after, after > trace.t[-1]
     ends["withdrawn" if withdrawn else "end of the run"] += 1
-    return Off(last, "end of an accepted intervention", float(not (withdrawn or over)), 0.0)
+    return Deviation(last, "end of an accepted intervention", float(not (withdrawn or over)), 0.0)
 
 
-def judge_decision(trace: Trace, row: Row, last: Row | None, patience: Patience) -> Iterator[Off]:
+def judge_decision(
+    trace: Trace, row: DecisionRecord, last: DecisionRecord | None, patience: Patience
+) -> Iterator[Deviation]:
     """A decision against the rules, from what is known of the UGV before; `patience` is brought up to date."""
     gate, given, t = trace.scenario.gatekeeper, row.given, row.t_s
     on, same = proposal_of(trace, row.number), last is not None and last.number == row.number
@@ -155,12 +157,12 @@ def judge_decision(trace: Trace, row: Row, last: Row | None, patience: Patience)
             end = min(float(on.times_s[-1]), t + gate.longest_s)
             patience.tries, patience.since, patience.until = patience.tries + 1, t, end
     theirs = (given["decision"], given["reason"])
-    yield Off(row, "answer or reason", float(answer != theirs), 0.0, recomputed=list(answer), standing=standing)
-    yield Off(row, "tries", given["tries"] - patience.tries, 0.0, recomputed=patience.tries)
-    yield Off(row, "tries: more than allowed", max(0.0, given["tries"] - gate.tries), 0.0)
+    yield Deviation(row, "answer or reason", float(answer != theirs), 0.0, recomputed=list(answer), standing=standing)
+    yield Deviation(row, "tries", given["tries"] - patience.tries, 0.0, recomputed=patience.tries)
+    yield Deviation(row, "tries: more than allowed", max(0.0, given["tries"] - gate.tries), 0.0)
 
 
-def _by_outcome(row: Row, on: Sent) -> tuple[str, str]:
+def _by_outcome(row: DecisionRecord, on: ProposalRecord) -> tuple[str, str]:
     """The answer that follows from the recorded outcomes."""
     given = row.given
     if given["accept_stalls"] < 0.0:

@@ -38,7 +38,7 @@ class Answer(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Sent:
+class ProposalRecord:
     """A proposal: a row of `Trace.proposals`.
 
     Attributes:
@@ -82,7 +82,7 @@ class Sent:
         return np.pad(np.diff(self.positions_m, axis=0) / np.diff(self.times_s)[:, None], ((1, 1), (0, 0)))
 
 
-def proposals_of(trace: Trace) -> list[Sent]:
+def proposals_of(trace: Trace) -> list[ProposalRecord]:
     """All proposals of a run, by time.
 
     Raises:
@@ -92,7 +92,7 @@ def proposals_of(trace: Trace) -> list[Sent]:
     return trace.derived("proposals", lambda: _proposals_of(trace))
 
 
-def _sent(trace: Trace, row: Mapping[Any, Any]) -> Sent:
+def _sent(trace: Trace, row: Mapping[Any, Any]) -> ProposalRecord:
     """The proposal of a row of the table."""
     times, places, selection, mapped, radii = (
         np.asarray(row[name], dtype=np.float64).ravel()
@@ -110,13 +110,13 @@ def _sent(trace: Trace, row: Mapping[Any, Any]) -> Sent:
     party = tuple(ugv for i, ugv in enumerate(trace.ugvs) if i in row["party"])
     if len(party) != len(row["party"]) or (party and row["robot"] not in party):
         raise TraceError(f"{label}: not in the joint plan of the UGVs {list(row['party'])}")
-    return Sent(
+    return ProposalRecord(
         int(row["number"]), str(row["robot"]), str(row["policy"]), float(row["issued_s"]), times,
         places.reshape(-1, 3), selected(selection), mapped.reshape(-1, 3), radii, str(row["cause"]), party,
     )  # fmt: skip
 
 
-def _proposals_of(trace: Trace) -> list[Sent]:
+def _proposals_of(trace: Trace) -> list[ProposalRecord]:
     found = [_sent(trace, row) for row in trace.proposals.to_dict("records")]
     recorded = sorted((s.ugv, s.issued_s, s.policy) for s in found)
     events = sorted((e["robot"], float(e["t_s"]), e["policy"]) for e in trace.events if e["kind"] == "proposal")
@@ -143,7 +143,7 @@ def _is_cause(trace: Trace, ugv: str, cause: str, issued_s: float) -> bool:
     return bool(called[cause].any()) and (cause == ugv or not called[ugv].all())
 
 
-def proposal_of(trace: Trace, number: int) -> Sent:
+def proposal_of(trace: Trace, number: int) -> ProposalRecord:
     """The proposal with a number.
 
     Raises:
@@ -155,7 +155,7 @@ def proposal_of(trace: Trace, number: int) -> Sent:
     return found[number]
 
 
-def parts_of(trace: Trace, sent: Sent) -> list[Sent]:
+def parts_of(trace: Trace, sent: ProposalRecord) -> list[ProposalRecord]:
     """The other parts of the joint plan that a proposal is part of."""
     if not sent.party:
         return []
@@ -163,7 +163,7 @@ def parts_of(trace: Trace, sent: Sent) -> list[Sent]:
     return [one for one in proposals_of(trace) if (one.issued_s, one.party) == same and one.number != sent.number]
 
 
-def accepted_at(trace: Trace, ugv: str) -> list[Sent | None]:
+def accepted_at(trace: Trace, ugv: str) -> list[ProposalRecord | None]:
     """The proposal that a UGV executes, at each control sample of the run, or None.
 
     A proposal is in force from its sending until it is withdrawn (`withdrawn_s`). Under method (b) it is accepted all
@@ -173,7 +173,7 @@ def accepted_at(trace: Trace, ugv: str) -> list[Sent | None]:
     return trace.derived(("accepted", ugv), lambda: _accepted_at(trace, ugv))
 
 
-def _accepted_at(trace: Trace, ugv: str) -> list[Sent | None]:
+def _accepted_at(trace: Trace, ugv: str) -> list[ProposalRecord | None]:
     mine = [sent for sent in proposals_of(trace) if sent.ugv == ugv]
     return [
         next((one for one in reversed(mine) if _in_force(trace, one, now) and _is_executed(trace, one, now)), None)
@@ -181,14 +181,14 @@ def _accepted_at(trace: Trace, ugv: str) -> list[Sent | None]:
     ]
 
 
-def _in_force(trace: Trace, sent: Sent, now: float) -> bool:
+def _in_force(trace: Trace, sent: ProposalRecord, now: float) -> bool:
     """Whether a proposal was in force after the last planning instant up to `now`, s."""
     period = trace.scenario.intervention.period_s
     planned = period * np.floor(now / period + 1e-6) + TIME_TOLERANCE_S
     return bool(sent.issued_s <= planned < withdrawn_s(trace, sent))
 
 
-def _is_executed(trace: Trace, sent: Sent, now: float) -> bool:
+def _is_executed(trace: Trace, sent: ProposalRecord, now: float) -> bool:
     """Whether a proposal in force is accepted at `now`, s, and all other parts in force are accepted or done."""
     if trace.meta["method"] not in GATED_METHODS:
         return True
@@ -199,7 +199,7 @@ def _is_executed(trace: Trace, sent: Sent, now: float) -> bool:
     return not any(answer is None or answer.refused for answer in others)
 
 
-def _answer_at(trace: Trace, sent: Sent, now: float) -> Answer | None:
+def _answer_at(trace: Trace, sent: ProposalRecord, now: float) -> Answer | None:
     """The decision about a proposal at the gatekeeper's last sample up to `now`, s, if there is one."""
     period = trace.scenario.gatekeeper.period_s
     asked = period * np.floor(now / period + 1e-6)
@@ -208,7 +208,7 @@ def _answer_at(trace: Trace, sent: Sent, now: float) -> Answer | None:
     return answers[k] if k < len(answers) and abs(answers[k].t_s - asked) <= TIME_TOLERANCE_S else None
 
 
-def answers_to(trace: Trace, sent: Sent) -> list[Answer]:
+def answers_to(trace: Trace, sent: ProposalRecord) -> list[Answer]:
     """Every decision about a proposal, by time."""
     return trace.derived("answers_to", lambda: _answers(trace)).get(sent.number, [])
 
@@ -227,7 +227,7 @@ def _answers(trace: Trace) -> dict[int, list[Answer]]:
     return found
 
 
-def withdrawn_s(trace: Trace, sent: Sent, *, unless_replaced: bool = False) -> float:
+def withdrawn_s(trace: Trace, sent: ProposalRecord, *, unless_replaced: bool = False) -> float:
     """The planning instant at which a proposal is taken back, s; infinite if it never is.
 
     That is the first instant at which one of these is so:
@@ -245,7 +245,7 @@ def withdrawn_s(trace: Trace, sent: Sent, *, unless_replaced: bool = False) -> f
     return trace.derived(("withdrawn", sent.number, unless_replaced), first)
 
 
-def _over(trace: Trace, sent: Sent, unless_replaced: bool = False) -> tuple[float, bool]:
+def _over(trace: Trace, sent: ProposalRecord, unless_replaced: bool = False) -> tuple[float, bool]:
     """When a proposal is taken back without regard to other parts, s, and whether the UAV has its refusal then."""
     t, period = trace.t, trace.scenario.intervention.period_s
     called = (trace.column(f"{sent.ugv}.mode") == 1.0) | (trace.column(f"{sent.cause}.mode") == 1.0)

@@ -21,7 +21,7 @@ from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Gatekeeper
 from airground_drake.verify.runs import convex_bounds, gate_feas, gate_opt
 from airground_drake.verify.runs.convex_bounds import enclose
-from airground_drake.verify.runs.gate_record import Row, rows_of
+from airground_drake.verify.runs.gate_record import DecisionRecord, rows_of
 from airground_drake.verify.runs.way_left import bounds_of_way_left
 
 COSTS = st.floats(0.1, 10.0)
@@ -95,7 +95,7 @@ def test_plans_of_blocks_are_enumerated(base: Callable[[str], Trace]) -> None:
 
 
 def test_a_bad_solution_decides_nothing(base: Callable[[str], Trace], monkeypatch: pytest.MonkeyPatch) -> None:
-    def nothing(rows: list[Row]) -> Any:
+    def nothing(rows: list[DecisionRecord]) -> Any:
         return [np.full(STAGES, 0.5) for _ in rows], [np.zeros((STAGES, len(row["distances_m"]))) for row in rows]
 
     monkeypatch.setattr(convex_bounds, "_solve", nothing)
@@ -131,7 +131,7 @@ def test_the_rules_are_those_of_the_running_gatekeeper(
     status: Any = "optimal" if planned else "refused_not_finite"
     decision = Solution(accept <= refuse, status, objective=min(costs), plan=plan, rounded=first)
     given = {"objective": min(costs), "accept_throughout": throughout[0], "refuse_throughout": throughout[1]}
-    row = Row(given, 1.0, 1.0, 1.0, 0.0, {"plan": plan, "rounded": first})
+    row = DecisionRecord(given, 1.0, 1.0, 1.0, 0.0, {"plan": plan, "rounded": first})
     gate = Gatekeeper(switching_margin=margin, min_dwell_s=0.2)
     stands = {SILENT: None, ACCEPT: "accept", REFUSE: "refuse"}[standing]
     rules = Rules(switching_margin=margin, min_dwell=0.2, first_stage=literal)
