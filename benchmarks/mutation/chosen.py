@@ -359,9 +359,9 @@ JUDGES = (
     Mutant(
         "EXEC believes the signal",
         "verify/runs/exec.py",
-        "_first_wrong",
-        "| (one.executing != one.said)",
-        "| (one.executing != one.executing)",
+        "Judged.first_wrong",
+        "| (self.executing != self.said)",
+        "| (self.executing != self.executing)",
         runs=("case_b d", "soft_gate c", "crowd b"),
         tests=(f"{RUNS}/test_breakages.py",),
     ),
