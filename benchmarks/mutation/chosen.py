@@ -328,6 +328,7 @@ GATEKEEPER = (
 )
 """The gatekeepers."""
 
+RULES = "tests/check/test_forgeries.py::test_each_rule_of_the_checker_refuses_what_it_is_for"
 JUDGES = (
     Mutant(
         "SAFE-TRACE allows 5 cm",
@@ -377,22 +378,20 @@ JUDGES = (
     Mutant(
         "checker: digests are not compared",
         "check/run.py",
-        "_run",
-        'same("SHA-256 of a table", meta["files"][file], sha256(content), about=file)',
+        "_table",
+        'same("SHA-256 of a table", digest, sha256(content), about=path.name)',
         "pass",
         runs=(),
-        tests=(
-            "tests/check/test_tampering.py::test_the_checker_itself_names_the_broken_rule[table_in_other_bytes_digest_left]",
-        ),
+        tests=(f"{RULES}[table with other bytes]",),
     ),
     Mutant(
         "checker: commands need not lead anywhere",
         "check/run.py",
-        "_robots_are_where_their_commands_lead",
-        'close("law of motion", run.position_m[robot][1:], led, within=SMALL,',
-        'close("law of motion", run.position_m[robot][1:], led, within=1e9,',
+        "_moves_as_commanded",
+        'close("law of motion", place[1:], led, within=SMALL,',
+        'close("law of motion", place[1:], led, within=1e9,',
         runs=(),
-        tests=("tests/check/test_tampering.py::test_the_checker_itself_names_the_broken_rule[position_changed]",),
+        tests=(f"{RULES}[elsewhere in a row]",),
     ),
 )
 """What judges: claims and the checker. On honest runs one that demands less says the same."""
