@@ -14,7 +14,7 @@ _AT_ONCE_S = 1e-6  # 0 would turn the timer off
 
 
 class OutOfTime(BaseException):
-    """Raised inside code that exceeds its time limit. It is not an Exception, so `except Exception` does not stop it."""
+    """Raised inside code that exceeds its time limit. `except Exception` does not catch it."""
 
 
 @contextmanager
