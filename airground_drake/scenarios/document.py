@@ -71,21 +71,35 @@ class Document(NamedTuple):
 
 
 class _Loader(yaml.BaseLoader):
-    """Composes nodes, tags scalars by the rules of YAML 1.2, and refuses too many nodes."""
+    """Composes nodes, tags scalars by the rules of YAML 1.2, and refuses nodes that are too large or too deep."""
 
-    count, depth = 0, 0
+    def __init__(self, text: str, source: str) -> None:
+        super().__init__(text)
+        self.name, self.depth = source, 0
+        self.sizes: dict[int, tuple[int, int]] = {}
+        """Numbers of values and of levels in each node, with aliases and merges expanded."""
 
-    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node:
         """A node and those within it.
 
         Raises:
-            ScenarioError: if the document has more than MAX_VALUES nodes, or nodes deeper than MAX_DEPTH.
+            ScenarioError: if the node has more than MAX_VALUES values, is deeper than MAX_DEPTH, or contains itself.
         """
-        self.count, self.depth = self.count + 1, self.depth + 1
-        if self.count > MAX_VALUES or self.depth > MAX_DEPTH:
-            raise _excess(f"{self.name}:{self.line + 1}", deep=self.depth > MAX_DEPTH)
+        event: yaml.Event = self.peek_event()  # type: ignore[no-untyped-call]
+        self.depth += 1
+        if self.depth > MAX_DEPTH:
+            raise _excess(_where(event), deep=True)
         node: yaml.Node | None = super().compose_node(parent, index)
+        assert node is not None
         self.depth -= 1
+        if not isinstance(event, yaml.AliasEvent):
+            inner = [self.sizes[id(each)] for each in _within(node)]
+            self.sizes[id(node)] = 1 + sum(n for n, _ in inner), 1 + max((levels for _, levels in inner), default=0)
+        elif id(node) not in self.sizes:  # an alias of a node around it
+            raise _excess(_where(event), deep=True)
+        values, levels = self.sizes[id(node)]
+        if values > MAX_VALUES or self.depth + levels > MAX_DEPTH:
+            raise _excess(_where(node), deep=self.depth + levels > MAX_DEPTH)
         return node
 
 
@@ -152,7 +166,6 @@ def parsed(text: str, source: str, at: tuple[str, ...] = ()) -> Document:
         ScenarioError: if the text is not plain YAML, or exceeds the limits.
     """
     root = _composed(text, source)
-    _within_limits(root)
     places: Places = {at: (_where(root), _where(root))}
     return Document(_plain(root, at, places), source, places)
 
@@ -160,9 +173,7 @@ def parsed(text: str, source: str, at: tuple[str, ...] = ()) -> Document:
 def _composed(text: str, source: str) -> yaml.Node:
     """The root node of a YAML document; the marks of all nodes have the source's name."""
     try:
-        loader = _Loader(text)
-        loader.name = source
-        root: yaml.Node | None = loader.get_single_node()
+        root: yaml.Node | None = _Loader(text, source).get_single_node()
     except (yaml.YAMLError, ValueError, OverflowError) as error:
         mark = getattr(error, "problem_mark", None)
         line = mark.line + 1 if mark else text.count("\n", 0, getattr(error, "position", 0)) + 1
@@ -287,31 +298,10 @@ def _entries_of(node: yaml.Node, key: str) -> Children:
     return entries
 
 
-def _where(node: yaml.Node) -> str:
-    """File and line of a node."""
-    return f"{node.start_mark.name}:{node.start_mark.line + 1}"
-
-
-def _within_limits(root: yaml.Node) -> None:
-    """Count the values of a document with its aliases and merges expanded; each node is visited once.
-
-    Raises:
-        ScenarioError: if there are more than MAX_VALUES, or deeper ones than MAX_DEPTH, as in a node that contains
-            itself.
-    """
-    counted: dict[int, tuple[int, int]] = {}
-
-    def count(node: yaml.Node, above: int) -> tuple[int, int]:
-        """Number of values in a node, itself included, and number of levels."""
-        if id(node) not in counted and above < MAX_DEPTH:
-            within = [count(child, above + 1) for child in _within(node)]
-            counted[id(node)] = 1 + sum(n for n, _ in within), 1 + max((levels for _, levels in within), default=0)
-        values, levels = counted.get(id(node), (1, 1))
-        if values > MAX_VALUES or above + levels > MAX_DEPTH:
-            raise _excess(_where(node), deep=above + levels > MAX_DEPTH)
-        return values, levels
-
-    count(root, 0)
+def _where(node: yaml.Node | yaml.Event) -> str:
+    """File and line of a node or of the event at its beginning."""
+    mark: Any = node.start_mark
+    return f"{mark.name}:{mark.line + 1}"
 
 
 def _within(node: yaml.Node) -> Iterable[yaml.Node]:

@@ -40,10 +40,7 @@ from airground_drake.scenarios.picture import picture
 Vector = list[float]
 
 TRIGGERS: tuple[str, ...] = ("automaton", "bare")
-SOURCES: tuple[str, ...] = ("calibrated", "ours")
-BUDGETS: tuple[str, ...] = ("counted", "wall_clock")
 RULES: tuple[str, ...] = ("hysteresis", "first_stage")
-SOLVERS: tuple[str, ...] = ("daqp", "gurobi", "mosek")
 SETTABLE: tuple[str, ...] = ("decision", "gatekeeper", "intervention")
 """Sections in which a run may set its own values. All runs share bodies, distances and controllers: a report draws them
 once, and proves safety once."""
@@ -257,7 +254,7 @@ class Gatekeeper:
     """Stages of (26): horizon_s / stages is a multiple of the control period."""
     blocks: CountFromZero = 0
     """Accept variables of (26), each for a block of stages, for route mixed_integer; 0: one per stage."""
-    solver: Annotated[Words, one_of(SOLVERS)] = "daqp"
+    solver: Annotated[Words, one_of(("daqp", "gurobi", "mosek"))] = "daqp"
     """Solver of the route mixed_integer; gurobi and mosek need a Drake that has them, and a licence."""
     error_weight_1_m2_s: Positive = 1.0
     """a of (25): weight of the distance to the preset trajectory."""
@@ -271,7 +268,7 @@ class Gatekeeper:
     """Relative amount by which a plan must be cheaper to reverse a decision of method (c)."""
     min_dwell_s: NotNegative = 0.2
     """Shortest time for which a decision of method (c) stands."""
-    budget: Annotated[Words, one_of(BUDGETS)] = "counted"
+    budget: Annotated[Words, one_of(("counted", "wall_clock"))] = "counted"
     """Limits of a decision's effort: counts only, or also the clock."""
     budget_iterations: Count = 100
     """Largest number of iterations of the solver of a relaxation."""
@@ -351,7 +348,7 @@ class Choice:
 
     key: Words
     """Dotted key of the value."""
-    source: Annotated[Words, one_of(SOURCES)]
+    source: Annotated[Words, one_of(("calibrated", "ours"))]
     """Its origin."""
     paper: Words = ""
     """The paper's value or statement."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,6 @@ from airground_drake.intervention.messages import ACCEPT, DONE, REFUSE, SILENT, 
 from airground_drake.intervention.planner import Planner, PlannerState, sent_after
 from airground_drake.intervention.policy import Observation, Policy
 from airground_drake.registry import METHODS
-from airground_drake.systems import components
 from airground_drake.systems.components import make_planner
 from airground_drake.verify import verify
 
@@ -151,11 +150,11 @@ def test_proposals_are_numbered_as_they_are_sent() -> None:
     assert [sent.number for sent in memory.proposals if sent] == [2, 3, 1]
 
 
-class Swaps(Planner):
-    """Changes the motion of a proposal that a UGV has accepted, under the same number and time of issue."""
+def test_no_motion_is_executed_that_was_not_decided_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Though the planner changes an accepted motion, under the same number and time of issue."""
 
-    def plan(self, memory: PlannerState, t: float, positions: Array, *given: Any) -> PlannerState:
-        planned = super().plan(memory, t, positions, *given)
+    def swapping(self: Planner, memory: PlannerState, t: float, positions: Array, *given: Any) -> PlannerState:
+        planned = honest(self, memory, t, positions, *given)
         talks = list(planned.talks)
         for i, talk in enumerate(talks):
             if talk.proposal is not None and answer_to(talk.proposal, given[1], i) == ACCEPT:
@@ -163,13 +162,8 @@ class Swaps(Planner):
                 talks[i] = replace(talk, proposal=replace(talk.proposal, motion=motion))
         return replace(planned, talks=tuple(talks))
 
-
-def test_no_motion_is_executed_that_was_not_decided_on(monkeypatch: pytest.MonkeyPatch) -> None:
-    def swapping(*given: Any) -> Planner:
-        honest = make_planner(*given)
-        return Swaps(**{each.name: getattr(honest, each.name) for each in fields(Planner)})
-
-    monkeypatch.setattr(components, "make_planner", swapping)
+    honest = Planner.plan
+    monkeypatch.setattr(Planner, "plan", swapping)
     trace = simulate(load("case_a", ["duration_s=17"])[0], "d")
     assert len(trace.proposals) > 2
     assert trace.column("ugv1.accepted").any()
