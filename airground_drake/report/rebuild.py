@@ -131,7 +131,7 @@ def _pages(folder: Path, report: Mapping[str, Any], scenario: Any, traces: Mappi
     if "junit.xml" in report["files"]:
         yield _same_text("junit.xml", folder, junit.render(made))
     if "report.html" in report["files"]:
-        text = page(made, draw(scenario, traces), traces, (folder / "diagram.svg").read_text(encoding="utf-8"))
+        text = page(made, draw(scenario, traces), (folder / "diagram.svg").read_text(encoding="utf-8"))
         text = text if found is None else proved.filled(text, found)
         drawn_by = report["provenance"]["packages"]["matplotlib"]
         yield _same_text("report.html", folder, text, other_drawings=drawn_by != version("matplotlib"))
