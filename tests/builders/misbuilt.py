@@ -1,4 +1,4 @@
-"""Controllers and teams that are built otherwise than the scenario says, for whoever must notice it."""
+"""Controllers and teams that are built otherwise than the scenario says."""
 
 from __future__ import annotations
 
