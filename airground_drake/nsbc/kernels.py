@@ -331,7 +331,8 @@ def _first_release(force: Array, share: Array, pull: Array, size: int) -> tuple[
     Without such a constraint: inf and -1.
     """
     step, leaving = np.inf, -1
-    pull[:size] = share[size, :size]
+    for m in range(size):
+        pull[m] = share[size, m]
     for m in range(size - 1, -1, -1):
         for n in range(m):
             pull[n] -= pull[m] * share[m, n]
@@ -390,8 +391,9 @@ def _meet(velocity: Array, normal: Array, bound: Array, active: npt.NDArray[np.i
     """
     for _ in range(2):
         for m in range(len(active)):
-            missed, along = _missed(velocity, normal, bound, active[m]), 0.0
+            missed, along = bound[active[m]], 0.0
             for a in range(len(velocity)):
+                missed -= normal[active[m], a] * velocity[a]
                 along += normal[active[m], a] * across[m, a]
             for a in range(len(velocity)):
                 velocity[a] += missed / along * across[m, a]
