@@ -15,8 +15,8 @@ from numba import njit
 from airground_drake.base.arrays import Array
 
 MARGIN_M_S = 1e-12
-"""Added to every bound in the projection, m/s. The bound of a robot in contact is 0. Without the margin
-rounding misses it every other time, and `_scale_back` stops a robot that should slide along."""
+"""Added to every bound in the projection, m/s. The bound of a robot in contact is 0. Without the margin rounding would
+miss it every other time, and `_scale_back` would stop a robot that should slide along."""
 CONTRADICTION_M_S = 1e-9
 """Constraints contradict each other if one is missed by more than this where the others are met, m/s."""
 ABOVE_LEAST = 1e-9
@@ -42,7 +42,7 @@ class Layer(NamedTuple):
 
 
 class Points(NamedTuple):
-    """What one robot must keep away from: centres, (K, 3), m, safe distances, (K,), m, and shares, (K,)."""
+    """The points that one robot must keep away from: centres, (K, 3), m, safe distances, (K,), m, shares, (K,)."""
 
     centre: Array
     distance: Array
