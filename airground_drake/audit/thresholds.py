@@ -165,7 +165,7 @@ def _intensity(scenario: Scenario) -> Item:
 
 def _zeno(proofs: Mapping[str, Finding]) -> Item:
     """Item 9: the bare threshold's triggers under refinement of the noise, and the bound of ours."""
-    refined = proofs["ZENO-REFINE"].evidence if "ZENO-REFINE" in proofs else {}
+    refined = proofs["ZENO-REFINE"].to_json()["evidence"] if "ZENO-REFINE" in proofs else {}
     found = {name: status(proofs, name) for name in ("ZENO-REFINE", "ZENO-PROOF")}
     shown = found == {"ZENO-REFINE": "supported", "ZENO-PROOF": "proved"}
     return item(

@@ -12,6 +12,7 @@ from dataclasses import replace
 from airground_drake.run.trace import Trace
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.model import thr_choice
+from airground_drake.verify.model.theorem import Proof
 from airground_drake.verify.runs.followed import followed
 from airground_drake.verify.runs.proposals import accepted_at
 from airground_drake.verify.runs.safe_hyp import guarantees
@@ -59,12 +60,12 @@ def counts(trace: Trace) -> dict[str, Count]:
 
 
 def with_counts(claim: str, finding: Finding, of_runs: Iterable[dict[str, Count]]) -> Finding:
-    """A finding about the model with how often the runs met its premise, `applies_to`, of how many times, `of`."""
+    """The finding on a theorem, with how often the runs met its premise."""
     counted = [found[claim] for found in of_runs if claim in found]
-    if not counted:
+    if not counted or not isinstance(finding.evidence, Proof):
         return finding
     met, cases = (sum(column) for column in zip(*counted, strict=True))
-    return replace(finding, evidence={**finding.evidence, "applies_to": met, "of": cases})
+    return replace(finding, evidence=replace(finding.evidence, applies_to=met, of=cases))
 
 
 def measured(trace: Trace) -> dict[str, thr_choice.Measured]:
@@ -75,9 +76,9 @@ def measured(trace: Trace) -> dict[str, thr_choice.Measured]:
         return {}
 
 
-def with_runs(claim: str, finding: Finding, of_runs: Iterable[dict[str, thr_choice.Measured]]) -> Finding:
-    """THR-CHOICE with what was measured in the runs under `runs`; other findings as they are."""
-    if claim != "THR-CHOICE" or finding.status == "error":
+def with_runs(finding: Finding, of_runs: Iterable[dict[str, thr_choice.Measured]]) -> Finding:
+    """The finding on THR-CHOICE with what was measured in the runs; other findings as they are."""
+    if not isinstance(finding.evidence, thr_choice.Choice):
         return finding
     runs = {name: row for each in of_runs for name, row in each.items()}
-    return replace(finding, evidence={**finding.evidence, "runs": runs})
+    return replace(finding, evidence=replace(finding.evidence, runs=runs))

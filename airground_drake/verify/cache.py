@@ -10,15 +10,16 @@ from __future__ import annotations
 
 import contextlib
 import json
-import math
 import os
 import platform
 from collections.abc import Mapping
-from dataclasses import asdict, replace
+from dataclasses import replace
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
+
+from pydantic import TypeAdapter
 
 from airground_drake.base import files
 from airground_drake.base.statuses import PASSING
@@ -93,24 +94,24 @@ def _keep(folder: Path | None, claim: ModelClaim, inputs: Mapping[str, Any], fin
     """Write an entry, whole or not at all, of a finding that passes."""
     if folder is None or claim.id not in KEPT or finding.status not in PASSING:
         return
-    made = asdict(finding)
+    made = finding.to_json()
     with contextlib.suppress(OSError):  # a folder that cannot be written keeps nothing
         entry = {**content(claim, inputs), "finding": made, "sha256": _digest(made)}
         files.write_json(_path(folder, claim, inputs), entry)
 
 
 def _read(folder: Path | None, claim: ModelClaim, inputs: Mapping[str, Any]) -> Finding | None:
-    """The finding that was kept; None if there is none, or none that can be taken."""
+    """The finding that was kept, if there is a sound one."""
     if folder is None or claim.id not in KEPT:
         return None
     path = _path(folder, claim, inputs)
     try:
         if not path.is_file() or path.stat().st_size > LARGEST_BYTES:
             return None
-        entry = json.loads(path.read_text(encoding="utf-8"), parse_constant=_refused, parse_float=_finite)
+        entry = json.loads(path.read_text(encoding="utf-8"))
         made, digest = entry.pop("finding"), entry.pop("sha256")
-        finding = Finding(**made)
-        sound = digest == _digest(made) and finding.status in PASSING
+        sound = digest == _digest(made) and made["status"] in PASSING
+        finding = Finding(**made | {"evidence": TypeAdapter(claim.record).validate_python(made["evidence"])})
     except (OSError, ValueError, TypeError, AttributeError, KeyError, RecursionError):
         return None
     about = json.dumps(entry, sort_keys=True) == json.dumps(content(claim, inputs), sort_keys=True)
@@ -124,12 +125,3 @@ def _digest(finding: Mapping[str, Any]) -> str:
 
 def _path(folder: Path, claim: ModelClaim, inputs: Mapping[str, Any]) -> Path:
     return folder / f"{key(claim, inputs)}.json"
-
-
-def _finite(text: str) -> float:
-    value = float(text)
-    return value if math.isfinite(value) else _refused(text)
-
-
-def _refused(text: str) -> NoReturn:
-    raise ValueError(f"{text} is not finite")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import abc
 import json
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from html import escape
 from typing import Any
 
@@ -15,7 +15,7 @@ from airground_drake.base.statuses import PASSING, STATUSES, Status, meets, outc
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.plants import plant_of
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.verify.finding import Finding
+from airground_drake.verify.finding import Evidence, Failure, Finding
 
 __all__ = [
     "Claim",
@@ -68,11 +68,14 @@ class Claim(abc.ABC):
 class ModelClaim(Claim):
     """A claim about the model and its constants, whatever the run: a proof, or an experiment of its own.
 
-    `check` sees nothing but `inputs`, so that equal inputs (and equal code) give equal findings: that is what the
-    cache of findings rests on.
+    `check` sees nothing but `inputs`. So equal inputs and equal code give equal findings, and the cache can keep them.
+
+    Attributes (all of the class):
+        record: type of the evidence; the cache needs it to read a finding back.
     """
 
     expected: Status = "proved"
+    record: type[Evidence] = Evidence
 
     @abc.abstractmethod
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
@@ -95,13 +98,13 @@ class ModelClaim(Claim):
     def judge(self, inputs: dict[str, Any]) -> Finding:
         """`check` under guard."""
         if set(inputs) == {"error"}:
-            return Finding("error", evidence=inputs)
+            return Finding("error", evidence=Failure(inputs["error"]))
         try:
             finding = self.check(inputs)
             require_count(self, finding)
-            json.dumps(asdict(finding), allow_nan=False)
+            json.dumps(finding.to_json(), allow_nan=False)
         except (Exception, SystemExit) as error:  # whatever went wrong, the claim was not decided
-            return Finding("error", evidence={"error": described(error)})
+            return Finding("error", evidence=Failure(described(error)))
         return finding
 
 
@@ -129,9 +132,9 @@ class TraceClaim(Claim):
             if finding.status in PASSING:
                 require_whole_run(trace)
             require_count(self, finding)
-            json.dumps(asdict(finding), allow_nan=False)  # a margin that is not a number must not pass
+            json.dumps(finding.to_json(), allow_nan=False)  # a margin that is not a number must not pass
         except (Exception, SystemExit) as error:  # whatever went wrong, the claim was not decided
-            return Finding("error", evidence={"error": described(error)})
+            return Finding("error", evidence=Failure(described(error)))
         return finding
 
 
@@ -188,7 +191,7 @@ class Verdict:
             "expected": self.expected,
             "as_expected": self.as_expected,
             "inputs": self.inputs,
-            **asdict(self.finding),
+            **self.finding.to_json(),
         }
 
 

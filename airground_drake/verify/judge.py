@@ -136,7 +136,7 @@ def verify_all(
             if each.run == (trace.run if (each.claim.id, trace.run) in apart else ""):
                 concerned.append(about)
         counted = with_counts(name, finding, [met for _, met, _ in concerned])
-        verdicts.append(each.verdict(scenario, with_runs(name, counted, [shown for *_, shown in concerned])))
+        verdicts.append(each.verdict(scenario, with_runs(counted, [shown for *_, shown in concerned])))
     return verdicts
 
 

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
 from airground_drake.report.figures import canvas
 from airground_drake.report.figures.panels import Figure, Table, panel
-from airground_drake.verify.model.zeno_refine import Series
 
-_SERIES: dict[Literal["bare", "automaton"], str] = {"bare": "bare threshold", "automaton": "automaton"}
+_SERIES: dict[str, str] = {"bare": "bare threshold", "automaton": "automaton"}
 
 
-def draw(evidence: Series) -> Figure | None:
+def draw(evidence: Mapping[str, Any]) -> Figure | None:
     """The figure, from the finding's evidence alone; None without it."""
     if not evidence.get("fit"):
         return None
@@ -48,7 +48,7 @@ def draw(evidence: Series) -> Figure | None:
     return Figure("refinement", title, caption, (drawn,), beside="ZENO-REFINE")
 
 
-def _counts(steps: Any, evidence: Series) -> Drawing:
+def _counts(steps: Any, evidence: Mapping[str, Any]) -> Drawing:
     """log2 of the mean count against the number of halvings: a slope of 1/2 is an exponent of -1/2."""
     drawing = Drawing(figsize=(canvas.WIDE_IN, 2.6))
     axes = drawing.add_axes((0.15, 0.2, 0.5, 0.75))

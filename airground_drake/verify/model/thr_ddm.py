@@ -14,14 +14,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from scipy.special import betainccinv, betaincinv, ndtri
 
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.claim import ModelClaim
-from airground_drake.verify.finding import Finding
+from airground_drake.verify.finding import Evidence, Finding
 from airground_drake.verify.model.first_passages import (
     PassageExperiment,
     Sample,
@@ -40,6 +40,36 @@ TIME_ALLOWANCE = 0.05
 
 Formulas = Callable[[PassageExperiment], tuple[float, float]]
 """Mean decision time, s, and error rate that are to be compared with the simulation."""
+
+
+@dataclass(frozen=True)
+class Comparison(Evidence):
+    """A simulated mean, its interval and the formula's value; everything else is counted or given.
+
+    `constants` are those of the experiment, `margin` is in half-widths of the interval.
+    """
+
+    experiment: str
+    quantity: str
+    unit: str
+    constants: dict[str, Any]
+    wrong_decisions: int
+    periods_sum: int
+    periods_sum_of_squares: int
+    estimate: float
+    interval: tuple[float, float]
+    formula: float
+    z_score: float
+    margin: float
+
+
+@dataclass(frozen=True)
+class Comparisons(Evidence):
+    """All comparisons, the number of paths and the simultaneous level of the intervals."""
+
+    paths: int
+    comparisons: list[Comparison]
+    family_level: float
 
 
 class ThrDdm(ModelClaim):
@@ -74,7 +104,7 @@ class ThrDdm(ModelClaim):
         "period or leak. Statistics exclude deviations larger than the intervals, not smaller ones."
     )
     expected = "supported"
-
+    record = Comparisons
     exercised_by = "simulated paths"
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
@@ -95,58 +125,57 @@ class ThrDdm(ModelClaim):
 def compare(chosen: tuple[PassageExperiment, ...], formulas: Formulas) -> Finding:
     """The verdict for these formulas: 'supported' if all intervals contain them, else 'refuted'."""
     rows = [row for each in chosen for row in _rows(simulate(each), formulas(each), 2 * len(chosen))]
-    worst = min(rows, key=lambda row: float(row["margin"]))
-    supported = worst["margin"] >= 0.0
+    worst = min(rows, key=lambda row: row.margin)
+    supported = worst.margin >= 0.0
     paths = sum(each.paths for each in chosen)
-    evidence = {
-        "paths": paths,
-        "comparisons": rows,
-        "family_level": LEVEL,
-    }
     return Finding(
         "supported" if supported else "refuted",
-        margin=worst["margin"],
+        margin=worst.margin,
         unit="interval half-widths",
         quantity="what a simulated mean leaves of its confidence interval about the formula",
-        where={key: worst[key] for key in ("experiment", "quantity")},
-        counterexample=None if supported else worst,
-        evidence=evidence,
+        where={"experiment": worst.experiment, "quantity": worst.quantity},
+        counterexample=None if supported else asdict(worst),
+        evidence=Comparisons(paths, rows, LEVEL),
         exercised=paths,
     )
 
 
-def _rows(sample: Sample, formula: tuple[float, float], comparisons: int) -> list[dict[str, Any]]:
-    """Both comparisons of an experiment: estimate, interval, formula, z-score and margin."""
-    each = sample.experiment
-    count = sample.experiment.paths
+def _rows(sample: Sample, formula: tuple[float, float], comparisons: int) -> list[Comparison]:
+    """Compare the mean decision time and the error rate of an experiment with the formula's."""
+    each, wrong = sample.experiment, sample.wrong
+    count, period = each.paths, each.period
     tail = (1.0 - LEVEL) / comparisons / 2.0
-    period = each.period
     mean = sample.periods / count
     deviation = math.sqrt((sample.squares - sample.periods * mean) / (count - 1.0) / count)
     half = float(-ndtri(tail)) * deviation + TIME_ALLOWANCE
-    time = [(mean - 0.25 + side * half) * period for side in (-1.0, 1.0)]
-    low = float(betaincinv(sample.wrong, count - sample.wrong + 1, tail)) if sample.wrong else 0.0
-    high = float(betainccinv(sample.wrong + 1, count - sample.wrong, tail)) if sample.wrong < count else 1.0
-    rate = sample.wrong / count
+    low = float(betaincinv(wrong, count - wrong + 1, tail)) if wrong else 0.0
+    high = float(betainccinv(wrong + 1, count - wrong, tail)) if wrong < count else 1.0
+    rate = wrong / count
     spread = math.sqrt(max(rate * (1.0 - rate), 1.0 / count) / count)
-    found = (
-        ("mean decision time", "s", (mean - 0.25) * period, deviation * period, time, formula[0]),
-        ("error rate", "", rate, spread, [low - ERROR_ALLOWANCE, high + ERROR_ALLOWANCE], formula[1]),
-    )
+
+    def compared(
+        quantity: str, unit: str, estimate: float, error: float, interval: tuple[float, float], value: float
+    ) -> Comparison:
+        below, above = value - interval[0], interval[1] - value
+        return Comparison(
+            each.name,
+            quantity,
+            unit,
+            {**asdict(each), "noise_period_s": period, "barrier_m": each.barrier},
+            wrong,
+            sample.periods,
+            sample.squares,
+            estimate,
+            interval,
+            value,
+            z_score=(estimate - value) / error,
+            margin=2.0 * min(below, above) / (interval[1] - interval[0]),
+        )
+
+    centre = mean - 0.25
+    times = (centre - half) * period, (centre + half) * period
+    rates = low - ERROR_ALLOWANCE, high + ERROR_ALLOWANCE
     return [
-        {
-            "experiment": each.name,
-            "quantity": quantity,
-            "unit": unit,
-            "constants": {**asdict(each), "noise_period_s": period, "barrier_m": each.barrier},
-            "wrong_decisions": sample.wrong,
-            "periods_sum": sample.periods,
-            "periods_sum_of_squares": sample.squares,
-            "estimate": estimate,
-            "interval": interval,
-            "formula": value,
-            "z_score": (estimate - value) / error,
-            "margin": 2.0 * min(value - interval[0], interval[1] - value) / (interval[1] - interval[0]),
-        }
-        for quantity, unit, estimate, error, interval, value in found
+        compared("mean decision time", "s", centre * period, deviation * period, times, formula[0]),
+        compared("error rate", "", rate, spread, rates, formula[1]),
     ]

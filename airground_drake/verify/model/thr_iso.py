@@ -61,7 +61,7 @@ class ThrIso(TheoremClaim):
         steps = decimal(inputs["noise_period_s"]) / decimal(inputs["period_s"])
         says = f"the noise period is a whole number of control periods: {float(steps):g}"
         return [
-            Hypothesis(self.margin_of, "the threshold is above 0", decimal(inputs["zeta_m"]), "m", strict=True),
-            Hypothesis("noise periods beside control samples", says, -(steps % 1)),
-            Hypothesis("control periods in a noise period", "there is at least one", steps - 1),
+            Hypothesis.of(self.margin_of, "the threshold is above 0", decimal(inputs["zeta_m"]), "m", strict=True),
+            Hypothesis.of("noise periods beside control samples", says, -(steps % 1)),
+            Hypothesis.of("control periods in a noise period", "there is at least one", steps - 1),
         ]

@@ -100,7 +100,7 @@ def test_safe_hyp_refuted_although_the_distance_was_kept() -> None:
 def test_safe_hyp_a_missing_sample_is_seen_even_if_the_motion_is_straight() -> None:
     mutant = rows(lambda signals: signals.drop(index=50))(stopped_at_the_limit())
     assert counterexample("SAFE-HYP", mutant)["hypothesis"] == "sampling"
-    assert "no row" in judge("SAFE-TRACE", mutant).evidence["error"]
+    assert "no row" in judge("SAFE-TRACE", mutant).evidence.error
 
 
 def towards_the_rock(step: float, start: float = -2.0) -> Trace:

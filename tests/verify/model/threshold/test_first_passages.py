@@ -42,20 +42,17 @@ def sampled(each: PassageExperiment, nodes: int = 160) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize("deviation", [-0.4, 0.0, 0.4])
-@pytest.mark.parametrize("drift", [0.01, 0.1815, 0.5, 1.0, 2.0, 4.0, 10.0])
+@pytest.mark.parametrize("drift", [0.01, 0.1815, 1.0, 10.0])
 def test_what_the_barrier_correction_leaves_is_within_the_allowances(drift: float, deviation: float) -> None:
     each = PassageExperiment("", drift, 1.0, 1.0, deviation, 1, 0)
     periods, wrong = sampled(each)
     time, rate = first_passages.running(each)
     assert abs(periods - 0.25 - time / each.period) < thr_ddm.TIME_ALLOWANCE
     assert abs(wrong - rate) < thr_ddm.ERROR_ALLOWANCE
-
-
-def test_the_experiments_are_within_the_range_of_that_test() -> None:
-    for inputs in INPUTS.values():
-        for each in first_passages.experiments(inputs):
-            assert 0.0 < each.zeta * each.drift / each.noise**2 <= 10.0
-            assert abs(each.deviation) <= 0.4 * each.zeta * (1.0 + 1e-12)
+    for inputs in INPUTS.values():  # whose experiments are in the range of this test
+        for one in first_passages.experiments(inputs):
+            assert 0.0 < one.zeta * one.drift / one.noise**2 <= 10.0
+            assert abs(one.deviation) <= 0.4 * one.zeta * (1.0 + 1e-12)
 
 
 @pytest.mark.parametrize("zeta", [1.0, 1e-3])  # noise periods of 4 ms and 4 ns
@@ -105,7 +102,5 @@ def test_paths_are_followed_to_their_ends() -> None:
     each = PassageExperiment("", 1.0, 1.0, 1.0, 0.0, 500, 3)
     found, again = first_passages.simulate(each), first_passages.simulate(replace(each, seed=4))
     assert found == first_passages.simulate.__wrapped__(each)
-    assert found.periods >= each.paths
     assert (found.wrong, found.periods) != (again.wrong, again.periods)
-    far = replace(each, drift=1e-3, noise=1e-6)
-    assert first_passages.simulate(far).wrong == 0  # the drift alone decides
+    assert first_passages.simulate(replace(each, drift=1e-3, noise=1e-6)).wrong == 0  # the drift alone decides
