@@ -1,4 +1,4 @@
-"""The shape of what a check found: a status, a margin, the evidence."""
+"""What a check found: a status, a margin, the evidence."""
 
 from __future__ import annotations
 
