@@ -15,7 +15,8 @@ from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.engines.signs import enclose
 from airground_drake.verify.finding import Evidence, Finding
-from airground_drake.verify.model.thr_root import NUMBERS, ThrRoot, rule_of
+from airground_drake.verify.model.levels import NUMBERS
+from airground_drake.verify.model.thr_root import ThrRoot, rule_of
 
 EQUAL = 1e-6
 """A threshold is the optimum if it differs by this share at most: it then costs less than 1e-11 of the risk."""

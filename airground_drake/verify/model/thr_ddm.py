@@ -1,13 +1,9 @@
 """THR-DDM: mean decision time and error rate of simulated drift-diffusion paths against (17)-(18).
 
-Paths are those of `first_passages.py`; what their correction for sampling leaves is allowed for by ERROR_ALLOWANCE and
-TIME_ALLOWANCE, which the tests check against a quadrature of the sampled process.
-
-Intervals are simultaneous over all comparisons (Bonferroni), Clopper-Pearson for error rates and normal for times.
-
-Each comparison in the evidence has the experiment's constants and seed, the numbers of paths and of wrong decisions,
-sum and sum of squares of the noise periods to the decision, the interval and the formula's value: from the counts on
-everything can be redone by hand.
+The paths are those of `first_passages.py`. ERROR_ALLOWANCE and TIME_ALLOWANCE cover the bias that their correction for
+sampling leaves; tests compare them with a quadrature of the sampled process. Intervals are simultaneous over all
+comparisons (Bonferroni): Clopper-Pearson for error rates, normal for times. The evidence has the counts, from which
+everything else can be redone by hand.
 """
 
 from __future__ import annotations
@@ -22,19 +18,12 @@ from scipy.special import betainccinv, betaincinv, ndtri
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.finding import Evidence, Finding
-from airground_drake.verify.model.first_passages import (
-    PassageExperiment,
-    Sample,
-    experiments,
-    running,
-    simulate,
-)
+from airground_drake.verify.model.first_passages import PassageExperiment, Sample, experiments, running, simulate
+from airground_drake.verify.model.levels import NUMBERS
 
 LEVEL = 0.99
-
 ERROR_ALLOWANCE = 2e-4
 """Bias of the corrected error rate."""
-
 TIME_ALLOWANCE = 0.05
 """Bias of the corrected time, in noise periods."""
 
@@ -44,10 +33,7 @@ Formulas = Callable[[PassageExperiment], tuple[float, float]]
 
 @dataclass(frozen=True)
 class Comparison(Evidence):
-    """A simulated mean, its interval and the formula's value; everything else is counted or given.
-
-    `constants` are those of the experiment, `margin` is in half-widths of the interval.
-    """
+    """A simulated mean, its interval and the formula's value; the margin is in half-widths of the interval."""
 
     experiment: str
     quantity: str
@@ -57,7 +43,7 @@ class Comparison(Evidence):
     periods_sum: int
     periods_sum_of_squares: int
     estimate: float
-    interval: tuple[float, float]
+    interval: list[float]
     formula: float
     z_score: float
     margin: float
@@ -110,12 +96,7 @@ class ThrDdm(ModelClaim):
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
         """The numbers of the threshold rule."""
         rule = scenario.decision.threshold
-        return {
-            "drift_m_s": rule.drift_m_s,
-            "noise_m_sqrt_s": rule.noise_m_sqrt_s,
-            "c1_1_s": rule.c1_1_s,
-            "c2": rule.c2,
-        }
+        return {name: getattr(rule, name) for name in NUMBERS}
 
     def check(self, inputs: dict[str, Any]) -> Finding:
         """Simulate and compare."""
@@ -148,34 +129,22 @@ def _rows(sample: Sample, formula: tuple[float, float], comparisons: int) -> lis
     mean = sample.periods / count
     deviation = math.sqrt((sample.squares - sample.periods * mean) / (count - 1.0) / count)
     half = float(-ndtri(tail)) * deviation + TIME_ALLOWANCE
+    time = [(mean - 0.25 + side * half) * period for side in (-1.0, 1.0)]
     low = float(betaincinv(wrong, count - wrong + 1, tail)) if wrong else 0.0
     high = float(betainccinv(wrong + 1, count - wrong, tail)) if wrong < count else 1.0
     rate = wrong / count
     spread = math.sqrt(max(rate * (1.0 - rate), 1.0 / count) / count)
-
-    def compared(
-        quantity: str, unit: str, estimate: float, error: float, interval: tuple[float, float], value: float
-    ) -> Comparison:
-        below, above = value - interval[0], interval[1] - value
-        return Comparison(
-            each.name,
-            quantity,
-            unit,
-            {**asdict(each), "noise_period_s": period, "barrier_m": each.barrier},
-            wrong,
-            sample.periods,
-            sample.squares,
-            estimate,
-            interval,
-            value,
-            z_score=(estimate - value) / error,
-            margin=2.0 * min(below, above) / (interval[1] - interval[0]),
-        )
-
-    centre = mean - 0.25
-    times = (centre - half) * period, (centre + half) * period
-    rates = low - ERROR_ALLOWANCE, high + ERROR_ALLOWANCE
+    found = (
+        ("mean decision time", "s", (mean - 0.25) * period, deviation * period, time, formula[0]),
+        ("error rate", "", rate, spread, [low - ERROR_ALLOWANCE, high + ERROR_ALLOWANCE], formula[1]),
+    )
+    constants = {**asdict(each), "noise_period_s": period, "barrier_m": each.barrier}
+    counted = wrong, sample.periods, sample.squares
     return [
-        compared("mean decision time", "s", centre * period, deviation * period, times, formula[0]),
-        compared("error rate", "", rate, spread, rates, formula[1]),
-    ]
+        Comparison(
+            each.name, quantity, unit, constants, *counted, estimate, interval, value,
+            z_score=(estimate - value) / error,
+            margin=2.0 * min(value - interval[0], interval[1] - value) / (interval[1] - interval[0]),
+        )
+        for quantity, unit, estimate, error, interval, value in found
+    ]  # fmt: skip

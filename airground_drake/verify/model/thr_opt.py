@@ -10,8 +10,9 @@ from airground_drake.base.exact import decimal
 from airground_drake.decision.bayes import bayes_risk
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.engines.signs import Ends, Rule, ball, enclose, sign, value
+from airground_drake.verify.model.levels import NUMBERS
 from airground_drake.verify.model.theorem import Hypothesis, Proof, TheoremClaim
-from airground_drake.verify.model.thr_root import NUMBERS, ThrRoot, as_floats, rule_of, two_signs
+from airground_drake.verify.model.thr_root import ThrRoot, as_floats, rule_of, two_signs
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,12 +10,11 @@ from airground_drake.base.exact import decimal
 from airground_drake.decision.bayes import optimal_threshold
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.engines.signs import Ends, Rule, enclose, value
-from airground_drake.verify.model.levels import threshold_m
+from airground_drake.verify.model.levels import NUMBERS, threshold_m
 from airground_drake.verify.model.theorem import Hypothesis, Proof, TheoremClaim
 
 FLOAT_TOLERANCE = Fraction(1, 10**12)
 """The program's threshold may be this far outside its enclosure, relative to it: rounding errs by some 1e-15."""
-NUMBERS = ("drift_m_s", "noise_m_sqrt_s", "c1_1_s", "c2")
 
 
 @dataclass(frozen=True, kw_only=True)

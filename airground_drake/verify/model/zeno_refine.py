@@ -1,20 +1,17 @@
 """ZENO-REFINE: as the noise step is refined, the bare threshold's event count diverges and the automaton's does not.
 
-Paths and counts are those of `refined_paths.py`: the bare count grows like dt^(-1/2) with a relative correction of
-order sqrt(dt). The delay of a level crossing that is seen on a grid, 0.58 s sqrt(dt) (Chernoff 1965, Siegmund 1979),
-makes the correction of the automaton's count one of order sqrt(dt) as well. Both counts are therefore fitted by
+Paths and counts are those of `refined_paths.py`. The bare count grows like dt^(-1/2) with a relative correction of
+order sqrt(dt). A level crossing is seen on a grid with a delay of 0.58 s sqrt(dt) (Chernoff 1965, Siegmund 1979), so
+the correction of the automaton's count is of order sqrt(dt), too. Both counts are therefore fitted by
 
     ln(mean count) = intercept + exponent ln(dt) + correction sqrt(dt)        (least squares over the dt)
 
-and the interval of the exponent is the percentile bootstrap over paths, which are independent (resampling weights:
+The interval of the exponent is the percentile bootstrap over paths, which are independent (resampling weights:
 numpy's default_rng([SEED, PATHS]).multinomial).
 
-Verdict, fixed beforehand: 'supported' as the claim's `method` says (the bias is that of the fit to the theoretical
-counts); 'inconclusive' if an interval is wider than 1/5, or all holds but the bare counts are too far from their
-expectation at some dt; else 'refuted'. Margin: the smallest distance of an interval's end from breaking the rule.
-
-The evidence has the trigger counts by path and dt, from which means, standard errors and fits can be redone; the
-theoretical counts follow from the formula in `refined_paths.py`.
+The rule was fixed beforehand. 'supported': see the claim's `method`; the bias is that of the fit to the theoretical
+counts. 'inconclusive': an interval is wider than 1/5, or only the bare counts are too far from their expectation at
+some dt. Else 'refuted'. The margin is the smallest distance of an interval's end from breaking the rule.
 """
 
 from __future__ import annotations
@@ -43,15 +40,10 @@ from airground_drake.verify.model.refined_paths import (
 )
 
 LEVEL = 0.99
-
 RESAMPLES = 4000
-
 DIVERGES_BELOW = -0.25
-
 FLAT_WITHIN = 0.1
-
 STANDARD_ERRORS = 5.0
-
 ROUNDING = 1e-9
 """Exponents are equal within this: the fit to equal counts gives about 1e-15."""
 
@@ -80,9 +72,9 @@ class Fit(Evidence):
 class Series(Evidence):
     """The evidence: everything that the figure needs.
 
-    `dt_s` are the noise steps. `expected_bare` is the theory of the bare mean for each dt. `counts` has a text for each
-    path, the triggers at each dt. `bias` is that of the bare exponent, `most_triggers` duration/dwell + 1, None without
-    a dwell, and `level` that of the intervals.
+    `dt_s` are the noise steps, and `expected_bare` is the theory of the bare mean at each. `counts` has a text for each
+    path with its triggers at each dt. `bias` is that of the bare exponent. `most_triggers` is duration/dwell + 1; None
+    without a dwell. `level` is that of the intervals.
     """
 
     dt_s: list[float]

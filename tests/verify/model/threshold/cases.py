@@ -6,7 +6,8 @@ from typing import Any
 
 from airground_drake.decision.bayes import optimal_threshold
 from airground_drake.scenarios.load import load
-from airground_drake.verify.model.thr_root import NUMBERS, ThrRoot
+from airground_drake.verify.model.levels import NUMBERS
+from airground_drake.verify.model.thr_root import ThrRoot
 
 TABLE_1: dict[str, Any] = ThrRoot().inputs(load("case_a")[0])
 

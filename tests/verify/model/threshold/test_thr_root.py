@@ -16,8 +16,9 @@ from airground_drake.decision.bayes import bayes_risk, optimal_threshold
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.engines.signs import enclose
 from airground_drake.verify.model import thr_root
+from airground_drake.verify.model.levels import NUMBERS
 from airground_drake.verify.model.thr_opt import ThrOpt
-from airground_drake.verify.model.thr_root import NUMBERS, ThrRoot, rule_of
+from airground_drake.verify.model.thr_root import ThrRoot, rule_of
 
 
 @pytest.mark.parametrize("name", INPUTS)
