@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,6 @@ from airground_drake.decision.bayes import bayes_risk, optimal_threshold, printe
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.claim import ModelClaim
-from airground_drake.verify.engines.signs import enclose
 from airground_drake.verify.finding import Evidence, Finding
 from airground_drake.verify.model.levels import NUMBERS
 from airground_drake.verify.model.thr_root import ThrRoot, rule_of
@@ -96,7 +94,7 @@ class ThrChoice(ModelClaim):
         """Compare the threshold in force with the optimum, and their risks."""
         numbers = [inputs[name] for name in NUMBERS]
         rule, zeta = rule_of(inputs), float(inputs["zeta_m"])
-        optimum = float(rule.zeta(enclose(rule.residual(rule.c2 / rule.c1), Fraction(0)).low))
+        optimum = float(rule.zeta(rule.root.low))
         least, risk = (float(bayes_risk(each, *numbers)) for each in (optimum, zeta))
         off = abs(zeta - optimum)
         optimal = off <= EQUAL * optimum

@@ -87,17 +87,17 @@ class ThrOpt(TheoremClaim):
         found = ThrRoot().hypotheses(inputs)
         if rule.c1 == rule.c2:
             return [*found, Hypothesis.of(self.margin_of, "c1 = c2: both equations have the same root", Fraction(0))]
-        printed = enclose(rule.residual(rule.c1 / rule.c2), Fraction(0))
+        printed = rule.printed_root
         return [
             *found,
-            *two_signs("the printed (19)", printed, (-1, 1)),
+            *two_signs("the printed (19)", printed),
             Hypothesis.of(self.margin_of, "the risk at the printed root is higher", _gap(rule, printed), strict=True),
         ]
 
     def evidence(self, inputs: dict[str, Any], **proof: Any) -> Optimum:
         """Add the enclosures of both roots and of the drifts, and the risks."""
         rule, zeta = rule_of(inputs), inputs["zeta_m"]
-        root, printed = (enclose(rule.residual(r), Fraction(0)) for r in (rule.c2 / rule.c1, rule.c1 / rule.c2))
+        root, printed = rule.root, rule.printed_root
         numbers = [inputs[each] for each in NUMBERS]
         return Optimum(
             enclosures={**as_floats(rule, root), **as_floats(rule, printed, "printed_")},
@@ -111,7 +111,7 @@ class ThrOpt(TheoremClaim):
 
 def _gap(rule: Rule, printed: Ends) -> Fraction:
     """A lower bound of the risk at the printed root less that at the root: of the ends next to each other."""
-    root = enclose(rule.residual(rule.c2 / rule.c1), Fraction(0))
+    root = rule.root
     v, u = (printed.high, root.low) if rule.c1 < rule.c2 else (printed.low, root.high)
     return Fraction(float((value(rule.risk, v) - value(rule.risk, u)).lower()))
 

@@ -9,7 +9,7 @@ from typing import Any
 from airground_drake.base.exact import decimal
 from airground_drake.decision.bayes import optimal_threshold
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.verify.engines.signs import Ends, Rule, enclose, value
+from airground_drake.verify.engines.signs import Ends, Rule, value
 from airground_drake.verify.model.levels import NUMBERS, threshold_m
 from airground_drake.verify.model.theorem import Hypothesis, Proof, TheoremClaim
 
@@ -63,7 +63,7 @@ class ThrRoot(TheoremClaim):
     def hypotheses(self, inputs: dict[str, Any]) -> list[Hypothesis]:
         """The constants are positive, two signs enclose the root, and the program's threshold is between them."""
         rule = rule_of(inputs)
-        root = enclose(rule.residual(rule.c2 / rule.c1), Fraction(0))
+        root = rule.root
         judged = [Fraction(self.computed(inputs))]
         if inputs["rule"] == "bayes":
             judged.append(Fraction(inputs["zeta_m"]))
@@ -75,15 +75,14 @@ class ThrRoot(TheoremClaim):
                 Hypothesis.of(name, f"{name} is above 0", number, strict=True)
                 for name, number in rule._asdict().items()
             ),
-            *two_signs("(19)", root, (-1, 1)),
+            *two_signs("(19)", root),
             Hypothesis.of(self.margin_of, says, FLOAT_TOLERANCE * high - outside, "m"),
         ]
 
     def evidence(self, inputs: dict[str, Any], **proof: Any) -> Root:
         """Add the enclosure of the root, and what the program computes."""
         rule = rule_of(inputs)
-        root = enclose(rule.residual(rule.c2 / rule.c1), Fraction(0))
-        return Root(enclosures=as_floats(rule, root), computed_threshold_m=self.computed(inputs), **proof)
+        return Root(enclosures=as_floats(rule, rule.root), computed_threshold_m=self.computed(inputs), **proof)
 
     def counterexample(self, inputs: dict[str, Any], broken: Hypothesis) -> dict[str, Any] | None:
         """The program's threshold does not solve the equation."""
@@ -103,14 +102,12 @@ def rule_of(inputs: dict[str, Any]) -> Rule:
     return Rule(*(decimal(inputs[name]) for name in NUMBERS))
 
 
-def two_signs(what: str, ends: Ends, wanted: tuple[int, int]) -> list[Hypothesis]:
-    """That a function has these signs at the ends of an enclosure."""
-    words = {-1: "below 0", 1: "above 0"}
+def two_signs(what: str, ends: Ends) -> list[Hypothesis]:
+    """That a function is below 0 at the lower end of an enclosure, and above 0 at the upper one."""
+    found = zip(("below", "above"), ends[:2], (-ends.signs[0], ends.signs[1]), strict=True)
     return [
-        Hypothesis.of(
-            f"sign of {what}", f"{what} is {words[want]} at u = {float(u)!r}", Fraction(have * want), strict=True
-        )
-        for u, have, want in zip(ends[:2], ends.signs, wanted, strict=True)
+        Hypothesis.of(f"sign of {what}", f"{what} is {side} 0 at u = {float(u)!r}", Fraction(right), strict=True)
+        for side, u, right in found
     ]
 
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from airground_drake.base.exact import decimal
-from airground_drake.decision.trigger import Mode, Trigger, TriggerState
 from airground_drake.scenarios.schema import Scenario
 from airground_drake.verify.model.levels import levels_of, trigger_of
 from airground_drake.verify.model.theorem import Hypothesis, Proof, TheoremClaim
@@ -90,20 +89,10 @@ class ZenoProof(TheoremClaim):
         gap = max(trigger.dwell, bound / 2.0)
         if not gap < bound:
             return None
-        low = trigger.release - trigger.zeta
-        run = replay(trigger, [(0.0, trigger.zeta), (gap / 2.0, low), (gap, trigger.zeta)])
+        state, run = trigger.start(0.0, trigger.zeta), list[dict[str, Any]]()
+        for t, x in ((0.0, trigger.zeta), (gap / 2.0, trigger.release - trigger.zeta), (gap, trigger.zeta)):
+            before = state.triggers if run else 0
+            state = trigger.step(state, t, x) if run else state
+            run.append({"t_s": t, "x_m": x, "mode": state.mode.name, "trigger": state.triggers > before})
         times = [row["t_s"] for row in run if row["trigger"]]
-        if len(times) < 2:
-            return None
-        return {"run": run, "gap_s": times[1] - times[0], "bound_s": bound}
-
-
-def replay(trigger: Trigger, events: list[tuple[float, float]]) -> list[dict[str, Any]]:
-    """Run the automaton through events (t in s, x in m): the state after each."""
-    state, rows = TriggerState(), list[dict[str, Any]]()
-    for i, (t, x) in enumerate(events):
-        before = state.mode
-        state = trigger.start(t, x) if i == 0 else trigger.step(state, t, x)
-        fired = state.mode is Mode.INTERVENING and before is not Mode.INTERVENING
-        rows.append({"t_s": t, "x_m": x, "mode": state.mode.name, "trigger": fired})
-    return rows
+        return {"run": run, "gap_s": times[1] - times[0], "bound_s": bound} if len(times) > 1 else None

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
-
 import mpmath
 import numpy as np
 import pytest
@@ -14,7 +12,6 @@ from verify.model.threshold.cases import INPUTS, TABLE_1
 
 from airground_drake.decision.bayes import bayes_risk, optimal_threshold
 from airground_drake.scenarios.schema import Scenario
-from airground_drake.verify.engines.signs import enclose
 from airground_drake.verify.model import thr_root
 from airground_drake.verify.model.levels import NUMBERS
 from airground_drake.verify.model.thr_opt import ThrOpt
@@ -62,7 +59,7 @@ def test_a_bayes_threshold_in_force_must_be_the_root(rule: str, status: str) -> 
 @given(*[st.floats(0.05, 20.0)] * 4)
 def test_enclosure_agrees_with_the_running_code(drift: float, noise: float, c1: float, c2: float) -> None:
     rule = rule_of(dict(zip(NUMBERS, (drift, noise, c1, c2), strict=True)))
-    root = enclose(rule.residual(rule.c2 / rule.c1), Fraction(0))
+    root = rule.root
     assert root.signs == (-1, 1)
     assert root.high - root.low <= root.low / 10**12
     zeta = optimal_threshold(drift, noise, c1, c2)
