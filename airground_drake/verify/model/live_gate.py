@@ -35,8 +35,8 @@ class LiveGate(LiveWait):
     )
     method = (
         "Theorems in Coq about the transitions of a commitment. Tests compare those of the running `Patience` with the "
-        "theorem's, and disturb the running gatekeeper and control law. The report counts how many accepted "
-        "interventions of its runs under (d) met the premise, from acceptance until they were given back or withdrawn."
+        "theorem's, and disturb the running gatekeeper and control law. For its runs under (d) the report counts the "
+        "accepted interventions that met the premise until they were given back or withdrawn."
     )
     equations = "(20)"
     assumptions = (

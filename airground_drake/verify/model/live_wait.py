@@ -41,8 +41,8 @@ class LiveWait(TheoremClaim):
         "Rounding of times, 1e-15 s, is not counted.",
     )
     does_not_establish = (
-        "That what is accepted is of use, or that the UGV gets anywhere on its own; that refused proposals cost "
-        "nothing but messages. Safety is SAFE-GATE."
+        "That an accepted intervention is useful, that the UGV gets anywhere on its own, or that refused proposals "
+        "cost only messages. Safety is SAFE-GATE."
     )
 
     theorems: tuple[str, ...] = ("Patience.bounded",)

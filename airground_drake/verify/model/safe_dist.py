@@ -1,4 +1,4 @@
-"""SAFE-DIST: what is left of the safe distance when velocities are disturbed (proofs/Safety.v, Gate.v).
+"""SAFE-DIST: the distance that remains when velocities are disturbed (proofs/Safety.v, Gate.v).
 
 Every robot moves with v + e(t), ||e(t)|| <= w, instead of v; W is what the disturbances of a pair add up to: w beside
 an obstacle, 2 w between robots. Other symbols are those of `safe_inv.py`.

@@ -48,7 +48,7 @@ class SafeInv(TheoremClaim):
     assumptions: tuple[str, ...] = (
         "Positions are integrals of the commands, which are held between samples; all robots are sampled at the same "
         "instants.",
-        "Obstacles stand still. Robots obey their speed limits; what is out of range counts on that. Distances are of "
+        "Obstacles stand still. Robots obey their speed limits: pairs out of range rely on that. Distances are of "
         "centres: a body is a ball, and both radii are part of d.",
         "A UGV's velocity has no z component.",
     )

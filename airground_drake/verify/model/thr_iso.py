@@ -32,8 +32,8 @@ class ThrIso(TheoremClaim):
     )
     method = (
         "Theorems in Coq. Checked here: noise is updated at control samples only, so that it is linear between two "
-        "updates. As the least value so far never rises within a step and the largest never falls, what has become due "
-        "stays due until the step ends, so that Drake sees the witness change its sign and isolates it. Tests compare "
+        "updates. Within a step the least value so far never rises and the largest never falls, so a due transition "
+        "stays due until the step ends. Drake then sees the witness change its sign and isolates it. Tests compare "
         "the running trigger with dense sampling."
     )
     equations = "(15), (20)"
