@@ -69,7 +69,7 @@ def comparisons(claim: TraceClaim, trace: Trace) -> list[Off]:
 
 
 def assert_decision_refuted(claim: TraceClaim, trace: Trace, what: str) -> None:
-    """The claim refutes a record whose third decision was edited, and for the right reason."""
+    """That a claim refutes a record of which the third decision was edited, and for the right reason."""
     finding = claim.judge(trace)
     assert finding.status == "refuted", finding
     assert finding.counterexample is not None

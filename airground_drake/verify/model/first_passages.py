@@ -1,7 +1,7 @@
 """Simulated drift-diffusion paths of the decision variable between two thresholds.
 
 The task error grows at the drift, x = drift t + n: over each noise period x changes by drift * period +
-noise * sqrt(period) * (a normal number). Tests compare these increments with those of the running systems.
+noise * sqrt(period) * (a normal number). tests/systems compares the variance with that of the running noise.
 
 A path is decided at the first sample at or beyond a barrier. That is later, and less often wrong, than for the
 continuous process. So the barrier is moved inwards by 0.5826 noise sqrt(period) (Chernoff 1965, Siegmund 1979); the

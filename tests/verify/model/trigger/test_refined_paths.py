@@ -6,25 +6,12 @@ import math
 
 import numpy as np
 import pytest
-from builders.worlds import world
 from hypothesis import example, given
 from hypothesis import strategies as st
-from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
-from pydrake.systems.framework import DiagramBuilder
-from pydrake.systems.primitives import (
-    ConstantVectorSource,
-    Integrator,
-    LogVectorOutput,
-    TrajectorySource,
-    ZeroOrderHold,
-)
-from pydrake.trajectories import PiecewisePolynomial
 from verify.model.trigger.cases import REFINE
 
 from airground_drake.decision.trigger import Trigger
 from airground_drake.systems.components import integrated_noise
-from airground_drake.systems.decision import DecisionVariable, EventTrigger
-from airground_drake.systems.signals import FIELDS
 from airground_drake.verify.engines.geometry import NormSignal
 from airground_drake.verify.model import refined_paths
 from airground_drake.verify.model.refined_paths import experiment
@@ -75,47 +62,6 @@ def test_fast_triggers_are_those_of_the_independent_checker(values: list[float],
 )
 def test_triggers_by_hand(trigger: Trigger, x: list[float], times: list[float]) -> None:
     assert refined_paths.triggers(trigger, np.array(x), 1.0) == times
-
-
-@pytest.mark.parametrize("trigger", [Trigger(3.0, 2.0, 0.5), Trigger.bare(3.0)])
-def test_fast_triggers_are_those_of_the_running_systems(trigger: Trigger) -> None:
-    """EventTrigger in a Drake diagram on six of the experiment's paths, its UGVs 3 m from their references."""
-    setting = experiment(REFINE | {"duration_s": 8.0})
-    dt = setting.dt_s[1]
-    paths = np.array([setting.noise_m_sqrt_s * refined_paths.path(setting, i)[1] for i in range(6)])
-    noise = TrajectorySource(PiecewisePolynomial.FirstOrderHold(dt * np.arange(paths.shape[1]), paths))
-    builder, system, variable = DiagramBuilder(), EventTrigger(6, trigger), DecisionVariable(world(6))
-    for name, each in (("noise", noise), ("event_trigger", system), ("decision_variable", variable)):
-        builder.AddNamedSystem(name, each)
-    for port in ("decision_variable", "decision_range"):
-        builder.Connect(variable.GetOutputPort(port), system.GetInputPort(port))
-    reference = np.concatenate([[3.0, 0.0, 0.0] * 6, np.zeros(18)])
-    for name, value in (("bodies", np.zeros(21)), ("reference", reference)):
-        constant = builder.AddNamedSystem(name, ConstantVectorSource(value))
-        builder.Connect(constant.get_output_port(), variable.GetInputPort(name))
-    builder.Connect(noise.get_output_port(), variable.GetInputPort("noise"))
-    # steps end at the multiples of dt, as at the noise samples of the diagram; they need a continuous state
-    clock = builder.AddNamedSystem("clock", Integrator(1))
-    sampled = builder.AddNamedSystem("sampled", ZeroOrderHold(dt, 1))
-    builder.Connect(clock.get_output_port(), sampled.get_input_port())
-    rate = builder.AddNamedSystem("rate", ConstantVectorSource([1.0]))
-    builder.Connect(rate.get_output_port(), clock.get_input_port())
-    log = LogVectorOutput(system.get_output_port(), builder)
-    log.set_name("log")
-    simulator = Simulator(builder.Build())
-    context = simulator.get_mutable_context()
-    context.SetAccuracy(1e-6)
-    config = SimulatorConfig(integration_scheme="explicit_euler", max_step_size=dt, use_error_control=False)
-    ApplySimulatorConfig(config, simulator)
-    simulator.Initialize()
-    simulator.AdvanceTo(dt * (paths.shape[1] - 1))
-    status, total = log.FindLog(context).data(), 0
-    for j in range(6):
-        expected = refined_paths.triggers(trigger, 3.0 + paths[j], dt)
-        times = sorted({float(t) for t in status[FIELDS * j + 2] if t >= 0.0})
-        assert times == pytest.approx(expected, abs=1e-5)
-        total += len(expected)
-    assert total > 6
 
 
 def test_paths_are_those_of_the_diagrams_noise() -> None:
