@@ -108,6 +108,7 @@ class ThrChoice(ModelClaim):
             least_risk=least,
             extra_risk=max(round(risk - least, DIGITS), 0.0),
         )
+        shown = {key: value for key, value in asdict(evidence).items() if value is not None}
         if not optimal and inputs["rule"] != "bayes":
             return Finding("holds", evidence=evidence, exercised=0)
         return Finding(
@@ -115,7 +116,7 @@ class ThrChoice(ModelClaim):
             margin=EQUAL * optimum - off,
             unit="m",
             quantity="tolerance left between threshold and optimum",
-            counterexample=None if optimal else asdict(evidence),
+            counterexample=None if optimal else shown,
             evidence=evidence,
             exercised=1,
         )
