@@ -13,7 +13,7 @@ from typing import Any
 from airground_drake.base import files
 from airground_drake.base.errors import TraceError, UnknownNameError, one_line
 from airground_drake.proofs import coq, readback
-from airground_drake.proofs.export import Demand, Recorded, distances_file, law_file, recorded
+from airground_drake.proofs.export import Demand, Recorded, demands, distances_file, law_file, recorded
 from airground_drake.proofs.record import FOLDER, digest
 from airground_drake.proofs.too_near import TooNear, too_near
 from airground_drake.run import trace
@@ -192,7 +192,7 @@ def prove_report(report: Path, names: Sequence[str] = (), limit_s: float = coq.L
                     files.write_bytes(report / PLACE / answer.file, (place.folder / answer.file).read_bytes())
             meta = digest(report / "trace" / name / "meta.json")
             found.append(
-                Proved(name, expects_kept(run), len(recorded(run).demands), len(run.t), distances, law, rounded, meta)
+                Proved(name, expects_kept(run), len(demands(run.scenario)), len(run.t), distances, law, rounded, meta)
             )
             yield found[-1]
         files.write_json(report / PLACE / FOUND, document(place, found))
