@@ -112,4 +112,4 @@ def test_numbers_that_follow() -> None:
     assert found["SAFE-DIST"].least_distances_m == {"obstacle": 1.75, "uav_ugv": 0.5, "ugv_ugv": 1.5}
     scenario = load("case_a", ["uav.radius_m=0.25", "obstacles.obstacle_1.radius_m=0.1"])[0]
     safe = {(each["kind"], each["safe_m"]) for each in CLAIMS["SAFE-INV"].inputs(scenario)["pairs"]}
-    assert {("obstacle", 2.35), ("uav_ugv", 1.25)} <= safe  # with both radii
+    assert {("obstacle", 2.35), ("obstacle", 2.0), ("uav_ugv", 1.25)} <= safe  # both radii: the farthest, the nearest
