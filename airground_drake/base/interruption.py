@@ -18,6 +18,7 @@ import select
 import signal
 import sys
 import threading
+import time
 import traceback
 from collections.abc import Callable
 from contextlib import suppress
@@ -29,8 +30,8 @@ from airground_drake.base import files
 from airground_drake.base.usage import EXIT_TOOL, refuse
 
 STOPPING = (signal.SIGINT, signal.SIGTERM)
-ROUNDS = 10
-"""Searches for descendants at most: one that is killed may just have begun another."""
+PATIENCE_S = 10.0
+"""How long killed descendants are waited for, s: on a busy machine they end later than they are killed."""
 
 CURRENT_FOLDER = {"PYTHONSAFEPATH": "1", "NUMBA_CACHE_DIR": "", "NUMBA_CACHE_LOCATOR_CLASSES": ""}
 """Environment in which nothing in the current folder is executed. Child interpreters do not import from there, and
@@ -174,14 +175,16 @@ def _line(number: int, *, clear: bool) -> bytes:
 
 
 def end_descendants() -> None:
-    """Kill every process below this one that /proc shows."""
-    for _ in range(ROUNDS):
-        found = _descendants()
-        if not found:
-            return
+    """Kill every process below this one, until /proc shows none: one that is killed may have begun another.
+
+    A process keeps its locks until it has ended. Temporary folders are removed by these locks.
+    """
+    until = time.monotonic() + PATIENCE_S
+    while (found := _descendants()) and time.monotonic() < until:
         for pid in found:
             with suppress(ProcessLookupError, PermissionError):
                 os.kill(pid, signal.SIGKILL)
+        time.sleep(0.001)
 
 
 def _descendants() -> list[int]:
