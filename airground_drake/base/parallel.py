@@ -24,9 +24,6 @@ from airground_drake.base.progress import SILENT, Progress
 
 T = TypeVar("T")
 
-MOST_JOBS = 1000
-"""Processes at a time that may be asked for: all of them begin at once."""
-
 _pieces: Sequence[Callable[[], object]] = ()
 """The current work: forked processes inherit it, so that it need not be pickled."""
 
