@@ -73,7 +73,7 @@ def conduct(
         if (last := max(store.finished, default=0)) >= wanted.stop:
             raise FolderError(one_line(f"{folder} has draw {last}; allowed: -n {last + 1} or more"))
         rule = InOrder(stopping, wanted) if stopping is not None else None
-        known = groupby(store.table().to_dict("records"), key=itemgetter("index"))
+        known: Any = groupby(store.table().to_dict("records"), key=itemgetter("index"))
         met = rule is not None and any(rule.met(index, list(rows)) for index, rows in known)
         left = [] if met else [index for index in wanted if index not in store.finished]
         progress.stage(spec.name, len(left), "draws")
