@@ -21,14 +21,15 @@ from airground_drake.scenarios.load import from_data, load, resolved
 @pytest.mark.parametrize("name", SAMPLERS.own)
 @pytest.mark.parametrize("dimensions", [1, 5])
 def test_samplers_stay_in_the_cube_and_depend_on_nothing_but_the_seed(name: str, dimensions: int) -> None:
-    one, same = (SAMPLERS.make(name, of=Sampler, dimensions=dimensions, seed=7) for _ in range(2))
-    for _ in range(4):
-        points = one.ask()
-        np.testing.assert_array_equal(points, same.ask())
-        assert points.shape[1] == dimensions
-        assert ((points >= 0.0) & (points < 1.0)).all()
-        for sampler in (one, same):
+    found: list[list[np.ndarray]] = [[], []]
+    for batches in found:
+        sampler = SAMPLERS.make(name, of=Sampler, dimensions=dimensions, seed=7)
+        for _ in range(4):
+            batches.append(points := sampler.ask())
+            assert points.shape[1] == dimensions
+            assert ((points >= 0.0) & (points < 1.0)).all()
             sampler.tell(points, ((points - 0.3) ** 2).sum(axis=1))
+    np.testing.assert_array_equal(*found)
 
 
 def test_the_strategy_goes_where_it_is_least_and_the_baselines_do_not() -> None:
