@@ -66,13 +66,6 @@ def test_nobody_and_nothing_is_left(children: str, name: str, code: int, tmp_pat
         assert os.listdir(tmp_path) == []
 
 
-def test_work_that_is_done_ends_at_once_with_its_code_and_its_output() -> None:
-    program = "import threading, time; from airground_drake.base.interruption import leave; print('done'); "
-    program += "threading.Thread(target=time.sleep, args=(600,)).start(); leave(3)"
-    ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
-    assert (ended.returncode, ended.stdout, ended.stderr) == (3, "done\n", "")
-
-
 BEGUN = """
 import os, signal, subprocess, sys, time
 from collections import deque
@@ -118,8 +111,9 @@ def test_whichever_process_of_a_command_is_killed_nothing_is_left(end: str, tmp_
     assert os.listdir(tmp_path) == []
 
 
-def test_a_command_leaves_with_its_own_code_and_lets_others_go_on() -> None:
-    program = "import subprocess; from airground_drake.base.interruption import begin, leave; begin(); print('done'); "
+def test_a_command_leaves_at_once_with_its_own_code_and_lets_others_go_on() -> None:
+    program = "import subprocess, threading, time; from airground_drake.base.interruption import begin, leave; begin();"
+    program += "print('done'); threading.Thread(target=time.sleep, args=(600,)).start(); "
     program += "left = subprocess.Popen(['sleep', '600'], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL); "
     program += "print(left.pid); leave(3)"
     ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
