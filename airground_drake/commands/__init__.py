@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from airground_drake.base import interruption
 from airground_drake.base.errors import AirgroundError, SimulationError
-from airground_drake.base.usage import EXIT_TOOL, Parser, refuse
+from airground_drake.base.usage import EXIT_TOOL, EXIT_USAGE, Parser, refuse
 
 
 class Command(NamedTuple):
@@ -73,8 +73,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         raise
     except SimulationError as error:
         return refuse(error, EXIT_TOOL)
-    except (AirgroundError, OSError) as error:
+    except AirgroundError as error:
         return refuse(error)
+    except OSError as error:  # of a file that was named, or of standard output
+        return refuse(error, EXIT_USAGE if error.filename else EXIT_TOOL)
     return code
 
 
