@@ -222,7 +222,7 @@ def told(lie: Lie) -> Told:
 
 
 def search(pool: ProcessPoolExecutor, runs: int) -> list[Told]:
-    """Lies in generations: the first at random, then what stole the most, with parts of its tactic drawn again."""
+    """Lies in generations: the first at random, then mutants of the tactics that stole the most."""
     random = np.random.default_rng(0)
     found: list[Told] = []
     while len(found) < runs:
@@ -238,7 +238,7 @@ def search(pool: ProcessPoolExecutor, runs: int) -> list[Told]:
 
 
 def print_lies(found: list[Told]) -> None:
-    """The worst of all, the worst for each part of a tactic, and those that stole the most."""
+    """Print the worst lies: of all, for each part of a tactic, and those that stole the most."""
     print(f"{len(found)} runs with a lying UAV:")
     print(f"  (d) worst margin to d: {min(one.margin_m for one in found):.3g} m")
     above = sum(one.stolen_s > one.bound_s + 1e-9 for one in found)
@@ -279,7 +279,7 @@ def stolen_s(trace: Trace, ugv: str) -> float:
 
 
 def main() -> None:
-    """Run both attacks and print what came of them."""
+    """Run the attacks and print their results."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--proposals", type=int, default=10_000)
     parser.add_argument("--runs", type=int, default=300)

@@ -28,7 +28,7 @@ from mkdocs.structure.pages import Page
 
 ROOT = Path(__file__).parent.parent
 OUTSIDE = "repository"
-"""Folder of the site for what is outside docs/."""
+"""Folder of the site for files outside docs/."""
 ALWAYS = ("CHANGELOG.md", "SECURITY.md", "examples/README.md")
 """Pages outside docs/ that the navigation of the site leads to."""
 LANGUAGES = {".py": "python", ".yaml": "yaml", ".toml": "toml", ".sh": "bash"}

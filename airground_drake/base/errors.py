@@ -1,4 +1,4 @@
-"""Exceptions of the package; messages say what, where and what is allowed."""
+"""Exceptions of the package; messages name the fault, its place and the allowed values."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class LimitError(AirgroundError):
 
 
 class FolderError(AirgroundError):
-    """A command cannot write to a folder or file, or would overwrite what is in it."""
+    """A command cannot write to a folder or file, or would overwrite its content."""
 
 
 class UnknownNameError(AirgroundError):
@@ -79,7 +79,7 @@ class PolicyError(AirgroundError):
 
 
 class ReportError(AirgroundError):
-    """A report is missing, or differs from what was written."""
+    """A report is missing, or was changed."""
 
 
 class ExportError(AirgroundError):

@@ -15,7 +15,7 @@ from airground_drake.base.arrays import Array
 from airground_drake.scenarios.limits import MAX_SEED
 
 HALTON, GRID = "halton", "grid"
-"""Kinds whose values in one draw depend on those in others."""
+"""Kinds with values that depend on the number of the draw, so that draws are not independent."""
 
 
 class Kind(NamedTuple):

@@ -76,7 +76,7 @@ class Separation(NamedTuple):
 
 
 def _separated(found: Mapping[str, Any]) -> list[Separation]:
-    """One for each claim whose violations depend on what was drawn."""
+    """One for each claim with violations that depend on a drawn key."""
     separations = list[Separation]()
     for claim in found["claims"]:
         if where := claim["fails_where"]:

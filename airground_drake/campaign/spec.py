@@ -1,4 +1,4 @@
-"""What a campaign draws: a scenario, distributions over its keys, a seed.
+"""The file of a campaign: a scenario, distributions over its keys, a seed.
 
 name: case_a_drawn
 scenario: case_a              # shipped, or a path beside this file
@@ -118,7 +118,7 @@ class Spec(File):
 
     @property
     def dependent(self) -> list[str]:
-        """Keys whose values in one draw depend on those in others: `halton` and `grid`."""
+        """Keys with values that are not independent from draw to draw: `halton` and `grid`."""
         return [key for key, drawn in self.drawn.items() if drawn.kind in (HALTON, GRID)]
 
     def values(self, index: int) -> dict[str, Any]:

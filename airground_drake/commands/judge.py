@@ -67,7 +67,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _table(path: Path) -> pd.DataFrame:
-    """Read a table; ValueError if the file is none."""
+    """Read a table; ValueError if the file does not contain one."""
     import pandas as pd
 
     content = files.read_bytes(path)

@@ -10,7 +10,7 @@ from airground_drake.registry import METHODS, MODEL_CLAIMS, POLICIES, ROUTES, RU
 from airground_drake.scenarios.shipped import shipped, title
 
 Lines = Iterator[tuple[str, str]]
-"""Names, and what each is."""
+"""Names and their descriptions."""
 
 
 def parser() -> argparse.ArgumentParser:

@@ -43,7 +43,7 @@ def airground(capsys: pytest.CaptureFixture[str]) -> Airground:
 
 @pytest.fixture
 def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Campaigns without processes, each of which takes seconds to begin."""
+    """Campaigns without processes, which take seconds to begin."""
 
     @contextmanager
     def local(jobs: int) -> Iterator[Pool]:
