@@ -106,7 +106,6 @@ def _exit(code: int) -> NoReturn:
 
 def end_on_signals() -> None:
     """From now on SIGINT and SIGTERM end this process with exit code 130 and 143, and its descendants with it."""
-    _open_standard_streams()
     owner = os.getpid()
     stderr = os.dup(2)  # 2 itself may point elsewhere while a C library is kept silent
 
@@ -124,8 +123,7 @@ def end_on_signals() -> None:
     for each in STOPPING:
         if signal.getsignal(each) is not signal.SIG_IGN:  # `nohup` ignores them
             signal.signal(each, end)
-    forks = _Forks()
-    os.register_at_fork(before=forks.before, after_in_child=forks.in_child)
+    _end_forks_with_parent()
 
 
 def _open_standard_streams() -> None:
@@ -230,18 +228,18 @@ def end_with_pipe(reader: int) -> None:
             os._exit(1)
 
 
-class _Forks:
-    """Makes forked processes end with the process that forked them."""
+def _end_forks_with_parent() -> None:
+    """Make processes that the main thread forks end with this one. Another thread may end before its process."""
+    parent, from_main = 0, False
 
-    def __init__(self) -> None:
-        self.parent, self.from_main = 0, False
+    def before() -> None:
+        nonlocal parent, from_main
+        parent, from_main = os.getpid(), threading.current_thread() is threading.main_thread()
 
-    def before(self) -> None:
-        self.parent, self.from_main = os.getpid(), threading.current_thread() is threading.main_thread()
-
-    def in_child(self) -> None:
-        """Forks by the main thread only: another thread may end before its process."""
-        if self.from_main:
+    def in_child() -> None:
+        if from_main:
             end_with_parent()
-            if os.getppid() != self.parent:
+            if os.getppid() != parent:
                 os._exit(1)
+
+    os.register_at_fork(before=before, after_in_child=in_child)

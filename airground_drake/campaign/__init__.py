@@ -3,6 +3,6 @@
     spec.yaml -> Spec -> draw(index) -> Scenario -> rows of verdicts -> Store -> evidence -> page
 
 `distributions.py` and `course.py` are pure functions of a draw's number, so that each draw can be repeated alone.
-`spec.py` reads the file, `work.py` does one draw, `pool.py` does many, on this machine or on a cluster. `store.py` keeps
-finished draws through kills. `statistics.py` and `evidence.py` conclude, `page.py` shows the conclusions.
+`spec.py` reads the file, `work.py` does one draw, `pool.py` does many, on this machine or on a cluster. `store.py`
+keeps finished draws through kills. `statistics.py` and `evidence.py` conclude, `page.py` shows the conclusions.
 """
