@@ -48,7 +48,10 @@ def test_a_draw_is_a_function_of_seed_and_index_and_within_its_bounds(seed: int,
 
 def test_draws_have_the_distribution_that_is_asked_for() -> None:
     drawn = {"u": made("uniform", [2.0, 3.0]), "n": made("normal", [5.0, 2.0]), "l": made("log_uniform", [1.0, np.e])}
-    u, n, log = np.array([list(values_of(drawn, 3, i).values()) for i in range(600)]).T
+    drawn |= {"i": made("integer", [-2, 2]), "c": made("choice", [0, 1, 2, 3, 4])}
+    u, n, log, whole, choice = np.array([list(values_of(drawn, 3, i).values()) for i in range(600)]).T
+    for values in (whole + 2.0, choice):
+        assert (abs(np.bincount(values.astype(int), minlength=5) - 120) < 40).all()
     assert kstest(u - 2.0, "uniform").pvalue > 1e-3
     assert kstest(n, norm(5.0, 2.0).cdf).pvalue > 1e-3
     assert kstest(np.log(log), "uniform").pvalue > 1e-3
@@ -56,9 +59,9 @@ def test_draws_have_the_distribution_that_is_asked_for() -> None:
 
 
 def test_grids_are_gone_through_in_all_combinations() -> None:
-    drawn = {"a": made("grid", [1, 2]), "b": made("grid", ["x", "y", "z"])}
-    assert combinations(drawn) == 6
-    assert len({tuple(values_of(drawn, 0, i).values()) for i in range(6)}) == 6
+    drawn = {"a": made("grid", [1, 2]), "b": made("grid", ["w", "x", "y", "z"])}
+    assert combinations(drawn) == 8
+    assert len({tuple(values_of(drawn, 0, i).values()) for i in range(8)}) == 8
 
 
 def test_halton_keys_are_one_sequence_and_a_late_point_needs_none_before() -> None:

@@ -69,7 +69,9 @@ def test_a_kill_between_a_part_and_the_journal_counts_nothing_twice(tmp_path: Pa
     store.flush()
     killed(store)
     (tmp_path / JOURNAL).write_bytes(journal)
-    killed(opened(tmp_path, 1))
+    store = opened(tmp_path, 1)
+    assert store.table()["index"].tolist() == [1, 1]
+    killed(store)
     assert indices(tmp_path) == [1, 1]
 
 
