@@ -20,7 +20,7 @@ from airground_drake.run.trace import Trace
 from airground_drake.scenarios.load import load
 from airground_drake.verify.runs.closed_loops import roll_out, stacked
 from airground_drake.verify.runs.gate_model import scene_of
-from airground_drake.verify.runs.gate_record import Row, rows_of
+from airground_drake.verify.runs.gate_record import DecisionRecord, rows_of
 
 BLOCKS = 6
 """Blocks of stages: all plans that are constant on blocks are rolled out."""
@@ -45,7 +45,7 @@ def main() -> None:
         print(f"| {name} | {len(found)} | {most[0]:.3g} | {most[1]:.3g} |", flush=True)
 
 
-def regrets(trace: Trace, row: Row) -> tuple[float, float]:
+def regrets(trace: Trace, row: DecisionRecord) -> tuple[float, float]:
     """The regret of a decision's plan, against the constant plans and against all that are rolled out."""
     plans = [row["plan"], *plans_of_blocks(row.stages)]
     loops = stacked([scene_of(trace, row, plan) for plan in plans])

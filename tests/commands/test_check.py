@@ -10,8 +10,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from check.tampering import TAMPERINGS
-from check.tampering.base import copy, mend
+from check.forgeries import HOSTILE
+from check.forging import copy, mend
 from commands.conftest import Airground
 
 from airground_drake.report.__main__ import main as report
@@ -47,7 +47,7 @@ def test_what_the_checker_does_not_decide_is_refused_when_it_is_judged_again(
 
 def test_foreign_files_are_not_judged_again(short: Path, tmp_path: Path, airground: Airground) -> None:
     folder = copy(short, tmp_path / "copy")
-    TAMPERINGS["parquet_is_garbage"].edit(folder)
+    HOSTILE["table cut off"][1](folder)
     mend(folder)
     said = airground("check", folder, code=1)
     assert "not judged again, since a check above failed" in said
