@@ -113,10 +113,9 @@ def _page(
     for position, run in enumerate(name for name in after["runs"] if name in before["runs"] and name.isidentifier()):
         try:
             one, two = (trace.load(folder / "trace" / run) for folder in folders)
+            figures.append(overlay.draw(run, position, one, two))
         except (TraceError, OSError) as error:
             problems.append(f"Run {run} cannot be drawn: {error}")
-        else:
-            figures.append(overlay.draw(run, position, one, two))
     return pages.render(
         "compare.html.j2", before=before, after=after, found=found, figures=figures, problems=problems, parts=PARTS,
         places=[str(folder) for folder in folders], most=MOST_ROWS, regressions=worse,

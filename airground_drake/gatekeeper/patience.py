@@ -45,15 +45,6 @@ class Patience:
     rest: float
     longest: float
 
-    def __post_init__(self) -> None:
-        """Check the parameters.
-
-        Raises:
-            ValueError: if there is no try, or a time is not positive.
-        """
-        if not (self.most >= 1 and self.rest > 0.0 and self.longest > 0.0):
-            raise ValueError(f"patience needs at least one try, and positive times, got {self}")
-
     def rested(self, now: Commitment, t: float) -> Commitment:
         """At time t, s: the tries count anew after a rest."""
         if not now.executing and t >= now.since + self.rest:
@@ -66,8 +57,7 @@ class Patience:
 
     def accept(self, now: Commitment, t: float, end: float) -> Commitment:
         """At time t, s: a motion that ends at `end`, s, is accepted, by a UGV on its own that is not exhausted."""
-        until = end if end <= t + self.longest else t + self.longest
-        return replace(now, executing=True, tries=now.tries + 1, since=t, until=until)
+        return replace(now, executing=True, tries=now.tries + 1, since=t, until=min(t + self.longest, end))
 
     def stop(self, now: Commitment, t: float) -> Commitment:
         """At time t, s: the UGV is on its own again."""

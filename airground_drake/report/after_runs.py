@@ -92,7 +92,7 @@ def write(
         files.write_text(output / "junit.xml", junit.render(report))
         written.append("junit.xml")
     if "html" in formats:
-        files.write_text(output / "report.html", page(report, judged.figures, traces, drawn))
+        files.write_text(output / "report.html", page(report, judged.figures, drawn))
         written.append("report.html")
     report = document.sealed(report, output, written)
     if "json" in formats:

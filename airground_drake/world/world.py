@@ -88,7 +88,7 @@ class Neighbours(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class World:
-    """All bodies: UGVs, UAVs, then obstacles; those of a kind stand side by side, those that move before the others.
+    """All bodies: UGVs, UAVs, then obstacles; of each kind, bodies that move stand before bodies at rest.
 
     The port `bodies` of the Diagram holds the positions of the M bodies that move, (3 M,), m, in this order. Bodies at
     rest are known here and never copied: a thousand of them would cost every tick more than the control law.
@@ -129,7 +129,7 @@ class World:
         """Row of a body.
 
         Raises:
-            ValueError: if there is no body of that name.
+            ValueError: if no body has that name.
         """
         return self.names().index(name)
 

@@ -22,7 +22,7 @@ RUNNING = (
     "scenarios/world.py", "decision", "gatekeeper", "geometry", "intervention", "nsbc", "systems", "world",
 )  # fmt: skip
 """Files and folders of what produces a run."""
-PICTURES = ("systems/blocks.py", "systems/graphviz.py", "systems/schematic.py")
+PICTURES = ("systems/graphviz.py", "systems/schematic.py")
 """Files in these folders that only draw diagrams."""
 PROBES = ("crowd d", "crowd c", "bodies d", "case_b d", "soft_gate c", "crowd b")
 HYPOTHESES = {

@@ -10,8 +10,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from check.tampering import TAMPERINGS
-from check.tampering.base import copy, mend
+from check.forgeries import HOSTILE
+from check.forging import copy, mend
 
 from airground_drake.commands import check
 
@@ -54,7 +54,7 @@ def test_files_that_are_not_the_reports_are_not_judged_again(
     short: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder = copy(short, tmp_path / "copy")
-    TAMPERINGS["parquet_is_garbage"].edit(folder)
+    HOSTILE["table cut off"][1](folder)
     mend(folder)
     assert check.main([str(folder)]) == 1
     said = capsys.readouterr().out

@@ -1,4 +1,4 @@
-"""What needs attention: in words, with who and when, and a picture of the moment."""
+"""What needs attention: in words, with who and when."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from report.cases import FINE, built, verdict
 
 from airground_drake.report import attention
-from airground_drake.report.figures import moments
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
 
@@ -93,15 +92,6 @@ def fault(what: str, t_s: float) -> dict[str, Any]:
     return {"t_s": t_s, "robot": "ugv1", "policy": "mine", "what": what}
 
 
-def test_the_moment_is_drawn_where_there_is_one(scenario: Scenario, traces: dict[str, Trace]) -> None:
-    somewhere = verdict("c", "refuted", where=AT, counterexample=AT | TOO_NEAR)
-    nowhere = verdict("a", "refuted", counterexample={"kind": "stray"})
-    drawn = moments.draw(built(scenario, traces, [nowhere, somewhere, FINE[2]]), traces)
-    assert [figure.beside for figure in drawn] == ["attention-1"]
-    assert "ugv1 and obstacle_1 at 7.717 s" in drawn[0].caption
-    assert [row[0] for row in drawn[0].panels[0].table.rows] == ["ugv1", "obstacle_1"]
-
-
 KEYS = st.sampled_from([*attention._NAMES, *TOO_NEAR, *END, "t_s", "hypothesis", "margin", "unit", "kind"])
 VALUES = st.none() | st.booleans() | st.floats() | st.text() | st.sampled_from(["ugv1", "uav", "obstacle_1"])
 
@@ -113,9 +103,3 @@ def test_whatever_a_claim_of_others_found_is_told(
 ) -> None:
     report = built(scenario, {"c": traces["c"]}, [verdict("c", "refuted", margin=margin, counterexample=found)])
     assert attention.items(report)[0].words
-    moments.draw(report, traces)
-
-
-def test_many_moments_are_not_all_drawn(scenario: Scenario, traces: dict[str, Trace]) -> None:
-    many = [verdict("c", "refuted", counterexample=AT | TOO_NEAR)] * (2 * moments.MAX_MOMENTS)
-    assert len(moments.draw(built(scenario, traces, many), traces)) == moments.MAX_MOMENTS

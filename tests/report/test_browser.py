@@ -18,7 +18,7 @@ from report.cases import FINE, built, verdict
 from airground_drake import audit
 from airground_drake.commands import index
 from airground_drake.report import document, html
-from airground_drake.report.figures import draw, moments
+from airground_drake.report.figures import draw
 from airground_drake.report.figures.panels import Figure
 from airground_drake.run.trace import Trace
 from airground_drake.scenarios.schema import Scenario
@@ -55,7 +55,7 @@ def page_file(scenario: Scenario, traces: dict[str, Trace], tmp_path_factory: py
         required=["SAFE-INV"],
     )  # fmt: skip
     path = tmp_path_factory.mktemp("page") / "report.html"
-    figures = [short(figure) for figure in (*draw.draw(scenario, traces), *moments.draw(report, traces))]
+    figures = [short(figure) for figure in draw.draw(scenario, traces)]
     path.write_text(html.render(report, figures), "utf-8")
     return path
 
