@@ -120,7 +120,7 @@ def predicted_problem(seen: View, law: UgvLaw, proposal: Proposal, horizon: Hori
     centres = points[horizon.substeps :: horizon.substeps]
     gap = np.linalg.norm(centres - seen.position, axis=2) - seen.distances - reach[:, None]
     height = np.abs(centres[:, :, 2] - seen.position[2]) - seen.distances
-    near = ~((gap >= 0.0) | (height >= 0.0)).all(axis=0)  # also what is not a number, so that the problem is refused
+    near = ~((gap >= 0.0) | (height >= 0.0)).all(axis=0)  # NaN counts as near, so that the problem is refused
     return Problem(
         dt=dt,
         initial=seen.position,

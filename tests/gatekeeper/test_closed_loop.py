@@ -76,7 +76,7 @@ def test_points_are_kept_that_any_plan_might_reach(max_speed: float, kept: int) 
     """A disc 1.5 m away, 1.5 s, and both constant plans at rest."""
     one, rest = np.ones(1), Motion(np.zeros(1), np.zeros((1, 3)))
     centres = np.array([[3.5, 0.0, 0.0]])
-    for velocity in (0.0, np.nan):  # what is not a number is kept, so that the problem is refused
+    for velocity in (0.0, np.nan):  # NaN is kept, so that the problem is refused
         scene = View(0.0, np.zeros(3), rest, centres, np.full((1, 3), velocity), 2 * one, one, max_speed)
         problem = predicted_problem(scene, LAW, Proposal("stay", 0.0, rest), Horizon(30, 1, 1.0, 200.0))
         assert len(problem.distances) == (kept if velocity == 0.0 else 1)
