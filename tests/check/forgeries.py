@@ -365,17 +365,14 @@ def renamed(folder: Path) -> None:
             about |= {"scenario": scenario, "run": name}
 
 
-def kept(folder: Path, which: list[int], run: str = "c") -> None:
-    """Only some decisions, with their problems and times."""
-    for table in ("decisions", "problems"):
-        write_table(folder, read_table(folder, table, run).iloc[which], table, run)
-    with edited_json(trace(folder, run) / "timings.json") as timings:
-        timings["decision_times_s"] = [timings["decision_times_s"][k] for k in which]
-
-
 def refusal_forgotten(folder: Path) -> None:
+    """The decisions on the first proposal are left out, with their problems, times and event."""
     issued = read_table(folder, "decisions", "c")["issued_s"]
-    kept(folder, np.flatnonzero(issued != issued.iloc[0]).tolist())
+    which = np.flatnonzero(issued != issued.iloc[0])
+    for table in ("decisions", "problems"):
+        write_table(folder, read_table(folder, table, "c").iloc[which], table, "c")
+    with edited_json(trace(folder, "c") / "timings.json") as timings:
+        timings["decision_times_s"] = [timings["decision_times_s"][k] for k in which]
     without_event("refuse", "c")(folder)
 
 
@@ -393,28 +390,6 @@ def bound_lowered(folder: Path) -> None:
     with edited_table(folder, "decisions", "c") as frame:
         frame["route_bound"] *= 0.98
         frame["gap"] = 1.0 - frame["route_bound"] / frame["objective"]
-
-
-def plan_of_another_vehicle(folder: Path) -> None:
-    """Refusing is predicted at twice the speed limit, in every plan that never refuses, with the cost that follows."""
-    with edited_table(folder, "problems", "c") as frame, edited_table(folder, "decisions", "c") as decisions:
-        never = [k for k, plan in enumerate(frame["plan"]) if (np.array(plan) == 1.0).all()]
-        assert never
-        for k in never:
-            problem = frame.loc[k]
-            path = problem["initial_m"] + problem["dt_s"] * np.cumsum(np.full((60, 3), 12.0), axis=0)
-            frame.at[k, "refuse_m_s"] = np.full_like(problem["refuse_m_s"], 12.0)
-            decisions.loc[k, "refuse_throughout"] = _cost(problem, path)
-
-
-def _cost(problem: Any, path: Any) -> float:
-    """(25) of positions (N, 3), m."""
-    error = ((path - np.reshape(problem["reference_m"], (-1, 3))) ** 2).sum()
-    centres = np.reshape(problem["centres_m"], (len(path), -1, 3))
-    reach = np.linalg.norm(path[:, None] - centres, axis=2) - problem["distances_m"]
-    slack = np.minimum(0.0, reach.min(axis=1, initial=0.0))
-    weights = problem["error_weight_1_m2_s"], problem["slack_weight_1_m2_s"]
-    return float(problem["dt_s"] * (weights[0] * error + weights[1] * (slack**2).sum()))
 
 
 def columns(table: str, run: str, **values: Callable[[pd.Series], list[Any]]) -> Edit:
@@ -462,7 +437,6 @@ CONCERTED: dict[str, Edit] = {
     "refusal forgotten": refusal_forgotten,
     "refusal called acceptance": refusal_called_acceptance,
     "bound lowered": bound_lowered,
-    "plan of another vehicle": plan_of_another_vehicle,
     "relaxation": columns("problems", "c", **dict.fromkeys(("relaxed", "rounded"), lambda f: [np.ones(60)] * len(f))),
     "obstacles left out of a problem": columns(
         "problems", "c", **dict.fromkeys(("centres_m", "normals", "distances_m"), lambda f: [np.empty(0)] * len(f))

@@ -1,4 +1,4 @@
-"""The command line: exit codes, JSON, and what is no report."""
+"""The command line: exit codes, JSON, and other files than reports."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from check.forgeries import RULES
 from check.forging import copy, mend
 
 from airground_drake import check
+from airground_drake.check import files, limits, rules
 
 
 @pytest.mark.parametrize(
@@ -39,6 +40,18 @@ def test_anything_else_is_no_report(content: str, tmp_path: Path, capsys: pytest
     (tmp_path / "report.json").write_text(content)
     assert check.main([str(tmp_path)]) == 2
     assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_a_check_that_takes_too_long_is_no_agreement() -> None:
+    with pytest.raises(rules.NotEstablished) as stopped, limits.at_most_s(0.01):  # noqa: PT012
+        while True:
+            pass
+    assert (stopped.value.rule, stopped.value.why) == ("the check comes to an end", "not within 0.01 s")
+
+
+def test_a_folder_of_too_many_files_is_no_report(report: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(files, "MOST_FILES", 5)
+    assert check.main([str(report)]) == 2
 
 
 BROKEN = """
