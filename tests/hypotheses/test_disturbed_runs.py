@@ -122,3 +122,12 @@ def test_a_weaker_layer_or_a_larger_disturbance_breaks_the_bound(
     edit: Callable[[HalfSpaces], HalfSpaces], force: float
 ) -> None:
     assert any(run("obstacle", how, edit=edit, force=force).broken for how in ("pinned", "idle"))
+
+
+@pytest.mark.parametrize("value", [np.nan, -np.inf, -1e300])
+def test_a_velocity_that_is_no_number_does_not_lead_inside(value: float) -> None:
+    layer = Avoidance(3.0, 0.05, 5.0, "augmented")
+    around = Surroundings(np.zeros((1, 1, 3)), np.full((1, 1), 2.0), np.ones((1, 1)))
+    spaces = layer.half_spaces(np.array([[2.0, 0.0, 0.0]]), np.ones((1, 3)), around)
+    velocity = layer.apply(np.array([[value, 0.0, 0.0]]), spaces)
+    assert not np.isfinite(velocity).all() or spaces.normal[0, 0] @ velocity[0] >= spaces.bound[0, 0]
