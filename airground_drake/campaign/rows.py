@@ -17,7 +17,7 @@ COLUMNS: dict[str, str] = {
 """Columns of the dataset and their types; a number that does not exist is NaN.
 
 `ended` is `judged`, or the reason why not, explained in `what`: `invalid` (no valid scenario), `stopped` (the
-simulation), `died` (its process). Such a row has no claim; the row of a run without claims has none, either. `drawn` is
+simulation), `died` (its process). Such a row has no claim, and neither has the row of a run without claims. `drawn` is
 strict JSON: values by key. `digest` is the digest of all rows of a draw (see `store`)."""
 
 JUDGED, INVALID, STOPPED, DIED = "judged", "invalid", "stopped", "died"
