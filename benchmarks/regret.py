@@ -1,10 +1,11 @@
-"""What the plans of method (c) cost on the closed loop, where (23) is an approximation: a table.
+"""Costs of the plans of method (c) on the closed loop, where (23) is an approximation: a table.
 
     python benchmarks/regret.py [scenario ...] [--route relaxed]
 
-A plan that changes its mode adds velocities of two different ways. Here the plan of each decision, the constant ones
-and all plans of 6 blocks are rolled out on the closed loop. The regret of a plan is what it costs above the cheapest of
-the constant plans, and of all of them, in units of the cheaper constant plan's cost. The largest of a run is printed.
+A plan that changes its mode adds velocities of two different paths. Here the plan of each decision, the constant plans
+and all plans of 6 blocks are rolled out on the closed loop. The regret of a plan is its cost above the cheapest
+constant plan, and above the cheapest of all plans, in units of the cheaper constant plan's cost. The largest regrets of
+a run are printed.
 """
 
 from __future__ import annotations
@@ -22,9 +23,9 @@ from airground_drake.verify.runs.gate_model import scene_of
 from airground_drake.verify.runs.gate_record import DecisionRecord, rows_of
 
 BLOCKS = 6
-"""Of stages: all plans that are constant on blocks are rolled out."""
+"""Blocks of stages: all plans that are constant on blocks are rolled out."""
 MOST = 30
-"""Decisions of a run that are looked at, evenly spaced."""
+"""Most decisions of a run that are compared, evenly spaced."""
 
 
 def main() -> None:

@@ -1,4 +1,4 @@
-"""From a solved problem to the UGV's answer to a proposal, and what solving it may cost."""
+"""From a solved problem to the UGV's answer to a proposal."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from airground_drake.intervention.policy import Proposal
 
 @dataclass(frozen=True)
 class Rules:
-    """When a solution becomes an answer, and what it may cost.
+    """How a solution becomes an answer, and the effort that solving may take.
 
     Attributes:
         switching_margin: relative gain that a reversal needs over keeping the answer throughout.
         min_dwell: least time between opposite answers to a proposal, s.
-        first_stage: the paper's own rule: the first stage of every plan is the answer, whatever was answered before.
+        first_stage: the paper's own rule: the first stage of every plan is the answer, whatever the answer before was.
         budget: of one solution, in counts.
         allowance_s: time by the budget's clock that all solutions of a sample may take, s; None: no limit.
     """
@@ -69,21 +69,21 @@ WORDS: dict[Reason, str] = {
 
 @dataclass(frozen=True)
 class Decision:
-    """What the gatekeeper decided about one proposal at one sample: a row of the trace's table `decisions`.
+    """The decision about one proposal for one UGV at one sample: a row of the trace's table `decisions`.
 
-    By (26) it rests on `problem`, `solution` and `throughout`; by outcomes, on `refuse`, `accept` and `tries`.
+    Under method (c) it rests on `problem`, `solution` and `throughout`; under (d), on `refuse`, `accept` and `tries`.
 
     Attributes:
-        t: when, s.
-        robot: for which UGV.
-        proposal: on what.
+        t: time, s.
+        robot: index of the UGV.
+        proposal: the proposal.
         accepted: the answer.
-        reason: why.
+        reason: see `WORDS`.
         problem: (26) as predicted.
         solution: the route's.
         throughout: costs (25) of accepting and of refusing throughout; -1 without a plan.
-        refuse: what comes of refusing; None unless it was looked at.
-        accept: what comes of accepting; None unless it was looked at.
+        refuse: outcome of refusing; None if no outcomes were compared.
+        accept: outcome of accepting; None if no outcomes were compared.
         tries: acceptances since the last rest, with this decision.
     """
 

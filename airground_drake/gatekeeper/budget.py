@@ -1,4 +1,4 @@
-"""What solving one problem may spend: counted work in simulation, a clock in real time."""
+"""Limits of solving one problem: counted work in simulation, a clock in real time."""
 
 from __future__ import annotations
 

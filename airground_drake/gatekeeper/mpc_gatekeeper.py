@@ -1,4 +1,4 @@
-"""What the UGVs do at one sample of the gatekeeper: sense, predict, decide, answer; by (26) under method (c)."""
+"""One sample of the UGVs' gatekeepers: sense, predict, decide, answer; under method (c) by problem (26)."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ from airground_drake.world.world import World
 
 @dataclass(frozen=True, eq=False)
 class GatekeeperState:
-    """What the gatekeepers of n UGVs keep from sample to sample.
+    """The memory of the gatekeepers of n UGVs between samples.
 
     Attributes:
         answers: in force, (2n,), see `messages`.
         since: when each UGV's answer became what it is, (n,), s.
         reports: what came with them.
-        decisions: those of the last sample at which anything was to be judged or remembered.
-        commitments: under method (d), what each UGV has committed itself to.
+        decisions: those of the last sample that was not idle.
+        commitments: under method (d), each UGV's tries and rests.
         sensed: under method (d), which obstacles each UGV has sensed so far, (n, m).
     """
 
@@ -61,7 +61,7 @@ class GatekeeperState:
 
 @dataclass(frozen=True, eq=False)
 class Inputs:
-    """What comes in at a sample.
+    """The inputs at a sample.
 
     Attributes:
         t: time, s.
@@ -104,13 +104,13 @@ class Gatekeepers(abc.ABC):
         return not any(proposals) and not any(before.answers[::2])
 
     def _report(self, position: Array, decision: Decision) -> Report:
-        """What goes with an answer: the obstacles within sensing range, and the reason."""
+        """The report with an answer: the obstacles within sensing range, and the reason."""
         near = distances(self._near.still, position) <= self.law.avoidance.sensing_range
         discs: tuple[Disc, ...] = tuple((x, y, z, radius) for x, y, z, radius in self._discs[near].tolist())
         return Report(discs, decision.reason, in_words(decision))
 
     def _view(self, now: Inputs, i: int) -> View:
-        """What a UGV has around it: all obstacles and robots, whether within sensing range or not."""
+        """All obstacles and robots around a UGV, whether within sensing range or not."""
         near = self._near
         return View(
             t=now.t,

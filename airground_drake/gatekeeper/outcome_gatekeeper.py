@@ -55,7 +55,7 @@ class OutcomeGatekeepers(Gatekeepers):
         return super().idle(proposals, positions, before) and before.sensed is self._remembered(positions, before)
 
     def sample(self, now: Inputs, before: GatekeeperState) -> GatekeeperState:
-        """Judge every proposal in force by its outcome if it is new; else keep to what was answered."""
+        """Judge every new proposal by its outcome; keep to the answer to every other."""
         sensed = self._remembered(now.positions, before)
         known = replace(before, sensed=sensed)
         answers: list[float] = []
@@ -108,7 +108,7 @@ class OutcomeGatekeepers(Gatekeepers):
         standing: float,
         held: Commitment,
     ) -> tuple[Decision, Commitment]:
-        """Judge a new proposal, watch over an accepted one, keep to a refusal; and what becomes of the commitment."""
+        """Judge a new proposal, watch over an accepted one, keep to a refusal: the decision, and the new commitment."""
         reason: Reason = "kept"
         refuse = accept = None
         if standing == ACCEPT and self._patience.over(held, now.t):
@@ -127,11 +127,11 @@ class OutcomeGatekeepers(Gatekeepers):
         return Decision(now.t, i, proposal, accepted, reason, refuse=refuse, accept=accept, tries=held.tries), held
 
     def foresee(self, seen: View, law: UgvLaw, proposal: Proposal) -> tuple[Outcome, Outcome]:
-        """What comes of refusing and of accepting, as far as a UGV sees."""
+        """The outcomes of refusing and of accepting, from what a UGV knows."""
         return outcomes(seen, law, proposal, self._outlook)
 
     def _view_of(self, now: Inputs, known: GatekeeperState, i: int, proposal: Proposal) -> View:
-        """What a UGV knows: obstacles that it has sensed or been told of, other robots and what these are asked."""
+        """A UGV's knowledge: obstacles sensed or told of, other robots and the motions asked of them."""
         around, m = self._view(now, i), len(self._near.still)
         discs, distances = self._known(now.positions[i], known.sensed[i], i, proposal)
         asked = []
@@ -170,7 +170,7 @@ class OutcomeGatekeepers(Gatekeepers):
 
 
 def _answer(decision: Decision, standing: float) -> float:
-    """The answer that a decision comes to: what was DONE stays so."""
+    """The answer that follows from a decision; DONE stays DONE."""
     if decision.accepted:
         return ACCEPT
     done = decision.reason == "over" and decision.t >= decision.proposal.motion.end

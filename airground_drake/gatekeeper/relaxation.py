@@ -47,8 +47,8 @@ def unavoidable_cost(problem: Problem) -> float:
 def normals_along(problem: Problem, positions: Array) -> Array:
     """Unit vectors (N, m, 3) from the points to a guiding trajectory (N, 3).
 
-    Where no plan can come near, (26d) asks for nothing, and no half-plane shall: there they are from the points to
-    the nearest place that any plan could reach. All of them are beyond that half-plane.
+    Where no plan can come near, (26d) demands nothing. There the vectors point to the nearest place that any plan could
+    reach, so that no plan violates the half-plane.
     """
     guide = np.where(within_reach(problem)[:, :, None], positions[:, None, :], nearest_in_reach(problem))
     offset = guide - problem.centres
@@ -68,10 +68,10 @@ def offsets(problem: Problem, normals: Array) -> Array:
 def dual_bound(problem: Problem, normals: Array, omega: Array, multipliers: Array | None = None) -> float:
     """Lower bound of (25), with distances along half-planes, by weak duality; valid for any arguments.
 
-    For multipliers l >= 0 of the half-planes, (25) is at least the Lagrangian, whose minimum over u >= 0 is
-    closed, and whose task error is convex in omega, so that it is at least its linearisation at any omega,
-    whose minimum over the box [0, 1]^N is closed, too. At an optimum of the relaxation, with its multipliers,
-    the bound is the optimum. A solver's tolerances cost tightness only, never validity.
+    For multipliers l >= 0 of the half-planes, (25) is at least the Lagrangian. Its minimum over u >= 0 has a closed
+    form. Its task error is convex in omega, hence at least its linearisation at any omega, and the minimum of that over
+    [0, 1]^N has a closed form, too. At an optimum of the relaxation, with its multipliers, the bound is the optimum. A
+    solver's tolerances cost tightness only, never validity.
 
     Args:
         problem: data of (26).

@@ -1,4 +1,4 @@
-"""The closed loop of one UGV from what it knows, rolled out under switching answers by the law that commands it."""
+"""Predicted motion of one UGV: its control law, rolled out from what it knows, under any answers to a proposal."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ REFUSED, ACCEPTED = 0, 1
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """What a UGV sees when it decides: K points, obstacles first, then other robots.
+    """A UGV's view when it decides: K points, obstacles first, then other robots.
 
     Attributes:
         t: time, s.
@@ -32,8 +32,8 @@ class View:
         distances: safe distances to them, (K,), m.
         shares: share of each avoidance inequality, (K,).
         max_speed: own speed limit, m/s.
-        asked: under method (d), per robot: the motion that it has accepted or is asked to make, and whether it has
-            accepted it; None without one.
+        asked: under method (d), per other robot, the motion that it is asked to make and whether it has accepted it,
+            or None.
     """
 
     t: float

@@ -30,14 +30,14 @@ TOL = 1e-9
 """Tolerance, m. A start or goal up to TOL inside a circle counts as on it; a disc of radius up to TOL is ignored. It is
 meant for coordinates and radii up to 1e4 m, where rounding (2e-12 m) stays well below."""
 _EPS = TOL / 10
-"""What absorbs rounding, m: a leg may dip so far into a disc, a disc that sticks out of another by no more is dropped,
-a piece that short is left out of the path."""
+"""Room for rounding, m: legs may dip so far into a disc, a disc that sticks out of another by less is dropped, shorter
+pieces are left out of the path."""
 
 FEW = 64
-"""Up to so many discs are all taken into account at once; of more, those that a path runs into."""
+"""Up to this number all discs enter the graph; beyond it only the discs that a path runs into."""
 
 AT_ONCE = 1_000_000
-"""Pairs of a segment and a disc that are looked at together, lest they take up the memory."""
+"""Largest number of pairs of a segment and a disc that are tested together, to limit memory."""
 
 
 class NoPath(ValueError):  # noqa: N818

@@ -49,7 +49,7 @@ class HalfSpaces:
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What each of n robots must keep away from, K points each.
+    """The K points that each of n robots must keep away from.
 
     Attributes:
         centre: (n, K, 3), m, world frame.
@@ -63,7 +63,7 @@ class Surroundings:
 
     @classmethod
     def of(cls, near: Neighbours, positions: Array) -> Surroundings:
-        """What is around the members when all bodies that move are at positions (M, 3) m."""
+        """The surroundings of the members when all bodies that move are at positions (M, 3) m."""
         return cls(kernels.gather(positions, near.still, near.others), near.distance, near.share)
 
 

@@ -15,8 +15,8 @@ from numba import njit
 from airground_drake.base.arrays import Array
 
 MARGIN_M_S = 1e-12
-"""Added to every bound in the projection, m/s. The bound of a robot in contact is 0. Without the margin
-rounding misses it every other time, and `_scale_back` stops a robot that should slide along."""
+"""Added to every bound in the projection, m/s. The bound of a robot in contact is 0. Without the margin rounding would
+miss it every other time, and `_scale_back` would stop a robot that should slide along."""
 CONTRADICTION_M_S = 1e-9
 """Constraints contradict each other if one is missed by more than this where the others are met, m/s."""
 ABOVE_LEAST = 1e-9
@@ -42,7 +42,7 @@ class Layer(NamedTuple):
 
 
 class Points(NamedTuple):
-    """What one robot must keep away from: centres, (K, 3), m, safe distances, (K,), m, and shares, (K,)."""
+    """The points that one robot must keep away from: centres, (K, 3), m, safe distances, (K,), m, shares, (K,)."""
 
     centre: Array
     distance: Array
@@ -331,7 +331,8 @@ def _first_release(force: Array, share: Array, pull: Array, size: int) -> tuple[
     Without such a constraint: inf and -1.
     """
     step, leaving = np.inf, -1
-    pull[:size] = share[size, :size]
+    for m in range(size):
+        pull[m] = share[size, m]
     for m in range(size - 1, -1, -1):
         for n in range(m):
             pull[n] -= pull[m] * share[m, n]
@@ -390,8 +391,9 @@ def _meet(velocity: Array, normal: Array, bound: Array, active: npt.NDArray[np.i
     """
     for _ in range(2):
         for m in range(len(active)):
-            missed, along = _missed(velocity, normal, bound, active[m]), 0.0
+            missed, along = bound[active[m]], 0.0
             for a in range(len(velocity)):
+                missed -= normal[active[m], a] * velocity[a]
                 along += normal[active[m], a] * across[m, a]
             for a in range(len(velocity)):
                 velocity[a] += missed / along * across[m, a]

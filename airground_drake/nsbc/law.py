@@ -22,7 +22,7 @@ from airground_drake.world.world import Neighbours
 
 
 class Intervention(NamedTuple):
-    """What an accepted intervention asks of one UGV now, (12)-(13).
+    """The demand of an accepted intervention on one UGV now, (12)-(13).
 
     Attributes:
         wanted: where it is to be, (3,), m, world frame.
@@ -139,7 +139,7 @@ def command(
             task[a] += asked.chosen[a, b] * (wish - below[b])
     for a in range(3):
         task[a] *= ugv.mobility[a]
-    if not np.isfinite(task).all():  # the planner sends no such thing; nothing to follow then
+    if not np.isfinite(task).all():  # the planner never sends such numbers
         task = below
     limit_one(task, ugv.max_speed)
     return task if law.intervention_on_top else avoid_one(task, normal, bound, composition)

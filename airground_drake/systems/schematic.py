@@ -249,10 +249,10 @@ def _routes(boxes: Mapping[str, Box], frames: Mapping[str, Box], plants: Sequenc
     reference, planner, gate = (boxes[name] for name in ("reference", "intervention_planner", "gatekeeper"))
     ugv, uav = boxes["ugv_controller"], boxes["uav_controller"]
     above, below, beside = planner.y + 7, planner.y - 7, ddm.left + 24
-    judged, asked, answered = gate.left - 22, ugv.left - 28, ugv.left - 14
-    fanned = boxes[plants[0]].left - 12
-    bus = frames["task_planning"].low - BUS_PT
-    start = (boxes[plants[-1]].right + 10, bus)
+    # where bent wires go up or down: answers to the planner, proposals, answers to the controller, commands
+    judged, asked, answered, fanned = gate.left - 22, ugv.left - 28, ugv.left - 14, boxes[plants[0]].left - 12
+    start = _junction(boxes, frames, plants)
+    bus = start[1]
     found = {
         ("decision_noise", "decision_variable"): Route(
             [(noise.x, noise.up), (noise.x, ddm.low)], (noise.x + 24, noise.up + 9)
@@ -297,6 +297,11 @@ def _routes(boxes: Mapping[str, Box], frames: Mapping[str, Box], plants: Sequenc
     return found
 
 
+def _junction(boxes: Mapping[str, Box], frames: Mapping[str, Box], plants: Sequence[str]) -> Point:
+    """Where the positions of all vehicles join."""
+    return boxes[plants[-1]].right + 10, frames["task_planning"].low - BUS_PT
+
+
 def _bent(start: Point, x: float, end: Point) -> list[Point]:
     """Corners of a wire that goes across to x, up or down, and across to its end."""
     return [start, (x, start[1]), (x, end[1]), end]
@@ -315,7 +320,7 @@ def _edges(
 ) -> list[str]:
     """Graphviz text of the wires and of the junction of the positions."""
     routes = _routes(boxes, frames, plants)
-    junction = (boxes[plants[-1]].right + 10, frames["task_planning"].low - BUS_PT)
+    junction = _junction(boxes, frames, plants)
     bold = "penwidth=2.5, "
     lines = [f'"bodies" [pos="{junction[0]:g},{junction[1]:g}", shape=point, width=0.05, label=""]']
     for plant in plants:

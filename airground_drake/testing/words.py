@@ -39,7 +39,7 @@ def told(verdict: Verdict, place: str) -> str:
     if more := [_told(key, value) for key, value in seen.items() if key not in told_already]:
         lines.append(f"  seen: {'; '.join(more)}")
     if finding.status not in ("refuted", *PASSING):
-        lines += [f"  why: {_told(key, value)}" for key, value in finding.evidence.items()][:5]
+        lines += [f"  why: {_told(key, value)}" for key, value in finding.to_json()["evidence"].items()][:5]
     return "\n".join(lines)
 
 

@@ -24,7 +24,7 @@ def chattering() -> Trace:
 
 
 def at_rest(t: float) -> list[list[float]]:
-    """Nobody moves."""
+    """No robot moves."""
     return [[0.0] * 3, [0.0] * 3]
 
 

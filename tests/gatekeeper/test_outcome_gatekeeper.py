@@ -12,7 +12,7 @@ from airground_drake.gatekeeper.outcome import Outcome, Outlook
 from airground_drake.gatekeeper.outcome_gatekeeper import OutcomeGatekeepers, reason_of
 from airground_drake.gatekeeper.patience import Commitment, Patience
 from airground_drake.geometry.motion import Motion
-from airground_drake.intervention.messages import ACCEPT, REFUSE, SILENT
+from airground_drake.intervention.messages import ACCEPT, DONE, REFUSE, SILENT
 from airground_drake.intervention.policy import Proposal
 
 ROCK = np.array([[3.0, 0.0, 0.0]])
@@ -93,6 +93,19 @@ def test_a_withdrawal_is_noticed_when_nothing_else_is_proposed() -> None:
     turn = team.sees(None)
     assert (turn.executing, turn.since) == (False, team.t)
     assert team.memory.answers[:2] == (SILENT, -1.0)
+
+
+@pytest.mark.parametrize(("end", "answer"), [(2.0, DONE), (9.0, REFUSE)])
+def test_an_accepted_proposal_is_over_with_its_motion_or_after_the_longest_try(end: float, answer: float) -> None:
+    team, way = Team(), Motion(np.array([0.0, end]), STAYS.positions)
+    proposal = Proposal("way", 0.0, way, cause="other", number=0)
+    while team.sees(proposal).executing:
+        assert team.memory.answers[0] == ACCEPT
+    assert team.t == pytest.approx(min(end, 5.05), abs=0.051)  # the longest try of 5 s begins at the first sample
+    assert [decision.reason for decision in team.memory.decisions] == ["over"]
+    for _ in range(3):
+        assert team.memory.answers[0] == answer
+        assert not team.sees(proposal).executing
 
 
 def test_a_replaced_proposal_ends_its_try_whatever_becomes_of_the_next() -> None:

@@ -15,8 +15,7 @@ from pathlib import Path
 import pytest
 from builders.hostile_policies import KINDS
 
-from airground_drake import scenarios
-from airground_drake.commands import diagram
+from airground_drake import commands, scenarios
 from airground_drake.report import after_runs, make
 from airground_drake.report.__main__ import main
 from airground_drake.verify import __main__ as judge
@@ -106,7 +105,7 @@ def test_a_diagram_is_drawn_without_code_of_others(
     (tmp_path / "mine.yaml").write_text(
         resources.files(scenarios).joinpath("minimal.yaml").read_text() + f"\ngatekeeper: {{route: '{module(EVIL)}'}}\n"
     )
-    assert diagram.main([str(tmp_path / "mine.yaml"), "-o", str(tmp_path / "out")]) == 2
+    assert commands.main(["diagram", str(tmp_path / "mine.yaml"), "-o", str(tmp_path / "out")]) == 2
     assert "--allow-plugins" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
 

@@ -133,7 +133,7 @@ def _improved(terms: Terms, normals: Array, block: npt.NDArray[np.int64], start:
 
 @njit(cache=True)
 def _cost_turned(terms: Terms, normals: Array, block: npt.NDArray[np.int64], plan: Array, turned: int) -> float:
-    """What a plan costs along the half-planes with the opposite choice in one block; -1: in no block."""
+    """Cost of a plan along the half-planes, with the opposite choice in one block; -1: in no block."""
     positions = np.empty((len(plan), 3))
     x, y, z = terms.initial[0], terms.initial[1], terms.initial[2]
     for k in range(len(plan)):

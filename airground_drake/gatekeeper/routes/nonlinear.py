@@ -38,8 +38,8 @@ class NonlinearRoute:
     The start is the cheaper constant plan. The plan returned is the cheapest, by the exact cost (25), of the
     rounded one and the two constant ones. A local optimum bounds nothing: `route_bound` and `gap` are -1.
 
-    Budget: major iterations and the time left go to the solver. An iterate that it stops at is
-    rounded like an optimum; the status is 'budget_spent' and the bound then that of `unavoidable_cost`.
+    Budget: major iterations and the time left go to the solver. If it stops early, its iterate is rounded like an
+    optimum; the status is then 'budget_spent' and the bound `unavoidable_cost`.
     """
 
     def __init__(self) -> None:

@@ -11,14 +11,13 @@ from airground_drake.decision.bayes import bayes_risk
 from airground_drake.report.figures import canvas
 from airground_drake.report.figures.findings.lines import Lines
 from airground_drake.report.figures.panels import Figure
-from airground_drake.verify.model.thr_choice import Choice, Measured
 
 POINTS = 200
 BEYOND = 1.6
 """Length of the axis, relative to the largest mark."""
 
 
-def draw(inputs: Mapping[str, Any], evidence: Choice) -> Figure | None:
+def draw(inputs: Mapping[str, Any], evidence: Mapping[str, Any]) -> Figure | None:
     """The figure from the inputs and the evidence of the claim; None without evidence."""
     if "optimal_threshold_m" not in evidence:
         return None
@@ -42,7 +41,7 @@ def draw(inputs: Mapping[str, Any], evidence: Choice) -> Figure | None:
         return shown.plate("threshold-choice", "", caption)
 
 
-def _as_it_was(runs: Mapping[str, Measured]) -> str:
+def _as_it_was(runs: Mapping[str, Any]) -> str:
     """Drift and noise of the first UGV that triggered, and the thresholds that are optimal for them."""
     for name, row in runs.items():
         optima = {

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 
 from airground_drake.report.figures import canvas
 from airground_drake.report.figures.findings.lines import Lines
 from airground_drake.report.figures.panels import Figure
-from airground_drake.verify.model.zeno_refine import Series
 
 FEWEST = 0.05
 """Smaller mean counts are drawn as this one: the axis is logarithmic."""
 
 
-def draw(evidence: Series) -> Figure | None:
+def draw(evidence: Mapping[str, Any]) -> Figure | None:
     """The figure from the finding's evidence; None without evidence."""
     if not evidence.get("fit"):
         return None

@@ -49,11 +49,11 @@ class Comm(TraceClaim):
     id = "COMM"
     summary = "The UAV talked only while it was needed, and less than if it always talked."
     statement = (
-        "Messages and gatekeeper solves were spent only while the UGV concerned, or the one that it was asked to make "
-        "way for, was being intervened on, and no more of them than an always-on scheme would have spent. "
-        "All parts of a joint plan were sent together, and one refusal withdrew them all. No proposal was decided on "
-        "once it was taken back. None in force was replaced but by a part of a joint plan, or while another UGV was "
-        "intervened on, too. What it said of obstacles was what the UAV knew: its own map, and what UGVs sensed when "
+        "Messages and gatekeeper solves were spent only while the UGV concerned, or the UGV that it was to make way "
+        "for, was being intervened on. An always-on scheme would have spent at least as many. All parts of a joint "
+        "plan were sent together, and one refusal withdrew them all. No proposal was decided on after it was "
+        "withdrawn. A proposal in force was replaced only by a part of a joint plan, or while another UGV was being "
+        "intervened on. Each proposal showed the obstacles that the UAV knew: its own map, and what UGVs sensed when "
         "they answered."
     )
     formula = (
@@ -69,12 +69,12 @@ class Comm(TraceClaim):
         r"h_{\text{gate}} \rceil",
     )
     method = (
-        "Counts of proposal events and of decisions (each one solve and one answer), each looked up in the intervals "
-        "in which the mode column of the UGV, or of the one whose trigger is the proposal's cause, says "
-        "'intervening'. After a release the UAV withdraws its proposal at its next "
-        "planning instant and the gatekeeper notices at its next sample: hence the allowance of one period each. What "
-        "UGVs sensed at answers follows from their positions; the UAV reads an answer at the next planning instant, "
-        "if the proposal is in force until then. When a proposal is withdrawn follows as for EXEC."
+        "Counts of proposal events and of decisions (each is one solve and one answer). Each must be in an interval in "
+        "which the mode of the UGV, or of the UGV whose trigger is the proposal's cause, is 'intervening'. After a "
+        "release the UAV withdraws its proposal at its next planning instant, and the gatekeeper notices at its next "
+        "sample: hence the allowance of one period each. Positions show what UGVs sensed when they answered; the UAV "
+        "reads an answer at the next planning instant if the proposal is still in force. Proposals are withdrawn as "
+        "for EXEC."
     )
     equations = "(20), (26)"
     assumptions = (

@@ -110,9 +110,9 @@ class Exec(TraceClaim):
     id = "EXEC"
     summary = "Each robot was commanded what its control law says, in every control period."
     statement = (
-        "At every control sample of the run each robot was commanded what the control law says: a UGV its own task (6) "
-        "and, from when it accepted a proposal until that was over, the intervention (14), composed with the avoidance "
-        "inequalities as the run's method has it; the UAV its formation task (9)-(10) below avoidance (11)."
+        "At every control sample of the run each robot got the command of the control law. A UGV follows its own task "
+        "(6) and, while a proposal is accepted, the intervention (14), composed with the avoidance inequalities in the "
+        "order of the run's method. The UAV follows its formation task (9)-(10) below avoidance (11)."
     )
     formula = (
         "own = lim(rho_rd' + B (rho_rd - rho)); int(v) = lim(v + J^+ J (rho_int' + Lambda (rho_int - rho) - v)); "
@@ -136,29 +136,28 @@ class Exec(TraceClaim):
         r"\lVert v_{\text{recorded}} - v \rVert \le 10^{-6} \text{ m/s}",
     )
     method = (
-        "Evaluated again in plain numpy at each multiple of the control period, at the recorded positions, from "
-        "the scenario and the table of proposals. The closest velocity is found by another algorithm than the "
-        "controller's (constraints one by one, each reducing the dimension), so also where inequalities bind, each "
-        "with the 1e-12 m/s that the controller adds to it; where they contradict each other it is the slowest of "
-        "those that miss them least. It is shortened until those hold that standing still meets but for 1e-9 m/s. What "
-        "is accepted follows from "
-        "proposals, modes, answers and the periods, not from the signal `accepted`, which has to agree. At a corner of "
-        "a preset or proposed motion either rate counts."
+        "The law is evaluated again in plain numpy at each multiple of the control period, at the recorded positions, "
+        "from the scenario and the table of proposals. Another algorithm than the controller's finds the closest "
+        "velocity (constraints one by one, each reducing the dimension); each inequality has the 1e-12 m/s that the "
+        "controller adds. If inequalities contradict each other, the slowest velocity that misses them least counts. "
+        "It is shortened until it meets all that standing still meets up to 1e-9 m/s. Proposals, modes, answers and "
+        "periods tell what is accepted; the signal `accepted` must agree. At a corner of a preset or proposed motion "
+        "either rate counts."
     )
     equations = "(5)-(6), (7)-(8), (9)-(10), (11), (12)-(14), (20)"
     assumptions = (
         "The command of a row is the velocity applied since the row before (the trace's convention); that it is held "
         "between samples is SAFE-HYP.",
-        "A proposal stays in force as the planner's rules say: see `verify.runs.proposals.accepted_at`. One that asks "
-        "a UGV to make way for another one is in force as long as one of the two is intervened on. The trace's table "
-        "of proposals says for whose trigger each was sent; that has to be the UGV's own while it is intervened on.",
+        "A proposal stays in force as the planner's rules say: see `verify.runs.proposals.accepted_at`. If it asks a "
+        "UGV to make way for another one, it is in force while one of the two is intervened on. The trace's table of "
+        "proposals says for whose trigger each was sent; while a UGV is intervened on, that must be its own trigger.",
         "The UAV feeds the UGVs' commands of the sample before forward: controllers of one sample see each other's "
         "last commands.",
     )
     does_not_establish = (
-        "That what was accepted was useful or safe, or that it was right to accept it (GATE-FEAS, SAFE-TRACE). "
-        "Commands that are wrong by less than 1e-6 m/s. Under a disturbance of the motion it is about the commands, "
-        "not about where they led. A UAV with another task than 'formation' is not judged; the evidence says so."
+        "That an accepted proposal was useful or safe, or that it was right to accept it (GATE-FEAS, SAFE-TRACE). "
+        "Errors of commands below 1e-6 m/s. With a disturbance of the motion the claim is about the commands, not "
+        "about where they led. A UAV with another task than 'formation' is not judged; the evidence says so."
     )
 
     exercised_by = "commands for which an accepted proposal was executed, or which an avoidance inequality bound"

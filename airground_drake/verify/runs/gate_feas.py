@@ -73,8 +73,8 @@ class GateFeas(GateClaim):
     summary = "Every decision was about the situation that the UGV was in, and its answer follows from its numbers."
     statement = (
         "Every gatekeeper decision was about the UGV's situation at that time, its plan satisfies (26b)-(26e) at the "
-        "recorded cost, and the answer given is the one that follows from the costs; every proposal that stood for "
-        "long enough was decided on. Relaxed plans were rounded by sum-up rounding, with an integrated error of at "
+        "recorded cost, and its answer follows from the costs. Every proposal that stood for long enough was decided "
+        "on. Relaxed plans were rounded by sum-up rounding, with an integrated error of at "
         "most half a stage."
     )
     formula = (
@@ -97,18 +97,18 @@ class GateFeas(GateClaim):
         r"\max_k \left| \Delta t \sum_{r \le k} (\tilde\omega_r - \bar\omega_r) \right| \le \frac{\Delta t}{2}",
     )
     method = (
-        "All recomputed in numpy from the scenario, the signals and the recorded mode velocities. A sensed obstacle or "
-        "robot may be missing only if no plan can come within its safe distance. The rules (no difference below a "
-        "relative gain of 1e-6, switching margin, dwell; or the first stage alone) are run again over those of each "
-        "UGV, which must follow each other without a gap while a proposal stands; a proposal that stands for a period "
-        "of the planner and one of the gatekeeper must have one. No step of a constant plan is longer than the speed "
-        "limit allows, except where it begins more than 1e-6 m inside a safe distance: "
-        "avoidance may then demand more. The same goes for other plans, where the constant plan of their stage's "
-        "choice keeps clear. "
-        "Rounding is judged stage by stage, by running sums of the recorded relaxed and rounded plans; deficits within "
-        "1e-9 of 1/2 are a tie, where either mode may follow. "
-        "Under method (d), which solves no problem (26), it is about the times of the decisions; what its answers rest "
-        "on is GATE-MODEL, how they follow LIVE-PROG. That answers are obeyed is EXEC."
+        "All numbers are computed again in numpy from the scenario, the signals and the recorded mode velocities. A "
+        "sensed obstacle or robot may be missing only if no plan can come within its safe distance. The rules (no "
+        "difference below a relative gain of 1e-6, switching margin, dwell; or the first stage alone) are run again "
+        "over the decisions of each UGV. These must follow each other without a gap while a proposal stands, and a "
+        "proposal that stands for a period of the planner and one of the gatekeeper must have a decision. No step of a "
+        "constant plan is longer than the speed limit allows, unless it begins more than 1e-6 m inside a safe "
+        "distance, where avoidance may demand more. A stage of another plan is held to that only if the constant plan "
+        "of its mode keeps clear there. "
+        "Rounding is judged stage by stage, by running sums of the recorded relaxed and rounded plans; after a deficit "
+        "within 1e-9 of 1/2 either mode may follow. Method (d) solves no problem (26): there the claim is about the "
+        "times of decisions, GATE-MODEL checks their outcomes, LIVE-PROG the answers. EXEC checks that answers are "
+        "obeyed."
     )
     equations = "(22)-(26), (28)-(29)"
     assumptions = (
@@ -119,8 +119,9 @@ class GateFeas(GateClaim):
     )
     does_not_establish = (
         "That the mode velocities are those of the closed loop, or that the run went as predicted. (26d) is soft: a "
-        "feasible plan may lead inside a safe distance, at the cost of its slack; safety is SAFE-TRACE. That the "
-        "relaxed plan is optimal is GATE-OPT. The cheapest plan known is taken, which need not be the rounded one."
+        "feasible plan may lead inside a safe distance, at the cost of its slack (SAFE-TRACE is about safety). That "
+        "the relaxed plan is optimal (GATE-OPT). The gatekeeper takes the cheapest plan it knows, which need not be "
+        "the rounded one."
     )
 
     exercised_by = "decisions"

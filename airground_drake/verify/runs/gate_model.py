@@ -47,8 +47,8 @@ class GateModel(GateClaim):
     id = "GATE-MODEL"
     summary = "What the gatekeeper predicted for yes and for no is what the UGV would have done."
     statement = (
-        "The mode velocities that every gatekeeper decision rests on are those of the UGV's closed loop, "
-        "with the proposal accepted throughout and refused throughout, rolled out again from what it sensed."
+        "Every gatekeeper decision rests on the right mode velocities: those of the UGV's closed loop with the "
+        "proposal accepted throughout and refused throughout, rolled out again from what the UGV sensed."
     )
     formula = (
         "a_k, b_k = mean velocity over stage k of rho+ = rho + h law(rho; accepted | refused), rho(0) = p(t), others "
@@ -60,19 +60,19 @@ class GateModel(GateClaim):
         r"10^{-6} \text{ m/s}",
     )
     method = (
-        "The control law in numpy as for EXEC, with code of its own, from the signals, the scenario and the table of "
-        "proposals, all decisions side by side. Reported besides, and never a reason to refute: by how much a UGV was "
-        "elsewhere than predicted while its answer stood."
+        "The control law in numpy as for EXEC, from the signals, the scenario and the table of proposals, for all "
+        "decisions side by side. The evidence also says how far a UGV was from its prediction while the answer stood; "
+        "that never refutes the claim."
     )
     equations = "(23), (25)"
     assumptions = (
-        "A UGV predicts with what is within sensing range when it decides, moving on as it does then.",
+        "A UGV predicts with the bodies within sensing range when it decides, which keep their velocities.",
         "In a prediction the rates of preset and proposed motion are those of the motion sampled every control period.",
     )
     does_not_establish = (
-        "That the run went as predicted: others turn, and what is out of sight is left out; the largest difference is "
-        "reported. For plans that change their mode (23) adds velocities of two different ways and is an "
-        "approximation: `benchmarks/regret.py` says what plans cost on the closed loop."
+        "That the run went as predicted: other robots turn, and bodies out of sight are left out; the largest "
+        "difference is reported. For plans that change their mode, (23) adds velocities of two different ways, which "
+        "is an approximation: `benchmarks/regret.py` shows what plans cost on the closed loop."
     )
 
     exercised_by = "decisions that were rolled out again"

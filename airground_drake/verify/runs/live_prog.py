@@ -52,8 +52,8 @@ class LiveProg(GateClaim):
     summary = "Every accepted intervention ended for a stated reason, and in time."
     statement = (
         "Every accepted intervention went on until the UGV gave it back for a stated reason, the UAV withdrew it by "
-        "the protocol, or the run ended, and no longer than it may; no UGV went along more often without a rest than "
-        "it may; and every answer is the one that follows, with its reason."
+        "the protocol, or the run ended. None lasted longer than allowed, and no UGV went along more often without a "
+        "rest than allowed. Every answer and its reason follow from the rules."
     )
     formula = (
         "accepted(t0) to min(end of motion, t0 + longest_s); tries <= most, 0 after rest_s on its own; first answer: "
@@ -68,17 +68,17 @@ class LiveProg(GateClaim):
         r"V)_{\text{refuse}} \text{ and tries are left, or it makes way}",
     )
     method = (
-        "The decisions of each UGV are gone through by time; the answer and its reason follow by the rules from the "
-        "recorded outcomes. Where the decisions on an accepted proposal end without a refusal, the proposal must have "
-        "been withdrawn, as for EXEC."
+        "For each UGV, decision by decision, the rules give the answer and its reason from the recorded outcomes. If "
+        "the decisions on an accepted proposal end without a refusal, the proposal must have been withdrawn, as for "
+        "EXEC."
     )
     equations = "(20)"
     assumptions = (
         "The outcomes of either choice are the recorded ones (GATE-MODEL recomputes them).",
-        "A sample of the gatekeeper at which the proposal is no longer in force is the first after its last decision.",
+        "At the gatekeeper's first sample after the last decision on a proposal, that is no longer in force.",
     )
     does_not_establish = (
-        "That an intervention was of use, that the UGV was where it was to be, or that it arrives (LIVE-GOAL)."
+        "That an intervention was useful, that the UGV was where it should be, or that it arrives (LIVE-GOAL)."
     )
 
     exercised_by = "decisions that accepted a proposal, at first or again"

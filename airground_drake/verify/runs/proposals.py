@@ -147,7 +147,7 @@ def proposal_of(trace: Trace, number: int) -> ProposalRecord:
     """The proposal with a number.
 
     Raises:
-        TraceError: if there is none.
+        TraceError: if no proposal has it.
     """
     found = trace.derived("proposals by number", lambda: {one.number: one for one in proposals_of(trace)})
     if number not in found:

@@ -141,10 +141,10 @@ class SafeHyp(TraceClaim):
         r"R \ge d + c h",
     )
     method = (
-        "From the recorded positions at the control samples, which are rational numbers, in exact arithmetic; square "
-        "roots are enclosed. Only pairs and samples that floats do not find far, or met by more than 1e-9 m, are "
-        "computed so. What the controllers were built with was read back from the diagram, and is compared with the "
-        "scenario. Rows less than 1e-9 s apart count as one instant."
+        "Exact arithmetic on the recorded positions at the control samples, which are rational numbers; square roots "
+        "are enclosed. Pairs and samples are left out if floats find them far apart, or an inequality met by more than "
+        "1e-9 m. The parameters of the controllers were read back from the diagram and are compared with the scenario. "
+        "Rows less than 1e-9 s apart count as one instant."
     )
     equations = "(7)-(8), (11) in the inequality form of the package (set-based avoidance)"
     assumptions = (

@@ -71,13 +71,13 @@ class ThrTrig(TraceClaim):
         r"n(0) = 0, \quad \dot n = \sigma w_k / \sqrt{h} - \lambda n, \quad |w_k| \le 9",
     )
     method = (
-        "(15) is rebuilt from positions, noise and the scenario's preset, and the recorded x, the signal that the "
-        "trigger has, is compared with it at every row: `port_against_15` in the evidence. Where they agree, the "
-        "rebuilt x also tells what x is between rows; where they do not, or the block that computes x is another than "
-        "that of (15), x is linear between rows. It is cut at the preset's corners and at its turning points (closed "
-        "form) into monotone pieces; crossings are then sign changes, located by Brent's method to 1e-12 s. The "
-        "automaton is run again on it and its events, and the mode column, are compared one by one. Where "
-        "a period of the noise has several rows, all must have the same sample, given the leak."
+        "(15) is rebuilt from positions, noise and the scenario's preset. The recorded x, the signal that the trigger "
+        "has, is compared with it at every row: `port_against_15` in the evidence. If they agree, the rebuilt x is "
+        "used between rows, too; if not, or if another block computes x, x is taken as linear between rows. It is cut "
+        "at the preset's corners and at its turning points (closed form) into monotone pieces; crossings are then sign "
+        "changes, located by Brent's method to 1e-12 s. The automaton is run again on x, and its events and the mode "
+        "column are compared one by one. If a period of the noise has several rows, all must have the same sample, "
+        "given the leak."
     )
     equations = "(15), (20)"
     assumptions = (
@@ -88,9 +88,8 @@ class ThrTrig(TraceClaim):
     )
     does_not_establish = (
         "That the threshold is a good one (THR-CHOICE); that the noise has the stated distribution (THR-DDM), "
-        "or the stated leak where no period of the noise has a row within; or anything about a Wiener path between the "
-        "noise samples. Where x only touches a level to within rounding, 1e-12 m, a trigger and none are equally right "
-        "and the verdict follows the rounding."
+        "or the stated leak if no period of the noise has a row within; or anything about a Wiener path between the "
+        "noise samples. If x only touches a level up to rounding, 1e-12 m, the verdict follows the rounding."
     )
 
     exercised_by = "transitions of the automaton that were due"

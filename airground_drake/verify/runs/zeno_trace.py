@@ -55,8 +55,8 @@ class ZenoTrace(TraceClaim):
     assumptions = ("The trace records every trigger (THR-TRIG recomputes them independently).",)
     does_not_establish = (
         "Absence of Zeno behaviour in other runs: a finite run has finitely many events whatever the trigger is. The "
-        "statement for all runs is ZENO-PROOF, that about refined noise ZENO-REFINE. With fewer than two triggers the "
-        "claim holds for lack of a gap (the margin is then empty)."
+        "statement for all runs is ZENO-PROOF, that about refined noise ZENO-REFINE. Without two triggers of a UGV "
+        "there is no gap: the claim holds with an empty margin."
     )
 
     exercised_by = "gaps between consecutive triggers of one UGV"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from builders.edits import with_scenario
 from airground_drake.run.trace import Trace
 from airground_drake.verify.applications import counts, with_counts
 from airground_drake.verify.finding import Finding
+from airground_drake.verify.model.theorem import Proof
 from airground_drake.verify.runs.followed import followed
 
 Run = Callable[[str, str], Trace]
@@ -43,8 +45,9 @@ def test_an_obstacle_that_is_sensed_later_is_no_part_of_the_premise(run: Run) ->
 
 def test_counts_of_several_runs_are_added() -> None:
     runs: list[dict[str, tuple[int, int]]] = [{"A": (1, 2)}, {}, {"A": (0, 3), "B": (1, 1)}]
-    assert with_counts("A", Finding("proved", evidence={"x": 1}), runs).evidence == {"x": 1, "applies_to": 1, "of": 5}
-    assert with_counts("C", Finding("proved"), runs).evidence == {}
+    proof = Proof(proof="checked", theorems={}, hypotheses=[])
+    assert with_counts("A", Finding("proved", evidence=proof), runs).evidence == replace(proof, applies_to=1, of=5)
+    assert with_counts("C", Finding("proved", evidence=proof), runs).evidence is proof
 
 
 def test_a_run_whose_records_are_wrong_is_not_counted(run: Run) -> None:

@@ -27,7 +27,8 @@ def both(
 ) -> tuple[Array, Array]:
     """Velocities by the claim and by the kernel."""
     ours = avoiding(wanted, Inequalities(normal, bound), composition, planar=planar)
-    return ours, kernels.team_avoid(wanted, normal, bound, CODES[composition])
+    running = [kernels.avoid_one(*one, CODES[composition]) for one in zip(wanted, normal, bound, strict=True)]
+    return ours, np.array(running)
 
 
 def drawn(seed: int, planar: bool, *, demanding: bool = False) -> tuple[Array, Array, Array]:

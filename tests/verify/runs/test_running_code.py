@@ -14,7 +14,7 @@ from verify.judging import CLAIMS
 from airground_drake.base.arrays import Array
 from airground_drake.gatekeeper import outcome, problem
 from airground_drake.gatekeeper.patience import Commitment, Patience
-from airground_drake.gatekeeper.rollout import ClosedLoop
+from airground_drake.gatekeeper.rollout import ACCEPTED, REFUSED, ClosedLoop, closed_loop
 from airground_drake.intervention import database
 from airground_drake.intervention.messages import accepted_proposals
 from airground_drake.intervention.policy import Proposal
@@ -191,15 +191,14 @@ PREDICTIONS: dict[str, Callable[[ClosedLoop], ClosedLoop]] = {
 )
 def test_wrong_predictions_are_refuted(run: str, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Until shortly after the first acceptance. What case B's outcomes under (d) rest on is not the gains."""
-    for module, maker in ((problem, "closed_loop"), (outcome, "loop_among")):
-        made = getattr(module, maker)
-        monkeypatch.setattr(module, maker, lambda *given, made=made: PREDICTIONS[name](made(*given)))
+    for module in (problem, outcome):
+        monkeypatch.setattr(module, "closed_loop", lambda *given: PREDICTIONS[name](closed_loop(*given)))
     assert judged("GATE-MODEL", run, given=["duration_s=14.0", "reproduction=[]"]).status == "refuted"
 
 
 def test_exchanged_predictions_are_refuted(monkeypatch: pytest.MonkeyPatch) -> None:
-    honest = ClosedLoop.constant_plans
-    monkeypatch.setattr(ClosedLoop, "constant_plans", lambda self: honest(self)[::-1])
+    for name, other in (("ACCEPTED", REFUSED), ("REFUSED", ACCEPTED)):
+        monkeypatch.setattr(problem, name, other)
     assert judged("GATE-MODEL", "c", given=["duration_s=14.0", "reproduction=[]"]).status == "refuted"
 
 
