@@ -1,8 +1,4 @@
-"""Forge copies of a report of case B, and check them.
-
-Files of a copy are hard links, so a forger never writes into a file: another one takes its place. Digests are made
-right afterwards, as a forger would.
-"""
+"""Forge copies of a report of case B, and check them; digests are made right afterwards, as a forger would."""
 
 from __future__ import annotations
 
@@ -109,7 +105,7 @@ def seal(folder: Path, run: str = RUN) -> None:
 def copy(report: Path, folder: Path) -> Path:
     """A new copy of a report, to be forged."""
     shutil.rmtree(folder, ignore_errors=True)
-    return Path(shutil.copytree(report, folder, copy_function=os.link))
+    return Path(shutil.copytree(report, folder))
 
 
 def mend(folder: Path) -> None:
