@@ -99,8 +99,8 @@ def _page(
     folders: tuple[Path, Path], before: compare.Document, after: compare.Document, found: Mapping[str, Any]
 ) -> str:
     """The comparison as a page, with the runs that both reports have traces of."""
-    from airground_drake.report import pages
     from airground_drake.report.figures import overlay
+    from airground_drake.report.html import render_beside
     from airground_drake.run import trace
 
     worse = [
@@ -117,7 +117,7 @@ def _page(
             problems.append(f"Run {run} cannot be drawn: {error}")
         else:
             figures.append(overlay.draw(run, position, one, two))
-    return pages.render(
+    return render_beside(
         "compare.html.j2", before=before, after=after, found=found, figures=figures, problems=problems, parts=PARTS,
         places=[str(folder) for folder in folders], most=MOST_ROWS, regressions=worse,
     )  # fmt: skip

@@ -12,6 +12,7 @@ from airground_drake.base import files
 from airground_drake.base.errors import AirgroundError, FolderError, ReportError, TraceError
 from airground_drake.base.usage import Parser, refuse
 from airground_drake.report import compare, folder, summary
+from airground_drake.report.phrases import Line
 
 PAGE = "index.html"
 MARK = "airground_drake index"
@@ -48,7 +49,7 @@ def _write(place: Path) -> Path:
         FolderError: if there are no reports in it, or a foreign page.
         OSError: if it cannot be written.
     """
-    from airground_drake.report import pages
+    from airground_drake.report.html import render_beside
 
     page = place / PAGE
     if page.exists() and MARK.encode() not in files.read_bytes(page):
@@ -66,7 +67,7 @@ def _write(place: Path) -> Path:
         raise FolderError(f"there are no reports in the folders below {place}{why}")
     entries.sort(key=lambda entry: (entry["scenario"]["name"], entry["provenance"].get("started", ""), entry["place"]))
     name = place.resolve().name
-    files.write_text(page, pages.render("index.html.j2", entries=entries, problems=problems, name=name, mark=MARK))
+    files.write_text(page, render_beside("index.html.j2", entries=entries, problems=problems, name=name, mark=MARK))
     return page
 
 
@@ -87,7 +88,7 @@ def _entry(report: Path, place: Path, prefix: str) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _headline(document: Mapping[str, Any]) -> summary.Line | None:
+def _headline(document: Mapping[str, Any]) -> Line | None:
     """The report in a sentence; None if it lacks something that only the first screen reads."""
     try:
         return summary.headline(document)

@@ -81,13 +81,12 @@ def _reported(options: argparse.Namespace, command: str) -> int:
     kept = None if options.no_cache else cache_folder()
     output = options.output or Path("reports") / scenario.name
     limits = Limits(options.limit_steps, options.limit_memory * GIB)
+    wanted = make.Wanted(options.format, command, kept, audited, limits)
     with (
         plugins.admitted(scenario, options.scenario, allow=options.allow_plugins),
         progress_bar(quiet=options.quiet, verbose=options.verbose) as progress,
     ):
-        report = make.write_report(
-            scenario, digest, output, options.format, command, kept, options.scenario == AUDIT, limits, progress
-        )
+        report = make.write_report(scenario, digest, output, wanted, progress)
     overall = report["overall"]
     if not options.quiet:
         for item in attention.beforehand(report):
