@@ -1,4 +1,4 @@
-"""Third-party code on the command line: only where it is allowed, and whatever it does, the exit code is right."""
+"""Third-party code on the command line: it runs only where allowed; whatever it does, the exit code is right."""
 
 from __future__ import annotations
 
@@ -17,7 +17,6 @@ from builders.hostile_policies import KINDS
 
 from airground_drake import scenarios
 from airground_drake.commands import diagram
-from airground_drake.report import after_runs, make
 from airground_drake.report.__main__ import main
 from airground_drake.verify import __main__ as judge
 
@@ -29,6 +28,7 @@ IN_A_RUN = (
     "text_sleeps", "array_ends_the_process", "sends_garbage", "closes_every_descriptor", "patches_the_claims",
     "patches_the_avoidance_layer", "leaves_a_child_behind",
 )  # fmt: skip
+ONLY = "third-party code is imported and run only with --allow-plugins"
 
 EVIL = """
 import os
@@ -52,9 +52,9 @@ def module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], s
     """Write a module of its own name and give `name:It`."""
     monkeypatch.syspath_prepend(str(tmp_path))
     monkeypatch.setenv("JUDGING", str(os.getpid()))
+    name = f"evil_{abs(hash(str(tmp_path)))}"
 
     def write(text: str) -> str:
-        name = f"evil_{abs(hash(str(tmp_path)))}"
         (tmp_path / f"{name}.py").write_text(text)
         return f"{name}:It"
 
@@ -84,38 +84,22 @@ def test_a_run_with_hostile_policies_is_reported_as_it_was(
     assert "detour" in {event.get("policy") for event in document["runs"]["d"]["events"]}
 
 
-def test_code_of_others_is_refused_unless_it_is_allowed(
+def test_third_party_code_is_refused_unless_it_is_allowed(
     module: Callable[[str], str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    name = module(EVIL)
-    keys = ("uav.task", "gatekeeper.route", "intervention.policies.0.name", "claims.MINE")
-    for key in keys[:3]:
-        assert main(["case_a", "-o", str(tmp_path / "out"), "--set", f"{key}={name}"]) == 2
-        error = capsys.readouterr().err
-        assert error == f"error: case_a: {key}: '{name}' is not allowed; {_only()}\n"
-    for key in keys:
-        change = [f"{key}={name}"] if key != "claims.MINE" else [f"claims={{MINE: '{name}'}}"]
-        assert main(["case_a", "-o", str(tmp_path / "out"), "--set", *change]) == 2
-        assert "--allow-plugins" in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()
+    name, out = module(EVIL), tmp_path / "out"
+    for key in ("uav.task", "gatekeeper.route", "intervention.policies.0.name"):
+        assert main(["case_a", "-o", str(out), "--set", f"{key}={name}"]) == 2
+        assert capsys.readouterr().err == f"error: case_a: {key}: '{name}' is not allowed; {ONLY}\n"
+    assert main(["case_a", "-o", str(out), "--set", f"claims={{MINE: '{name}'}}"]) == 2
+    minimal = resources.files(scenarios).joinpath("minimal.yaml").read_text()
+    (tmp_path / "mine.yaml").write_text(f"{minimal}\ngatekeeper: {{route: '{name}'}}\n")
+    assert diagram.main([str(tmp_path / "mine.yaml"), "-o", str(out)]) == 2
+    assert capsys.readouterr().err.count("--allow-plugins") == 2
+    assert not out.exists()
 
 
-def test_a_diagram_is_drawn_without_code_of_others(
-    module: Callable[[str], str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (tmp_path / "mine.yaml").write_text(
-        resources.files(scenarios).joinpath("minimal.yaml").read_text() + f"\ngatekeeper: {{route: '{module(EVIL)}'}}\n"
-    )
-    assert diagram.main([str(tmp_path / "mine.yaml"), "-o", str(tmp_path / "out")]) == 2
-    assert "--allow-plugins" in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()
-
-
-def _only() -> str:
-    return "third-party code is imported and run only with --allow-plugins"
-
-
-@pytest.mark.parametrize("name", ["..:x", ".a:x", "a.:x", "a b:x", "a:x:y", "a/b:x", ":x", "a:", "a:x()", "1:2"])
+@pytest.mark.parametrize("name", ["..:x", "a b:x", "a:x:y", ":x", "a:x()"])
 def test_names_of_no_module_are_one_line(name: str, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     change = f"intervention.policies.0.name={json.dumps(name)}"
     assert main(["case_a", "-o", str(tmp_path / "out"), "--allow-plugins", "--set", change]) == 2
@@ -147,9 +131,6 @@ class It(TraceClaim):
     def applies(self, trace): os._exit(0)
     def check(self, trace): ...
 """
-CLAIMS = {"on import": "import os; os._exit(0)", "when asked": CLAIM}
-
-
 LIMITS = """
 import os, resource
 from airground_drake.intervention.policy import Policy
@@ -164,75 +145,58 @@ class It(Policy):
 """
 
 
-def ended(folder: Path, *settings: str) -> tuple[int, list[str]]:
-    """Exit code of a report in `folder`, and what is said on standard error; its process ends, so not in this one."""
-    options = ["--format", "json", "--set", "duration_s=0.5", "--allow-plugins"]
-    options += [part for setting in settings for part in ("--set", setting)]
-    command = [sys.executable, "-m", "airground_drake.report", "minimal", "-o", str(folder / "out"), *options]
-    done = subprocess.run(
-        command, env={**os.environ, "PYTHONPATH": str(folder)}, capture_output=True, text=True, check=False
-    )
-    assert not (folder / "out" / "report.json").exists()
-    return done.returncode, done.stderr.splitlines()
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("when", CLAIMS)
-def test_a_claim_that_ends_its_process_is_no_report(when: str, module: Callable[[str], str], tmp_path: Path) -> None:
-    said = ended(tmp_path, f"claims={{MINE: '{module(CLAIMS[when])}'}}")
-    assert said == (4, ["error: the process of this command died (exit code 0)"])
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(sys.platform != "linux", reason="`prlimit` is of Linux")
-@pytest.mark.parametrize(("above", "who"), [(1, "that simulated it"), (2, "of this command")])
-def test_a_policy_that_takes_time_away_from_another_process_is_one_line(
-    above: int, who: str, module: Callable[[str], str], tmp_path: Path
+@pytest.mark.parametrize(
+    ("text", "setting", "said"),
+    [
+        ("import os; os._exit(0)", "claims={{MINE: '{}'}}", "the process of this command died (exit code 0)"),
+        (CLAIM, "claims={{MINE: '{}'}}", "the process of this command died (exit code 0)"),
+        (LIMITS, "intervention.policies=[{{name: '{}', parameters: {{above: 1}}}}]",
+         "the process that simulated it died (signal 9)"),
+        (LIMITS, "intervention.policies=[{{name: '{}', parameters: {{above: 2}}}}]",
+         "the process of this command died (signal 9)"),
+    ],
+    ids=["claim that ends it on import", "claim that ends it", "policy that starves the run", "policy that starves it"],
+)  # fmt: skip
+def test_a_process_that_dies_is_one_line_and_no_report(
+    text: str, setting: str, said: str, module: Callable[[str], str], tmp_path: Path
 ) -> None:
-    policy = f"{{name: '{module(LIMITS)}', parameters: {{above: {above}}}}}"
-    code, said = ended(tmp_path, f"intervention.policies=[{policy}]")
-    assert (code, len(said)) == (4, 1)
-    assert said[0].endswith(f"the process {who} died (signal 9)")
+    if text is LIMITS and sys.platform != "linux":
+        pytest.skip("`prlimit` is of Linux")
+    command = [
+        sys.executable,
+        "-m",
+        "airground_drake.report",
+        "minimal",
+        "-o",
+        str(tmp_path / "out"),
+        "--format",
+        "json",
+    ]
+    command += ["--set", "duration_s=0.5", "--allow-plugins", "--set", setting.format(module(text))]
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr.count("\n")) == (4, 1)
+    assert done.stderr.endswith(f"{said}\n")
+    assert not (tmp_path / "out" / "report.json").exists()
 
 
-@pytest.fixture
-def saved(report: Report, tmp_path: Path, module: Callable[[str], str]) -> Path:
-    """A saved run whose scenario names a module for everything."""
-    folder = shutil.copytree(report("case_a") / "trace" / "d", tmp_path / "d")
-    meta = json.loads((folder / "meta.json").read_text())
-    name = module(EVIL)
+@pytest.mark.slow
+def test_judging_a_saved_run_imports_nothing_that_it_names(
+    report: Report, tmp_path: Path, module: Callable[[str], str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    saved, name = shutil.copytree(report("case_a") / "trace" / "d", tmp_path / "d"), module(EVIL)
+    meta = json.loads((saved / "meta.json").read_text())
     meta["scenario"]["intervention"]["policies"][0]["name"] = name
     meta["scenario"]["gatekeeper"]["route"] = meta["scenario"]["uav"]["task"] = name
     meta["scenario"]["claims"] = {"MINE": name}
-    (folder / "meta.json").write_text(json.dumps(meta))
-    return folder
-
-
-@pytest.mark.slow
-def test_judging_a_saved_run_imports_nothing_that_it_names(saved: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (saved / "meta.json").write_text(json.dumps(meta))
+    capsys.readouterr()
     assert judge.main([str(saved), "SAFE-TRACE", "SAFE-GATE", "EXEC"]) == 0
-    assert not [name for name in sys.modules if name.startswith("evil_")]
+    assert not [each for each in sys.modules if each.startswith("evil_")]
     assert "SAFE-GATE: proved" in capsys.readouterr().out
     for wanted in ([], ["MINE"]):
         assert judge.main([str(saved), *wanted]) == 2
-        assert f"claims.MINE: {_named(saved)!r} is not allowed; {_only()}" in capsys.readouterr().err
+        assert f"claims.MINE: {name!r} is not allowed; {ONLY}" in capsys.readouterr().err
     assert judge.main([str(saved), "MINE", "--allow-plugins"]) == 2
     assert "imported in the process of the command line" in capsys.readouterr().err
-
-
-def _named(saved: Path) -> str:
-    return str(json.loads((saved / "meta.json").read_text())["scenario"]["claims"]["MINE"])
-
-
-def test_a_report_that_is_not_what_was_written_is_exit_code_4(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    def half(scenario: object, digest: str, folder: Path, *_: object) -> dict[str, object]:
-        (folder / "report.json").write_text('{"overall": ')
-        return {"overall": {"status": "as_expected", "exit_code": 0, "why": ""}}
-
-    monkeypatch.setattr(make, "simulate_all", lambda *_, **__: {})
-    monkeypatch.setattr(after_runs, "judge", lambda *_, **__: None)
-    monkeypatch.setattr(after_runs, "write", half)
-    assert main(["case_a", "-o", str(tmp_path / "out"), "--format", "json"]) == 4
-    assert "is not what was written" in capsys.readouterr().err
