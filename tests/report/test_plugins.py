@@ -38,13 +38,36 @@ from airground_drake.intervention.policy import Policy
 class It(Policy):
     def propose(self, seen): return None
 """
-ROUTES = {
-    "class It:\n    def solve(self, problem, budget):\n        import os; os._exit(0)": (4, "died (exit code 0)"),
-    "class It:\n    def solve(self, problem, budget):\n        raise SystemExit(0)": (4, "SystemExit: 0"),
-    "class It:\n    def __init__(self):\n        raise SystemExit(0)\n    def solve(self): ...": (2, "SystemExit: 0"),
-    "import sys; sys.exit(0)": (2, "cannot be imported: SystemExit: 0"),
-    "import os; os._exit(0)": (4, "died (exit code 0)"),
-}
+ROUTE = "class It:\n    def solve(self, problem, budget): "
+CLAIM = """
+import os
+from airground_drake.verify.claim import Finding, TraceClaim
+class It(TraceClaim):
+    id = "MINE"
+    statement = formula = method = equations = does_not_establish = summary = ""
+    assumptions = latex = ()
+    def applies(self, trace): os._exit(0)
+    def check(self, trace): ...
+"""
+LIMITS = """
+import os, resource
+from airground_drake.intervention.policy import Policy
+class It(Policy):
+    def __init__(self, *, above):
+        pid = os.getpid()
+        for _ in range(int(above)):
+            with open(f"/proc/{pid}/stat") as file:
+                pid = int(file.read().rpartition(")")[2].split()[1])
+        resource.prlimit(pid, resource.RLIMIT_CPU, (0, 0))
+    def propose(self, seen): return None
+"""
+IN_C = ["case_a", "gatekeeper.route=IT", "runs={c: {method: c}}", "duration_s=16", "reproduction=[]", "choices=[]"]
+JUDGED = ["minimal", "duration_s=0.5", "claims={MINE: 'IT'}"]
+
+
+def limited(above: int) -> list[str]:
+    """A policy that takes its CPU time away from a process so many above its own."""
+    return ["minimal", "duration_s=0.5", f"intervention.policies=[{{name: 'IT', parameters: {{above: {above}}}}}]"]
 
 
 @pytest.fixture
@@ -107,77 +130,31 @@ def test_names_of_no_module_are_one_line(name: str, capsys: pytest.CaptureFixtur
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("text", ROUTES)
-def test_a_simulation_that_ends_its_process_is_no_report(
-    text: str, module: Callable[[str], str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    code, said = ROUTES[text]
-    changes = [f"gatekeeper.route={module(text)}", "runs={c: {method: c}}", "duration_s=16"]
-    settings = [part for change in changes for part in ("--set", change)]
-    assert main(["case_a", "-o", str(tmp_path / "out"), *settings, *ONE_RUN, "--allow-plugins"]) == code
-    error = capsys.readouterr().err
-    assert said in error
-    assert error.count("\n") == 1
-    assert not (tmp_path / "out" / "report.json").exists()
-
-
-CLAIM = """
-import os
-from airground_drake.verify.claim import Finding, TraceClaim
-class It(TraceClaim):
-    id = "MINE"
-    statement = formula = method = equations = does_not_establish = summary = ""
-    assumptions = latex = ()
-    def applies(self, trace): os._exit(0)
-    def check(self, trace): ...
-"""
-LIMITS = """
-import os, resource
-from airground_drake.intervention.policy import Policy
-class It(Policy):
-    def __init__(self, *, above):
-        pid = os.getpid()
-        for _ in range(int(above)):
-            with open(f"/proc/{pid}/stat") as file:
-                pid = int(file.read().rpartition(")")[2].split()[1])
-        resource.prlimit(pid, resource.RLIMIT_CPU, (0, 0))
-    def propose(self, seen): return None
-"""
-
-
-@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="`prlimit` is of Linux")
 @pytest.mark.parametrize(
-    ("text", "setting", "said"),
+    ("text", "scenario", "code", "said"),
     [
-        ("import os; os._exit(0)", "claims={{MINE: '{}'}}", "the process of this command died (exit code 0)"),
-        (CLAIM, "claims={{MINE: '{}'}}", "the process of this command died (exit code 0)"),
-        (LIMITS, "intervention.policies=[{{name: '{}', parameters: {{above: 1}}}}]",
-         "the process that simulated it died (signal 9)"),
-        (LIMITS, "intervention.policies=[{{name: '{}', parameters: {{above: 2}}}}]",
-         "the process of this command died (signal 9)"),
+        (f"{ROUTE}import os; os._exit(0)", IN_C, 4, "died (exit code 0)"),
+        (f"{ROUTE}raise SystemExit(0)", IN_C, 4, "SystemExit: 0"),
+        ("import sys; sys.exit(0)", IN_C, 2, "cannot be imported: SystemExit: 0"),
+        ("import os; os._exit(0)", JUDGED, 4, "the process of this command died (exit code 0)"),
+        (CLAIM, JUDGED, 4, "the process of this command died (exit code 0)"),
+        (LIMITS, limited(1), 4, "the process that simulated it died (signal 9)"),
+        (LIMITS, limited(2), 4, "the process of this command died (signal 9)"),
     ],
-    ids=["claim that ends it on import", "claim that ends it", "policy that starves the run", "policy that starves it"],
-)  # fmt: skip
-def test_a_process_that_dies_is_one_line_and_no_report(
-    text: str, setting: str, said: str, module: Callable[[str], str], tmp_path: Path
+)
+def test_code_that_ends_a_process_is_one_line_and_no_report(
+    text: str, scenario: list[str], code: int, said: str, module: Callable[[str], str], tmp_path: Path
 ) -> None:
-    if text is LIMITS and sys.platform != "linux":
-        pytest.skip("`prlimit` is of Linux")
-    command = [
-        sys.executable,
-        "-m",
-        "airground_drake.report",
-        "minimal",
-        "-o",
-        str(tmp_path / "out"),
-        "--format",
-        "json",
-    ]
-    command += ["--set", "duration_s=0.5", "--allow-plugins", "--set", setting.format(module(text))]
-    environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stderr.count("\n")) == (4, 1)
-    assert done.stderr.endswith(f"{said}\n")
+    name, *settings = (part.replace("IT", module(text)) for part in scenario)
+    options = [part for setting in settings for part in ("--set", setting)]
+    command = [sys.executable, "-m", "airground_drake.report", name, "-o", str(tmp_path / "out"), *options]
+    done = subprocess.run(
+        [*command, "--format", "json", "--allow-plugins"], env={**os.environ, "PYTHONPATH": str(tmp_path)},
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert (done.returncode, done.stderr.count("\n")) == (code, 1)
+    assert said in done.stderr
     assert not (tmp_path / "out" / "report.json").exists()
 
 
