@@ -108,7 +108,7 @@ def provenance(scenario: Scenario, started: datetime, command: str) -> dict[str,
 
 
 def _solver(scenario: Scenario, daqp: str) -> str:
-    """What solves (26) under method (c)."""
+    """The solver of (26) under method (c)."""
     route, solver = scenario.gatekeeper.route, scenario.gatekeeper.solver
     if route != "mixed_integer":
         return f"that of the route {route}"

@@ -1,7 +1,7 @@
 """What has changed from one report to another, read from their report.json alone.
 
-A verdict is worse than before if it stands further down in `ORDER`, if it was as the scenario expected and no longer
-is, or if it is gone; so is a row of the reproduction table, by `ROWS`, and a finding about the paper that is no longer
+A verdict is worse if it stands further down in `ORDER` than before, if it was as expected and no longer is, or if it
+is gone. A row of the reproduction table is worse by `ROWS`, and a finding about the paper if it is no longer
 demonstrated. Numbers are compared to the last digit.
 """
 
@@ -24,7 +24,7 @@ SCHEMA = "airground_drake.comparison/1"
 REPORT = "airground_drake.report/2"
 
 ORDER = (("proved",), ("holds", "supported"), ("not_exercised",), (*UNDECIDED, "gone"), ("refuted",))
-"""Verdicts from the best to the worst, as `statuses.outcome` names them; `gone`: there is none any more."""
+"""Verdicts from the best to the worst, as `statuses.outcome` names them; `gone`: no verdict any more."""
 ROWS = (("reproduced",), ("calibrated",), ("by_construction",), ("ambiguous",), ("not_reproduced", "gone"))
 """Rows of the reproduction table, likewise."""
 OVERALL = (("as_expected",), ("inconclusive",), ("not_as_expected",))
@@ -46,7 +46,7 @@ def read(folder: Path) -> Document:
     try:
         text = files.read_text(path)
         document = json.loads(text, parse_constant=_finite, parse_float=_finite, parse_int=_short)
-        json.dumps(document, ensure_ascii=False).encode()  # no halves of characters
+        json.dumps(document, ensure_ascii=False).encode()  # refuses half of a surrogate pair
         if document["schema"] != REPORT:
             raise ValueError(f"its schema is not {REPORT}")
         _require_usable(document)
@@ -60,10 +60,10 @@ _CLAIM = {"margin": (int, float, type(None)), "exercised": (int, type(None)), "e
 
 
 def _require_usable(document: Document) -> None:
-    """Look at everything that a comparison looks at.
+    """Refuse a report in which a value that the comparison reads is of another kind.
 
     Raises:
-        ValueError, TypeError, KeyError, AttributeError: if something is of another kind.
+        ValueError, TypeError, KeyError, AttributeError: if there is one.
     """
     compared(document, document)
     overall, claims, runs = document["overall"], document["claims"], document["runs"]
@@ -91,8 +91,8 @@ def compared(before: Document, after: Document) -> dict[str, Any]:
 
     Returns:
         Strict JSON: `regressions`, a count; lists of changes `overall` (one at most), `verdicts`, `margins`,
-        `exercised`, `expectations`, `reproduction`, `audit`, `events`. A change has `before` and `after` (None where
-        there is none), whether it is `worse`, and what it is about: `claim` and `run`; `id`; or `run`, `robot`,
+        `exercised`, `expectations`, `reproduction`, `audit`, `events`. A change has `before` and `after` (None if
+        missing), whether it is `worse`, and what it is about: `claim` and `run`; `id`; or `run`, `robot`,
         `kind` and `n`, the number of the event among those of its kind, from 1. Margins have their `relative` change.
     """
     found: dict[str, Any] = {

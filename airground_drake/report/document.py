@@ -85,7 +85,7 @@ def build(
 
 
 def sealed(document: Mapping[str, Any], folder: Path, names: Iterable[str]) -> dict[str, Any]:
-    """The document with the SHA-256 of every other file of the report under `files`, so that none can be exchanged.
+    """The document with the SHA-256 of every other file of the report under `files`: an exchanged file is noticed.
 
     Args:
         document: of `build`.
@@ -184,7 +184,7 @@ def _run(scenario: Scenario, trace: Trace) -> dict[str, Any]:
 
 
 def _lookup(resolved: Any, key: str) -> Any:
-    """Value at a dotted path of the resolved scenario, None if there is none."""
+    """Value at a dotted path of the resolved scenario, None if the path leads nowhere."""
     for part in key.split("."):
         if isinstance(resolved, list):
             resolved = {str(position): each for position, each in enumerate(resolved)}

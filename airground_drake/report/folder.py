@@ -42,13 +42,13 @@ def held(folder: Path) -> Iterator[None]:
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             raise FolderError(one_line(f"{folder} is in use by another report; name another folder")) from None
-        except OSError:  # the file system has no such locks
+        except OSError:  # a file system without locks
             pass
         prepare(folder)
         yield
     finally:
         with suppress(OSError):
-            fcntl.flock(handle, fcntl.LOCK_UN)  # also where a process that was forked meanwhile still lives
+            fcntl.flock(handle, fcntl.LOCK_UN)  # a process forked meanwhile may still hold the handle
         os.close(handle)
 
 
@@ -87,7 +87,9 @@ def is_report(folder: Path) -> bool:
     """Whether there is a report.json of ours in a folder."""
     try:
         with files.open_regular(folder / PAGES["json"]) as file:
-            beginning = min(100, os.fstat(file.fileno()).st_size)  # a file of the kernel's has none, and may wait
+            beginning = min(
+                100, os.fstat(file.fileno()).st_size
+            )  # files of the kernel have size 0, and reading may block
             return _OURS.match(file.read(beginning)) is not None
     except OSError:
         return False

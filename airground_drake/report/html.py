@@ -1,7 +1,7 @@
 """report.html: one self-contained page that renders report.json, the figures and the diagram.
 
-Its content security policy admits its own style sheet and scripts, by their digests, and nothing else; without scripts
-it has everything but the filter of claims and the marks that move over the trajectories.
+Its content security policy admits only its own style sheet and scripts, by their digests. Without scripts it lacks the
+filter of claims and the marks that move over the trajectories, nothing else.
 """
 
 from __future__ import annotations
@@ -39,10 +39,10 @@ MAX_DIAGRAM_CHARS = 500_000
 MAX_SCENARIO_CHARS = 20_000
 LINE_CHARS = 110
 KINDS = ("declared", "stuck")
-"""Evidence of these kinds is shown instead of the verdict where that passes: it must not look like more than it is."""
+"""Kinds of evidence shown instead of a passing verdict, so that it does not look like more than it is."""
 MAX_DISTANCE_ROWS = 120
 MAX_FAULTS = 40
-"""Different ones of a run that are listed."""
+"""Maximum number of kinds of faults listed per run."""
 
 SECTIONS = {
     "happened": "What happened",
@@ -55,7 +55,7 @@ SECTIONS = {
     "claims": "All checks",
     "provenance": "How to run it again",
 }
-"""Sections of the page, in order, by their identifiers; what has nothing to say is left out."""
+"""Sections of the page, in order, by their identifiers; an empty section is left out."""
 PLACES = {"distances": "safe", **dict.fromkeys(("decision", "events", "gaps", "threshold-choice"), "intervened")}
 """Sections of the figures; the others are maps of what happened."""
 LOOKS = {"yes": "good", "partly": "tuned", "no": "bad", "open": "open", "none": "idle"}
@@ -91,7 +91,7 @@ def render(document: Mapping[str, Any], figures: Sequence[Figure], diagram_svg: 
     Args:
         document: report.json, as built by `document.build`.
         figures: as drawn by `figures.draw` and the like, in the order of the page.
-        diagram_svg: the exported block diagram; left out if it is not an SVG or too large to inline.
+        diagram_svg: the block diagram; left out if it is no SVG or too large to inline.
     """
     runs, claims = document["runs"], document["claims"]
     distances = [(name, pair) for name, run in runs.items() for pair in pairs(run)]
@@ -178,7 +178,7 @@ def digest(text: str) -> str:
 
 
 def _in_the_dark() -> str:
-    """Rules that give the drawings other colours on a dark page; an ancestor in a selector is not seen from <use>."""
+    """Rules that recolour the drawings on a dark page; they name no ancestor, which would not match inside <use>."""
     rules = "\n".join(
         f'[{name}="{light}"] {{ {name}: {dark}; }}' for light, dark in DARK.items() for name in ("fill", "stroke")
     )
@@ -271,6 +271,6 @@ def _together(members: Sequence[Mapping[str, Any]]) -> list[tuple[Mapping[str, A
 
 
 def _assumptions(claims: Sequence[Mapping[str, Any]]) -> dict[str, list[str]]:
-    """What is taken for granted, and by which claims; assumptions of many claims first."""
+    """Assumptions and the claims that make them; those of many claims first."""
     resting = grouped(dict.fromkeys((assumed, claim["id"]) for claim in claims for assumed in claim["assumptions"]))
     return dict(sorted(resting.items(), key=lambda item: -len(item[1])))

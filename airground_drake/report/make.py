@@ -17,7 +17,7 @@ from airground_drake.scenarios.estimate import DEFAULT_LIMITS, Limits, within
 from airground_drake.scenarios.schema import Scenario
 
 _NEXT = "airground_drake.report.after_runs"
-"""What follows the simulation takes long to import: that is done while the runs are simulated."""
+"""Slow to import, and needed after the simulation: it is imported while the runs are simulated."""
 
 
 class Wanted(NamedTuple):
@@ -61,7 +61,7 @@ def write_report(
     """
     within(scenario, wanted.limits)
     started, clock = datetime.now(UTC), time.perf_counter()
-    if scenario.claims:  # what cannot be made is told before the work
+    if scenario.claims:  # a claim that cannot be made is refused before the work
         from airground_drake.verify.registry import model_claims
 
         model_claims(added=scenario.claims)

@@ -21,10 +21,10 @@ from airground_drake.scenarios.schema import Reproduction, Scenario
 Measure = Callable[[Trace, str], list[float]]
 
 STILL_M = 1e-3
-"""A robot that moved less than this during the last STILL_S of a run stands still."""
+"""A robot stands still if it moved less than this during the last STILL_S of a run."""
 STILL_S = 1.0
 TRIGGER_TOLERANCE_M = 1e-5
-"""A trigger is at the threshold if the decision variable is not below it by more than this: event isolation."""
+"""A trigger counts as at the threshold if the decision variable is at most this much below: event isolation."""
 YES_NO = "yes/no"
 """Unit of a row that is compared exactly."""
 
@@ -94,8 +94,8 @@ def trigger_time(trace: Trace, robot: str) -> list[float]:
 def recovery_duration(trace: Trace, robot: str) -> list[float]:
     """Time from the first trigger until the decision variable first falls below the threshold, s.
 
-    The row of the trigger may be below the threshold by the accuracy of event isolation, so a fall needs a row
-    at or above the threshold before it. Linear interpolation between rows.
+    The row of the trigger may be slightly below the threshold (accuracy of event isolation), so a fall starts from a
+    row at or above it. Rows are interpolated linearly.
     """
     triggers = _times(trace, robot, "trigger")
     if not triggers:
@@ -140,7 +140,7 @@ def refusal_time(trace: Trace, robot: str) -> list[float]:
 
 @measure
 def execution_time(trace: Trace, robot: str) -> list[float]:
-    """Time from which on an intervention is executed for the first time, s."""
+    """Time at which an intervention is first executed, s."""
     rows = np.flatnonzero(trace.column(f"{robot}.accepted") > 0.0)
     return [float(trace.t[max(rows[0] - 1, 0)])] if len(rows) else []
 

@@ -26,7 +26,7 @@ def tracks(drawing: Drawing, trace: Trace, ugvs: Sequence[str]) -> dict[str, Any
     """Places of the UAV and of some UGVs in a drawing of the ground plane, as JSON that `scrubber.js` reads.
 
     Args:
-        drawing: with one pair of axes, over x and y in m; drawn, so that the axes have their final place.
+        drawing: with one pair of axes, over x and y in m; already drawn, so that the axes are in their final place.
         trace: the run.
         ugvs: their names, in the order of their looks.
     """

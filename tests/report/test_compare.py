@@ -1,4 +1,4 @@
-"""Two reports compared: what is worse, what only differs, and what is no report."""
+"""Two reports compared: what is worse, what only differs, and which files are refused."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ DIAGRAM = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9"><text>plant
 
 
 class Page(HTMLParser):
-    """Tags with their attributes and parents, and what is not balanced."""
+    """Tags with their attributes and parents, and unbalanced ones."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
