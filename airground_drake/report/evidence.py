@@ -48,11 +48,9 @@ def tables(evidence: Mapping[str, Any], caption: str, number: Callable[[Any], st
 
 def _records(value: Any) -> list[tuple[str, Mapping[str, Any]]]:
     """The records in a list, by number, or in a record, by key; empty if the value is neither."""
-    if isinstance(value, list) and value and all(isinstance(each, Mapping) and each for each in value):
-        return [(str(position + 1), each) for position, each in enumerate(value)]
-    if isinstance(value, Mapping) and value and all(isinstance(each, Mapping) and each for each in value.values()):
-        return [(str(key), each) for key, each in value.items()]
-    return []
+    items = value.items() if isinstance(value, Mapping) else enumerate(value, 1) if isinstance(value, list) else ()
+    records = [(str(key), each) for key, each in items]
+    return records if all(isinstance(each, Mapping) and each for _, each in records) else []
 
 
 def _table(caption: str, records: Sequence[tuple[str, Mapping[str, Any]]], number: Callable[[Any], str]) -> Table:

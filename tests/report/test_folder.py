@@ -48,6 +48,7 @@ def test_new_empty_and_own_folders_are_taken(holds: dict[str, str], tmp_path: Pa
         ({"report.json": '{"schema": "other.report/1"}', "x": ""}, "and no report"),
         ({"diagram.svg": "", "x\n\u202e": ""}, "and no report"),
         ({"trace/d/signals.parquet": "", "trace/d/notes.txt": "mine"}, "and no report"),
+        ({"proofs/notes.txt": "mine"}, "and no report"),
         ({"report.json": OURS, "trace": ""}, "in the way"),
         ({"report.json": OURS, "diagram.svg/x": ""}, "in the way"),
     ],
@@ -82,17 +83,19 @@ def test_nothing_stays_of_an_old_report_and_everything_else_does(tmp_path: Path)
 def test_two_reports_at_once_do_not_mix_and_a_killed_one_leaves_the_folder_to_others(tmp_path: Path) -> None:
     program = "import sys, time; from pathlib import Path; from airground_drake.report import folder\n"
     program += "with folder.held(Path(sys.argv[1])): print(flush=True); time.sleep(600)"
-    with subprocess.Popen([sys.executable, "-c", program, tmp_path / "out"], stdout=subprocess.PIPE) as process:
+    process = subprocess.Popen([sys.executable, "-c", program, tmp_path / "out"], stdout=subprocess.PIPE)
+    try:
         assert process.stdout is not None
         process.stdout.readline()
         with pytest.raises(FolderError, match="out is in use by another report"), folder.held(tmp_path / "out"):
             pass
         with folder.held(tmp_path / "other"):
             assert list((tmp_path / "out").iterdir()) == []
+    finally:
         process.kill()
-        process.wait()
-        with folder.held(tmp_path / "out"):
-            pass
+        process.communicate()
+    with folder.held(tmp_path / "out"):
+        pass
 
 
 def test_a_folder_that_cannot_be_had_is_named(tmp_path: Path) -> None:

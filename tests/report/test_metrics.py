@@ -34,8 +34,10 @@ def test_least_pair_margin_is_the_exact_one_not_that_at_the_rows() -> None:
 def test_decisions_are_counted_by_their_gap_and_those_that_met_their_budget() -> None:
     trace = decided_run("mixed_integer")
     table = trace.decisions.assign(gap=[0.0, -1e-12, -1.0, 0.01, 0.02, 1.0])
+    table = table.assign(decision="refuse", number=[1, 1, 2, 2, 2, 3], robot="ugv1", reason=["waits", "kept"] * 3)
     table["status"] = ["optimal", "optimal", "optimal", "budget_spent", "budget_spent", "solver_failed"]
     found = metrics.gatekeeper(replace(trace, decisions=table))
     assert found is not None
     assert found["gaps"] == {"zero": 2, "up_to_1_percent": 1, "more": 2}
     assert (found["budget_spent"], found["solver_failures"], found["max_gap"]) == (2, 1, 1.0)
+    assert found["refusals"] == {"ugv1": {"waits": 2, "kept": 1}}  # first answers only
